@@ -1,0 +1,33 @@
+//! HybridSim: a differentiable simulator of mmWave radar recordings of moving people.
+//!
+//! The modules in the order the data travels. A module imports only from those before it; `tests/layers.rs` enforces it.
+
+// 0: what everyone needs
+pub mod complex;
+pub mod error;
+// 1: what the user gives
+pub mod person;
+pub mod radar;
+pub mod room;
+// 2: the files it comes in
+pub mod data;
+pub mod import;
+// the independent world that makes recordings: shares settings, errors and files with the simulator, never physics
+pub mod recorder;
+// 3: the simulator
+pub mod body;
+pub mod features;
+pub mod scatterers;
+pub mod paths;
+pub mod if_signal;
+pub mod heatmap;
+pub mod loss;
+pub mod metrics;
+pub mod simulator;
+// 4: what is done with it
+pub mod training;
+pub mod pictures;
+pub mod config;
+pub mod cli;
+
+pub use error::{Error, Result};

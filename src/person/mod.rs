@@ -1,0 +1,103 @@
+//! The person as data: a body in SMPL layout, a motion in AMASS layout, or a plain sequence of meshes.
+//!
+//! Nothing here poses a body; the simulator and the recorder each do that on their own.
+
+pub mod actions;
+pub mod procedural;
+
+use serde::{Deserialize, Serialize};
+
+/// Names of the 24 SMPL joints, in SMPL's order.
+pub const JOINT_NAMES: [&str; 24] = [
+    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle", "spine3",
+    "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder", "right_shoulder", "left_elbow",
+    "right_elbow", "left_wrist", "right_wrist", "left_hand", "right_hand",
+];
+
+/// A body that skinning can pose. V vertices, J joints, B shape parameters; SMPL's frame: y up, the person faces +z,
+/// the left hand is at +x; metres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyModel {
+    /// `[vertex, xyz]`, the rest pose (`v_template`).
+    pub template: Vec<[f64; 3]>,
+    /// `[shape][vertex, xyz]`, metres per unit of a shape parameter (`shapedirs`).
+    pub shape_directions: Vec<Vec<[f64; 3]>>,
+    /// `[9 (J − 1)][vertex, xyz]`, metres per entry of R − 1 (`posedirs`); may be empty.
+    pub pose_directions: Vec<Vec<[f64; 3]>>,
+    /// `[joint]` → (vertex, weight) pairs (`J_regressor`).
+    pub joint_regressor: Vec<Vec<(usize, f64)>>,
+    /// `[vertex]` → (joint, weight) pairs that sum to 1 (`weights`).
+    pub skinning: Vec<Vec<(usize, f64)>>,
+    /// `[joint]`; the root has none, and every parent comes before its child (`kintree_table`).
+    pub parents: Vec<Option<usize>>,
+    /// Counter-clockwise seen from outside (`f`).
+    pub faces: Vec<[usize; 3]>,
+}
+
+/// Poses of a body in time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    /// `[pose][joint]` axis-angle, radians; as many joints as the body has.
+    pub poses: Vec<Vec<[f64; 3]>>,
+    /// `[pose]`, metres.
+    pub translations: Vec<[f64; 3]>,
+    pub betas: Vec<f64>,
+    pub rate_hz: f64,
+}
+
+/// Where and when in the radar frame a motion happens: `rotation · (LBS(betas, pose) + translation) + origin`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Placement {
+    /// Radar time at which the first pose happens.
+    #[serde(default)]
+    pub start_s: f64,
+    #[serde(default = "upright")]
+    pub radar_from_motion: [[f64; 3]; 3],
+    #[serde(default)]
+    pub origin_m: [f64; 3],
+}
+
+/// From y-up with the person facing +z to z-up with the person facing the radar (−y).
+fn upright() -> [[f64; 3]; 3] {
+    [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        Self { start_s: 0.0, radar_from_motion: upright(), origin_m: [0.0; 3] }
+    }
+}
+
+/// A person who moves in front of the radar.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Person {
+    Skinned { model: BodyModel, motion: Motion, placement: Placement },
+    /// Meshes that something else has posed, already in the radar frame.
+    Meshes {
+        /// `[pose][vertex, xyz]`, metres, radar frame.
+        vertices: Vec<Vec<[f64; 3]>>,
+        faces: Vec<[usize; 3]>,
+        /// `[pose]`, ascending.
+        pose_times_s: Vec<f64>,
+    },
+}
+
+impl Person {
+    pub fn faces(&self) -> &[[usize; 3]] {
+        match self {
+            Self::Skinned { model, .. } => &model.faces,
+            Self::Meshes { faces, .. } => faces,
+        }
+    }
+
+    /// Radar time of every pose, seconds, ascending.
+    pub fn pose_times_s(&self) -> Vec<f64> {
+        match self {
+            Self::Skinned { motion, placement, .. } => {
+                (0..motion.poses.len()).map(|pose| placement.start_s + pose as f64 / motion.rate_hz).collect()
+            }
+            Self::Meshes { pose_times_s, .. } => pose_times_s.clone(),
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Rules that a radar must keep, each with its formula, its reason and a three-valued result.
+
+use super::Radar;
+use crate::error::{Error, Result};
+
+/// One rule held against one radar.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Check {
+    /// What must hold, as a formula.
+    pub rule: &'static str,
+    /// Why.
+    pub reason: &'static str,
+    /// Left-hand side and right-hand side with their unit, as found.
+    pub found: String,
+    /// `None`: does not apply.
+    pub passed: Option<bool>,
+}
+
+/// The rules that are advice: a recording that breaks one can still be read.
+pub fn checks(radar: &Radar, farthest_m: Option<f64>, fastest_mps: Option<f64>) -> Vec<Check> {
+    let window_s = radar.samples_per_chirp as f64 / radar.sample_rate_hz;
+    let ramp_s = radar.adc_start_s + window_s;
+    vec![
+        Check {
+            rule: "adc_start_s + samples_per_chirp / sample_rate_hz <= chirp_period_s",
+            reason: "the last sample must be taken before the next ramp starts",
+            found: format!("{:.2} us against {:.2} us", ramp_s * 1e6, radar.chirp_period_s * 1e6),
+            passed: Some(ramp_s <= radar.chirp_period_s * (1.0 + 1e-9)),
+        },
+        Check {
+            rule: "loops_per_frame * tx * chirp_period_s <= frame_period_s",
+            reason: "a frame must end before the next one starts",
+            found: format!("{:.2} ms against {:.2} ms", radar.frame_duration_s() * 1e3, radar.frame_period_s * 1e3),
+            passed: (radar.frames > 1).then_some(radar.frame_duration_s() <= radar.frame_period_s * (1.0 + 1e-9)),
+        },
+        Check {
+            rule: "farthest range <= max range",
+            reason: "a farther echo folds back to a wrong range",
+            found: format!(
+                "{} against {:.2} m",
+                farthest_m.map_or("unknown".into(), |range| format!("{range:.2} m")),
+                radar.max_range_m()
+            ),
+            passed: farthest_m.map(|range| range <= radar.max_range_m()),
+        },
+        Check {
+            rule: "fastest velocity <= max velocity",
+            reason: "a faster echo folds back to a wrong velocity",
+            found: format!(
+                "{} against {:.2} m/s",
+                fastest_mps.map_or("unknown".into(), |speed| format!("{speed:.2} m/s")),
+                radar.max_velocity_mps()
+            ),
+            passed: fastest_mps.map(|speed| speed <= radar.max_velocity_mps()),
+        },
+    ]
+}
+
+impl Radar {
+    /// Refuses numbers that no radar can have. `key` is what names this radar in messages, such as `radar`.
+    pub fn check(&self, key: &str) -> Result<()> {
+        let positive = [
+            ("start_frequency_hz", self.start_frequency_hz),
+            ("slope_hz_per_s", self.slope_hz_per_s),
+            ("sample_rate_hz", self.sample_rate_hz),
+            ("chirp_period_s", self.chirp_period_s),
+            ("frame_period_s", self.frame_period_s),
+            ("samples_per_chirp", self.samples_per_chirp as f64),
+            ("loops_per_frame", self.loops_per_frame as f64),
+            ("frames", self.frames as f64),
+        ];
+        for (field, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::setting(format!("{key}.{field}"), value, "a positive number"));
+            }
+        }
+        if !(self.adc_start_s.is_finite() && self.adc_start_s >= 0.0) {
+            return Err(Error::setting(format!("{key}.adc_start_s"), self.adc_start_s, "zero or a positive number"));
+        }
+        for (field, antennas) in [("tx_m", &self.tx_m), ("rx_m", &self.rx_m)] {
+            if antennas.is_empty() {
+                return Err(Error::setting(format!("{key}.{field}"), "empty", "at least one antenna position"));
+            }
+            if antennas.iter().flatten().chain(&self.position_m).any(|coordinate| !coordinate.is_finite()) {
+                return Err(Error::setting(format!("{key}.{field}"), "not finite", "finite positions in metres"));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mmmesh_radar_keeps_every_rule() {
+        let radar = Radar::mmmesh(10);
+        radar.check("radar").unwrap();
+        assert!(checks(&radar, Some(7.0), Some(2.0)).iter().all(|check| check.passed == Some(true)));
+    }
+
+    #[test]
+    fn a_room_beyond_the_unambiguous_range_is_noticed() {
+        let radar = Radar::mmmesh(10);
+        let broken: Vec<_> = checks(&radar, Some(12.0), None).into_iter().filter(|check| check.passed == Some(false)).collect();
+        assert_eq!(broken.len(), 1);
+        assert_eq!(broken[0].rule, "farthest range <= max range");
+    }
+
+    #[test]
+    fn a_radar_without_receivers_is_refused_by_name() {
+        let radar = Radar { rx_m: vec![], ..Radar::mmmesh(1) };
+        assert_eq!(radar.check("radar").unwrap_err().to_string(), "`radar.rx_m` is empty, expected at least one antenna position");
+    }
+}
