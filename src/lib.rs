@@ -26,6 +26,7 @@ pub mod metrics;
 pub mod simulator;
 // 4: what is done with it
 pub mod training;
+pub mod evaluation;
 pub mod pictures;
 pub mod config;
 pub mod cli;
