@@ -108,8 +108,19 @@ pub fn shared_body(name: &str) -> Option<BodyModel> {
         return None;
     }
     let mut archive = npyz::npz::NpzArchive::open(&path).unwrap();
+    // In C order, whatever order the file keeps (the shared joint regressor is stored column by column).
     let mut floats = |key: &str| -> Vec<f64> {
-        archive.by_name(key).unwrap().unwrap().into_vec::<f32>().unwrap().into_iter().map(f64::from).collect()
+        let array = archive.by_name(key).unwrap().unwrap();
+        let (order, shape) = (array.order(), array.shape().to_vec());
+        let flat: Vec<f64> = array.into_vec::<f32>().unwrap().into_iter().map(f64::from).collect();
+        match (order, shape.as_slice()) {
+            (npyz::Order::C, _) => flat,
+            (_, &[rows, columns]) => {
+                let (rows, columns) = (rows as usize, columns as usize);
+                (0..rows * columns).map(|index| flat[(index % columns) * rows + index / columns]).collect()
+            }
+            _ => panic!("{key}: a Fortran array of shape {shape:?}"),
+        }
     };
     let triples = |flat: &[f64]| -> Vec<[f64; 3]> { flat.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect() };
     let template = triples(&floats("v_template"));
