@@ -217,9 +217,9 @@ mod tests {
         let kappa = directions();
         let triangles = vec![TRIANGLE; kappa.len()];
         let (exact, single) = (integral(&triangles, &kappa, DType::F64), integral(&triangles, &kappa, DType::F32));
-        for row in 0..kappa.len() {
+        for (row, direction) in kappa.iter().enumerate() {
             let error = (exact.0[row] - single.0[row]).hypot(exact.1[row] - single.1[row]);
-            assert!(error < 2e-6, "{:?}: {error}", kappa[row]);
+            assert!(error < 2e-6, "{direction:?}: {error}");
         }
     }
 

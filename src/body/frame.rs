@@ -112,8 +112,8 @@ impl PosedBody {
     ) -> Displacement {
         let options = options.into();
         let weights = basis_tensor(&frame.basis.weights, frame.basis.poses.len(), &chirps, &options);
-        let poses = self.at_poses(frame, points, |frame, vertex, pose| frame.change_m[vertex * frame.basis.poses.len() + pose]);
-        let mut window = poses.map(|values| window_tensor(values, points.len(), &options));
+        let changes = self.changes_m(frame, points);
+        let mut window = changes.map(|values| window_tensor(values, points.len(), &options));
         if let Some(offset) = offset {
             assert_eq!(offset.dims(), [points.len(), 3], "body: offset {:?}, points {}", offset.dims(), points.len());
             let turned = self.turned(frame, points, offset, &options);
@@ -135,8 +135,8 @@ impl PosedBody {
     ) -> Displacement {
         let options = options.into();
         let rates = basis_tensor(&frame.basis.rates, frame.basis.poses.len(), &chirps, &options);
-        let poses = self.at_poses(frame, points, |frame, vertex, pose| frame.change_m[vertex * frame.basis.poses.len() + pose]);
-        let [x, y, z] = poses.map(|values| window_tensor(values, points.len(), &options).matmul(rates.clone()));
+        let changes = self.changes_m(frame, points);
+        let [x, y, z] = changes.map(|values| window_tensor(values, points.len(), &options).matmul(rates.clone()));
         Displacement { x, y, z }
     }
 
@@ -211,29 +211,16 @@ impl PosedBody {
         Displacement { x, y, z }
     }
 
-    /// A quantity of vertices and poses at the points: three components, each `[point, pose]`.
-    fn at_poses(
-        &self,
-        frame: &BodyFrame,
-        points: &[usize],
-        value: impl Fn(&BodyFrame, usize, usize) -> [f64; 3] + Sync,
-    ) -> [Vec<f64>; 3] {
+    /// Change of the points at every pose of the window: three components, each `[point, pose]`, metres.
+    fn changes_m(&self, frame: &BodyFrame, points: &[usize]) -> [Vec<f64>; 3] {
         let count = frame.basis.poses.len();
         let mut parts: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(points.len() * count));
         for &point in points {
             let (corners, weights) = (&self.surface.corners[point], &self.surface.weights[point]);
             for pose in 0..count {
-                let mut sum = [0.0; 3];
-                for (&vertex, &weight) in corners.iter().zip(weights) {
-                    if weight != 0.0 {
-                        let value = value(frame, vertex, pose);
-                        for axis in 0..3 {
-                            sum[axis] += weight * value[axis];
-                        }
-                    }
-                }
-                for (part, value) in parts.iter_mut().zip(sum) {
-                    part.push(value);
+                for (axis, part) in parts.iter_mut().enumerate() {
+                    let corner = |(&vertex, &weight): (&usize, &f64)| weight * frame.change_m[vertex * count + pose][axis];
+                    part.push(corners.iter().zip(weights).map(corner).sum());
                 }
             }
         }

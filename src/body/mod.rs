@@ -48,7 +48,7 @@ impl Displacement {
 /// What moves the mesh.
 #[derive(Clone, Debug)]
 enum Source {
-    Skinned { body: SkinnedBody, poses: Vec<Vec<[f64; 3]>>, shifts_m: Vec<Vector>, world_from_body: Matrix },
+    Skinned { body: Box<SkinnedBody>, poses: Vec<Vec<[f64; 3]>>, shifts_m: Vec<Vector>, world_from_body: Matrix },
     Meshes { vertices_m: Vec<Vec<[f64; 3]>> },
 }
 
@@ -145,7 +145,7 @@ fn place(body: SkinnedBody, motion: &Motion, placement: &Placement) -> Source {
     let world_from_body = Matrix::from_fn(|row, column| rows[row][column]);
     let shift = |&translation: &[f64; 3]| world_from_body * Vector::from(translation) + Vector::from(placement.origin_m);
     let shifts_m = motion.translations.iter().map(shift).collect();
-    Source::Skinned { body, poses: motion.poses.clone(), shifts_m, world_from_body }
+    Source::Skinned { body: Box::new(body), poses: motion.poses.clone(), shifts_m, world_from_body }
 }
 
 /// About the centre of the bounding box.

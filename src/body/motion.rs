@@ -168,10 +168,10 @@ mod tests {
             assert!((value(&cubic, row, bend) - time * time).abs() < 1e-12, "{time}");
         }
         let wild = |pose: usize| [0.0, 1.0, -1.0, 2.0, 0.5, 0.0][pose];
-        for pose in 1..5 {
-            let around = [UNEVEN[pose] - 1e-7, UNEVEN[pose] + 1e-7];
+        for &time in &UNEVEN[1..5] {
+            let around = [time - 1e-7, time + 1e-7];
             let near = basis(&UNEVEN, &around, Interpolation::Cubic).unwrap();
-            assert!((rate(&near, 0, wild) - rate(&near, 1, wild)).abs() < 1e-3, "pose {pose}");
+            assert!((rate(&near, 0, wild) - rate(&near, 1, wild)).abs() < 1e-3, "{time}");
             let straight = basis(&UNEVEN, &around, Interpolation::Linear).unwrap();
             assert!((rate(&straight, 0, wild) - rate(&straight, 1, wild)).abs() > 1.0, "a line does jump");
         }

@@ -163,11 +163,9 @@ mod tests {
     fn plain_smpl(model: &BodyModel, betas: &[f64], pose: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let vertices = model.template.len();
         let mut rest = model.template.clone();
-        for vertex in 0..vertices {
-            for axis in 0..3 {
-                for (shape, beta) in betas.iter().enumerate() {
-                    rest[vertex][axis] += beta * model.shape_directions[shape][vertex][axis];
-                }
+        for (shape, beta) in betas.iter().enumerate() {
+            for (point, change) in rest.iter_mut().flatten().zip(model.shape_directions[shape].iter().flatten()) {
+                *point += beta * change;
             }
         }
         let joints: Vec<[f64; 3]> = model

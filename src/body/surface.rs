@@ -17,7 +17,8 @@ pub enum Sampling {
     Vertices,
     /// Every facet split evenly until no edge exceeds `edge_m`, with a scatterer on the middle of each edge.
     Subdivided,
-    /// One scatterer per facet, whose phase is integrated over the facet in closed form ([`super::facets`]).
+    /// One scatterer per facet, whose phase is integrated over the facet in closed form ([`super::facets`]). What
+    /// remains (the wave's curvature and the amplitude's change within a facet) is −35 dB at 11 mm and 2 m.
     Facets,
 }
 

@@ -143,8 +143,10 @@ fn squarest(count: usize, size_m: [f64; 2]) -> [usize; 2] {
         let rows = count / columns;
         ((size_m[0] / columns as f64) / (size_m[1] / rows as f64)).ln().abs()
     };
-    let columns =
-        (1..=count).filter(|columns| count % columns == 0).min_by(|&a, &b| stretch(a).total_cmp(&stretch(b))).unwrap_or(1);
+    let columns = (1..=count)
+        .filter(|columns| count.is_multiple_of(*columns))
+        .min_by(|&a, &b| stretch(a).total_cmp(&stretch(b)))
+        .unwrap_or(1);
     [columns, count / columns]
 }
 
