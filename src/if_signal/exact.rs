@@ -2,7 +2,7 @@
 
 use burn::tensor::{Tensor, TensorData};
 
-use crate::complex::Complex;
+use crate::complex::{Complex, wrap};
 use crate::paths::Phasors;
 
 /// Elements of one block's phases.
@@ -18,7 +18,8 @@ pub fn sum(phasors: &Phasors, samples: usize) -> Complex<2> {
     for start in (0..points).step_by(step) {
         let count = step.min(points - start);
         let block = |tensor: &Tensor<2>| -> Tensor<3> { tensor.clone().narrow(0, start, count).unsqueeze_dim(2) };
-        let turns = block(&phasors.sweep_turns) * s.clone() + block(&phasors.phase_turns);
+        // Whole turns of the phase would cost digits of the sum.
+        let turns = block(&phasors.sweep_turns) * s.clone() + wrap(block(&phasors.phase_turns));
         let unit = Complex::unit(turns);
         let re = block(&phasors.amplitude);
         let terms = match &phasors.amplitude_im {

@@ -5,7 +5,7 @@
 
 use burn::tensor::{Tensor, TensorData};
 
-use crate::complex::Complex;
+use crate::complex::{Complex, wrap};
 use crate::paths::Phasors;
 
 /// Elements of one factor of a block of points.
@@ -30,7 +30,7 @@ pub fn sum(phasors: &Phasors, samples: usize) -> Complex<2> {
         // [chirp, 1, point]
         let block = |tensor: &Tensor<2>| -> Tensor<3> { tensor.clone().narrow(0, start, count).swap_dims(0, 1).unsqueeze_dim(1) };
         let sweep = block(&phasors.sweep_turns);
-        let unit = Complex::unit(sweep.clone() * at_coarse.clone() + block(&phasors.phase_turns));
+        let unit = Complex::unit(sweep.clone() * at_coarse.clone() + wrap(block(&phasors.phase_turns)));
         let re = block(&phasors.amplitude);
         let left = match &phasors.amplitude_im {
             Some(im) => unit.mul(Complex::new(re, block(im))),

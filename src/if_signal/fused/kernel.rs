@@ -42,6 +42,8 @@ struct Plan {
     /// `[sample][order]`.
     moments: Vec<[f32; ORDERS]>,
     cells_per_turn: f32,
+    /// What f32 leaves out of `cells_per_turn`.
+    cells_per_turn_rest: f32,
     phase_per_sweep: f32,
 }
 
@@ -55,6 +57,7 @@ impl Plan {
             places: (0..cells).map(|cell| fourier.place(cell) as u32).collect(),
             moments: (0..samples).map(|n| std::array::from_fn(|order| by_order[order][n] as f32)).collect(),
             cells_per_turn: grid.cells_per_turn() as f32,
+            cells_per_turn_rest: (grid.cells_per_turn() - f64::from(grid.cells_per_turn() as f32)) as f32,
             phase_per_sweep: grid.phase_per_sweep() as f32,
             fourier,
             grid,
@@ -78,6 +81,12 @@ impl Plan {
         self.places[cell] as usize * ROW
     }
 
+    /// Distance from a cell, without the rounding that the position on the grid has.
+    #[inline(always)]
+    fn offset(&self, sweep: Lanes, cell: f32) -> Lanes {
+        map(sweep, |v| multiply_add(v, self.cells_per_turn_rest, multiply_add(v, self.cells_per_turn, -cell)))
+    }
+
     /// Spreads a range of points over the cells, for the chirps from `chirp` on.
     fn spread(&self, inputs: &Inputs, chirp: usize, points: std::ops::Range<usize>, grid: &mut [Lanes]) {
         let width = LANES.min(inputs.chirps - chirp);
@@ -94,7 +103,7 @@ impl Plan {
             }
             let cells = map(sweep, |v| v * self.cells_per_turn);
             self.by_cell(cells, width, |cell, inside| {
-                let offset = map(cells, |u| u - cell);
+                let offset = self.offset(sweep, cell);
                 let keep = |value: Lanes| match inside {
                     None => value,
                     Some(inside) => zip(value, *inside, |value, on| if on > 0.0 { value } else { 0.0 }),
@@ -283,7 +292,7 @@ impl Plan {
             let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
             let (mut slope_re, mut slope_im) = ([0.0; LANES], [0.0; LANES]);
             self.by_cell(cells, width, |cell, inside| {
-                let offset = map(cells, |u| u - cell);
+                let offset = self.offset(sweep, cell);
                 let start = self.row(cell);
                 let row: &[Lanes; ROW] = (&grid[start..start + ROW]).try_into().expect("a row of the grid");
                 let (mut a, mut b) = (row[ROW - 2], row[ROW - 1]);
