@@ -25,7 +25,7 @@ pub struct Simulation<'a> {
 impl<'a> Simulation<'a> {
     /// `noise` off gives the clean signal.
     pub fn new(simulator: &'a Simulator, scene: &'a Scene, seed: u64, noise: bool) -> Self {
-        Self { simulator, scene, surfaces: simulator.surfaces(scene, Mode::Inference), seed, noise }
+        Self { simulator, scene, surfaces: simulator.surfaces(&simulator.constants(scene), Mode::Inference), seed, noise }
     }
 
     /// `[tx, rx, loop, sample]`, in the units of the recordings it was trained on.

@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         simulator_config: &config.simulator,
         seed: config.seed,
         recordings: &recordings,
-        site: recordings[0].site(),
+        site: recordings[0].site(&config.simulator),
         config_toml: &config_toml,
         folder: &run_folder,
         device: device.clone(),

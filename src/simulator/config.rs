@@ -4,10 +4,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     body::{Interpolation, SurfaceConfig},
-    features::{EncodingConfig, GraphConfig, TriPlaneConfig},
+    error::{Error, Result},
+    features::{EncodingConfig, GcnConfig, TriPlaneConfig},
     if_signal::{NoiseConfig, SumForm},
     paths::Dechirp,
-    scatterers::{GaussianConfig, MaterialConfig, room_patches::RoomPatchesConfig},
+    scatterers::{
+        decoders::DecodersConfig, microfacet::Response, room_patches::RoomPatchesConfig, visibility::DEFAULT_FLIP_EXPONENT,
+    },
 };
 
 /// Which paths are simulated, and by which model of scattering (the paper's ablations).
@@ -50,11 +53,10 @@ pub struct SimulatorConfig {
     pub room: RoomPatchesConfig,
     pub triplane: TriPlaneConfig,
     pub encoding: EncodingConfig,
-    pub graph: GraphConfig,
-    /// The ablation that keeps the graph convolution on at inference.
-    pub graph_at_inference: bool,
-    pub material: MaterialConfig,
-    pub gaussian: GaussianConfig,
+    pub graph: GcnConfig,
+    pub decoders: DecodersConfig,
+    /// What of the microfacet model is the amplitude.
+    pub response: Response,
     pub noise: NoiseConfig,
 }
 
@@ -62,19 +64,35 @@ impl Default for SimulatorConfig {
     fn default() -> Self {
         Self {
             paths: PathModel::default(),
-            dechirp: Dechirp::Exact,
-            sum: SumForm::Auto,
-            interpolation: Interpolation::Cubic,
-            flip_exponent: 2.25,
+            dechirp: Dechirp::default(),
+            sum: SumForm::default(),
+            interpolation: Interpolation::default(),
+            flip_exponent: DEFAULT_FLIP_EXPONENT,
             surface: SurfaceConfig::default(),
             room: RoomPatchesConfig::default(),
             triplane: TriPlaneConfig::default(),
             encoding: EncodingConfig::default(),
-            graph: GraphConfig::default(),
-            graph_at_inference: false,
-            material: MaterialConfig::default(),
-            gaussian: GaussianConfig::default(),
+            graph: GcnConfig::default(),
+            decoders: DecodersConfig::default(),
+            response: Response::default(),
             noise: NoiseConfig::default(),
         }
+    }
+}
+
+impl SimulatorConfig {
+    /// Refuses settings that cannot work.
+    pub fn check(&self) -> Result<()> {
+        self.surface.check("simulator.surface")?;
+        self.room.check("simulator.room")?;
+        self.triplane.check("simulator.triplane")?;
+        self.encoding.check("simulator.encoding")?;
+        self.graph.check("simulator.graph")?;
+        self.decoders.check("simulator.decoders")?;
+        self.noise.check("simulator.noise")?;
+        if !(0.0..=10.0).contains(&self.flip_exponent) {
+            return Err(Error::setting("simulator.flip_exponent", self.flip_exponent, "0 to 10"));
+        }
+        Ok(())
     }
 }

@@ -5,16 +5,19 @@ use std::{
     sync::{Arc, Mutex},
 };
 
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
 use super::SimulatorConfig;
 use crate::{
-    body::{BodyFrame, PosedBody},
+    body::{BodyFrame, PosedBody, Sampling},
     error::Result,
     person::Person,
     radar::Radar,
     room::Room,
     scatterers::{
-        room_patches::{self, Proxy, RoomPatches},
-        visibility::{self, FrameVisibility},
+        room_patches::{Proxy, RoomPatches},
+        visibility::frame_visibility,
     },
 };
 
@@ -29,6 +32,8 @@ pub struct Seen {
 pub struct FrameView {
     pub frame: usize,
     pub body: Option<BodyFrame>,
+    /// `[point, xyz]` of the body: a direction on the surface that turns with it.
+    pub tangent: Vec<[f64; 3]>,
     /// From the radar.
     pub direct: Seen,
     /// From every wall proxy.
@@ -41,6 +46,8 @@ pub struct Scene {
     pub body: Option<PosedBody>,
     pub patches: RoomPatches,
     pub proxies: Vec<Proxy>,
+    /// Whether every scatterer of the body stands for a whole facet.
+    pub facets: bool,
     flip_exponent: f64,
     /// Visibility does not learn, so every frame is looked at once.
     views: Mutex<HashMap<usize, Arc<FrameView>>>,
@@ -50,14 +57,15 @@ impl Scene {
     /// # Errors
     /// A body whose mesh or motion cannot be sampled.
     pub fn new(radar: &Radar, room: Option<&Room>, person: Option<&Person>, config: &SimulatorConfig) -> Result<Self> {
-        let patches = room.map(|room| RoomPatches::new(room, radar.position_m, &config.room)).unwrap_or_default();
-        let proxies = room.map(|room| room_patches::proxies(room, radar.position_m, &config.room)).unwrap_or_default();
+        let patches = room.map(|room| config.room.init(room)).transpose()?.unwrap_or_default();
+        let proxies = room.map(|room| config.room.proxies(room)).unwrap_or_default();
         let body = person.map(|person| PosedBody::new(person, &config.surface, config.interpolation)).transpose()?;
         Ok(Self {
             radar: radar.clone(),
             body,
             patches,
             proxies,
+            facets: config.surface.sampling == Sampling::Facets,
             flip_exponent: config.flip_exponent,
             views: Mutex::new(HashMap::new()),
         })
@@ -88,19 +96,45 @@ impl Scene {
 
     fn look(&self, frame: usize) -> Result<FrameView> {
         let body = self.body.as_ref().map(|body| body.frame(&self.chirp_times_s(frame))).transpose()?;
-        let body_points = body.as_ref().map(|body| body.position_m.as_slice()).unwrap_or_default();
-        let FrameVisibility { direct, proxies } = visibility::frame_visibility(
-            body_points,
-            &self.patches,
+        // A dense surface is as visible as the vertices around it.
+        let vertices = body.as_ref().map(|body| body.vertices_m.as_slice()).unwrap_or_default();
+        let patches = &self.patches;
+        let seen = |mask: &[bool]| {
+            let (of_vertices, of_room) = mask.split_at(vertices.len());
+            let of_body = self.body.as_ref().map(|body| body.surface().decide(of_vertices)).unwrap_or_default();
+            let indices = |mask: &[bool]| (0..mask.len()).filter(|&index| mask[index]).collect();
+            Seen { body: indices(&of_body), room: indices(of_room) }
+        };
+        let visibility = frame_visibility(
+            vertices,
+            &patches.position_m,
+            &patches.boundary,
             self.radar.centre_m(),
             &self.proxies,
             self.flip_exponent,
         );
-        let seen = |mask: Vec<bool>| {
-            let (of_body, of_room) = mask.split_at(body_points.len());
-            let indices = |mask: &[bool]| (0..mask.len()).filter(|&index| mask[index]).collect();
-            Seen { body: indices(of_body), room: indices(of_room) }
-        };
-        Ok(FrameView { frame, direct: seen(direct), proxies: proxies.into_iter().map(seen).collect(), body })
+        Ok(FrameView {
+            frame,
+            tangent: self.tangents(body.as_ref()),
+            direct: seen(&visibility.direct),
+            proxies: visibility.proxies.iter().map(|mask| seen(mask)).collect(),
+            body,
+        })
+    }
+
+    /// A canonical direction of every point, turned with the body: the axis that lies flattest on the surface.
+    fn tangents(&self, frame: Option<&BodyFrame>) -> Vec<[f64; 3]> {
+        let (Some(body), Some(frame)) = (&self.body, frame) else { return Vec::new() };
+        let pose = frame.basis.poses.len() / 2;
+        (0..frame.position_m.len())
+            .into_par_iter()
+            .map(|point| {
+                let rotation = body.rotation(frame, point, pose);
+                let canonical = rotation.transpose() * Vector3::from(frame.normal[point]);
+                let flattest = canonical.iamin();
+                let axis = Vector3::from_fn(|row, _| if row == flattest { 1.0 } else { 0.0 });
+                (rotation * axis).into()
+            })
+            .collect()
     }
 }

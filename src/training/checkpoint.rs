@@ -17,6 +17,7 @@ use super::metrics::EpochMetrics;
 use crate::{
     data::atomic::AtomicFolder,
     error::{Error, Result},
+    features::Extent,
     person::Placement,
     radar::Radar,
     room::Room,
@@ -35,6 +36,8 @@ pub struct Site {
     pub room: Option<Room>,
     /// Where the training person's motion stood; the default for new motions.
     pub placement: Option<Placement>,
+    /// The box around the canonical body that the tri-plane covers, with its margin.
+    pub body_extent: Extent,
 }
 
 /// How far training has come.
@@ -159,7 +162,7 @@ pub fn load_optimizer(folder: &Path, optimizer: ModuleOptimizer) -> Result<Modul
 /// A simulator ready to infer, with the state of its checkpoint.
 pub fn open(folder: &Path, device: &Device) -> Result<(Simulator, CheckpointState)> {
     let state = read_state(folder)?;
-    let simulator = state.simulator.init(state.site.room.as_ref(), state.seed, device)?;
+    let simulator = state.simulator.init(state.site.body_extent, state.seed, device);
     Ok((load_weights(folder, with_stable_ids(simulator))?, state))
 }
 

@@ -25,10 +25,6 @@ pub struct TrainingConfig {
     pub split: Split,
     /// Stop after this many epochs without a better validation loss; zero never stops early.
     pub patience_epochs: usize,
-    /// How often the graph convolution is on in training.
-    pub graph_probability: f64,
-    /// Part of the vertices whose features are masked when it is.
-    pub mask_fraction: f64,
     pub heatmap: HeatmapConfig,
     pub loss: LossConfig,
 }
@@ -44,8 +40,6 @@ impl Default for TrainingConfig {
             validation_fraction: 0.2,
             split: Split::Last,
             patience_epochs: 0,
-            graph_probability: 0.5,
-            mask_fraction: 0.15,
             heatmap: HeatmapConfig::default(),
             loss: LossConfig::default(),
         }
@@ -66,16 +60,8 @@ impl TrainingConfig {
         if let Some((key, value)) = positive.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
             return Err(Error::setting(format!("training.{key}"), value, "a positive number"));
         }
-        let fractions = [
-            ("validation_fraction", self.validation_fraction),
-            ("graph_probability", self.graph_probability),
-            ("mask_fraction", self.mask_fraction),
-        ];
-        if let Some((key, value)) = fractions.into_iter().find(|(_, value)| !(0.0..=1.0).contains(value)) {
-            return Err(Error::setting(format!("training.{key}"), value, "a fraction between 0 and 1"));
-        }
-        if self.validation_fraction == 1.0 {
-            return Err(Error::setting("training.validation_fraction", 1.0, "less than 1")
+        if !(0.0..1.0).contains(&self.validation_fraction) {
+            return Err(Error::setting("training.validation_fraction", self.validation_fraction, "0 or more, and less than 1")
                 .with_hint("something must be left to train on"));
         }
         Ok(())
@@ -107,7 +93,8 @@ mod tests {
         assert_eq!(config.check().unwrap_err().to_string(), "`training.epochs` is 0, expected at least 1");
         let config = TrainingConfig { learning_rate: -1.0, ..Default::default() };
         assert_eq!(config.check().unwrap_err().to_string(), "`training.learning_rate` is -1, expected a positive number");
-        let config = TrainingConfig { mask_fraction: f64::NAN, ..Default::default() };
-        assert!(config.check().is_err());
+        for fraction in [f64::NAN, 1.0, -0.1] {
+            assert!(TrainingConfig { validation_fraction: fraction, ..Default::default() }.check().is_err());
+        }
     }
 }

@@ -9,6 +9,7 @@ use crate::{
     complex::Complex,
     data::recording::{IfFrame, Recording},
     error::{Error, Result},
+    features::Extent,
     person::{Person, Placement},
     radar::Sampling,
     simulator::{Scene, SimulatorConfig},
@@ -45,8 +46,15 @@ impl LoadedRecording {
         }
     }
 
-    pub fn site(&self) -> Site {
-        Site { radar: self.recording.radar.clone(), room: self.recording.room.clone(), placement: self.placement() }
+    /// What a simulator trained on this recording must remember of it.
+    pub fn site(&self, config: &SimulatorConfig) -> Site {
+        let canonical = self.scene.body.as_ref().map(|body| body.canonical_vertices()).unwrap_or_default();
+        Site {
+            radar: self.recording.radar.clone(),
+            room: self.recording.room.clone(),
+            placement: self.placement(),
+            body_extent: Extent::around(canonical, config.triplane.margin),
+        }
     }
 
     /// The measured samples of a frame, `[tx, rx, loop, sample]`.

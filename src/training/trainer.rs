@@ -21,7 +21,7 @@ use crate::{
     error::{Error, Result},
     heatmap::RangeDoppler,
     loss::DbLoss,
-    simulator::{Mode, Scene, Simulator, SimulatorConfig, is_finite},
+    simulator::{Mode, SceneConstants, Simulator, SimulatorConfig, is_finite},
 };
 
 /// What happens in a run, for whoever shows it.
@@ -38,6 +38,12 @@ pub enum Event {
 pub struct Outcome {
     pub simulator: Simulator,
     pub progress: Progress,
+}
+
+/// What training keeps of each recording beside its scene.
+struct Prepared {
+    loss: DbLoss,
+    constants: SceneConstants,
 }
 
 /// Everything a run needs; `run` does it.
@@ -67,8 +73,8 @@ impl Trainer<'_> {
         let device = self.device.clone().autodiff();
         let losses = self.losses(&split)?;
 
-        let simulator = self.simulator_config.init(self.site.room.as_ref(), self.seed, &device)?;
-        let mut simulator = checkpoint::with_stable_ids(simulator);
+        let mut simulator =
+            checkpoint::with_stable_ids(self.simulator_config.init(self.site.body_extent, self.seed, &device));
         let mut optimizer = ModuleOptimizer::from(AdamConfig::new().with_epsilon(1e-8).build())
             .with_grad_clipping(GradientClipping::Norm(self.config.gradient_clip as f32));
         let mut progress =
@@ -86,8 +92,13 @@ impl Trainer<'_> {
                 optimizer = checkpoint::load_optimizer(folder, optimizer)?;
                 progress = state.progress;
             }
-            None => simulator = calibrate::scale_to_recordings(simulator, self.recordings, &split.training, self.seed)?,
+            None => simulator = calibrate::fit_gain(simulator, self.recordings, &split.training)?,
         }
+        let prepared: Vec<Prepared> = losses
+            .into_iter()
+            .zip(self.recordings)
+            .map(|(loss, recording)| Prepared { loss, constants: simulator.constants(&recording.scene) })
+            .collect();
 
         emit(Event::Started {
             steps,
@@ -101,7 +112,7 @@ impl Trainer<'_> {
             let mut learning_rate = self.config.learning_rate;
             for batch in order.chunks(self.config.frames_per_step) {
                 learning_rate = self.config.learning_rate_at(progress.steps_done, steps);
-                let (stepped, loss) = self.step(simulator, &mut optimizer, &losses, batch, progress.steps_done, learning_rate)?;
+                let (stepped, loss) = self.step(simulator, &mut optimizer, &prepared, batch, progress.steps_done, learning_rate)?;
                 simulator = stepped;
                 sum += loss * batch.len() as f64;
                 progress.steps_done += 1;
@@ -111,7 +122,7 @@ impl Trainer<'_> {
                 epoch,
                 learning_rate,
                 training_loss: sum / order.len() as f64,
-                validation_loss: self.validate(&simulator, &losses, &split.validation)?,
+                validation_loss: self.validate(&simulator, &prepared, &split.validation)?,
                 noise_rate: simulator.noise_rate(),
             };
             progress.epochs_done = epoch + 1;
@@ -161,21 +172,17 @@ impl Trainer<'_> {
         &self,
         simulator: Simulator,
         optimizer: &mut ModuleOptimizer,
-        losses: &[DbLoss],
+        prepared: &[Prepared],
         batch: &[FrameId],
         step: usize,
         learning_rate: f64,
     ) -> Result<(Simulator, f64)> {
         let mut rng = step_rng(self.seed, step, 0x57E9);
-        let mode = Mode::Training {
-            graph: rng.random_bool(self.config.graph_probability),
-            mask_fraction: self.config.mask_fraction,
-            seed: rng.random(),
-        };
-        let loss = self.batch_loss(&simulator, losses, batch, mode, &mut rng)?;
+        let mode = Mode::Training { seed: rng.random() };
+        let loss = self.batch_loss(&simulator, prepared, batch, mode, &mut rng)?;
         let value: f64 = loss.clone().into_scalar::<f32>().into();
         if !value.is_finite() {
-            return Err(self.first_broken_stage(&simulator, batch, mode, step)?);
+            return Err(self.first_broken_stage(&simulator, prepared, batch, mode, step)?);
         }
         let mut gradients = loss.backward();
         let gradients = GradientsParams::from_module(&mut gradients, &simulator);
@@ -189,7 +196,7 @@ impl Trainer<'_> {
     fn batch_loss(
         &self,
         simulator: &Simulator,
-        losses: &[DbLoss],
+        prepared: &[Prepared],
         frames: &[FrameId],
         mode: Mode,
         rng: &mut ChaCha8Rng,
@@ -197,16 +204,17 @@ impl Trainer<'_> {
         let mut sum: Option<Tensor<1>> = None;
         for (index, frames) in by_recording(frames) {
             let recording = &self.recordings[index];
-            let surfaces = simulator.surfaces(&recording.scene, mode);
+            let Prepared { loss, constants } = &prepared[index];
+            let surfaces = simulator.surfaces(constants, mode);
             for frame in frames {
                 let view = recording.scene.view(frame)?;
                 let clean = simulator.clean_signal(&recording.scene, &view, &surfaces);
                 let signal = simulator.with_noise(clean, rng.random());
-                let measured = losses[index].maps_db(one_frame(recording.target(frame, &self.device)?));
-                let loss = losses[index].loss(one_frame(signal), measured);
+                let measured = loss.maps_db(one_frame(recording.target(frame, &self.device)?));
+                let value = loss.loss(one_frame(signal), measured);
                 sum = Some(match sum {
-                    Some(sum) => sum + loss,
-                    None => loss,
+                    Some(sum) => sum + value,
+                    None => value,
                 });
             }
         }
@@ -233,7 +241,7 @@ impl Trainer<'_> {
     }
 
     /// Loss on held-out frames as at inference, without gradients; the same noise in every epoch.
-    fn validate(&self, simulator: &Simulator, losses: &[DbLoss], frames: &[FrameId]) -> Result<Option<f64>> {
+    fn validate(&self, simulator: &Simulator, prepared: &[Prepared], frames: &[FrameId]) -> Result<Option<f64>> {
         if frames.is_empty() {
             return Ok(None);
         }
@@ -242,14 +250,21 @@ impl Trainer<'_> {
         let mut sum = 0.0;
         for frame in frames {
             // One frame at a time bounds the memory.
-            let loss = self.batch_loss(&simulator, losses, std::slice::from_ref(frame), Mode::Inference, &mut rng)?;
+            let loss = self.batch_loss(&simulator, prepared, std::slice::from_ref(frame), Mode::Inference, &mut rng)?;
             sum += f64::from(loss.into_scalar::<f32>());
         }
         Ok(Some(sum / frames.len() as f64))
     }
 
     /// Runs the journey once more and names the first stage whose result is not finite.
-    fn first_broken_stage(&self, simulator: &Simulator, batch: &[FrameId], mode: Mode, step: usize) -> Result<Error> {
+    fn first_broken_stage(
+        &self,
+        simulator: &Simulator,
+        prepared: &[Prepared],
+        batch: &[FrameId],
+        mode: Mode,
+        step: usize,
+    ) -> Result<Error> {
         if let Some(name) = checkpoint::first_non_finite(simulator) {
             return Ok(Error::NonFinite { stage: format!("the parameter `{name}`"), step });
         }
@@ -259,8 +274,9 @@ impl Trainer<'_> {
                 if !is_finite(recording.target(frame, &self.device)?.re) {
                     return Ok(Error::NonFinite { stage: format!("frame {frame} of the recording"), step });
                 }
-                let scene: &Scene = &recording.scene;
-                if let Some(stage) = simulator.first_non_finite_stage(scene, &scene.view(frame)?, mode) {
+                let scene = &recording.scene;
+                let constants = &prepared[index].constants;
+                if let Some(stage) = simulator.first_non_finite_stage(scene, &scene.view(frame)?, constants, mode) {
                     return Ok(Error::NonFinite { stage: stage.into(), step });
                 }
             }
