@@ -98,7 +98,8 @@ impl Half {
         let squared = length_squared.clone() + TINY;
         Self {
             cosine_squared: along.powi_scalar(2) / squared.clone(),
-            sine_squared: dot(across.clone(), across) / squared,
+            // The same small number makes this 1 when there is no half vector, with opposite directions.
+            sine_squared: (dot(across.clone(), across) + TINY) / squared,
             deviation_cosine_squared: length_squared * 0.25,
         }
     }
@@ -127,15 +128,17 @@ impl Side {
 
 /// Trowbridge-Reitz: D = α² / (π (α² cos² + sin²)²), the facets' density around h per steradian.
 fn distribution(half: &Half, alpha_squared: Tensor<2>) -> Tensor<2> {
-    let spread = alpha_squared.clone() * half.cosine_squared.clone() + half.sine_squared.clone() + TINY;
-    alpha_squared / spread.powi_scalar(2) * std::f64::consts::FRAC_1_PI
+    let spread = alpha_squared.clone() * half.cosine_squared.clone() + half.sine_squared.clone();
+    // Squared last: the fourth power of a mirror's spread, which a quotient's gradient needs, is below f32.
+    (alpha_squared.sqrt() / spread).powi_scalar(2) * std::f64::consts::FRAC_1_PI
 }
 
 /// G₂ / (4 cos θ_i cos θ_o) = ½ / (cos θ_o √(α² + (1 − α²) cos² θ_i) + cos θ_i √(α² + (1 − α²) cos² θ_o)).
 fn visibility(incident: &Side, outgoing: &Side, alpha_squared: Tensor<2>) -> Tensor<2> {
     let masked = |side: &Side| {
         let cosine_squared = side.rounded.clone().powi_scalar(2);
-        (alpha_squared.clone() * (1.0 - cosine_squared.clone()) + cosine_squared).sqrt()
+        let sine_squared: Tensor<2> = 1.0 - cosine_squared.clone();
+        (alpha_squared.clone() * sine_squared + cosine_squared).sqrt()
     };
     0.5 / (outgoing.rounded.clone() * masked(incident) + incident.rounded.clone() * masked(outgoing))
 }

@@ -8,14 +8,14 @@
 //! Amplitudes are evaluated at a few instants of a frame (axis `knot`), because directions change little within it; all
 //! directions are unit vectors that point *away from the scatterer*.
 
-// pub mod decoders;
+pub mod decoders;
 pub mod fresnel;
-// pub mod material;
-// pub mod microfacet;
-// pub mod patches;
+pub mod material;
+pub mod microfacet;
+pub mod patches;
 // pub mod room_patches;
-// pub mod spherical_harmonics;
-// pub mod tangent;
+pub mod spherical_harmonics;
+pub mod tangent;
 // pub mod visibility;
 
 use burn::tensor::Tensor;

@@ -44,7 +44,7 @@ impl Frame {
         let (x, y, z) = (axis(0), axis(1), axis(2));
         // The sign of z, with +1 at zero; sign() is zero there.
         let sign = (z.clone().detach().sign() * 2.0 + 1.0).sign();
-        let a = -1.0 / (sign.clone() + z);
+        let a: Tensor<3> = -1.0 / (sign.clone() + z);
         let b = x.clone() * y.clone() * a.clone();
         let tangent = Tensor::cat(
             vec![sign.clone() * x.clone().powi_scalar(2) * a.clone() + 1.0, sign.clone() * b.clone(), -sign.clone() * x],
@@ -75,12 +75,14 @@ mod tests {
 
     fn assert_orthonormal(frame: &Frame) {
         let axes = [&frame.tangent, &frame.bitangent, &frame.normal];
+        let (mut found, mut wanted) = (Vec::new(), Vec::new());
         for (i, a) in axes.iter().enumerate() {
             for (j, b) in axes.iter().enumerate() {
-                let found = values(&dot((*a).clone(), (*b).clone()));
-                assert_close("axes", &found, &vec![if i == j { 1.0 } else { 0.0 }; found.len()], 1e-9);
+                found.extend(values(&dot((*a).clone(), (*b).clone())));
+                wanted.resize(found.len(), if i == j { 1.0 } else { 0.0 });
             }
         }
+        assert_close("products of the axes", &found, &wanted, 1e-9);
         let handed = values(&cross(frame.tangent.clone(), frame.bitangent.clone()));
         assert_close("tangent × bitangent", &handed, &values(&frame.normal), 1e-9);
     }
