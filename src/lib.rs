@@ -32,3 +32,8 @@ pub mod config;
 pub mod cli;
 
 pub use error::{Error, Result};
+
+/// Helpers of the tests, shared with the integration tests.
+#[cfg(test)]
+#[path = "../tests/support/mod.rs"]
+mod support;
