@@ -73,6 +73,17 @@ impl Map {
         Self::new(self.rows.clone(), self.columns.clone(), values)
     }
 
+    /// The part whose axis values lie within both limits, ends included.
+    pub fn cropped(&self, rows: [f64; 2], columns: [f64; 2]) -> Self {
+        let inside = |axis: &Axis, [low, high]: [f64; 2]| -> Vec<usize> {
+            (0..axis.len()).filter(|&index| (low..=high).contains(&axis.values[index])).collect()
+        };
+        let (kept_rows, kept_columns) = (inside(&self.rows, rows), inside(&self.columns, columns));
+        let keep = |axis: &Axis, kept: &[usize]| Axis::new(axis.name, axis.unit, kept.iter().map(|&i| axis.values[i]).collect());
+        let values = kept_rows.iter().flat_map(|&row| kept_columns.iter().map(move |&column| self.at(row, column))).collect();
+        Self::new(keep(&self.rows, &kept_rows), keep(&self.columns, &kept_columns), values)
+    }
+
     /// The largest value.
     pub fn max(&self) -> f64 {
         self.values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
@@ -115,6 +126,13 @@ mod tests {
         assert_eq!(small().peak_where(|velocity, _| velocity < 0.0), Some([0, 1]));
         assert_eq!(small().peak_where(|_, range| range > 2.0), None);
         assert_eq!(small().columns.nearest(0.6), 1);
+    }
+
+    #[test]
+    fn a_crop_keeps_the_cells_within_its_limits() {
+        let part = small().cropped([0.0, 1.0], [0.5, 2.0]);
+        assert_eq!((part.dims(), part.values.as_slice()), ([1, 2], [100.0, 6.0].as_slice()));
+        assert_eq!(part.columns.values, [0.5, 1.0]);
     }
 
     #[test]
