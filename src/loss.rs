@@ -130,7 +130,13 @@ impl DbLoss {
 /// # Panics
 /// When their shapes differ.
 pub fn mean_squared_db<const D: usize>(simulated_db: Tensor<D>, measured_db: Tensor<D>) -> Tensor<1> {
-    assert_eq!(simulated_db.dims(), measured_db.dims(), "loss: simulated {:?}, measured {:?}", simulated_db.dims(), measured_db.dims());
+    assert_eq!(
+        simulated_db.dims(),
+        measured_db.dims(),
+        "loss: simulated {:?}, measured {:?}",
+        simulated_db.dims(),
+        measured_db.dims()
+    );
     let difference = simulated_db - measured_db;
     (difference.clone() * difference).mean()
 }

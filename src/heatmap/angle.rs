@@ -90,9 +90,10 @@ impl Analysis {
 
     /// Of every antenna pair: its transmitter, and the sum of both positions (the virtual antenna), in axis order `tx, rx`.
     fn channel_positions_m(&self) -> Vec<(usize, [f64; 3])> {
-        let pairs = self.radar.tx_m.iter().enumerate().flat_map(|(tx, from)| {
-            self.radar.rx_m.iter().map(move |to| (tx, std::array::from_fn(|axis| from[axis] + to[axis])))
-        });
+        let pairs =
+            self.radar.tx_m.iter().enumerate().flat_map(|(tx, from)| {
+                self.radar.rx_m.iter().map(move |to| (tx, std::array::from_fn(|axis| from[axis] + to[axis])))
+            });
         pairs.collect()
     }
 }
@@ -140,11 +141,8 @@ mod tests {
         let rx_m = vec![[0.0; 3], [half, 0.0, 0.0], [0.0, 0.0, half], [half, 0.0, half]];
         let radar = Radar { tx_m: vec![[0.0; 3]], rx_m, ..synthetic::radar() };
         let signal = synthetic::point(&radar, |_| [0.0, 4.0 * 0.3f64.cos(), 4.0 * 0.3f64.sin()]);
-        let map = Analysis::new(&radar, &HeatmapConfig::default()).range_angle(
-            &signal,
-            &Scan::elevation(60.0, 1.0),
-            &Gate::default(),
-        );
+        let map =
+            Analysis::new(&radar, &HeatmapConfig::default()).range_angle(&signal, &Scan::elevation(60.0, 1.0), &Gate::default());
         assert!((map.rows.values[map.peak()[0]] - 0.3f64.to_degrees()).abs() <= 1.0);
     }
 
@@ -156,8 +154,7 @@ mod tests {
         let centre = radar.centre_m();
         let signal = synthetic::point(&radar, |_| [centre[0], 20.0 * bin, 0.0]);
         let only_still = Gate { velocity_mps: Some([-1e-6, 1e-6]), ..Gate::default() };
-        let map =
-            Analysis::new(&radar, &HeatmapConfig::default()).range_angle(&signal, &Scan::azimuth(10.0, 1.0), &only_still);
+        let map = Analysis::new(&radar, &HeatmapConfig::default()).range_angle(&signal, &Scan::azimuth(10.0, 1.0), &only_still);
         assert!((map.max() - 1.0).abs() < 0.02, "{}", map.max());
     }
 }

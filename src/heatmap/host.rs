@@ -60,7 +60,8 @@ pub fn remove_static(samples: Samples<'_>, removal: StaticRemoval) -> Vec<Comple
             StaticRemoval::Frames => vec![(0..frames).map(|frame| start(frame, channel)).collect()],
         };
         for starts in groups {
-            let chirps: Vec<usize> = starts.iter().flat_map(|start| (0..loops).map(move |index| start + index * length)).collect();
+            let chirps: Vec<usize> =
+                starts.iter().flat_map(|start| (0..loops).map(move |index| start + index * length)).collect();
             for sample in 0..length {
                 let sum: Complex64 = chirps.iter().map(|chirp| widen(values[chirp + sample])).sum();
                 let mean = sum / chirps.len() as f64;

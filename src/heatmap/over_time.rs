@@ -64,12 +64,7 @@ impl Analysis {
         })
     }
 
-    fn over_time(
-        &self,
-        samples: Samples<'_>,
-        rows: Axis,
-        column: impl Fn(&[num_complex::Complex32]) -> Vec<f64> + Sync,
-    ) -> Map {
+    fn over_time(&self, samples: Samples<'_>, rows: Axis, column: impl Fn(&[num_complex::Complex32]) -> Vec<f64> + Sync) -> Map {
         let frames = samples.frames();
         let columns: Vec<Vec<f64>> = (0..frames).into_par_iter().map(|frame| column(samples.frame(frame))).collect();
         let values = (0..rows.len()).flat_map(|row| columns.iter().map(move |column| column[row])).collect();

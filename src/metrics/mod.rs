@@ -3,8 +3,8 @@
 //! Images are decibels mapped from a stated [`DbWindow`] to 0 … 1. Because most cells of a map hold no person, the same
 //! numbers are reported globally (as in the paper), on static-removed maps, and on the cells that the person occupies.
 
-mod ssim;
 mod spread;
+mod ssim;
 
 pub use spread::Spread;
 pub use ssim::{ssim, ssim_map};

@@ -76,8 +76,7 @@ fn blur(image: &[f64], [rows, columns]: [usize; 2]) -> Vec<f64> {
 }
 
 fn kernel() -> [f64; 2 * RADIUS + 1] {
-    let raw: [f64; 2 * RADIUS + 1] =
-        std::array::from_fn(|index| (-0.5 * ((index as f64 - RADIUS as f64) / SIGMA).powi(2)).exp());
+    let raw: [f64; 2 * RADIUS + 1] = std::array::from_fn(|index| (-0.5 * ((index as f64 - RADIUS as f64) / SIGMA).powi(2)).exp());
     let sum: f64 = raw.iter().sum();
     raw.map(|weight| weight / sum)
 }

@@ -9,15 +9,16 @@ use crate::error::Result;
 use crate::heatmap::{Axis, Map};
 use crate::metrics::DbWindow;
 
-const BAR_WIDTH: u32 = 92;
+const BAR_WIDTH: u32 = 106;
 const TITLE_HEIGHT: u32 = 44;
+const CAPTION_HEIGHT: u32 = 26;
 
 /// One map of decibels, rows upwards.
 pub fn heatmap(path: &Path, title: &str, map_db: &Map, window: DbWindow) -> Result<()> {
     save(path, (900, 640), |area| {
-        let area = titled(area, title)?;
+        let area = under(area, title, 26, TITLE_HEIGHT)?;
         let (left, right) = area.split_horizontally(area.dim_in_pixel().0 - BAR_WIDTH);
-        draw_map(&left, "", map_db, &Colours::sequential(window))?;
+        draw_map(&left, map_db, &Colours::sequential(window))?;
         draw_bar(&right, "dB", &Colours::sequential(window))
     })
 }
@@ -34,19 +35,20 @@ pub fn comparison(path: &Path, title: &str, measured_db: &Map, simulated_db: &Ma
     let within = |db: f64| db.clamp(window.low_db, window.high_db);
     let pairs = measured_db.values.iter().zip(&simulated_db.values);
     let difference = measured_db.with_values(pairs.map(|(measured, simulated)| within(*simulated) - within(*measured)).collect());
-    let (levels, differences) = (Colours::sequential(window), Colours::diverging((0.5 * (window.high_db - window.low_db)).min(30.0)));
+    let (levels, differences) =
+        (Colours::sequential(window), Colours::diverging((0.5 * (window.high_db - window.low_db)).min(30.0)));
     save(path, (1760, 600), |area| {
-        let area = titled(area, title)?;
+        let area = under(area, title, 26, TITLE_HEIGHT)?;
         let picture = (area.dim_in_pixel().0 - 2 * BAR_WIDTH) / 3;
         let (measured, rest) = area.split_horizontally(picture);
         let (simulated, rest) = rest.split_horizontally(picture);
         let (bar, rest) = rest.split_horizontally(BAR_WIDTH);
         let (third, last_bar) = rest.split_horizontally(picture);
-        draw_map(&measured, "measured", measured_db, &levels)?;
-        draw_map(&simulated, "simulated", simulated_db, &levels)?;
-        draw_bar(&bar, "dB", &levels)?;
-        draw_map(&third, "simulated − measured", &difference, &differences)?;
-        draw_bar(&last_bar, "dB", &differences)
+        draw_map(&under(&measured, "measured", 20, CAPTION_HEIGHT)?, measured_db, &levels)?;
+        draw_map(&under(&simulated, "simulated", 20, CAPTION_HEIGHT)?, simulated_db, &levels)?;
+        draw_bar(&under(&bar, "", 20, CAPTION_HEIGHT)?, "dB", &levels)?;
+        draw_map(&under(&third, "simulated − measured", 20, CAPTION_HEIGHT)?, &difference, &differences)?;
+        draw_bar(&under(&last_bar, "", 20, CAPTION_HEIGHT)?, "dB", &differences)
     })
 }
 
@@ -73,11 +75,12 @@ impl Colours {
     }
 }
 
-fn titled<'a>(area: &Area<'a>, title: &str) -> std::result::Result<Area<'a>, Box<dyn std::error::Error>> {
-    let (top, rest) = area.split_vertically(TITLE_HEIGHT);
-    let style = letters(26);
-    let width = area.estimate_text_size(title, &style)?.0 as i32;
-    top.draw_text(title, &style, ((area.dim_in_pixel().0 as i32 - width) / 2, 12))?;
+/// The area below a centred line of text.
+fn under<'a>(area: &Area<'a>, text: &str, size: u32, height: u32) -> std::result::Result<Area<'a>, Box<dyn std::error::Error>> {
+    let (top, rest) = area.split_vertically(height);
+    let style = letters(size);
+    let width = area.estimate_text_size(text, &style)?.0 as i32;
+    top.draw_text(text, &style, ((area.dim_in_pixel().0 as i32 - width) / 2, (height as i32 - size as i32) * 2 / 3))?;
     Ok(rest)
 }
 
@@ -92,16 +95,12 @@ fn label(axis: &Axis) -> String {
     format!("{} ({})", axis.name, axis.unit)
 }
 
-fn draw_map(area: &Area<'_>, caption: &str, map: &Map, colours: &Colours) -> DrawResult {
-    let mut builder = ChartBuilder::on(area);
-    if !caption.is_empty() {
-        builder.caption(caption, letters(20));
-    }
-    let mut chart = builder
+fn draw_map(area: &Area<'_>, map: &Map, colours: &Colours) -> DrawResult {
+    let mut chart = ChartBuilder::on(area)
         .margin(10)
         .margin_right(16)
         .x_label_area_size(52)
-        .y_label_area_size(68)
+        .y_label_area_size(66)
         .build_cartesian_2d(edges(&map.columns), edges(&map.rows))?;
     chart
         .configure_mesh()
@@ -133,18 +132,21 @@ fn draw_map(area: &Area<'_>, caption: &str, map: &Map, colours: &Colours) -> Dra
 fn draw_bar(area: &Area<'_>, unit: &str, colours: &Colours) -> DrawResult {
     let mut chart = ChartBuilder::on(area)
         .margin(10)
-        .margin_top(30)
         .margin_left(0)
+        .margin_right(4)
         .x_label_area_size(52)
-        .right_y_label_area_size(56)
+        .right_y_label_area_size(68)
         .build_cartesian_2d(0.0..1.0, colours.low..colours.high)?;
     chart
         .configure_mesh()
         .disable_mesh()
         .x_labels(0)
         .y_labels(9)
+        .y_desc(unit)
+        .axis_desc_style(letters(19))
         .label_style(letters(17))
         .axis_style(INK)
+        .set_tick_mark_size(LabelAreaPosition::Right, 8)
         .y_label_formatter(&tick)
         .draw()?;
     let plot = chart.plotting_area().strip_coord_spec();
@@ -155,7 +157,6 @@ fn draw_bar(area: &Area<'_>, unit: &str, colours: &Colours) -> DrawResult {
             plot.draw_pixel((x as i32, y as i32), &colours.of(value))?;
         }
     }
-    area.draw_text(unit, &letters(19), (0, 8))?;
     Ok(())
 }
 
@@ -187,8 +188,7 @@ mod tests {
         let (width, pixels) = pixels(&path);
         let brightest = colorous::VIRIDIS.eval_continuous(1.0).as_array();
         // the colour bar, on the right, ends with the same colour
-        let found: Vec<usize> =
-            (0..pixels.len()).filter(|&i| pixels[i] == brightest && i % (width as usize) < 700).collect();
+        let found: Vec<usize> = (0..pixels.len()).filter(|&i| pixels[i] == brightest && i % (width as usize) < 700).collect();
         let (rows, columns): (Vec<_>, Vec<_>) = found.iter().map(|i| (i / width as usize, i % width as usize)).unzip();
         // a fifth of the height by an eighth of the width, in the upper left corner
         assert!((80 * 70..110 * 100).contains(&found.len()), "{} bright pixels", found.len());
