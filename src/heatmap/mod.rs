@@ -14,8 +14,6 @@ mod dft;
 mod host;
 mod map;
 mod over_time;
-#[cfg(test)]
-pub(crate) mod synthetic;
 mod windows;
 
 pub use angle::Scan;
@@ -53,3 +51,6 @@ impl HeatmapConfig {
         peak_amplitude * 10f64.powf(self.floor_db / 20.0)
     }
 }
+
+#[cfg(test)]
+pub(crate) mod synthetic;
