@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::heatmap::{Axis, Map};
 use crate::metrics::DbWindow;
 
-const BAR_WIDTH: u32 = 106;
+const BAR_WIDTH: u32 = 116;
 const TITLE_HEIGHT: u32 = 44;
 const CAPTION_HEIGHT: u32 = 26;
 
@@ -133,7 +133,7 @@ fn draw_bar(area: &Area<'_>, unit: &str, colours: &Colours) -> DrawResult {
     let mut chart = ChartBuilder::on(area)
         .margin(10)
         .margin_left(0)
-        .margin_right(4)
+        .margin_right(14)
         .x_label_area_size(52)
         .right_y_label_area_size(68)
         .build_cartesian_2d(0.0..1.0, colours.low..colours.high)?;
@@ -205,7 +205,7 @@ mod tests {
         let red = colorous::RED_BLUE.eval_continuous(0.0).as_array();
         let blue = colorous::RED_BLUE.eval_continuous(1.0).as_array();
         let (width, pixels) = pixels(&path);
-        let cell = |colour| (0..pixels.len()).filter(|&i| pixels[i] == colour && i % (width as usize) < 1650).count();
+        let cell = |colour| (0..pixels.len()).filter(|&i| pixels[i] == colour && i % (width as usize) < 1600).count();
         assert!(cell(red) > 1000 && cell(blue) == 0, "{} red, {} blue", cell(red), cell(blue));
     }
 
