@@ -1,4 +1,4 @@
-"""Golden arrays for tests/parity.rs, from the formulas alone: NumPy in f64, seeded, sharing no code with the crate.
+"""Golden arrays for tests/parity, from the formulas alone: NumPy in f64, seeded, sharing no code with the crate.
 
     python scripts/golden.py            writes tests/golden/*.npz
     python scripts/golden.py --check    fails when those files differ from what would be written
@@ -42,7 +42,7 @@ def to_db(power, floor):
     return 10 * np.log10(power + floor**2)
 
 
-# 77 GHz, two transmitters and two receivers, lengths that are no powers of two; also written in tests/parity.rs
+# 77 GHz, two transmitters and two receivers, lengths that are no powers of two; also written in tests/parity
 RADAR = dict(f0=77e9, slope=60e12, rate=4e6, adc_start=6e-6, chirp_period=80e-6, frame_period=0.05)
 TX = np.array([[0.0, 0.0, 0.0], [0.0038, 0.0, 0.0]])
 RX = np.array([[0.0, 0.0, 0.0], [0.0019, 0.0, 0.0]])
