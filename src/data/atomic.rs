@@ -321,4 +321,52 @@ mod tests {
         living.finish().unwrap();
         assert_eq!(names(folder.path()), [".b.txt.partial-dead", "a.txt"]);
     }
+
+    /// Where the writer that is going to be killed works; unset in every other run.
+    const VICTIM: &str = "HYBRIDSIM_TEST_VICTIM";
+
+    #[test]
+    fn a_victim_writes_half_and_waits() {
+        let Some(folder) = std::env::var_os(VICTIM).map(PathBuf::from) else { return };
+        let mut file = AtomicFile::create(folder.join("a.txt")).unwrap();
+        file.write_all(&[0; 3 << 20]).unwrap();
+        let partial = AtomicFolder::replacing(folder.join("last")).unwrap();
+        write_text(partial.path().join("half.txt"), "half").unwrap();
+        write_text(folder.join("ready"), "").unwrap();
+        std::thread::sleep(Duration::from_secs(600));
+    }
+
+    #[test]
+    fn a_killed_writer_leaves_the_old_ones_and_the_next_writer_cleans_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, last) = (folder.path().join("a.txt"), folder.path().join("last"));
+        write_text(&file, "old").unwrap();
+        fs::create_dir(&last).unwrap();
+        write_text(last.join("old.txt"), "old").unwrap();
+        let test = "data::atomic::tests::a_victim_writes_half_and_waits";
+        let mut victim = std::process::Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", test])
+            .env(VICTIM, folder.path())
+            .stdout(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        let started = SystemTime::now();
+        while !folder.path().join("ready").exists() {
+            assert!(started.elapsed().unwrap() < Duration::from_secs(60), "the victim does not start");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        victim.kill().unwrap();
+        victim.wait().unwrap();
+
+        assert_eq!(fs::read_to_string(&file).unwrap(), "old");
+        assert_eq!(names(&last), ["old.txt"]);
+        let leftovers = [siblings(&file, "partial"), siblings(&last, "partial")].concat();
+        assert_eq!(leftovers.len(), 2);
+        for path in leftovers {
+            File::open(path).unwrap().set_modified(SystemTime::now() - Duration::from_secs(3600)).unwrap();
+        }
+        write_text(&file, "new").unwrap();
+        AtomicFolder::replacing(&last).unwrap().finish().unwrap();
+        assert_eq!(names(folder.path()), ["a.txt", "last", "ready"]);
+    }
 }
