@@ -88,7 +88,12 @@ fn read_person(folder: &Path, path: &Path, settings: &RecordingSettings, notes: 
     let meshes = [("vertices", &files.vertices), ("faces", &files.faces), ("pose_times", &files.pose_times)];
     if meshes.iter().any(|(_, file)| file.is_some()) {
         if files.body.is_some() || files.motion.is_some() {
-            return Err(Error::field(path, "files", "both a body and meshes", "body and motion, or vertices, faces and pose_times"));
+            return Err(Error::field(
+                path,
+                "files",
+                "both a body and meshes",
+                "body and motion, or vertices, faces and pose_times",
+            ));
         }
         if let Some((key, _)) = meshes.iter().find(|(_, file)| file.is_none()) {
             return Err(Error::field(path, format!("files.{key}"), "missing", "vertices, faces and pose_times together"));

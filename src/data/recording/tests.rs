@@ -168,7 +168,11 @@ fn an_axis_that_does_not_fit_the_radar_is_named() {
         refused_with(&folder, "loops_per_frame = 3", "loops_per_frame = 5"),
         "if.npy: `if` is int16 [2, 1, 2, 3, 4, 2], expected int16 [frame = 2, tx = 1, rx = 2, loop = 5, sample = 4, iq = 2]"
     );
-    fs::write(folder.join(SETTINGS_FILE), fs::read_to_string(folder.join(SETTINGS_FILE)).unwrap().replace("loops_per_frame = 3", "loops_per_frame = 5")).unwrap();
+    fs::write(
+        folder.join(SETTINGS_FILE),
+        fs::read_to_string(folder.join(SETTINGS_FILE)).unwrap().replace("loops_per_frame = 3", "loops_per_frame = 5"),
+    )
+    .unwrap();
     assert_eq!(Recording::open(&folder).unwrap_err().hint().unwrap(), "loop is 3 instead of 5");
 }
 
@@ -195,7 +199,10 @@ fn samples_that_are_cut_off_or_not_finite_are_refused() {
     let path = folder.join("if.npy");
     let whole = fs::read(&path).unwrap();
     fs::write(&path, &whole[..whole.len() - 10]).unwrap();
-    assert_eq!(refused(&folder), "if.npy: `if` is 182 bytes of data, expected 192 bytes for the float32 [2, 1, 2, 3, 4] of its header");
+    assert_eq!(
+        refused(&folder),
+        "if.npy: `if` is 182 bytes of data, expected 192 bytes for the float32 [2, 1, 2, 3, 4] of its header"
+    );
     fs::write(&path, "").unwrap();
     assert_eq!(refused(&folder), "if.npy: `if` is an empty file, expected a NumPy array (.npy)");
     let mut values = [0.0; 48];
@@ -204,7 +211,10 @@ fn samples_that_are_cut_off_or_not_finite_are_refused() {
     let recording = Recording::open(&folder).unwrap();
     recording.frame(0).unwrap();
     let message = recording.frame(1).unwrap_err().to_string();
-    assert!(message.ends_with("if.npy: `if` is NaN or infinite at frame 1, tx 0, rx 1, loop 1, sample 3, expected finite samples"), "{message}");
+    assert!(
+        message.ends_with("if.npy: `if` is NaN or infinite at frame 1, tx 0, rx 1, loop 1, sample 3, expected finite samples"),
+        "{message}"
+    );
     fs::remove_file(&path).unwrap();
     assert!(refused(&folder).starts_with("if.npy: cannot be read: "));
 }
@@ -221,12 +231,21 @@ fn settings_that_cannot_be_are_refused_in_their_file() {
         with("loops_per_frame", "loop_per_frame"),
         "recording.toml: unknown key `radar.loop_per_frame`, the nearest known one is `loops_per_frame`"
     );
-    assert_eq!(with("left_m = 1.9", "left_m = -1.9"), "recording.toml: `room.left_m` is -1.9, expected a distance above zero in metres");
+    assert_eq!(
+        with("left_m = 1.9", "left_m = -1.9"),
+        "recording.toml: `room.left_m` is -1.9, expected a distance above zero in metres"
+    );
     assert_eq!(with("frames = 2", "frames = 0"), "recording.toml: `radar.frames` is 0, expected a positive number");
-    assert_eq!(with("frames = 2", "frames = \"two\""), "recording.toml: line 13, column 10: invalid type: string \"two\", expected usize");
-    assert_eq!(with("[1.0, 0.0, 0.0]", "[-1.0, 0.0, 0.0]"), "recording.toml: `motion.radar_from_motion` is a mirror image, expected a rotation");
+    assert_eq!(
+        with("frames = 2", "frames = \"two\""),
+        "recording.toml: line 13, column 10: invalid type: string \"two\", expected usize"
+    );
+    assert_eq!(
+        with("[1.0, 0.0, 0.0]", "[-1.0, 0.0, 0.0]"),
+        "recording.toml: `motion.radar_from_motion` is a mirror image, expected a rotation"
+    );
     assert!(with("[1.0, 0.0, 0.0]", "[2.0, 0.0, 0.0]").ends_with("expected a rotation"));
-    assert_eq!(with("start_s = 0.0", "start_s = nan"), "recording.toml: `motion` is not finite, expected finite numbers");
+    assert_eq!(with("\nstart_s = 0.0", "\nstart_s = nan"), "recording.toml: `motion` is not finite, expected finite numbers");
     assert!(with("motion = \"motion.npz\"", "motion = \"other.npz\"").starts_with("other.npz: cannot be read: "));
     assert!(refused(&folder.join("none")).contains("recording.toml: cannot be read: "));
 }
@@ -281,7 +300,10 @@ fn a_recording_that_fails_half_way_leaves_nothing() {
         Ok(frame)
     };
     let message = write_recording(&folder, &contents, &mut spoiled).unwrap_err().to_string();
-    assert!(message.ends_with("`if` is NaN or infinite at frame 0, tx 0, rx 0, loop 1, sample 1, expected finite samples"), "{message}");
+    assert!(
+        message.ends_with("`if` is NaN or infinite at frame 0, tx 0, rx 0, loop 1, sample 1, expected finite samples"),
+        "{message}"
+    );
     assert!(names(parent.path()).is_empty());
 
     let panicked = std::panic::catch_unwind(|| write_recording(&folder, &contents, &mut |_| panic!("a bug")));
@@ -292,7 +314,8 @@ fn a_recording_that_fails_half_way_leaves_nothing() {
 fn a_recording_does_not_overwrite_another() {
     let radar = small_radar(Sampling::Complex);
     let (_parent, folder) = written(&contents(&radar, IfLayout::Codes));
-    let error = write_recording(&folder, &contents(&radar, IfLayout::Codes), &mut |index| Ok(frame_of(&radar, index))).unwrap_err();
+    let error =
+        write_recording(&folder, &contents(&radar, IfLayout::Codes), &mut |index| Ok(frame_of(&radar, index))).unwrap_err();
     assert!(error.to_string().ends_with("exists already and is not an empty folder"), "{error}");
     let error = write_recording(folder.join("x"), &contents(&radar, IfLayout::Real), &mut |_| unreachable!()).unwrap_err();
     assert_eq!(error.to_string(), "`radar.sampling` is complex, expected real for samples stored as real");

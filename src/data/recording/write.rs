@@ -74,8 +74,7 @@ pub fn write_recording(
 
 /// Writes the person's files and says how they are called.
 fn write_person(folder: &Path, contents: &RecordingContents) -> Result<Files> {
-    let mut files =
-        Files { samples: "if.npy".into(), body: None, motion: None, vertices: None, faces: None, pose_times: None };
+    let mut files = Files { samples: "if.npy".into(), body: None, motion: None, vertices: None, faces: None, pose_times: None };
     match contents.person {
         None => {}
         Some(Person::Skinned { model, motion, .. }) => {
