@@ -118,6 +118,8 @@ impl Default for Placement {
 }
 
 /// A person who moves in front of the radar.
+// There are one or two of them in a program: their size on the stack does not matter.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Person {
     Skinned {
