@@ -6,7 +6,7 @@ use super::{column, distance};
 
 /// Added to lengths in quadrature so that a point on an antenna has a finite gradient, metres.
 /// At 0.1 m it changes a length by 5·10⁻⁸ m.
-const SOFTENING_M: f64 = 1e-4;
+pub(crate) const SOFTENING_M: f64 = 1e-4;
 
 /// Displacement from the reference position, metres; each `[point, chirp]`. Carries gradients.
 #[derive(Clone, Debug)]
