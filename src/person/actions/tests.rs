@@ -117,9 +117,9 @@ fn motions_are_smooth() {
         let joints: Vec<Points> = posed(body(), &motion, 1).into_iter().map(|(joints, _)| joints).collect();
         let mut most = (0.0f64, 0.0f64);
         for triple in joints.windows(3) {
-            for joint in 0..24 {
-                let velocity = (triple[2][joint] - triple[1][joint]) * 60.0;
-                let acceleration = (triple[2][joint] - 2.0 * triple[1][joint] + triple[0][joint]) * 3600.0;
+            let [before, now, after] = triple else { unreachable!() };
+            for ((before, now), after) in before.iter().zip(now).zip(after) {
+                let (velocity, acceleration) = ((after - now) * 60.0, (after - now * 2.0 + before) * 3600.0);
                 most = (most.0.max(velocity.norm()), most.1.max(acceleration.norm()));
             }
         }
