@@ -118,8 +118,7 @@ impl Default for Placement {
 }
 
 /// A person who moves in front of the radar.
-// There are one or two of them in a program: their size on the stack does not matter.
-#[allow(clippy::large_enum_variant)]
+#[allow(clippy::large_enum_variant, reason = "there are a few persons, never many")]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Person {
     Skinned {
