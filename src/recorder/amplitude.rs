@@ -69,16 +69,16 @@ impl Laws {
         }
     }
 
-    /// Gain of the antenna and the walls on one leg, `direction` pointing from the image to the element.
-    fn leg(&self, mirror: &Mirror, direction: Vector, wavenumber: f64) -> Complex64 {
-        let gain = self.antenna_gain(mirror.direction(direction));
+    /// Gain of the antenna and the walls on one leg, `to_image` pointing from the element to the image.
+    fn leg(&self, mirror: &Mirror, to_image: Vector, wavenumber: f64) -> Complex64 {
+        let gain = self.antenna_gain(mirror.direction(scale(to_image, -1.0)));
         mirror.walls.iter().fold(gain.into(), |product: Complex64, wall: &Boundary| {
-            product * self.wall(direction[wall.axis().0].abs(), wavenumber)
+            product * self.wall(to_image[wall.axis().0].abs(), wavenumber)
         })
     }
 
     /// Complex amplitude of an element at each of `wavenumbers` (rad/m), relative to the phase of its reference point
-    /// and without the spreading 1/(r_tx r_rx). Zero where it faces away from either antenna.
+    /// and without the spreading 1/(r_tx r_rx). Smooth in the element's motion: who faces away is for `visibility` to say.
     pub fn response<const N: usize>(
         &self,
         element: &Element,
@@ -90,13 +90,8 @@ impl Laws {
         let to_tx = scale(subtract(view.tx_m, patch.point), 1.0 / tx);
         let to_rx = scale(subtract(view.rx_m, patch.point), 1.0 / rx);
         let (cos_tx, cos_rx) = (dot(patch.normal, to_tx), dot(patch.normal, to_rx));
-        if cos_tx <= 0.0 || cos_rx <= 0.0 {
-            return [Complex64::ZERO; N];
-        }
         let obliquity = 0.5 * (cos_tx + cos_rx);
-        let middle = wavenumbers[N / 2];
-        let legs = self.leg(view.tx, scale(to_tx, -1.0), middle) * self.leg(view.rx, scale(to_rx, -1.0), middle);
-        let strength = legs * self.body.reflection(obliquity) * (element.reflectivity * obliquity * patch.area_m2 / (4.0 * PI));
+        let strength = self.body.reflection(obliquity) * (element.reflectivity * obliquity * patch.area_m2 / (4.0 * PI));
         let extra = patch.corners.map(|corners| {
             corners.map(|corner| distance(view.tx_m, corner) + distance(view.rx_m, corner) - tx - rx)
         });
@@ -106,7 +101,8 @@ impl Laws {
                 let lift = extra.iter().sum::<f64>() / 3.0;
                 mean_phasor(extra.map(|path| wavenumber * (path - 0.75 * lift)))
             });
-            strength * shape * self.body.coherence(wavenumber, cos_tx + cos_rx)
+            let legs = self.leg(view.tx, to_tx, wavenumber) * self.leg(view.rx, to_rx, wavenumber);
+            strength * legs * shape * self.body.coherence(wavenumber, cos_tx + cos_rx)
         })
     }
 }

@@ -8,6 +8,17 @@ use crate::radar::SPEED_OF_LIGHT;
 /// Elements in a block: all arrays below stay in the first caches.
 pub const BLOCK: usize = 256;
 
+/// Instants between which amplitudes are interpolated.
+pub const NODES: usize = 4;
+
+/// Weights of those instants in one chirp.
+pub struct NodeShares {
+    /// In the middle of the ADC window.
+    pub value: [f64; NODES],
+    /// From its start to its end: amplitudes change within a chirp, too.
+    pub change: [f64; NODES],
+}
+
 /// Geometry of one block of elements in one chirp.
 pub struct Lanes {
     position: [[f64; BLOCK]; 3],
@@ -63,11 +74,19 @@ impl Lanes {
         }
     }
 
-    /// Amplitudes by quadratic interpolation between three instants `nodes[element][node]`.
-    pub fn weigh(&mut self, nodes: &[[ToneWeights; 3]], share: [f64; 3]) {
-        let share = share.map(|s| s as f32);
+    /// Amplitudes by interpolation between the instants of `nodes[element][node]`.
+    pub fn weigh(&mut self, nodes: &[[ToneWeights; NODES]], shares: &NodeShares) {
+        let (value, change) = (shares.value.map(|s| s as f32), shares.change.map(|s| s as f32));
         for (amplitude, node) in self.amplitude.iter_mut().zip(nodes) {
-            *amplitude = std::array::from_fn(|k| share[0] * node[0][k] + share[1] * node[1][k] + share[2] * node[2][k]);
+            let mut sum: ToneWeights = [0.0; 2 * ORDERS];
+            for (weights, (value, change)) in node.iter().zip(value.into_iter().zip(change)) {
+                for (sum, weight) in sum.iter_mut().zip(weights) {
+                    *sum += value * weight;
+                }
+                sum[2] += change * weights[0];
+                sum[3] += change * weights[1];
+            }
+            *amplitude = sum;
         }
     }
 

@@ -8,7 +8,7 @@ use super::material::Material;
 use super::receiver::range_doppler_power;
 use super::record::Recorder;
 use super::surface::{Returns, SurfaceConfig};
-use super::test_support::{bare_world, gliding, plate, sphere};
+use super::test_support::{bare_world, gliding, plate, sphere, turning};
 use super::world::{Reflector, World};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::Room;
@@ -79,8 +79,7 @@ fn a_metal_sphere_has_the_cross_section_of_its_disc() {
     // From the nearest point of the sphere, with the spread of its curved mirror: r (r + a/2) instead of r².
     let nearest = range - radius;
     let wanted = radar.wavelength_m() * (PI * radius * radius).sqrt()
-        / ((4.0 * PI).powf(1.5) * nearest * (nearest + 0.5 * radius))
-        * (1.0 + 0.5 * radius / nearest).recip().powi(0);
+        / ((4.0 * PI).powf(1.5) * nearest * (nearest + 0.5 * radius));
     let db = 20.0 * (level(&world) / wanted).log10();
     assert!(db.abs() < 0.5, "{db:.2} dB from the geometric limit");
 }
@@ -130,15 +129,15 @@ fn the_surface_integral_converges_and_vertices_do_not() {
 
 #[test]
 fn the_fast_path_agrees_with_the_reference_to_minus_eighty_decibels() {
-    // A sphere that crosses at walking speed, direct and over a wall, with two transmitters.
+    // A ball on a long arm: 3 m/s and 6 rad/s, direct and over a wall, with two transmitters, across several poses.
     let radar = Radar {
         samples_per_chirp: 64,
-        loops_per_frame: 12,
+        loops_per_frame: 16,
         tx_m: vec![[-0.02, 0.0, 0.0], [-0.016, 0.0, 0.002]],
         ..Radar::small(1)
     };
     for returns in [Returns::Facets, Returns::Vertices, Returns::Random] {
-        let mut world = bare_world(radar.clone(), gliding(sphere([0.3, 1.5, 0.1], 0.15, 3), [1.0, -3.0, 0.5]));
+        let mut world = bare_world(radar.clone(), turning(sphere([0.3, 1.5, 0.1], 0.1, 2), [0.0, 1.5, 0.0], [1.0, -1.5, 0.5], 6.0));
         world.surface = SurfaceConfig { returns, variation_db: 2.0, ..world.surface };
         world.skin = Material::SKIN;
         world.room = Room { left_m: Some(1.0), ..Room::default() };
@@ -154,7 +153,7 @@ fn the_fast_path_agrees_with_the_reference_to_minus_eighty_decibels() {
 #[test]
 fn an_image_in_a_wall_is_the_explicit_reflected_path() {
     // A tiny facet; its first-order returns against the path over the reflection point, computed by hand.
-    let (side, wall) = (1.0e-3, 1.2);
+    let (side, wall) = (2.0e-4, 1.2);
     let radar = Radar { loops_per_frame: 1, tx_m: vec![[0.0; 3]], rx_m: vec![[0.0; 3]], ..Radar::small(1) };
     let mut world = bare_world(radar.clone(), gliding(plate([0.4, 2.0, 0.1], side, 1), [0.0; 3]));
     world.skin = METAL;
@@ -178,7 +177,7 @@ fn an_image_in_a_wall_is_the_explicit_reflected_path() {
         let turns = radar.carrier_hz() * delay + radar.slope_hz_per_s * (t * delay - 0.5 * delay * delay);
         // The metal plate turns the sign.
         let wanted = -amplitude * Complex64::cis(std::f64::consts::TAU * turns.fract());
-        assert!(((a - b) - wanted).norm() < 2e-2 * amplitude, "sample {sample}: {} against {wanted}", a - b);
+        assert!(((a - b) - wanted).norm() < 5e-3 * amplitude, "sample {sample}: {} against {wanted}", a - b);
     }
 }
 

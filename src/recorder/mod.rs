@@ -18,6 +18,7 @@
 pub mod amplitude;
 pub mod body;
 pub mod chirp;
+pub mod config;
 mod lanes;
 pub mod material;
 pub mod mirror;
@@ -40,6 +41,7 @@ mod laws;
 #[cfg(test)]
 pub(crate) mod test_support;
 
+pub use config::{ActorConfig, RadarChoice, RecorderConfig};
 pub use material::Material;
 pub use receiver::{ReceiverConfig, Samples};
 pub use record::{Recorder, record};

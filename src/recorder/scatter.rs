@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::amplitude::{Laws, View};
 use super::body::MovingBody;
 use super::chirp::Chirp;
-use super::lanes::{BLOCK, ChirpWeights, Lanes};
+use super::lanes::{BLOCK, ChirpWeights, Lanes, NODES, NodeShares};
 use super::mirror::Mirror;
 use super::range_grid::{RangeGrid, ToneWeights};
 use super::surface::{Element, Pose};
@@ -18,8 +18,8 @@ use super::visibility::Obstacle;
 use crate::error::Result;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
-/// Amplitudes are evaluated at three instants at most this far apart together, and interpolated between them.
-const AMPLITUDE_SPAN_S: f64 = 3.5e-3;
+/// Amplitudes are evaluated at four instants that span no more than this, and interpolated between them.
+const AMPLITUDE_SPAN_S: f64 = 7.0e-3;
 
 /// A body in front of a radar.
 pub struct Scatter {
@@ -180,9 +180,11 @@ impl Scatter {
         let times: Vec<f64> = chirps.clone().map(|chirp| self.chirp_time_s(frame, chirp)).collect();
         let weights = times.iter().map(|&time| self.chirp_weights(scene, time)).collect::<Result<Vec<_>>>()?;
         let (first, last) = (times[0], times[times.len() - 1]);
-        let nodes = [first, 0.5 * (first + last), last]
-            .map(|time| Ok(self.pose_at(scene, &self.body.weights(time + self.chirp.middle_s)?)));
-        let nodes: Vec<Pose> = nodes.into_iter().collect::<Result<_>>()?;
+        let shares: Vec<NodeShares> = times.iter().map(|time| self.node_shares(time - first, last - first)).collect();
+        let nodes: Vec<Pose> = (0..NODES)
+            .map(|node| first + (last - first) * node as f64 / (NODES - 1) as f64)
+            .map(|time| Ok(self.pose_at(scene, &self.body.weights(time + self.chirp.middle_s)?)))
+            .collect::<Result<_>>()?;
         let mut storage = vec![0f32; chirps.len() * receivers * self.grid.storage()];
         let mut lanes = Lanes::new();
         for lit in &scene.lit {
@@ -196,7 +198,7 @@ impl Scatter {
                 for (index, chirp) in chirps.clone().enumerate() {
                     let transmitter = self.radar.tx_position_m(chirp % self.radar.tx_m.len());
                     lanes.place(&lit.positions, start, block.len(), &weights[index]);
-                    lanes.weigh(&amplitudes, lagrange(if last > first { (times[index] - first) / (last - first) } else { 0.0 }));
+                    lanes.weigh(&amplitudes, &shares[index]);
                     lanes.transmit(tx_mirror.point(transmitter));
                     let grids = storage.chunks_mut(self.grid.storage()).skip(index * receivers);
                     for (&receiver, grid) in receivers_m.iter().zip(grids) {
@@ -208,8 +210,18 @@ impl Scatter {
         Ok(storage.chunks(self.grid.storage()).flat_map(|grid| self.grid.samples(grid)).collect())
     }
 
-    /// `[element][node]`: amplitude as a parabola over the sweep, at each of three instants.
-    fn amplitudes(&self, block: &[u32], nodes: &[Pose], view: &View) -> Vec<[ToneWeights; 3]> {
+    /// Interpolation between the instants of a chunk, for a chirp `since_s` after the first of them.
+    fn node_shares(&self, since_s: f64, span_s: f64) -> NodeShares {
+        if span_s == 0.0 {
+            return NodeShares { value: lagrange(0.0), change: [0.0; NODES] };
+        }
+        let (middle, half) = (since_s / span_s, 0.5 * self.chirp.window_s / span_s);
+        let (before, after) = (lagrange(middle - half), lagrange(middle + half));
+        NodeShares { value: lagrange(middle), change: std::array::from_fn(|node| after[node] - before[node]) }
+    }
+
+    /// `[element][node]`: amplitude as a parabola over the sweep, at each of the instants.
+    fn amplitudes(&self, block: &[u32], nodes: &[Pose], view: &View) -> Vec<[ToneWeights; NODES]> {
         let wavenumbers = [-0.5, 0.0, 0.5].map(|s| std::f64::consts::TAU * self.chirp.frequency_hz(s) / SPEED_OF_LIGHT);
         block
             .iter()
@@ -235,8 +247,8 @@ impl Scatter {
             .into_par_iter()
             .map(|(chirp, sample)| {
                 let ramp_s = self.radar.sample_time_s(sample);
-                let pose = self.pose_at(&scene, &self.body.weights(self.chirp_time_s(frame, chirp) + ramp_s)?);
-                Ok(self.reference_sample(&scene, &pose, chirp % self.radar.tx_m.len(), ramp_s))
+                let weights = self.body.weights(self.chirp_time_s(frame, chirp) + ramp_s)?;
+                Ok(self.reference_sample(&scene, &weights, chirp % self.radar.tx_m.len(), ramp_s))
             })
             .collect::<Result<_>>()?;
         // [chirp, sample][rx] to [chirp, rx, sample]
@@ -249,7 +261,8 @@ impl Scatter {
         Ok(self.ordered(&signal))
     }
 
-    fn reference_sample(&self, scene: &FrameScene, pose: &Pose, transmitter: usize, ramp_s: f64) -> Vec<Complex64> {
+    fn reference_sample(&self, scene: &FrameScene, weights: &Weights, transmitter: usize, ramp_s: f64) -> Vec<Complex64> {
+        let pose = self.pose_at(scene, weights);
         let mut sums = vec![Complex64::ZERO; self.radar.rx_m.len()];
         let frequency_hz = self.chirp.middle_hz + self.chirp.slope_hz_per_s * (ramp_s - self.chirp.middle_s);
         let wavenumber = std::f64::consts::TAU * frequency_hz / SPEED_OF_LIGHT;
@@ -257,13 +270,16 @@ impl Scatter {
             let (tx_mirror, rx_mirror) = (&self.mirrors[lit.tx], &self.mirrors[lit.rx]);
             let view = View::new(tx_mirror, rx_mirror, self.radar.centre_m());
             let tx_m = tx_mirror.point(self.radar.tx_position_m(transmitter));
-            for &index in &lit.elements {
+            for (position, &index) in lit.elements.iter().enumerate() {
                 let element = &self.elements[index as usize];
                 let patch = pose.patch(element, &self.body.faces, self.smoothing);
                 let [amplitude] = self.laws.response(element, &patch, &view, [wavenumber]);
-                let to_tx = distance(patch.point, tx_m);
+                let point: Vector = std::array::from_fn(|axis| {
+                    weights.iter().map(|&(pose, weight)| weight * lit.positions[pose - scene.first_pose][axis][position]).sum()
+                });
+                let to_tx = distance(point, tx_m);
                 for (rx, sum) in sums.iter_mut().enumerate() {
-                    let to_rx = distance(patch.point, rx_mirror.point(self.radar.rx_position_m(rx)));
+                    let to_rx = distance(point, rx_mirror.point(self.radar.rx_position_m(rx)));
                     let turns = self.chirp.exact_turns(ramp_s, (to_tx + to_rx) / SPEED_OF_LIGHT);
                     *sum += amplitude * Complex64::cis(std::f64::consts::TAU * turns.fract()) / (to_tx * to_rx);
                 }
@@ -273,7 +289,8 @@ impl Scatter {
     }
 }
 
-/// Quadratic interpolation between 0, 1/2 and 1.
-fn lagrange(u: f64) -> [f64; 3] {
-    [(1.0 - u) * (1.0 - 2.0 * u), 4.0 * u * (1.0 - u), u * (2.0 * u - 1.0)]
+/// Cubic interpolation between 0, 1/3, 2/3 and 1.
+fn lagrange(u: f64) -> [f64; NODES] {
+    let [a, b, c, d] = [0.0, 1.0, 2.0, 3.0].map(|node| 3.0 * u - node);
+    [b * c * d / -6.0, a * c * d / 2.0, a * b * d / -2.0, a * b * c / 6.0]
 }

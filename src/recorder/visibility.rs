@@ -57,14 +57,18 @@ impl<'a> Obstacle<'a> {
             return vec![false; group.len()];
         }
         let longest = (0..3).map(|i| distance(corners[i], corners[(i + 1) % 3])).fold(0.0, f64::max);
-        if longest <= SMALL_FACET_M && group.len() > 4 {
+        if self.smoothing == 0.0 && longest <= SMALL_FACET_M && group.len() > 4 {
             let probes = [[1.0 / 3.0; 3], [0.96, 0.02, 0.02], [0.02, 0.96, 0.02], [0.02, 0.02, 0.96]];
             let seen = probes.map(|probe| self.sees(viewpoint, combine(&corners, probe)));
             if seen.iter().all(|&s| s == seen[0]) {
                 return vec![seen[0]; group.len()];
             }
         }
-        group.iter().map(|element| self.sees(viewpoint, self.pose.point(element, self.faces, self.smoothing))).collect()
+        let seen = |element: &Element| {
+            let patch = self.pose.patch(element, self.faces, self.smoothing);
+            dot(patch.normal, subtract(viewpoint, patch.point)) > 0.0 && self.sees(viewpoint, patch.point)
+        };
+        group.iter().map(seen).collect()
     }
 }
 
