@@ -92,9 +92,9 @@ impl Laws {
         let (cos_tx, cos_rx) = (dot(patch.normal, to_tx), dot(patch.normal, to_rx));
         let obliquity = 0.5 * (cos_tx + cos_rx);
         let strength = self.body.reflection(obliquity) * (element.reflectivity * obliquity * patch.area_m2 / (4.0 * PI));
-        let extra = patch.corners.map(|corners| {
-            corners.map(|corner| distance(view.tx_m, corner) + distance(view.rx_m, corner) - tx - rx)
-        });
+        let extra = patch
+            .corners
+            .map(|corners| corners.map(|corner| distance(view.tx_m, corner) + distance(view.rx_m, corner) - tx - rx));
         wavenumbers.map(|wavenumber| {
             let shape = extra.map_or(Complex64::ONE, |extra| {
                 // The sphericity of the wave lifts the corners together; over the triangle a quarter of it remains.

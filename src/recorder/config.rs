@@ -235,7 +235,8 @@ mod tests {
         assert_eq!(named.radar.radar().unwrap().samples_per_chirp, 256);
         let unknown = RadarChoice::Preset("bmmesh".into()).radar().unwrap_err().to_string();
         assert!(unknown.contains("`mmmesh`"), "{unknown}");
-        let table = toml::to_string(&RecorderConfig { radar: RadarChoice::Full(Box::new(Radar::small(3))), ..RecorderConfig::default() });
+        let table =
+            toml::to_string(&RecorderConfig { radar: RadarChoice::Full(Box::new(Radar::small(3))), ..RecorderConfig::default() });
         assert_eq!(toml::from_str::<RecorderConfig>(&table.unwrap()).unwrap().radar.radar().unwrap().frames, 3);
         let message = toml::from_str::<RecorderConfig>("[radar]\nslope = 1.0").unwrap_err().to_string();
         assert!(message.contains("unknown field `slope`"), "{message}");

@@ -114,10 +114,8 @@ impl Lanes {
         let mut spread = [0f32; BLOCK];
         for (i, spread) in spread.iter_mut().enumerate() {
             let (distance, rate) = self.leg(antenna, i);
-            let line = chirp.line(
-                (self.tx_delay[i] + distance) * (1.0 / SPEED_OF_LIGHT),
-                (self.tx_rate[i] + rate) * (1.0 / SPEED_OF_LIGHT),
-            );
+            let line = chirp
+                .line((self.tx_delay[i] + distance) * (1.0 / SPEED_OF_LIGHT), (self.tx_rate[i] + rate) * (1.0 / SPEED_OF_LIGHT));
             *spread = (self.spread[i] / distance) as f32;
             self.turns[i] = (line.turns - nearest(line.turns)) as f32;
             self.bend[i] = line.bend_rad as f32;

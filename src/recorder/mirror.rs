@@ -106,7 +106,8 @@ mod tests {
     #[test]
     fn facing_walls_move_the_image_by_twice_their_distance() {
         let all = Mirror::images(&room(), &[Boundary::Left, Boundary::Right], 2);
-        let mut shifts: Vec<f64> = all.iter().filter(|mirror| mirror.order() == 2).map(|mirror| mirror.point([0.0; 3])[0]).collect();
+        let mut shifts: Vec<f64> =
+            all.iter().filter(|mirror| mirror.order() == 2).map(|mirror| mirror.point([0.0; 3])[0]).collect();
         shifts.sort_by(f64::total_cmp);
         assert_eq!(shifts, vec![-7.0, 7.0]);
     }

@@ -35,6 +35,7 @@ mod truth;
 pub mod vector;
 pub mod visibility;
 pub mod world;
+mod write;
 
 #[cfg(test)]
 mod laws;
@@ -43,9 +44,10 @@ pub(crate) mod test_support;
 
 pub use config::{ActorConfig, RadarChoice, RecorderConfig};
 pub use material::Material;
-pub use receiver::{ReceiverConfig, Samples};
+pub use receiver::ReceiverConfig;
 pub use record::{Recorder, record};
 pub use surface::{Returns, SurfaceConfig};
 pub use timeline::Interpolation;
 pub use truth::truth;
 pub use world::{Reflector, WallsConfig, World};
+pub use write::{Labels, record_to, write_world};

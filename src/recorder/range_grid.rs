@@ -132,7 +132,10 @@ mod tests {
                     let n = sample as f64 - (samples / 2) as f64;
                     let s = n / samples as f64;
                     let factor: Complex64 = (0..ORDERS)
-                        .map(|order| Complex64::new(f64::from(weights[2 * order]), f64::from(weights[2 * order + 1])) * s.powi(order as i32))
+                        .map(|order| {
+                            Complex64::new(f64::from(weights[2 * order]), f64::from(weights[2 * order + 1]))
+                                * s.powi(order as i32)
+                        })
                         .sum();
                     *value += factor * Complex64::cis(TAU * frequency * n);
                 }

@@ -7,6 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rustfft::FftPlanner;
 use serde::{Deserialize, Serialize};
 
+use crate::data::{IfFrame, IfLayout};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
 
@@ -49,16 +50,6 @@ impl ReceiverConfig {
     }
 }
 
-/// Samples of one frame, `[tx, rx, loop, sample]`, as they are written.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Samples {
-    /// ADC codes of a quadrature receiver: `[.., iq]`.
-    ComplexCodes(Vec<i16>),
-    RealCodes(Vec<i16>),
-    Complex(Vec<num_complex::Complex32>),
-    Real(Vec<f32>),
-}
-
 /// A receiver whose gain and noise level are settled.
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver {
@@ -82,32 +73,32 @@ pub fn random_phase(rng: &mut ChaCha8Rng) -> Complex64 {
 }
 
 impl Receiver {
-    /// From the field at the antennas to what is written.
-    pub fn receive(&self, field: &[Complex64], rng: &mut ChaCha8Rng) -> Samples {
-        let components = if self.sampling == Sampling::Complex { 2 } else { 1 };
-        let mut values = Vec::with_capacity(field.len() * components);
+    /// How its samples are stored.
+    pub fn layout(&self) -> IfLayout {
+        match (self.adc, self.sampling) {
+            (true, Sampling::Complex) => IfLayout::Codes,
+            (true, Sampling::Real) => IfLayout::RealCodes,
+            (false, Sampling::Complex) => IfLayout::Complex,
+            (false, Sampling::Real) => IfLayout::Real,
+        }
+    }
+
+    /// From the field at the antennas, `[tx, rx, loop, sample]`, to what is written.
+    pub fn receive(&self, field: &[Complex64], dims: [usize; 4], rng: &mut ChaCha8Rng) -> IfFrame {
+        let mut value = |ideal: f64| {
+            let noise: f64 = if self.noise_codes > 0.0 { StandardNormal.sample(rng) } else { 0.0 };
+            let value = ideal + self.noise_codes * noise;
+            if self.adc { value.round().clamp(-self.rail - 1.0, self.rail) as f32 } else { value as f32 }
+        };
+        let (mut re, mut im) = (Vec::with_capacity(field.len()), Vec::new());
         for &sample in field {
             let scaled = sample * self.gain;
-            values.push(scaled.re);
-            if components == 2 {
-                values.push(scaled.im);
+            re.push(value(scaled.re));
+            if self.sampling == Sampling::Complex {
+                im.push(value(scaled.im));
             }
         }
-        if self.noise_codes > 0.0 {
-            for value in &mut values {
-                let noise: f64 = StandardNormal.sample(rng);
-                *value += self.noise_codes * noise;
-            }
-        }
-        let code = |value: &f64| value.round().clamp(-self.rail - 1.0, self.rail) as i16;
-        match (self.adc, self.sampling) {
-            (true, Sampling::Complex) => Samples::ComplexCodes(values.iter().map(code).collect()),
-            (true, Sampling::Real) => Samples::RealCodes(values.iter().map(code).collect()),
-            (false, Sampling::Complex) => {
-                Samples::Complex(values.chunks_exact(2).map(|iq| num_complex::Complex32::new(iq[0] as f32, iq[1] as f32)).collect())
-            }
-            (false, Sampling::Real) => Samples::Real(values.iter().map(|&value| value as f32).collect()),
-        }
+        IfFrame::new(dims, re, (self.sampling == Sampling::Complex).then_some(im))
     }
 }
 
@@ -171,24 +162,29 @@ mod tests {
         Receiver { sampling, gain: Complex64::new(1000.0, 0.0), noise_codes, adc, rail: 32767.0 }
     }
 
+    fn field_of(frame: &IfFrame) -> Vec<Complex64> {
+        let im = frame.im.clone().unwrap_or(vec![0.0; frame.re.len()]);
+        frame.re.iter().zip(im).map(|(&re, im)| Complex64::new(re.into(), im.into())).collect()
+    }
+
     #[test]
     fn codes_are_rounded_and_clipped_at_the_rail() {
         let field = [Complex64::new(1.2344, -0.0006), Complex64::new(40.0, -40.0)];
-        let codes = receiver(true, 0.0, Sampling::Complex).receive(&field, &mut ChaCha8Rng::seed_from_u64(0));
-        assert_eq!(codes, Samples::ComplexCodes(vec![1234, -1, 32767, -32768]));
-        let real = receiver(true, 0.0, Sampling::Real).receive(&field, &mut ChaCha8Rng::seed_from_u64(0));
-        assert_eq!(real, Samples::RealCodes(vec![1234, 32767]));
+        let receive = |sampling| receiver(true, 0.0, sampling).receive(&field, [1, 1, 1, 2], &mut ChaCha8Rng::seed_from_u64(0));
+        let codes = receive(Sampling::Complex);
+        assert_eq!((codes.re, codes.im), (vec![1234.0, 32767.0], Some(vec![-1.0, -32768.0])));
+        let codes = receive(Sampling::Real);
+        assert_eq!((codes.re, codes.im), (vec![1234.0, 32767.0], None));
     }
 
     #[test]
     fn noise_has_the_power_that_was_asked_for_and_is_white() {
-        let field = vec![Complex64::ZERO; 64 * 64];
-        let Samples::Complex(noise) = receiver(false, 3.0, Sampling::Complex).receive(&field, &mut ChaCha8Rng::seed_from_u64(5)) else {
-            panic!("complex samples")
-        };
-        let power: f64 = noise.iter().map(|v| f64::from(v.norm_sqr())).sum::<f64>() / noise.len() as f64;
+        let receiver = receiver(false, 3.0, Sampling::Complex);
+        let noise =
+            field_of(&receiver.receive(&vec![Complex64::ZERO; 64 * 64], [1, 1, 64, 64], &mut ChaCha8Rng::seed_from_u64(5)));
+        let power: f64 = noise.iter().map(|v| v.norm_sqr()).sum::<f64>() / noise.len() as f64;
         assert!((power / 18.0 - 1.0).abs() < 0.05, "{power}");
-        let lag: f64 = noise.windows(2).map(|pair| f64::from((pair[0] * pair[1].conj()).re)).sum::<f64>() / noise.len() as f64;
+        let lag: f64 = noise.windows(2).map(|pair| (pair[0] * pair[1].conj()).re).sum::<f64>() / noise.len() as f64;
         assert!(lag.abs() < 0.8, "{lag}");
     }
 
@@ -198,18 +194,16 @@ mod tests {
             let radar = Radar { sampling, ..Radar::small(1) };
             let (loops, samples) = (radar.loops_per_frame, radar.samples_per_chirp);
             let channels = radar.rx_m.len();
-            let body: Vec<Complex64> =
-                (0..channels * loops * samples).map(|i| Complex64::cis(0.6 * (i % samples) as f64 + 0.9 * (i / samples % loops) as f64)).collect();
+            let body: Vec<Complex64> = (0..channels * loops * samples)
+                .map(|i| Complex64::cis(0.6 * (i % samples) as f64 + 0.9 * (i / samples % loops) as f64))
+                .collect();
             let sigma = noise_for_snr(&body, &radar, 30.0);
             let receiver = Receiver { gain: Complex64::ONE, noise_codes: sigma, ..receiver(false, 0.0, sampling) };
             let mut floor = 0.0;
             let mut rng = ChaCha8Rng::seed_from_u64(1);
             for _ in 0..20 {
-                let noise: Vec<Complex64> = match receiver.receive(&vec![Complex64::ZERO; loops * samples], &mut rng) {
-                    Samples::Complex(values) => values.iter().map(|v| Complex64::new(v.re.into(), v.im.into())).collect(),
-                    Samples::Real(values) => values.iter().map(|&v| f64::from(v).into()).collect(),
-                    _ => panic!("floating-point samples"),
-                };
+                let silence = vec![Complex64::ZERO; loops * samples];
+                let noise = field_of(&receiver.receive(&silence, [1, 1, loops, samples], &mut rng));
                 let map = range_doppler_power(&noise, samples);
                 floor += map.iter().sum::<f64>() / map.len() as f64 / 20.0;
             }

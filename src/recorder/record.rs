@@ -5,11 +5,12 @@ use num_complex::Complex64;
 use super::amplitude::{Laws, WallLaw};
 use super::body::{MovingBody, smooth_field};
 use super::mirror::Mirror;
-use super::receiver::{Receiver, Samples, noise_for_snr, rail, random_phase};
+use super::receiver::{Receiver, noise_for_snr, rail, random_phase};
 use super::scatter::Scatter;
 use super::surface::elements;
 use super::surroundings::static_signal;
 use super::world::{Draw, World};
+use crate::data::{IfFrame, IfLayout};
 use crate::error::Result;
 
 /// Frames from which the converter's scale is estimated.
@@ -67,13 +68,20 @@ impl Recorder {
     }
 
     /// What the receiver makes of a frame.
-    pub fn frame(&self, frame: usize) -> Result<Samples> {
-        Ok(self.receiver.receive(&self.field(frame)?, &mut self.world.random(Draw::Noise { frame })))
+    pub fn frame(&self, frame: usize) -> Result<IfFrame> {
+        let [_, tx, rx, loops, samples] = self.world.radar.dims();
+        let mut rng = self.world.random(Draw::Noise { frame });
+        Ok(self.receiver.receive(&self.field(frame)?, [tx, rx, loops, samples], &mut rng))
+    }
+
+    /// How its frames are stored.
+    pub fn layout(&self) -> IfLayout {
+        self.receiver.layout()
     }
 }
 
 /// All frames of a world; `progress` hears how many of how many are done.
-pub fn record(world: &World, progress: &mut dyn FnMut(usize, usize)) -> Result<Vec<Samples>> {
+pub fn record(world: &World, progress: &mut dyn FnMut(usize, usize)) -> Result<Vec<IfFrame>> {
     let recorder = Recorder::new(world)?;
     (0..world.radar.frames)
         .map(|frame| {
@@ -127,11 +135,5 @@ fn settle_receiver(world: &World, scatter: Option<&Scatter>, surroundings: &[Com
     };
     let scale = if peak > 0.0 { config.peak_fraction * rail(radar) / peak } else { 1.0 };
     let phase = if config.unknown_phase { random_phase(&mut world.random(Draw::Gain)) } else { Complex64::ONE };
-    Ok(Receiver {
-        sampling: radar.sampling,
-        gain: phase * scale,
-        noise_codes: noise * scale,
-        adc: config.adc,
-        rail: rail(radar),
-    })
+    Ok(Receiver { sampling: radar.sampling, gain: phase * scale, noise_codes: noise * scale, adc: config.adc, rail: rail(radar) })
 }

@@ -190,8 +190,7 @@ impl Scatter {
         for lit in &scene.lit {
             let (tx_mirror, rx_mirror) = (&self.mirrors[lit.tx], &self.mirrors[lit.rx]);
             let view = View::new(tx_mirror, rx_mirror, self.radar.centre_m());
-            let receivers_m: Vec<Vector> =
-                (0..receivers).map(|rx| rx_mirror.point(self.radar.rx_position_m(rx))).collect();
+            let receivers_m: Vec<Vector> = (0..receivers).map(|rx| rx_mirror.point(self.radar.rx_position_m(rx))).collect();
             for start in (0..lit.elements.len()).step_by(BLOCK) {
                 let block = &lit.elements[start..(start + BLOCK).min(lit.elements.len())];
                 let amplitudes = self.amplitudes(block, &nodes, &view);

@@ -39,7 +39,14 @@ pub struct SurfaceConfig {
 
 impl Default for SurfaceConfig {
     fn default() -> Self {
-        Self { returns: Returns::Facets, edge_m: 5.0e-3, smoothing: 0.0, height_m: 2.0e-4, variation_db: 2.0, variation_scale_m: 0.25 }
+        Self {
+            returns: Returns::Facets,
+            edge_m: 5.0e-3,
+            smoothing: 0.0,
+            height_m: 2.0e-4,
+            variation_db: 2.0,
+            variation_scale_m: 0.25,
+        }
     }
 }
 
@@ -49,11 +56,9 @@ impl SurfaceConfig {
             return Err(Error::setting(format!("{key}.edge_m"), self.edge_m, "between 0.0002 and 0.012 metres")
                 .with_hint("pieces longer than three wavelengths leave the closed form's range"));
         }
-        for (name, value, most) in [
-            ("smoothing", self.smoothing, 1.0),
-            ("height_m", self.height_m, 0.01),
-            ("variation_db", self.variation_db, 40.0),
-        ] {
+        for (name, value, most) in
+            [("smoothing", self.smoothing, 1.0), ("height_m", self.height_m, 0.01), ("variation_db", self.variation_db, 40.0)]
+        {
             if !(0.0..=most).contains(&value) {
                 return Err(Error::setting(format!("{key}.{name}"), value, format!("between 0 and {most}")));
             }

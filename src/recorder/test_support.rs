@@ -72,10 +72,10 @@ pub fn gliding(mesh: (Vec<Vector>, Vec<[usize; 3]>), velocity: Vector) -> Person
     Person::Meshes { vertices: vec![vertices, later], faces, pose_times_s: vec![0.0, 1.0] }
 }
 
-/// A mesh that glides and turns about a vertical axis through `pivot`, 500 poses per second for 20 ms.
+/// A mesh that glides and turns about a vertical axis through `pivot`, 1000 poses per second for 10 ms.
 pub fn turning(mesh: (Vec<Vector>, Vec<[usize; 3]>), pivot: Vector, velocity: Vector, turn_rad_per_s: f64) -> Person {
     let (vertices, faces) = mesh;
-    let pose_times_s: Vec<f64> = (0..=10).map(|pose| 2.0e-3 * pose as f64).collect();
+    let pose_times_s: Vec<f64> = (0..=10).map(|pose| 1.0e-3 * pose as f64).collect();
     let at = |time: f64| {
         let rotation = super::skinning::rodrigues([0.0, 0.0, turn_rad_per_s * time]);
         let place = |&vertex: &Vector| {

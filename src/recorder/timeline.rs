@@ -28,8 +28,13 @@ pub type Weights = Vec<(usize, f64)>;
 
 impl Timeline {
     pub fn new(times_s: Vec<f64>, interpolation: Interpolation) -> Result<Self> {
-        if times_s.is_empty() || times_s.windows(2).any(|pair| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater)) {
-            return Err(Error::setting("person.pose_times_s", format!("{} times", times_s.len()), "at least one, each later than the one before"));
+        if times_s.is_empty() || times_s.windows(2).any(|pair| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater))
+        {
+            return Err(Error::setting(
+                "person.pose_times_s",
+                format!("{} times", times_s.len()),
+                "at least one, each later than the one before",
+            ));
         }
         Ok(Self { times_s, interpolation })
     }
@@ -43,8 +48,12 @@ impl Timeline {
         }
         // A nanosecond of slack: a motion may end exactly where the recording does.
         if time_s < first - 1e-9 || time_s > last + 1e-9 {
-            return Err(Error::setting("radar.frames", format!("a sample at {time_s:.4} s"), format!("within the motion, {first:.4} s to {last:.4} s"))
-                .with_hint("record fewer frames, or change person.placement.start_s"));
+            return Err(Error::setting(
+                "radar.frames",
+                format!("a sample at {time_s:.4} s"),
+                format!("within the motion, {first:.4} s to {last:.4} s"),
+            )
+            .with_hint("record fewer frames, or change person.placement.start_s"));
         }
         let left = times.partition_point(|&time| time <= time_s).saturating_sub(1).min(times.len() - 2);
         let span = times[left + 1] - times[left];
@@ -56,10 +65,7 @@ impl Timeline {
     }
 
     fn hermite(&self, left: usize, u: f64, span: f64) -> Weights {
-        let mut weights = vec![
-            (left, (1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u)),
-            (left + 1, u * u * (3.0 - 2.0 * u)),
-        ];
+        let mut weights = vec![(left, (1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u)), (left + 1, u * u * (3.0 - 2.0 * u))];
         for (pose, blend) in [(left, u * (1.0 - u) * (1.0 - u)), (left + 1, u * u * (u - 1.0))] {
             let (before, after) = (pose.saturating_sub(1), (pose + 1).min(self.times_s.len() - 1));
             let slope = span * blend / (self.times_s[after] - self.times_s[before]);
@@ -103,7 +109,8 @@ mod tests {
         let values = [0.0, 1.0, 0.5, 2.0];
         let jump = |interpolation| {
             let timeline = Timeline::new(vec![0.0, 1.0, 2.0, 3.0], interpolation).unwrap();
-            let velocity = |time: f64| (position(&timeline, &values, time + 1e-6) - position(&timeline, &values, time - 1e-6)) / 2e-6;
+            let velocity =
+                |time: f64| (position(&timeline, &values, time + 1e-6) - position(&timeline, &values, time - 1e-6)) / 2e-6;
             (velocity(1.0 + 1e-5) - velocity(1.0 - 1e-5)).abs()
         };
         assert!(jump(Interpolation::Linear) > 1.0);

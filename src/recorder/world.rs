@@ -172,9 +172,11 @@ impl World {
                     .with_hint(format!("give room.{}_m", wall.name())));
             }
         }
-        if let Some(bad) = self.furniture.iter().find(|thing| {
-            !(thing.rcs_m2.is_finite() && thing.rcs_m2 >= 0.0 && thing.position_m.iter().all(|x| x.is_finite()))
-        }) {
+        if let Some(bad) = self
+            .furniture
+            .iter()
+            .find(|thing| !(thing.rcs_m2.is_finite() && thing.rcs_m2 >= 0.0 && thing.position_m.iter().all(|x| x.is_finite())))
+        {
             return Err(Error::setting("furniture", format!("{bad:?}"), "a finite position and a cross-section of at least 0"));
         }
         Ok(())
