@@ -21,7 +21,7 @@ pub struct MovingBody {
 
 #[derive(Clone, Debug)]
 enum Source {
-    Skinned { skinning: Skinning, motion: Motion, placement: Placement },
+    Skinned { skinning: Box<Skinning>, motion: Motion, placement: Placement },
     Meshes(Vec<Vec<Vector>>),
 }
 
@@ -29,7 +29,7 @@ impl MovingBody {
     pub fn new(person: &Person, interpolation: Interpolation) -> Result<Self> {
         let source = match person {
             Person::Skinned { model, motion, placement } => Source::Skinned {
-                skinning: Skinning::new(model, &motion.betas),
+                skinning: Box::new(Skinning::new(model, &motion.betas)),
                 motion: motion.clone(),
                 placement: placement.clone(),
             },

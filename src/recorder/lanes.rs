@@ -60,8 +60,7 @@ impl Lanes {
 
     /// Positions and velocities; `poses[pose][axis][element]`, the block starting at `start`, `count` long.
     pub fn place(&mut self, poses: &[[Vec<f64>; 3]], start: usize, count: usize, weights: &ChirpWeights) {
-        for axis in 0..3 {
-            let (position, velocity) = (&mut self.position[axis], &mut self.velocity[axis]);
+        for (axis, (position, velocity)) in self.position.iter_mut().zip(&mut self.velocity).enumerate() {
             position.fill(0.0);
             velocity.fill(0.0);
             for &(pose, weight, slope) in &weights.poses {

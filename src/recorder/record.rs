@@ -1,6 +1,7 @@
 //! A world put to work: frames of samples, one after the other.
 
 use num_complex::Complex64;
+use rayon::prelude::*;
 
 use super::amplitude::{Laws, WallLaw};
 use super::body::{MovingBody, smooth_field};
@@ -13,6 +14,8 @@ use super::world::{Draw, World};
 use crate::data::{IfFrame, IfLayout};
 use crate::error::Result;
 
+/// Frames that are in memory together.
+const MOST_AT_ONCE: usize = 16;
 /// Frames from which the converter's scale is estimated.
 const PREVIEWS: usize = 6;
 
@@ -74,6 +77,15 @@ impl Recorder {
         Ok(self.receiver.receive(&self.field(frame)?, [tx, rx, loops, samples], &mut rng))
     }
 
+    /// All frames in order, several at a time on all cores. A frame that cannot be recorded ends the sequence with its error.
+    pub fn frames(&self) -> impl Iterator<Item = Result<IfFrame>> + '_ {
+        let (count, batch) = (self.world.radar.frames, rayon::current_num_threads().clamp(1, MOST_AT_ONCE));
+        (0..count).step_by(batch).flat_map(move |start| {
+            let frames = start..(start + batch).min(count);
+            frames.into_par_iter().map(|frame| self.frame(frame)).collect::<Vec<_>>()
+        })
+    }
+
     /// How its frames are stored.
     pub fn layout(&self) -> IfLayout {
         self.receiver.layout()
@@ -83,13 +95,8 @@ impl Recorder {
 /// All frames of a world; `progress` hears how many of how many are done.
 pub fn record(world: &World, progress: &mut dyn FnMut(usize, usize)) -> Result<Vec<IfFrame>> {
     let recorder = Recorder::new(world)?;
-    (0..world.radar.frames)
-        .map(|frame| {
-            let samples = recorder.frame(frame)?;
-            progress(frame + 1, world.radar.frames);
-            Ok(samples)
-        })
-        .collect()
+    let frames = recorder.frames().enumerate();
+    frames.map(|(frame, samples)| samples.inspect(|_| progress(frame + 1, world.radar.frames))).collect()
 }
 
 fn body_scatter(world: &World, laws: Laws) -> Result<Scatter> {

@@ -46,12 +46,12 @@ impl Skinning {
         // World rotation of each joint and what it adds to a rotated rest position.
         let mut rotations: Vec<Rotation> = Vec::with_capacity(joints);
         let mut positions: Vec<Vector> = Vec::with_capacity(joints);
-        for joint in 0..joints {
-            let (rotation, position) = match self.model.parents[joint] {
-                None => (local[joint], self.joints[joint]),
+        for ((parent, local), &rest) in self.model.parents.iter().zip(&local).zip(&self.joints) {
+            let (rotation, position) = match *parent {
+                None => (*local, rest),
                 Some(parent) => {
-                    let bone = subtract(self.joints[joint], self.joints[parent]);
-                    (multiply(&rotations[parent], &local[joint]), add(positions[parent], rotate(&rotations[parent], bone)))
+                    let bone = subtract(rest, self.joints[parent]);
+                    (multiply(&rotations[parent], local), add(positions[parent], rotate(&rotations[parent], bone)))
                 }
             };
             rotations.push(rotation);

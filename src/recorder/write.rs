@@ -43,8 +43,9 @@ pub fn write_world(world: &World, labels: Labels, out: &Path, progress: &mut dyn
         layout: recorder.layout(),
         truth: Some(&truth),
     };
+    let mut recorded = recorder.frames();
     write_recording(out, &contents, &mut |frame| {
-        let samples = recorder.frame(frame)?;
+        let samples = recorded.next().expect("as many frames as the radar has")?;
         progress(frame + 1, frames);
         Ok(samples)
     })
