@@ -92,7 +92,10 @@ impl Trainer<'_> {
                 optimizer = checkpoint::load_optimizer(folder, optimizer)?;
                 progress = state.progress;
             }
-            None => simulator = calibrate::fit_gain(simulator, self.recordings, &split.training)?,
+            None => {
+                simulator = calibrate::fit_gain(simulator, self.recordings, &split.training)?;
+                simulator = checkpoint::with_stable_ids(simulator);
+            }
         }
         let prepared: Vec<Prepared> = losses
             .into_iter()
