@@ -17,17 +17,17 @@ pub mod recorder;
 // 3: the simulator
 pub mod body;
 pub mod features;
-pub mod scatterers;
-pub mod paths;
-pub mod if_signal;
 pub mod heatmap;
+pub mod if_signal;
 pub mod loss;
 pub mod metrics;
+pub mod paths;
+pub mod scatterers;
 pub mod simulator;
 // 4: what is done with it
-pub mod training;
-pub mod pictures;
-pub mod config;
 pub mod cli;
+pub mod config;
+pub mod pictures;
+pub mod training;
 
 pub use error::{Error, Result};

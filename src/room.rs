@@ -87,10 +87,7 @@ impl Room {
     /// Lowest and highest coordinate of the room along each axis; `open_m` stands in for a boundary that is absent.
     pub fn extent_m(&self, open_m: f64) -> ([f64; 3], [f64; 3]) {
         let or = |distance: Option<f64>| distance.unwrap_or(open_m);
-        (
-            [-or(self.left_m), -or(self.back_m), -or(self.floor_m)],
-            [or(self.right_m), or(self.front_m), or(self.ceiling_m)],
-        )
+        ([-or(self.left_m), -or(self.back_m), -or(self.floor_m)], [or(self.right_m), or(self.front_m), or(self.ceiling_m)])
     }
 
     /// Range of the farthest corner that has walls, metres; `None` without any boundary.

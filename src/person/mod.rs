@@ -9,9 +9,30 @@ use serde::{Deserialize, Serialize};
 
 /// Names of the 24 SMPL joints, in SMPL's order.
 pub const JOINT_NAMES: [&str; 24] = [
-    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle", "spine3",
-    "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder", "right_shoulder", "left_elbow",
-    "right_elbow", "left_wrist", "right_wrist", "left_hand", "right_hand",
+    "pelvis",
+    "left_hip",
+    "right_hip",
+    "spine1",
+    "left_knee",
+    "right_knee",
+    "spine2",
+    "left_ankle",
+    "right_ankle",
+    "spine3",
+    "left_foot",
+    "right_foot",
+    "neck",
+    "left_collar",
+    "right_collar",
+    "head",
+    "left_shoulder",
+    "right_shoulder",
+    "left_elbow",
+    "right_elbow",
+    "left_wrist",
+    "right_wrist",
+    "left_hand",
+    "right_hand",
 ];
 
 /// A body that skinning can pose. V vertices, J joints, B shape parameters; SMPL's frame: y up, the person faces +z,
@@ -72,7 +93,11 @@ impl Default for Placement {
 /// A person who moves in front of the radar.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Person {
-    Skinned { model: BodyModel, motion: Motion, placement: Placement },
+    Skinned {
+        model: BodyModel,
+        motion: Motion,
+        placement: Placement,
+    },
     /// Meshes that something else has posed, already in the radar frame.
     Meshes {
         /// `[pose][vertex, xyz]`, metres, radar frame.

@@ -1,1 +1,4 @@
-//! (to be written)
+//! Scatterers: room patches and who sees whom.
+
+pub mod room_patches;
+pub mod visibility;
