@@ -20,6 +20,7 @@ impl Golden {
         let values = match file.dtype().descr().trim_matches(['\'', '"']) {
             "<f4" => file.into_vec::<f32>().unwrap().into_iter().map(f64::from).collect(),
             "<f8" => file.into_vec::<f64>().unwrap(),
+            "<i8" => file.into_vec::<i64>().unwrap().into_iter().map(|value| value as f64).collect(),
             "|u1" => file.into_vec::<u8>().unwrap().into_iter().map(f64::from).collect(),
             other => panic!("{name} is of type {other}"),
         };
@@ -28,6 +29,11 @@ impl Golden {
 
     pub fn values(&self, name: &str) -> Vec<f64> {
         self.array(name).1
+    }
+
+    /// Rows of three numbers.
+    pub fn points(&self, name: &str) -> Vec<[f64; 3]> {
+        self.values(name).chunks_exact(3).map(|xyz| [xyz[0], xyz[1], xyz[2]]).collect()
     }
 
     pub fn number(&self, name: &str) -> f64 {
