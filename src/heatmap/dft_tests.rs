@@ -137,3 +137,26 @@ fn doppler_over_time_sums_the_power_over_range_and_averages_the_antennas() {
     assert_eq!(found.dims(), [2, 4]);
     assert!(found.into_data().iter::<f64>().all(|value| (value - 20.0).abs() < 1e-6));
 }
+
+#[cfg(feature = "wgpu")]
+#[test]
+fn wgpu_agrees_with_the_fft_in_values_and_with_flex_in_gradients() {
+    let (loops, samples) = (85, 100);
+    let radar = Radar { loops_per_frame: loops, samples_per_chirp: samples, ..synthetic::radar() };
+    let config = HeatmapConfig::default();
+    let signal = noise(2 * loops * samples, 5);
+    let wanted = Analysis::new(&radar, &config).range_doppler_complex(&signal);
+    let gradient = |device: Device| {
+        let transform = RangeDoppler::new(loops, samples, Sampling::Complex, &config, &device);
+        let signal = tensor(&signal, [2, loops, samples], &device, DType::F32);
+        let signal = Complex::new(signal.re.require_grad(), signal.im);
+        let map = transform.map(signal.clone());
+        let gradients = power_db(map.clone().power(), 1e-3).sum().backward();
+        let gradient: Vec<f64> = signal.re.grad(&gradients).unwrap().into_data().iter::<f64>().collect();
+        (values(map), gradient.into_iter().map(Complex64::from).collect::<Vec<_>>())
+    };
+    let (map, found) = gradient(Device::wgpu(burn::tensor::DeviceKind::Cpu).autodiff());
+    assert!(error(&map, &wanted) < 1e-6, "{:e}", error(&map, &wanted));
+    let (_, wanted) = gradient(Device::flex().autodiff());
+    assert!(error(&found, &wanted) < 1e-4, "{:e}", error(&found, &wanted));
+}
