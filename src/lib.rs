@@ -17,17 +17,23 @@ pub mod recorder;
 // 3: the simulator
 pub mod body;
 pub mod features;
-pub mod heatmap;
+pub mod scatterers;
+pub mod paths;
 pub mod if_signal;
+pub mod heatmap;
 pub mod loss;
 pub mod metrics;
-pub mod paths;
-pub mod scatterers;
 pub mod simulator;
 // 4: what is done with it
-pub mod cli;
-pub mod config;
-pub mod pictures;
 pub mod training;
+pub mod evaluation;
+pub mod pictures;
+pub mod config;
+pub mod cli;
 
 pub use error::{Error, Result};
+
+/// Helpers of the tests, shared with the integration tests.
+#[cfg(test)]
+#[path = "../tests/support/mod.rs"]
+mod support;

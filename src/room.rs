@@ -99,6 +99,11 @@ impl Room {
         Some((0..3).map(|axis| low[axis].abs().max(high[axis].abs()).powi(2)).sum::<f64>().sqrt())
     }
 
+    /// Distance of the farthest boundary, metres; `None` without any.
+    pub fn farthest_wall_m(&self) -> Option<f64> {
+        self.boundaries().into_iter().filter_map(|boundary| self.distance_m(boundary)).max_by(f64::total_cmp)
+    }
+
     /// Refuses distances that no room can have. `key` names this room in messages.
     pub fn check(&self, key: &str) -> Result<()> {
         for boundary in Boundary::ALL {

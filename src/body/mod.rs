@@ -16,7 +16,7 @@ mod golden;
 #[cfg(test)]
 pub(crate) mod test_bodies;
 
-use burn::tensor::Tensor;
+use burn::tensor::{DType, Device, Tensor};
 
 pub use facets::{FacetEdges, facet_integral};
 pub use frame::BodyFrame;
@@ -39,6 +39,17 @@ pub struct Displacement {
 }
 
 impl Displacement {
+    /// Points that stay where they are: a chirp axis of length 1, to be broadcast after the sum.
+    pub fn still(points: usize, device: &Device, dtype: DType) -> Self {
+        let zero = || Tensor::zeros([points, 1], (device, dtype));
+        Self { x: zero(), y: zero(), z: zero() }
+    }
+
+    /// `[point, chirp]`.
+    pub fn dims(&self) -> [usize; 2] {
+        self.x.dims()
+    }
+
     /// The same done to all three components.
     pub fn map(self, f: impl Fn(Tensor<2>) -> Tensor<2>) -> Self {
         Self { x: f(self.x), y: f(self.y), z: f(self.z) }

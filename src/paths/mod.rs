@@ -11,7 +11,8 @@ mod waveform;
 
 pub use direct::DirectPaths;
 pub use indirect::{IndirectPaths, Onward};
-pub use leg::{Displacement, Leg, Motion, leg};
+pub use crate::body::Displacement;
+pub use leg::{Leg, Motion, leg};
 pub use waveform::{Amplitude, Dechirp, Waveform, phasors};
 
 use burn::tensor::{DType, Device, Tensor, TensorData};

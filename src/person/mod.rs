@@ -3,6 +3,7 @@
 //! Nothing here poses a body; the simulator and the recorder each do that on their own.
 
 pub mod actions;
+pub mod mesh;
 pub mod procedural;
 
 use serde::{Deserialize, Serialize};
@@ -53,6 +54,32 @@ pub struct BodyModel {
     pub parents: Vec<Option<usize>>,
     /// Counter-clockwise seen from outside (`f`).
     pub faces: Vec<[usize; 3]>,
+}
+
+impl BodyModel {
+    /// `[vertex, xyz]`, metres: the rest pose of the body with these shape parameters; missing ones are zero, surplus ones
+    /// ignored.
+    pub fn shaped(&self, betas: &[f64]) -> Vec<[f64; 3]> {
+        let mut vertices = self.template.clone();
+        for (direction, &beta) in self.shape_directions.iter().zip(betas) {
+            for (vertex, change) in vertices.iter_mut().zip(direction) {
+                (0..3).for_each(|axis| vertex[axis] += beta * change[axis]);
+            }
+        }
+        vertices
+    }
+
+    /// `[joint, xyz]`, metres: the joints of [`BodyModel::shaped`].
+    pub fn rest_joints(&self, betas: &[f64]) -> Vec<[f64; 3]> {
+        let vertices = self.shaped(betas);
+        let joint = |weights: &Vec<(usize, f64)>| {
+            let add = |sum: [f64; 3], &(vertex, weight): &(usize, f64)| {
+                std::array::from_fn(|axis| sum[axis] + weight * vertices[vertex][axis])
+            };
+            weights.iter().fold([0.0; 3], add)
+        };
+        self.joint_regressor.iter().map(joint).collect()
+    }
 }
 
 /// Poses of a body in time.
