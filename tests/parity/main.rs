@@ -3,5 +3,6 @@
 mod body;
 mod golden;
 mod heatmaps;
+mod learned;
 mod metrics;
 mod paths;
