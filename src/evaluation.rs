@@ -52,7 +52,7 @@ fn to_host(signal: Complex<4>) -> Vec<Complex32> {
 /// The measured samples of a frame, `[tx, rx, loop, sample]`.
 pub fn measured_frame(recording: &LoadedRecording, frame: usize) -> Result<Vec<Complex32>> {
     let samples = recording.recording.frame(frame)?;
-    let im = samples.im.iter().copied().chain(std::iter::repeat(0.0));
+    let im = samples.im.iter().flatten().copied().chain(std::iter::repeat(0.0));
     Ok(samples.re.iter().copied().zip(im).map(|(re, im)| Complex32::new(re, im)).collect())
 }
 

@@ -7,7 +7,7 @@ use clap::Args;
 use super::Common;
 use crate::{
     config::Config,
-    data::recording::Recording,
+    data::Recording,
     error::Result,
     radar::{self, Radar},
     room::Room,
@@ -38,7 +38,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(record) = &config.record {
         let world = record.world()?;
         println!("a recording to be made:");
-        show_radar(&world.radar, world.room.as_ref());
+        show_radar(&world.radar, Some(&world.room));
     }
     println!("resolved configuration:\n\n{}", config.to_toml());
     Ok(())

@@ -7,22 +7,17 @@ use num_complex::Complex32;
 
 use super::{Common, Out, device, progress::Progress, report};
 use crate::{
-    data::{
-        atomic::AtomicFolder,
-        bodies::read_body,
-        recording::{Contents, PersonFiles, write_recording},
-    },
+    data::{IfFrame, IfLayout, RecordingContents, atomic::AtomicFolder, read_body, settings::read_settings, write_recording},
     error::{Error, Result},
     evaluation::{Simulation, measured_frame},
     heatmap::HeatmapConfig,
-    import::{self, MotionConfig},
+    import::{self, BvhConfig},
     person::{
         BodyModel, Person, Placement,
         actions::{self, Action, StyleConfig},
         procedural::{self, PersonConfig},
     },
-    radar::Radar,
-    room::Room,
+    radar::{Radar, Sampling},
     simulator::Scene,
     training::{
         LoadedRecording,
@@ -65,7 +60,7 @@ pub(crate) struct Arguments {
 }
 
 fn parse_action(name: &str) -> std::result::Result<Action, String> {
-    Action::from_name(name).ok_or_else(|| {
+    Action::ALL.into_iter().find(|action| action.name() == name).ok_or_else(|| {
         let names: Vec<&str> = Action::ALL.iter().map(|action| action.name()).collect();
         format!("expected one of {}", names.join(", "))
     })
@@ -104,12 +99,22 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let simulation = Simulation::new(&simulator, scene, state.seed, !arguments.clean);
     let progress = Progress::new("simulating", radar.frames, common.quiet);
     let mut simulated: Vec<Complex32> = Vec::new();
-    let contents = contents(&radar, room.as_ref(), person.as_ref());
-    write_recording(&folder.path().join("recording"), &contents, &mut |frame| {
-        let samples = simulation.frame(frame)?;
-        simulated.extend_from_slice(&samples);
+    let contents = RecordingContents {
+        radar: &radar,
+        room: room.as_ref(),
+        person: person.as_ref(),
+        body_file: None,
+        labels: arguments.action.map(|action| ("action".to_string(), action.name().to_string())).into_iter().collect(),
+        layout: if radar.sampling == Sampling::Real { IfLayout::Real } else { IfLayout::Complex },
+        truth: None,
+    };
+    let [_, tx, rx, loops, samples] = radar.dims();
+    write_recording(folder.path().join("recording"), &contents, &mut |frame| {
+        let signal = simulation.frame(frame)?;
+        simulated.extend_from_slice(&signal);
         progress.set(frame + 1);
-        Ok(samples)
+        let im = (radar.sampling == Sampling::Complex).then(|| signal.iter().map(|value| value.im).collect());
+        Ok(IfFrame::new([tx, rx, loops, samples], signal.iter().map(|value| value.re).collect(), im))
     })?;
     progress.finish();
 
@@ -136,9 +141,9 @@ fn new_person(arguments: &Arguments, state: &CheckpointState) -> Result<Person> 
     };
     let motion = match (&arguments.motion, arguments.action) {
         (Some(path), _) => {
-            let config: MotionConfig = match &arguments.motion_config {
-                Some(config) => crate::data::settings::read_settings(config, &[])?,
-                None => MotionConfig::default(),
+            let config: BvhConfig = match &arguments.motion_config {
+                Some(config) => read_settings(config, &[])?,
+                None => BvhConfig::default(),
             };
             let (motion, notes) = import::read_motion(path, &model, &config)?;
             for note in notes {
@@ -150,7 +155,7 @@ fn new_person(arguments: &Arguments, state: &CheckpointState) -> Result<Person> 
             let radar = &state.site.radar;
             let count = arguments.frames.unwrap_or(24);
             let seconds = count as f64 * radar.frame_period_s + 1.0;
-            actions::motion(action, &StyleConfig::default(), &model, seconds, 60.0)?
+            actions::motion(action, &StyleConfig::default(), &model, &[], seconds, 60.0)?
         }
         (None, None) => unreachable!("clap asks for one of them"),
     };

@@ -108,7 +108,8 @@ fn nonzero(row: &[f64]) -> Vec<(usize, f64)> {
 
 fn skinning(path: &Path, weights: &Array<f64>) -> Result<Vec<Vec<(usize, f64)>>> {
     let of_vertex = |(vertex, row): (usize, &[f64])| {
-        let refuse = |found: String, hint: &str| Err(Error::field(path, "weights", found, "weights that sum to 1").with_hint(hint));
+        let refuse =
+            |found: String, hint: &str| Err(Error::field(path, "weights", found, "weights that sum to 1").with_hint(hint));
         if let Some(joint) = row.iter().position(|&weight| weight < -WEIGHT_TOLERANCE) {
             return refuse(format!("{} at vertex {vertex}, joint {joint}", row[joint]), "skinning weights are not negative");
         }

@@ -7,12 +7,12 @@ pub mod arrays;
 pub mod atomic;
 pub mod bodies;
 pub mod motions;
-// pub mod recording;
+pub mod recording;
 pub mod settings;
 
 pub use bodies::{read_body, write_body};
 pub use motions::{read_motion, write_motion};
-// pub use recording::{IfFrame, Recording, RecordingContents, write_recording};
+pub use recording::{IfFrame, IfLayout, Recording, RecordingContents, write_recording};
 pub use settings::{read_settings, read_toml};
 
 #[cfg(test)]

@@ -18,7 +18,10 @@ pub fn read_motion(path: impl AsRef<Path>, joints: usize, betas: usize) -> Resul
     let path = path.as_ref();
     let mut npz = Npz::open(path)?;
     if npz.has("v_template") && !npz.has("poses") {
-        return Err(Error::Parse { path: path.into(), message: "this is a body (it has `v_template`), expected a motion".into() });
+        return Err(Error::Parse {
+            path: path.into(),
+            message: "this is a body (it has `v_template`), expected a motion".into(),
+        });
     }
     let mut notes = vec![];
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -79,8 +82,12 @@ fn fit<T: Copy>(values: &[T], length: usize, padding: T) -> Vec<T> {
 
 fn fit_note(file: &str, what: &str, found: usize, wanted: usize, padded: &str) -> Option<String> {
     match found {
-        _ if found > wanted => Some(format!("{file}: {found} {what}, the body has {wanted}: the last {} are left out", found - wanted)),
-        _ if found < wanted => Some(format!("{file}: {found} {what}, the body has {wanted}: the last {} {padded}", wanted - found)),
+        _ if found > wanted => {
+            Some(format!("{file}: {found} {what}, the body has {wanted}: the last {} are left out", found - wanted))
+        }
+        _ if found < wanted => {
+            Some(format!("{file}: {found} {what}, the body has {wanted}: the last {} {padded}", wanted - found))
+        }
         _ => None,
     }
 }
@@ -132,12 +139,18 @@ mod tests {
         assert_eq!((motion.poses, motion.betas, motion.rate_hz), (vec![vec![[1.0, 2.0, 3.0]]], vec![7.0], 60.0));
         assert_eq!(
             notes,
-            ["motion.npz: 2 joints, the body has 1: the last 1 are left out", "motion.npz: 2 betas, the body has 1: the last 1 are left out"]
+            [
+                "motion.npz: 2 joints, the body has 1: the last 1 are left out",
+                "motion.npz: 2 betas, the body has 1: the last 1 are left out"
+            ]
         );
         let (motion, notes) = read_motion(&path, 3, 3).unwrap();
         assert_eq!(motion.poses, [[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [0.0; 3]]]);
         assert_eq!(motion.betas, [7.0, 8.0, 0.0]);
-        assert_eq!(notes, ["motion.npz: 2 joints, the body has 3: the last 1 rest", "motion.npz: 2 betas, the body has 3: the last 1 are zero"]);
+        assert_eq!(
+            notes,
+            ["motion.npz: 2 joints, the body has 3: the last 1 rest", "motion.npz: 2 betas, the body has 3: the last 1 are zero"]
+        );
     }
 
     #[test]

@@ -26,7 +26,8 @@ pub fn shared(path: &str) -> Option<PathBuf> {
 
 /// Two joints, four vertices, one shape, no symmetry that could hide a mistake.
 pub fn small_body() -> BodyModel {
-    let wave = |seed: usize| (0..4).map(|v| std::array::from_fn(|axis| (((seed + v) * 3 + axis) as f64 * 0.25).fract() - 0.5)).collect();
+    let wave =
+        |seed: usize| (0..4).map(|v| std::array::from_fn(|axis| (((seed + v) * 3 + axis) as f64 * 0.25).fract() - 0.5)).collect();
     BodyModel {
         template: wave(1),
         shape_directions: vec![wave(2)],

@@ -7,11 +7,11 @@ use burn::tensor::{Device, Tensor, TensorData};
 use super::checkpoint::Site;
 use crate::{
     complex::Complex,
-    data::recording::{IfFrame, Recording},
+    data::{IfFrame, Recording},
     error::{Error, Result},
     features::Extent,
     person::{Person, Placement},
-    radar::Sampling,
+    radar::Radar,
     simulator::{Scene, SimulatorConfig},
 };
 
@@ -32,10 +32,6 @@ impl LoadedRecording {
         }
         let scene = Scene::new(&recording.radar, recording.room.as_ref(), recording.person(), config)?;
         Ok(Self { folder: folder.into(), recording, scene })
-    }
-
-    pub fn sampling(&self) -> Sampling {
-        self.recording.radar.sampling
     }
 
     /// Where the person's motion stands, if a motion is what moves the person.
@@ -67,7 +63,7 @@ impl LoadedRecording {
 pub fn signal_tensor(frame: &IfFrame, device: &Device) -> Complex<4> {
     let tensor = |values: &[f32]| Tensor::<4>::from_data(TensorData::new(values.to_vec(), frame.dims), device);
     let re = tensor(&frame.re);
-    let im = if frame.im.is_empty() { re.zeros_like() } else { tensor(&frame.im) };
+    let im = frame.im.as_deref().map_or_else(|| re.zeros_like(), tensor);
     Complex::new(re, im)
 }
 
@@ -86,7 +82,7 @@ pub fn load_recordings(folders: &[PathBuf], config: &SimulatorConfig) -> Result<
             return Err(Error::field(file, "room", "missing", "a room, or a body with its motion")
                 .with_hint("without either there is nothing to simulate"));
         }
-        let same_radar = crate::radar::Radar { frames: first.scene.radar.frames, ..other.scene.radar.clone() };
+        let same_radar = Radar { frames: first.scene.radar.frames, ..other.scene.radar.clone() };
         if same_radar != first.scene.radar {
             return Err(Error::field(file, "radar", "another radar", format!("that of {}", first.folder.display()))
                 .with_hint("one simulator learns one site: train other radars on their own"));

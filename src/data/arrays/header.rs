@@ -42,11 +42,8 @@ impl Header {
         let length = text[8..].iter().rev().fold(0, |sum, &byte| sum << 8 | u64::from(byte));
         let data_start = text.len() as u64 + length;
         if length > LONGEST_HEADER || data_start > size {
-            return Err(Problem::new(
-                format!("an array with a header of {length} bytes in {size} bytes"),
-                "a header that fits",
-            )
-            .with_hint("the file is cut off or damaged; copy it again"));
+            return Err(Problem::new(format!("an array with a header of {length} bytes in {size} bytes"), "a header that fits")
+                .with_hint("the file is cut off or damaged; copy it again"));
         }
         reader.take(length).read_to_end(&mut text).map_err(super::damaged)?;
         Self::parse(&text, data_start)

@@ -125,7 +125,8 @@ fn damaged(error: io::Error) -> Problem {
     use io::ErrorKind::{InvalidData, InvalidInput, Other, UnexpectedEof};
     match error.kind() {
         InvalidData | InvalidInput | Other | UnexpectedEof => {
-            Problem::new(format!("damaged ({error})"), "data that matches its checksum").with_hint("copy or download the file again")
+            Problem::new(format!("damaged ({error})"), "data that matches its checksum")
+                .with_hint("copy or download the file again")
         }
         _ => Problem::Io(error),
     }

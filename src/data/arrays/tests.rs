@@ -103,7 +103,10 @@ fn a_file_that_is_no_array_is_described() {
     assert_eq!(of(b"[radar]\nx = 1"), r#"`trans` is a text that starts with "[radar]\nx ", expected a NumPy array (.npy)"#);
     assert_eq!(of(b"PK\x03\x04........"), "`trans` is a zip archive (.npz?), expected a NumPy array (.npy)");
     assert_eq!(of(b"\x80\x02}q\x00(U\nv_t"), "`trans` is a Python pickle, expected a NumPy array (.npy)");
-    assert_eq!(of(b"\xff\xd8\xff\xe0"), "`trans` is a file that starts with the bytes [ff, d8, ff, e0], expected a NumPy array (.npy)");
+    assert_eq!(
+        of(b"\xff\xd8\xff\xe0"),
+        "`trans` is a file that starts with the bytes [ff, d8, ff, e0], expected a NumPy array (.npy)"
+    );
     assert_eq!(of(b"\x93NUMPY\x01"), "`trans` is cut off after 7 bytes, expected a NumPy array (.npy)");
 }
 
@@ -139,7 +142,8 @@ fn a_header_that_announces_the_impossible_allocates_nothing() {
 
 #[test]
 fn a_header_that_cannot_be_parsed_is_refused() {
-    for text in ["{'descr': '<f8', 'fortran_order'", "", "[1, 2]", "{'descr': '<f8', 'fortran_order': False, 'shape': (-1, 3), }"] {
+    for text in ["{'descr': '<f8', 'fortran_order'", "", "[1, 2]", "{'descr': '<f8', 'fortran_order': False, 'shape': (-1, 3), }"]
+    {
         let (message, _) = refused::<f64>(&npy(text, &[0; 24]), POSE);
         assert!(message.starts_with("`trans` is an array with an unreadable header ("), "{message}");
     }

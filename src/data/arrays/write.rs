@@ -65,7 +65,11 @@ impl Values<'_> {
 
     /// Writes the numbers little-endian, in blocks, without a header.
     pub fn write_to(&self, writer: &mut impl Write) -> io::Result<()> {
-        fn blocks<T: Copy, const N: usize>(writer: &mut impl Write, values: &[T], bytes: impl Fn(T) -> [u8; N]) -> io::Result<()> {
+        fn blocks<T: Copy, const N: usize>(
+            writer: &mut impl Write,
+            values: &[T],
+            bytes: impl Fn(T) -> [u8; N],
+        ) -> io::Result<()> {
             values.chunks(1 << 14).try_for_each(|block| {
                 let encoded: Vec<u8> = block.iter().flat_map(|&value| bytes(value)).collect();
                 writer.write_all(&encoded)
@@ -121,9 +125,7 @@ pub fn write_npz(path: impl AsRef<Path>, members: &[Member]) -> Result<()> {
     let path = path.as_ref();
     // Archives can only be written where one can go back; they are small enough for memory.
     let mut archive = ZipWriter::new(io::Cursor::new(Vec::new()));
-    let options = FileOptions::default()
-        .compression_method(CompressionMethod::Deflated)
-        .last_modified_time(DateTime::default());
+    let options = FileOptions::default().compression_method(CompressionMethod::Deflated).last_modified_time(DateTime::default());
     let mut write_all = || -> io::Result<()> {
         for member in members {
             let large = member.values.len() > 1 << 28;

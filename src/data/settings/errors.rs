@@ -85,7 +85,8 @@ fn find_whole(key: &str, keys: &[String], error: &toml::de::Error, sources: &[So
     if matches!(origin(&whole, sources, sets), Origin::Nowhere) {
         // Deeper than TOML said: take it where the settings have it.
         let mut found = vec![];
-        let overrides = sets.iter().filter_map(|set| Some(set.split_once('=')?.0.trim().split('.').map(str::to_string).collect()));
+        let overrides =
+            sets.iter().filter_map(|set| Some(set.split_once('=')?.0.trim().split('.').map(str::to_string).collect()));
         found.extend(overrides.filter(|path: &Vec<String>| path.iter().any(|part| part == key)));
         for source in sources {
             let table = toml::from_str::<Table>(&source.text).unwrap_or_default();
@@ -119,7 +120,9 @@ fn key_at(table: &DeTable, span: &Range<usize>) -> Option<Vec<String>> {
         }
         let below = match value.get_ref() {
             DeValue::Table(below) => key_at(below, span),
-            DeValue::Array(items) => items.iter().find_map(|item| item.get_ref().as_table().and_then(|below| key_at(below, span))),
+            DeValue::Array(items) => {
+                items.iter().find_map(|item| item.get_ref().as_table().and_then(|below| key_at(below, span)))
+            }
             _ => None,
         };
         below.map(|mut path| {

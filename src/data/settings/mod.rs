@@ -67,11 +67,14 @@ fn resolve_with_sources(path: &Path, sets: &[String]) -> Result<(Table, Vec<Sour
         seen.push(identity);
         sources.push(source);
         let source = sources.last().expect("just pushed");
-        let mut table: Table = toml::from_str(&source.text).map_err(|error| errors::explain(&error, &sources[sources.len() - 1..], &[]))?;
+        let mut table: Table =
+            toml::from_str(&source.text).map_err(|error| errors::explain(&error, &sources[sources.len() - 1..], &[]))?;
         next = match table.remove(EXTENDS) {
             None => None,
             Some(Value::String(parent)) => Some(path.parent().unwrap_or(Path::new("")).join(parent)),
-            Some(other) => return Err(Error::field(&path, EXTENDS, other.to_string(), "the name of another config, such as \"base.toml\"")),
+            Some(other) => {
+                return Err(Error::field(&path, EXTENDS, other.to_string(), "the name of another config, such as \"base.toml\""));
+            }
         };
         tables.push(table);
     }

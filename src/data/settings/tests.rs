@@ -83,7 +83,9 @@ fn an_unknown_key_is_named_with_the_nearest_known_one() {
     let of_training = "a.toml: unknown key `training.learning_rat`, the nearest known one is `learning_rate`";
     assert_eq!(folder.refused("a.toml", &[]), of_training);
     let error = read_toml::<Config>(folder.0.path().join("a.toml")).unwrap_err();
-    assert!(matches!(&error, Error::UnknownKey { key, nearest: Some(nearest), .. } if key == "training.learning_rat" && nearest == "learning_rate"));
+    assert!(
+        matches!(&error, Error::UnknownKey { key, nearest: Some(nearest), .. } if key == "training.learning_rat" && nearest == "learning_rate")
+    );
     assert_eq!(error.hint().unwrap(), "remove the key or correct its name");
     assert_eq!(folder.refused("b.toml", &[]), "b.toml: unknown key `sed`, the nearest known one is `seed`");
     // The file that has the key is named, not the one that was asked for.
@@ -92,7 +94,10 @@ fn an_unknown_key_is_named_with_the_nearest_known_one() {
         folder.refused("d.toml", &["training.epoch=1"]),
         "--set: unknown key `training.epoch`, the nearest known one is `epochs`"
     );
-    assert_eq!(folder.refused("d.toml", &["trainings.epochs=1"]), "--set: unknown key `trainings`, the nearest known one is `training`");
+    assert_eq!(
+        folder.refused("d.toml", &["trainings.epochs=1"]),
+        "--set: unknown key `trainings`, the nearest known one is `training`"
+    );
 }
 
 #[test]
@@ -127,7 +132,10 @@ fn a_circle_of_parents_is_refused() {
 fn a_parent_that_is_absent_or_no_name_is_refused() {
     let folder = Folder::new(&[("a.toml", "extends = \"none.toml\""), ("b.toml", "extends = 3")]);
     assert!(folder.refused("a.toml", &[]).starts_with("none.toml: cannot be read: "));
-    assert_eq!(folder.refused("b.toml", &[]), "b.toml: `extends` is 3, expected the name of another config, such as \"base.toml\"");
+    assert_eq!(
+        folder.refused("b.toml", &[]),
+        "b.toml: `extends` is 3, expected the name of another config, such as \"base.toml\""
+    );
 }
 
 #[test]
