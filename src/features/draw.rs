@@ -7,8 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// A parameter drawn evenly from ±`bound`.
 pub fn uniform<const D: usize>(shape: [usize; D], bound: f64, rng: &mut ChaCha8Rng, device: &Device) -> Param<Tensor<D>> {
-    let values: Vec<f32> =
-        (0..shape.iter().product()).map(|_| ((2.0 * rng.random::<f64>() - 1.0) * bound) as f32).collect();
+    let values: Vec<f32> = (0..shape.iter().product()).map(|_| ((2.0 * rng.random::<f64>() - 1.0) * bound) as f32).collect();
     Param::from_data(TensorData::new(values, shape), device)
 }
 

@@ -54,10 +54,8 @@ impl EncodingConfig {
         if !self.boundary {
             return periodic;
         }
-        let membership: Vec<f32> = boundary
-            .iter()
-            .flat_map(|own| Boundary::ALL.map(|other| if *own == other { 1.0 } else { 0.0 }))
-            .collect();
+        let membership: Vec<f32> =
+            boundary.iter().flat_map(|own| Boundary::ALL.map(|other| if *own == other { 1.0 } else { 0.0 })).collect();
         let membership = Tensor::from_data(TensorData::new(membership, [point, Boundary::ALL.len()]), device);
         Tensor::cat(vec![periodic, membership], 1)
     }

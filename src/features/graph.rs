@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::draw;
-use super::mlp::{Layer, silu};
+use super::mlp::{Layer, activation};
 use super::rows::RowIndex;
 use crate::error::{Error, Result};
 
@@ -96,8 +96,9 @@ impl GcnConfig {
             }
         }
         if self.layers == 0 {
-            return Err(Error::setting(format!("{key}.layers"), 0, "at least 1")
-                .with_hint("to train without the graph, set used = 0"));
+            return Err(
+                Error::setting(format!("{key}.layers"), 0, "at least 1").with_hint("to train without the graph, set used = 0")
+            );
         }
         Ok(())
     }
@@ -114,7 +115,7 @@ impl GcnConfig {
     }
 }
 
-/// Layers p = (1 − residual) Â h + residual · h₀, h ← p + silu(p · weight + bias): the initial residual and identity
+/// Layers p = (1 − residual) Â h + residual · h₀, h ← p + activation(p · weight + bias): the initial residual and identity
 /// mapping of GCNII (Chen et al. 2020), which keep several layers from smoothing everything away.
 ///
 /// Learned: the layers and the token.
@@ -144,7 +145,7 @@ impl Gcn {
         };
         self.layers.iter().fold(input.clone(), |value, layer| {
             let mixed = graph.propagate(value) * (1.0 - self.residual) + input.clone() * self.residual;
-            mixed.clone() + silu(layer.forward(mixed))
+            mixed.clone() + activation(layer.forward(mixed))
         })
     }
 }

@@ -176,8 +176,7 @@ mod tests {
         // Each plane holds 2·column + 3·row in fractions of the box: bilinear interpolation must return it everywhere.
         let config = TriPlaneConfig { resolution: 5, features: 1, ..Default::default() };
         let mut plane = planes(&config);
-        let texels: Vec<f64> =
-            (0..75).map(|texel| (2.0 * (texel % 5) as f64 + 3.0 * (texel / 5 % 5) as f64) / 4.0).collect();
+        let texels: Vec<f64> = (0..75).map(|texel| (2.0 * (texel % 5) as f64 + 3.0 * (texel / 5 % 5) as f64) / 4.0).collect();
         plane.texels = Param::from_tensor(tensor(&texels, [75, 1], &Device::flex()));
         let points = points(20);
         let sampler = TriPlaneSampler::new(&points, &unit_box(), 5, &Device::flex());
@@ -209,8 +208,10 @@ mod tests {
         assert_eq!(side.dims(), [6, config.features_out()]);
         assert_eq!(sums.dims(), [6, sum.features_out()]);
         let side = values(&side);
-        let wanted: Vec<f64> =
-            (0..6).flat_map(|p| (0..3).map(move |f| (p, f))).map(|(p, f)| (0..3).map(|k| side[9 * p + 3 * k + f]).sum()).collect();
+        let wanted: Vec<f64> = (0..6)
+            .flat_map(|p| (0..3).map(move |f| (p, f)))
+            .map(|(p, f)| (0..3).map(|k| side[9 * p + 3 * k + f]).sum())
+            .collect();
         assert_close("sum", &values(&sums), &wanted, 1e-6);
     }
 

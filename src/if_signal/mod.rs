@@ -43,6 +43,13 @@ pub enum SumForm {
     Exact,
 }
 
+impl SumForm {
+    /// Whether the fused kernel takes tensors like this one.
+    fn is_fused(self, like: &Tensor<2>) -> bool {
+        matches!(self, Self::Auto | Self::Fused) && is_flex(&like.device()) && like.dtype() == DType::F32
+    }
+}
+
 /// Complex samples of one receiver.
 ///
 /// # Shapes
@@ -57,10 +64,9 @@ pub fn coherent_sum(phasors: &Phasors, samples: usize, form: SumForm) -> Complex
         let zeros = || Tensor::zeros([chirps, samples], (&device, dtype));
         return Complex::new(zeros(), zeros());
     }
-    let fused = is_flex(&device) && dtype == DType::F32;
     match form {
         SumForm::Exact => exact::sum(phasors, samples),
-        SumForm::Auto | SumForm::Fused if fused => fused::sum(phasors, samples),
+        _ if form.is_fused(&phasors.phase_turns) => fused::sum(phasors, samples),
         _ if is_cpu(&device) => spread::sum(phasors, samples),
         _ => split::sum(phasors, samples),
     }

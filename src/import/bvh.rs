@@ -236,7 +236,7 @@ fn table(lines: &mut Lines, joints: &[BvhJoint]) -> std::result::Result<(f64, Ve
     let columns: Vec<(&str, Channel)> =
         joints.iter().flat_map(|joint| joint.channels.iter().map(|&channel| (joint.name.as_str(), channel))).collect();
     let mut frames = Vec::new();
-    while let Some((number, line)) = lines.lines.next() {
+    for (number, line) in lines.lines.by_ref() {
         if frames.len() == count {
             return Err(format!("line {number}: `Frames:` says {count}, but more lines follow"));
         }

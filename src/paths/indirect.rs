@@ -21,14 +21,20 @@ pub struct IndirectPaths {
 impl IndirectPaths {
     /// `proxy_m`: position of the wall's receiver, metres, radar frame. The amplitude is that towards it.
     pub fn new(points: Points, proxy_m: [f64; 3], radar: &Radar, tx: usize, dechirp: Dechirp) -> Self {
-        let lengths_m: Vec<f64> = (0..radar.rx_m.len()).map(|rx| distance(proxy_m, radar.rx_position_m(rx))).collect();
-        let mean_s = lengths_m.iter().sum::<f64>() / lengths_m.len() as f64 / SPEED_OF_LIGHT;
-        let waveform = Waveform::new(radar, dechirp).with_onward(mean_s);
+        let (waveform, onward) = onward(proxy_m, radar, dechirp);
         let motion = Motion::new(points.reference_m, points.displacement);
         let (from_tx, to_wall) = (motion.leg(radar.tx_position_m(tx)), motion.leg(proxy_m));
         let at_wall = waveform.phasors(&[&from_tx, &to_wall], points.amplitude);
-        Self { at_wall, onward: lengths_m.into_iter().map(|length_m| Onward { waveform, length_m }).collect() }
+        Self { at_wall, onward }
     }
+}
+
+/// The last legs `[rx]` from a wall's receiver, and the waveform for the legs before them.
+pub(crate) fn onward(proxy_m: [f64; 3], radar: &Radar, dechirp: Dechirp) -> (Waveform, Vec<Onward>) {
+    let lengths_m: Vec<f64> = (0..radar.rx_m.len()).map(|rx| distance(proxy_m, radar.rx_position_m(rx))).collect();
+    let mean_s = lengths_m.iter().sum::<f64>() / lengths_m.len() as f64 / SPEED_OF_LIGHT;
+    let waveform = Waveform::new(radar, dechirp).with_onward(mean_s);
+    (waveform, lengths_m.into_iter().map(|length_m| Onward { waveform, length_m }).collect())
 }
 
 /// The static last leg.

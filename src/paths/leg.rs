@@ -7,7 +7,7 @@ use crate::body::Displacement;
 
 /// Added to lengths in quadrature so that a point on an antenna has a finite gradient, metres.
 /// At 0.1 m it changes a length by 5·10⁻⁸ m.
-const SOFTENING_M: f64 = 1e-4;
+pub(crate) const SOFTENING_M: f64 = 1e-4;
 
 /// One straight leg between every scatterer and an antenna (or a wall's receiver).
 #[derive(Clone, Debug)]

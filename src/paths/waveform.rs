@@ -1,13 +1,13 @@
 //! What a chirp makes of a path's length: phase and sweep.
 
-use burn::tensor::{DType, Device, Tensor, TensorData};
+use burn::tensor::{Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
 use super::{Leg, Phasors, column};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
 /// Added to the product of the legs' lengths, m²: a point on an antenna is strong, not infinite.
-const NEAR_FIELD_M2: f64 = 1e-8;
+pub(crate) const NEAR_FIELD_M2: f64 = 1e-8;
 
 /// Which terms of the mixer's phase are kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -94,22 +94,15 @@ impl Waveform {
         }
         let spreading = product + NEAR_FIELD_M2;
 
-        let to_column = |of: &dyn Fn(f64) -> f64| column(reference_m.iter().map(|&length| of(length)), &device, dtype);
-        let phase = to_column(&|length| self.reference_turns(length / SPEED_OF_LIGHT));
-        let sweep = to_column(&|length| self.bandwidth_hz * length / SPEED_OF_LIGHT);
-        let (phase_turns, sweep_turns) = match self.dechirp {
-            Dechirp::Paper => (
-                change.clone() * (self.middle_hz / SPEED_OF_LIGHT) + phase,
-                change * (self.bandwidth_hz / SPEED_OF_LIGHT) + sweep,
-            ),
-            Dechirp::Exact => {
-                let turns_per_metre = to_column(&|length| {
-                    let delay = length / SPEED_OF_LIGHT + self.onward_s;
-                    (self.middle_hz - self.slope_hz_per_s * delay) / SPEED_OF_LIGHT
-                });
-                (change.clone() * turns_per_metre + phase, self.sweep_change(change) + sweep)
-            }
+        let at_rest: Vec<AtRest> = reference_m.iter().map(|&length| self.at_rest(length)).collect();
+        let to_column = |of: fn(&AtRest) -> f64| column(at_rest.iter().map(of), &device, dtype);
+        let phase = to_column(|point| point.phase_turns);
+        let sweep = to_column(|point| point.sweep_turns);
+        let phase_turns = match self.dechirp {
+            Dechirp::Paper => change.clone() * (self.middle_hz / SPEED_OF_LIGHT) + phase,
+            Dechirp::Exact => change.clone() * to_column(|point| point.turns_per_metre) + phase,
         };
+        let sweep_turns = self.sweep_change(change) + sweep;
         Phasors {
             amplitude: amplitude.re.clone() / spreading.clone(),
             amplitude_im: amplitude.im.clone().map(|im| im / spreading),
@@ -129,36 +122,61 @@ impl Waveform {
         (fraction(self.middle_hz * delay_s - residual), self.bandwidth_hz * delay_s)
     }
 
-    fn reference_turns(&self, delay_s: f64) -> f64 {
-        let residual = match self.dechirp {
-            Dechirp::Paper => 0.0,
-            Dechirp::Exact => 0.5 * self.slope_hz_per_s * (delay_s + self.onward_s).powi(2),
+    /// A path of the given length at rest, and how its phase follows the length.
+    pub(crate) fn at_rest(&self, length_m: f64) -> AtRest {
+        let delay_s = length_m / SPEED_OF_LIGHT;
+        let (residual, lowered_hz) = match self.dechirp {
+            Dechirp::Paper => (0.0, 0.0),
+            Dechirp::Exact => {
+                let whole_s = delay_s + self.onward_s;
+                (0.5 * self.slope_hz_per_s * whole_s * whole_s, self.slope_hz_per_s * whole_s)
+            }
         };
-        fraction(self.middle_hz * delay_s - residual)
+        AtRest {
+            phase_turns: fraction(self.middle_hz * delay_s - residual),
+            sweep_turns: self.bandwidth_hz * delay_s,
+            turns_per_metre: (self.middle_hz - lowered_hz) / SPEED_OF_LIGHT,
+        }
+    }
+
+    /// Growth of the sweep with the path's change, turns per metre (B/c), and with its difference from chirp to chirp
+    /// (f_mid T/c over the chirps' spacing; zero where motion within a chirp is left out).
+    pub(crate) fn sweep_factors(&self) -> (f64, f64) {
+        let per_step = match self.dechirp {
+            Dechirp::Paper => 0.0,
+            Dechirp::Exact => self.middle_hz * self.window_s / SPEED_OF_LIGHT / self.loop_period_s,
+        };
+        (self.bandwidth_hz / SPEED_OF_LIGHT, per_step)
     }
 
     /// B/c·Δ + f_mid T/c·dΔ/dt as one product with a `[chirp, chirp]` matrix.
     fn sweep_change(&self, change: Tensor<2>) -> Tensor<2> {
         let [_, chirps] = change.dims();
-        if chirps == 1 {
-            return change * (self.bandwidth_hz / SPEED_OF_LIGHT);
+        let (per_metre, per_step) = self.sweep_factors();
+        if chirps == 1 || per_step == 0.0 {
+            return change * per_metre;
         }
-        let (device, dtype) = (change.device(), change.dtype());
-        change.matmul(self.sweep_matrix(chirps, &device, dtype))
-    }
-
-    fn sweep_matrix(&self, chirps: usize, device: &Device, dtype: DType) -> Tensor<2> {
-        let per_metre = self.bandwidth_hz / SPEED_OF_LIGHT;
-        let per_rate = self.middle_hz * self.window_s / SPEED_OF_LIGHT / self.loop_period_s;
         let mut matrix = vec![0.0; chirps * chirps];
         for chirp in 0..chirps {
             matrix[chirp * chirps + chirp] += per_metre;
             for (from, weight) in difference(chirp, chirps) {
-                matrix[from * chirps + chirp] += per_rate * weight;
+                matrix[from * chirps + chirp] += per_step * weight;
             }
         }
-        Tensor::from_data(TensorData::new(matrix, [chirps, chirps]).convert_dtype(dtype), (device, dtype))
+        let (device, dtype) = (change.device(), change.dtype());
+        let matrix = TensorData::new(matrix, [chirps, chirps]).convert_dtype(dtype);
+        change.matmul(Tensor::from_data(matrix, (&device, dtype)))
     }
+}
+
+/// What a path's length at the reference positions makes of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AtRest {
+    /// At the middle of the window, −½ … ½.
+    pub phase_turns: f64,
+    pub sweep_turns: f64,
+    /// Of the phase, with the length.
+    pub turns_per_metre: f64,
 }
 
 /// Sum of the legs → phasors, for a path that ends after them. See [`Waveform::phasors`].
@@ -166,14 +184,15 @@ pub fn phasors(legs: &[&Leg], amplitude: &Amplitude, radar: &Radar, dechirp: Dec
     Waveform::new(radar, dechirp).phasors(legs, amplitude)
 }
 
-/// Central difference at a chirp as (chirp, weight) pairs; of second order at both ends too.
-fn difference(chirp: usize, chirps: usize) -> Vec<(usize, f64)> {
+/// Central difference at a chirp as (chirp, weight) pairs; of second order at both ends too, zero for a single chirp.
+pub(crate) fn difference(chirp: usize, chirps: usize) -> [(usize, f64); 3] {
     let last = chirps - 1;
-    match chirp {
-        _ if chirps == 2 => vec![(0, -1.0), (1, 1.0)],
-        0 => vec![(0, -1.5), (1, 2.0), (2, -0.5)],
-        _ if chirp == last => vec![(last, 1.5), (last - 1, -2.0), (last - 2, 0.5)],
-        _ => vec![(chirp - 1, -0.5), (chirp + 1, 0.5)],
+    match (chirp, chirps) {
+        (_, 1) => [(0, 0.0); 3],
+        (_, 2) => [(0, -1.0), (1, 1.0), (0, 0.0)],
+        (0, _) => [(0, -1.5), (1, 2.0), (2, -0.5)],
+        _ if chirp == last => [(last, 1.5), (last - 1, -2.0), (last - 2, 0.5)],
+        _ => [(chirp - 1, -0.5), (chirp + 1, 0.5), (chirp, 0.0)],
     }
 }
 

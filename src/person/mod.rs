@@ -118,6 +118,7 @@ impl Default for Placement {
 }
 
 /// A person who moves in front of the radar.
+#[allow(clippy::large_enum_variant, reason = "there are a few persons, never many")]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Person {
     Skinned {

@@ -31,8 +31,7 @@ pub fn reflectance(cosine_squared: Tensor<2>, refraction: Tensor<2>, extinction:
     let sine_squared: Tensor<2> = 1.0 - cosine_squared.clone();
     let cosine = (cosine_squared.clone() + TINY).sqrt();
     // a² − b² and 2ab, the parts of ñ² − sin²θ.
-    let difference =
-        refraction.clone().powi_scalar(2) - extinction.clone().powi_scalar(2) - sine_squared.clone();
+    let difference = refraction.clone().powi_scalar(2) - extinction.clone().powi_scalar(2) - sine_squared.clone();
     let product = refraction * extinction * 2.0;
     let modulus = (difference.clone().powi_scalar(2) + product.clone().powi_scalar(2) + TINY).sqrt();
     let a = ((modulus + difference) * 0.5 + TINY).sqrt();

@@ -45,7 +45,11 @@ impl Range {
     pub fn check(&self, key: &str, allowed: std::ops::RangeInclusive<f64>) -> Result<()> {
         let (least, most) = allowed.into_inner();
         if !(self.low >= least && self.high <= most && self.low < self.high) {
-            return Err(Error::setting(key, format!("{} to {}", self.low, self.high), format!("a range within {least} to {most}")));
+            return Err(Error::setting(
+                key,
+                format!("{} to {}", self.low, self.high),
+                format!("a range within {least} to {most}"),
+            ));
         }
         if !(self.initial > self.low && self.initial < self.high) {
             return Err(Error::setting(

@@ -52,7 +52,11 @@ const TINY: f64 = 1e-10;
 /// Flows to all inputs; smooth and finite everywhere, also at grazing, from behind, with opposite directions and for
 /// α → 0. Symmetric in `incident` and `outgoing`.
 pub fn amplitude(
-    material: &Material, normal: Tensor<3>, incident: Tensor<3>, outgoing: Tensor<3>, response: Response,
+    material: &Material,
+    normal: Tensor<3>,
+    incident: Tensor<3>,
+    outgoing: Tensor<3>,
+    response: Response,
 ) -> Tensor<2> {
     let alpha_squared = column(material.roughness.clone()).powi_scalar(2) + TINY;
     let half = Half::between(&normal, incident.clone(), outgoing.clone());

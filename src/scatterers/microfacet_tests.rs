@@ -28,19 +28,11 @@ fn from_flat(x: &[Tensor<1>], response: Response) -> Tensor<1> {
 fn single(alpha: f64, index: (f64, f64), incident: (f64, f64), outgoing: (f64, f64), response: Response) -> f64 {
     let device = Device::flex();
     let unit = |(polar, azimuth): (f64, f64)| [polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos()];
-    let flat: Vec<Tensor<1>> = [
-        &[alpha][..],
-        &[0.0],
-        &[index.0],
-        &[index.1],
-        &[0.5],
-        &[0.0, 0.0, 1.0],
-        &unit(incident),
-        &unit(outgoing),
-    ]
-    .iter()
-    .map(|values| tensor(values, [values.len()], &device))
-    .collect();
+    let flat: Vec<Tensor<1>> =
+        [&[alpha][..], &[0.0], &[index.0], &[index.1], &[0.5], &[0.0, 0.0, 1.0], &unit(incident), &unit(outgoing)]
+            .iter()
+            .map(|values| tensor(values, [values.len()], &device))
+            .collect();
     values(&from_flat(&flat, response))[0]
 }
 
@@ -93,8 +85,7 @@ fn the_distribution_of_facets_projects_to_one() {
             deviation_cosine_squared: column(vec![1.0; steps]),
         };
         let d = values(&distribution(&half, tensor(&[alpha * alpha], [1, 1], &device)));
-        let integral: f64 =
-            (0..steps).map(|k| d[k] * cosines[k] * sines[k]).sum::<f64>() * 2.0 * PI * (PI / 2.0) / steps as f64;
+        let integral: f64 = (0..steps).map(|k| d[k] * cosines[k] * sines[k]).sum::<f64>() * 2.0 * PI * (PI / 2.0) / steps as f64;
         assert_close("∫ D cos", &[integral], &[1.0], 1e-5);
     }
 }
@@ -145,10 +136,11 @@ fn no_more_power_is_scattered_than_arrives() {
 fn swapping_transmitter_and_receiver_changes_nothing() {
     let device = Device::flex();
     let flat = |values: &[f64]| tensor(values, [values.len()], &device);
-    let mut x: Vec<Tensor<1>> =
-        [(0.1, 0.9), (0.0, 1.0), (1.1, 5.0), (0.0, 3.0), (0.0, 1.0)].iter().enumerate()
-            .map(|(seed, &(low, high))| flat(&numbers(seed as u64, 20, low, high)))
-            .collect();
+    let mut x: Vec<Tensor<1>> = [(0.1, 0.9), (0.0, 1.0), (1.1, 5.0), (0.0, 3.0), (0.0, 1.0)]
+        .iter()
+        .enumerate()
+        .map(|(seed, &(low, high))| flat(&numbers(seed as u64, 20, low, high)))
+        .collect();
     x.extend([directions(7, 20), directions(8, 20), directions(9, 20)].map(|d| flat(&d)));
     for response in RESPONSES {
         let forth = values(&from_flat(&x, response));

@@ -36,3 +36,6 @@ fn column(per_point: Tensor<1>) -> Tensor<2> {
     let [point] = per_point.dims();
     per_point.reshape([point, 1])
 }
+
+#[cfg(test)]
+mod chain_tests;

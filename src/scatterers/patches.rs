@@ -34,12 +34,7 @@ pub struct PatchConfig {
 
 impl Default for PatchConfig {
     fn default() -> Self {
-        Self {
-            degree: 2,
-            offset_m: 0.01,
-            scale_m: Range::new(1e-4, 5e-3, 5e-4),
-            reflectance: Range::new(0.0, 1.0, 0.1),
-        }
+        Self { degree: 2, offset_m: 0.01, scale_m: Range::new(1e-4, 5e-3, 5e-4), reflectance: Range::new(0.0, 1.0, 0.1) }
     }
 }
 

@@ -123,9 +123,9 @@ fn several_receivers_share_a_call() {
     let axes = |seed| tensor(&directions(seed, 3), [3, 1, 3], &device);
     let frame = Frame::along(axes(1), axes(2));
     let (first, second) = (axes(4), axes(5));
-    let together =
-        amplitude(&patch, &frame, axes(3), Tensor::cat(vec![first.clone(), second.clone()], 1), WAVENUMBER);
-    let apart = Tensor::cat(vec![first, second].into_iter().map(|o| amplitude(&patch, &frame, axes(3), o, WAVENUMBER)).collect(), 1);
+    let together = amplitude(&patch, &frame, axes(3), Tensor::cat(vec![first.clone(), second.clone()], 1), WAVENUMBER);
+    let apart =
+        Tensor::cat(vec![first, second].into_iter().map(|o| amplitude(&patch, &frame, axes(3), o, WAVENUMBER)).collect(), 1);
     assert_close("amplitude", &values(&together), &values(&apart), 1e-14);
 }
 

@@ -79,7 +79,10 @@ fn evaluate(inputs: &[Vec<f64>], device: &Device, function: &dyn Fn(&[Tensor<1>]
 
 /// d(Σ weight · output)/d(input element) in f64, by (f(x + step) − f(x − step)) / 2 step.
 pub fn central_difference(
-    inputs: &[Input], step: f64, device: &Device, function: &dyn Fn(&[Tensor<1>]) -> Tensor<1>,
+    inputs: &[Input],
+    step: f64,
+    device: &Device,
+    function: &dyn Fn(&[Tensor<1>]) -> Tensor<1>,
 ) -> Vec<Vec<f64>> {
     let mut at: Vec<Vec<f64>> = inputs.iter().map(|input| input.values.clone()).collect();
     let mut gradients = Vec::new();
@@ -119,7 +122,11 @@ pub fn backward(inputs: &[Input], device: &Device, function: &dyn Fn(&[Tensor<1>
 /// Where the backward pass and central differences disagree by more than `tolerance` of the input's largest derivative:
 /// one line each.
 pub fn disagreements(
-    inputs: &[Input], step: f64, tolerance: f64, device: &Device, function: &dyn Fn(&[Tensor<1>]) -> Tensor<1>,
+    inputs: &[Input],
+    step: f64,
+    tolerance: f64,
+    device: &Device,
+    function: &dyn Fn(&[Tensor<1>]) -> Tensor<1>,
 ) -> Vec<String> {
     let found = backward(inputs, device, function);
     let wanted = central_difference(inputs, step, device, function);
@@ -129,8 +136,7 @@ pub fn disagreements(
         for (element, (&found, &wanted)) in found.iter().zip(wanted).enumerate() {
             let allowed = tolerance * largest.max(1e-6);
             let difference = (found - wanted).abs();
-            // Not `difference > allowed`: NaN must fail.
-            if !(difference <= allowed) {
+            if difference > allowed || difference.is_nan() {
                 rows.push(format!(
                     "{}[{element}]: found {found:e}, wanted {wanted:e}, difference {difference:e}, tolerance {allowed:e}",
                     input.name
@@ -172,11 +178,7 @@ pub fn check_finite(inputs: &[Input], function: impl Fn(&[Tensor<1>]) -> Tensor<
             for (input, tensor) in inputs.iter().zip(&tensors) {
                 if let Some(gradient) = tensor.grad(&gradients) {
                     let found = values(&gradient);
-                    assert!(
-                        found.iter().all(|v| v.is_finite()),
-                        "gradient to {} on {name} in {dtype:?}: {found:?}",
-                        input.name
-                    );
+                    assert!(found.iter().all(|v| v.is_finite()), "gradient to {} on {name} in {dtype:?}: {found:?}", input.name);
                 }
             }
         }
@@ -224,7 +226,7 @@ pub fn assert_close(what: &str, found: &[f64], wanted: &[f64], tolerance: f64) {
         .iter()
         .zip(wanted)
         .enumerate()
-        .filter(|(_, (f, w))| !((*f - *w).abs() <= tolerance * largest))
+        .filter(|(_, (f, w))| (*f - *w).abs() > tolerance * largest || (*f - *w).is_nan())
         .map(|(i, (f, w))| format!("{what}[{i}]: found {f:e}, wanted {w:e}, difference {:e}", (f - w).abs()))
         .collect();
     assert!(rows.is_empty(), "tolerance {:e}\n{}", tolerance * largest, rows.join("\n"));

@@ -53,13 +53,17 @@ impl Npz {
     /// Names of the arrays, sorted.
     pub fn names(&self) -> Vec<String> {
         let mut names: Vec<_> =
-            self.archive.file_names().filter_map(|name| name.strip_suffix(".npy").map(str::to_string)).collect();
+            self.members().map(str::to_string).collect();
         names.sort();
         names
     }
 
     pub fn has(&self, name: &str) -> bool {
-        self.archive.file_names().any(|file| file.strip_suffix(".npy") == Some(name))
+        self.members().any(|member| member == name)
+    }
+
+    fn members(&self) -> impl Iterator<Item = &str> {
+        self.archive.file_names_raw().filter_map(|name| std::str::from_utf8(name).ok()?.strip_suffix(".npy"))
     }
 
     /// Reads an array that must be there. Floating-point values must be finite.

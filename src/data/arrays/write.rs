@@ -5,7 +5,7 @@ use std::path::Path;
 
 use npyz::WriterBuilder;
 use num_complex::Complex;
-use zip::write::FileOptions;
+use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use crate::data::atomic::{AtomicFile, write_file};
@@ -125,7 +125,8 @@ pub fn write_npz(path: impl AsRef<Path>, members: &[Member]) -> Result<()> {
     let path = path.as_ref();
     // Archives can only be written where one can go back; they are small enough for memory.
     let mut archive = ZipWriter::new(io::Cursor::new(Vec::new()));
-    let options = FileOptions::default().compression_method(CompressionMethod::Deflated).last_modified_time(DateTime::default());
+    let options =
+        SimpleFileOptions::default().compression_method(CompressionMethod::Deflated).last_modified_time(DateTime::default());
     let mut write_all = || -> io::Result<()> {
         for member in members {
             let large = member.values.len() > 1 << 28;

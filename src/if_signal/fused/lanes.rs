@@ -7,6 +7,8 @@ pub const LANES: usize = 16;
 
 pub type Lanes = [f32; LANES];
 
+pub const ZERO: Lanes = [0.0; LANES];
+
 #[inline(always)]
 pub fn map(x: Lanes, of: impl Fn(f32) -> f32) -> Lanes {
     std::array::from_fn(|lane| of(x[lane]))
@@ -51,4 +53,29 @@ pub fn cis(turns: Lanes) -> (Lanes, Lanes) {
         sin[lane] = h * odd;
     }
     (cos, sin)
+}
+
+/// Sixteen values from `at` on, or `width` of them and the last one repeated.
+#[inline(always)]
+pub fn load(values: &[f32], at: usize, width: usize) -> Lanes {
+    if width >= LANES {
+        return values[at..at + LANES].try_into().expect("sixteen values");
+    }
+    std::array::from_fn(|lane| values[at + lane.min(width - 1)])
+}
+
+/// The first `width` lanes to `at` on.
+#[inline(always)]
+pub fn store(values: &mut [f32], at: usize, width: usize, lanes: Lanes) {
+    let width = width.min(LANES);
+    values[at..at + width].copy_from_slice(&lanes[..width]);
+}
+
+/// Adds the first `width` lanes to what is at `at` on.
+#[inline(always)]
+pub fn accumulate(values: &mut [f32], at: usize, width: usize, lanes: Lanes) {
+    let width = width.min(LANES);
+    for (value, lane) in values[at..at + width].iter_mut().zip(lanes) {
+        *value += lane;
+    }
 }

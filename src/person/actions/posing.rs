@@ -105,7 +105,7 @@ impl Figure {
         let (ankle, ball) = (self.joints[7 + side], self.joints[10 + side]);
         let forward = ball.z - ankle.z;
         // The point that touches the floor moves from behind the ankle to the ball as the foot tips over.
-        let contact = vector![0.0, 0.0, forward * (-0.35 + 1.35 * ease((foot.pitch + 0.1) / 0.2))];
+        let contact = vector![0.0, 0.0, forward * (-0.55 + 1.55 * ease((foot.pitch + 0.1) / 0.2))];
         let above = vector![0.0, ankle.y - self.sole, 0.0] - contact;
         foot.place + about(1, foot.heading) * (contact + about(0, foot.pitch) * above)
     }
@@ -135,7 +135,7 @@ impl Figure {
         local[4 + side] = thigh_turn.inverse() * shank_turn;
         local[7 + side] = shank_turn.inverse() * foot_turn;
         // The toes stay on the floor while the heel rises.
-        local[10 + side] = about(0, -0.85 * foot.pitch * ease((foot.pitch + 0.1) / 0.2));
+        local[10 + side] = about(0, -foot.pitch * ease((foot.pitch + 0.1) / 0.2));
     }
 }
 

@@ -49,7 +49,7 @@ fn the_feet_stay_on_the_floor() {
         let motion = usual(action, 12.0);
         for (pose, (_, vertices)) in posed(body(), &motion, 3).iter().enumerate() {
             let lowest = vertices.iter().map(|vertex| vertex.y).fold(f64::INFINITY, f64::min);
-            assert!((-0.02..0.02).contains(&lowest), "{} at pose {}: {lowest} m", action.name(), 3 * pose);
+            assert!((-0.015..0.01).contains(&lowest), "{} at pose {}: {lowest} m", action.name(), 3 * pose);
         }
     }
 }
@@ -117,15 +117,15 @@ fn motions_are_smooth() {
         let joints: Vec<Points> = posed(body(), &motion, 1).into_iter().map(|(joints, _)| joints).collect();
         let mut most = (0.0f64, 0.0f64);
         for triple in joints.windows(3) {
-            for joint in 0..24 {
-                let velocity = (triple[2][joint] - triple[1][joint]) * 60.0;
-                let acceleration = (triple[2][joint] - 2.0 * triple[1][joint] + triple[0][joint]) * 3600.0;
+            let [before, now, after] = triple else { unreachable!() };
+            for ((before, now), after) in before.iter().zip(now).zip(after) {
+                let (velocity, acceleration) = ((after - now) * 60.0, (after - now * 2.0 + before) * 3600.0);
                 most = (most.0.max(velocity.norm()), most.1.max(acceleration.norm()));
             }
         }
         println!("{}: {:.2} m/s, {:.1} m/s2", action.name(), most.0, most.1);
         // Sprinters exceed these, an everyday walk does not.
-        assert!(most.0 < 5.0 && most.1 < 90.0, "{}: {most:?}", action.name());
+        assert!(most.0 < 5.0 && most.1 < 60.0, "{}: {most:?}", action.name());
     }
 }
 

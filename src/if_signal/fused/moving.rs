@@ -1,0 +1,353 @@
+//! Returns given as moving points and antennas: legs, phase, sweep and spreading are computed where they are needed.
+//!
+//! The same formulas as [`crate::paths`], which defines them; here they neither become tensors nor a tape.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::kernel::{self, Return, Returns, Sink};
+use super::lanes::{LANES, Lanes, ZERO, accumulate, fma, load, map, multiply_add, zip};
+use crate::paths::{AtRest, NEAR_FIELD_M2, SOFTENING_M, Waveform, difference, distance};
+
+/// Host constants of paths from one transmitter by way of points to several receivers.
+#[derive(Debug)]
+pub struct Geometry {
+    /// Transmitter first, then the receivers.
+    antennas_m: Vec<[f32; 3]>,
+    reference_m: Vec<[f32; 3]>,
+    /// `[antenna][point]`: the leg's reference length.
+    lengths_m: Vec<Vec<f32>>,
+    /// `[receiver][point]`.
+    at_rest: Vec<Vec<PathAtRest>>,
+    sweep_per_metre: f32,
+    sweep_per_step: f32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct PathAtRest {
+    phase_turns: f32,
+    sweep_turns: f32,
+    turns_per_metre: f32,
+}
+
+impl Geometry {
+    pub fn new(reference_m: &[[f64; 3]], tx_m: [f64; 3], receivers_m: &[[f64; 3]], waveform: &Waveform) -> Self {
+        let lengths = |antenna_m: [f64; 3]| -> Vec<f64> { reference_m.par_iter().map(|&x| distance(x, antenna_m)).collect() };
+        let from_tx = lengths(tx_m);
+        let narrow = |values: &[f64]| values.iter().map(|&value| value as f32).collect::<Vec<f32>>();
+        let mut lengths_m = vec![narrow(&from_tx)];
+        let mut at_rest = vec![];
+        for &receiver_m in receivers_m {
+            let to_rx = lengths(receiver_m);
+            let paths = from_tx.par_iter().zip(&to_rx).map(|(a, b)| {
+                let AtRest { phase_turns, sweep_turns, turns_per_metre } = waveform.at_rest(a + b);
+                PathAtRest {
+                    phase_turns: phase_turns as f32,
+                    sweep_turns: sweep_turns as f32,
+                    turns_per_metre: turns_per_metre as f32,
+                }
+            });
+            at_rest.push(paths.collect());
+            lengths_m.push(narrow(&to_rx));
+        }
+        let (per_metre, per_step) = waveform.sweep_factors();
+        let position = |x: &[f64; 3]| x.map(|value| value as f32);
+        Self {
+            antennas_m: std::iter::once(&tx_m).chain(receivers_m).map(position).collect(),
+            reference_m: reference_m.iter().map(position).collect(),
+            lengths_m,
+            at_rest,
+            sweep_per_metre: per_metre as f32,
+            sweep_per_step: per_step as f32,
+        }
+    }
+
+    pub fn points(&self) -> usize {
+        self.reference_m.len()
+    }
+
+    pub fn receivers(&self) -> usize {
+        self.at_rest.len()
+    }
+
+    fn legs(&self) -> usize {
+        self.antennas_m.len()
+    }
+
+    /// |x0+u−r|² − |x0−r|² for one displacement, and half its derivative x0+u−r.
+    #[inline(always)]
+    fn growth(&self, point: usize, leg: usize, u: [f32; 3]) -> (f32, [f32; 3]) {
+        let (x0, r) = (self.reference_m[point], self.antennas_m[leg]);
+        let v: [f32; 3] = std::array::from_fn(|axis| x0[axis] - r[axis]);
+        let growth = u[0] * (u[0] + 2.0 * v[0]) + u[1] * (u[1] + 2.0 * v[1]) + u[2] * (u[2] + 2.0 * v[2]);
+        (growth, std::array::from_fn(|axis| v[axis] + u[axis]))
+    }
+}
+
+/// Displacements `[point, chirp]`, amplitudes `[point, chirp]` or `[point, 1]`, in row-major order.
+#[derive(Clone, Copy)]
+pub struct Tensors<'a> {
+    pub axes: [&'a [f32]; 3],
+    pub re: &'a [f32],
+    pub im: Option<&'a [f32]>,
+    pub chirps: usize,
+    pub amplitude_chirps: usize,
+}
+
+/// Moving points with the changes of all their legs.
+pub struct Moving<'a> {
+    geometry: Arc<Geometry>,
+    tensors: Tensors<'a>,
+    /// `[point][leg][chirp]`, metres.
+    changes_m: Vec<f32>,
+}
+
+/// Of one receiver's path at sixteen chirps.
+struct Path {
+    lengths_m: [Lanes; 2],
+    spreading: Lanes,
+    change_m: Lanes,
+}
+
+impl<'a> Moving<'a> {
+    pub fn new(geometry: Arc<Geometry>, tensors: Tensors<'a>) -> Self {
+        let (chirps, legs) = (tensors.chirps, geometry.legs());
+        let softening = (SOFTENING_M * SOFTENING_M) as f32;
+        let mut changes_m = vec![0.0; geometry.points() * legs * chirps];
+        changes_m.par_chunks_mut(legs * chirps).enumerate().with_min_len(256).for_each(|(point, changes)| {
+            let row = |axis: usize| &tensors.axes[axis][point * chirps..][..chirps];
+            let (x, y, z) = (row(0), row(1), row(2));
+            for (leg, changes) in changes.chunks_mut(chirps).enumerate() {
+                let length = geometry.lengths_m[leg][point];
+                let squared = multiply_add(length, length, softening);
+                for (chirp, change) in changes.iter_mut().enumerate() {
+                    let (growth, _) = geometry.growth(point, leg, [x[chirp], y[chirp], z[chirp]]);
+                    *change = growth / ((growth + squared).sqrt() + length);
+                }
+            }
+        });
+        Self { geometry, tensors, changes_m }
+    }
+
+    fn row(&self, point: usize, leg: usize) -> &[f32] {
+        let chirps = self.tensors.chirps;
+        &self.changes_m[(point * self.geometry.legs() + leg) * chirps..][..chirps]
+    }
+
+    #[inline(always)]
+    fn path(&self, receiver: usize, point: usize, chirp: usize) -> Path {
+        let width = self.tensors.chirps - chirp;
+        let changes = [0, receiver + 1].map(|leg| load(self.row(point, leg), chirp, width));
+        let lengths_m: [Lanes; 2] = std::array::from_fn(|i| {
+            let length = self.geometry.lengths_m[[0, receiver + 1][i]][point];
+            map(changes[i], |change| change + length)
+        });
+        let spreading = zip(lengths_m[0], lengths_m[1], |a, b| 1.0 / multiply_add(a, b, NEAR_FIELD_M2 as f32));
+        Path { lengths_m, spreading, change_m: zip(changes[0], changes[1], |a, b| a + b) }
+    }
+
+    #[inline(always)]
+    fn amplitude(&self, values: &[f32], point: usize, chirp: usize) -> Lanes {
+        match self.tensors.amplitude_chirps {
+            1 => [values[point]; LANES],
+            chirps => load(values, point * chirps + chirp, chirps - chirp),
+        }
+    }
+
+    /// Difference of the path from chirp to chirp, metres.
+    #[inline(always)]
+    fn step(&self, receiver: usize, point: usize, chirp: usize) -> Lanes {
+        let chirps = self.tensors.chirps;
+        let (a, b) = (self.row(point, 0), self.row(point, receiver + 1));
+        if chirp > 0 && chirp + LANES < chirps {
+            let at = |from: usize| zip(load(a, from, LANES), load(b, from, LANES), |a, b| a + b);
+            return zip(at(chirp + 1), at(chirp - 1), |next, last| 0.5 * (next - last));
+        }
+        std::array::from_fn(|lane| {
+            let pairs = difference((chirp + lane).min(chirps - 1), chirps);
+            pairs.iter().map(|&(from, weight)| weight as f32 * (a[from] + b[from])).sum()
+        })
+    }
+}
+
+impl Returns for Moving<'_> {
+    fn points(&self) -> usize {
+        self.geometry.points()
+    }
+
+    fn chirps(&self) -> usize {
+        self.tensors.chirps
+    }
+
+    fn receivers(&self) -> usize {
+        self.geometry.receivers()
+    }
+
+    #[inline(always)]
+    fn load(&self, receiver: usize, point: usize, chirp: usize) -> Return {
+        let path = self.path(receiver, point, chirp);
+        let rest = self.geometry.at_rest[receiver][point];
+        let mut sweep = map(path.change_m, |change| multiply_add(change, self.geometry.sweep_per_metre, rest.sweep_turns));
+        if self.geometry.sweep_per_step != 0.0 && self.tensors.chirps > 1 {
+            sweep = fma(self.step(receiver, point, chirp), [self.geometry.sweep_per_step; LANES], sweep);
+        }
+        let spread = |values: &[f32]| zip(self.amplitude(values, point, chirp), path.spreading, |a, w| a * w);
+        Return {
+            re: spread(self.tensors.re),
+            im: self.tensors.im.map_or(ZERO, spread),
+            phase: map(path.change_m, |change| multiply_add(change, rest.turns_per_metre, rest.phase_turns)),
+            sweep,
+        }
+    }
+}
+
+/// Gradients to x, y, z, re and im; that to im is empty for a real amplitude.
+pub fn gradients(moving: &Moving, upstream: &[f32], samples: usize) -> [Vec<f32>; 5] {
+    let (points, chirps) = (moving.points(), moving.chirps());
+    let amplitude_chirps = moving.tensors.amplitude_chirps;
+    let zeros = |columns: usize| vec![0.0f32; points * columns];
+    let im_columns = if moving.tensors.im.is_some() { amplitude_chirps } else { 0 };
+    let mut all = [zeros(chirps), zeros(chirps), zeros(chirps), zeros(amplitude_chirps), zeros(im_columns)];
+    let count = kernel::points_per_sink(points);
+    let [x, y, z, re, im] = &mut all;
+    let mut im = im.chunks_mut(count * amplitude_chirps);
+    let sinks: Vec<Back> = (x.chunks_mut(count * chirps).zip(y.chunks_mut(count * chirps)))
+        .zip(z.chunks_mut(count * chirps).zip(re.chunks_mut(count * amplitude_chirps)))
+        .enumerate()
+        .map(|(index, ((x, y), (z, re)))| Back {
+            moving,
+            first: index * count,
+            to_legs: vec![0.0; x.len() * moving.geometry.legs()],
+            to_sweep: vec![0.0; x.len()],
+            axes: [x, y, z],
+            re,
+            im: im.next(),
+        })
+        .collect();
+    kernel::gradients(moving, upstream, samples, sinks);
+    all
+}
+
+/// Takes the gradients to a range of points back to their displacements and amplitudes.
+struct Back<'a> {
+    moving: &'a Moving<'a>,
+    first: usize,
+    /// `[point][leg][chirp]`, to the legs' changes.
+    to_legs: Vec<f32>,
+    /// `[point][chirp]`, of the receiver at hand.
+    to_sweep: Vec<f32>,
+    axes: [&'a mut [f32]; 3],
+    re: &'a mut [f32],
+    im: Option<&'a mut [f32]>,
+}
+
+impl Back<'_> {
+    fn to_amplitude(values: &mut [f32], amplitude_chirps: usize, local: usize, chirp: usize, width: usize, gradient: Lanes) {
+        match amplitude_chirps {
+            1 => values[local] += gradient[..width.min(LANES)].iter().sum::<f32>(),
+            chirps => accumulate(values, local * chirps + chirp, width, gradient),
+        }
+    }
+}
+
+impl Sink for Back<'_> {
+    fn points(&self) -> usize {
+        self.to_sweep.len() / self.moving.tensors.chirps
+    }
+
+    #[inline(always)]
+    fn put(&mut self, receiver: usize, local: usize, chirp: usize, gradient: &Return) {
+        let Moving { geometry, tensors, .. } = self.moving;
+        let (point, width, chirps) = (self.first + local, tensors.chirps - chirp, tensors.chirps);
+        let path = self.moving.path(receiver, point, chirp);
+        let spread = |gradient: Lanes| zip(gradient, path.spreading, |g, w| g * w);
+        Self::to_amplitude(self.re, tensors.amplitude_chirps, local, chirp, width, spread(gradient.re));
+        let mut to_spreading = zip(gradient.re, self.moving.amplitude(tensors.re, point, chirp), |g, a| g * a);
+        if let (Some(values), Some(im)) = (&mut self.im, tensors.im) {
+            Self::to_amplitude(values, tensors.amplitude_chirps, local, chirp, width, spread(gradient.im));
+            to_spreading = fma(gradient.im, self.moving.amplitude(im, point, chirp), to_spreading);
+        }
+        // The spreading is 1/(a·b + ε): to either length it falls by its square times the other one.
+        let to_product = zip(to_spreading, path.spreading, |g, w| -g * w * w);
+        let turns_per_metre = geometry.at_rest[receiver][point].turns_per_metre;
+        let common = zip(gradient.phase, gradient.sweep, |phase, sweep| {
+            multiply_add(phase, turns_per_metre, sweep * geometry.sweep_per_metre)
+        });
+        for (leg, other) in [(0, 1), (receiver + 1, 0)] {
+            let to_leg = fma(to_product, path.lengths_m[other], common);
+            accumulate(&mut self.to_legs, (local * geometry.legs() + leg) * chirps + chirp, width, to_leg);
+        }
+        super::lanes::store(&mut self.to_sweep, local * chirps + chirp, width, gradient.sweep);
+    }
+
+    fn close(&mut self, receiver: usize) {
+        let (chirps, legs) = (self.moving.tensors.chirps, self.moving.geometry.legs());
+        let per_step = self.moving.geometry.sweep_per_step;
+        if per_step != 0.0 && chirps > 1 {
+            for (sweep, to_legs) in self.to_sweep.chunks(chirps).zip(self.to_legs.chunks_mut(legs * chirps)) {
+                for leg in [0, receiver + 1] {
+                    add_difference_adjoint(sweep, per_step, &mut to_legs[leg * chirps..][..chirps]);
+                }
+            }
+        }
+        if receiver + 1 == self.moving.receivers() {
+            self.to_displacements();
+        }
+    }
+}
+
+impl Back<'_> {
+    fn to_displacements(&mut self) {
+        let Moving { geometry, tensors, .. } = self.moving;
+        let chirps = tensors.chirps;
+        let softening = (SOFTENING_M * SOFTENING_M) as f32;
+        for local in 0..self.to_sweep.len() / chirps {
+            let point = self.first + local;
+            let u: [&[f32]; 3] = std::array::from_fn(|axis| &tensors.axes[axis][point * chirps..][..chirps]);
+            let [x, y, z] = &mut self.axes;
+            let [x, y, z] = [x, y, z].map(|values| &mut values[local * chirps..][..chirps]);
+            for leg in 0..geometry.legs() {
+                let length = geometry.lengths_m[leg][point];
+                let squared = multiply_add(length, length, softening);
+                let to_change = &self.to_legs[(local * geometry.legs() + leg) * chirps..][..chirps];
+                for chirp in 0..chirps {
+                    let (growth, along) = geometry.growth(point, leg, [u[0][chirp], u[1][chirp], u[2][chirp]]);
+                    let whole = (growth + squared).sqrt();
+                    let both = 1.0 / (whole + length);
+                    // Twice the derivative of growth/(whole + length), for the derivative 2·along of the growth.
+                    let factor = to_change[chirp] * (2.0 * both - growth * both * both / whole);
+                    x[chirp] = multiply_add(factor, along[0], x[chirp]);
+                    y[chirp] = multiply_add(factor, along[1], y[chirp]);
+                    z[chirp] = multiply_add(factor, along[2], z[chirp]);
+                }
+            }
+        }
+    }
+}
+
+/// to\[k\] += factor · Σ_m g\[m\] · (weight of k in the difference at m).
+fn add_difference_adjoint(gradient: &[f32], factor: f32, to: &mut [f32]) {
+    let chirps = gradient.len();
+    if chirps < 4 {
+        for (chirp, &g) in gradient.iter().enumerate() {
+            for (from, weight) in difference(chirp, chirps) {
+                to[from] += factor * weight as f32 * g;
+            }
+        }
+        return;
+    }
+    for chirp in [0, chirps - 1] {
+        for (from, weight) in difference(chirp, chirps) {
+            to[from] += factor * weight as f32 * gradient[chirp];
+        }
+    }
+    // Every chirp but the first and the last has weights −½ and ½ for its neighbours.
+    let half = 0.5 * factor;
+    for (to, &g) in to[..chirps - 2].iter_mut().zip(&gradient[1..chirps - 1]) {
+        *to -= half * g;
+    }
+    for (to, &g) in to[2..].iter_mut().zip(&gradient[1..chirps - 1]) {
+        *to += half * g;
+    }
+}
