@@ -276,7 +276,7 @@ impl Trainer<'_> {
                 }
                 let scene = &recording.scene;
                 let constants = &prepared[index].constants;
-                if let Some(stage) = simulator.first_non_finite_stage(scene, &scene.view(frame)?, constants, mode) {
+                if let Some(stage) = simulator.first_non_finite_stage(scene, &*scene.view(frame)?, constants, mode) {
                     return Ok(Error::NonFinite { stage: stage.into(), step });
                 }
             }
