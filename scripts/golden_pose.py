@@ -33,7 +33,10 @@ def pose_body(body, betas, pose):
         world.append(world[parent] @ local if joint else local)
     world = np.stack(world)
     world[:, :3, 3] -= np.einsum("jab,jb->ja", world[:, :3, :3], joints)
-    blend = np.einsum("vj,jab->vab", body["weights"], world)
+    # f32 weights do not sum to one exactly; readers normalise them.
+    weights = body["weights"].astype(float)
+    weights = weights / weights.sum(axis=1, keepdims=True)
+    blend = np.einsum("vj,jab->vab", weights, world)
     return rest, np.einsum("vab,vb->va", blend[:, :3, :3], blended) + blend[:, :3, 3]
 
 

@@ -107,47 +107,5 @@ pub fn shared_body(name: &str) -> Option<BodyModel> {
         eprintln!("skipped: {} is not there", path.display());
         return None;
     }
-    let mut archive = npyz::npz::NpzArchive::open(&path).unwrap();
-    // In C order, whatever order the file keeps (the shared joint regressor is stored column by column).
-    let mut floats = |key: &str| -> Vec<f64> {
-        let array = archive.by_name(key).unwrap().unwrap();
-        let (order, shape) = (array.order(), array.shape().to_vec());
-        let flat: Vec<f64> = array.into_vec::<f32>().unwrap().into_iter().map(f64::from).collect();
-        match (order, shape.as_slice()) {
-            (npyz::Order::C, _) => flat,
-            (_, &[rows, columns]) => {
-                let (rows, columns) = (rows as usize, columns as usize);
-                (0..rows * columns).map(|index| flat[(index % columns) * rows + index / columns]).collect()
-            }
-            _ => panic!("{key}: a Fortran array of shape {shape:?}"),
-        }
-    };
-    let triples = |flat: &[f64]| -> Vec<[f64; 3]> { flat.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect() };
-    let template = triples(&floats("v_template"));
-    let count = template.len();
-    // [vertex, xyz, direction] → [direction][vertex, xyz]
-    let blends = |flat: Vec<f64>| -> Vec<Vec<[f64; 3]>> {
-        let directions = flat.len() / (3 * count);
-        let entry = |vertex: usize, axis: usize, direction: usize| flat[(vertex * 3 + axis) * directions + direction];
-        let whole =
-            |direction: usize| (0..count).map(|vertex| std::array::from_fn(|axis| entry(vertex, axis, direction))).collect();
-        (0..directions).map(whole).collect()
-    };
-    let sparse = |flat: Vec<f64>, width: usize| -> Vec<Vec<(usize, f64)>> {
-        let row = |row: &[f64]| row.iter().copied().enumerate().filter(|(_, weight)| *weight != 0.0).collect();
-        flat.chunks_exact(width).map(row).collect()
-    };
-    let (shape_directions, pose_directions) = (blends(floats("shapedirs")), blends(floats("posedirs")));
-    let (joint_regressor, skinning) = (sparse(floats("J_regressor"), count), sparse(floats("weights"), 24));
-    let tree = archive.by_name("kintree_table").unwrap().unwrap().into_vec::<i64>().unwrap();
-    let faces = archive.by_name("f").unwrap().unwrap().into_vec::<u32>().unwrap();
-    Some(BodyModel {
-        template,
-        shape_directions,
-        pose_directions,
-        joint_regressor,
-        skinning,
-        parents: tree[..24].iter().enumerate().map(|(joint, &parent)| (joint > 0).then_some(parent as usize)).collect(),
-        faces: faces.chunks_exact(3).map(|face| [face[0] as usize, face[1] as usize, face[2] as usize]).collect(),
-    })
+    Some(crate::data::read_body(path).unwrap())
 }

@@ -54,10 +54,8 @@ impl NoiseConfig {
     }
 
     pub fn init(&self, device: &Device) -> Noise {
-        // The inverse of softplus, in the form that holds for large rates too.
-        let raw = self.rate + (-(-self.rate).exp_m1()).ln();
         Noise {
-            raw_rate: (self.law == NoiseLaw::Learned).then(|| Param::from_tensor(Tensor::from_data([raw as f32], device))),
+            raw_rate: (self.law == NoiseLaw::Learned).then(|| raw_rate(self.rate, device)),
             law: self.law,
             rate: self.rate,
             level: self.level,
@@ -78,7 +76,18 @@ pub struct Noise {
     level: f64,
 }
 
+/// The inverse of softplus, in the form that holds for large rates too.
+fn raw_rate(rate: f64, device: &Device) -> Param<Tensor<1>> {
+    let raw = rate + (-(-rate).exp_m1()).ln();
+    Param::from_tensor(Tensor::from_data([raw as f32], device))
+}
+
 impl Noise {
+    /// The same noise, learning from another rate on; laws that do not learn stay as they are.
+    pub fn starting_at(self, rate: f64, device: &Device) -> Self {
+        Self { raw_rate: self.raw_rate.is_some().then(|| raw_rate(rate, device)), ..self }
+    }
+
     /// σ over the signal's mean amplitude `[1]`, with the gradient to the parameter; `None` for a law without a rate.
     pub fn rate(&self, device: &Device) -> Option<Tensor<1>> {
         match (self.law, &self.raw_rate) {

@@ -41,53 +41,14 @@ fn joints(model: &BodyModel, motion: &Motion) -> Vec<Vec<Point>> {
 }
 
 fn twin(path: &Path) -> Motion {
-    let mut archive = npyz::npz::NpzArchive::open(path).unwrap();
-    let mut array = |name: &str| -> Vec<f64> {
-        let array = archive.by_name(name).unwrap().unwrap();
-        match array.dtype() {
-            npyz::DType::Plain(plain) if plain.size_field() == 4 => {
-                array.into_vec::<f32>().unwrap().into_iter().map(f64::from).collect()
-            }
-            _ => array.into_vec::<f64>().unwrap(),
-        }
-    };
-    let triples = |flat: Vec<f64>| -> Vec<[f64; 3]> { flat.chunks(3).map(|chunk| [chunk[0], chunk[1], chunk[2]]).collect() };
-    Motion {
-        poses: triples(array("poses")).chunks(24).map(<[_]>::to_vec).collect(),
-        translations: triples(array("trans")),
-        betas: Vec::new(),
-        rate_hz: array("mocap_framerate")[0],
-    }
+    let (motion, _) = crate::data::read_motion(path, 24, 0).unwrap();
+    motion
 }
 
-/// Joints of a body in SMPL layout, enough to place them.
+/// Joints of a body in SMPL layout.
 fn smpl(path: &Path) -> BodyModel {
-    let mut archive = npyz::npz::NpzArchive::open(path).unwrap();
-    // Row-major, whatever the order in the file.
-    let mut array = |name: &str| {
-        let array = archive.by_name(name).unwrap().unwrap();
-        let (order, shape) = (array.order(), array.shape().to_vec());
-        let flat = array.into_vec::<f32>().unwrap();
-        let (rows, columns) = (shape[0] as usize, shape[1] as usize);
-        let place = |index: usize| match order {
-            npyz::Order::C => index,
-            npyz::Order::Fortran => index / columns + index % columns * rows,
-        };
-        (0..flat.len()).map(|index| flat[place(index)]).collect::<Vec<f32>>()
-    };
-    let (template, regressor) = (array("v_template"), array("J_regressor"));
-    let template: Vec<[f64; 3]> = template.chunks(3).map(|chunk| [0, 1, 2].map(|axis| f64::from(chunk[axis]))).collect();
-    let rows = regressor.chunks(template.len());
-    let sparse = |row: &[f32]| row.iter().enumerate().map(|(vertex, &weight)| (vertex, f64::from(weight))).collect();
-    BodyModel {
-        joint_regressor: rows.map(sparse).collect(),
-        parents: person().parents,
-        template,
-        shape_directions: Vec::new(),
-        pose_directions: Vec::new(),
-        skinning: Vec::new(),
-        faces: Vec::new(),
-    }
+    let model = crate::data::read_body(path).unwrap();
+    BodyModel { shape_directions: Vec::new(), ..model }
 }
 
 /// Bones whose direction a motion decides.

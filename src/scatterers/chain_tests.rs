@@ -59,7 +59,7 @@ impl Chain {
     fn amplitudes(&self) -> [Tensor<2>; 2] {
         let body = self.planes.forward(&self.sampler);
         let mixed = self.gcn.forward(&self.graph, body.clone(), None);
-        let Decoders { body_material, room_material, body_patch, room_patch, gain } = &self.decoders;
+        let Decoders { body_material, room_material, body_patch, room_patch, body_gain, .. } = &self.decoders;
         let material = Material::cat(vec![body_material.forward(mixed), room_material.forward(self.room.clone())]);
         let patch = Patch::cat(vec![body_patch.forward(body), room_patch.forward(self.room.clone())]);
         let [normal, reference, incident, outgoing] = self.directions.clone();
@@ -67,7 +67,7 @@ impl Chain {
         let direct = microfacet::amplitude(&material, normal.clone(), incident.clone(), outgoing.clone(), Response::Projected);
         let frame = Frame::along(normal, reference);
         let indirect = patches::amplitude(&patch.pick(&self.seen), &frame, incident, outgoing, 1653.5);
-        [direct, indirect].map(|amplitude| amplitude * gain.factor().unsqueeze_dim::<2>(1))
+        [direct, indirect].map(|amplitude| amplitude * body_gain.factor().unsqueeze_dim::<2>(1))
     }
 
     /// Parameters at both ends of the chain.

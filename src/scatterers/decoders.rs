@@ -22,8 +22,8 @@ pub struct DecodersConfig {
     pub room_material: MaterialConfig,
     pub body_patch: PatchConfig,
     pub room_patch: PatchConfig,
-    /// Where the learned gain starts, decibels of amplitude: ADC codes (or whatever unit the recording has) per unit of
-    /// amplitude of one square metre at one metre. Best set from the first recording, see `Gain::scale`.
+    /// Where the learned gains start, decibels of amplitude: ADC codes (or whatever unit the recording has) per unit of
+    /// amplitude of one square metre at one metre. Training sets them from its first recording, see `Gain::scale`.
     pub gain_db: f64,
 }
 
@@ -74,18 +74,23 @@ impl DecodersConfig {
             config: config.clone(),
         };
         let (body_patch, room_patch) = (patch(&self.body_patch, body_features), patch(&self.room_patch, room_features));
-        Decoders { body_material, room_material, body_patch, room_patch, gain: Gain::new(self.gain_db, device) }
+        let gain = || Gain::new(self.gain_db, device);
+        Decoders { body_material, room_material, body_patch, room_patch, body_gain: gain(), room_gain: gain() }
     }
 }
 
-/// All that turns features into scattering. Learned: the networks and the gain.
+/// All that turns features into scattering. Learned: the networks and the gains.
+///
+/// Body and room have gains of their own: how densely each is sampled is a choice of ours, and a surface sampled more
+/// coarsely than half a wavelength returns too much or too little by up to 16 dB.
 #[derive(Module, Debug)]
 pub struct Decoders {
     pub body_material: MaterialDecoder,
     pub room_material: MaterialDecoder,
     pub body_patch: PatchDecoder,
     pub room_patch: PatchDecoder,
-    pub gain: Gain,
+    pub body_gain: Gain,
+    pub room_gain: Gain,
 }
 
 /// Features to material (the paper's BRDF decoder).
@@ -128,8 +133,8 @@ impl PatchDecoder {
     }
 }
 
-/// The one overall factor from scattering amplitude to the recording's unit (ADC codes), which no physics here knows:
-/// transmit power, antenna gains, receiver gain. Applied to direct and indirect path alike, after the coherent sum.
+/// The factor from scattering amplitude to the recording's unit (ADC codes), which no physics here knows: transmit
+/// power, antenna gains, receiver gain. Applied to direct and indirect path alike.
 #[derive(Module, Debug)]
 pub struct Gain {
     /// `[1]`, natural logarithm of the factor.
@@ -219,7 +224,7 @@ mod tests {
         let inputs = [input("features", numbers(2, 8, -1.0, 1.0)), input("gain", [0.3])];
         check_gradient(&inputs, 1e-5, 1e-7, |x| {
             let mut decoders = decoders.clone().to_device(&x[0].device());
-            decoders.gain.log_gain = decoders.gain.log_gain.map(|_| x[1].clone());
+            decoders.body_gain.log_gain = decoders.body_gain.log_gain.map(|_| x[1].clone());
             let features = x[0].clone().reshape([2, 4]);
             let skin = decoders.body_material.forward(features.clone());
             let patch = decoders.body_patch.forward(features);
@@ -230,7 +235,7 @@ mod tests {
                 patch.scale_m.reshape([4]) * 1e3,
                 patch.rotation_rad,
                 patch.lobes.reshape([18]),
-                decoders.gain.factor(),
+                decoders.body_gain.factor(),
             ];
             Tensor::cat(parts, 0)
         });

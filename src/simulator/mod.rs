@@ -77,7 +77,7 @@ impl Simulator {
     }
 
     pub fn device(&self) -> Device {
-        self.decoders.gain.log_gain.val().device()
+        self.decoders.body_gain.log_gain.val().device()
     }
 
     /// The tensors of a scene that never change; made once.
@@ -145,12 +145,10 @@ impl Simulator {
         if self.config.paths.has_indirect() && !scene.proxies.is_empty() {
             add(self.indirect_signal(scene, view, surfaces));
         }
-        let signal = sum.unwrap_or_else(|| {
+        sum.unwrap_or_else(|| {
             let [_, tx, rx, loops, samples] = scene.radar.dims();
             Complex::zeros([tx, rx, loops, samples], &self.device())
-        });
-        let gain = self.decoders.gain.factor().reshape([1, 1, 1, 1]);
-        Complex::new(signal.re * gain.clone(), signal.im * gain)
+        })
     }
 
     /// Adds noise; equal seeds give equal noise on every backend.
@@ -199,9 +197,6 @@ impl Simulator {
             return Some("indirect path");
         }
         let clean = self.clean_signal(scene, view, &surfaces);
-        if !finite(clean.clone()) {
-            return Some("gain");
-        }
         (!finite(self.with_noise(clean, 0))).then_some("noise")
     }
 }

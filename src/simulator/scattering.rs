@@ -34,7 +34,7 @@ enum Kind {
 }
 
 impl Simulator {
-    /// Eq. 2 for all transmitters: `[tx, rx, loop, sample]`, without gain.
+    /// Eq. 2 for all transmitters: `[tx, rx, loop, sample]`.
     pub(super) fn direct_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
         let centre = scene.radar.centre_m();
         let groups = self.groups(scene, view, surfaces, &view.direct, |group, surface| match self.config.paths {
@@ -53,7 +53,7 @@ impl Simulator {
         })
     }
 
-    /// Eq. 3 for all transmitters and walls: `[tx, rx, loop, sample]`, without gain.
+    /// Eq. 3 for all transmitters and walls: `[tx, rx, loop, sample]`.
     pub(super) fn indirect_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
         let walls: Vec<(usize, Vec<Group<'_>>)> = (0..scene.proxies.len())
             .map(|wall| {
@@ -113,7 +113,12 @@ impl Simulator {
             let picked = rows(points, all.len(), &device);
             let surface = Surface { material: surface.material.pick(&picked), patch: surface.patch.pick(&picked) };
             (group.amplitude, group.offset_m) = amplitude(&group, &surface);
-            group.amplitude = group.amplitude.clone() * column(group.areas_m2().into_iter(), &device);
+            let gain = match kind {
+                Kind::Body => &self.decoders.body_gain,
+                Kind::Room => &self.decoders.room_gain,
+            };
+            let weight = column(group.areas_m2().into_iter(), &device) * gain.factor().reshape([1, 1]);
+            group.amplitude = group.amplitude.clone() * weight;
             groups.push(group);
         }
         groups

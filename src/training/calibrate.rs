@@ -1,43 +1,134 @@
-//! Where training starts: the gain from scattering amplitude to the recording's unit, which no physics here knows.
+//! Where training starts: the levels that no physics here knows, from scattering amplitude to the recording's unit.
+//!
+//! Body, room and noise are each brought to their power in the recording, in the cells where each of them is alone:
+//! the body in moving cells above the noise, the room at rest, the noise in the median cell. Training refines them.
+
+use std::f64::consts::LN_2;
+
+use burn::{module::Module, tensor::Tensor};
 
 use super::{FrameId, LoadedRecording};
 use crate::{
+    complex::Complex,
     error::{Error, Result},
-    simulator::{Mode, Simulator},
+    heatmap::{HeatmapConfig, RangeDoppler, remove_loop_mean},
+    simulator::{Mode, Simulator, Surfaces},
 };
 
 /// Frames that are looked at.
-const FRAMES: usize = 4;
+const FRAMES: usize = 8;
 
-/// The simulator with the gain at which its power is that of the recordings, over a few training frames.
+/// A moving cell counts when it is this many times stronger than the noise.
+const ABOVE_NOISE: f64 = 10.0;
+
+/// Powers summed over frames.
+#[derive(Default)]
+struct Levels {
+    measured_moving: f64,
+    simulated_moving: f64,
+    measured_still: f64,
+    simulated_still: f64,
+    /// Noise power of a sample, both components, and mean amplitude; summed over frames.
+    noise: f64,
+    amplitude: f64,
+    frames: f64,
+}
+
+/// The simulator with gains and noise at the recordings' levels.
 ///
 /// # Errors
 /// A recording without any signal, or a scene that returns nothing.
-pub fn fit_gain(mut simulator: Simulator, recordings: &[LoadedRecording], frames: &[FrameId]) -> Result<Simulator> {
-    use burn::module::Module;
+pub fn fit_levels(
+    mut simulator: Simulator,
+    recordings: &[LoadedRecording],
+    frames: &[FrameId],
+    heatmap: &HeatmapConfig,
+) -> Result<Simulator> {
     let plain = simulator.clone().valid();
-    let device = plain.device();
-    let step = frames.len().div_ceil(FRAMES).max(1);
-    let (mut measured, mut simulated) = (0.0, 0.0);
-    for id in frames.iter().step_by(step) {
-        let recording = &recordings[id.recording];
-        let surfaces = plain.surfaces(&plain.constants(&recording.scene), Mode::Inference);
-        let signal = plain.clean_signal(&recording.scene, &*recording.scene.view(id.frame)?, &surfaces);
-        simulated += f64::from(signal.power().sum().into_scalar::<f32>());
-        measured += f64::from(recording.target(id.frame, &device)?.power().sum().into_scalar::<f32>());
+    let mut levels = Levels::default();
+    for id in frames.iter().step_by(frames.len().div_ceil(FRAMES).max(1)) {
+        levels.add(&plain, &recordings[id.recording], id.frame, heatmap)?;
     }
+    let measured = levels.measured_moving + levels.measured_still;
     if !(measured.is_finite() && measured > 0.0) {
         return Err(Error::Usage {
             message: format!("the recording's power is {measured}, nothing can be learned from it"),
             hint: Some("check that the recording holds a signal: `hybridsim check`".into()),
         });
     }
+    let simulated = levels.simulated_moving + levels.simulated_still;
     if !(simulated.is_finite() && simulated > 0.0) {
         return Err(Error::Usage {
             message: format!("the simulated power is {simulated}: the radar sees nothing of the scene"),
             hint: Some("check the room's distances and where the person stands: `hybridsim check`".into()),
         });
     }
-    simulator.decoders.gain = simulator.decoders.gain.scale((measured / simulated).sqrt());
+    let ratio = |measured: f64, simulated: f64| (measured > 0.0 && simulated > 0.0).then(|| (measured / simulated).sqrt());
+    let body = ratio(levels.measured_moving, levels.simulated_moving);
+    let room = ratio(levels.measured_still, levels.simulated_still);
+    // Where one of them cannot be told apart, the other's level is the best guess.
+    let decoders = &mut simulator.decoders;
+    if let Some(factor) = body.or(room) {
+        decoders.body_gain = decoders.body_gain.clone().scale(factor);
+    }
+    if let Some(factor) = room.or(body) {
+        decoders.room_gain = decoders.room_gain.clone().scale(factor);
+    }
+    if levels.noise > 0.0 && levels.amplitude > 0.0 {
+        let deviation = (0.5 * levels.noise / levels.frames).sqrt();
+        let rate = deviation / (levels.amplitude / levels.frames);
+        let device = simulator.device();
+        simulator.noise = simulator.noise.starting_at(rate, &device);
+    }
     Ok(simulator)
+}
+
+impl Levels {
+    fn add(&mut self, plain: &Simulator, recording: &LoadedRecording, frame: usize, heatmap: &HeatmapConfig) -> Result<()> {
+        let device = plain.device();
+        let scene = &recording.scene;
+        let radar = &scene.radar;
+        let transform =
+            RangeDoppler::new(radar.loops_per_frame, radar.samples_per_chirp, radar.sampling, heatmap, &device);
+        let power = |signal: Complex<4>| values(transform.map(signal).power());
+
+        let measured = recording.target(frame, &device)?;
+        let view = scene.view(frame)?;
+        let Surfaces { body, room } = plain.surfaces(&plain.constants(scene), Mode::Inference);
+        let alone = |surfaces: Surfaces| plain.clean_signal(scene, &view, &surfaces);
+        let of_body = alone(Surfaces { body, room: None });
+        let of_room = alone(Surfaces { body: None, room });
+
+        self.amplitude += (measured.clone().power() + 1e-30).sqrt().mean().into_scalar::<f32>() as f64;
+        let moving = power(remove_loop_mean(measured.clone()));
+        let floor = median(&moving) / LN_2;
+        self.noise += floor / noise_gain(radar, heatmap);
+        self.frames += 1.0;
+        for (measured, simulated) in moving.iter().zip(power(remove_loop_mean(of_body))) {
+            if *measured > ABOVE_NOISE * floor {
+                self.measured_moving += measured - floor;
+                self.simulated_moving += simulated;
+            }
+        }
+        let still = |signal: Complex<4>| values(signal.mean_dim(2).power()).iter().sum::<f64>();
+        self.measured_still += still(measured);
+        self.simulated_still += still(of_room);
+        Ok(())
+    }
+}
+
+/// Power of a heatmap's cell for white noise of power 1 in a sample.
+fn noise_gain(radar: &crate::radar::Radar, heatmap: &HeatmapConfig) -> f64 {
+    let squares = |weights: Vec<f64>| weights.iter().map(|weight| weight * weight).sum::<f64>();
+    squares(heatmap.range_window.weights(radar.samples_per_chirp)) * squares(heatmap.doppler_window.weights(radar.loops_per_frame))
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
+}
+
+fn values(power: Tensor<4>) -> Vec<f64> {
+    power.into_data().convert::<f64>().try_into_vec::<f64>().expect("converted")
 }

@@ -93,7 +93,7 @@ impl Trainer<'_> {
                 progress = state.progress;
             }
             None => {
-                simulator = calibrate::fit_gain(simulator, self.recordings, &split.training)?;
+                simulator = calibrate::fit_levels(simulator, self.recordings, &split.training, &self.config.heatmap)?;
                 simulator = checkpoint::with_stable_ids(simulator);
             }
         }
