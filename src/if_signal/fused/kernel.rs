@@ -41,6 +41,8 @@ pub trait Returns: Sync {
 pub trait Sink: Send {
     /// How many points.
     fn points(&self) -> usize;
+    /// Before anything else.
+    fn open(&mut self);
     /// At the chirps from `chirp` on, for a point counted from the first of this range.
     fn put(&mut self, receiver: usize, local: usize, chirp: usize, gradient: &Return);
     /// After the last chirp of a receiver.
@@ -219,29 +221,37 @@ pub fn sum(returns: &impl Returns, samples: usize) -> Vec<f32> {
     let blocks = chirps.div_ceil(LANES);
     let parts = if blocks * receivers >= ENOUGH_TASKS { 1 } else { points.div_ceil(CHUNK).max(1) };
     let chunk = points.div_ceil(parts).max(1);
-    let grid_of = |task: usize, part: usize| {
+    let fill = |grid: &mut [Lanes], task: usize, part: usize| {
         let (receiver, chirp) = (task / blocks, task % blocks * LANES);
-        let mut grid = plan.empty();
+        let width = LANES.min(chirps - chirp);
+        grid.fill(ZERO);
         for point in part * chunk..((part + 1) * chunk).min(points) {
-            plan.spread(&returns.load(receiver, point, chirp), LANES.min(chirps - chirp), &mut grid);
+            plan.spread(&returns.load(receiver, point, chirp), width, grid);
         }
-        grid
     };
 
     let mut out = vec![0.0; 2 * receivers * chirps * samples];
     let (out_re, out_im) = out.split_at_mut(receivers * chirps * samples);
     let by_block = |part| blocks_of(part, receivers, chirps * samples, LANES * samples);
-    by_block(out_re).into_par_iter().zip(by_block(out_im)).enumerate().for_each(|(task, (re, im))| {
-        let mut grid = match parts {
-            1 => grid_of(task, 0),
-            _ => {
-                let grids: Vec<_> = (0..parts).into_par_iter().map(|part| grid_of(task, part)).collect();
-                grids.into_iter().reduce(add).expect("one part at least")
+    // One grid per thread and not per task: fresh memory is slow.
+    by_block(out_re).into_par_iter().zip(by_block(out_im)).enumerate().for_each_init(Vec::new, |grid, (task, (re, im))| {
+        match parts {
+            1 => {
+                grid.resize(plan.grid.cells * ROW, ZERO);
+                fill(grid, task, 0);
             }
-        };
-        plan.fourier.from_cells(&mut grid, ORDERS);
+            _ => {
+                let grids = (0..parts).into_par_iter().map(|part| {
+                    let mut grid = plan.empty();
+                    fill(&mut grid, task, part);
+                    grid
+                });
+                *grid = grids.collect::<Vec<_>>().into_iter().reduce(add).expect("one part at least");
+            }
+        }
+        plan.fourier.from_cells(grid, ORDERS);
         let width = re.len() / samples;
-        plan.collect(&grid, |sample, r, i| {
+        plan.collect(grid, |sample, r, i| {
             for lane in 0..width {
                 re[lane * samples + sample] = r[lane];
                 im[lane * samples + sample] = i[lane];
@@ -264,8 +274,11 @@ pub fn gradients(returns: &impl Returns, upstream: &[f32], samples: usize, sinks
             let (receiver, chirp) = (task / blocks, task % blocks * LANES);
             let width = LANES.min(chirps - chirp);
             let lanes = |part: &[f32], sample: usize| -> Lanes {
-                let at = |lane: usize| part[(receiver * chirps + chirp + lane) * samples + sample];
-                std::array::from_fn(|lane| if lane < width { at(lane) } else { 0.0 })
+                let mut lanes = ZERO;
+                for (lane, value) in lanes[..width].iter_mut().enumerate() {
+                    *value = part[(receiver * chirps + chirp + lane) * samples + sample];
+                }
+                lanes
             };
             let mut grid = plan.empty();
             plan.distribute(|sample| (lanes(up_re, sample), lanes(up_im, sample)), &mut grid);
@@ -283,6 +296,7 @@ pub fn gradients(returns: &impl Returns, upstream: &[f32], samples: usize, sinks
         })
         .collect();
     sinks.into_par_iter().zip(starts).for_each(|(mut sink, start)| {
+        sink.open();
         for receiver in 0..receivers {
             for block in 0..blocks {
                 let chirp = block * LANES;
