@@ -69,3 +69,6 @@ fn column(values: impl Iterator<Item = f64>, device: &Device, dtype: DType) -> T
 pub(crate) fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
 }
+
+#[cfg(test)]
+mod tests;
