@@ -40,8 +40,7 @@ impl Scene {
     fn new(points: usize, chirps: usize, amplitude_chirps: usize, radar: &Radar) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(11);
         let mut within = |low: f64, high: f64| random.random_range(low..=high);
-        let reference_m: Vec<[f64; 3]> =
-            (0..points).map(|_| [within(-1.0, 1.0), within(0.8, 1.8), within(-0.5, 0.5)]).collect();
+        let reference_m: Vec<[f64; 3]> = (0..points).map(|_| [within(-1.0, 1.0), within(0.8, 1.8), within(-0.5, 0.5)]).collect();
         let velocity_mps: Vec<[f64; 3]> = (0..points).map(|_| [0; 3].map(|_| within(-2.0, 2.0))).collect();
         let time_s = |chirp: usize| (chirp as f64 - 0.5 * (chirps as f64 - 1.0)) * radar.loop_period_s();
         // Rounded to f32, so that all precisions get the same.
@@ -175,8 +174,19 @@ fn signals_agree_with_the_mixers_phase_in_f64() {
                 (Dechirp::Paper, DType::F64) => 5e-7,
                 (Dechirp::Paper, _) => 2e-5,
             };
-            println!("{} chirps, wall {}, {:?}, {form:?}, {dtype:?}: {error:.1e}", scene.chirps, how.proxy_m.is_some(), how.dechirp);
-            assert!(error < tolerance, "{} chirps, wall {}, {:?}, {form:?}, {dtype:?}: {error:.1e}", scene.chirps, how.proxy_m.is_some(), how.dechirp);
+            println!(
+                "{} chirps, wall {}, {:?}, {form:?}, {dtype:?}: {error:.1e}",
+                scene.chirps,
+                how.proxy_m.is_some(),
+                how.dechirp
+            );
+            assert!(
+                error < tolerance,
+                "{} chirps, wall {}, {:?}, {form:?}, {dtype:?}: {error:.1e}",
+                scene.chirps,
+                how.proxy_m.is_some(),
+                how.dechirp
+            );
         }
     }
 }
@@ -213,7 +223,10 @@ fn fused_gradients_agree_with_the_tensor_form_in_f64() {
                     let error = relative_error(found, wanted);
                     if error.is_nan() || error > 5e-5 {
                         let wall = how.proxy_m.is_some();
-                        failures.push(format!("{} chirps, wall {wall}, {:?} {:?}, input {input}: {error:.1e}", scene.chirps, how.dechirp, how.form));
+                        failures.push(format!(
+                            "{} chirps, wall {wall}, {:?} {:?}, input {input}: {error:.1e}",
+                            scene.chirps, how.dechirp, how.form
+                        ));
                     }
                 }
             }

@@ -10,11 +10,11 @@ mod leg;
 mod waveform;
 
 pub use direct::DirectPaths;
-pub use indirect::{IndirectPaths, Onward};
 pub(crate) use indirect::onward;
+pub use indirect::{IndirectPaths, Onward};
+pub(crate) use leg::SOFTENING_M;
 pub use leg::{Displacement, Leg, Motion, leg};
 pub use waveform::{Amplitude, Dechirp, Waveform, phasors};
-pub(crate) use leg::SOFTENING_M;
 pub(crate) use waveform::{AtRest, NEAR_FIELD_M2, difference};
 
 use burn::tensor::{DType, Device, Tensor, TensorData};

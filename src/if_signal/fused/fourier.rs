@@ -116,7 +116,11 @@ mod tests {
                     grid[(place * width + 1) * 2 + part][3] = value(i)[part];
                 }
             }
-            if forward { fourier.from_cells(&mut grid, width) } else { fourier.to_cells(&mut grid, width) }
+            if forward {
+                fourier.from_cells(&mut grid, width)
+            } else {
+                fourier.to_cells(&mut grid, width)
+            }
             for k in 0..length {
                 let (mut re, mut im) = (0.0, 0.0);
                 for i in 0..length {
