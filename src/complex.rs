@@ -9,6 +9,8 @@ pub struct Complex<const D: usize> {
     pub im: Tensor<D>,
 }
 
+// `add`, `sub` and `mul` are methods that chain, as Burn's own are.
+#[allow(clippy::should_implement_trait)]
 impl<const D: usize> Complex<D> {
     /// # Panics
     /// When the shapes of the two parts differ.

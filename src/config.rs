@@ -1,1 +1,62 @@
-//! (to be written)
+//! One experiment as one TOML file: the parts' settings gathered, read and checked.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    data::settings,
+    error::{Error, Result},
+    recorder::RecorderConfig,
+    simulator::SimulatorConfig,
+    training::TrainingConfig,
+};
+
+/// What a config file may hold. Every section has defaults but one of `data` and `record` must say what to learn from.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    pub seed: u64,
+    pub data: DataConfig,
+    pub simulator: SimulatorConfig,
+    pub training: TrainingConfig,
+    /// A recording to make, where none is at hand.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub record: Option<RecorderConfig>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DataConfig {
+    /// Recording folders, relative to the config file's folder.
+    pub recordings: Vec<PathBuf>,
+}
+
+impl Config {
+    /// Reads a config file with its `extends` parents, changed by `--set key=value`.
+    pub fn read(path: &Path, sets: &[String]) -> Result<Self> {
+        let mut config: Self = settings::read_settings(path, sets)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for recording in &mut config.data.recordings {
+            if recording.is_relative() {
+                *recording = folder.join(&*recording);
+            }
+        }
+        config.training.check()?;
+        config.simulator.check()?;
+        Ok(config)
+    }
+
+    /// The resolved configuration, as kept beside each result.
+    pub fn to_toml(&self) -> String {
+        toml::to_string_pretty(self).expect("settings are plain data")
+    }
+
+    /// The `[record]` section, or what to do without it.
+    pub fn record(&self, path: &Path) -> Result<&RecorderConfig> {
+        self.record.as_ref().ok_or_else(|| {
+            Error::field(path, "record", "missing", "a [record] section")
+                .with_hint("see configs/quickstart.toml for one; [data] recordings = [...] uses recordings that exist")
+        })
+    }
+}

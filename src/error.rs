@@ -43,8 +43,19 @@ impl Error {
         Self::Write { path: path.as_ref().into(), source }
     }
 
-    pub fn field(path: impl AsRef<Path>, field: impl Into<String>, found: impl Into<String>, expected: impl Into<String>) -> Self {
-        Self::Field { path: path.as_ref().into(), field: field.into(), found: found.into(), expected: expected.into(), hint: None }
+    pub fn field(
+        path: impl AsRef<Path>,
+        field: impl Into<String>,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self::Field {
+            path: path.as_ref().into(),
+            field: field.into(),
+            found: found.into(),
+            expected: expected.into(),
+            hint: None,
+        }
     }
 
     pub fn setting(key: impl Into<String>, found: impl ToString, expected: impl Into<String>) -> Self {

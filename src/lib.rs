@@ -26,8 +26,14 @@ pub mod metrics;
 pub mod simulator;
 // 4: what is done with it
 pub mod training;
+pub mod evaluation;
 pub mod pictures;
 pub mod config;
 pub mod cli;
 
 pub use error::{Error, Result};
+
+/// Helpers of the tests, shared with the integration tests.
+#[cfg(test)]
+#[path = "../tests/support/mod.rs"]
+mod support;

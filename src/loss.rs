@@ -1,1 +1,261 @@
-//! (to be written)
+//! The loss: how far two range-Doppler maps are apart in decibels (ℒ of the paper, sec. 3.4 and supplement 7).
+
+use burn::tensor::{Tensor, TensorCreationOptions};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    complex::Complex,
+    error::{Error, Result},
+    heatmap::{HeatmapConfig, RangeDoppler, power_db, remove_loop_mean},
+    radar::Radar,
+};
+
+/// What becomes of several antennas.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Combine {
+    /// Every antenna's map is compared with its own.
+    #[default]
+    Each,
+    /// The power is averaged over the antennas first, and one map compared: less speckle, less information.
+    Mean,
+}
+
+/// Which maps are compared, and down to which level.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LossConfig {
+    pub combine: Combine,
+    /// Antenna pairs that count, as `tx · receivers + rx`; empty for all.
+    pub channels: Vec<usize>,
+    /// Cells below this level count as having it, relative to the recording's strongest cell; none for no limit (the paper).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clamp_db: Option<f64>,
+    /// Compare what is left after the mean over the loops is removed.
+    pub static_removed: bool,
+}
+
+/// Mean squared difference of decibel maps; built once for a recording.
+#[derive(Clone, Debug)]
+pub struct DbLoss {
+    transform: RangeDoppler,
+    combine: Combine,
+    channels: Vec<usize>,
+    static_removed: bool,
+    floor_amplitude: f64,
+    clamp_db: Option<f64>,
+}
+
+impl DbLoss {
+    /// `peak_amplitude` is the recording's strongest cell ([`RangeDoppler::peak_amplitude`]); floors refer to it.
+    /// `options`: a device, or a device with a type.
+    pub fn new(
+        radar: &Radar,
+        heatmap: &HeatmapConfig,
+        config: &LossConfig,
+        peak_amplitude: f64,
+        options: impl Into<TensorCreationOptions>,
+    ) -> Result<Self> {
+        let count = radar.tx_m.len() * radar.rx_m.len();
+        if let Some(channel) = config.channels.iter().find(|&&channel| channel >= count) {
+            return Err(Error::setting("loss.channels", channel, format!("0 to {}: one for each antenna pair", count - 1)));
+        }
+        if !(peak_amplitude.is_finite() && peak_amplitude > 0.0) {
+            return Err(Error::Usage {
+                message: format!("the recording's strongest cell has amplitude {peak_amplitude}, nothing can be learned from it"),
+                hint: Some("check that the recording holds a signal".into()),
+            });
+        }
+        Ok(Self {
+            transform: RangeDoppler::new(radar.loops_per_frame, radar.samples_per_chirp, radar.sampling, heatmap, options),
+            combine: config.combine,
+            channels: if config.channels.is_empty() { (0..count).collect() } else { config.channels.clone() },
+            static_removed: config.static_removed,
+            floor_amplitude: heatmap.floor_amplitude(peak_amplitude),
+            clamp_db: config.clamp_db.map(|clamp| 20.0 * peak_amplitude.log10() + clamp),
+        })
+    }
+
+    pub fn transform(&self) -> &RangeDoppler {
+        &self.transform
+    }
+
+    /// The maps that are compared, in decibels.
+    ///
+    /// # Shapes
+    /// - `signal`: `[frame, tx, rx, loop, sample]`; noise already added
+    /// - result: `[map, doppler, range]`, a map for each frame and chosen antenna, or for each frame when they are averaged
+    ///
+    /// # Gradient
+    /// Flows to `signal`; smooth except at `clamp_db`, below which it is zero.
+    pub fn maps_db(&self, signal: Complex<5>) -> Tensor<3> {
+        let [frames, transmitters, receivers, loops, samples] = signal.dims();
+        let count = transmitters * receivers;
+        let mut signal = signal.reshape([frames, count, loops, samples]);
+        if self.channels.len() < count {
+            let chosen = self.channels.iter().map(|&channel| signal.clone().narrow(1, channel, 1)).collect();
+            signal = Complex::cat(chosen, 1);
+        }
+        if self.static_removed {
+            signal = remove_loop_mean(signal);
+        }
+        let power = self.transform.map(signal).power();
+        let [_, chosen, doppler, range] = power.dims();
+        let power = match self.combine {
+            Combine::Each => power.reshape([frames * chosen, doppler, range]),
+            Combine::Mean => power.mean_dim(1).reshape([frames, doppler, range]),
+        };
+        let db = power_db(power, self.floor_amplitude);
+        match self.clamp_db {
+            Some(level) => db.clamp_min(level),
+            None => db,
+        }
+    }
+
+    /// ℒ: mean squared difference over all cells, dB².
+    ///
+    /// # Shapes
+    /// - `simulated`: `[frame, tx, rx, loop, sample]`, with the noise injected before
+    /// - `measured_db`: [`Self::maps_db`] of the recording's same frames, a constant of training
+    ///
+    /// # Gradient
+    /// Flows to `simulated`.
+    pub fn loss(&self, simulated: Complex<5>, measured_db: Tensor<3>) -> Tensor<1> {
+        mean_squared_db(self.maps_db(simulated), measured_db)
+    }
+}
+
+/// Mean squared difference of two maps of decibels, dB².
+///
+/// # Panics
+/// When their shapes differ.
+pub fn mean_squared_db<const D: usize>(simulated_db: Tensor<D>, measured_db: Tensor<D>) -> Tensor<1> {
+    assert_eq!(
+        simulated_db.dims(),
+        measured_db.dims(),
+        "loss: simulated {:?}, measured {:?}",
+        simulated_db.dims(),
+        measured_db.dims()
+    );
+    let difference = simulated_db - measured_db;
+    (difference.clone() * difference).mean()
+}
+
+#[cfg(test)]
+mod tests {
+    use burn::tensor::{DType, Device, TensorData};
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::heatmap::synthetic;
+
+    const DIMS: [usize; 5] = [1, 2, 2, 4, 6];
+
+    fn radar() -> Radar {
+        let mut radar = Radar { loops_per_frame: 4, samples_per_chirp: 6, ..synthetic::radar() };
+        radar.rx_m.truncate(2);
+        radar
+    }
+
+    fn noise(seed: u64) -> Vec<f64> {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        (0..DIMS.iter().product()).map(|_| random.random::<f64>() - 0.5).collect()
+    }
+
+    fn tensor(values: Vec<f64>, device: &Device) -> Tensor<5> {
+        Tensor::from_data(TensorData::new(values, DIMS), (device, DType::F64))
+    }
+
+    fn signal(seed: u64, device: &Device) -> Complex<5> {
+        Complex::new(tensor(noise(seed), device), tensor(noise(seed + 100), device))
+    }
+
+    fn loss(config: &LossConfig, device: &Device) -> DbLoss {
+        DbLoss::new(&radar(), &HeatmapConfig::default(), config, 0.2, (device, DType::F64)).unwrap()
+    }
+
+    #[test]
+    fn a_signal_has_no_distance_to_itself_and_ten_times_its_amplitude_is_twenty_decibels_away() {
+        let device = Device::flex();
+        for combine in [Combine::Each, Combine::Mean] {
+            let loss = loss(&LossConfig { combine, ..Default::default() }, &device);
+            let measured = loss.maps_db(signal(1, &device));
+            assert_eq!(loss.loss(signal(1, &device), measured.clone()).into_scalar::<f64>(), 0.0);
+            let louder = loss.loss(signal(1, &device).scale_by(10.0), measured).into_scalar::<f64>();
+            assert!((louder - 400.0).abs() < 1e-3, "{combine:?}: {louder}");
+        }
+    }
+
+    #[test]
+    fn antennas_are_chosen_and_averaged_as_the_settings_say() {
+        let device = Device::flex();
+        let dims = |config: LossConfig| loss(&config, &device).maps_db(signal(1, &device)).dims();
+        assert_eq!(dims(LossConfig::default()), [4, 4, 6]);
+        assert_eq!(dims(LossConfig { channels: vec![3, 0], ..Default::default() }), [2, 4, 6]);
+        assert_eq!(dims(LossConfig { combine: Combine::Mean, ..Default::default() }), [1, 4, 6]);
+        let all = loss(&LossConfig::default(), &device).maps_db(signal(1, &device));
+        let last = loss(&LossConfig { channels: vec![3], ..Default::default() }, &device).maps_db(signal(1, &device));
+        assert_eq!((all.narrow(0, 3, 1) - last).abs().max().into_scalar::<f64>(), 0.0);
+        let error = DbLoss::new(
+            &radar(),
+            &HeatmapConfig::default(),
+            &LossConfig { channels: vec![4], ..Default::default() },
+            1.0,
+            &device,
+        );
+        assert_eq!(error.unwrap_err().to_string(), "`loss.channels` is 4, expected 0 to 3: one for each antenna pair");
+    }
+
+    #[test]
+    fn gradients_agree_with_central_differences_for_every_setting() {
+        let device = Device::flex().autodiff();
+        let settings = [
+            LossConfig::default(),
+            LossConfig { combine: Combine::Mean, channels: vec![1, 2], ..Default::default() },
+            LossConfig { clamp_db: Some(-15.0), static_removed: true, ..Default::default() },
+        ];
+        for config in settings {
+            let loss = loss(&config, &device);
+            let measured = loss.maps_db(signal(2, &device)).detach();
+            let start = noise(1);
+            let value = |re: Tensor<5>| loss.loss(Complex::new(re, tensor(noise(101), &device)), measured.clone());
+            let tracked = tensor(start.clone(), &device).require_grad();
+            let gradients = value(tracked.clone()).backward();
+            let found: Vec<f64> = tracked.grad(&gradients).unwrap().into_data().iter::<f64>().collect();
+            let step = 1e-6;
+            for index in (0..start.len()).step_by(5) {
+                let moved = |by: f64| {
+                    let mut values = start.clone();
+                    values[index] += by;
+                    value(tensor(values, &device)).into_scalar::<f64>()
+                };
+                let wanted = (moved(step) - moved(-step)) / (2.0 * step);
+                let difference = (found[index] - wanted).abs();
+                assert!(difference < 1e-5 * (1.0 + wanted.abs()), "{config:?} {index}: found {}, wanted {wanted}", found[index]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_clamped_cell_does_not_pull_and_silence_gives_no_nan() {
+        let device = Device::flex().autodiff();
+        let loss = loss(&LossConfig { clamp_db: Some(-40.0), ..Default::default() }, &device);
+        let quiet = |scale: f64| tensor(noise(1), &device) * scale;
+        let measured = loss.maps_db(Complex::new(quiet(1e-9), quiet(0.0))).detach();
+        for scale in [0.0, 1e-8] {
+            let tracked = quiet(scale).detach().require_grad();
+            let value = loss.loss(Complex::new(tracked.clone(), quiet(0.0)), measured.clone());
+            let gradients = value.backward();
+            assert_eq!(value.into_scalar::<f64>(), 0.0);
+            let gradient: Vec<f64> = tracked.grad(&gradients).unwrap().into_data().iter::<f64>().collect();
+            assert!(gradient.iter().all(|g| *g == 0.0), "{gradient:?}");
+        }
+    }
+
+    #[test]
+    fn a_silent_recording_is_refused() {
+        let error = DbLoss::new(&radar(), &HeatmapConfig::default(), &LossConfig::default(), 0.0, &Device::flex()).unwrap_err();
+        assert!(error.to_string().contains("strongest cell has amplitude 0"), "{error}");
+        assert!(error.hint().is_some());
+    }
+}

@@ -87,10 +87,7 @@ impl Room {
     /// Lowest and highest coordinate of the room along each axis; `open_m` stands in for a boundary that is absent.
     pub fn extent_m(&self, open_m: f64) -> ([f64; 3], [f64; 3]) {
         let or = |distance: Option<f64>| distance.unwrap_or(open_m);
-        (
-            [-or(self.left_m), -or(self.back_m), -or(self.floor_m)],
-            [or(self.right_m), or(self.front_m), or(self.ceiling_m)],
-        )
+        ([-or(self.left_m), -or(self.back_m), -or(self.floor_m)], [or(self.right_m), or(self.front_m), or(self.ceiling_m)])
     }
 
     /// Range of the farthest corner that has walls, metres; `None` without any boundary.
@@ -100,6 +97,11 @@ impl Room {
         }
         let (low, high) = self.extent_m(0.0);
         Some((0..3).map(|axis| low[axis].abs().max(high[axis].abs()).powi(2)).sum::<f64>().sqrt())
+    }
+
+    /// Distance of the farthest boundary, metres; `None` without any.
+    pub fn farthest_wall_m(&self) -> Option<f64> {
+        self.boundaries().into_iter().filter_map(|boundary| self.distance_m(boundary)).max_by(f64::total_cmp)
     }
 
     /// Refuses distances that no room can have. `key` names this room in messages.

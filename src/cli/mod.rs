@@ -1,1 +1,119 @@
-//! (to be written)
+//! The command line: verbs, their help, and what they say on the terminal.
+//!
+//! Results go to standard output, progress and warnings to standard error. Exit status: 0 done, 1 failed,
+//! 2 wrong usage, configuration or input.
+
+mod check;
+mod device;
+mod evaluate;
+mod infer;
+mod progress;
+mod record;
+mod report;
+mod train;
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::error::Error;
+
+pub use device::{available, device};
+
+/// Simulate mmWave radar recordings of moving people, and learn the physics from recordings.
+#[derive(Parser)]
+#[command(name = "hybridsim", version, about, max_term_width = 100, arg_required_else_help = true)]
+#[command(after_help = "Start with:  hybridsim train configs/quickstart.toml")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Args, Clone)]
+pub(crate) struct Common {
+    /// Change one setting, such as training.epochs=10; may be repeated
+    #[arg(long, global = true, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// flex, ndarray, wgpu, wgpu-cpu, cuda:0 or auto (a real GPU if there is one, else flex)
+    #[arg(long, global = true, value_name = "NAME", default_value = "auto")]
+    pub device: String,
+    /// Print results and errors only
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Read a config, a recording or a checkpoint, and show what it describes
+    ///
+    /// Shows what follows from the radar's settings (resolutions, limits), holds its rules against the room and the
+    /// motion, and says which parts are missing.
+    Check(check::Arguments),
+    /// Make a recording of a person in a room, in a world that shares nothing with the simulator
+    ///
+    /// Writes a recording folder (recording.toml, if.npy, body.npz, motion.npz, truth.json) from the [record] section
+    /// of a config. Use it when you have no radar at hand.
+    Record(record::Arguments),
+    /// Fit the simulator to recordings
+    ///
+    /// Reads recording folders (or makes one first from [record]), trains, and leaves a run folder: config.toml
+    /// (resolved), metrics.json, loss curve and heatmaps as PNG, report.md, and the checkpoints `best` and `last`.
+    /// Killed runs continue with --resume.
+    Train(train::Arguments),
+    /// Simulate a motion at a trained site
+    ///
+    /// Takes a checkpoint and a motion (BVH or AMASS-layout npz, or one of the embedded actions) and writes a
+    /// recording folder with the simulated IF samples, and heatmaps as PNG.
+    Infer(infer::Arguments),
+    /// Compare simulated with measured heatmaps
+    ///
+    /// PSNR, SSIM and dB error over all cells, with what is static removed, and on the cells that the person
+    /// occupies, with confidence intervals.
+    Evaluate(evaluate::Arguments),
+}
+
+/// Where results go.
+#[derive(Args, Clone)]
+pub(crate) struct Out {
+    /// Folder for the results
+    #[arg(short, long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Parses, runs, reports. Every error is printed once, here, with its hint.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+        }
+    };
+    let result = match &cli.command {
+        Command::Check(arguments) => check::run(arguments, &cli.common),
+        Command::Record(arguments) => record::run(arguments, &cli.common),
+        Command::Train(arguments) => train::run(arguments, &cli.common),
+        Command::Infer(arguments) => infer::run(arguments, &cli.common),
+        Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            if let Some(hint) = error.hint() {
+                eprintln!("hint: {hint}");
+            }
+            ExitCode::from(status(&error))
+        }
+    }
+}
+
+/// 1: the work failed; 2: what was asked for cannot be done as asked.
+fn status(error: &Error) -> u8 {
+    match error {
+        Error::NonFinite { .. } | Error::Write { .. } => 1,
+        _ => 2,
+    }
+}

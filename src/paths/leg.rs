@@ -3,31 +3,11 @@
 use burn::tensor::{DType, Device, Tensor};
 
 use super::{column, distance};
+use crate::body::Displacement;
 
 /// Added to lengths in quadrature so that a point on an antenna has a finite gradient, metres.
 /// At 0.1 m it changes a length by 5·10⁻⁸ m.
 pub(crate) const SOFTENING_M: f64 = 1e-4;
-
-/// Displacement from the reference position, metres; each `[point, chirp]`. Carries gradients.
-#[derive(Clone, Debug)]
-pub struct Displacement {
-    pub x: Tensor<2>,
-    pub y: Tensor<2>,
-    pub z: Tensor<2>,
-}
-
-impl Displacement {
-    /// Points that stay where they are: a chirp axis of length 1, to be broadcast after the sum.
-    pub fn still(points: usize, device: &Device, dtype: DType) -> Self {
-        let zero = || Tensor::zeros([points, 1], (device, dtype));
-        Self { x: zero(), y: zero(), z: zero() }
-    }
-
-    /// `[point, chirp]`.
-    pub fn dims(&self) -> [usize; 2] {
-        self.x.dims()
-    }
-}
 
 /// One straight leg between every scatterer and an antenna (or a wall's receiver).
 #[derive(Clone, Debug)]

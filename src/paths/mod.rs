@@ -9,11 +9,12 @@ pub mod indirect;
 mod leg;
 mod waveform;
 
+pub use crate::body::Displacement;
 pub use direct::DirectPaths;
 pub(crate) use indirect::onward;
 pub use indirect::{IndirectPaths, Onward};
 pub(crate) use leg::SOFTENING_M;
-pub use leg::{Displacement, Leg, Motion, leg};
+pub use leg::{Leg, Motion, leg};
 pub use waveform::{Amplitude, Dechirp, Waveform, phasors};
 pub(crate) use waveform::{AtRest, NEAR_FIELD_M2, difference};
 

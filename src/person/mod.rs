@@ -3,15 +3,37 @@
 //! Nothing here poses a body; the simulator and the recorder each do that on their own.
 
 pub mod actions;
+pub mod mesh;
 pub mod procedural;
 
 use serde::{Deserialize, Serialize};
 
 /// Names of the 24 SMPL joints, in SMPL's order.
 pub const JOINT_NAMES: [&str; 24] = [
-    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle", "spine3",
-    "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder", "right_shoulder", "left_elbow",
-    "right_elbow", "left_wrist", "right_wrist", "left_hand", "right_hand",
+    "pelvis",
+    "left_hip",
+    "right_hip",
+    "spine1",
+    "left_knee",
+    "right_knee",
+    "spine2",
+    "left_ankle",
+    "right_ankle",
+    "spine3",
+    "left_foot",
+    "right_foot",
+    "neck",
+    "left_collar",
+    "right_collar",
+    "head",
+    "left_shoulder",
+    "right_shoulder",
+    "left_elbow",
+    "right_elbow",
+    "left_wrist",
+    "right_wrist",
+    "left_hand",
+    "right_hand",
 ];
 
 /// A body that skinning can pose. V vertices, J joints, B shape parameters; SMPL's frame: y up, the person faces +z,
@@ -32,6 +54,32 @@ pub struct BodyModel {
     pub parents: Vec<Option<usize>>,
     /// Counter-clockwise seen from outside (`f`).
     pub faces: Vec<[usize; 3]>,
+}
+
+impl BodyModel {
+    /// `[vertex, xyz]`, metres: the rest pose of the body with these shape parameters; missing ones are zero, surplus ones
+    /// ignored.
+    pub fn shaped(&self, betas: &[f64]) -> Vec<[f64; 3]> {
+        let mut vertices = self.template.clone();
+        for (direction, &beta) in self.shape_directions.iter().zip(betas) {
+            for (vertex, change) in vertices.iter_mut().zip(direction) {
+                (0..3).for_each(|axis| vertex[axis] += beta * change[axis]);
+            }
+        }
+        vertices
+    }
+
+    /// `[joint, xyz]`, metres: the joints of [`BodyModel::shaped`].
+    pub fn rest_joints(&self, betas: &[f64]) -> Vec<[f64; 3]> {
+        let vertices = self.shaped(betas);
+        let joint = |weights: &Vec<(usize, f64)>| {
+            let add = |sum: [f64; 3], &(vertex, weight): &(usize, f64)| {
+                std::array::from_fn(|axis| sum[axis] + weight * vertices[vertex][axis])
+            };
+            weights.iter().fold([0.0; 3], add)
+        };
+        self.joint_regressor.iter().map(joint).collect()
+    }
 }
 
 /// Poses of a body in time.
@@ -70,9 +118,14 @@ impl Default for Placement {
 }
 
 /// A person who moves in front of the radar.
+#[allow(clippy::large_enum_variant, reason = "there are a few persons, never many")]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Person {
-    Skinned { model: BodyModel, motion: Motion, placement: Placement },
+    Skinned {
+        model: BodyModel,
+        motion: Motion,
+        placement: Placement,
+    },
     /// Meshes that something else has posed, already in the radar frame.
     Meshes {
         /// `[pose][vertex, xyz]`, metres, radar frame.

@@ -111,6 +111,9 @@ mod tests {
     #[test]
     fn a_radar_without_receivers_is_refused_by_name() {
         let radar = Radar { rx_m: vec![], ..Radar::mmmesh(1) };
-        assert_eq!(radar.check("radar").unwrap_err().to_string(), "`radar.rx_m` is empty, expected at least one antenna position");
+        assert_eq!(
+            radar.check("radar").unwrap_err().to_string(),
+            "`radar.rx_m` is empty, expected at least one antenna position"
+        );
     }
 }

@@ -1,1 +1,15 @@
-//! (to be written)
+//! Training: the loop, its split of frames, its checkpoints. It emits events and prints nothing.
+
+pub mod calibrate;
+pub mod checkpoint;
+mod config;
+mod metrics;
+mod site;
+mod split;
+mod trainer;
+
+pub use config::TrainingConfig;
+pub use metrics::EpochMetrics;
+pub use site::{LoadedRecording, load_recordings};
+pub use split::{FrameId, FrameSplit, Split, step_rng};
+pub use trainer::{Event, Outcome, Trainer};

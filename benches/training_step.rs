@@ -1,0 +1,112 @@
+//! Times a whole training step and a frame's inference of the paper's model, as JSON lines.
+//!
+//! `cargo bench --bench training_step`. The paper's sizes: a body of about 6,890 vertices, 5,000 room points, 6 walls,
+//! 1 TX × 4 RX, 128 chirps, 256 samples. Visibility is computed once per frame and kept, so it is timed apart.
+
+use std::time::Instant;
+
+use burn::{
+    module::Module,
+    optim::{AdamConfig, GradientsParams, ModuleOptimizer},
+    tensor::Device,
+};
+use hybridsim::{
+    features::Extent,
+    heatmap::{HeatmapConfig, RangeDoppler, power_db},
+    person::{
+        Person,
+        actions::{self, Action, StyleConfig},
+        procedural::{self, PersonConfig},
+    },
+    radar::Radar,
+    room::Room,
+    simulator::{Mode, PathModel, Scene, Simulator, SimulatorConfig},
+};
+
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+const REPETITIONS: usize = 5;
+
+fn main() {
+    let device = std::env::args().skip(1).find(|argument| argument != "--bench").unwrap_or("flex".into());
+    let device = hybridsim::cli::device(&device).expect("a device of this build");
+    for paths in [PathModel::Decoupled, PathModel::Direct] {
+        measure(paths, &device);
+    }
+}
+
+fn measure(paths: PathModel, device: &Device) {
+    let radar = Radar { tx_m: vec![[0.0; 3]], chirp_period_s: 216e-6, ..Radar::mmmesh(2) };
+    let room = Room {
+        left_m: Some(1.9),
+        right_m: Some(2.4),
+        front_m: Some(5.6),
+        back_m: Some(0.6),
+        floor_m: Some(1.0),
+        ceiling_m: Some(1.7),
+    };
+    let model = procedural::person(&PersonConfig { edge_m: 0.0198, ..Default::default() }).expect("a person");
+    let vertices = model.template.len();
+    let motion = actions::motion(Action::WalkBackForthArmswing, &StyleConfig::default(), &model, &[], 2.0, 60.0).expect("a motion");
+    let person = Person::Skinned { model, motion, placement: actions::placement(1.0, 3.0) };
+    let mut config = SimulatorConfig { paths, ..Default::default() };
+    config.room.patches = Some(5000);
+    let scene = Scene::new(&radar, Some(&room), Some(&person), &config).expect("a scene");
+
+    let started = Instant::now();
+    let view = scene.view(0).expect("a frame");
+    let visibility_s = started.elapsed().as_secs_f64();
+    let extent = Extent::around(scene.body.as_ref().expect("a body").canonical_vertices(), 0.05);
+
+    let plain = config.init(extent, 1, device);
+    let constants = plain.constants(&scene);
+    let inference_s = median(|| {
+        let surfaces = plain.surfaces(&constants, Mode::Inference);
+        let signal = plain.with_noise(plain.clean_signal(&scene, &view, &surfaces), 1);
+        assert!(signal.power().sum().into_scalar::<f32>() > 0.0);
+    });
+
+    let autodiff = device.clone().autodiff();
+    let transform = RangeDoppler::new(128, 256, radar.sampling, &HeatmapConfig::default(), &autodiff);
+    let mut simulator: Option<Simulator> = Some(config.init(extent, 1, &autodiff));
+    let mut optimizer = ModuleOptimizer::from(AdamConfig::new().build());
+    let step_s = median(|| {
+        let current = simulator.take().expect("put back below");
+        let surfaces = current.surfaces(&constants, Mode::Training { seed: 3 });
+        let signal = current.with_noise(current.clean_signal(&scene, &view, &surfaces), 1);
+        let loss = power_db(transform.map(signal).power(), 1e-6).powi_scalar(2).mean();
+        let mut gradients = loss.backward();
+        let gradients = GradientsParams::from_module(&mut gradients, &current);
+        simulator = Some(optimizer.step(1e-3, current, gradients));
+    });
+    println!(
+        "{}",
+        serde_json::json!({
+            "bench": "training_step", "paths": paths, "device": format!("{device:?}"), "vertices": vertices,
+            "room_points": scene.patches.position_m.len(), "walls": scene.proxies.len(), "visible_body": view.direct.body.len(),
+            "parameters": plain.num_params(), "step_s": step_s, "inference_s": inference_s, "visibility_s": visibility_s,
+            "peak_mb": peak_mb(),
+        })
+    );
+}
+
+fn median(mut work: impl FnMut()) -> f64 {
+    work();
+    let mut seconds: Vec<f64> = (0..REPETITIONS)
+        .map(|_| {
+            let started = Instant::now();
+            work();
+            started.elapsed().as_secs_f64()
+        })
+        .collect();
+    seconds.sort_by(f64::total_cmp);
+    seconds[REPETITIONS / 2]
+}
+
+/// Peak resident memory of this process, MB; Linux only.
+fn peak_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? / 1024.0)
+}

@@ -1,0 +1,94 @@
+//! `hybridsim check`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::Common;
+use crate::{
+    config::Config,
+    data::Recording,
+    error::Result,
+    radar::{self, Radar},
+    room::Room,
+    training::checkpoint,
+};
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// A config file, a recording folder or a checkpoint folder
+    path: PathBuf,
+}
+
+pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
+    let path = &arguments.path;
+    if path.join("checkpoint.json").is_file() {
+        let state = checkpoint::read_state(path)?;
+        println!("checkpoint of hybridsim {}, {} epochs, best in epoch {}", state.version, state.progress.epochs_done, state.progress.best_epoch + 1);
+        show_radar(&state.site.radar, state.site.room.as_ref());
+        return Ok(());
+    }
+    if path.is_dir() {
+        return show_recording(path);
+    }
+    let config = Config::read(path, &common.set)?;
+    for recording in &config.data.recordings {
+        show_recording(recording)?;
+    }
+    if let Some(record) = &config.record {
+        let world = record.world()?;
+        println!("a recording to be made:");
+        show_radar(&world.radar, Some(&world.room));
+    }
+    println!("resolved configuration:\n\n{}", config.to_toml());
+    Ok(())
+}
+
+fn show_recording(folder: &Path) -> Result<()> {
+    let recording = Recording::open(folder)?;
+    println!("recording: {}", folder.display());
+    show_radar(&recording.radar, recording.room.as_ref());
+    match recording.person() {
+        Some(person) => {
+            let times = person.pose_times_s();
+            println!("  person             {} faces, {} poses from {:.2} s to {:.2} s", person.faces().len(), times.len(), times[0], times[times.len() - 1]);
+        }
+        None => println!("  person             none: only what needs no tracked body will work"),
+    }
+    for note in &recording.notes {
+        eprintln!("note: {note}");
+    }
+    // Every frame is read once, so that a truncated or lying file shows here.
+    for frame in 0..recording.radar.frames {
+        recording.frame(frame)?;
+    }
+    println!("  samples            all {} frames can be read", recording.radar.frames);
+    Ok(())
+}
+
+fn show_radar(radar: &Radar, room: Option<&Room>) {
+    let [frames, tx, rx, loops, samples] = radar.dims();
+    println!("  frames x tx x rx x loops x samples   {frames} x {tx} x {rx} x {loops} x {samples}");
+    println!("  carrier            {:.3} GHz, wavelength {:.3} mm", radar.carrier_hz() / 1e9, radar.wavelength_m() * 1e3);
+    println!("  bandwidth          {:.3} GHz", radar.bandwidth_hz() / 1e9);
+    println!("  range              {:.3} m resolution, up to {:.2} m", radar.range_resolution_m(), radar.max_range_m());
+    println!("  velocity           {:.3} m/s resolution, up to {:.2} m/s", radar.velocity_resolution_mps(), radar.max_velocity_mps());
+    match room {
+        Some(room) => println!(
+            "  room               {}",
+            room.boundaries()
+                .into_iter()
+                .map(|boundary| format!("{} {:.2} m", boundary.name(), room.distance_m(boundary).expect("it exists")))
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
+        None => println!("  room               none: only what needs no walls will work"),
+    }
+    for check in radar::checks(radar, room.and_then(Room::farthest_wall_m), None) {
+        match check.passed {
+            Some(true) => println!("  ok       {} ({})", check.rule, check.found),
+            Some(false) => eprintln!("warning: {} does not hold ({}): {}", check.rule, check.found, check.reason),
+            None => {}
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Progress on standard error: a bar on a terminal, a line per epoch elsewhere, or silence.
+
+use std::{io::IsTerminal, time::Duration};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::training::Event;
+
+/// Shows how far a task is, with the time that remains.
+pub struct Progress {
+    bar: ProgressBar,
+    quiet: bool,
+    terminal: bool,
+}
+
+impl Progress {
+    pub fn new(what: &str, length: usize, quiet: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let target = if quiet || !terminal { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let bar = ProgressBar::with_draw_target(Some(length as u64), target);
+        let style = ProgressStyle::with_template("{prefix} [{bar:30}] {pos}/{len}  {msg}  {elapsed} elapsed, {eta} left")
+            .expect("a constant template")
+            .progress_chars("=> ");
+        bar.set_style(style);
+        bar.set_prefix(what.to_string());
+        bar.enable_steady_tick(Duration::from_millis(500));
+        if !quiet && !terminal {
+            eprintln!("{what}: {length} steps");
+        }
+        Self { bar, quiet, terminal }
+    }
+
+    pub fn set(&self, position: usize) {
+        self.bar.set_position(position as u64);
+    }
+
+    pub fn message(&self, text: String) {
+        self.bar.set_message(text);
+    }
+
+    /// A line that stays, above the bar.
+    pub fn line(&self, text: &str) {
+        if self.quiet {
+            return;
+        }
+        if self.terminal { self.bar.println(text) } else { eprintln!("{text}") }
+    }
+
+    pub fn finish(self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// Shows the events of a training run.
+pub struct TrainingProgress {
+    progress: Option<Progress>,
+    quiet: bool,
+}
+
+impl TrainingProgress {
+    pub fn new(quiet: bool) -> Self {
+        Self { progress: None, quiet }
+    }
+
+    pub fn show(&mut self, event: &Event) {
+        match event {
+            Event::Started { steps, first_step, training_frames, validation_frames } => {
+                let progress = Progress::new("training", *steps, self.quiet);
+                progress.line(&format!("{training_frames} frames to train on, {validation_frames} held out"));
+                if *first_step > 0 {
+                    progress.line(&format!("resuming after step {first_step}"));
+                }
+                progress.set(*first_step);
+                self.progress = Some(progress);
+            }
+            Event::Step { step, loss } => {
+                if let Some(progress) = &self.progress {
+                    progress.set(*step);
+                    progress.message(format!("loss {loss:.2} dB^2"));
+                }
+            }
+            Event::Epoch(metrics) => {
+                if let Some(progress) = &self.progress {
+                    let held_out = metrics.validation_loss.map_or(String::new(), |loss| format!(", held out {loss:.2} dB^2"));
+                    progress.line(&format!("epoch {}: loss {:.2} dB^2{held_out}", metrics.epoch + 1, metrics.training_loss));
+                }
+            }
+            Event::Saved(_) => {}
+            Event::StoppedEarly { epoch, best_epoch } => {
+                if let Some(progress) = &self.progress {
+                    progress.line(&format!("stopped after epoch {}: none was better since epoch {}", epoch + 1, best_epoch + 1));
+                }
+            }
+        }
+    }
+
+    pub fn finish(self) {
+        if let Some(progress) = self.progress {
+            progress.finish();
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! What a run leaves behind: pictures, numbers and a short report, all from the same evaluation.
+
+use std::{
+    fmt::Write as _,
+    path::{Path, PathBuf},
+};
+
+use burn::tensor::Device;
+use num_complex::Complex32;
+use serde_json::json;
+
+use crate::{
+    config::Config,
+    data::atomic,
+    error::{Error, Result},
+    evaluation::{self, Evaluation, FrameMaps, ScoreSummary, Simulation, measured_frame},
+    heatmap::{Analysis, Gate, HeatmapConfig, Map, Samples, Scan, StaticRemoval, remove_static},
+    metrics::{DbWindow, MetricsConfig},
+    pictures::{self, Chart, Series},
+    radar::Radar,
+    training::{FrameSplit, LoadedRecording, checkpoint, checkpoint::Progress},
+};
+
+/// Decibels that a picture shows below its strongest cell.
+const SHOWN_DB: f64 = 60.0;
+
+/// `runs/<config>`, or the next `runs/<config>-N` that is free.
+pub(super) fn fresh_run_folder(config: &Path) -> PathBuf {
+    let stem = config.file_stem().map_or("run".into(), |stem| stem.to_string_lossy().into_owned());
+    std::iter::once(stem.clone())
+        .chain((2..).map(|count| format!("{stem}-{count}")))
+        .map(|name| Path::new("runs").join(name))
+        .find(|folder| !folder.exists())
+        .expect("one of endlessly many names is free")
+}
+
+/// A trained simulator speaks for one radar; the number of frames is free.
+pub(super) fn same_radar(folder: &Path, found: &Radar, trained: &Radar) -> Result<()> {
+    if (Radar { frames: trained.frames, full_scale_codes: trained.full_scale_codes, ..found.clone() }) == *trained {
+        return Ok(());
+    }
+    Err(Error::field(folder.join("recording.toml"), "radar", "another radar", "that of the checkpoint")
+        .with_hint("train on a recording of this radar first; `hybridsim check` shows both"))
+}
+
+/// The scores as lines of text.
+pub(super) fn table(evaluation: &Evaluation) -> String {
+    let mut text = format!(
+        "  {} frames, decibels from {:.0} dB below the strongest cell, mean ± standard deviation over frames\n",
+        evaluation.frames, evaluation.span_db
+    );
+    let rows = [
+        ("all cells", &evaluation.global),
+        ("static removed", &evaluation.moving),
+        ("person's cells", &evaluation.person),
+    ];
+    for (name, scores) in rows {
+        match scores {
+            Some(ScoreSummary { psnr_db, ssim, mean_absolute_error_db }) => writeln!(
+                text,
+                "  {name:<15} PSNR {psnr_db:.2} dB   SSIM {ssim:.3}   mean error {mean_absolute_error_db:.2} dB"
+            ),
+            None => writeln!(text, "  {name:<15} not available"),
+        }
+        .expect("text grows");
+    }
+    text.push_str("  LPIPS           not available: it needs backbone weights\n");
+    text
+}
+
+/// Draws heatmaps of recordings of one radar.
+pub(super) struct Pictures {
+    radar: Radar,
+    analysis: Analysis,
+    heatmap: HeatmapConfig,
+}
+
+impl Pictures {
+    pub fn new(radar: &Radar, heatmap: &HeatmapConfig) -> Self {
+        Self { radar: radar.clone(), analysis: Analysis::new(radar, heatmap), heatmap: heatmap.clone() }
+    }
+
+    /// Pictures of one recording, `[frame, tx, rx, loop, sample]`.
+    pub fn show(&mut self, folder: &Path, samples: &[Complex32]) -> Result<()> {
+        for (name, title, map) in self.maps(samples) {
+            let map = self.db(&map, &map);
+            pictures::heatmap(&folder.join(name), title, &map, window(&map))?;
+        }
+        Ok(())
+    }
+
+    /// Pictures of a measured recording, its simulation and their difference.
+    pub fn compare(&mut self, folder: &Path, measured: &[Complex32], simulated: &[Complex32]) -> Result<()> {
+        for ((name, title, measured), (_, _, simulated)) in self.maps(measured).into_iter().zip(self.maps(simulated)) {
+            let (measured, simulated) = (self.db(&measured, &measured), self.db(&simulated, &measured));
+            pictures::comparison(&folder.join(name), title, &measured, &simulated, window(&measured))?;
+        }
+        Ok(())
+    }
+
+    fn db(&self, map: &Map, reference: &Map) -> Map {
+        map.db(self.heatmap.floor_amplitude(reference.max().sqrt()))
+    }
+
+    /// (file, title, power) of every picture.
+    fn maps(&self, samples: &[Complex32]) -> Vec<(&'static str, &'static str, Map)> {
+        let [_, tx, rx, loops, length] = self.radar.dims();
+        let frames = samples.len() / (tx * rx * loops * length);
+        let dims = [frames, tx, rx, loops, length];
+        let still = Samples::new(samples, dims);
+        let moving = remove_static(still, StaticRemoval::Loops);
+        let moving = Samples::new(&moving, dims);
+        let middle = frames / 2;
+        let everywhere = Gate::default();
+        let mut maps = vec![
+            ("range_doppler.png", "Range-Doppler, middle frame", self.analysis.range_doppler(still.frame(middle))),
+            (
+                "range_doppler_moving.png",
+                "Range-Doppler, middle frame, static removed",
+                self.analysis.range_doppler(moving.frame(middle)),
+            ),
+        ];
+        if tx * rx > 1 {
+            let scan = Scan::azimuth(60.0, 2.0);
+            maps.push((
+                "range_azimuth.png",
+                "Range-azimuth, middle frame, static removed",
+                self.analysis.range_angle(moving.frame(middle), &scan, &everywhere),
+            ));
+        }
+        if frames > 1 {
+            maps.push(("time_doppler.png", "Time-Doppler, static removed", self.analysis.time_doppler(moving, &everywhere)));
+            maps.push(("time_range.png", "Time-range, static removed", self.analysis.time_range(moving, &everywhere)));
+        }
+        maps
+    }
+}
+
+fn window(map_db: &Map) -> DbWindow {
+    DbWindow::below(map_db.max(), SHOWN_DB)
+}
+
+/// Everything the report of a training run is made of.
+pub(super) struct RunReport<'a> {
+    pub folder: &'a Path,
+    pub config: &'a Config,
+    pub recordings: &'a [LoadedRecording],
+    pub progress: &'a Progress,
+    pub device: &'a Device,
+    pub seconds: f64,
+}
+
+impl RunReport<'_> {
+    /// Evaluates the best checkpoint on held-out frames and writes everything into the run folder.
+    pub fn write(&self) -> Result<()> {
+        let best = self.folder.join("best");
+        let (simulator, _) = checkpoint::open(&best, self.device)?;
+        let training = &self.config.training;
+        let counts: Vec<usize> = self.recordings.iter().map(|recording| recording.scene.radar.frames).collect();
+        let split = FrameSplit::new(&counts, training.validation_fraction, training.split, self.config.seed);
+        let held_out = if split.validation.is_empty() { &split.training } else { &split.validation };
+
+        let mut evaluations = Vec::new();
+        for (index, recording) in self.recordings.iter().enumerate() {
+            let frames: Vec<usize> = held_out.iter().filter(|id| id.recording == index).map(|id| id.frame).collect();
+            if frames.is_empty() {
+                continue;
+            }
+            let simulation = Simulation::new(&simulator, &recording.scene, self.config.seed, true);
+            let metrics = MetricsConfig::default();
+            let middle = frames[frames.len() / 2];
+            let mut drawn = Ok(());
+            let evaluation = evaluation::evaluate(
+                recording,
+                &simulation,
+                &frames,
+                &training.heatmap,
+                &metrics,
+                &mut |frame, all, moving| {
+                    if index == 0 && frame == middle {
+                        drawn = self.draw_held_out(frame, &all, &moving);
+                    }
+                },
+            )?;
+            drawn?;
+            if index == 0 {
+                self.draw_over_time(recording, &simulation)?;
+            }
+            evaluations.push((recording.folder.clone(), evaluation));
+        }
+        self.draw_loss()?;
+        self.write_numbers(&evaluations)?;
+        self.write_report(&evaluations, !split.validation.is_empty())?;
+        for (folder, evaluation) in &evaluations {
+            println!("{}", folder.display());
+            print!("{}", table(evaluation));
+        }
+        println!("report: {}", self.folder.join("report.md").display());
+        Ok(())
+    }
+
+    fn draw_held_out(&self, frame: usize, all: &FrameMaps, moving: &FrameMaps) -> Result<()> {
+        for (name, what, maps) in [("range_doppler.png", "", all), ("range_doppler_moving.png", ", static removed", moving)] {
+            let title = format!("Range-Doppler, held-out frame {frame}{what}");
+            pictures::comparison(&self.folder.join(name), &title, &maps.measured, &maps.simulated, window(&maps.measured))?;
+        }
+        Ok(())
+    }
+
+    /// Time-Doppler needs all frames at once; a long recording shows its first minute or so.
+    fn draw_over_time(&self, recording: &LoadedRecording, simulation: &Simulation<'_>) -> Result<()> {
+        let radar = &recording.scene.radar;
+        let frames = radar.frames.min(600);
+        if frames < 2 {
+            return Ok(());
+        }
+        let analysis = Analysis::new(radar, &self.config.training.heatmap);
+        let [_, tx, rx, loops, samples] = radar.dims();
+        let map = |signal: Vec<Complex32>| {
+            let dims = [frames, tx, rx, loops, samples];
+            let moving = remove_static(Samples::new(&signal, dims), StaticRemoval::Loops);
+            analysis.time_doppler(Samples::new(&moving, dims), &Gate::default())
+        };
+        let measured = map((0..frames).map(|frame| measured_frame(recording, frame)).collect::<Result<Vec<_>>>()?.concat());
+        let simulated = map((0..frames).map(|frame| simulation.frame(frame)).collect::<Result<Vec<_>>>()?.concat());
+        let floor = self.config.training.heatmap.floor_amplitude(measured.max().sqrt());
+        let (measured, simulated) = (measured.db(floor), simulated.db(floor));
+        pictures::comparison(
+            &self.folder.join("time_doppler.png"),
+            "Time-Doppler, static removed",
+            &measured,
+            &simulated,
+            window(&measured),
+        )
+    }
+
+    fn draw_loss(&self) -> Result<()> {
+        let series = |name: &str, value: &dyn Fn(&crate::training::EpochMetrics) -> Option<f64>| Series {
+            name: name.into(),
+            points: self
+                .progress
+                .history
+                .iter()
+                .filter_map(|metrics| Some([(metrics.epoch + 1) as f64, value(metrics)?]))
+                .collect(),
+        };
+        let chart = Chart {
+            title: "Loss".into(),
+            x_label: "epoch".into(),
+            y_label: "mean squared difference (dB²)".into(),
+            series: vec![
+                series("training", &|metrics| Some(metrics.training_loss)),
+                series("held out", &|metrics| metrics.validation_loss),
+            ],
+        };
+        chart.save(&self.folder.join("loss.png"))
+    }
+
+    fn write_numbers(&self, evaluations: &[(PathBuf, Evaluation)]) -> Result<()> {
+        let scores: serde_json::Map<String, serde_json::Value> = evaluations
+            .iter()
+            .map(|(folder, evaluation)| (folder.display().to_string(), serde_json::to_value(evaluation).expect("plain data")))
+            .collect();
+        let metrics = json!({ "held_out": scores, "history": self.progress.history });
+        let run = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "seed": self.config.seed,
+            "device": format!("{:?}", self.device),
+            "seconds": self.seconds,
+            "epochs": self.progress.epochs_done,
+            "best_epoch": self.progress.best_epoch + 1,
+            "command": std::env::args().collect::<Vec<_>>(),
+        });
+        for (name, value) in [("metrics.json", metrics), ("run.json", run)] {
+            let text = serde_json::to_string_pretty(&value).expect("plain data");
+            atomic::write_text(self.folder.join(name), &text)?;
+        }
+        Ok(())
+    }
+
+    fn write_report(&self, evaluations: &[(PathBuf, Evaluation)], held_out: bool) -> Result<()> {
+        let history = &self.progress.history;
+        let (first, best) = (&history[0], &history[self.progress.best_epoch]);
+        let mut text = format!(
+            "# Training run\n\n{} epochs in {:.0} s; the best was epoch {}: loss {:.2} dB² after {:.2} dB² in the first{}.\n\n",
+            self.progress.epochs_done,
+            self.seconds,
+            best.epoch + 1,
+            best.score(),
+            first.score(),
+            if held_out { ", on held-out frames" } else { " (no frames were held out)" }
+        );
+        for (folder, evaluation) in evaluations {
+            let which = if held_out { "held-out" } else { "training" };
+            writeln!(text, "`{}`, {which} frames:\n\n```\n{}```\n", folder.display(), table(evaluation)).expect("text grows");
+        }
+        text.push_str("![loss](loss.png)\n![range-Doppler](range_doppler.png)\n");
+        text.push_str("![range-Doppler, static removed](range_doppler_moving.png)\n![time-Doppler](time_doppler.png)\n\n");
+        text.push_str("Settings: `config.toml`. Numbers: `metrics.json`, `run.json`. Weights: `best/`, `last/`.\n");
+        atomic::write_text(self.folder.join("report.md"), &text)
+    }
+}

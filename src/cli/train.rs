@@ -1,0 +1,94 @@
+//! `hybridsim train`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::{
+    Common, Out, device,
+    progress::TrainingProgress,
+    record,
+    report::{self, RunReport},
+};
+use crate::{
+    config::Config,
+    data::atomic,
+    error::{Error, Result},
+    training::{Trainer, load_recordings},
+};
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// The experiment, such as configs/quickstart.toml; with --resume it may be left out
+    #[arg(required_unless_present = "resume")]
+    config: Option<PathBuf>,
+    /// Continue a run folder that was interrupted
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["config", "out"])]
+    resume: Option<PathBuf>,
+    #[command(flatten)]
+    out: Out,
+}
+
+pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
+    let (config_path, run_folder, resume) = match (&arguments.resume, &arguments.config) {
+        (Some(run), _) => (run.join("config.toml"), run.clone(), Some(run.join("last")).filter(|last| last.is_dir())),
+        (None, Some(config)) => {
+            let folder = match &arguments.out.out {
+                Some(out) => out.clone(),
+                None => report::fresh_run_folder(config),
+            };
+            (config.clone(), folder, None)
+        }
+        (None, None) => unreachable!("clap asks for one of them"),
+    };
+    let mut config = Config::read(&config_path, &common.set)?;
+    let device = device(&common.device)?;
+    if resume.is_none() && run_folder.join("last").is_dir() {
+        return Err(Error::Usage {
+            message: format!("{}: already holds a run", run_folder.display()),
+            hint: Some("continue it with --resume, or choose another folder with --out".into()),
+        });
+    }
+    if config.data.recordings.is_empty() {
+        let recorded = record::recorded(config.record(&config_path)?, Path::new("runs/recordings"), common.quiet)?;
+        config.data.recordings = vec![recorded];
+    }
+    absolute(&mut config.data.recordings)?;
+    let config_toml = config.to_toml();
+    std::fs::create_dir_all(&run_folder).map_err(|error| Error::write(&run_folder, error))?;
+    atomic::write_text(run_folder.join("config.toml"), &config_toml)?;
+
+    let started = std::time::Instant::now();
+    let recordings = load_recordings(&config.data.recordings, &config.simulator)?;
+    let trainer = Trainer {
+        config: &config.training,
+        simulator_config: &config.simulator,
+        seed: config.seed,
+        recordings: &recordings,
+        site: recordings[0].site(&config.simulator),
+        config_toml: &config_toml,
+        folder: &run_folder,
+        device: device.clone(),
+    };
+    let mut progress = TrainingProgress::new(common.quiet);
+    let outcome = trainer.run(resume.as_deref(), &mut |event| progress.show(&event))?;
+    progress.finish();
+
+    let report = RunReport {
+        folder: &run_folder,
+        config: &config,
+        recordings: &recordings,
+        progress: &outcome.progress,
+        device: &device,
+        seconds: started.elapsed().as_secs_f64(),
+    };
+    report.write()
+}
+
+/// The resolved config must find its recordings from wherever a later command runs.
+fn absolute(paths: &mut [PathBuf]) -> Result<()> {
+    for path in paths {
+        *path = path.canonicalize().map_err(|error| Error::read(&*path, error))?;
+    }
+    Ok(())
+}

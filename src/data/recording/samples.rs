@@ -1,0 +1,232 @@
+//! `if.npy`: the samples, one frame at a time.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use num_complex::Complex;
+use serde::{Deserialize, Serialize};
+
+use crate::data::arrays::{Axes, Element, Header, Kind, Problem, Stored, describe, field_of, open, to_c_order};
+use crate::error::{Error, Result};
+use crate::radar::{Radar, Sampling};
+
+const AXES: [&str; 5] = ["frame", "tx", "rx", "loop", "sample"];
+
+/// How the samples lie in `if.npy`; the axes before are always `[frame, tx, rx, loop, sample]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum IfLayout {
+    /// `int16 [..., iq]`: ADC codes of a quadrature receiver.
+    Codes,
+    /// `complex64`.
+    Complex,
+    /// `int16`: ADC codes of a receiver without quadrature.
+    RealCodes,
+    /// `float32`, without quadrature.
+    Real,
+}
+
+impl IfLayout {
+    pub fn sampling(self) -> Sampling {
+        match self {
+            Self::Codes | Self::Complex => Sampling::Complex,
+            Self::RealCodes | Self::Real => Sampling::Real,
+        }
+    }
+
+    /// NumPy's type string.
+    pub(super) fn descr(self) -> &'static str {
+        match self {
+            Self::Codes | Self::RealCodes => "<i2",
+            Self::Complex => "<c8",
+            Self::Real => "<f4",
+        }
+    }
+
+    /// The shape of a whole file.
+    pub(super) fn shape(self, radar: &Radar) -> Vec<usize> {
+        let mut shape = radar.dims().to_vec();
+        shape.extend((self == Self::Codes).then_some(2));
+        shape
+    }
+
+    fn axes(self, dims: [usize; 5]) -> Vec<(&'static str, Option<usize>)> {
+        let mut axes: Vec<_> = AXES.into_iter().zip(dims.map(Some)).collect();
+        axes.extend((self == Self::Codes).then_some(("iq", Some(2))));
+        axes
+    }
+
+    fn of(sampling: Sampling, stored: Stored) -> Option<Self> {
+        match (sampling, stored.kind, stored.bytes) {
+            (Sampling::Complex, Kind::Int, 2) => Some(Self::Codes),
+            (Sampling::Complex, Kind::Complex, 8) => Some(Self::Complex),
+            (Sampling::Real, Kind::Int, 2) => Some(Self::RealCodes),
+            (Sampling::Real, Kind::Float, 4) => Some(Self::Real),
+            _ => None,
+        }
+    }
+}
+
+/// The IF samples of one frame, in the units of the file: ADC codes, or whatever its floats are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IfFrame {
+    /// `[tx, rx, loop, sample]`.
+    pub dims: [usize; 4],
+    /// In-phase part, in C order.
+    pub re: Vec<f32>,
+    /// Quadrature part; absent where the receiver has none.
+    pub im: Option<Vec<f32>>,
+}
+
+impl IfFrame {
+    /// Panics when the numbers of samples do not fit the axes: that is a bug.
+    pub fn new(dims: [usize; 4], re: Vec<f32>, im: Option<Vec<f32>>) -> Self {
+        let count: usize = dims.iter().product();
+        assert_eq!(re.len(), count, "in-phase samples for [tx, rx, loop, sample] = {dims:?}");
+        assert!(im.as_ref().is_none_or(|im| im.len() == count), "quadrature samples for [tx, rx, loop, sample] = {dims:?}");
+        Self { dims, re, im }
+    }
+
+    /// Where a sample is in `re` and `im`.
+    pub fn position(&self, tx: usize, rx: usize, index: usize, sample: usize) -> usize {
+        let [_, n_rx, loops, samples] = self.dims;
+        ((tx * n_rx + rx) * loops + index) * samples + sample
+    }
+
+    /// One sample; without quadrature its imaginary part is zero.
+    pub fn sample(&self, tx: usize, rx: usize, index: usize, sample: usize) -> Complex<f32> {
+        let position = self.position(tx, rx, index, sample);
+        Complex::new(self.re[position], self.im.as_ref().map_or(0.0, |im| im[position]))
+    }
+
+    /// The first sample that is not finite, as `tx 0, rx 1, loop 2, sample 3`.
+    pub(super) fn first_non_finite(&self) -> Option<String> {
+        let bad = |values: &[f32]| values.iter().position(|value| !value.is_finite());
+        let position = bad(&self.re).into_iter().chain(self.im.as_deref().and_then(bad)).min()?;
+        let [_, n_rx, loops, samples] = self.dims;
+        let (chirp, sample) = (position / samples, position % samples);
+        let (tx, rx) = (chirp / loops / n_rx, chirp / loops % n_rx);
+        Some(format!("tx {tx}, rx {rx}, loop {}, sample {sample}", chirp % loops))
+    }
+}
+
+/// The error for samples that are NaN or infinite.
+pub(super) fn not_finite(path: &Path, frame: usize, place: &str) -> Error {
+    Error::field(path, field_of(path), format!("NaN or infinite at frame {frame}, {place}"), "finite samples")
+}
+
+/// The samples' file: its header, held against the radar.
+#[derive(Clone, Debug)]
+pub(super) struct IfFile {
+    path: PathBuf,
+    header: Header,
+    layout: IfLayout,
+    dims: [usize; 5],
+}
+
+impl IfFile {
+    pub fn open(path: PathBuf, radar: &Radar) -> Result<Self> {
+        let (mut reader, size) = open(&path)?;
+        let dims = radar.dims();
+        let checked = Header::read(&mut reader, size).and_then(|header| {
+            let layout = IfLayout::of(radar.sampling, header.stored).ok_or_else(|| other_kind(&header, radar))?;
+            let axes = layout.axes(dims);
+            let expected = || format!("{} {}", header.stored.name(), describe(&axes));
+            header.check_shape(&axes, expected).map_err(|problem| match sampling_hint(&header, radar) {
+                Some(hint) => problem.with_hint(hint),
+                None => problem,
+            })?;
+            header.check_size(size)?;
+            Ok((header, layout))
+        });
+        let (header, layout) = checked.map_err(|problem| problem.at(&path, &field_of(&path)))?;
+        Ok(Self { path, header, layout, dims })
+    }
+
+    pub fn layout(&self) -> IfLayout {
+        self.layout
+    }
+
+    pub fn frame(&self, index: usize) -> Result<IfFrame> {
+        let [frames, tx, rx, loops, samples] = self.dims;
+        assert!(index < frames, "frame {index} of a recording of {frames}");
+        let mut bytes = self.frame_bytes(index).map_err(|source| Error::read(&self.path, source))?;
+        let stored = self.header.stored;
+        let (re, im) = match self.layout {
+            IfLayout::RealCodes | IfLayout::Real => (self.ordered(f32::decode(stored, &mut bytes)), None),
+            IfLayout::Codes => {
+                let values = self.ordered(f32::decode(stored, &mut bytes));
+                let (re, im) = values.as_chunks().0.iter().map(|&[re, im]| (re, im)).unzip();
+                (re, Some(im))
+            }
+            IfLayout::Complex => {
+                let values = self.ordered(Complex::<f32>::decode(stored, &mut bytes));
+                let (re, im) = values.iter().map(|value| (value.re, value.im)).unzip();
+                (re, Some(im))
+            }
+        };
+        let frame = IfFrame::new([tx, rx, loops, samples], re, im);
+        match frame.first_non_finite() {
+            None => Ok(frame),
+            Some(place) => Err(not_finite(&self.path, index, &place)),
+        }
+    }
+
+    /// The bytes of one frame, in the order of the file.
+    fn frame_bytes(&self, index: usize) -> std::io::Result<Vec<u8>> {
+        let (frames, width) = (self.dims[0], self.header.stored.bytes);
+        let length = self.header.data_bytes() as usize / frames;
+        let mut file = File::open(&self.path)?;
+        if !self.header.fortran {
+            file.seek(SeekFrom::Start(self.header.data_start + (index * length) as u64))?;
+            let mut bytes = vec![0; length];
+            file.read_exact(&mut bytes)?;
+            return Ok(bytes);
+        }
+        // The frames lie interleaved: the whole file goes by, and every so-manieth number is kept.
+        file.seek(SeekFrom::Start(self.header.data_start))?;
+        let mut bytes = Vec::with_capacity(length);
+        let mut block = vec![0; width * frames * (1usize << 20).div_ceil(width * frames)];
+        let mut left = length * frames;
+        while left > 0 {
+            let part = left.min(block.len());
+            file.read_exact(&mut block[..part])?;
+            block[..part].chunks(width * frames).for_each(|row| bytes.extend(&row[index * width..(index + 1) * width]));
+            left -= part;
+        }
+        Ok(bytes)
+    }
+
+    fn ordered<T: Copy>(&self, values: Vec<T>) -> Vec<T> {
+        if self.header.fortran { to_c_order(values, &self.header.shape[1..]) } else { values }
+    }
+}
+
+/// No layout of the contract has such numbers for this sampling.
+fn other_kind(header: &Header, radar: &Radar) -> Problem {
+    let of = |layout: IfLayout| describe(&layout.axes(radar.dims()) as Axes);
+    let expected = match radar.sampling {
+        Sampling::Complex => format!("int16 {} or complex64 {}", of(IfLayout::Codes), of(IfLayout::Complex)),
+        Sampling::Real => format!("int16 or float32 {}", of(IfLayout::Real)),
+    };
+    let problem = Problem::new(header.describe(), expected);
+    match sampling_hint(header, radar) {
+        Some(hint) => problem.with_hint(hint),
+        None => problem,
+    }
+}
+
+/// When the file looks like the other kind of receiver.
+fn sampling_hint(header: &Header, radar: &Radar) -> Option<&'static str> {
+    let (axes, kind) = (header.shape.len(), header.stored.kind);
+    match radar.sampling {
+        Sampling::Complex if axes == 5 && kind != Kind::Complex => {
+            Some("a receiver without quadrature needs radar.sampling = \"real\" in recording.toml")
+        }
+        Sampling::Real if kind == Kind::Complex || axes == 6 && header.shape[5] == 2 => {
+            Some("a quadrature receiver needs radar.sampling = \"complex\" in recording.toml")
+        }
+        _ => None,
+    }
+}

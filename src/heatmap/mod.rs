@@ -1,0 +1,56 @@
+//! Heatmaps: IF samples to range-Doppler, angle and time maps (ℱ_RD of the paper's loss, sec. 3.4).
+//!
+//! [`RangeDoppler`] works inside the graph: DFT matrices, any length, every backend, gradients. [`Analysis`] works on the
+//! host in f64 through rustfft, and adds angles and time. Both fold in the same windows and the same scale, and tests hold
+//! one against the other.
+//!
+//! Scale: a path of amplitude 1 in the middle of a cell peaks at 1 (0 dB), whatever the lengths and windows. A real-sampled
+//! signal is doubled, so that its path also peaks at 1. The paper's plain FFT differs by a constant factor, which cancels
+//! in its loss.
+
+mod angle;
+mod axes;
+mod dft;
+mod host;
+mod map;
+mod over_time;
+mod windows;
+
+pub use angle::Scan;
+pub use axes::{doppler_turns_per_loop, range_axis, range_bins, velocity_axis};
+pub use dft::{RangeDoppler, power_db, remove_loop_mean, time_doppler};
+pub use host::{Analysis, Samples, StaticRemoval, remove_static};
+pub use map::{Axis, Map};
+pub use over_time::Gate;
+pub use windows::Window;
+
+use serde::{Deserialize, Serialize};
+
+/// How IF samples become maps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HeatmapConfig {
+    /// Over the samples of a chirp.
+    pub range_window: Window,
+    /// Over the loops of a frame.
+    pub doppler_window: Window,
+    /// Floor of the logarithm, relative to the amplitude of the recording's strongest cell.
+    pub floor_db: f64,
+}
+
+impl Default for HeatmapConfig {
+    /// Hann windows, and a floor that f32 barely resolves: it keeps the logarithm finite and changes no real cell.
+    fn default() -> Self {
+        Self { range_window: Window::Hann, doppler_window: Window::Hann, floor_db: -120.0 }
+    }
+}
+
+impl HeatmapConfig {
+    /// The floor as an amplitude, for [`power_db`] and [`Map::db`].
+    pub fn floor_amplitude(&self, peak_amplitude: f64) -> f64 {
+        peak_amplitude * 10f64.powf(self.floor_db / 20.0)
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod synthetic;

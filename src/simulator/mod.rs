@@ -1,0 +1,213 @@
+//! The simulator: the whole journey as one Burn module.
+//!
+//! Features of the body (tri-plane) and of the room (encoded coordinates) are decoded into materials and Gaussian
+//! patches; the scene says where they are and who is seen; paths and the coherent sum make IF samples of them.
+//!
+//! Amplitudes are evaluated once per frame, at its middle and between the antennas' centres; phases at every chirp
+//! and antenna. A body part that turns at 5 rad/s turns by 8° within a 27 ms frame.
+
+mod config;
+mod scattering;
+mod scene;
+mod surfaces;
+
+pub use config::{PathModel, SimulatorConfig};
+pub use scene::{FrameView, Scene, Seen};
+pub use surfaces::{SceneConstants, Surface, Surfaces};
+
+use burn::{
+    module::Module,
+    tensor::{DType, Device, Tensor},
+};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::{
+    complex::Complex,
+    features::{Extent, Gcn, TriPlane, draw},
+    if_signal::{Noise, noise},
+    scatterers::decoders::Decoders,
+};
+
+/// What learns.
+#[derive(Module, Debug)]
+pub struct Simulator {
+    pub triplane: TriPlane,
+    pub graph: Gcn,
+    pub decoders: Decoders,
+    pub noise: Noise,
+    #[module(skip)]
+    config: SimulatorConfig,
+    /// The box that canonical points are looked up in.
+    #[module(skip)]
+    extent: Extent,
+}
+
+/// Training regularises with the masked graph convolution; inference does not.
+#[derive(Clone, Copy, Debug)]
+pub enum Mode {
+    Inference,
+    /// `seed` decides whether the graph is on in this step and which vertices it hides.
+    Training {
+        seed: u64,
+    },
+}
+
+impl SimulatorConfig {
+    /// A simulator as it is before training; equal seeds give equal parameters on every backend.
+    ///
+    /// `extent`: the box around the canonical body.
+    pub fn init(&self, extent: Extent, seed: u64, device: &Device) -> Simulator {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let body_features = self.triplane.features_out();
+        Simulator {
+            triplane: self.triplane.init(&mut rng, device),
+            graph: self.graph.init(body_features, &mut rng, device),
+            decoders: self.decoders.init(body_features, self.encoding.features_out(), &mut rng, device),
+            noise: self.noise.init(device),
+            config: self.clone(),
+            extent,
+        }
+    }
+}
+
+impl Simulator {
+    pub fn config(&self) -> &SimulatorConfig {
+        &self.config
+    }
+
+    pub fn device(&self) -> Device {
+        self.decoders.gain.log_gain.val().device()
+    }
+
+    /// The tensors of a scene that never change; made once.
+    pub fn constants(&self, scene: &Scene) -> SceneConstants {
+        SceneConstants::new(scene, &self.config, &self.extent, &self.device())
+    }
+
+    /// Decodes materials and patches of all scatterers.
+    ///
+    /// # Gradient
+    /// Flows to the planes, the graph's layers and the decoders.
+    pub fn surfaces(&self, constants: &SceneConstants, mode: Mode) -> Surfaces {
+        let body = constants.body.as_ref().map(|body| {
+            let features = self.triplane.forward(&body.sampler);
+            let regularised = self.regularise(features.clone(), body, mode);
+            let at_points = |features: Tensor<2>| match &body.points {
+                Some(points) => points.apply(features),
+                None => features,
+            };
+            Surface {
+                material: self.decoders.body_material.forward(at_points(regularised)),
+                patch: self.decoders.body_patch.forward(at_points(features)),
+            }
+        });
+        let room = constants.room.as_ref().map(|encoded| Surface {
+            material: self.decoders.room_material.forward(encoded.clone()),
+            patch: self.decoders.room_patch.forward(encoded.clone()),
+        });
+        Surfaces { body, room }
+    }
+
+    fn regularise(&self, features: Tensor<2>, body: &surfaces::BodyConstants, mode: Mode) -> Tensor<2> {
+        match mode {
+            Mode::Training { seed } => {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed);
+                if !rng.random_bool(self.config.graph.used) {
+                    return features;
+                }
+                let mask = draw::mask(body.vertices, self.config.graph.masked, &mut rng, &features.device());
+                self.graph.forward(&body.graph, features, Some(mask))
+            }
+            Mode::Inference if self.config.graph.at_inference => self.graph.forward(&body.graph, features, None),
+            Mode::Inference => features,
+        }
+    }
+
+    /// The signal before noise: direct and indirect paths, as the settings have it.
+    ///
+    /// # Shapes
+    /// - result: `[tx, rx, loop, sample]`, in the units of the recordings it was trained on
+    ///
+    /// # Gradient
+    /// Flows to everything that learns.
+    pub fn clean_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
+        let mut sum: Option<Complex<4>> = None;
+        let mut add = |part: Complex<4>| {
+            sum = Some(match sum.take() {
+                Some(sum) => sum.add(part),
+                None => part,
+            });
+        };
+        if self.config.paths.has_direct() {
+            add(self.direct_signal(scene, view, surfaces));
+        }
+        if self.config.paths.has_indirect() && !scene.proxies.is_empty() {
+            add(self.indirect_signal(scene, view, surfaces));
+        }
+        let signal = sum.unwrap_or_else(|| {
+            let [_, tx, rx, loops, samples] = scene.radar.dims();
+            Complex::zeros([tx, rx, loops, samples], &self.device())
+        });
+        let gain = self.decoders.gain.factor().reshape([1, 1, 1, 1]);
+        Complex::new(signal.re * gain.clone(), signal.im * gain)
+    }
+
+    /// Adds noise; equal seeds give equal noise on every backend.
+    pub fn with_noise(&self, clean: Complex<4>, seed: u64) -> Complex<4> {
+        let normals = noise::normals(seed, clean.dims(), &clean.device(), DType::F32);
+        self.noise.add_to(clean, normals)
+    }
+
+    /// σ of the noise over the signal's mean amplitude; `None` for a law without a rate.
+    pub fn noise_rate(&self) -> Option<f64> {
+        Some(f64::from(self.noise.rate(&self.device())?.into_scalar::<f32>()))
+    }
+
+    /// The first stage of the journey with a value that is not finite; for the message when training breaks.
+    pub fn first_non_finite_stage(
+        &self,
+        scene: &Scene,
+        view: &FrameView,
+        constants: &SceneConstants,
+        mode: Mode,
+    ) -> Option<&'static str> {
+        if let Some(body) = &constants.body {
+            let features = self.triplane.forward(&body.sampler);
+            if !is_finite(features.clone()) {
+                return Some("tri-plane features");
+            }
+            if !is_finite(self.regularise(features, body, mode)) {
+                return Some("graph convolution");
+            }
+        }
+        let surfaces = self.surfaces(constants, mode);
+        for surface in [&surfaces.body, &surfaces.room].into_iter().flatten() {
+            if !(is_finite(surface.material.refraction.clone()) && is_finite(surface.material.roughness.clone())) {
+                return Some("material decoder");
+            }
+            if !(is_finite(surface.patch.lobes.clone()) && is_finite(surface.patch.offset_m.clone())) {
+                return Some("patch decoder");
+            }
+        }
+        let finite = |signal: Complex<4>| is_finite(signal.re) && is_finite(signal.im);
+        if self.config.paths.has_direct() && !finite(self.direct_signal(scene, view, &surfaces)) {
+            return Some("direct path");
+        }
+        if self.config.paths.has_indirect() && !scene.proxies.is_empty() && !finite(self.indirect_signal(scene, view, &surfaces))
+        {
+            return Some("indirect path");
+        }
+        let clean = self.clean_signal(scene, view, &surfaces);
+        if !finite(clean.clone()) {
+            return Some("gain");
+        }
+        (!finite(self.with_noise(clean, 0))).then_some("noise")
+    }
+}
+
+/// Whether no element is NaN or infinite.
+pub fn is_finite<const D: usize>(tensor: Tensor<D>) -> bool {
+    let data = tensor.detach().into_data().convert::<f32>();
+    data.as_slice::<f32>().expect("converted").iter().all(|value| value.is_finite())
+}

@@ -1,0 +1,215 @@
+//! From decoded surfaces to the signals of direct and indirect paths.
+
+use burn::tensor::{DType, Device, Tensor};
+
+use super::{
+    FrameView, PathModel, Scene, Seen, Simulator, Surface, Surfaces,
+    surfaces::{column, rows, towards, vectors},
+};
+use crate::{
+    body::{Displacement, facets},
+    complex::Complex,
+    if_signal::{direct_signal, indirect_signal},
+    paths::{Amplitude, Points},
+    scatterers::{microfacet, patches, tangent::Frame},
+};
+
+/// Scatterers that move together, with what they return in one direction.
+struct Group<'a> {
+    scene: &'a Scene,
+    view: &'a FrameView,
+    kind: Kind,
+    points: &'a [usize],
+    reference_m: Vec<[f64; 3]>,
+    /// `[point, 1]`
+    amplitude: Tensor<2>,
+    /// `[point, xyz]`, of the Gaussian patches from their surface.
+    offset_m: Option<Tensor<2>>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Body,
+    Room,
+}
+
+impl Simulator {
+    /// Eq. 2 for all transmitters: `[tx, rx, loop, sample]`, without gain.
+    pub(super) fn direct_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
+        let centre = scene.radar.centre_m();
+        let groups = self.groups(scene, view, surfaces, &view.direct, |group, surface| match self.config.paths {
+            PathModel::Coupled => self.patch_amplitude(group, surface, centre),
+            _ => self.microfacet_amplitude(group, surface),
+        });
+        self.transmitters(scene, |tx, device| {
+            let radar = &scene.radar;
+            let parts = groups.iter().map(|group| {
+                let displacement = group.displacement(tx, device);
+                let amplitude = group.facet_amplitude(&displacement, tx, device);
+                let points = Points { reference_m: &group.reference_m, displacement: &displacement, amplitude: &amplitude };
+                direct_signal(points, radar, tx, self.config.dechirp, self.config.sum)
+            });
+            parts.reduce(Complex::add)
+        })
+    }
+
+    /// Eq. 3 for all transmitters and walls: `[tx, rx, loop, sample]`, without gain.
+    pub(super) fn indirect_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
+        let walls: Vec<(usize, Vec<Group<'_>>)> = (0..scene.proxies.len())
+            .map(|wall| {
+                let place = scene.proxies[wall].position_m;
+                let groups = self.groups(scene, view, surfaces, &view.proxies[wall], |group, surface| {
+                    self.patch_amplitude(group, surface, place)
+                });
+                (wall, groups)
+            })
+            .collect();
+        self.transmitters(scene, |tx, device| {
+            let parts = walls.iter().flat_map(|(wall, groups)| groups.iter().map(move |group| (wall, group))).map(|(wall, group)| {
+                let displacement = group.displacement(tx, device);
+                let amplitude = Amplitude::real(group.amplitude.clone());
+                let points = Points { reference_m: &group.reference_m, displacement: &displacement, amplitude: &amplitude };
+                let place = scene.proxies[*wall].position_m;
+                indirect_signal(points, place, &scene.radar, tx, self.config.dechirp, self.config.sum)
+            });
+            parts.reduce(Complex::add)
+        })
+    }
+
+    /// `[rx, chirp, sample]` of every transmitter, stacked; what stands still has one chirp and is repeated.
+    fn transmitters(&self, scene: &Scene, signal: impl Fn(usize, &Device) -> Option<Complex<3>>) -> Complex<4> {
+        let device = self.device();
+        let [_, tx, rx, loops, samples] = scene.radar.dims();
+        let silent = || Complex::zeros([rx, loops, samples], &device);
+        let parts = (0..tx).map(|tx| {
+            let signal = signal(tx, &device).unwrap_or_else(silent);
+            let full = |part: Tensor<3>| part.expand([rx, loops, samples]).unsqueeze_dim::<4>(0);
+            Complex::new(full(signal.re), full(signal.im))
+        });
+        Complex::cat(parts.collect(), 0)
+    }
+
+    /// The visible scatterers of body and room, each with the amplitude that `amplitude` finds for it.
+    fn groups<'a>(
+        &self,
+        scene: &'a Scene,
+        view: &'a FrameView,
+        surfaces: &Surfaces,
+        seen: &'a Seen,
+        amplitude: impl Fn(&Group<'a>, &Surface) -> (Tensor<2>, Option<Tensor<2>>),
+    ) -> Vec<Group<'a>> {
+        let device = self.device();
+        let sides = [(Kind::Body, &seen.body, &surfaces.body), (Kind::Room, &seen.room, &surfaces.room)];
+        let mut groups = Vec::new();
+        for (kind, points, surface) in sides {
+            let (Some(surface), false) = (surface, points.is_empty()) else { continue };
+            let all = match kind {
+                Kind::Body => &view.body.as_ref().expect("it has visible points").position_m,
+                Kind::Room => &scene.patches.position_m,
+            };
+            let reference_m = points.iter().map(|&point| all[point]).collect();
+            let amplitude_of = Tensor::zeros([1, 1], &device);
+            let mut group = Group { scene, view, kind, points, reference_m, amplitude: amplitude_of, offset_m: None };
+            let picked = rows(points, all.len(), &device);
+            let surface = Surface { material: surface.material.pick(&picked), patch: surface.patch.pick(&picked) };
+            (group.amplitude, group.offset_m) = amplitude(&group, &surface);
+            group.amplitude = group.amplitude.clone() * column(group.areas_m2().into_iter(), &device);
+            groups.push(group);
+        }
+        groups
+    }
+
+    /// L_p of the direct path, `[point, 1]`.
+    fn microfacet_amplitude(&self, group: &Group<'_>, surface: &Surface) -> (Tensor<2>, Option<Tensor<2>>) {
+        let device = self.device();
+        let radar = &group.scene.radar;
+        let incident = towards(group.reference_m.iter().copied(), mean(&radar.tx_m, radar.position_m), &device);
+        let outgoing = towards(group.reference_m.iter().copied(), mean(&radar.rx_m, radar.position_m), &device);
+        let normal = vectors(group.normals().into_iter(), &device);
+        (microfacet::amplitude(&surface.material, normal, incident, outgoing, self.config.response), None)
+    }
+
+    /// SH_{p,k} towards a place, `[point, 1]`, and the patches' offsets.
+    fn patch_amplitude(&self, group: &Group<'_>, surface: &Surface, place: [f64; 3]) -> (Tensor<2>, Option<Tensor<2>>) {
+        let device = self.device();
+        let radar = &group.scene.radar;
+        let incident = towards(group.reference_m.iter().copied(), mean(&radar.tx_m, radar.position_m), &device);
+        let outgoing = towards(group.reference_m.iter().copied(), place, &device);
+        let normal = vectors(group.normals().into_iter(), &device);
+        let frame = match group.tangents() {
+            Some(tangents) => Frame::along(normal, vectors(tangents.into_iter(), &device)),
+            None => Frame::from_normal(normal),
+        };
+        let wavenumber = std::f64::consts::TAU / radar.wavelength_m();
+        let amplitude = patches::amplitude(&surface.patch, &frame, incident, outgoing, wavenumber);
+        (amplitude, Some(surface.patch.offset_m.clone()))
+    }
+}
+
+impl Group<'_> {
+    fn pick<T: Copy>(&self, of_body: impl Fn() -> Vec<T>, of_room: &[T]) -> Vec<T> {
+        match self.kind {
+            Kind::Body => of_body(),
+            Kind::Room => self.points.iter().map(|&point| of_room[point]).collect(),
+        }
+    }
+
+    fn normals(&self) -> Vec<[f64; 3]> {
+        self.pick(|| self.of_frame(|frame| &frame.normal), &self.scene.patches.normal)
+    }
+
+    fn areas_m2(&self) -> Vec<f64> {
+        self.pick(|| self.of_frame(|frame| &frame.area_m2), &self.scene.patches.area_m2)
+    }
+
+    /// Tangents that turn with the body; a room needs none.
+    fn tangents(&self) -> Option<Vec<[f64; 3]>> {
+        (self.kind == Kind::Body).then(|| self.points.iter().map(|&point| self.view.tangent[point]).collect())
+    }
+
+    fn of_frame<T: Copy>(&self, values: impl Fn(&crate::body::BodyFrame) -> &Vec<T>) -> Vec<T> {
+        let values = values(self.view.body.as_ref().expect("a body's group"));
+        self.points.iter().map(|&point| values[point]).collect()
+    }
+
+    /// How the points move around their references in the chirps of a transmitter.
+    fn displacement(&self, tx: usize, device: &Device) -> Displacement {
+        let loops = self.scene.radar.loops_per_frame;
+        match (self.kind, &self.scene.body, &self.view.body) {
+            (Kind::Body, Some(body), Some(frame)) => {
+                body.displacement(frame, self.points, tx * loops..(tx + 1) * loops, self.offset_m.clone(), device)
+            }
+            _ => match &self.offset_m {
+                Some(offset) => {
+                    let along = |axis: usize| offset.clone().narrow(1, axis, 1);
+                    Displacement { x: along(0), y: along(1), z: along(2) }
+                }
+                None => Displacement::still(self.points.len(), device, DType::F32),
+            },
+        }
+    }
+
+    /// The amplitude with the closed-form integral over each facet, where facets are what is sampled.
+    fn facet_amplitude(&self, displacement: &Displacement, tx: usize, device: &Device) -> Amplitude {
+        let (Kind::Body, Some(body), Some(frame)) = (self.kind, &self.scene.body, &self.view.body) else {
+            return Amplitude::real(self.amplitude.clone());
+        };
+        if !self.scene.facets {
+            return Amplitude::real(self.amplitude.clone());
+        }
+        let radar = &self.scene.radar;
+        let loops = radar.loops_per_frame;
+        let antennas = [radar.tx_position_m(tx), mean(&radar.rx_m, radar.position_m)];
+        let wavevector = facets::wavevector(&self.reference_m, displacement, antennas, radar.wavelength_m());
+        let edges = body.facet_edges(frame, self.points, tx * loops..(tx + 1) * loops, device);
+        let integral = facets::facet_integral(&edges, &wavevector);
+        Amplitude { re: integral.re * self.amplitude.clone(), im: Some(integral.im * self.amplitude.clone()) }
+    }
+}
+
+/// Mean position of antennas, radar frame.
+fn mean(antennas: &[[f64; 3]], position_m: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|axis| {
+        position_m[axis] + antennas.iter().map(|antenna| antenna[axis]).sum::<f64>() / antennas.len() as f64
+    })
+}

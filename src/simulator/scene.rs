@@ -1,0 +1,140 @@
+//! The scene: all that does not learn. Where every scatterer is in each frame, and who sees it.
+
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex},
+};
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::SimulatorConfig;
+use crate::{
+    body::{BodyFrame, PosedBody, Sampling},
+    error::Result,
+    person::Person,
+    radar::Radar,
+    room::Room,
+    scatterers::{
+        room_patches::{Proxy, RoomPatches},
+        visibility::frame_visibility,
+    },
+};
+
+/// Indices of the scatterers that a viewpoint sees.
+#[derive(Clone, Debug, Default)]
+pub struct Seen {
+    pub body: Vec<usize>,
+    pub room: Vec<usize>,
+}
+
+/// One frame of a scene.
+pub struct FrameView {
+    pub frame: usize,
+    pub body: Option<BodyFrame>,
+    /// `[point, xyz]` of the body: a direction on the surface that turns with it.
+    pub tangent: Vec<[f64; 3]>,
+    /// From the radar.
+    pub direct: Seen,
+    /// From every wall proxy.
+    pub proxies: Vec<Seen>,
+}
+
+/// Radar, room and person, sampled into scatterers.
+pub struct Scene {
+    pub radar: Radar,
+    pub body: Option<PosedBody>,
+    pub patches: RoomPatches,
+    pub proxies: Vec<Proxy>,
+    /// Whether every scatterer of the body stands for a whole facet.
+    pub facets: bool,
+    flip_exponent: f64,
+    /// Visibility does not learn, so every frame is looked at once.
+    views: Mutex<HashMap<usize, Arc<FrameView>>>,
+}
+
+impl Scene {
+    /// # Errors
+    /// A body whose mesh or motion cannot be sampled.
+    pub fn new(radar: &Radar, room: Option<&Room>, person: Option<&Person>, config: &SimulatorConfig) -> Result<Self> {
+        let patches = room.map(|room| config.room.init(room)).transpose()?.unwrap_or_default();
+        let proxies = room.map(|room| config.room.proxies(room)).unwrap_or_default();
+        let body = person.map(|person| PosedBody::new(person, &config.surface, config.interpolation)).transpose()?;
+        Ok(Self {
+            radar: radar.clone(),
+            body,
+            patches,
+            proxies,
+            facets: config.surface.sampling == Sampling::Facets,
+            flip_exponent: config.flip_exponent,
+            views: Mutex::new(HashMap::new()),
+        })
+    }
+
+    /// Times of all chirps of a frame, seconds: transmitter by transmitter, loop by loop; each at the middle of its
+    /// sampling window, where the phases are referred to.
+    pub fn chirp_times_s(&self, frame: usize) -> Vec<f64> {
+        let middle = self.radar.sample_time_s(self.radar.samples_per_chirp / 2);
+        (0..self.radar.tx_m.len())
+            .flat_map(|tx| (0..self.radar.loops_per_frame).map(move |index| (tx, index)))
+            .map(|(tx, index)| self.radar.chirp_time_s(frame, tx, index) + middle)
+            .collect()
+    }
+
+    /// Positions and visibility of a frame, computed once and kept.
+    ///
+    /// # Errors
+    /// A frame outside the motion.
+    pub fn view(&self, frame: usize) -> Result<Arc<FrameView>> {
+        if let Some(view) = self.views.lock().expect("no panic while locked").get(&frame) {
+            return Ok(view.clone());
+        }
+        let view = Arc::new(self.look(frame)?);
+        self.views.lock().expect("no panic while locked").insert(frame, view.clone());
+        Ok(view)
+    }
+
+    fn look(&self, frame: usize) -> Result<FrameView> {
+        let body = self.body.as_ref().map(|body| body.frame(&self.chirp_times_s(frame))).transpose()?;
+        // A dense surface is as visible as the vertices around it.
+        let vertices = body.as_ref().map(|body| body.vertices_m.as_slice()).unwrap_or_default();
+        let patches = &self.patches;
+        let seen = |mask: &[bool]| {
+            let (of_vertices, of_room) = mask.split_at(vertices.len());
+            let of_body = self.body.as_ref().map(|body| body.surface().decide(of_vertices)).unwrap_or_default();
+            let indices = |mask: &[bool]| (0..mask.len()).filter(|&index| mask[index]).collect();
+            Seen { body: indices(&of_body), room: indices(of_room) }
+        };
+        let visibility = frame_visibility(
+            vertices,
+            &patches.position_m,
+            &patches.boundary,
+            self.radar.centre_m(),
+            &self.proxies,
+            self.flip_exponent,
+        );
+        Ok(FrameView {
+            frame,
+            tangent: self.tangents(body.as_ref()),
+            direct: seen(&visibility.direct),
+            proxies: visibility.proxies.iter().map(|mask| seen(mask)).collect(),
+            body,
+        })
+    }
+
+    /// A canonical direction of every point, turned with the body: the axis that lies flattest on the surface.
+    fn tangents(&self, frame: Option<&BodyFrame>) -> Vec<[f64; 3]> {
+        let (Some(body), Some(frame)) = (&self.body, frame) else { return Vec::new() };
+        let pose = frame.basis.poses.len() / 2;
+        (0..frame.position_m.len())
+            .into_par_iter()
+            .map(|point| {
+                let rotation = body.rotation(frame, point, pose);
+                let canonical = rotation.transpose() * Vector3::from(frame.normal[point]);
+                let flattest = canonical.iamin();
+                let axis = Vector3::from_fn(|row, _| if row == flattest { 1.0 } else { 0.0 });
+                (rotation * axis).into()
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,191 @@
+//! Checkpoints: what is needed to infer (weights, settings, site) and to continue as if nothing had happened.
+//!
+//! A checkpoint is a folder, written under a temporary name and renamed when it is complete:
+//! `weights.safetensors`, `optimizer.bpk`, `config.toml` (resolved), `checkpoint.json` (progress and site).
+
+use std::path::Path;
+
+use burn::{
+    module::{Module, ModuleMapper, ModuleVisitor, Param, ParamId},
+    optim::ModuleOptimizer,
+    store::{ModuleSnapshot, SafetensorsStore},
+    tensor::{Device, Tensor},
+};
+use serde::{Deserialize, Serialize};
+
+use super::metrics::EpochMetrics;
+use crate::{
+    data::atomic::AtomicFolder,
+    error::{Error, Result},
+    features::Extent,
+    person::Placement,
+    radar::Radar,
+    room::Room,
+    simulator::{Simulator, SimulatorConfig},
+};
+
+pub const WEIGHTS: &str = "weights.safetensors";
+const OPTIMIZER: &str = "optimizer.bpk";
+const STATE: &str = "checkpoint.json";
+
+/// The place a simulator was trained for: what `infer` needs beside weights and a motion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Site {
+    pub radar: Radar,
+    pub room: Option<Room>,
+    /// Where the training person's motion stood; the default for new motions.
+    pub placement: Option<Placement>,
+    /// The box around the canonical body that the tri-plane covers, with its margin.
+    pub body_extent: Extent,
+}
+
+/// How far training has come.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Progress {
+    pub epochs_done: usize,
+    pub steps_done: usize,
+    pub best_epoch: usize,
+    pub best_validation: f64,
+    pub history: Vec<EpochMetrics>,
+}
+
+/// `checkpoint.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CheckpointState {
+    pub format: u32,
+    pub version: String,
+    pub seed: u64,
+    pub simulator: SimulatorConfig,
+    pub site: Site,
+    pub progress: Progress,
+}
+
+/// Gives the parameters identities that depend on their order alone. Burn numbers them at random, but the
+/// optimiser's saved state is found by these numbers when a run resumes.
+pub fn with_stable_ids(simulator: Simulator) -> Simulator {
+    struct Renumber(u64);
+    impl ModuleMapper for Renumber {
+        fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+            self.0 += 1;
+            let (_, value, mapper) = param.consume();
+            Param::from_mapped_value(ParamId::from(self.0), value, mapper)
+        }
+    }
+    simulator.map(&mut Renumber(0))
+}
+
+/// Writes a checkpoint folder, replacing an older one of the same name.
+pub fn save(
+    folder: &Path,
+    simulator: &Simulator,
+    optimizer: Option<&ModuleOptimizer>,
+    state: &CheckpointState,
+    config_toml: &str,
+) -> Result<()> {
+    let partial = AtomicFolder::replacing(folder)?;
+    let weights = partial.path().join(WEIGHTS);
+    simulator
+        .save_into(&mut SafetensorsStore::from_file(&weights).metadata("hybridsim", &state.version))
+        .map_err(|error| Error::write(&weights, std::io::Error::other(error.to_string())))?;
+    if let Some(optimizer) = optimizer {
+        let path = partial.path().join(OPTIMIZER);
+        optimizer.save(&path).map_err(|error| Error::write(&path, std::io::Error::other(error.to_string())))?;
+    }
+    let json = serde_json::to_string_pretty(state).expect("plain data");
+    for (name, text) in [("config.toml", config_toml), (STATE, &json)] {
+        let path = partial.path().join(name);
+        std::fs::write(&path, text).map_err(|error| Error::write(&path, error))?;
+    }
+    partial.finish()
+}
+
+/// Reads what a checkpoint says about itself.
+pub fn read_state(folder: &Path) -> Result<CheckpointState> {
+    let path = folder.join(STATE);
+    let text = std::fs::read_to_string(&path).map_err(|error| {
+        if error.kind() == std::io::ErrorKind::NotFound {
+            Error::Usage {
+                message: format!("{}: not a checkpoint: it holds no {STATE}", folder.display()),
+                hint: Some("a run folder keeps its checkpoints in `best` and `last`".into()),
+            }
+        } else {
+            Error::read(&path, error)
+        }
+    })?;
+    let state: CheckpointState =
+        serde_json::from_str(&text).map_err(|error| Error::Parse { path: path.clone(), message: error.to_string() })?;
+    if state.format != 1 {
+        return Err(Error::field(path, "format", state.format.to_string(), "1"));
+    }
+    Ok(state)
+}
+
+/// Loads the weights into a simulator that was initialised from the same settings.
+pub fn load_weights(folder: &Path, mut simulator: Simulator) -> Result<Simulator> {
+    let path = folder.join(WEIGHTS);
+    if !path.is_file() {
+        return Err(Error::read(&path, std::io::Error::from(std::io::ErrorKind::NotFound)));
+    }
+    let mut store = SafetensorsStore::from_file(&path).allow_partial(true).validate(false);
+    let result = simulator.load_from(&mut store).map_err(|error| Error::Parse {
+        path: path.clone(),
+        message: format!("not a complete weights file: {error}"),
+    })?;
+    let other = |found: String, expected: &str| {
+        Error::field(&path, "weights", found, expected)
+            .with_hint("this checkpoint belongs to another configuration; use the config.toml beside it")
+    };
+    if let Some(error) = result.errors.first() {
+        return Err(other(error.to_string(), "the shapes of this configuration"));
+    }
+    if let Some((name, _)) = result.missing.first() {
+        return Err(other(format!("without `{name}`"), "a tensor for each parameter of this configuration"));
+    }
+    if let Some(name) = result.unused.first() {
+        return Err(other(format!("with an unknown tensor `{name}`"), "the parameters of this configuration alone"));
+    }
+    if let Some(name) = first_non_finite(&simulator) {
+        return Err(Error::field(&path, name, "NaN or infinite", "finite weights"));
+    }
+    Ok(simulator)
+}
+
+/// Loads the optimiser's state.
+pub fn load_optimizer(folder: &Path, optimizer: ModuleOptimizer) -> Result<ModuleOptimizer> {
+    let path = folder.join(OPTIMIZER);
+    optimizer.load(&path).map_err(|error| Error::Parse { path, message: format!("not an optimiser's state: {error}") })
+}
+
+/// A simulator ready to infer, with the state of its checkpoint.
+pub fn open(folder: &Path, device: &Device) -> Result<(Simulator, CheckpointState)> {
+    let state = read_state(folder)?;
+    let simulator = state.simulator.init(state.site.body_extent, state.seed, device);
+    Ok((load_weights(folder, with_stable_ids(simulator))?, state))
+}
+
+/// Name of the first parameter with a value that is not finite.
+pub fn first_non_finite(simulator: &Simulator) -> Option<String> {
+    struct Finder {
+        path: Vec<String>,
+        found: Option<String>,
+    }
+    impl ModuleVisitor for Finder {
+        fn enter_module(&mut self, name: &str, _: &str) {
+            self.path.push(name.into());
+        }
+        fn exit_module(&mut self, _: &str, _: &str) {
+            self.path.pop();
+        }
+        fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+            if self.found.is_none() && !crate::simulator::is_finite(param.val()) {
+                self.found = Some(self.path.join("."));
+            }
+        }
+    }
+    let mut finder = Finder { path: Vec::new(), found: None };
+    simulator.visit(&mut finder);
+    finder.found
+}

@@ -1,0 +1,110 @@
+//! Which frames train and which are held out, and in which order an epoch visits them.
+
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+/// How the held-out frames are chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Split {
+    /// The last frames of every recording: nothing near them was trained on.
+    #[default]
+    Last,
+    /// Frames drawn from the whole recording.
+    Random,
+}
+
+/// A frame of one of several recordings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct FrameId {
+    pub recording: usize,
+    pub frame: usize,
+}
+
+/// Disjoint frames to train on and to validate on, both ascending.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameSplit {
+    pub training: Vec<FrameId>,
+    pub validation: Vec<FrameId>,
+}
+
+impl FrameSplit {
+    /// `frames` holds the number of frames of each recording; at least one of each with more than one is held out
+    /// when `validation_fraction` is above zero.
+    pub fn new(frames: &[usize], validation_fraction: f64, split: Split, seed: u64) -> Self {
+        let mut training = Vec::new();
+        let mut validation = Vec::new();
+        for (recording, &count) in frames.iter().enumerate() {
+            let held_out = match (validation_fraction > 0.0, count) {
+                (false, _) | (_, 0 | 1) => 0,
+                (true, _) => ((count as f64 * validation_fraction).round() as usize).clamp(1, count - 1),
+            };
+            let mut order: Vec<usize> = (0..count).collect();
+            if split == Split::Random {
+                order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed ^ (recording as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)));
+            }
+            let (train, held) = order.split_at(count - held_out);
+            training.extend(train.iter().map(|&frame| FrameId { recording, frame }));
+            validation.extend(held.iter().map(|&frame| FrameId { recording, frame }));
+        }
+        training.sort_unstable();
+        validation.sort_unstable();
+        Self { training, validation }
+    }
+
+    /// The order in which an epoch visits the training frames: a function of seed and epoch alone, so that a
+    /// resumed run continues as if it had never stopped.
+    pub fn epoch_order(&self, seed: u64, epoch: usize) -> Vec<FrameId> {
+        let mut order = self.training.clone();
+        order.shuffle(&mut step_rng(seed, epoch, 0xE90C));
+        order
+    }
+}
+
+/// Random numbers for one step, a function of seed, step and purpose alone.
+pub fn step_rng(seed: u64, step: usize, purpose: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ purpose.rotate_left(32));
+    rng.set_stream(step as u64);
+    rng
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_fifth_of_every_recording_is_held_out() {
+        let split = FrameSplit::new(&[10, 5], 0.2, Split::Last, 1);
+        assert_eq!(split.training.len(), 12);
+        let held: Vec<_> = split.validation.iter().map(|id| (id.recording, id.frame)).collect();
+        assert_eq!(held, [(0, 8), (0, 9), (1, 4)]);
+    }
+
+    #[test]
+    fn a_random_split_is_disjoint_complete_and_set_by_its_seed() {
+        let split = FrameSplit::new(&[40], 0.25, Split::Random, 7);
+        assert_eq!(split.validation.len(), 10);
+        assert!(split.validation.iter().all(|id| !split.training.contains(id)));
+        assert_eq!(split, FrameSplit::new(&[40], 0.25, Split::Random, 7));
+        assert_ne!(split, FrameSplit::new(&[40], 0.25, Split::Random, 8));
+    }
+
+    #[test]
+    fn a_single_frame_is_trained_on_not_held_out() {
+        let split = FrameSplit::new(&[1], 0.2, Split::Last, 1);
+        assert_eq!((split.training.len(), split.validation.len()), (1, 0));
+    }
+
+    #[test]
+    fn every_epoch_visits_all_frames_in_an_order_of_its_own() {
+        let split = FrameSplit::new(&[30], 0.2, Split::Last, 1);
+        let (first, second) = (split.epoch_order(3, 0), split.epoch_order(3, 1));
+        assert_ne!(first, second);
+        assert_eq!(first, split.epoch_order(3, 0));
+        let mut sorted = second.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, split.training);
+    }
+}

@@ -1,0 +1,303 @@
+//! The training loop.
+
+use std::path::{Path, PathBuf};
+
+use burn::{
+    module::Module,
+    grad_clipping::GradientClipping,
+    optim::{AdamConfig, GradientsParams, ModuleOptimizer},
+    tensor::{Device, Tensor},
+};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::{
+    EpochMetrics, FrameId, FrameSplit, LoadedRecording, TrainingConfig, calibrate,
+    checkpoint::{self, CheckpointState, Progress, Site},
+    step_rng,
+};
+use crate::{
+    complex::Complex,
+    error::{Error, Result},
+    heatmap::RangeDoppler,
+    loss::DbLoss,
+    simulator::{Mode, SceneConstants, Simulator, SimulatorConfig, is_finite},
+};
+
+/// What happens in a run, for whoever shows it.
+#[derive(Clone, Debug)]
+pub enum Event {
+    Started { steps: usize, first_step: usize, training_frames: usize, validation_frames: usize },
+    Step { step: usize, loss: f64 },
+    Epoch(EpochMetrics),
+    Saved(PathBuf),
+    StoppedEarly { epoch: usize, best_epoch: usize },
+}
+
+/// How a run ended.
+pub struct Outcome {
+    pub simulator: Simulator,
+    pub progress: Progress,
+}
+
+/// What training keeps of each recording beside its scene.
+struct Prepared {
+    loss: DbLoss,
+    constants: SceneConstants,
+}
+
+/// Everything a run needs; `run` does it.
+pub struct Trainer<'a> {
+    pub config: &'a TrainingConfig,
+    pub simulator_config: &'a SimulatorConfig,
+    pub seed: u64,
+    pub recordings: &'a [LoadedRecording],
+    pub site: Site,
+    /// The resolved configuration, kept beside every checkpoint.
+    pub config_toml: &'a str,
+    /// Where `best` and `last` are kept.
+    pub folder: &'a Path,
+    pub device: Device,
+}
+
+impl Trainer<'_> {
+    /// Trains from the beginning, or from `resume` (a checkpoint folder of the same configuration).
+    ///
+    /// A resumed run visits the same frames with the same noise as one that was never stopped.
+    pub fn run(&self, resume: Option<&Path>, emit: &mut dyn FnMut(Event)) -> Result<Outcome> {
+        self.config.check()?;
+        let counts: Vec<usize> = self.recordings.iter().map(|recording| recording.scene.radar.frames).collect();
+        let split = FrameSplit::new(&counts, self.config.validation_fraction, self.config.split, self.seed);
+        let steps_per_epoch = split.training.len().div_ceil(self.config.frames_per_step);
+        let steps = self.config.epochs * steps_per_epoch;
+        let device = self.device.clone().autodiff();
+        let losses = self.losses(&split)?;
+
+        let mut simulator =
+            checkpoint::with_stable_ids(self.simulator_config.init(self.site.body_extent, self.seed, &device));
+        let mut optimizer = ModuleOptimizer::from(AdamConfig::new().with_epsilon(1e-8).build())
+            .with_grad_clipping(GradientClipping::Norm(self.config.gradient_clip as f32));
+        let mut progress =
+            Progress { epochs_done: 0, steps_done: 0, best_epoch: 0, best_validation: f64::INFINITY, history: Vec::new() };
+        match resume {
+            Some(folder) => {
+                let state = checkpoint::read_state(folder)?;
+                if state.simulator != *self.simulator_config || state.seed != self.seed || state.site != self.site {
+                    return Err(Error::Usage {
+                        message: format!("{}: a checkpoint of another configuration", folder.display()),
+                        hint: Some("resume with the config.toml of its run folder, or start a new run".into()),
+                    });
+                }
+                simulator = checkpoint::load_weights(folder, simulator)?;
+                optimizer = checkpoint::load_optimizer(folder, optimizer)?;
+                progress = state.progress;
+            }
+            None => simulator = calibrate::fit_gain(simulator, self.recordings, &split.training)?,
+        }
+        let prepared: Vec<Prepared> = losses
+            .into_iter()
+            .zip(self.recordings)
+            .map(|(loss, recording)| Prepared { loss, constants: simulator.constants(&recording.scene) })
+            .collect();
+
+        emit(Event::Started {
+            steps,
+            first_step: progress.steps_done,
+            training_frames: split.training.len(),
+            validation_frames: split.validation.len(),
+        });
+        for epoch in progress.epochs_done..self.config.epochs {
+            let order = split.epoch_order(self.seed, epoch);
+            let mut sum = 0.0;
+            let mut learning_rate = self.config.learning_rate;
+            for batch in order.chunks(self.config.frames_per_step) {
+                learning_rate = self.config.learning_rate_at(progress.steps_done, steps);
+                let (stepped, loss) = self.step(simulator, &mut optimizer, &prepared, batch, progress.steps_done, learning_rate)?;
+                simulator = stepped;
+                sum += loss * batch.len() as f64;
+                progress.steps_done += 1;
+                emit(Event::Step { step: progress.steps_done, loss });
+            }
+            let metrics = EpochMetrics {
+                epoch,
+                learning_rate,
+                training_loss: sum / order.len() as f64,
+                validation_loss: self.validate(&simulator, &prepared, &split.validation)?,
+                noise_rate: simulator.noise_rate(),
+            };
+            progress.epochs_done = epoch + 1;
+            let better = metrics.score() < progress.best_validation;
+            if better {
+                progress.best_validation = metrics.score();
+                progress.best_epoch = epoch;
+            }
+            progress.history.push(metrics.clone());
+            emit(Event::Epoch(metrics));
+            if better {
+                self.save("best", &simulator, &optimizer, &progress, emit)?;
+            }
+            self.save("last", &simulator, &optimizer, &progress, emit)?;
+            if self.config.patience_epochs > 0 && epoch - progress.best_epoch >= self.config.patience_epochs {
+                emit(Event::StoppedEarly { epoch, best_epoch: progress.best_epoch });
+                break;
+            }
+        }
+        Ok(Outcome { simulator, progress })
+    }
+
+    fn save(
+        &self,
+        name: &str,
+        simulator: &Simulator,
+        optimizer: &ModuleOptimizer,
+        progress: &Progress,
+        emit: &mut dyn FnMut(Event),
+    ) -> Result<()> {
+        let state = CheckpointState {
+            format: 1,
+            version: env!("CARGO_PKG_VERSION").into(),
+            seed: self.seed,
+            simulator: self.simulator_config.clone(),
+            site: self.site.clone(),
+            progress: progress.clone(),
+        };
+        let folder = self.folder.join(name);
+        checkpoint::save(&folder, simulator, Some(optimizer), &state, self.config_toml)?;
+        emit(Event::Saved(folder));
+        Ok(())
+    }
+
+    /// One step of the optimiser on a few frames; its loss, dB².
+    fn step(
+        &self,
+        simulator: Simulator,
+        optimizer: &mut ModuleOptimizer,
+        prepared: &[Prepared],
+        batch: &[FrameId],
+        step: usize,
+        learning_rate: f64,
+    ) -> Result<(Simulator, f64)> {
+        let mut rng = step_rng(self.seed, step, 0x57E9);
+        let mode = Mode::Training { seed: rng.random() };
+        let loss = self.batch_loss(&simulator, prepared, batch, mode, &mut rng)?;
+        let value: f64 = loss.clone().into_scalar::<f32>().into();
+        if !value.is_finite() {
+            return Err(self.first_broken_stage(&simulator, prepared, batch, mode, step)?);
+        }
+        let mut gradients = loss.backward();
+        let gradients = GradientsParams::from_module(&mut gradients, &simulator);
+        let simulator = optimizer.step(learning_rate, simulator, gradients);
+        match checkpoint::first_non_finite(&simulator) {
+            Some(name) => Err(Error::NonFinite { stage: format!("the gradient of `{name}`"), step }),
+            None => Ok((simulator, value)),
+        }
+    }
+
+    fn batch_loss(
+        &self,
+        simulator: &Simulator,
+        prepared: &[Prepared],
+        frames: &[FrameId],
+        mode: Mode,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Tensor<1>> {
+        let mut sum: Option<Tensor<1>> = None;
+        for (index, frames) in by_recording(frames) {
+            let recording = &self.recordings[index];
+            let Prepared { loss, constants } = &prepared[index];
+            let surfaces = simulator.surfaces(constants, mode);
+            for frame in frames {
+                let view = recording.scene.view(frame)?;
+                let clean = simulator.clean_signal(&recording.scene, &view, &surfaces);
+                let signal = simulator.with_noise(clean, rng.random());
+                let measured = loss.maps_db(one_frame(recording.target(frame, &self.device)?));
+                let value = loss.loss(one_frame(signal), measured);
+                sum = Some(match sum {
+                    Some(sum) => sum + value,
+                    None => value,
+                });
+            }
+        }
+        Ok(sum.expect("a batch has frames") / frames.len() as f64)
+    }
+
+    /// The loss of every recording; its floors refer to the recording's first training frame.
+    fn losses(&self, split: &FrameSplit) -> Result<Vec<DbLoss>> {
+        let mut losses = Vec::new();
+        for (index, recording) in self.recordings.iter().enumerate() {
+            let radar = &recording.scene.radar;
+            let frame = split.training.iter().find(|id| id.recording == index).map_or(0, |id| id.frame);
+            let transform = RangeDoppler::new(
+                radar.loops_per_frame,
+                radar.samples_per_chirp,
+                radar.sampling,
+                &self.config.heatmap,
+                &self.device,
+            );
+            let peak = transform.peak_amplitude(recording.target(frame, &self.device)?);
+            losses.push(DbLoss::new(radar, &self.config.heatmap, &self.config.loss, peak, &self.device)?);
+        }
+        Ok(losses)
+    }
+
+    /// Loss on held-out frames as at inference, without gradients; the same noise in every epoch.
+    fn validate(&self, simulator: &Simulator, prepared: &[Prepared], frames: &[FrameId]) -> Result<Option<f64>> {
+        if frames.is_empty() {
+            return Ok(None);
+        }
+        let simulator = simulator.clone().valid();
+        let mut rng = step_rng(self.seed, 0, 0x7A11);
+        let mut sum = 0.0;
+        for frame in frames {
+            // One frame at a time bounds the memory.
+            let loss = self.batch_loss(&simulator, prepared, std::slice::from_ref(frame), Mode::Inference, &mut rng)?;
+            sum += f64::from(loss.into_scalar::<f32>());
+        }
+        Ok(Some(sum / frames.len() as f64))
+    }
+
+    /// Runs the journey once more and names the first stage whose result is not finite.
+    fn first_broken_stage(
+        &self,
+        simulator: &Simulator,
+        prepared: &[Prepared],
+        batch: &[FrameId],
+        mode: Mode,
+        step: usize,
+    ) -> Result<Error> {
+        if let Some(name) = checkpoint::first_non_finite(simulator) {
+            return Ok(Error::NonFinite { stage: format!("the parameter `{name}`"), step });
+        }
+        for (index, frames) in by_recording(batch) {
+            let recording = &self.recordings[index];
+            for frame in frames {
+                if !is_finite(recording.target(frame, &self.device)?.re) {
+                    return Ok(Error::NonFinite { stage: format!("frame {frame} of the recording"), step });
+                }
+                let scene = &recording.scene;
+                let constants = &prepared[index].constants;
+                if let Some(stage) = simulator.first_non_finite_stage(scene, &scene.view(frame)?, constants, mode) {
+                    return Ok(Error::NonFinite { stage: stage.into(), step });
+                }
+            }
+        }
+        Ok(Error::NonFinite { stage: "the loss".into(), step })
+    }
+}
+
+fn one_frame(signal: Complex<4>) -> Complex<5> {
+    let [tx, rx, loops, samples] = signal.dims();
+    signal.reshape([1, tx, rx, loops, samples])
+}
+
+/// Frames of a batch, grouped by recording, each group in the batch's order.
+fn by_recording(batch: &[FrameId]) -> Vec<(usize, Vec<usize>)> {
+    let mut groups: Vec<(usize, Vec<usize>)> = Vec::new();
+    for id in batch {
+        match groups.iter_mut().find(|(recording, _)| *recording == id.recording) {
+            Some((_, frames)) => frames.push(id.frame),
+            None => groups.push((id.recording, vec![id.frame])),
+        }
+    }
+    groups
+}

@@ -1,0 +1,191 @@
+//! The program as its user meets it: help, results, errors with their hints, exit status.
+
+use std::{
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+fn hybridsim(arguments: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hybridsim")).args(arguments).current_dir(folder).env("NO_COLOR", "1").output().unwrap()
+}
+
+fn out(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn err(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn test_config() -> String {
+    root().join("configs/test.toml").display().to_string()
+}
+
+/// A recording of `configs/test.toml`, made once by the program itself.
+fn recording() -> PathBuf {
+    static ONCE: std::sync::OnceLock<(tempfile::TempDir, PathBuf)> = std::sync::OnceLock::new();
+    let (_, folder) = ONCE.get_or_init(|| {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = parent.path().join("recording");
+        let output = hybridsim(&["record", &test_config(), "-q", "--out", folder.to_str().unwrap()], parent.path());
+        assert!(output.status.success(), "{}", err(&output));
+        (parent, folder)
+    });
+    folder.clone()
+}
+
+/// A copy of the recording to spoil.
+fn spoiled(spoil: impl FnOnce(&Path)) -> tempfile::TempDir {
+    let copy = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(recording()).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, copy.path().join(path.file_name().unwrap())).unwrap();
+    }
+    spoil(copy.path());
+    copy
+}
+
+fn replace(file: &Path, from: &str, to: &str) {
+    let text = std::fs::read_to_string(file).unwrap();
+    assert!(text.contains(from), "{} has no `{from}`:\n{text}", file.display());
+    std::fs::write(file, text.replace(from, to)).unwrap();
+}
+
+fn assert_refused(output: &Output, status: i32, parts: &[&str]) {
+    let text = err(output);
+    assert_eq!(output.status.code(), Some(status), "{text}");
+    for part in parts {
+        assert!(text.contains(part), "`{part}` is missing in:\n{text}");
+    }
+    assert!(!text.contains("panicked"), "{text}");
+}
+
+#[test]
+fn help_names_every_verb_and_where_to_start() {
+    let output = hybridsim(&["--help"], &root());
+    assert!(output.status.success());
+    for word in ["check", "record", "train", "infer", "evaluate", "--set", "--device", "configs/quickstart.toml"] {
+        assert!(out(&output).contains(word), "{word} is missing in:\n{}", out(&output));
+    }
+    for verb in ["check", "record", "train", "infer", "evaluate"] {
+        let output = hybridsim(&[verb, "--help"], &root());
+        assert!(out(&output).lines().count() > 10, "{verb} --help teaches nothing:\n{}", out(&output));
+    }
+}
+
+#[test]
+fn a_run_leaves_pictures_numbers_and_a_model_that_infers_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let recordings = format!("data.recordings=[{:?}]", recording().display().to_string());
+    let arguments =
+        ["train", &test_config(), "-q", "--device", "flex", "--set", "training.epochs=2", "--set", &recordings, "--out", "run"];
+    let output = hybridsim(&arguments, folder.path());
+    assert!(output.status.success(), "{}", err(&output));
+    assert!(out(&output).contains("PSNR") && out(&output).contains("report: run/report.md"), "{}", out(&output));
+    let run = folder.path().join("run");
+    for file in [
+        "config.toml", "metrics.json", "run.json", "report.md", "loss.png", "range_doppler.png", "range_doppler_moving.png",
+        "time_doppler.png", "best/weights.safetensors", "last/checkpoint.json",
+    ] {
+        assert!(run.join(file).is_file(), "{file} is missing");
+    }
+
+    let output = hybridsim(&arguments, folder.path());
+    assert_refused(&output, 2, &["run: already holds a run", "--resume"]);
+
+    let output =
+        hybridsim(&["infer", "--checkpoint", "run/best", "--action", "lunge", "--frames", "2", "-q", "--out", "made"], folder.path());
+    assert!(output.status.success(), "{}", err(&output));
+    assert!(folder.path().join("made/recording/if.npy").is_file());
+    assert!(folder.path().join("made/range_doppler.png").is_file());
+
+    let recorded = recording().display().to_string();
+    let output = hybridsim(&["evaluate", "--checkpoint", "run/best", &recorded, "-q"], folder.path());
+    assert!(output.status.success(), "{}", err(&output));
+    assert!(out(&output).contains("person's cells") && out(&output).contains("LPIPS           not available"), "{}", out(&output));
+}
+
+#[test]
+fn a_misspelt_key_is_named_with_the_one_that_was_meant() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("bad.toml"), "[training]\nepoch = 3\n").unwrap();
+    let output = hybridsim(&["train", "bad.toml"], folder.path());
+    assert_refused(&output, 2, &["error: bad.toml", "unknown key `", "epoch`", "`epochs`", "hint: "]);
+    let output = hybridsim(&["train", &test_config(), "--set", "training.epochz=3"], folder.path());
+    assert_refused(&output, 2, &["epochz`", "`epochs`"]);
+    assert!(!folder.path().join("runs").exists(), "something was left behind");
+}
+
+#[test]
+fn an_unknown_device_is_refused_with_those_that_work() {
+    let output = hybridsim(&["train", &test_config(), "--device", "abacus"], &root());
+    assert_refused(&output, 2, &["no device `abacus` here, available: flex, ndarray"]);
+}
+
+#[test]
+fn a_room_beyond_the_unambiguous_range_stops_training_and_is_a_warning_elsewhere() {
+    let far = spoiled(|folder| {
+        let file = folder.join("recording.toml");
+        let text = std::fs::read_to_string(&file).unwrap();
+        let front = text.lines().find(|line| line.starts_with("front_m")).unwrap().to_string();
+        replace(&file, &front, "front_m = 40.0");
+    });
+    let path = far.path().display().to_string();
+    let recordings = format!("data.recordings=[{path:?}]");
+    let output = hybridsim(&["train", &test_config(), "--set", &recordings, "--out", "run"], far.path());
+    assert_refused(&output, 2, &["recording.toml: `room` is up to 40.00 m away", "unambiguous range", "hint: "]);
+    let output = hybridsim(&["check", &path], far.path());
+    assert!(output.status.success(), "{}", err(&output));
+    assert!(err(&output).contains("warning: ") && err(&output).contains("folds back"), "{}", err(&output));
+}
+
+#[test]
+fn truncated_samples_are_refused_before_hours_are_spent() {
+    let cut = spoiled(|folder| {
+        let file = folder.join("if.npy");
+        let bytes = std::fs::read(&file).unwrap();
+        std::fs::write(&file, &bytes[..bytes.len() - 100]).unwrap();
+    });
+    let path = cut.path().display().to_string();
+    let recordings = format!("data.recordings=[{path:?}]");
+    let output = hybridsim(&["train", &test_config(), "--set", &recordings, "--out", "run"], cut.path());
+    assert_refused(&output, 2, &["if.npy"]);
+    assert!(!cut.path().join("run/last").exists());
+    assert_refused(&hybridsim(&["check", &path], cut.path()), 2, &["if.npy"]);
+}
+
+#[test]
+fn a_missing_config_is_said_to_be_missing() {
+    let output = hybridsim(&["train", "nowhere.toml"], &root());
+    assert_refused(&output, 2, &["error: nowhere.toml: cannot be read", "hint: check the path"]);
+}
+
+#[test]
+fn a_folder_without_a_checkpoint_is_no_checkpoint() {
+    let output = hybridsim(&["infer", "--checkpoint", "src", "--action", "lunge"], &root());
+    assert_refused(&output, 2, &["src: not a checkpoint", "`best` and `last`"]);
+    let output = hybridsim(&["infer", "--checkpoint", "src", "--action", "flying"], &root());
+    assert_refused(&output, 2, &["torso_rotation"]);
+}
+
+#[test]
+fn a_full_disk_stops_with_what_to_do_and_leaves_nothing() {
+    let full = Path::new("/dev/full");
+    if !full.exists() {
+        println!("skipped: this system has no /dev/full");
+        return;
+    }
+    // A folder on a full disk cannot be had without privileges; a file that cannot be created behaves alike.
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("file");
+    std::fs::write(&target, "in the way").unwrap();
+    let below = target.join("run").display().to_string();
+    let recordings = format!("data.recordings=[{:?}]", recording().display().to_string());
+    let output = hybridsim(&["train", &test_config(), "-q", "--set", &recordings, "--out", &below], folder.path());
+    assert_refused(&output, 1, &["cannot be written"]);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}

@@ -1,0 +1,27 @@
+//! Every config that ships is valid, and says the same after a round trip through its resolved form.
+
+use std::path::Path;
+
+use hybridsim::config::Config;
+
+#[test]
+fn all_configs_parse_and_resolve_to_themselves() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+    let mut count = 0;
+    for entry in std::fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            continue;
+        }
+        let config = Config::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let again = tempfile::tempdir().unwrap();
+        let resolved = again.path().join("config.toml");
+        std::fs::write(&resolved, config.to_toml()).unwrap();
+        assert_eq!(Config::read(&resolved, &[]).unwrap(), config, "{}", path.display());
+        let listed = std::fs::read_to_string(folder.join("README.md")).unwrap();
+        let name = path.file_name().unwrap().to_str().unwrap();
+        assert!(listed.contains(&format!("`{name}`")), "configs/README.md does not list {name}");
+        count += 1;
+    }
+    assert!(count >= 3);
+}

@@ -1,0 +1,162 @@
+//! The whole journey on a recording made here: record, train, resume, infer.
+
+use std::path::{Path, PathBuf};
+
+use hybridsim::{
+    config::Config,
+    error::{Error, Result},
+    recorder,
+    training::{Event, LoadedRecording, Trainer, checkpoint, load_recordings},
+};
+
+/// `configs/test.toml`, with its recording made once for all tests of this file.
+fn config() -> Config {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/test.toml");
+    let mut config = Config::read(&path, &[]).unwrap();
+    config.data.recordings = vec![recording()];
+    config
+}
+
+fn recording() -> PathBuf {
+    static ONCE: std::sync::OnceLock<(tempfile::TempDir, PathBuf)> = std::sync::OnceLock::new();
+    let (_, folder) = ONCE.get_or_init(|| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/test.toml");
+        let config = Config::read(&path, &[]).unwrap();
+        let parent = tempfile::tempdir().unwrap();
+        let folder = parent.path().join("recording");
+        recorder::record_to(config.record(&path).unwrap(), &folder, &mut |_| {}).unwrap();
+        (parent, folder)
+    });
+    folder.clone()
+}
+
+struct Run {
+    folder: tempfile::TempDir,
+    losses: Vec<f64>,
+    result: Result<()>,
+}
+
+fn train(config: &Config, recordings: &[LoadedRecording], resume: Option<&Path>, stop_after: Option<usize>) -> Run {
+    let folder = tempfile::tempdir().unwrap();
+    let trainer = Trainer {
+        config: &config.training,
+        simulator_config: &config.simulator,
+        seed: config.seed,
+        recordings,
+        site: recordings[0].site(&config.simulator),
+        config_toml: &config.to_toml(),
+        folder: folder.path(),
+        device: burn::tensor::Device::flex(),
+    };
+    let mut losses = Vec::new();
+    let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+        trainer.run(resume, &mut |event| {
+            if let Event::Epoch(metrics) = &event {
+                losses.push(metrics.training_loss);
+            }
+            if let Event::Saved(path) = &event
+                && path.ends_with("last")
+                && stop_after.is_some_and(|epochs| losses.len() >= epochs)
+            {
+                // What a killed process leaves: everything up to here, and nothing after.
+                std::panic::resume_unwind(Box::new("killed"));
+            }
+        })
+    }));
+    let result = match outcome {
+        Ok(outcome) => outcome.map(drop),
+        Err(_) => Ok(()),
+    };
+    Run { folder, losses, result }
+}
+
+fn weights(run: &Run) -> Vec<u8> {
+    std::fs::read(run.folder.path().join("last").join(checkpoint::WEIGHTS)).unwrap()
+}
+
+#[test]
+fn training_lowers_the_loss_on_held_out_frames() {
+    let config = config();
+    let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
+    let run = train(&config, &recordings, None, None);
+    run.result.as_ref().unwrap();
+    let history = checkpoint::read_state(&run.folder.path().join("best")).unwrap().progress.history;
+    let held_out = |index: usize| history[index].validation_loss.unwrap();
+    let best = (0..history.len()).map(held_out).fold(f64::INFINITY, f64::min);
+    assert!(best < 0.7 * held_out(0), "held-out loss only fell from {:.1} to {best:.1} dB²", held_out(0));
+}
+
+#[test]
+fn equal_seeds_give_equal_weights_and_others_do_not() {
+    let mut config = config();
+    config.training.epochs = 2;
+    let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
+    let (first, second) = (train(&config, &recordings, None, None), train(&config, &recordings, None, None));
+    assert_eq!(first.losses, second.losses);
+    assert_eq!(weights(&first), weights(&second));
+    config.seed += 1;
+    assert_ne!(first.losses, train(&config, &recordings, None, None).losses);
+}
+
+#[test]
+fn a_killed_run_resumes_as_if_it_had_never_stopped() {
+    let mut config = config();
+    config.training.epochs = 3;
+    let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
+    let whole = train(&config, &recordings, None, None);
+    let killed = train(&config, &recordings, None, Some(1));
+    assert_eq!(killed.losses.len(), 1);
+    let resumed = train(&config, &recordings, Some(&killed.folder.path().join("last")), None);
+    resumed.result.as_ref().unwrap();
+    assert_eq!(whole.losses[1..], resumed.losses[..]);
+    assert_eq!(weights(&whole), weights(&resumed));
+}
+
+#[test]
+fn a_checkpoint_of_another_configuration_is_refused() {
+    let mut config = config();
+    config.training.epochs = 1;
+    let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
+    let run = train(&config, &recordings, None, None);
+    let last = run.folder.path().join("last");
+    config.simulator.triplane.features += 1;
+    let other = train(&config, &recordings, Some(&last), None);
+    let error = other.result.unwrap_err();
+    assert_eq!(error.to_string(), format!("{}: a checkpoint of another configuration", last.display()));
+
+    // The same with the state forged to fit: the weights themselves give it away.
+    let state = checkpoint::read_state(&last).unwrap();
+    let mut simulator = state.simulator.clone();
+    simulator.triplane.features += 1;
+    let simulator = simulator.init(state.site.body_extent, state.seed, &burn::tensor::Device::flex());
+    let error = checkpoint::load_weights(&last, simulator).unwrap_err();
+    assert!(error.to_string().contains(checkpoint::WEIGHTS), "{error}");
+    assert!(error.hint().unwrap().contains("belongs to another configuration"));
+}
+
+#[test]
+fn a_loss_that_is_not_finite_stops_with_the_stage_that_broke() {
+    let mut config = config();
+    config.training.epochs = 2;
+    config.training.learning_rate = 1e30;
+    config.training.final_learning_rate = 1e30;
+    config.training.gradient_clip = 1e30;
+    let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
+    let error = train(&config, &recordings, None, None).result.unwrap_err();
+    assert!(matches!(&error, Error::NonFinite { stage, .. } if !stage.is_empty()), "{error}");
+    assert!(error.hint().unwrap().contains("learning_rate"));
+}
+
+#[test]
+fn truncated_weights_are_refused_by_name() {
+    let mut config = config();
+    config.training.epochs = 1;
+    let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
+    let run = train(&config, &recordings, None, None);
+    let last = run.folder.path().join("last");
+    let path = last.join(checkpoint::WEIGHTS);
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    let error = checkpoint::open(&last, &burn::tensor::Device::flex()).unwrap_err();
+    assert!(error.to_string().starts_with(&format!("{}: ", path.display())), "{error}");
+}

@@ -1,0 +1,277 @@
+//! What tests share: gradients against central differences, agreement between backends, seeded numbers.
+//!
+//! Unit tests reach it as `crate::support`, integration tests with `mod support;`. It knows nothing of the crate.
+//!
+//! A function under test takes flat tensors (`Tensor<1>`, one per input, f64) that it reshapes itself, and returns
+//! anything flattened. Not one sum of its outputs is differentiated but a weighted one, so that errors of opposite
+//! sign in two outputs cannot cancel.
+#![allow(dead_code)]
+
+use burn::module::{Module, ModuleMapper, Param};
+use burn::tensor::{DType, Device, Tensor, TensorData};
+
+/// A named input of the function under test, row by row.
+pub struct Input {
+    pub name: &'static str,
+    pub values: Vec<f64>,
+}
+
+pub fn input(name: &'static str, values: impl Into<Vec<f64>>) -> Input {
+    Input { name, values: values.into() }
+}
+
+/// Numbers in `low .. high` that are the same in every run (a linear congruential generator).
+pub fn numbers(seed: u64, count: usize, low: f64, high: f64) -> Vec<f64> {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for _ in 0..8 {
+        next();
+    }
+    (0..count).map(|_| low + (high - low) * next()).collect()
+}
+
+/// Unit vectors in all directions, `[point, xyz]` row by row, the same in every run.
+pub fn directions(seed: u64, count: usize) -> Vec<f64> {
+    let draws = numbers(seed, 2 * count, 0.0, 1.0);
+    draws
+        .chunks_exact(2)
+        .flat_map(|draw| {
+            let height = 2.0 * draw[0] - 1.0;
+            let radius = (1.0 - height * height).sqrt();
+            let (sine, cosine) = (std::f64::consts::TAU * draw[1]).sin_cos();
+            [radius * cosine, radius * sine, height]
+        })
+        .collect()
+}
+
+/// An f64 tensor.
+pub fn tensor<const D: usize>(values: &[f64], shape: [usize; D], device: &Device) -> Tensor<D> {
+    Tensor::from_data(TensorData::new(values.to_vec(), shape), (device, DType::F64))
+}
+
+/// The values as f64, whatever the tensor's own type is.
+pub fn values<const D: usize>(tensor: &Tensor<D>) -> Vec<f64> {
+    tensor.clone().into_data_as::<f64>().try_into_vec::<f64>().expect("f64 data")
+}
+
+/// A module with every parameter in f64.
+pub fn in_f64<M: Module>(module: M) -> M {
+    struct Cast;
+    impl ModuleMapper for Cast {
+        fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+            param.map(|tensor| tensor.cast(DType::F64).detach())
+        }
+    }
+    module.map(&mut Cast)
+}
+
+fn weights(count: usize) -> Vec<f64> {
+    numbers(77, count, 0.5, 1.5).into_iter().enumerate().map(|(i, w)| if i % 2 == 0 { w } else { -w }).collect()
+}
+
+fn evaluate(inputs: &[Vec<f64>], device: &Device, function: &dyn Fn(&[Tensor<1>]) -> Tensor<1>) -> Vec<f64> {
+    let tensors: Vec<_> = inputs.iter().map(|input| tensor(input, [input.len()], device)).collect();
+    values(&function(&tensors))
+}
+
+/// d(Σ weight · output)/d(input element) in f64, by (f(x + step) − f(x − step)) / 2 step.
+pub fn central_difference(
+    inputs: &[Input],
+    step: f64,
+    device: &Device,
+    function: &dyn Fn(&[Tensor<1>]) -> Tensor<1>,
+) -> Vec<Vec<f64>> {
+    let mut at: Vec<Vec<f64>> = inputs.iter().map(|input| input.values.clone()).collect();
+    let mut gradients = Vec::new();
+    for which in 0..inputs.len() {
+        let mut gradient = Vec::new();
+        for element in 0..at[which].len() {
+            let centre = at[which][element];
+            let mut probe = |offset: f64| {
+                at[which][element] = centre + offset;
+                let output = evaluate(&at, device, function);
+                at[which][element] = centre;
+                output
+            };
+            let (above, below) = (probe(step), probe(-step));
+            let weights = weights(above.len());
+            gradient.push(above.iter().zip(&below).zip(&weights).map(|((a, b), w)| w * (a - b)).sum::<f64>() / (2.0 * step));
+        }
+        gradients.push(gradient);
+    }
+    gradients
+}
+
+/// The same by Burn's backward pass. An input that the function does not reach has gradient zero.
+pub fn backward(inputs: &[Input], device: &Device, function: &dyn Fn(&[Tensor<1>]) -> Tensor<1>) -> Vec<Vec<f64>> {
+    let device = device.clone().autodiff();
+    let tensors: Vec<_> =
+        inputs.iter().map(|input| tensor(&input.values, [input.values.len()], &device).require_grad()).collect();
+    let output = function(&tensors);
+    let weights = tensor(&weights(output.dims()[0]), output.dims(), &device);
+    let gradients = (output * weights).sum().backward();
+    tensors
+        .iter()
+        .map(|tensor| tensor.grad(&gradients).map_or(vec![0.0; tensor.dims()[0]], |gradient| values(&gradient)))
+        .collect()
+}
+
+/// Where the backward pass and central differences disagree by more than `tolerance` of the input's largest derivative:
+/// one line each.
+pub fn disagreements(
+    inputs: &[Input],
+    step: f64,
+    tolerance: f64,
+    device: &Device,
+    function: &dyn Fn(&[Tensor<1>]) -> Tensor<1>,
+) -> Vec<String> {
+    let found = backward(inputs, device, function);
+    let wanted = central_difference(inputs, step, device, function);
+    let mut rows = Vec::new();
+    for ((input, found), wanted) in inputs.iter().zip(&found).zip(&wanted) {
+        let largest = wanted.iter().fold(0.0_f64, |largest, w| largest.max(w.abs()));
+        for (element, (&found, &wanted)) in found.iter().zip(wanted).enumerate() {
+            let allowed = tolerance * largest.max(1e-6);
+            let difference = (found - wanted).abs();
+            if difference > allowed || difference.is_nan() {
+                rows.push(format!(
+                    "{}[{element}]: found {found:e}, wanted {wanted:e}, difference {difference:e}, tolerance {allowed:e}",
+                    input.name
+                ));
+            }
+        }
+    }
+    rows
+}
+
+/// Gradient of every input element against central differences in f64, on flex and on ndarray.
+///
+/// # Panics
+/// With all rows that disagree.
+pub fn check_gradient(inputs: &[Input], step: f64, tolerance: f64, function: impl Fn(&[Tensor<1>]) -> Tensor<1>) {
+    for (name, device) in cpu_devices() {
+        let rows = disagreements(inputs, step, tolerance, &device, &function);
+        assert!(rows.is_empty(), "gradients on {name} differ from central differences:\n{}", rows.join("\n"));
+    }
+}
+
+/// Values and gradients without NaN or infinity: for points where the formula is singular. Checked in f32 too, where
+/// less can be represented.
+///
+/// # Panics
+/// With the name of what is not finite.
+pub fn check_finite(inputs: &[Input], function: impl Fn(&[Tensor<1>]) -> Tensor<1>) {
+    for (name, device) in cpu_devices() {
+        for dtype in [DType::F64, DType::F32] {
+            let device = device.clone().autodiff();
+            let tensors: Vec<_> = inputs
+                .iter()
+                .map(|input| tensor(&input.values, [input.values.len()], &device).cast(dtype).detach().require_grad())
+                .collect();
+            let output = function(&tensors);
+            let found = values(&output.clone().inner());
+            assert!(found.iter().all(|v| v.is_finite()), "values on {name} in {dtype:?}: {found:?}");
+            let gradients = output.sum().backward();
+            for (input, tensor) in inputs.iter().zip(&tensors) {
+                if let Some(gradient) = tensor.grad(&gradients) {
+                    let found = values(&gradient);
+                    assert!(found.iter().all(|v| v.is_finite()), "gradient to {} on {name} in {dtype:?}: {found:?}", input.name);
+                }
+            }
+        }
+    }
+}
+
+/// The same f32 values and gradients on flex and ndarray, to `tolerance` of the largest.
+pub fn check_backends(inputs: &[Input], tolerance: f64, function: impl Fn(&[Tensor<1>]) -> Tensor<1>) {
+    let runs: Vec<(Vec<f64>, Vec<Vec<f64>>)> = cpu_devices()
+        .into_iter()
+        .map(|(_, device)| {
+            let device = device.autodiff();
+            let tensors: Vec<Tensor<1>> = inputs
+                .iter()
+                .map(|input| tensor(&input.values, [input.values.len()], &device).cast(DType::F32).detach().require_grad())
+                .collect();
+            let output = function(&tensors);
+            let found = values(&output.clone().inner());
+            let gradients = output.powi_scalar(2).sum().backward();
+            let gradients =
+                tensors.iter().map(|t| t.grad(&gradients).map(|g| values(&g)).unwrap_or_default()).collect::<Vec<_>>();
+            (found, gradients)
+        })
+        .collect();
+    assert_close("values", &runs[1].0, &runs[0].0, tolerance);
+    for (input, (a, b)) in inputs.iter().zip(runs[1].1.iter().zip(&runs[0].1)) {
+        assert_close(input.name, a, b, tolerance);
+    }
+}
+
+/// The backends that compute in f64.
+pub fn cpu_devices() -> Vec<(&'static str, Device)> {
+    // ndarray is deprecated in 0.22, but it is the independent implementation to compare with.
+    #[allow(deprecated)]
+    let ndarray = Device::ndarray();
+    vec![("flex", Device::flex()), ("ndarray", ndarray)]
+}
+
+/// # Panics
+/// With all rows that differ by more than `tolerance` of the largest wanted value.
+pub fn assert_close(what: &str, found: &[f64], wanted: &[f64], tolerance: f64) {
+    assert_eq!(found.len(), wanted.len(), "{what}: number of values");
+    let largest = wanted.iter().fold(1e-12_f64, |largest, w| largest.max(w.abs()));
+    let rows: Vec<_> = found
+        .iter()
+        .zip(wanted)
+        .enumerate()
+        .filter(|(_, (f, w))| (*f - *w).abs() > tolerance * largest || (*f - *w).is_nan())
+        .map(|(i, (f, w))| format!("{what}[{i}]: found {f:e}, wanted {w:e}, difference {:e}", (f - w).abs()))
+        .collect();
+    assert!(rows.is_empty(), "tolerance {:e}\n{}", tolerance * largest, rows.join("\n"));
+}
+
+mod tests {
+    #[allow(unused_imports)]
+    use super::*;
+
+    #[test]
+    fn a_polynomial_has_the_gradient_of_its_formula() {
+        let inputs = [input("x", [0.5, -1.0, 2.0])];
+        let cube = |x: &[Tensor<1>]| x[0].clone().powi_scalar(3);
+        let wanted: Vec<f64> = weights(3).iter().zip([0.5, -1.0, 2.0_f64]).map(|(w, x)| w * 3.0 * x * x).collect();
+        assert_close("difference", &central_difference(&inputs, 1e-4, &Device::flex(), &cube)[0], &wanted, 1e-7);
+        assert_close("backward", &backward(&inputs, &Device::flex(), &cube)[0], &wanted, 1e-14);
+        check_gradient(&inputs, 1e-4, 1e-7, cube);
+    }
+
+    #[test]
+    fn a_wrong_gradient_is_found_in_its_element() {
+        // Detached, the second factor contributes to the value but not to the gradient.
+        let wrong = |x: &[Tensor<1>]| x[0].clone() * x[0].clone().detach();
+        let inputs = [input("x", [0.0, 3.0])];
+        let rows = disagreements(&inputs, 1e-4, 1e-6, &Device::flex(), &wrong);
+        assert_eq!(rows.len(), 1, "{rows:?}");
+        assert!(rows[0].starts_with("x[1]"));
+    }
+
+    #[test]
+    fn errors_of_opposite_sign_do_not_cancel() {
+        let wrong = |x: &[Tensor<1>]| Tensor::cat(vec![x[0].clone().detach() - x[0].clone(), x[0].clone().detach()], 0);
+        let rows = disagreements(&[input("x", [1.0])], 1e-4, 1e-6, &Device::flex(), &wrong);
+        assert!(!rows.is_empty());
+    }
+
+    #[test]
+    #[should_panic(expected = "gradient to x")]
+    fn an_infinite_gradient_is_found() {
+        check_finite(&[input("x", [0.0])], |x| x[0].clone().sqrt());
+    }
+
+    #[test]
+    fn nan_is_never_close() {
+        let close = std::panic::catch_unwind(|| assert_close("x", &[f64::NAN], &[1.0], 1.0));
+        assert!(close.is_err());
+    }
+}
