@@ -19,10 +19,11 @@ YARDSTICKS = ROOT / "scripts" / "yardsticks"
 PLACE = ROOT / "target" / "yardsticks"
 
 
-def lines(command, **options):
+def lines(command):
     """The JSON lines that a program prints."""
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
     print("$", " ".join(str(part) for part in command), file=sys.stderr)
-    found = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, cwd=ROOT, **options).stdout
+    found = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, cwd=ROOT, env=environment).stdout
     return [json.loads(line) for line in found.splitlines() if line.startswith("{")]
 
 

@@ -323,3 +323,17 @@ fn a_point_on_an_antenna_is_finite_in_value_and_gradient() {
         }
     }
 }
+
+#[test]
+fn displacements_need_no_tape_when_only_amplitudes_learn() {
+    let radar = radar(32, 2);
+    let scene = Scene::new(20, 6, 1, &radar);
+    for form in [SumForm::Tensor, SumForm::Fused] {
+        let how = How { radar: radar.clone(), tx: 0, proxy_m: None, dechirp: Dechirp::Exact, form };
+        let [x, y, z, _, im] = scene.tensors(&Device::flex(), DType::F32);
+        let [_, _, _, re, _] = scene.tensors(&Device::flex().autodiff(), DType::F32);
+        let signal = scene.signal([x, y, z, re.clone(), im], false, &how);
+        let gradients = signal.power().sum().backward();
+        assert!(re.grad(&gradients).is_some(), "{form:?}");
+    }
+}

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::fourier::Fourier;
 use super::lanes::{LANES, Lanes, ZERO, cis, fma, map, multiply_add, round, zip};
+use super::scratch::Scratch;
 use crate::if_signal::grid::RangeGrid;
 
 /// Moments per cell. With a reach of one cell the expansion is right to 10⁻⁵ in the worst sample, 3·10⁻⁶ on average.
@@ -79,8 +80,10 @@ impl Plan {
         }
     }
 
-    fn empty(&self) -> Vec<Lanes> {
-        vec![ZERO; self.grid.cells * ROW]
+    fn empty(&self) -> Scratch {
+        let mut grid = Scratch::new(self.grid.cells * ROW);
+        grid.fill(ZERO);
+        grid
     }
 
     /// Row of the transform that belongs to a sample.
@@ -224,7 +227,6 @@ pub fn sum(returns: &impl Returns, samples: usize) -> Vec<f32> {
     let fill = |grid: &mut [Lanes], task: usize, part: usize| {
         let (receiver, chirp) = (task / blocks, task % blocks * LANES);
         let width = LANES.min(chirps - chirp);
-        grid.fill(ZERO);
         for point in part * chunk..((part + 1) * chunk).min(points) {
             plan.spread(&returns.load(receiver, point, chirp), width, grid);
         }
@@ -233,25 +235,22 @@ pub fn sum(returns: &impl Returns, samples: usize) -> Vec<f32> {
     let mut out = vec![0.0; 2 * receivers * chirps * samples];
     let (out_re, out_im) = out.split_at_mut(receivers * chirps * samples);
     let by_block = |part| blocks_of(part, receivers, chirps * samples, LANES * samples);
-    // One grid per thread and not per task: fresh memory is slow.
-    by_block(out_re).into_par_iter().zip(by_block(out_im)).enumerate().for_each_init(Vec::new, |grid, (task, (re, im))| {
-        match parts {
-            1 => {
-                grid.resize(plan.grid.cells * ROW, ZERO);
-                fill(grid, task, 0);
-            }
+    by_block(out_re).into_par_iter().zip(by_block(out_im)).enumerate().for_each(|(task, (re, im))| {
+        let part = |part: usize| {
+            let mut grid = plan.empty();
+            fill(&mut grid, task, part);
+            grid
+        };
+        let mut grid = match parts {
+            1 => part(0),
             _ => {
-                let grids = (0..parts).into_par_iter().map(|part| {
-                    let mut grid = plan.empty();
-                    fill(&mut grid, task, part);
-                    grid
-                });
-                *grid = grids.collect::<Vec<_>>().into_iter().reduce(add).expect("one part at least");
+                let grids: Vec<_> = (0..parts).into_par_iter().map(part).collect();
+                grids.into_iter().reduce(add).expect("one part at least")
             }
-        }
-        plan.fourier.from_cells(grid, ORDERS);
+        };
+        plan.fourier.from_cells(&mut grid, ORDERS);
         let width = re.len() / samples;
-        plan.collect(grid, |sample, r, i| {
+        plan.collect(&grid, |sample, r, i| {
             for lane in 0..width {
                 re[lane * samples + sample] = r[lane];
                 im[lane * samples + sample] = i[lane];
@@ -268,7 +267,7 @@ pub fn gradients(returns: &impl Returns, upstream: &[f32], samples: usize, sinks
     let (chirps, receivers) = (returns.chirps(), returns.receivers());
     let blocks = chirps.div_ceil(LANES);
     let (up_re, up_im) = upstream.split_at(receivers * chirps * samples);
-    let grids: Vec<Vec<Lanes>> = (0..receivers * blocks)
+    let grids: Vec<Scratch> = (0..receivers * blocks)
         .into_par_iter()
         .map(|task| {
             let (receiver, chirp) = (task / blocks, task % blocks * LANES);
@@ -340,8 +339,8 @@ fn turn((re, im): (Lanes, Lanes), times: usize) -> (Lanes, Lanes) {
     }
 }
 
-fn add(mut a: Vec<Lanes>, b: Vec<Lanes>) -> Vec<Lanes> {
-    for (a, b) in a.iter_mut().zip(&b) {
+fn add(mut a: Scratch, b: Scratch) -> Scratch {
+    for (a, b) in a.iter_mut().zip(b.iter()) {
         *a = zip(*a, *b, |a, b| a + b);
     }
     a

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::kernel::{self, Return, Returns, Sink};
-use super::lanes::{LANES, Lanes, ZERO, accumulate, fma, load, map, multiply_add, zip};
+use super::lanes::{LANES, Lanes, ZERO, accumulate, fma, load, map, multiply_add, store, zip};
+use super::scratch::Scratch;
 use crate::paths::{AtRest, NEAR_FIELD_M2, SOFTENING_M, Waveform, difference, distance};
 
 /// Host constants of paths from one transmitter by way of points to several receivers.
@@ -111,7 +112,7 @@ pub struct Moving<'a> {
     geometry: Arc<Geometry>,
     tensors: Tensors<'a>,
     /// `[point][leg][stride]`, metres; see [`extend`].
-    changes_m: Vec<f32>,
+    changes_m: Scratch,
     stride: usize,
 }
 
@@ -126,8 +127,10 @@ impl<'a> Moving<'a> {
     pub fn new(geometry: Arc<Geometry>, tensors: Tensors<'a>) -> Self {
         let (chirps, legs) = (tensors.chirps, geometry.legs());
         let stride = chirps.next_multiple_of(LANES) + 2;
-        let mut changes_m = vec![0.0; geometry.points() * legs * stride];
-        changes_m.par_chunks_mut(legs * stride).enumerate().with_min_len(256).for_each(|(point, changes)| {
+        let size = geometry.points() * legs * stride;
+        let mut changes_m = Scratch::new(size.div_ceil(LANES));
+        let rows = &mut changes_m.as_flattened_mut()[..size];
+        rows.par_chunks_mut(legs * stride).enumerate().with_min_len(256).for_each(|(point, changes)| {
             let [x, y, z] = tensors.axes.map(|axis| &axis[point * chirps..][..chirps]);
             for (leg, row) in changes.chunks_mut(stride).enumerate() {
                 let v = geometry.offset_m(point, leg);
@@ -143,7 +146,7 @@ impl<'a> Moving<'a> {
     }
 
     fn row(&self, point: usize, leg: usize) -> &[f32] {
-        &self.changes_m[(point * self.geometry.legs() + leg) * self.stride..][..self.stride]
+        &self.changes_m.as_flattened()[(point * self.geometry.legs() + leg) * self.stride..][..self.stride]
     }
 
     #[inline(always)]
@@ -234,8 +237,8 @@ pub fn gradients(moving: &Moving, upstream: &[f32], samples: usize) -> [Vec<f32>
         .map(|(index, ((x, y), (z, re)))| Back {
             moving,
             first: index * count,
-            to_legs: vec![],
-            to_sweep: vec![],
+            to_legs: Scratch::new(0),
+            to_sweep: Scratch::new(0),
             axes: [x, y, z],
             re,
             im: im.next(),
@@ -250,9 +253,9 @@ struct Back<'a> {
     moving: &'a Moving<'a>,
     first: usize,
     /// `[point][leg][chirp]`, to the legs' changes.
-    to_legs: Vec<f32>,
+    to_legs: Scratch,
     /// `[point][chirp]`, of the receiver at hand.
-    to_sweep: Vec<f32>,
+    to_sweep: Scratch,
     axes: [&'a mut [f32]; 3],
     re: &'a mut [f32],
     im: Option<&'a mut [f32]>,
@@ -273,8 +276,10 @@ impl Sink for Back<'_> {
     }
 
     fn open(&mut self) {
-        self.to_legs = vec![0.0; self.axes[0].len() * self.moving.geometry.legs()];
-        self.to_sweep = vec![0.0; self.axes[0].len()];
+        let size = self.axes[0].len();
+        self.to_legs = Scratch::new((size * self.moving.geometry.legs()).div_ceil(LANES));
+        self.to_legs.fill(ZERO);
+        self.to_sweep = Scratch::new(size.div_ceil(LANES));
     }
 
     #[inline(always)]
@@ -297,16 +302,18 @@ impl Sink for Back<'_> {
         });
         for (leg, other) in [(0, 1), (receiver + 1, 0)] {
             let to_leg = fma(to_product, path.lengths_m[other], common);
-            accumulate(&mut self.to_legs, (local * geometry.legs() + leg) * chirps + chirp, width, to_leg);
+            accumulate(self.to_legs.as_flattened_mut(), (local * geometry.legs() + leg) * chirps + chirp, width, to_leg);
         }
-        super::lanes::store(&mut self.to_sweep, local * chirps + chirp, width, gradient.sweep);
+        store(self.to_sweep.as_flattened_mut(), local * chirps + chirp, width, gradient.sweep);
     }
 
     fn close(&mut self, receiver: usize) {
         let (chirps, legs) = (self.moving.tensors.chirps, self.moving.geometry.legs());
         let per_step = self.moving.geometry.sweep_per_step;
         if per_step != 0.0 && chirps > 1 {
-            for (sweep, to_legs) in self.to_sweep.chunks(chirps).zip(self.to_legs.chunks_mut(legs * chirps)) {
+            let rows = self.to_legs.as_flattened_mut().chunks_mut(legs * chirps);
+            for (sweep, to_legs) in self.to_sweep.as_flattened().chunks_exact(chirps).zip(rows).take(self.axes[0].len() / chirps)
+            {
                 for leg in [0, receiver + 1] {
                     add_difference_adjoint(sweep, per_step, &mut to_legs[leg * chirps..][..chirps]);
                 }
@@ -324,7 +331,9 @@ impl Back<'_> {
         let chirps = tensors.chirps;
         let [to_x, to_y, to_z] = &mut self.axes;
         let rows = to_x.chunks_mut(chirps).zip(to_y.chunks_mut(chirps)).zip(to_z.chunks_mut(chirps));
-        for ((local, ((to_x, to_y), to_z)), to_legs) in rows.enumerate().zip(self.to_legs.chunks(geometry.legs() * chirps)) {
+        for ((local, ((to_x, to_y), to_z)), to_legs) in
+            rows.enumerate().zip(self.to_legs.as_flattened().chunks(geometry.legs() * chirps))
+        {
             let point = self.first + local;
             let [x, y, z] = tensors.axes.map(|axis| &axis[point * chirps..][..chirps]);
             for (leg, to_change) in to_legs.chunks(chirps).enumerate() {
