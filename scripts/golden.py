@@ -218,26 +218,27 @@ def indirect():
 # --- surface --------------------------------------------------------------------------------------------------------
 
 
-def fresnel():
-    """Amplitude reflection from air onto n = eta − jk (time as exp(+jωt)), from Maxwell's boundary conditions.
+def reflection(n, cosine):
+    """Amplitude reflection (s, p) from air onto n = eta − jk (time as exp(+jωt)), from Maxwell's boundary conditions.
 
     For each polarisation the tangential fields of incoming, reflected and transmitted plane wave are matched by solving
-    the 2 × 2 system, rather than by quoting the formulas. H-plane waves are measured in E, so that both agree up to the
-    sign convention at normal incidence: there s = −p with these signs.
+    the 2 × 2 system, rather than by quoting the formulas. s follows E, p follows H: at normal incidence s = −p.
     """
+    sine = np.sqrt(1 - cosine**2)
+    inside = np.sqrt(1 - (sine / n) ** 2 + 0j)
+    # s: E continuous, H tangential continuous:  1 + r = t,  cosine (1 − r) = n inside t
+    s = np.linalg.solve([[1, -1], [-cosine, -n * inside]], [-1, -cosine])[0]
+    # p: H continuous, E tangential continuous:  1 + r = n t,  cosine (1 − r) = inside t
+    p = np.linalg.solve([[1, -n], [-cosine, -inside]], [-1, -cosine])[0]
+    return s, p
+
+
+def fresnel():
     eta = np.array([1.0, 1.5, 2.6, 3.0, 6.0, 1.2])
     k = np.array([0.0, 0.0, 0.8, 2.5, 7.0, 0.05])
     cosines = np.array([1.0, 0.9, 0.7, 0.5, 0.3, 0.1, 0.01])
-    s = np.zeros((len(eta), len(cosines)), complex)
-    p = np.zeros_like(s)
-    for i, n in enumerate(eta - 1j * k):
-        for j, cosine in enumerate(cosines):
-            sine = np.sqrt(1 - cosine**2)
-            inside = np.sqrt(1 - (sine / n) ** 2 + 0j)
-            # s: E continuous, H tangential continuous:  1 + r = t,  cosine (1 − r) = n inside t
-            s[i, j] = np.linalg.solve([[1, -1], [-cosine, -n * inside]], [-1, -cosine])[0]
-            # p: H continuous, E tangential continuous:  1 + r = n t,  cosine (1 − r) = inside t
-            p[i, j] = np.linalg.solve([[1, -n], [-cosine, -inside]], [-1, -cosine])[0]
+    pairs = np.array([[reflection(n, cosine) for cosine in cosines] for n in eta - 1j * k])
+    s, p = pairs[..., 0], pairs[..., 1]
     return {
         "in_eta": eta,
         "in_k": k,
@@ -281,6 +282,15 @@ def microfacet():
     shadow_in = np.array([one_direction(*pair) for pair in zip(incident, alpha)])
     shadow_out = np.array([one_direction(*pair) for pair in zip(outgoing, alpha)])
     auxiliary = lambda g: 1 / g - 1
+    correlated = 1 / (1 + auxiliary(shadow_in) + auxiliary(shadow_out))
+
+    eta, k = random.uniform(1.2, 6, count), random.uniform(0, 4, count)
+    weight, metallic = random.uniform(0, 1, count), random.uniform(0, 0.5, count)
+    cosine_half = (incident * half).sum(-1)
+    pairs = np.array([reflection(n, cosine) for n, cosine in zip(eta - 1j * k, cosine_half)])
+    power = weight * np.abs(pairs[:, 0]) ** 2 + (1 - weight) * np.abs(pairs[:, 1]) ** 2
+    # a metal reflects all
+    power = metallic + (1 - metallic) * power
     return {
         "in_incident": incident,
         "in_outgoing": outgoing,
@@ -289,8 +299,14 @@ def microfacet():
         "shadow_in": shadow_in,
         "shadow_out": shadow_out,
         "shadow_separable": shadow_in * shadow_out,
-        "shadow_correlated": 1 / (1 + auxiliary(shadow_in) + auxiliary(shadow_out)),
-        "cosine_half": (incident * half).sum(-1),
+        "shadow_correlated": correlated,
+        "cosine_half": cosine_half,
+        "in_eta": eta,
+        "in_k": k,
+        "in_weight_s": weight,
+        "in_metallic": metallic,
+        "reflected_power": power,
+        "amplitude": distribution * correlated * power / (4 * incident[:, 2] * outgoing[:, 2]),
     }
 
 
@@ -333,9 +349,8 @@ def encoding():
 
 
 def harmonics():
-    """Real spherical harmonics up to degree 3, in the order and with the signs of Gaussian splatting: (l, m), m from −l to l.
-
-    From associated Legendre functions with the Condon-Shortley phase, which is where the alternating signs come from.
+    """Real spherical harmonics up to degree 3, (l, m) with m from −l to l, from associated Legendre functions without the
+    Condon-Shortley phase. Gaussian splatting's have it: theirs are these times (−1)^m.
     """
     random = np.random.default_rng(8)
     direction = random.normal(size=(30, 3))
@@ -345,10 +360,10 @@ def harmonics():
     factorial = lambda n: float(np.prod(np.arange(1, n + 1))) if n > 0 else 1.0
 
     def legendre(degree, order):
-        # P_l^m = (−1)^m (1 − z²)^(m/2) d^m/dz^m P_l, P_l from Rodrigues' formula
+        # P_l^m = (1 − z²)^(m/2) d^m/dz^m P_l, P_l from Rodrigues' formula
         polynomial = np.polynomial.Polynomial([-1, 0, 1]) ** degree
         polynomial = polynomial.deriv(degree + order) / (2**degree * factorial(degree))
-        return (-1) ** order * (1 - z**2) ** (order / 2) * polynomial(z)
+        return (1 - z**2) ** (order / 2) * polynomial(z)
 
     columns = []
     for degree in range(4):

@@ -45,7 +45,7 @@ impl<'a> Simulation<'a> {
 
 /// A signal's values on the host, in the order of its axes.
 fn to_host(signal: Complex<4>) -> Vec<Complex32> {
-    let part = |tensor: burn::tensor::Tensor<4>| tensor.into_data().convert::<f32>().into_vec::<f32>().expect("converted");
+    let part = |tensor: burn::tensor::Tensor<4>| tensor.into_data().convert::<f32>().try_into_vec::<f32>().expect("converted");
     part(signal.re).into_iter().zip(part(signal.im)).map(|(re, im)| Complex32::new(re, im)).collect()
 }
 

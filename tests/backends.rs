@@ -46,7 +46,7 @@ fn answer(device: &Device) -> Answer {
 
     let surfaces = simulator.surfaces(&simulator.constants(&scene), Mode::Training { seed: 5 });
     let clean = simulator.clean_signal(&scene, &scene.view(0).unwrap(), &surfaces);
-    let flat = |tensor: Tensor<4>| tensor.into_data().convert::<f64>().into_vec::<f64>().unwrap();
+    let flat = |tensor: Tensor<4>| tensor.into_data().convert::<f64>().try_into_vec::<f64>().unwrap();
     let mut signal = flat(clean.re.clone());
     signal.extend(flat(clean.im.clone()));
     let noisy = simulator.with_noise(clean, 7);
@@ -62,7 +62,7 @@ fn flatten(simulator: &Simulator, gradients: &mut GradientsParams) -> Vec<f64> {
     impl ModuleVisitor for Collect<'_> {
         fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
             match self.0.remove::<D>(param.id) {
-                Some(gradient) => self.1.extend(gradient.into_data().convert::<f64>().into_vec::<f64>().unwrap()),
+                Some(gradient) => self.1.extend(gradient.into_data().convert::<f64>().try_into_vec::<f64>().unwrap()),
                 None => self.1.extend(std::iter::repeat_n(0.0, param.val().dims().iter().product())),
             }
         }

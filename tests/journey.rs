@@ -24,7 +24,7 @@ fn recording() -> PathBuf {
         let config = Config::read(&path, &[]).unwrap();
         let parent = tempfile::tempdir().unwrap();
         let folder = parent.path().join("recording");
-        recorder::record_to(config.record(&path).unwrap(), &folder, &mut |_| {}).unwrap();
+        recorder::record_to(config.record(&path).unwrap(), parent.path(), &folder, &mut |_, _| {}).unwrap();
         (parent, folder)
     });
     folder.clone()

@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         show_recording(recording)?;
     }
     if let Some(record) = &config.record {
-        let world = record.world()?;
+        let world = record.world(path.parent().unwrap_or(Path::new("")))?;
         println!("a recording to be made:");
         show_radar(&world.radar, Some(&world.room));
     }

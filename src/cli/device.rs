@@ -17,6 +17,8 @@ pub fn device(name: &str) -> Result<Device> {
     match kind {
         "auto" => Ok(fastest()),
         "flex" | "cpu" => Ok(Device::flex()),
+        // Deprecated in Burn 0.22, kept as a second CPU implementation to compare with.
+        #[allow(deprecated)]
         "ndarray" => Ok(Device::ndarray()),
         #[cfg(feature = "wgpu")]
         "wgpu" => real_adapter(index).ok_or_else(|| unknown(name)),

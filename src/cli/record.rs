@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 use super::{Common, Out, progress::Progress};
 use crate::{
     config::Config,
-    error::{Error, Result},
+    error::Result,
     recorder::{self, RecorderConfig},
 };
 
@@ -25,36 +25,33 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let record = config.record(&arguments.config)?;
     let folder = match &arguments.out.out {
         Some(out) => {
-            if out.exists() {
-                return Err(Error::Usage {
-                    message: format!("{}: exists already", out.display()),
-                    hint: Some("choose another folder with --out, or remove this one".into()),
-                });
-            }
-            make(record, out, common.quiet)?;
+            make(record, &arguments.config, out, common.quiet)?;
             out.clone()
         }
-        None => recorded(record, Path::new("runs/recordings"), common.quiet)?,
+        None => recorded(record, &arguments.config, common.quiet)?,
     };
     println!("recording: {}", folder.display());
     Ok(())
 }
 
-/// The recording of these settings, made if it is not there yet: its folder is named after their hash.
-pub(crate) fn recorded(config: &RecorderConfig, parent: &Path, quiet: bool) -> Result<PathBuf> {
+/// The recording of these settings, made if it is not there yet: its folder in `runs/recordings` is named after
+/// their hash. `config_path`: where the settings were read, which relative paths start from.
+pub(crate) fn recorded(config: &RecorderConfig, config_path: &Path, quiet: bool) -> Result<PathBuf> {
     let text = toml::to_string(config).expect("settings are plain data");
-    let hash: String = Sha256::digest(format!("{} {text}", env!("CARGO_PKG_VERSION"))).iter().take(6).map(|byte| format!("{byte:02x}")).collect();
-    let folder = parent.join(hash);
+    let digest = Sha256::digest(format!("{} {text}", env!("CARGO_PKG_VERSION")));
+    let name: String = digest.iter().take(6).map(|byte| format!("{byte:02x}")).collect();
+    let folder = Path::new("runs/recordings").join(name);
     if !folder.is_dir() {
-        std::fs::create_dir_all(parent).map_err(|error| Error::write(parent, error))?;
-        make(config, &folder, quiet)?;
+        make(config, config_path, &folder, quiet)?;
     }
     Ok(folder)
 }
 
-fn make(config: &RecorderConfig, folder: &Path, quiet: bool) -> Result<()> {
-    let progress = Progress::new("recording", config.frames(), quiet);
-    recorder::record_to(config, folder, &mut |frame| progress.set(frame))?;
+fn make(config: &RecorderConfig, config_path: &Path, folder: &Path, quiet: bool) -> Result<()> {
+    let settings_folder = config_path.parent().unwrap_or(Path::new(""));
+    let frames = config.world(settings_folder)?.radar.frames;
+    let progress = Progress::new("recording", frames, quiet);
+    recorder::record_to(config, settings_folder, folder, &mut |done, _| progress.set(done))?;
     progress.finish();
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! `hybridsim train`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
@@ -50,7 +50,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         });
     }
     if config.data.recordings.is_empty() {
-        let recorded = record::recorded(config.record(&config_path)?, Path::new("runs/recordings"), common.quiet)?;
+        let recorded = record::recorded(config.record(&config_path)?, &config_path, common.quiet)?;
         config.data.recordings = vec![recorded];
     }
     absolute(&mut config.data.recordings)?;

@@ -1,6 +1,6 @@
 //! Straight legs between scatterers and antennas, as a reference length and a small change.
 
-use burn::tensor::{DType, Device, Tensor};
+use burn::tensor::Tensor;
 
 use super::{column, distance};
 use crate::body::Displacement;

@@ -84,8 +84,8 @@ impl Chain {
 #[allow(unused_mut)]
 fn devices() -> Vec<(&'static str, Device)> {
     let mut devices = cpu_devices();
-    //TMP    #[cfg(feature = "wgpu")]
-    //TMP    devices.push(("wgpu", Device::wgpu(burn::tensor::DeviceKind::Cpu)));
+    #[cfg(feature = "wgpu")]
+    devices.push(("wgpu", Device::wgpu(burn::tensor::DeviceKind::Cpu)));
     devices
 }
 

@@ -38,10 +38,6 @@ pub fn fit_gain(mut simulator: Simulator, recordings: &[LoadedRecording], frames
             hint: Some("check the room's distances and where the person stands: `hybridsim check`".into()),
         });
     }
-    let gain = &mut simulator.decoders.gain;
-    gain.log_gain = gain.log_gain.clone().map(|log_gain| {
-        let tensor = log_gain.detach() + 0.5 * (measured / simulated).ln();
-        tensor.require_grad()
-    });
+    simulator.decoders.gain = simulator.decoders.gain.scale((measured / simulated).sqrt());
     Ok(simulator)
 }

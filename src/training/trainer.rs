@@ -92,7 +92,10 @@ impl Trainer<'_> {
                 optimizer = checkpoint::load_optimizer(folder, optimizer)?;
                 progress = state.progress;
             }
-            None => simulator = calibrate::fit_gain(simulator, self.recordings, &split.training)?,
+            None => {
+                simulator = calibrate::fit_gain(simulator, self.recordings, &split.training)?;
+                simulator = checkpoint::with_stable_ids(simulator);
+            }
         }
         let prepared: Vec<Prepared> = losses
             .into_iter()
@@ -276,7 +279,7 @@ impl Trainer<'_> {
                 }
                 let scene = &recording.scene;
                 let constants = &prepared[index].constants;
-                if let Some(stage) = simulator.first_non_finite_stage(scene, &scene.view(frame)?, constants, mode) {
+                if let Some(stage) = simulator.first_non_finite_stage(scene, &*scene.view(frame)?, constants, mode) {
                     return Ok(Error::NonFinite { stage: stage.into(), step });
                 }
             }

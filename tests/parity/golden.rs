@@ -4,7 +4,6 @@ use std::path::Path;
 
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use hybridsim::radar::{Radar, Sampling};
-use npyz::npz::NpzArchive;
 use num_complex::Complex64;
 
 /// One file of golden arrays.
@@ -14,12 +13,14 @@ impl Golden {
     /// An array's shape and values, whatever its type.
     pub fn array(&self, name: &str) -> (Vec<usize>, Vec<f64>) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{}.npz", self.0));
-        let mut archive = NpzArchive::open(&path).unwrap();
-        let file = archive.by_name(name).unwrap().unwrap_or_else(|| panic!("{} holds no {name}", path.display()));
+        let mut archive = zip::ZipArchive::new(std::fs::File::open(&path).unwrap()).unwrap();
+        let entry = archive.by_name(&format!("{name}.npy")).unwrap_or_else(|error| panic!("{}: {name}: {error}", path.display()));
+        let file = npyz::NpyFile::new(entry).unwrap();
         let shape = file.shape().iter().map(|&length| length as usize).collect();
         let values = match file.dtype().descr().trim_matches(['\'', '"']) {
             "<f4" => file.into_vec::<f32>().unwrap().into_iter().map(f64::from).collect(),
             "<f8" => file.into_vec::<f64>().unwrap(),
+            "<i8" => file.into_vec::<i64>().unwrap().into_iter().map(|value| value as f64).collect(),
             "|u1" => file.into_vec::<u8>().unwrap().into_iter().map(f64::from).collect(),
             other => panic!("{name} is of type {other}"),
         };
@@ -28,6 +29,11 @@ impl Golden {
 
     pub fn values(&self, name: &str) -> Vec<f64> {
         self.array(name).1
+    }
+
+    /// Rows of three numbers.
+    pub fn points(&self, name: &str) -> Vec<[f64; 3]> {
+        self.values(name).chunks_exact(3).map(|xyz| [xyz[0], xyz[1], xyz[2]]).collect()
     }
 
     pub fn number(&self, name: &str) -> f64 {

@@ -1,5 +1,8 @@
 //! The crate agrees with NumPy: golden arrays written by `scripts/golden.py` from the formulas alone.
 
+mod body;
 mod golden;
 mod heatmaps;
+mod learned;
 mod metrics;
+mod paths;

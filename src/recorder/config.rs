@@ -1,0 +1,253 @@
+//! The settings of `hybridsim record`, and the world they describe.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Deserializer, Serialize, de};
+
+use super::material::Material;
+use super::receiver::ReceiverConfig;
+use super::surface::SurfaceConfig;
+use super::timeline::Interpolation;
+use super::world::{Reflector, WallsConfig, World};
+use crate::data::{read_body, read_motion};
+use crate::error::{Error, Result};
+use crate::person::actions::{self, Action, StyleConfig};
+use crate::person::{Motion, Person, Placement, procedural};
+use crate::radar::Radar;
+use crate::room::Room;
+
+/// A radar by name or in full.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum RadarChoice {
+    /// `mmmesh` or `small`.
+    Preset(String),
+    Full(Box<Radar>),
+}
+
+impl RadarChoice {
+    pub fn radar(&self) -> Result<Radar> {
+        match self {
+            Self::Full(radar) => Ok((**radar).clone()),
+            Self::Preset(name) => match name.as_str() {
+                "mmmesh" => Ok(Radar::mmmesh(24)),
+                "small" => Ok(Radar::small(24)),
+                _ => Err(Error::setting("radar", name, "`mmmesh`, `small`, or a table [radar]")),
+            },
+        }
+    }
+}
+
+/// By hand, so that a mistake inside the table is reported as what it is.
+impl<'de> Deserialize<'de> for RadarChoice {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        struct Visitor;
+        impl<'de> de::Visitor<'de> for Visitor {
+            type Value = RadarChoice;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
+                formatter.write_str("the name of a radar or a table")
+            }
+
+            fn visit_str<E: de::Error>(self, name: &str) -> std::result::Result<RadarChoice, E> {
+                Ok(RadarChoice::Preset(name.into()))
+            }
+
+            fn visit_map<A: de::MapAccess<'de>>(self, map: A) -> std::result::Result<RadarChoice, A::Error> {
+                Radar::deserialize(de::value::MapAccessDeserializer::new(map)).map(|radar| RadarChoice::Full(Box::new(radar)))
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
+
+/// Who moves, and how. Paths are relative to the settings' folder.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ActorConfig {
+    /// One of the embedded subjects; used when there is no `body`.
+    pub subject: String,
+    /// A skinned body in SMPL layout (`.npz`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body: Option<PathBuf>,
+    /// Shape parameters of an embedded action; a motion file brings its own.
+    pub betas: Vec<f64>,
+    /// An embedded action; used when there is no `motion`.
+    pub action: Action,
+    pub style: StyleConfig,
+    /// Poses per second of an embedded action.
+    pub rate_hz: f64,
+    /// Poses in AMASS layout (`.npz`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion: Option<PathBuf>,
+    /// Horizontal distance of the motion's origin, straight ahead; used when there is no `placement`.
+    pub distance_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub placement: Option<Placement>,
+}
+
+impl Default for ActorConfig {
+    fn default() -> Self {
+        Self {
+            subject: "s1".into(),
+            body: None,
+            betas: vec![],
+            action: Action::WalkBackForth,
+            style: StyleConfig::default(),
+            rate_hz: 60.0,
+            motion: None,
+            distance_m: 3.0,
+            placement: None,
+        }
+    }
+}
+
+/// Everything that `hybridsim record` can be told. The default is a baseline recording: nothing but what FORMATS.md
+/// calls "nothing missing".
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RecorderConfig {
+    pub seed: u64,
+    /// Overrides the radar's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frames: Option<usize>,
+    pub interpolation: Interpolation,
+    /// Honest error of the body model, root mean square.
+    pub mesh_error_m: f64,
+    /// Effect: power gain cos^q of every antenna.
+    pub antenna_exponent: f64,
+    /// Without it nobody is in the room.
+    pub empty: bool,
+    pub radar: RadarChoice,
+    pub room: Room,
+    pub person: ActorConfig,
+    pub surface: SurfaceConfig,
+    pub skin: Material,
+    pub walls: WallsConfig,
+    /// Effect.
+    pub furniture: Vec<Reflector>,
+    pub receiver: ReceiverConfig,
+}
+
+impl Default for RecorderConfig {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            frames: None,
+            interpolation: Interpolation::default(),
+            mesh_error_m: 0.0,
+            antenna_exponent: 0.0,
+            empty: false,
+            radar: RadarChoice::Preset("small".into()),
+            room: Room {
+                left_m: Some(1.9),
+                right_m: Some(2.4),
+                front_m: Some(5.6),
+                back_m: Some(0.6),
+                floor_m: Some(1.0),
+                ceiling_m: Some(1.7),
+            },
+            person: ActorConfig::default(),
+            surface: SurfaceConfig::default(),
+            skin: Material::SKIN,
+            walls: WallsConfig::default(),
+            furniture: vec![],
+            receiver: ReceiverConfig::default(),
+        }
+    }
+}
+
+impl RecorderConfig {
+    /// The world of these settings; `folder` is what relative paths start from.
+    pub fn world(&self, folder: &Path) -> Result<World> {
+        let mut radar = self.radar.radar()?;
+        radar.frames = self.frames.unwrap_or(radar.frames);
+        radar.check("radar")?;
+        let person = if self.empty { None } else { Some(self.person.person(folder, &radar, &self.room)?) };
+        let world = World {
+            radar,
+            room: self.room.clone(),
+            person,
+            interpolation: self.interpolation,
+            surface: self.surface,
+            skin: self.skin,
+            mesh_error_m: self.mesh_error_m,
+            walls: self.walls.clone(),
+            furniture: self.furniture.clone(),
+            antenna_exponent: self.antenna_exponent,
+            receiver: self.receiver,
+            seed: self.seed,
+        };
+        world.check()?;
+        Ok(world)
+    }
+
+    /// Name of what is done, for the recording's labels.
+    pub fn action(&self) -> Option<&str> {
+        (!self.empty && self.person.motion.is_none()).then(|| self.person.action.name())
+    }
+
+    /// Name of who does it.
+    pub fn subject(&self) -> Option<&str> {
+        (!self.empty && self.person.body.is_none()).then_some(self.person.subject.as_str())
+    }
+}
+
+impl ActorConfig {
+    fn person(&self, folder: &Path, radar: &Radar, room: &Room) -> Result<Person> {
+        let model = match &self.body {
+            Some(path) => read_body(folder.join(path))?,
+            None => procedural::person(&procedural::subject(&self.subject)?)?,
+        };
+        let placement = self.placement.clone().unwrap_or_else(|| {
+            // Without a floor the radar is on a table.
+            actions::placement(room.floor_m.unwrap_or(1.0), self.distance_m)
+        });
+        let motion: Motion = match &self.motion {
+            Some(path) => read_motion(folder.join(path), model.parents.len(), model.shape_directions.len())?.0,
+            None => {
+                let end_s = (radar.frames - 1) as f64 * radar.frame_period_s + radar.frame_duration_s();
+                let duration_s = (end_s - placement.start_s).max(1.0 / self.rate_hz);
+                actions::motion(self.action, &self.style, &model, &self.betas, duration_s, self.rate_hz)?
+            }
+        };
+        Ok(Person::Skinned { model, motion, placement })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_settings_survive_a_round_trip_and_describe_a_world() {
+        let config = RecorderConfig::default();
+        let text = toml::to_string(&config).unwrap();
+        assert_eq!(toml::from_str::<RecorderConfig>(&text).unwrap(), config);
+        let world = RecorderConfig { frames: Some(2), ..config }.world(Path::new(".")).unwrap();
+        assert_eq!(world.radar.frames, 2);
+        assert!(world.image_walls().is_empty() && world.furniture.is_empty());
+    }
+
+    #[test]
+    fn a_radar_is_a_name_or_a_table_and_mistakes_are_named() {
+        let named: RecorderConfig = toml::from_str("radar = \"mmmesh\"").unwrap();
+        assert_eq!(named.radar.radar().unwrap().samples_per_chirp, 256);
+        let unknown = RadarChoice::Preset("bmmesh".into()).radar().unwrap_err().to_string();
+        assert!(unknown.contains("`mmmesh`"), "{unknown}");
+        let table =
+            toml::to_string(&RecorderConfig { radar: RadarChoice::Full(Box::new(Radar::small(3))), ..RecorderConfig::default() });
+        assert_eq!(toml::from_str::<RecorderConfig>(&table.unwrap()).unwrap().radar.radar().unwrap().frames, 3);
+        let message = toml::from_str::<RecorderConfig>("[radar]\nslope = 1.0").unwrap_err().to_string();
+        assert!(message.contains("unknown field `slope`"), "{message}");
+    }
+
+    #[test]
+    fn a_wall_that_the_room_lacks_cannot_mirror() {
+        let mut config = RecorderConfig { empty: true, ..RecorderConfig::default() };
+        config.room.left_m = None;
+        config.walls.image_walls = vec![crate::room::Boundary::Left];
+        let error = config.world(Path::new(".")).unwrap_err();
+        assert!(error.to_string().contains("walls.image_walls") && error.hint().unwrap().contains("room.left_m"));
+    }
+}

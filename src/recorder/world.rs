@@ -1,0 +1,184 @@
+//! Everything that a recording is made of, each part switched separately.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use super::material::Material;
+use super::receiver::ReceiverConfig;
+use super::surface::SurfaceConfig;
+use super::timeline::Interpolation;
+use crate::error::{Error, Result};
+use crate::person::Person;
+use crate::radar::Radar;
+use crate::room::{Boundary, Room};
+
+/// The walls of the room. Clutter and specular returns are static and part of the baseline; images are an effect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WallsConfig {
+    /// Rough patches that send some of the wave straight back.
+    pub clutter: bool,
+    /// Backscattering cross-section of a wall per area and per cosine of incidence (γ).
+    pub clutter_gamma: f64,
+    /// Distance between patches.
+    pub patch_m: f64,
+    /// How far a wall reaches where no other boundary ends it.
+    pub open_m: f64,
+    /// The mirror image of the radar itself, at perpendicular incidence.
+    pub specular: bool,
+    pub material: Material,
+    /// Effect: up to how many mirror reflections a wave makes between the antennas and the body, 0 to 2.
+    pub images: usize,
+    /// Which walls mirror; empty: all.
+    pub image_walls: Vec<Boundary>,
+    /// Of each mirror reflection; absent: Fresnel's for `material` and its roughness.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub image_coefficient: Option<f64>,
+}
+
+impl Default for WallsConfig {
+    fn default() -> Self {
+        Self {
+            clutter: true,
+            clutter_gamma: 0.03,
+            patch_m: 0.06,
+            open_m: 4.0,
+            specular: true,
+            material: Material::PLASTERBOARD,
+            images: 0,
+            image_walls: vec![],
+            image_coefficient: None,
+        }
+    }
+}
+
+/// Effect: a thing that stands in the room.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reflector {
+    /// Radar frame.
+    pub position_m: [f64; 3],
+    /// Radar cross-section.
+    pub rcs_m2: f64,
+}
+
+/// What is recorded. `World::empty` has nothing in it; `Default` is the baseline of FORMATS.md without a person.
+#[derive(Clone, Debug)]
+pub struct World {
+    pub radar: Radar,
+    pub room: Room,
+    pub person: Option<Person>,
+    pub interpolation: Interpolation,
+    pub surface: SurfaceConfig,
+    pub skin: Material,
+    /// Root mean square distance between the recorded surface and the one that is handed out.
+    pub mesh_error_m: f64,
+    pub walls: WallsConfig,
+    pub furniture: Vec<Reflector>,
+    /// Effect: power gain cos^q of every antenna.
+    pub antenna_exponent: f64,
+    pub receiver: ReceiverConfig,
+    pub seed: u64,
+}
+
+impl Default for World {
+    fn default() -> Self {
+        Self {
+            radar: Radar::small(1),
+            room: Room::default(),
+            person: None,
+            interpolation: Interpolation::default(),
+            surface: SurfaceConfig::default(),
+            skin: Material::SKIN,
+            mesh_error_m: 0.0,
+            walls: WallsConfig::default(),
+            furniture: vec![],
+            antenna_exponent: 0.0,
+            receiver: ReceiverConfig::default(),
+            seed: 0,
+        }
+    }
+}
+
+/// What random numbers are drawn for; each has its own stream, so that one switch does not move the others.
+#[derive(Clone, Copy, Debug)]
+pub enum Draw {
+    MeshError,
+    Reflectivity,
+    Elements,
+    Clutter,
+    Gain,
+    Noise { frame: usize },
+}
+
+impl World {
+    /// Isotropic antennas in empty space, a perfectly uniform body, an ideal receiver.
+    pub fn empty() -> Self {
+        Self {
+            surface: SurfaceConfig { variation_db: 0.0, ..SurfaceConfig::default() },
+            skin: Material { roughness_m: 0.0, ..Material::SKIN },
+            walls: WallsConfig { clutter: false, specular: false, ..WallsConfig::default() },
+            receiver: ReceiverConfig::ideal(),
+            ..Self::default()
+        }
+    }
+
+    /// Walls that mirror the body.
+    pub fn image_walls(&self) -> Vec<Boundary> {
+        if self.walls.images == 0 {
+            return vec![];
+        }
+        let chosen = |wall: &Boundary| self.walls.image_walls.is_empty() || self.walls.image_walls.contains(wall);
+        self.room.boundaries().into_iter().filter(chosen).collect()
+    }
+
+    pub fn random(&self, draw: Draw) -> ChaCha8Rng {
+        let stream = match draw {
+            Draw::MeshError => 1,
+            Draw::Reflectivity => 2,
+            Draw::Elements => 3,
+            Draw::Clutter => 4,
+            Draw::Gain => 5,
+            Draw::Noise { frame } => 1000 + frame as u64,
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(stream);
+        rng
+    }
+
+    pub fn check(&self) -> Result<()> {
+        self.radar.check("radar")?;
+        self.room.check("room")?;
+        self.surface.check("surface")?;
+        self.receiver.check("receiver")?;
+        if self.walls.images > 2 {
+            return Err(Error::setting("walls.images", self.walls.images, "0, 1 or 2"));
+        }
+        for (key, value, least) in [
+            ("walls.patch_m", self.walls.patch_m, 1.0e-3),
+            ("walls.open_m", self.walls.open_m, 1.0e-3),
+            ("walls.clutter_gamma", self.walls.clutter_gamma, 0.0),
+            ("mesh_error_m", self.mesh_error_m, 0.0),
+            ("antenna_exponent", self.antenna_exponent, 0.0),
+        ] {
+            if !(value.is_finite() && value >= least) {
+                return Err(Error::setting(key, value, format!("a number of at least {least}")));
+            }
+        }
+        for wall in &self.walls.image_walls {
+            if self.room.distance_m(*wall).is_none() {
+                return Err(Error::setting("walls.image_walls", wall.name(), "a boundary that the room has")
+                    .with_hint(format!("give room.{}_m", wall.name())));
+            }
+        }
+        if let Some(bad) = self
+            .furniture
+            .iter()
+            .find(|thing| !(thing.rcs_m2.is_finite() && thing.rcs_m2 >= 0.0 && thing.position_m.iter().all(|x| x.is_finite())))
+        {
+            return Err(Error::setting("furniture", format!("{bad:?}"), "a finite position and a cross-section of at least 0"));
+        }
+        Ok(())
+    }
+}
