@@ -168,7 +168,6 @@ fn peak_mb() -> u64 {
 /// A person's worth of moving points two to four metres away, and points at rest on the walls.
 struct World {
     radar: Radar,
-    device: Device,
     moving: Part,
     still: Part,
     proxies: Vec<[f64; 3]>,
@@ -179,6 +178,8 @@ struct Part {
     velocity_mps: Vec<[f64; 3]>,
     amplitude: Vec<f64>,
     chirps: usize,
+    /// x, y, z `[point, chirp]`, and the amplitude `[point, 1]`: made before the clock starts.
+    tensors: Option<[Tensor<2>; 4]>,
 }
 
 impl World {
@@ -205,7 +206,7 @@ impl World {
         let mut random = ChaCha8Rng::seed_from_u64(0);
         let mut part = |count: usize, speed: f64, chirps: usize| {
             let mut uniform = |low: f64, high: f64| random.random_range(low..=high);
-            let mut part = Part { reference_m: vec![], velocity_mps: vec![], amplitude: vec![], chirps };
+            let mut part = Part { reference_m: vec![], velocity_mps: vec![], amplitude: vec![], chirps, tensors: None };
             for _ in 0..count {
                 part.reference_m.push([uniform(-2.0, 2.0), uniform(1.0, 5.0), uniform(-1.2, 1.2)]);
                 part.velocity_mps.push([uniform(-speed, speed), uniform(-speed, speed), uniform(-speed, speed)]);
@@ -213,19 +214,20 @@ impl World {
             }
             part
         };
-        let moving = part(case.points - case.still, 1.5, case.chirps);
-        let still = part(case.still, 0.0, 1);
+        let mut moving = part(case.points - case.still, 1.5, case.chirps);
+        let mut still = part(case.still, 0.0, 1);
+        moving.prepare(&radar, &device);
+        still.prepare(&radar, &device);
         let proxies = (0..case.walls).map(|wall| [2.5 * (wall as f64 - 2.5), 3.0 + 0.5 * wall as f64, 0.3]).collect();
-        Self { radar, device, moving, still, proxies }
+        Self { radar, moving, still, proxies }
     }
 
     /// Forward, or forward and backward with the loss Σ|X|².
     fn step(&self, case: &Case) {
-        let device = if case.mode == "forward" { self.device.clone() } else { self.device.clone().autodiff() };
         let mut tracked = vec![];
         let mut signal: Option<Complex<3>> = None;
         for part in [&self.moving, &self.still].into_iter().filter(|part| !part.reference_m.is_empty()) {
-            let (displacement, amplitude) = part.tensors(&self.radar, &device, case, &mut tracked);
+            let (displacement, amplitude) = part.tensors(case, &mut tracked);
             let points = Points { reference_m: &part.reference_m, displacement: &displacement, amplitude: &amplitude };
             let mut parts = vec![];
             if self.proxies.is_empty() {
@@ -258,7 +260,7 @@ impl World {
         let mut total: Option<Complex<3>> = None;
         let forward = Case { mode: "forward".into(), ..case.clone() };
         for part in [&self.moving, &self.still].into_iter().filter(|part| !part.reference_m.is_empty()) {
-            let (displacement, amplitude) = part.tensors(&self.radar, &self.device, &forward, &mut vec![]);
+            let (displacement, amplitude) = part.tensors(&forward, &mut vec![]);
             let points = Points { reference_m: &part.reference_m, displacement: &displacement, amplitude: &amplitude };
             let signal = direct_signal(points, &self.radar, 0, case.dechirp, case.form);
             total = Some(match total {
@@ -292,25 +294,36 @@ impl Part {
         (chirp as f64 - 0.5 * (self.chirps as f64 - 1.0)) * radar.loop_period_s()
     }
 
-    fn tensors(&self, radar: &Radar, device: &Device, case: &Case, tracked: &mut Vec<Tensor<2>>) -> (Displacement, Amplitude) {
+    fn prepare(&mut self, radar: &Radar, device: &Device) {
         let points = self.reference_m.len();
-        let mut tensor = |values: Vec<f32>, columns: usize, track: bool| {
-            let tensor = Tensor::<2>::from_data(TensorData::new(values, [points, columns]), (device, DType::F32));
-            if !track {
+        let tensor = |values: Vec<f32>, columns: usize| -> Tensor<2> {
+            Tensor::from_data(TensorData::new(values, [points, columns]), (device, DType::F32))
+        };
+        let times_s: Vec<f64> = (0..self.chirps).map(|chirp| self.time_s(radar, chirp)).collect();
+        let axis = |axis: usize| {
+            let moved = |velocity: &[f64; 3]| times_s.iter().map(|time_s| (velocity[axis] * time_s) as f32).collect::<Vec<_>>();
+            tensor(self.velocity_mps.iter().flat_map(moved).collect(), self.chirps)
+        };
+        let amplitude = tensor(self.amplitude.iter().map(|&a| a as f32).collect(), 1);
+        self.tensors = Some([axis(0), axis(1), axis(2), amplitude]);
+    }
+
+    /// With gradients for the case's mode; what has them is added to `tracked`.
+    fn tensors(&self, case: &Case, tracked: &mut Vec<Tensor<2>>) -> (Displacement, Amplitude) {
+        let [x, y, z, amplitude] = self.tensors.clone().expect("prepared tensors");
+        let mut track = |tensor: Tensor<2>, modes: &[&str]| {
+            if case.mode == "forward" {
                 return tensor;
             }
-            tracked.push(tensor.clone().require_grad());
+            let tensor = tensor.autodiff();
+            if !modes.contains(&case.mode.as_str()) {
+                return tensor;
+            }
+            tracked.push(tensor.require_grad());
             tracked.last().expect("just pushed").clone()
         };
-        let mut axis = |axis: usize| {
-            let values = self.velocity_mps.iter().flat_map(|velocity| {
-                (0..self.chirps).map(move |chirp| (velocity[axis] * self.time_s(radar, chirp)) as f32)
-            });
-            tensor(values.collect(), self.chirps, case.mode == "positions")
-        };
-        let displacement = Displacement { x: axis(0), y: axis(1), z: axis(2) };
-        let amplitude = self.amplitude.iter().map(|&a| a as f32).collect();
-        (displacement, Amplitude::real(tensor(amplitude, 1, case.mode != "forward")))
+        let [x, y, z] = [x, y, z].map(|axis| track(axis, &["positions"]));
+        (Displacement { x, y, z }, Amplitude::real(track(amplitude, &["positions", "amplitudes"])))
     }
 
     /// The definition in f64, at the first receiver.

@@ -25,10 +25,7 @@ pub fn sum(phasors: &Phasors, samples: usize) -> Complex<2> {
         let terms = match &phasors.amplitude_im {
             Some(im) => {
                 let im = block(im);
-                Complex::new(
-                    unit.re.clone() * re.clone() - unit.im.clone() * im.clone(),
-                    unit.re * im + unit.im * re,
-                )
+                Complex::new(unit.re.clone() * re.clone() - unit.im.clone() * im.clone(), unit.re * im + unit.im * re)
             }
             None => Complex::new(unit.re * re.clone(), unit.im * re),
         };

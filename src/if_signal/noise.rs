@@ -135,3 +135,121 @@ pub fn normals<const D: usize>(seed: u64, dims: [usize; D], device: &Device, dty
     let re = draw();
     Complex::new(re, draw())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn signal(device: &Device, dtype: DType, scale: f64) -> Complex<3> {
+        let tensor = |offset: usize| {
+            let values: Vec<f64> = (0..2 * 3 * 4).map(|i| scale * (((i * 5 + offset) % 7) as f64 - 3.0)).collect();
+            let tensor = Tensor::from_data(TensorData::new(values, [2, 3, 4]).convert_dtype(dtype), (device, dtype));
+            if device.is_autodiff() { tensor.require_grad() } else { tensor }
+        };
+        Complex::new(tensor(0), tensor(3))
+    }
+
+    fn numbers<const D: usize>(tensor: &Tensor<D>) -> Vec<f64> {
+        tensor.clone().into_data().convert::<f64>().try_into_vec::<f64>().unwrap()
+    }
+
+    fn config(law: NoiseLaw, rate: f64) -> NoiseConfig {
+        NoiseConfig { law, rate, level: 0.5 }
+    }
+
+    #[test]
+    fn the_learned_rate_starts_where_the_settings_say() {
+        for rate in [1e-4, 0.025, 3.0, 50.0] {
+            let noise = config(NoiseLaw::Learned, rate).init(&Device::flex());
+            let found = numbers(&noise.rate(&Device::flex()).unwrap())[0];
+            assert!((found / rate - 1.0).abs() < 1e-4, "{found}, wanted {rate}");
+        }
+    }
+
+    #[test]
+    fn deviation_is_the_rate_times_the_mean_amplitude_in_each_component() {
+        let device = Device::flex();
+        let dims = [40, 50, 60];
+        let signal = Complex::new(Tensor::full(dims, 3.0, &device), Tensor::full(dims, 4.0, &device));
+        for law in [NoiseLaw::Learned, NoiseLaw::Fixed, NoiseLaw::Constant] {
+            let noisy = config(law, 0.1).init(&device).add_to(signal.clone(), normals(1, dims, &device, DType::F32));
+            for (part, clean) in [(noisy.re, 3.0), (noisy.im, 4.0)] {
+                let variance = numbers(&part).iter().map(|x| (x - clean).powi(2)).sum::<f64>() / 120_000.0;
+                // 0.1 · |3 + 4j|, and the constant level, are both one half.
+                assert!((variance.sqrt() - 0.5).abs() < 0.01, "{law:?}: {}", variance.sqrt());
+            }
+        }
+    }
+
+    #[test]
+    fn without_noise_the_signal_stays_as_it_is() {
+        let device = Device::flex();
+        let clean = signal(&device, DType::F32, 1.0);
+        let noisy = config(NoiseLaw::None, 0.1).init(&device).add_to(clean.clone(), normals(1, [2, 3, 4], &device, DType::F32));
+        assert_eq!(numbers(&noisy.re), numbers(&clean.re));
+    }
+
+    #[test]
+    fn equal_seeds_draw_equal_normals_and_others_do_not() {
+        let draw = |seed| numbers(&normals(seed, [2, 3], &Device::flex(), DType::F32).im);
+        assert_eq!(draw(5), draw(5));
+        assert_ne!(draw(5), draw(6));
+    }
+
+    #[test]
+    fn gradients_flow_to_the_rate_and_to_the_signal() {
+        let device = Device::flex().autodiff();
+        let noise = config(NoiseLaw::Learned, 0.3).init(&device);
+        let loss = |noise: &Noise, signal: Complex<3>| {
+            let normals = normals(2, [2, 3, 4], &signal.device(), DType::F64);
+            noise.add_to(signal, normals).power().sum()
+        };
+        let clean = signal(&device, DType::F64, 1.0);
+        let raw = noise.raw_rate.as_ref().unwrap().val();
+        let gradients = loss(&noise, clean.clone()).backward();
+        let to_rate = numbers(&raw.grad(&gradients).expect("a gradient to the rate"))[0];
+        let to_signal = numbers(&clean.re.grad(&gradients).expect("a gradient to the signal"));
+
+        let step = 1e-3;
+        let at_rate = |by: f64| {
+            let mut moved = noise.clone();
+            moved.raw_rate = Some(Param::from_tensor(Tensor::from_data([(numbers(&raw)[0] + by) as f32], &device)));
+            numbers(&loss(&moved, clean.clone()))[0]
+        };
+        let wanted = (at_rate(step) - at_rate(-step)) / (2.0 * step);
+        assert!((to_rate / wanted - 1.0).abs() < 1e-3, "{to_rate}, wanted {wanted}");
+        for (i, found) in to_signal.iter().enumerate() {
+            let at = |by: f64| {
+                let mut values = numbers(&clean.re);
+                values[i] += by;
+                let re = Tensor::from_data(TensorData::new(values, [2, 3, 4]), (&device, DType::F64));
+                numbers(&loss(&noise, Complex::new(re, clean.im.clone())))[0]
+            };
+            let wanted = (at(1e-6) - at(-1e-6)) / 2e-6;
+            assert!((found - wanted).abs() < 1e-6 * wanted.abs().max(1.0), "element {i}: {found}, wanted {wanted}");
+        }
+    }
+
+    #[test]
+    fn silence_has_finite_gradients() {
+        let device = Device::flex().autodiff();
+        for dtype in [DType::F32, DType::F64] {
+            let noise = config(NoiseLaw::Learned, 0.3).init(&device);
+            let silence = signal(&device, dtype, 0.0);
+            let noisy = noise.add_to(silence.clone(), normals(2, [2, 3, 4], &device, dtype));
+            let gradients = noisy.re.sum().backward();
+            let found = numbers(&silence.re.grad(&gradients).unwrap());
+            assert!(found.iter().all(|g| g.is_finite()), "{dtype:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn rates_that_are_no_rates_are_refused() {
+        assert!(config(NoiseLaw::Fixed, 0.1).check("noise").is_ok());
+        for rate in [0.0, -1.0, f64::NAN] {
+            let error = config(NoiseLaw::Fixed, rate).check("noise").unwrap_err();
+            assert!(error.to_string().starts_with("`noise.rate` is"), "{error}");
+        }
+        assert!(serde_json::from_str::<NoiseConfig>(r#"{"law": "learned", "rat": 1}"#).is_err());
+    }
+}

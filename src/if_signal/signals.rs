@@ -71,3 +71,7 @@ fn silence(points: &Points, radar: &Radar) -> Complex<3> {
     let zeros = || Tensor::zeros([radar.rx_m.len(), chirps, radar.samples_per_chirp], (&device, dtype));
     Complex::new(zeros(), zeros())
 }
+
+#[cfg(test)]
+#[path = "signals_tests.rs"]
+mod tests;

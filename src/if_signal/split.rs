@@ -9,7 +9,7 @@ use crate::complex::{Complex, wrap};
 use crate::paths::Phasors;
 
 /// Elements of one factor of a block of points.
-const BLOCK: usize = 1 << 25;
+const BLOCK: usize = 1 << 24;
 
 pub fn sum(phasors: &Phasors, samples: usize) -> Complex<2> {
     let [points, chirps] = phasors.dims();

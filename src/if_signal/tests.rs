@@ -242,7 +242,9 @@ fn a_delay_that_is_no_number_reaches_the_samples_of_its_chirp() {
 
 #[test]
 fn the_forms_are_settings_in_lower_case() {
-    for (text, form) in [("auto", SumForm::Auto), ("tensor", SumForm::Tensor), ("fused", SumForm::Fused), ("exact", SumForm::Exact)] {
+    for (text, form) in
+        [("auto", SumForm::Auto), ("tensor", SumForm::Tensor), ("fused", SumForm::Fused), ("exact", SumForm::Exact)]
+    {
         assert_eq!(serde_json::from_str::<SumForm>(&format!("\"{text}\"")).unwrap(), form);
     }
 }

@@ -9,13 +9,13 @@ pub mod indirect;
 mod leg;
 mod waveform;
 
-pub use direct::DirectPaths;
-pub use indirect::{IndirectPaths, Onward};
 pub use crate::body::Displacement;
+pub use direct::DirectPaths;
 pub(crate) use indirect::onward;
+pub use indirect::{IndirectPaths, Onward};
+pub(crate) use leg::SOFTENING_M;
 pub use leg::{Leg, Motion, leg};
 pub use waveform::{Amplitude, Dechirp, Waveform, phasors};
-pub(crate) use leg::SOFTENING_M;
 pub(crate) use waveform::{AtRest, NEAR_FIELD_M2, difference};
 
 use burn::tensor::{DType, Device, Tensor, TensorData};
@@ -70,3 +70,6 @@ fn column(values: impl Iterator<Item = f64>, device: &Device, dtype: DType) -> T
 pub(crate) fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
 }
+
+#[cfg(test)]
+mod tests;

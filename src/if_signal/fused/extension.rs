@@ -113,7 +113,14 @@ fn with_moving<T>(tensors: [FlexTensor; 5], geometry: Arc<Geometry>, complex: bo
 }
 
 impl RadarOps for Flex {
-    fn sum_of_phasors(re: FlexTensor, im: FlexTensor, phase: FlexTensor, sweep: FlexTensor, complex: bool, samples: usize) -> FlexTensor {
+    fn sum_of_phasors(
+        re: FlexTensor,
+        im: FlexTensor,
+        phase: FlexTensor,
+        sweep: FlexTensor,
+        complex: bool,
+        samples: usize,
+    ) -> FlexTensor {
         with_phasors([re, im, phase, sweep], complex, |inputs| {
             tensor(kernel::sum(&inputs, samples), [2, 1, inputs.chirps, samples])
         })
@@ -255,8 +262,7 @@ impl<B: Backend + RadarOps, C: CheckpointStrategy> RadarOps for Autodiff<B, C> {
             fn backward(self, ops: Ops<Self::State, 5>, gradients: &mut Gradients, _: &mut Checkpointer) {
                 let upstream = gradients.consume::<B>(&ops.node);
                 let ([x, y, z, re, im], geometry, complex, samples) = ops.state;
-                let (x, y, z, re, im) =
-                    B::sum_of_moving_gradients(x, y, z, re, im, upstream, geometry, complex, samples);
+                let (x, y, z, re, im) = B::sum_of_moving_gradients(x, y, z, re, im, upstream, geometry, complex, samples);
                 let parents = ops.parents.map(|parent| parent.map(|parent| parent.id));
                 register::<B, 5>(parents, [x, y, z, re, im], 4, complex, gradients);
             }

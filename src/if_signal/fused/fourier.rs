@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::lanes::{LANES, Lanes, multiply_add};
+use super::lanes::{Lanes, multiply_add, zip};
 
 /// A radix-2 transform of a power-of-two length without the reordering pass: whoever fills or reads the grid does so
 /// at [`Fourier::place`].
@@ -34,58 +34,73 @@ impl Fourier {
 
     /// Y\[k\] = Σ_g x\[g\] exp(+j2πgk/C), in place; x at its places, Y in natural order. A row is `width` complex lanes.
     pub fn from_cells(&self, grid: &mut [Lanes], width: usize) {
-        let row = 2 * width;
-        let mut half = 1;
-        while half < self.length {
-            let stride = self.length / (2 * half);
-            for group in grid.chunks_exact_mut(2 * half * row) {
-                let (low, high) = group.split_at_mut(half * row);
-                for (i, (a, b)) in low.chunks_exact_mut(row).zip(high.chunks_exact_mut(row)).enumerate() {
-                    let (c, s) = self.roots[i * stride];
-                    for (a, b) in a.chunks_exact_mut(2).zip(b.chunks_exact_mut(2)) {
-                        for lane in 0..LANES {
-                            let (br, bi) = (b[0][lane], b[1][lane]);
-                            let re = multiply_add(c, br, -s * bi);
-                            let im = multiply_add(c, bi, s * br);
-                            let (ar, ai) = (a[0][lane], a[1][lane]);
-                            (a[0][lane], a[1][lane]) = (ar + re, ai + im);
-                            (b[0][lane], b[1][lane]) = (ar - re, ai - im);
-                        }
-                    }
-                }
-            }
-            half *= 2;
+        let half = grid.len() / (4 * width);
+        if half == 0 {
+            return;
         }
+        // Halves first, and theirs before: small ones stay in the cache from their first to their last pass.
+        let (low, high) = grid.split_at_mut(half * 2 * width);
+        self.from_cells(low, width);
+        self.from_cells(high, width);
+        self.butterflies(low, high, width, |a, b, root| {
+            let b = multiply(b, root);
+            (add(a, b), subtract(a, b))
+        });
     }
 
     /// The adjoint: x\[g\] = Σ_k Y\[k\] exp(−j2πgk/C), in place; Y in natural order, x at its places.
     pub fn to_cells(&self, grid: &mut [Lanes], width: usize) {
+        let half = grid.len() / (4 * width);
+        if half == 0 {
+            return;
+        }
+        let (low, high) = grid.split_at_mut(half * 2 * width);
+        self.butterflies(low, high, width, |a, b, (c, s)| (add(a, b), multiply(subtract(a, b), (c, -s))));
+        self.to_cells(low, width);
+        self.to_cells(high, width);
+    }
+
+    /// Replaces every pair of complex lanes of two halves; the root belongs to the row.
+    #[inline(always)]
+    fn butterflies(
+        &self,
+        low: &mut [Lanes],
+        high: &mut [Lanes],
+        width: usize,
+        of: impl Fn(Pair, Pair, (f32, f32)) -> (Pair, Pair),
+    ) {
         let row = 2 * width;
-        let mut half = self.length / 2;
-        while half > 0 {
-            let stride = self.length / (2 * half);
-            for group in grid.chunks_exact_mut(2 * half * row) {
-                let (low, high) = group.split_at_mut(half * row);
-                for (i, (a, b)) in low.chunks_exact_mut(row).zip(high.chunks_exact_mut(row)).enumerate() {
-                    let (c, s) = self.roots[i * stride];
-                    for (a, b) in a.chunks_exact_mut(2).zip(b.chunks_exact_mut(2)) {
-                        for lane in 0..LANES {
-                            let (dr, di) = (a[0][lane] - b[0][lane], a[1][lane] - b[1][lane]);
-                            a[0][lane] += b[0][lane];
-                            a[1][lane] += b[1][lane];
-                            b[0][lane] = multiply_add(c, dr, s * di);
-                            b[1][lane] = multiply_add(c, di, -s * dr);
-                        }
-                    }
-                }
+        let stride = self.roots.len() * row / low.len();
+        for ((a, b), &root) in low.chunks_exact_mut(row).zip(high.chunks_exact_mut(row)).zip(self.roots.iter().step_by(stride)) {
+            for (a, b) in a.chunks_exact_mut(2).zip(b.chunks_exact_mut(2)) {
+                let ((ar, ai), (br, bi)) = of((a[0], a[1]), (b[0], b[1]), root);
+                (a[0], a[1], b[0], b[1]) = (ar, ai, br, bi);
             }
-            half /= 2;
         }
     }
 }
 
+/// Real and imaginary part.
+type Pair = (Lanes, Lanes);
+
+#[inline(always)]
+fn add(a: Pair, b: Pair) -> Pair {
+    (zip(a.0, b.0, |a, b| a + b), zip(a.1, b.1, |a, b| a + b))
+}
+
+#[inline(always)]
+fn subtract(a: Pair, b: Pair) -> Pair {
+    (zip(a.0, b.0, |a, b| a - b), zip(a.1, b.1, |a, b| a - b))
+}
+
+#[inline(always)]
+fn multiply(a: Pair, (c, s): (f32, f32)) -> Pair {
+    (zip(a.0, a.1, |re, im| multiply_add(c, re, -s * im)), zip(a.0, a.1, |re, im| multiply_add(c, im, s * re)))
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::lanes::LANES;
     use super::*;
 
     #[test]
@@ -101,7 +116,11 @@ mod tests {
                     grid[(place * width + 1) * 2 + part][3] = value(i)[part];
                 }
             }
-            if forward { fourier.from_cells(&mut grid, width) } else { fourier.to_cells(&mut grid, width) }
+            if forward {
+                fourier.from_cells(&mut grid, width)
+            } else {
+                fourier.to_cells(&mut grid, width)
+            }
             for k in 0..length {
                 let (mut re, mut im) = (0.0, 0.0);
                 for i in 0..length {

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::fourier::Fourier;
 use super::lanes::{LANES, Lanes, ZERO, cis, fma, map, multiply_add, round, zip};
+use super::scratch::Scratch;
 use crate::if_signal::grid::RangeGrid;
 
 /// Moments per cell. With a reach of one cell the expansion is right to 10⁻⁵ in the worst sample, 3·10⁻⁶ on average.
@@ -41,6 +42,8 @@ pub trait Returns: Sync {
 pub trait Sink: Send {
     /// How many points.
     fn points(&self) -> usize;
+    /// Before anything else.
+    fn open(&mut self);
     /// At the chirps from `chirp` on, for a point counted from the first of this range.
     fn put(&mut self, receiver: usize, local: usize, chirp: usize, gradient: &Return);
     /// After the last chirp of a receiver.
@@ -77,8 +80,10 @@ impl Plan {
         }
     }
 
-    fn empty(&self) -> Vec<Lanes> {
-        vec![ZERO; self.grid.cells * ROW]
+    fn empty(&self) -> Scratch {
+        let mut grid = Scratch::new(self.grid.cells * ROW);
+        grid.fill(ZERO);
+        grid
     }
 
     /// Row of the transform that belongs to a sample.
@@ -219,23 +224,27 @@ pub fn sum(returns: &impl Returns, samples: usize) -> Vec<f32> {
     let blocks = chirps.div_ceil(LANES);
     let parts = if blocks * receivers >= ENOUGH_TASKS { 1 } else { points.div_ceil(CHUNK).max(1) };
     let chunk = points.div_ceil(parts).max(1);
-    let grid_of = |task: usize, part: usize| {
+    let fill = |grid: &mut [Lanes], task: usize, part: usize| {
         let (receiver, chirp) = (task / blocks, task % blocks * LANES);
-        let mut grid = plan.empty();
+        let width = LANES.min(chirps - chirp);
         for point in part * chunk..((part + 1) * chunk).min(points) {
-            plan.spread(&returns.load(receiver, point, chirp), LANES.min(chirps - chirp), &mut grid);
+            plan.spread(&returns.load(receiver, point, chirp), width, grid);
         }
-        grid
     };
 
     let mut out = vec![0.0; 2 * receivers * chirps * samples];
     let (out_re, out_im) = out.split_at_mut(receivers * chirps * samples);
     let by_block = |part| blocks_of(part, receivers, chirps * samples, LANES * samples);
     by_block(out_re).into_par_iter().zip(by_block(out_im)).enumerate().for_each(|(task, (re, im))| {
+        let part = |part: usize| {
+            let mut grid = plan.empty();
+            fill(&mut grid, task, part);
+            grid
+        };
         let mut grid = match parts {
-            1 => grid_of(task, 0),
+            1 => part(0),
             _ => {
-                let grids: Vec<_> = (0..parts).into_par_iter().map(|part| grid_of(task, part)).collect();
+                let grids: Vec<_> = (0..parts).into_par_iter().map(part).collect();
                 grids.into_iter().reduce(add).expect("one part at least")
             }
         };
@@ -258,14 +267,17 @@ pub fn gradients(returns: &impl Returns, upstream: &[f32], samples: usize, sinks
     let (chirps, receivers) = (returns.chirps(), returns.receivers());
     let blocks = chirps.div_ceil(LANES);
     let (up_re, up_im) = upstream.split_at(receivers * chirps * samples);
-    let grids: Vec<Vec<Lanes>> = (0..receivers * blocks)
+    let grids: Vec<Scratch> = (0..receivers * blocks)
         .into_par_iter()
         .map(|task| {
             let (receiver, chirp) = (task / blocks, task % blocks * LANES);
             let width = LANES.min(chirps - chirp);
             let lanes = |part: &[f32], sample: usize| -> Lanes {
-                let at = |lane: usize| part[(receiver * chirps + chirp + lane) * samples + sample];
-                std::array::from_fn(|lane| if lane < width { at(lane) } else { 0.0 })
+                let mut lanes = ZERO;
+                for (lane, value) in lanes[..width].iter_mut().enumerate() {
+                    *value = part[(receiver * chirps + chirp + lane) * samples + sample];
+                }
+                lanes
             };
             let mut grid = plan.empty();
             plan.distribute(|sample| (lanes(up_re, sample), lanes(up_im, sample)), &mut grid);
@@ -283,6 +295,7 @@ pub fn gradients(returns: &impl Returns, upstream: &[f32], samples: usize, sinks
         })
         .collect();
     sinks.into_par_iter().zip(starts).for_each(|(mut sink, start)| {
+        sink.open();
         for receiver in 0..receivers {
             for block in 0..blocks {
                 let chirp = block * LANES;
@@ -326,8 +339,8 @@ fn turn((re, im): (Lanes, Lanes), times: usize) -> (Lanes, Lanes) {
     }
 }
 
-fn add(mut a: Vec<Lanes>, b: Vec<Lanes>) -> Vec<Lanes> {
-    for (a, b) in a.iter_mut().zip(&b) {
+fn add(mut a: Scratch, b: Scratch) -> Scratch {
+    for (a, b) in a.iter_mut().zip(b.iter()) {
         *a = zip(*a, *b, |a, b| a + b);
     }
     a

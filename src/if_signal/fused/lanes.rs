@@ -9,14 +9,21 @@ pub type Lanes = [f32; LANES];
 
 pub const ZERO: Lanes = [0.0; LANES];
 
+// Loops over slices of a known length: closures of `array::from_fn` are not always inlined.
 #[inline(always)]
-pub fn map(x: Lanes, of: impl Fn(f32) -> f32) -> Lanes {
-    std::array::from_fn(|lane| of(x[lane]))
+pub fn map(mut x: Lanes, of: impl Fn(f32) -> f32) -> Lanes {
+    for x in &mut x {
+        *x = of(*x);
+    }
+    x
 }
 
 #[inline(always)]
-pub fn zip(a: Lanes, b: Lanes, of: impl Fn(f32, f32) -> f32) -> Lanes {
-    std::array::from_fn(|lane| of(a[lane], b[lane]))
+pub fn zip(mut a: Lanes, b: Lanes, of: impl Fn(f32, f32) -> f32) -> Lanes {
+    for (a, b) in a.iter_mut().zip(&b) {
+        *a = of(*a, *b);
+    }
+    a
 }
 
 /// a·b + c, fused where the machine can: elsewhere `mul_add` would be a slow call.
@@ -26,8 +33,11 @@ pub fn multiply_add(a: f32, b: f32, c: f32) -> f32 {
 }
 
 #[inline(always)]
-pub fn fma(a: Lanes, b: Lanes, c: Lanes) -> Lanes {
-    std::array::from_fn(|lane| multiply_add(a[lane], b[lane], c[lane]))
+pub fn fma(a: Lanes, b: Lanes, mut c: Lanes) -> Lanes {
+    for ((a, b), c) in a.iter().zip(&b).zip(&mut c) {
+        *c = multiply_add(*a, *b, *c);
+    }
+    c
 }
 
 /// Nearest whole number, for |x| < 2²².
@@ -41,18 +51,23 @@ pub fn round(x: f32) -> f32 {
 pub fn cis(turns: Lanes) -> (Lanes, Lanes) {
     let mut cos = [0.0; LANES];
     let mut sin = [0.0; LANES];
-    for lane in 0..LANES {
-        let whole = turns[lane] - round(turns[lane]);
+    for ((turns, cos), sin) in turns.iter().zip(&mut cos).zip(&mut sin) {
+        let whole = turns - round(*turns);
         // Beyond a quarter turn: the sine mirrors, the cosine changes its sign.
         let far = whole.abs() > 0.25;
         let h = if far { 0.5f32.copysign(whole) - whole } else { whole };
         let u = h * h;
-        let even = COS[..4].iter().rev().fold(COS[4] as f32, |sum, &c| multiply_add(sum, u, c as f32));
-        let odd = SIN[..4].iter().rev().fold(SIN[4] as f32, |sum, &c| multiply_add(sum, u, c as f32));
-        cos[lane] = if far { -even } else { even };
-        sin[lane] = h * odd;
+        let even = horner(u, COS.map(|c| c as f32));
+        let odd = horner(u, SIN.map(|c| c as f32));
+        *cos = if far { -even } else { even };
+        *sin = h * odd;
     }
     (cos, sin)
+}
+
+#[inline(always)]
+fn horner(u: f32, [a, b, c, d, e]: [f32; 5]) -> f32 {
+    multiply_add(multiply_add(multiply_add(multiply_add(e, u, d), u, c), u, b), u, a)
 }
 
 /// Sixteen values from `at` on, or `width` of them and the last one repeated.
@@ -61,7 +76,9 @@ pub fn load(values: &[f32], at: usize, width: usize) -> Lanes {
     if width >= LANES {
         return values[at..at + LANES].try_into().expect("sixteen values");
     }
-    std::array::from_fn(|lane| values[at + lane.min(width - 1)])
+    let mut lanes = [values[at + width - 1]; LANES];
+    lanes[..width].copy_from_slice(&values[at..at + width]);
+    lanes
 }
 
 /// The first `width` lanes to `at` on.

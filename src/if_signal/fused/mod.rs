@@ -10,6 +10,7 @@ mod kernel;
 mod lanes;
 mod moving;
 mod phasors;
+mod scratch;
 
 use std::sync::Arc;
 

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::kernel::{self, Return, Returns, Sink};
-use super::lanes::{LANES, Lanes, ZERO, accumulate, fma, load, map, multiply_add, zip};
+use super::lanes::{LANES, Lanes, ZERO, accumulate, fma, load, map, multiply_add, store, zip};
+use super::scratch::Scratch;
 use crate::paths::{AtRest, NEAR_FIELD_M2, SOFTENING_M, Waveform, difference, distance};
 
 /// Host constants of paths from one transmitter by way of points to several receivers.
@@ -75,14 +76,25 @@ impl Geometry {
         self.antennas_m.len()
     }
 
-    /// |x0+u−r|² − |x0−r|² for one displacement, and half its derivative x0+u−r.
+    /// From a leg's antenna to a point at rest.
     #[inline(always)]
-    fn growth(&self, point: usize, leg: usize, u: [f32; 3]) -> (f32, [f32; 3]) {
+    fn offset_m(&self, point: usize, leg: usize) -> [f32; 3] {
         let (x0, r) = (self.reference_m[point], self.antennas_m[leg]);
-        let v: [f32; 3] = std::array::from_fn(|axis| x0[axis] - r[axis]);
-        let growth = u[0] * (u[0] + 2.0 * v[0]) + u[1] * (u[1] + 2.0 * v[1]) + u[2] * (u[2] + 2.0 * v[2]);
-        (growth, std::array::from_fn(|axis| v[axis] + u[axis]))
+        [x0[0] - r[0], x0[1] - r[1], x0[2] - r[2]]
     }
+
+    /// Reference length of a leg, and its square softened.
+    #[inline(always)]
+    fn length(&self, point: usize, leg: usize) -> (f32, f32) {
+        let length = self.lengths_m[leg][point];
+        (length, multiply_add(length, length, (SOFTENING_M * SOFTENING_M) as f32))
+    }
+}
+
+/// |v+u|² − |v|².
+#[inline(always)]
+fn growth(v: [f32; 3], x: f32, y: f32, z: f32) -> f32 {
+    x * (x + 2.0 * v[0]) + y * (y + 2.0 * v[1]) + z * (z + 2.0 * v[2])
 }
 
 /// Displacements `[point, chirp]`, amplitudes `[point, chirp]` or `[point, 1]`, in row-major order.
@@ -99,8 +111,9 @@ pub struct Tensors<'a> {
 pub struct Moving<'a> {
     geometry: Arc<Geometry>,
     tensors: Tensors<'a>,
-    /// `[point][leg][chirp]`, metres.
-    changes_m: Vec<f32>,
+    /// `[point][leg][stride]`, metres; see [`extend`].
+    changes_m: Scratch,
+    stride: usize,
 }
 
 /// Of one receiver's path at sixteen chirps.
@@ -113,38 +126,36 @@ struct Path {
 impl<'a> Moving<'a> {
     pub fn new(geometry: Arc<Geometry>, tensors: Tensors<'a>) -> Self {
         let (chirps, legs) = (tensors.chirps, geometry.legs());
-        let softening = (SOFTENING_M * SOFTENING_M) as f32;
-        let mut changes_m = vec![0.0; geometry.points() * legs * chirps];
-        changes_m.par_chunks_mut(legs * chirps).enumerate().with_min_len(256).for_each(|(point, changes)| {
-            let row = |axis: usize| &tensors.axes[axis][point * chirps..][..chirps];
-            let (x, y, z) = (row(0), row(1), row(2));
-            for (leg, changes) in changes.chunks_mut(chirps).enumerate() {
-                let length = geometry.lengths_m[leg][point];
-                let squared = multiply_add(length, length, softening);
-                for (chirp, change) in changes.iter_mut().enumerate() {
-                    let (growth, _) = geometry.growth(point, leg, [x[chirp], y[chirp], z[chirp]]);
+        let stride = chirps.next_multiple_of(LANES) + 2;
+        let size = geometry.points() * legs * stride;
+        let mut changes_m = Scratch::new(size.div_ceil(LANES));
+        let rows = &mut changes_m.as_flattened_mut()[..size];
+        rows.par_chunks_mut(legs * stride).enumerate().with_min_len(256).for_each(|(point, changes)| {
+            let [x, y, z] = tensors.axes.map(|axis| &axis[point * chirps..][..chirps]);
+            for (leg, row) in changes.chunks_mut(stride).enumerate() {
+                let v = geometry.offset_m(point, leg);
+                let (length, squared) = geometry.length(point, leg);
+                for (((change, x), y), z) in row[1..=chirps].iter_mut().zip(x).zip(y).zip(z) {
+                    let growth = growth(v, *x, *y, *z);
                     *change = growth / ((growth + squared).sqrt() + length);
                 }
+                extend(row, chirps);
             }
         });
-        Self { geometry, tensors, changes_m }
+        Self { geometry, tensors, changes_m, stride }
     }
 
     fn row(&self, point: usize, leg: usize) -> &[f32] {
-        let chirps = self.tensors.chirps;
-        &self.changes_m[(point * self.geometry.legs() + leg) * chirps..][..chirps]
+        &self.changes_m.as_flattened()[(point * self.geometry.legs() + leg) * self.stride..][..self.stride]
     }
 
     #[inline(always)]
     fn path(&self, receiver: usize, point: usize, chirp: usize) -> Path {
-        let width = self.tensors.chirps - chirp;
-        let changes = [0, receiver + 1].map(|leg| load(self.row(point, leg), chirp, width));
-        let lengths_m: [Lanes; 2] = std::array::from_fn(|i| {
-            let length = self.geometry.lengths_m[[0, receiver + 1][i]][point];
-            map(changes[i], |change| change + length)
-        });
+        let (a, b) = (load(self.row(point, 0), chirp + 1, LANES), load(self.row(point, receiver + 1), chirp + 1, LANES));
+        let lengths = (self.geometry.lengths_m[0][point], self.geometry.lengths_m[receiver + 1][point]);
+        let lengths_m = [map(a, |change| change + lengths.0), map(b, |change| change + lengths.1)];
         let spreading = zip(lengths_m[0], lengths_m[1], |a, b| 1.0 / multiply_add(a, b, NEAR_FIELD_M2 as f32));
-        Path { lengths_m, spreading, change_m: zip(changes[0], changes[1], |a, b| a + b) }
+        Path { lengths_m, spreading, change_m: zip(a, b, |a, b| a + b) }
     }
 
     #[inline(always)]
@@ -158,16 +169,24 @@ impl<'a> Moving<'a> {
     /// Difference of the path from chirp to chirp, metres.
     #[inline(always)]
     fn step(&self, receiver: usize, point: usize, chirp: usize) -> Lanes {
-        let chirps = self.tensors.chirps;
         let (a, b) = (self.row(point, 0), self.row(point, receiver + 1));
-        if chirp > 0 && chirp + LANES < chirps {
-            let at = |from: usize| zip(load(a, from, LANES), load(b, from, LANES), |a, b| a + b);
-            return zip(at(chirp + 1), at(chirp - 1), |next, last| 0.5 * (next - last));
+        let at = |from: usize| zip(load(a, from, LANES), load(b, from, LANES), |a, b| a + b);
+        zip(at(chirp + 2), at(chirp), |next, last| 0.5 * (next - last))
+    }
+}
+
+/// Fills what surrounds a row's values, which begin at 1: before and after them what makes the central difference of
+/// the first and the last that of [`difference`], then the last one again up to a whole number of lanes.
+fn extend(row: &mut [f32], chirps: usize) {
+    let last = row[chirps];
+    row[chirps + 1..].fill(last);
+    match chirps {
+        1 => row[0] = last,
+        2 => (row[0], row[3]) = (2.0 * row[1] - row[2], 2.0 * row[2] - row[1]),
+        _ => {
+            row[0] = 3.0 * (row[1] - row[2]) + row[3];
+            row[chirps + 1] = 3.0 * (last - row[chirps - 1]) + row[chirps - 2];
         }
-        std::array::from_fn(|lane| {
-            let pairs = difference((chirp + lane).min(chirps - 1), chirps);
-            pairs.iter().map(|&(from, weight)| weight as f32 * (a[from] + b[from])).sum()
-        })
     }
 }
 
@@ -218,8 +237,8 @@ pub fn gradients(moving: &Moving, upstream: &[f32], samples: usize) -> [Vec<f32>
         .map(|(index, ((x, y), (z, re)))| Back {
             moving,
             first: index * count,
-            to_legs: vec![0.0; x.len() * moving.geometry.legs()],
-            to_sweep: vec![0.0; x.len()],
+            to_legs: Scratch::new(0),
+            to_sweep: Scratch::new(0),
             axes: [x, y, z],
             re,
             im: im.next(),
@@ -234,9 +253,9 @@ struct Back<'a> {
     moving: &'a Moving<'a>,
     first: usize,
     /// `[point][leg][chirp]`, to the legs' changes.
-    to_legs: Vec<f32>,
+    to_legs: Scratch,
     /// `[point][chirp]`, of the receiver at hand.
-    to_sweep: Vec<f32>,
+    to_sweep: Scratch,
     axes: [&'a mut [f32]; 3],
     re: &'a mut [f32],
     im: Option<&'a mut [f32]>,
@@ -253,7 +272,14 @@ impl Back<'_> {
 
 impl Sink for Back<'_> {
     fn points(&self) -> usize {
-        self.to_sweep.len() / self.moving.tensors.chirps
+        self.axes[0].len() / self.moving.tensors.chirps
+    }
+
+    fn open(&mut self) {
+        let size = self.axes[0].len();
+        self.to_legs = Scratch::new((size * self.moving.geometry.legs()).div_ceil(LANES));
+        self.to_legs.fill(ZERO);
+        self.to_sweep = Scratch::new(size.div_ceil(LANES));
     }
 
     #[inline(always)]
@@ -276,16 +302,18 @@ impl Sink for Back<'_> {
         });
         for (leg, other) in [(0, 1), (receiver + 1, 0)] {
             let to_leg = fma(to_product, path.lengths_m[other], common);
-            accumulate(&mut self.to_legs, (local * geometry.legs() + leg) * chirps + chirp, width, to_leg);
+            accumulate(self.to_legs.as_flattened_mut(), (local * geometry.legs() + leg) * chirps + chirp, width, to_leg);
         }
-        super::lanes::store(&mut self.to_sweep, local * chirps + chirp, width, gradient.sweep);
+        store(self.to_sweep.as_flattened_mut(), local * chirps + chirp, width, gradient.sweep);
     }
 
     fn close(&mut self, receiver: usize) {
         let (chirps, legs) = (self.moving.tensors.chirps, self.moving.geometry.legs());
         let per_step = self.moving.geometry.sweep_per_step;
         if per_step != 0.0 && chirps > 1 {
-            for (sweep, to_legs) in self.to_sweep.chunks(chirps).zip(self.to_legs.chunks_mut(legs * chirps)) {
+            let rows = self.to_legs.as_flattened_mut().chunks_mut(legs * chirps);
+            for (sweep, to_legs) in self.to_sweep.as_flattened().chunks_exact(chirps).zip(rows).take(self.axes[0].len() / chirps)
+            {
                 for leg in [0, receiver + 1] {
                     add_difference_adjoint(sweep, per_step, &mut to_legs[leg * chirps..][..chirps]);
                 }
@@ -301,25 +329,26 @@ impl Back<'_> {
     fn to_displacements(&mut self) {
         let Moving { geometry, tensors, .. } = self.moving;
         let chirps = tensors.chirps;
-        let softening = (SOFTENING_M * SOFTENING_M) as f32;
-        for local in 0..self.to_sweep.len() / chirps {
+        let [to_x, to_y, to_z] = &mut self.axes;
+        let rows = to_x.chunks_mut(chirps).zip(to_y.chunks_mut(chirps)).zip(to_z.chunks_mut(chirps));
+        for ((local, ((to_x, to_y), to_z)), to_legs) in
+            rows.enumerate().zip(self.to_legs.as_flattened().chunks(geometry.legs() * chirps))
+        {
             let point = self.first + local;
-            let u: [&[f32]; 3] = std::array::from_fn(|axis| &tensors.axes[axis][point * chirps..][..chirps]);
-            let [x, y, z] = &mut self.axes;
-            let [x, y, z] = [x, y, z].map(|values| &mut values[local * chirps..][..chirps]);
-            for leg in 0..geometry.legs() {
-                let length = geometry.lengths_m[leg][point];
-                let squared = multiply_add(length, length, softening);
-                let to_change = &self.to_legs[(local * geometry.legs() + leg) * chirps..][..chirps];
-                for chirp in 0..chirps {
-                    let (growth, along) = geometry.growth(point, leg, [u[0][chirp], u[1][chirp], u[2][chirp]]);
+            let [x, y, z] = tensors.axes.map(|axis| &axis[point * chirps..][..chirps]);
+            for (leg, to_change) in to_legs.chunks(chirps).enumerate() {
+                let v = geometry.offset_m(point, leg);
+                let (length, squared) = geometry.length(point, leg);
+                let to = to_x.iter_mut().zip(to_y.iter_mut()).zip(to_z.iter_mut());
+                for ((((x, y), z), to_change), ((to_x, to_y), to_z)) in x.iter().zip(y).zip(z).zip(to_change).zip(to) {
+                    let growth = growth(v, *x, *y, *z);
                     let whole = (growth + squared).sqrt();
                     let both = 1.0 / (whole + length);
-                    // Twice the derivative of growth/(whole + length), for the derivative 2·along of the growth.
-                    let factor = to_change[chirp] * (2.0 * both - growth * both * both / whole);
-                    x[chirp] = multiply_add(factor, along[0], x[chirp]);
-                    y[chirp] = multiply_add(factor, along[1], y[chirp]);
-                    z[chirp] = multiply_add(factor, along[2], z[chirp]);
+                    // The growth's derivative is 2(v + u), that of growth/(whole + length) to it half of this factor.
+                    let factor = to_change * (2.0 * both - growth * both * both / whole);
+                    *to_x = multiply_add(factor, v[0] + x, *to_x);
+                    *to_y = multiply_add(factor, v[1] + y, *to_y);
+                    *to_z = multiply_add(factor, v[2] + z, *to_z);
                 }
             }
         }

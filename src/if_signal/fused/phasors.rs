@@ -68,6 +68,8 @@ impl Sink for Columns<'_> {
         self.phase.len() / self.chirps
     }
 
+    fn open(&mut self) {}
+
     #[inline(always)]
     fn put(&mut self, _: usize, local: usize, chirp: usize, gradient: &Return) {
         let (at, width) = (local * self.chirps + chirp, self.chirps - chirp);
