@@ -48,7 +48,8 @@ fn measure(paths: PathModel, device: &Device) {
     };
     let model = procedural::person(&PersonConfig { edge_m: 0.0198, ..Default::default() }).expect("a person");
     let vertices = model.template.len();
-    let motion = actions::motion(Action::WalkBackForthArmswing, &StyleConfig::default(), &model, &[], 2.0, 60.0).expect("a motion");
+    let motion =
+        actions::motion(Action::WalkBackForthArmswing, &StyleConfig::default(), &model, &[], 2.0, 60.0).expect("a motion");
     let person = Person::Skinned { model, motion, placement: actions::placement(1.0, 3.0) };
     let mut config = SimulatorConfig { paths, ..Default::default() };
     config.room.patches = Some(5000);

@@ -86,7 +86,10 @@ fn assert_same_as_flex(name: &str, device: &Device) {
         (relative_difference(&found.signal, &wanted.signal), relative_difference(&found.gradients, &wanted.gradients));
     println!("{name}: signal differs by {signal:.1e}, gradients by {gradients:.1e}");
     assert!(signal < SIGNAL_TOLERANCE, "{name}: the signal differs by {signal:.1e} from flex, tolerance {SIGNAL_TOLERANCE:.1e}");
-    assert!(gradients < GRADIENT_TOLERANCE, "{name}: gradients differ by {gradients:.1e} from flex, tolerance {GRADIENT_TOLERANCE:.1e}");
+    assert!(
+        gradients < GRADIENT_TOLERANCE,
+        "{name}: gradients differ by {gradients:.1e} from flex, tolerance {GRADIENT_TOLERANCE:.1e}"
+    );
 }
 
 #[test]

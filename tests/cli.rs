@@ -88,8 +88,16 @@ fn a_run_leaves_pictures_numbers_and_a_model_that_infers_at_once() {
     assert!(out(&output).contains("PSNR") && out(&output).contains("report: run/report.md"), "{}", out(&output));
     let run = folder.path().join("run");
     for file in [
-        "config.toml", "metrics.json", "run.json", "report.md", "loss.png", "range_doppler.png", "range_doppler_moving.png",
-        "time_doppler.png", "best/weights.safetensors", "last/checkpoint.json",
+        "config.toml",
+        "metrics.json",
+        "run.json",
+        "report.md",
+        "loss.png",
+        "range_doppler.png",
+        "range_doppler_moving.png",
+        "time_doppler.png",
+        "best/weights.safetensors",
+        "last/checkpoint.json",
     ] {
         assert!(run.join(file).is_file(), "{file} is missing");
     }
@@ -97,8 +105,10 @@ fn a_run_leaves_pictures_numbers_and_a_model_that_infers_at_once() {
     let output = hybridsim(&arguments, folder.path());
     assert_refused(&output, 2, &["run: already holds a run", "--resume"]);
 
-    let output =
-        hybridsim(&["infer", "--checkpoint", "run/best", "--action", "lunge", "--frames", "2", "-q", "--out", "made"], folder.path());
+    let output = hybridsim(
+        &["infer", "--checkpoint", "run/best", "--action", "lunge", "--frames", "2", "-q", "--out", "made"],
+        folder.path(),
+    );
     assert!(output.status.success(), "{}", err(&output));
     assert!(folder.path().join("made/recording/if.npy").is_file());
     assert!(folder.path().join("made/range_doppler.png").is_file());
@@ -106,7 +116,11 @@ fn a_run_leaves_pictures_numbers_and_a_model_that_infers_at_once() {
     let recorded = recording().display().to_string();
     let output = hybridsim(&["evaluate", "--checkpoint", "run/best", &recorded, "-q"], folder.path());
     assert!(output.status.success(), "{}", err(&output));
-    assert!(out(&output).contains("person's cells") && out(&output).contains("LPIPS           not available"), "{}", out(&output));
+    assert!(
+        out(&output).contains("person's cells") && out(&output).contains("LPIPS           not available"),
+        "{}",
+        out(&output)
+    );
 }
 
 #[test]

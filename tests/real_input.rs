@@ -74,13 +74,10 @@ fn captured_motions_are_simulated_on_bodies_of_others() {
     let Some(shared) = shared() else { return };
     let out = tempfile::tempdir().unwrap();
     let checkpoint = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/quickstart");
-    for (index, (motion, body)) in [
-        ("cmu/02_01.bvh", "male_lite"),
-        ("cmu/02_01_smpl24.npz", "female_lite"),
-        ("procedural/arm_swing_s1.bvh", "neutral_lite"),
-    ]
-    .into_iter()
-    .enumerate()
+    for (index, (motion, body)) in
+        [("cmu/02_01.bvh", "male_lite"), ("cmu/02_01_smpl24.npz", "female_lite"), ("procedural/arm_swing_s1.bvh", "neutral_lite")]
+            .into_iter()
+            .enumerate()
     {
         let folder = out.path().join(index.to_string());
         let output = Command::new(env!("CARGO_BIN_EXE_hybridsim"))

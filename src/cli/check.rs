@@ -24,7 +24,12 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let path = &arguments.path;
     if path.join("checkpoint.json").is_file() {
         let state = checkpoint::read_state(path)?;
-        println!("checkpoint of hybridsim {}, {} epochs, best in epoch {}", state.version, state.progress.epochs_done, state.progress.best_epoch + 1);
+        println!(
+            "checkpoint of hybridsim {}, {} epochs, best in epoch {}",
+            state.version,
+            state.progress.epochs_done,
+            state.progress.best_epoch + 1
+        );
         show_radar(&state.site.radar, state.site.room.as_ref());
         return Ok(());
     }
@@ -51,7 +56,13 @@ fn show_recording(folder: &Path) -> Result<()> {
     match recording.person() {
         Some(person) => {
             let times = person.pose_times_s();
-            println!("  person             {} faces, {} poses from {:.2} s to {:.2} s", person.faces().len(), times.len(), times[0], times[times.len() - 1]);
+            println!(
+                "  person             {} faces, {} poses from {:.2} s to {:.2} s",
+                person.faces().len(),
+                times.len(),
+                times[0],
+                times[times.len() - 1]
+            );
         }
         None => println!("  person             none: only what needs no tracked body will work"),
     }
@@ -72,7 +83,11 @@ fn show_radar(radar: &Radar, room: Option<&Room>) {
     println!("  carrier            {:.3} GHz, wavelength {:.3} mm", radar.carrier_hz() / 1e9, radar.wavelength_m() * 1e3);
     println!("  bandwidth          {:.3} GHz", radar.bandwidth_hz() / 1e9);
     println!("  range              {:.3} m resolution, up to {:.2} m", radar.range_resolution_m(), radar.max_range_m());
-    println!("  velocity           {:.3} m/s resolution, up to {:.2} m/s", radar.velocity_resolution_mps(), radar.max_velocity_mps());
+    println!(
+        "  velocity           {:.3} m/s resolution, up to {:.2} m/s",
+        radar.velocity_resolution_mps(),
+        radar.max_velocity_mps()
+    );
     match room {
         Some(room) => println!(
             "  room               {}",

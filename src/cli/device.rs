@@ -92,7 +92,8 @@ fn opens(open: impl FnOnce() -> Device + std::panic::UnwindSafe) -> Option<Devic
 
 #[cfg(feature = "wgpu")]
 fn real_adapter(index: usize) -> Option<Device> {
-    opens(move || Device::wgpu(DeviceKind::DiscreteGpu(index))).or_else(|| opens(move || Device::wgpu(DeviceKind::IntegratedGpu(index))))
+    opens(move || Device::wgpu(DeviceKind::DiscreteGpu(index)))
+        .or_else(|| opens(move || Device::wgpu(DeviceKind::IntegratedGpu(index))))
 }
 
 #[cfg(feature = "wgpu")]

@@ -49,17 +49,13 @@ pub(super) fn table(evaluation: &Evaluation) -> String {
         "  {} frames, decibels from {:.0} dB below the strongest cell, mean ± standard deviation over frames\n",
         evaluation.frames, evaluation.span_db
     );
-    let rows = [
-        ("all cells", &evaluation.global),
-        ("static removed", &evaluation.moving),
-        ("person's cells", &evaluation.person),
-    ];
+    let rows =
+        [("all cells", &evaluation.global), ("static removed", &evaluation.moving), ("person's cells", &evaluation.person)];
     for (name, scores) in rows {
         match scores {
-            Some(ScoreSummary { psnr_db, ssim, mean_absolute_error_db }) => writeln!(
-                text,
-                "  {name:<15} PSNR {psnr_db:.2} dB   SSIM {ssim:.3}   mean error {mean_absolute_error_db:.2} dB"
-            ),
+            Some(ScoreSummary { psnr_db, ssim, mean_absolute_error_db }) => {
+                writeln!(text, "  {name:<15} PSNR {psnr_db:.2} dB   SSIM {ssim:.3}   mean error {mean_absolute_error_db:.2} dB")
+            }
             None => writeln!(text, "  {name:<15} not available"),
         }
         .expect("text grows");
@@ -170,18 +166,12 @@ impl RunReport<'_> {
             let metrics = MetricsConfig::default();
             let middle = frames[frames.len() / 2];
             let mut drawn = Ok(());
-            let evaluation = evaluation::evaluate(
-                recording,
-                &simulation,
-                &frames,
-                &training.heatmap,
-                &metrics,
-                &mut |frame, all, moving| {
+            let evaluation =
+                evaluation::evaluate(recording, &simulation, &frames, &training.heatmap, &metrics, &mut |frame, all, moving| {
                     if index == 0 && frame == middle {
                         drawn = self.draw_held_out(frame, &all, &moving);
                     }
-                },
-            )?;
+                })?;
             drawn?;
             if index == 0 {
                 self.draw_over_time(recording, &simulation)?;

@@ -65,13 +65,14 @@ impl Simulator {
             })
             .collect();
         self.transmitters(scene, |tx, device| {
-            let parts = walls.iter().flat_map(|(wall, groups)| groups.iter().map(move |group| (wall, group))).map(|(wall, group)| {
-                let displacement = group.displacement(tx, device);
-                let amplitude = Amplitude::real(group.amplitude.clone());
-                let points = Points { reference_m: &group.reference_m, displacement: &displacement, amplitude: &amplitude };
-                let place = scene.proxies[*wall].position_m;
-                indirect_signal(points, place, &scene.radar, tx, self.config.dechirp, self.config.sum)
-            });
+            let parts =
+                walls.iter().flat_map(|(wall, groups)| groups.iter().map(move |group| (wall, group))).map(|(wall, group)| {
+                    let displacement = group.displacement(tx, device);
+                    let amplitude = Amplitude::real(group.amplitude.clone());
+                    let points = Points { reference_m: &group.reference_m, displacement: &displacement, amplitude: &amplitude };
+                    let place = scene.proxies[*wall].position_m;
+                    indirect_signal(points, place, &scene.radar, tx, self.config.dechirp, self.config.sum)
+                });
             parts.reduce(Complex::add)
         })
     }

@@ -88,8 +88,7 @@ impl Levels {
         let device = plain.device();
         let scene = &recording.scene;
         let radar = &scene.radar;
-        let transform =
-            RangeDoppler::new(radar.loops_per_frame, radar.samples_per_chirp, radar.sampling, heatmap, &device);
+        let transform = RangeDoppler::new(radar.loops_per_frame, radar.samples_per_chirp, radar.sampling, heatmap, &device);
         let power = |signal: Complex<4>| values(transform.map(signal).power());
 
         let measured = recording.target(frame, &device)?;
@@ -120,7 +119,8 @@ impl Levels {
 /// Power of a heatmap's cell for white noise of power 1 in a sample.
 fn noise_gain(radar: &crate::radar::Radar, heatmap: &HeatmapConfig) -> f64 {
     let squares = |weights: Vec<f64>| weights.iter().map(|weight| weight * weight).sum::<f64>();
-    squares(heatmap.range_window.weights(radar.samples_per_chirp)) * squares(heatmap.doppler_window.weights(radar.loops_per_frame))
+    squares(heatmap.range_window.weights(radar.samples_per_chirp))
+        * squares(heatmap.doppler_window.weights(radar.loops_per_frame))
 }
 
 fn median(values: &[f64]) -> f64 {

@@ -130,10 +130,9 @@ pub fn load_weights(folder: &Path, mut simulator: Simulator) -> Result<Simulator
         return Err(Error::read(&path, std::io::Error::from(std::io::ErrorKind::NotFound)));
     }
     let mut store = SafetensorsStore::from_file(&path).allow_partial(true).validate(false);
-    let result = simulator.load_from(&mut store).map_err(|error| Error::Parse {
-        path: path.clone(),
-        message: format!("not a complete weights file: {error}"),
-    })?;
+    let result = simulator
+        .load_from(&mut store)
+        .map_err(|error| Error::Parse { path: path.clone(), message: format!("not a complete weights file: {error}") })?;
     let other = |found: String, expected: &str| {
         Error::field(&path, "weights", found, expected)
             .with_hint("this checkpoint belongs to another configuration; use the config.toml beside it")

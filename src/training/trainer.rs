@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use burn::{
-    module::Module,
     grad_clipping::GradientClipping,
+    module::Module,
     optim::{AdamConfig, GradientsParams, ModuleOptimizer},
     tensor::{Device, Tensor},
 };
@@ -73,8 +73,7 @@ impl Trainer<'_> {
         let device = self.device.clone().autodiff();
         let losses = self.losses(&split)?;
 
-        let mut simulator =
-            checkpoint::with_stable_ids(self.simulator_config.init(self.site.body_extent, self.seed, &device));
+        let mut simulator = checkpoint::with_stable_ids(self.simulator_config.init(self.site.body_extent, self.seed, &device));
         let mut optimizer = ModuleOptimizer::from(AdamConfig::new().with_epsilon(1e-8).build())
             .with_grad_clipping(GradientClipping::Norm(self.config.gradient_clip as f32));
         let mut progress =
@@ -115,7 +114,8 @@ impl Trainer<'_> {
             let mut learning_rate = self.config.learning_rate;
             for batch in order.chunks(self.config.frames_per_step) {
                 learning_rate = self.config.learning_rate_at(progress.steps_done, steps);
-                let (stepped, loss) = self.step(simulator, &mut optimizer, &prepared, batch, progress.steps_done, learning_rate)?;
+                let (stepped, loss) =
+                    self.step(simulator, &mut optimizer, &prepared, batch, progress.steps_done, learning_rate)?;
                 simulator = stepped;
                 sum += loss * batch.len() as f64;
                 progress.steps_done += 1;

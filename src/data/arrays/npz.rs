@@ -52,8 +52,7 @@ impl Npz {
 
     /// Names of the arrays, sorted.
     pub fn names(&self) -> Vec<String> {
-        let mut names: Vec<_> =
-            self.members().map(str::to_string).collect();
+        let mut names: Vec<_> = self.members().map(str::to_string).collect();
         names.sort();
         names
     }
