@@ -37,14 +37,14 @@ impl RangeGrid {
     pub fn moments(&self) -> Vec<Vec<f64>> {
         let legendre = legendre(self.orders);
         let mut moments = vec![vec![0.0; self.samples]; self.orders];
-        for sample in 0..self.samples {
-            let kappa = TAU * self.reach * self.bin(sample) as f64 / self.cells as f64;
-            for (degree, polynomial) in legendre.iter().enumerate() {
-                let weight = (2 * degree + 1) as f64 * spherical_bessel(degree, kappa);
-                for (power, coefficient) in polynomial.iter().enumerate().filter(|(_, c)| **c != 0.0) {
-                    let sign = if (degree - power) / 2 % 2 == 0 { 1.0 } else { -1.0 };
-                    moments[power][sample] += sign * weight * coefficient;
-                }
+        for (degree, polynomial) in legendre.iter().enumerate() {
+            let weights: Vec<f64> = (0..self.samples)
+                .map(|sample| TAU * self.reach * self.bin(sample) as f64 / self.cells as f64)
+                .map(|kappa| (2 * degree + 1) as f64 * spherical_bessel(degree, kappa))
+                .collect();
+            for (power, coefficient) in polynomial.iter().enumerate().filter(|(_, c)| **c != 0.0) {
+                let sign = if (degree - power) / 2 % 2 == 0 { 1.0 } else { -1.0 };
+                moments[power].iter_mut().zip(&weights).for_each(|(moment, weight)| *moment += sign * weight * coefficient);
             }
         }
         moments

@@ -1,8 +1,9 @@
 //! From geometry to phasors: the amplitude and the delay of every path (paper, eq. 1 and the three-segment delay).
 //!
 //! The carrier's phase is thousands of turns, which f32 cannot hold. So the host keeps the reference length of every
-//! leg in f64 and drops its whole turns, and the device holds the few centimetres by which the leg changes. With
-//! displacements of up to 0.1 m the phase is then right to 3·10⁻⁵ rad instead of 4·10⁻³ rad (tested here against f64).
+//! leg in f64 and drops its whole turns, and the device holds the few centimetres by which the leg changes. For
+//! displacements of 3 cm along each axis the phase is then right to 4·10⁻⁵ rad, typically 6·10⁻⁶ rad, where f32 alone
+//! errs by 4·10⁻³ rad (tested here against f64).
 
 pub mod direct;
 pub mod indirect;

@@ -33,15 +33,15 @@ impl Fourier {
     }
 
     /// Y\[k\] = Σ_g x\[g\] exp(+j2πgk/C), in place; x at its places, Y in natural order. A row is `width` complex lanes.
-    pub fn from_cells(&self, grid: &mut [Lanes], width: usize) {
+    pub fn transform(&self, grid: &mut [Lanes], width: usize) {
         let half = grid.len() / (4 * width);
         if half == 0 {
             return;
         }
         // Halves first, and theirs before: small ones stay in the cache from their first to their last pass.
         let (low, high) = grid.split_at_mut(half * 2 * width);
-        self.from_cells(low, width);
-        self.from_cells(high, width);
+        self.transform(low, width);
+        self.transform(high, width);
         self.butterflies(low, high, width, |a, b, root| {
             let b = multiply(b, root);
             (add(a, b), subtract(a, b))
@@ -49,15 +49,15 @@ impl Fourier {
     }
 
     /// The adjoint: x\[g\] = Σ_k Y\[k\] exp(−j2πgk/C), in place; Y in natural order, x at its places.
-    pub fn to_cells(&self, grid: &mut [Lanes], width: usize) {
+    pub fn adjoint(&self, grid: &mut [Lanes], width: usize) {
         let half = grid.len() / (4 * width);
         if half == 0 {
             return;
         }
         let (low, high) = grid.split_at_mut(half * 2 * width);
         self.butterflies(low, high, width, |a, b, (c, s)| (add(a, b), multiply(subtract(a, b), (c, -s))));
-        self.to_cells(low, width);
-        self.to_cells(high, width);
+        self.adjoint(low, width);
+        self.adjoint(high, width);
     }
 
     /// Replaces every pair of complex lanes of two halves; the root belongs to the row.
@@ -117,9 +117,9 @@ mod tests {
                 }
             }
             if forward {
-                fourier.from_cells(&mut grid, width)
+                fourier.transform(&mut grid, width)
             } else {
-                fourier.to_cells(&mut grid, width)
+                fourier.adjoint(&mut grid, width)
             }
             for k in 0..length {
                 let (mut re, mut im) = (0.0, 0.0);

@@ -248,7 +248,7 @@ pub fn sum(returns: &impl Returns, samples: usize) -> Vec<f32> {
                 grids.into_iter().reduce(add).expect("one part at least")
             }
         };
-        plan.fourier.from_cells(&mut grid, ORDERS);
+        plan.fourier.transform(&mut grid, ORDERS);
         let width = re.len() / samples;
         plan.collect(&grid, |sample, r, i| {
             for lane in 0..width {
@@ -281,7 +281,7 @@ pub fn gradients(returns: &impl Returns, upstream: &[f32], samples: usize, sinks
             };
             let mut grid = plan.empty();
             plan.distribute(|sample| (lanes(up_re, sample), lanes(up_im, sample)), &mut grid);
-            plan.fourier.to_cells(&mut grid, ORDERS);
+            plan.fourier.adjoint(&mut grid, ORDERS);
             grid
         })
         .collect();

@@ -320,13 +320,13 @@ impl Sink for Back<'_> {
             }
         }
         if receiver + 1 == self.moving.receivers() {
-            self.to_displacements();
+            self.close_legs();
         }
     }
 }
 
 impl Back<'_> {
-    fn to_displacements(&mut self) {
+    fn close_legs(&mut self) {
         let Moving { geometry, tensors, .. } = self.moving;
         let chirps = tensors.chirps;
         let [to_x, to_y, to_z] = &mut self.axes;
