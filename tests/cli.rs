@@ -97,7 +97,7 @@ fn a_run_leaves_pictures_numbers_and_a_model_that_infers_at_once() {
         "range_doppler_moving.png",
         "time_doppler.png",
         "best/weights.safetensors",
-        "last/checkpoint.json",
+        "last/checkpoint.toml",
     ] {
         assert!(run.join(file).is_file(), "{file} is missing");
     }

@@ -70,8 +70,11 @@ fn train(config: &Config, recordings: &[LoadedRecording], resume: Option<&Path>,
     Run { folder, losses, result }
 }
 
+/// The numbers of the last weights; the header before them names the library's metadata in any order.
 fn weights(run: &Run) -> Vec<u8> {
-    std::fs::read(run.folder.path().join("last").join(checkpoint::WEIGHTS)).unwrap()
+    let bytes = std::fs::read(run.folder.path().join("last").join(checkpoint::WEIGHTS)).unwrap();
+    let header = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    bytes[8 + header..].to_vec()
 }
 
 #[test]
@@ -83,7 +86,12 @@ fn training_lowers_the_loss_on_held_out_frames() {
     let history = checkpoint::read_state(&run.folder.path().join("best")).unwrap().progress.history;
     let held_out = |index: usize| history[index].validation_loss.unwrap();
     let best = (0..history.len()).map(held_out).fold(f64::INFINITY, f64::min);
-    assert!(best < 0.7 * held_out(0), "held-out loss only fell from {:.1} to {best:.1} dB²", held_out(0));
+    // Decibels of exponentially distributed powers have the variance (10/ln 10)² π²/6; two independent noises differ by
+    // twice that, and no simulator can come nearer in cells that hold nothing but noise.
+    let floor = 2.0 * (10.0 / std::f64::consts::LN_10).powi(2) * std::f64::consts::PI.powi(2) / 6.0;
+    let excess = |loss: f64| loss - floor;
+    let (first, best) = (excess(held_out(0)), excess(best));
+    assert!(best < 0.5 * first, "held-out loss above that of noise only fell from {first:.1} to {best:.1} dB²");
 }
 
 #[test]

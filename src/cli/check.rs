@@ -22,7 +22,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let path = &arguments.path;
-    if path.join("checkpoint.json").is_file() {
+    if path.join("checkpoint.toml").is_file() {
         let state = checkpoint::read_state(path)?;
         println!(
             "checkpoint of hybridsim {}, {} epochs, best in epoch {}",

@@ -1,7 +1,7 @@
 //! Checkpoints: what is needed to infer (weights, settings, site) and to continue as if nothing had happened.
 //!
 //! A checkpoint is a folder, written under a temporary name and renamed when it is complete:
-//! `weights.safetensors`, `optimizer.bpk`, `config.toml` (resolved), `checkpoint.json` (progress and site).
+//! `weights.safetensors`, `optimizer.bpk`, `config.toml` (resolved), `checkpoint.toml` (progress and site).
 
 use std::path::Path;
 
@@ -15,7 +15,10 @@ use serde::{Deserialize, Serialize};
 
 use super::metrics::EpochMetrics;
 use crate::{
-    data::atomic::AtomicFolder,
+    data::{
+        atomic::{self, AtomicFolder},
+        settings,
+    },
     error::{Error, Result},
     features::Extent,
     person::Placement,
@@ -26,7 +29,7 @@ use crate::{
 
 pub const WEIGHTS: &str = "weights.safetensors";
 const OPTIMIZER: &str = "optimizer.bpk";
-const STATE: &str = "checkpoint.json";
+const STATE: &str = "checkpoint.toml";
 
 /// The place a simulator was trained for: what `infer` needs beside weights and a motion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,7 +54,7 @@ pub struct Progress {
     pub history: Vec<EpochMetrics>,
 }
 
-/// `checkpoint.json`.
+/// `checkpoint.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CheckpointState {
@@ -94,8 +97,8 @@ pub fn save(
         let path = partial.path().join(OPTIMIZER);
         optimizer.save(&path).map_err(|error| Error::write(&path, std::io::Error::other(error.to_string())))?;
     }
-    let json = serde_json::to_string_pretty(state).expect("plain data");
-    for (name, text) in [("config.toml", config_toml), (STATE, &json)] {
+    let state = toml::to_string(state).expect("plain data");
+    for (name, text) in [("config.toml", config_toml), (STATE, &state)] {
         let path = partial.path().join(name);
         std::fs::write(&path, text).map_err(|error| Error::write(&path, error))?;
     }
@@ -104,19 +107,15 @@ pub fn save(
 
 /// Reads what a checkpoint says about itself.
 pub fn read_state(folder: &Path) -> Result<CheckpointState> {
+    atomic::recover(folder)?;
     let path = folder.join(STATE);
-    let text = std::fs::read_to_string(&path).map_err(|error| {
-        if error.kind() == std::io::ErrorKind::NotFound {
-            Error::Usage {
-                message: format!("{}: not a checkpoint: it holds no {STATE}", folder.display()),
-                hint: Some("a run folder keeps its checkpoints in `best` and `last`".into()),
-            }
-        } else {
-            Error::read(&path, error)
-        }
-    })?;
-    let state: CheckpointState =
-        serde_json::from_str(&text).map_err(|error| Error::Parse { path: path.clone(), message: error.to_string() })?;
+    if !path.is_file() {
+        return Err(Error::Usage {
+            message: format!("{}: not a checkpoint: it holds no {STATE}", folder.display()),
+            hint: Some("a run folder keeps its checkpoints in `best` and `last`".into()),
+        });
+    }
+    let state: CheckpointState = settings::read_toml(&path)?;
     if state.format != 1 {
         return Err(Error::field(path, "format", state.format.to_string(), "1"));
     }
