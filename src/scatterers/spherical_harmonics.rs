@@ -100,14 +100,14 @@ mod tests {
     #[test]
     fn the_basis_is_orthonormal() {
         // Gauss-Legendre in height (8 nodes: exact to degree 15) times 16 even steps in azimuth: exact for degree 3 × 3.
-        let nodes = [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_2];
+        let nodes: [f64; 4] = [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_2];
         let weights = [0.362_683_783_378_362, 0.313_706_645_877_887_3, 0.222_381_034_453_374_5, 0.101_228_536_290_376_3];
         let (mut quadrature, mut weight) = (Vec::new(), Vec::new());
         for (node, node_weight) in nodes.iter().zip(weights) {
             for height in [*node, -node] {
                 for step in 0..16 {
                     let (sine, cosine) = (PI * f64::from(step) / 8.0).sin_cos();
-                    let radius = (1.0 - height * height as f64).sqrt();
+                    let radius = (1.0 - height * height).sqrt();
                     quadrature.extend([radius * cosine, radius * sine, height]);
                     weight.push(node_weight * PI / 8.0);
                 }
