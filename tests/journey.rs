@@ -6,7 +6,7 @@ use hybridsim::{
     config::Config,
     error::{Error, Result},
     recorder,
-    training::{Event, LoadedRecording, Trainer, checkpoint, load_recordings},
+    training::{Event, LoadedRecording, Trainer, checkpoint, load_recordings, site},
 };
 
 /// `configs/test.toml`, with its recording made once for all tests of this file.
@@ -43,7 +43,7 @@ fn train(config: &Config, recordings: &[LoadedRecording], resume: Option<&Path>,
         simulator_config: &config.simulator,
         seed: config.seed,
         recordings,
-        site: recordings[0].site(&config.simulator),
+        site: site(recordings, &config.simulator),
         config_toml: &config.to_toml(),
         folder: folder.path(),
         device: burn::tensor::Device::flex(),

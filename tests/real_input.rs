@@ -9,7 +9,7 @@ use hybridsim::{
     config::Config,
     data::{Recording, read_body},
     import::{self, BvhConfig},
-    training::{Event, Trainer, load_recordings},
+    training::{Event, Trainer, load_recordings, site},
 };
 
 fn shared() -> Option<PathBuf> {
@@ -36,7 +36,7 @@ fn training_on_a_planted_recording_lowers_its_loss() {
         simulator_config: &config.simulator,
         seed: config.seed,
         recordings: &recordings,
-        site: recordings[0].site(&config.simulator),
+        site: site(&recordings, &config.simulator),
         config_toml: &config.to_toml(),
         folder: folder.path(),
         device: burn::tensor::Device::flex(),

@@ -9,7 +9,6 @@ use crate::{
     data::atomic,
     error::{Error, Result},
     evaluation::{self, Simulation},
-    heatmap::HeatmapConfig,
     metrics::MetricsConfig,
     training::{LoadedRecording, checkpoint},
 };
@@ -44,6 +43,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     for folder in &arguments.recordings {
         let recording = LoadedRecording::open(folder, &state.simulator, false)?;
         report::same_radar(folder, &recording.scene.radar, &state.site.radar)?;
+        report::tell_notes(&recording);
         let available = recording.scene.radar.frames;
         let (first, end) = arguments.frames.unwrap_or((0, available));
         if end > available {
@@ -56,17 +56,11 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         let simulation = Simulation::new(&simulator, &recording.scene, state.seed, true);
         let progress = Progress::new("evaluating", frames.len(), common.quiet);
         let mut done = 0;
-        let evaluation = evaluation::evaluate(
-            &recording,
-            &simulation,
-            &frames,
-            &HeatmapConfig::default(),
-            &MetricsConfig::default(),
-            &mut |_, _, _| {
+        let evaluation =
+            evaluation::evaluate(&recording, &simulation, &frames, &state.heatmap, &MetricsConfig::default(), &mut |_, _, _| {
                 done += 1;
                 progress.set(done);
-            },
-        )?;
+            })?;
         progress.finish();
         println!("{}", folder.display());
         print!("{}", report::table(&evaluation));

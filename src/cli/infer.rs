@@ -10,7 +10,6 @@ use crate::{
     data::{IfFrame, IfLayout, RecordingContents, atomic::AtomicFolder, read_body, settings::read_settings, write_recording},
     error::{Error, Result},
     evaluation::{Simulation, measured_frame},
-    heatmap::HeatmapConfig,
     import::{self, BvhConfig},
     person::{
         BodyModel, Person, Placement,
@@ -46,6 +45,9 @@ pub(crate) struct Arguments {
     /// How to read a BVH file: a TOML file with its joint map, units and up axis
     #[arg(long, value_name = "FILE", requires = "motion")]
     motion_config: Option<PathBuf>,
+    /// Up axis of an npz motion: y as in SMPL, or z as AMASS has it
+    #[arg(long, value_enum, default_value_t = Up::Y, requires = "motion")]
+    up: Up,
     /// Distance of the motion's origin in front of the radar; the training person's place by default
     #[arg(long, value_name = "METRES")]
     distance: Option<f64>,
@@ -57,6 +59,12 @@ pub(crate) struct Arguments {
     clean: bool,
     #[command(flatten)]
     out: Out,
+}
+
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Up {
+    Y,
+    Z,
 }
 
 fn parse_action(name: &str) -> std::result::Result<Action, String> {
@@ -76,6 +84,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         Some(recording) => {
             let recording = LoadedRecording::open(recording, &state.simulator, false)?;
             report::same_radar(&recording.folder, &recording.scene.radar, &state.site.radar)?;
+            report::tell_notes(&recording);
             Some(recording)
         }
         None => None,
@@ -118,7 +127,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     })?;
     progress.finish();
 
-    let mut pictures = report::Pictures::new(&radar, &HeatmapConfig::default());
+    let mut pictures = report::Pictures::new(&radar, &state.heatmap);
     match &measured {
         Some(recording) => {
             let samples = (0..radar.frames).map(|frame| measured_frame(recording, frame)).collect::<Result<Vec<_>>>()?.concat();
@@ -167,8 +176,12 @@ fn new_person(arguments: &Arguments, state: &CheckpointState) -> Result<Person> 
     if let Some(distance) = arguments.distance {
         placement.origin_m[1] = distance;
     }
-    // A captured motion starts wherever its recorder's floor had its origin: its first pose is put in place instead,
-    // with the feet's height left as captured.
+    if arguments.up == Up::Z {
+        // The body of a z-up motion that faces -y faces the radar.
+        placement.radar_from_motion = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    }
+    // A captured motion starts wherever its recorder's floor had its origin: its path is centred instead, with the
+    // feet's height left as captured.
     if arguments.motion.is_some() {
         recentre(&motion, &mut placement);
     }
@@ -193,7 +206,8 @@ fn frames(arguments: &Arguments, radar: &Radar, person: Option<&Person>, recorde
         _ if recorded => radar.frames,
         Some(person) => {
             let end = person.pose_times_s().last().copied().unwrap_or(0.0);
-            ((end - radar.frame_duration_s()) / radar.frame_period_s).floor().max(-1.0) as i64 as usize + 1
+            // Below zero, not even the first frame fits.
+            ((end - radar.frame_duration_s()) / radar.frame_period_s + 1.0).floor().max(0.0) as usize
         }
         None => wanted,
     };

@@ -16,7 +16,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::error::Error;
+use crate::error::{Error, Result};
 
 pub use device::{available, device};
 
@@ -70,7 +70,7 @@ enum Command {
     /// Compare simulated with measured heatmaps
     ///
     /// PSNR, SSIM and dB error over all cells, with what is static removed, and on the cells that the person
-    /// occupies, with confidence intervals.
+    /// occupies, as mean and standard deviation over frames; --out writes them with their 95 % intervals as JSON.
     Evaluate(evaluate::Arguments),
 }
 
@@ -91,13 +91,13 @@ pub fn main() -> ExitCode {
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
-    let result = match &cli.command {
+    let result = refuse_idle_settings(&cli).and_then(|()| match &cli.command {
         Command::Check(arguments) => check::run(arguments, &cli.common),
         Command::Record(arguments) => record::run(arguments, &cli.common),
         Command::Train(arguments) => train::run(arguments, &cli.common),
         Command::Infer(arguments) => infer::run(arguments, &cli.common),
         Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
-    };
+    });
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -107,6 +107,17 @@ pub fn main() -> ExitCode {
             }
             ExitCode::from(status(&error))
         }
+    }
+}
+
+/// A checkpoint keeps the settings it was trained with: changing some would change nothing.
+fn refuse_idle_settings(cli: &Cli) -> Result<()> {
+    match cli.command {
+        Command::Infer(_) | Command::Evaluate(_) if !cli.common.set.is_empty() => Err(Error::Usage {
+            message: "--set: a checkpoint keeps the settings it was trained with".into(),
+            hint: Some("give --set to train or record".into()),
+        }),
+        _ => Ok(()),
     }
 }
 

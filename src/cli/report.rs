@@ -34,6 +34,19 @@ pub(super) fn fresh_run_folder(config: &Path) -> PathBuf {
         .expect("one of endlessly many names is free")
 }
 
+/// What had to be fitted when a recording was read, on standard error.
+pub(super) fn tell_notes(loaded: &LoadedRecording) {
+    for note in &loaded.recording.notes {
+        eprintln!("note: {}: {note}", loaded.folder.display());
+    }
+    if loaded.recording.person().is_none() {
+        eprintln!("note: {}: no person: only the room is simulated", loaded.folder.display());
+    }
+    if loaded.recording.room.is_none() {
+        eprintln!("note: {}: no room: only the person is simulated, without indirect path", loaded.folder.display());
+    }
+}
+
 /// A trained simulator speaks for one radar; the number of frames is free.
 pub(super) fn same_radar(folder: &Path, found: &Radar, trained: &Radar) -> Result<()> {
     if (Radar { frames: trained.frames, full_scale_codes: trained.full_scale_codes, ..found.clone() }) == *trained {

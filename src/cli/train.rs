@@ -14,7 +14,7 @@ use crate::{
     config::Config,
     data::atomic,
     error::{Error, Result},
-    training::{Trainer, load_recordings},
+    training::{Trainer, load_recordings, site},
 };
 
 #[derive(Args)]
@@ -31,7 +31,10 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let (config_path, run_folder, resume) = match (&arguments.resume, &arguments.config) {
-        (Some(run), _) => (run.join("config.toml"), run.clone(), Some(run.join("last")).filter(|last| last.is_dir())),
+        (Some(run), _) => {
+            atomic::recover(run.join("last"))?;
+            (run.join("config.toml"), run.clone(), Some(run.join("last")).filter(|last| last.is_dir()))
+        }
         (None, Some(config)) => {
             let folder = match &arguments.out.out {
                 Some(out) => out.clone(),
@@ -41,6 +44,12 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         }
         (None, None) => unreachable!("clap asks for one of them"),
     };
+    if resume.is_some() && !common.set.is_empty() {
+        return Err(Error::Usage {
+            message: "--set: a resumed run keeps the settings it was started with".into(),
+            hint: Some("start a new run with other settings, or edit nothing and leave --set out".into()),
+        });
+    }
     let mut config = Config::read(&config_path, &common.set)?;
     let device = device(&common.device)?;
     if resume.is_none() && run_folder.join("last").is_dir() {
@@ -60,12 +69,13 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 
     let started = std::time::Instant::now();
     let recordings = load_recordings(&config.data.recordings, &config.simulator)?;
+    recordings.iter().for_each(report::tell_notes);
     let trainer = Trainer {
         config: &config.training,
         simulator_config: &config.simulator,
         seed: config.seed,
         recordings: &recordings,
-        site: recordings[0].site(&config.simulator),
+        site: site(&recordings, &config.simulator),
         config_toml: &config_toml,
         folder: &run_folder,
         device: device.clone(),

@@ -14,7 +14,7 @@ use crate::room::Boundary;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EncodingConfig {
-    /// Frequencies per coordinate (L): the finest period is 2^(1−L) of the room's half width.
+    /// Frequencies per coordinate (L): the finest period is 2^(2−L) of the room's half width.
     pub octaves: usize,
     /// Adds six numbers that say which boundary the patch belongs to, so that the two sides of an edge can differ.
     pub boundary: bool,

@@ -5,8 +5,8 @@
 //! one against the other.
 //!
 //! Scale: a path of amplitude 1 in the middle of a cell peaks at 1 (0 dB), whatever the lengths and windows. A real-sampled
-//! signal is doubled, so that its path also peaks at 1. The paper's plain FFT differs by a constant factor, which cancels
-//! in its loss.
+//! signal is doubled, so that its path also peaks at 1. With rectangular windows the paper's plain FFT differs by a constant
+//! factor, which cancels in its loss; the default windows are Hann's, whose sidelobes do not cover a person.
 
 mod angle;
 mod axes;

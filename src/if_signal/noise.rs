@@ -50,6 +50,10 @@ impl NoiseConfig {
         if !(self.level.is_finite() && self.level >= 0.0) {
             return Err(Error::setting(format!("{key}.level"), self.level, "a level of zero or more"));
         }
+        if self.law == NoiseLaw::Constant && self.level == 0.0 {
+            return Err(Error::setting(format!("{key}.level"), self.level, "a level above zero for law = \"constant\"")
+                .with_hint("in the recording's unit (ADC codes), per component; law = \"none\" is a signal without noise"));
+        }
         Ok(())
     }
 

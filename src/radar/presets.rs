@@ -29,7 +29,7 @@ impl Radar {
 
     /// The same chirp made small for tests: one transmitter, two receivers, 32 samples, 16 loops.
     ///
-    /// The sampling rate is kept, so a bin is 18 × coarser than it is far: range resolution 0.34 m, up to 11 m.
+    /// The sampling rate is kept, so range bins are eight times coarser: 0.34 m, up to 11 m.
     pub fn small(frames: usize) -> Self {
         let full = Self::mmmesh(frames);
         Self {

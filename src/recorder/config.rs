@@ -208,7 +208,10 @@ impl ActorConfig {
             None => {
                 let end_s = (radar.frames - 1) as f64 * radar.frame_period_s + radar.frame_duration_s();
                 let duration_s = (end_s - placement.start_s).max(1.0 / self.rate_hz);
-                actions::motion(self.action, &self.style, &model, &self.betas, duration_s, self.rate_hz)?
+                // All of the body's parameters are written, so that no reader has to guess the rest.
+                let mut betas = self.betas.clone();
+                betas.resize(betas.len().max(model.shape_directions.len()), 0.0);
+                actions::motion(self.action, &self.style, &model, &betas, duration_s, self.rate_hz)?
             }
         };
         Ok(Person::Skinned { model, motion, placement })

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    body::{Interpolation, SurfaceConfig},
+    body::{Interpolation, Sampling, SurfaceConfig},
     error::{Error, Result},
     features::{EncodingConfig, GcnConfig, TriPlaneConfig},
     if_signal::{NoiseConfig, SumForm},
@@ -49,6 +49,7 @@ pub struct SimulatorConfig {
     pub interpolation: Interpolation,
     /// γ of hidden point removal: the flip radius is 10^γ times the largest distance.
     pub flip_exponent: f64,
+    /// Facets are integrated on the direct path; on the indirect one the patches' own aperture takes that place.
     pub surface: SurfaceConfig,
     pub room: RoomPatchesConfig,
     pub triplane: TriPlaneConfig,
@@ -90,6 +91,14 @@ impl SimulatorConfig {
         self.graph.check("simulator.graph")?;
         self.decoders.check("simulator.decoders")?;
         self.noise.check("simulator.noise")?;
+        if self.paths == PathModel::Coupled && self.surface.sampling == Sampling::Facets {
+            return Err(Error::setting(
+                "simulator.surface.sampling",
+                "facets",
+                "vertices or subdivided with paths = \"coupled\"",
+            )
+            .with_hint("Gaussian patches have an aperture of their own; the facets' integral would count it twice"));
+        }
         if !(0.0..=10.0).contains(&self.flip_exponent) {
             return Err(Error::setting("simulator.flip_exponent", self.flip_exponent, "0 to 10"));
         }

@@ -1,7 +1,7 @@
 //! The scene: all that does not learn. Where every scatterer is in each frame, and who sees it.
 
 use std::{
-    collections::HashMap,
+    collections::VecDeque,
     sync::{Arc, Mutex},
 };
 
@@ -49,9 +49,14 @@ pub struct Scene {
     /// Whether every scatterer of the body stands for a whole facet.
     pub facets: bool,
     flip_exponent: f64,
-    /// Visibility does not learn, so every frame is looked at once.
-    views: Mutex<HashMap<usize, Arc<FrameView>>>,
+    /// `[point]` of the body: the canonical axis that lies flattest on its surface.
+    flattest: Vec<usize>,
+    /// Visibility does not learn, so a frame is looked at once and kept; the oldest go first.
+    views: Mutex<VecDeque<Arc<FrameView>>>,
 }
+
+/// Views that are kept: a few MB each.
+const KEPT_VIEWS: usize = 200;
 
 impl Scene {
     /// # Errors
@@ -60,6 +65,10 @@ impl Scene {
         let patches = room.map(|room| config.room.init(room)).transpose()?.unwrap_or_default();
         let proxies = room.map(|room| config.room.proxies(room)).unwrap_or_default();
         let body = person.map(|person| PosedBody::new(person, &config.surface, config.interpolation)).transpose()?;
+        let flattest = body.as_ref().map_or_else(Vec::new, |body| {
+            let normals = body.surface().normals(body.canonical_vertices());
+            normals.into_iter().map(|normal| Vector3::from(normal).iamin()).collect()
+        });
         Ok(Self {
             radar: radar.clone(),
             body,
@@ -67,7 +76,8 @@ impl Scene {
             proxies,
             facets: config.surface.sampling == Sampling::Facets,
             flip_exponent: config.flip_exponent,
-            views: Mutex::new(HashMap::new()),
+            flattest,
+            views: Mutex::new(VecDeque::new()),
         })
     }
 
@@ -86,11 +96,16 @@ impl Scene {
     /// # Errors
     /// A frame outside the motion.
     pub fn view(&self, frame: usize) -> Result<Arc<FrameView>> {
-        if let Some(view) = self.views.lock().expect("no panic while locked").get(&frame) {
-            return Ok(view.clone());
+        let known = self.views.lock().expect("no panic while locked").iter().find(|view| view.frame == frame).cloned();
+        if let Some(view) = known {
+            return Ok(view);
         }
         let view = Arc::new(self.look(frame)?);
-        self.views.lock().expect("no panic while locked").insert(frame, view.clone());
+        let mut views = self.views.lock().expect("no panic while locked");
+        if views.len() == KEPT_VIEWS {
+            views.pop_front();
+        }
+        views.push_back(view.clone());
         Ok(view)
     }
 
@@ -122,7 +137,7 @@ impl Scene {
         })
     }
 
-    /// A canonical direction of every point, turned with the body: the axis that lies flattest on the surface.
+    /// A canonical direction of every point, turned with the body.
     fn tangents(&self, frame: Option<&BodyFrame>) -> Vec<[f64; 3]> {
         let (Some(body), Some(frame)) = (&self.body, frame) else { return Vec::new() };
         let pose = frame.basis.poses.len() / 2;
@@ -130,9 +145,7 @@ impl Scene {
             .into_par_iter()
             .map(|point| {
                 let rotation = body.rotation(frame, point, pose);
-                let canonical = rotation.transpose() * Vector3::from(frame.normal[point]);
-                let flattest = canonical.iamin();
-                let axis = Vector3::from_fn(|row, _| if row == flattest { 1.0 } else { 0.0 });
+                let axis = Vector3::from_fn(|row, _| if row == self.flattest[point] { 1.0 } else { 0.0 });
                 (rotation * axis).into()
             })
             .collect()

@@ -1,7 +1,8 @@
 //! Where training starts: the levels that no physics here knows, from scattering amplitude to the recording's unit.
 //!
-//! Body, room and noise are each brought to their power in the recording, in the cells where each of them is alone:
-//! the body in moving cells above the noise, the room at rest, the noise in the median cell. Training refines them.
+//! Body, room and noise are each brought to their power in the recording: the body in the moving cells that stand
+//! out of the noise, the room to all that is at rest (leakage and furniture included), the noise in the median cell.
+//! Training refines them.
 
 use std::f64::consts::LN_2;
 
@@ -12,6 +13,7 @@ use crate::{
     complex::Complex,
     error::{Error, Result},
     heatmap::{HeatmapConfig, RangeDoppler, remove_loop_mean},
+    radar::{Radar, Sampling},
     simulator::{Mode, Simulator, Surfaces},
 };
 
@@ -19,7 +21,7 @@ use crate::{
 const FRAMES: usize = 8;
 
 /// A moving cell counts when it is this many times stronger than the noise.
-const ABOVE_NOISE: f64 = 10.0;
+const ABOVE_NOISE: f64 = 30.0;
 
 /// Powers summed over frames.
 #[derive(Default)]
@@ -28,9 +30,10 @@ struct Levels {
     simulated_moving: f64,
     measured_still: f64,
     simulated_still: f64,
-    /// Noise power of a sample, both components, and mean amplitude; summed over frames.
+    /// Of everything, whether or not it can be told apart.
+    simulated: f64,
+    /// Noise variance of one component of a sample, summed over frames.
     noise: f64,
-    amplitude: f64,
     frames: f64,
 }
 
@@ -46,7 +49,8 @@ pub fn fit_levels(
 ) -> Result<Simulator> {
     let plain = simulator.clone().valid();
     let mut levels = Levels::default();
-    for id in frames.iter().step_by(frames.len().div_ceil(FRAMES).max(1)) {
+    let looked_at: Vec<FrameId> = frames.iter().copied().step_by(frames.len().div_ceil(FRAMES).max(1)).collect();
+    for id in &looked_at {
         levels.add(&plain, &recordings[id.recording], id.frame, heatmap)?;
     }
     let measured = levels.measured_moving + levels.measured_still;
@@ -56,10 +60,9 @@ pub fn fit_levels(
             hint: Some("check that the recording holds a signal: `hybridsim check`".into()),
         });
     }
-    let simulated = levels.simulated_moving + levels.simulated_still;
-    if !(simulated.is_finite() && simulated > 0.0) {
+    if !(levels.simulated.is_finite() && levels.simulated > 0.0) {
         return Err(Error::Usage {
-            message: format!("the simulated power is {simulated}: the radar sees nothing of the scene"),
+            message: format!("the simulated power is {}: the radar sees nothing of the scene", levels.simulated),
             hint: Some("check the room's distances and where the person stands: `hybridsim check`".into()),
         });
     }
@@ -68,15 +71,20 @@ pub fn fit_levels(
     let room = ratio(levels.measured_still, levels.simulated_still);
     // Where one of them cannot be told apart, the other's level is the best guess.
     let decoders = &mut simulator.decoders;
-    if let Some(factor) = body.or(room) {
-        decoders.body_gain = decoders.body_gain.clone().scale(factor);
+    let any = (measured / levels.simulated).sqrt();
+    decoders.body_gain = decoders.body_gain.clone().scale(body.or(room).unwrap_or(any));
+    decoders.room_gain = decoders.room_gain.clone().scale(room.or(body).unwrap_or(any));
+    // The rate is relative to the simulated amplitude, which the gains have just changed.
+    let plain = simulator.clone().valid();
+    let mut amplitude = 0.0;
+    for id in &looked_at {
+        let scene = &recordings[id.recording].scene;
+        let surfaces = plain.surfaces(&plain.constants(scene), Mode::Inference);
+        let clean = plain.clean_signal(scene, &*scene.view(id.frame)?, &surfaces);
+        amplitude += f64::from((clean.power() + 1e-30).sqrt().mean().into_scalar::<f32>());
     }
-    if let Some(factor) = room.or(body) {
-        decoders.room_gain = decoders.room_gain.clone().scale(factor);
-    }
-    if levels.noise > 0.0 && levels.amplitude > 0.0 {
-        let deviation = (0.5 * levels.noise / levels.frames).sqrt();
-        let rate = deviation / (levels.amplitude / levels.frames);
+    if levels.noise > 0.0 && amplitude > 0.0 {
+        let rate = (levels.noise / levels.frames).sqrt() / (amplitude / levels.frames);
         let device = simulator.device();
         simulator.noise = simulator.noise.starting_at(rate, &device);
     }
@@ -91,14 +99,19 @@ impl Levels {
         let transform = RangeDoppler::new(radar.loops_per_frame, radar.samples_per_chirp, radar.sampling, heatmap, &device);
         let power = |signal: Complex<4>| values(transform.map(signal).power());
 
+        // A receiver without quadrature sees the real part alone.
+        let sampled = |signal: Complex<4>| match radar.sampling {
+            Sampling::Complex => signal,
+            Sampling::Real => Complex::new(signal.re, signal.im.zeros_like()),
+        };
         let measured = recording.target(frame, &device)?;
         let view = scene.view(frame)?;
         let Surfaces { body, room } = plain.surfaces(&plain.constants(scene), Mode::Inference);
         let alone = |surfaces: Surfaces| plain.clean_signal(scene, &view, &surfaces);
-        let of_body = alone(Surfaces { body, room: None });
-        let of_room = alone(Surfaces { body: None, room });
+        let of_body = sampled(alone(Surfaces { body, room: None }));
+        let of_room = sampled(alone(Surfaces { body: None, room }));
 
-        self.amplitude += (measured.clone().power() + 1e-30).sqrt().mean().into_scalar::<f32>() as f64;
+        self.simulated += values(of_body.clone().power()).iter().chain(&values(of_room.clone().power())).sum::<f64>();
         let moving = power(remove_loop_mean(measured.clone()));
         let floor = median(&moving) / LN_2;
         self.noise += floor / noise_gain(radar, heatmap);
@@ -116,11 +129,13 @@ impl Levels {
     }
 }
 
-/// Power of a heatmap's cell for white noise of power 1 in a sample.
-fn noise_gain(radar: &crate::radar::Radar, heatmap: &HeatmapConfig) -> f64 {
+/// Power of a heatmap's cell for white noise of variance 1 in each component of a sample.
+fn noise_gain(radar: &Radar, heatmap: &HeatmapConfig) -> f64 {
     let squares = |weights: Vec<f64>| weights.iter().map(|weight| weight * weight).sum::<f64>();
-    squares(heatmap.range_window.weights(radar.samples_per_chirp))
-        * squares(heatmap.doppler_window.weights(radar.loops_per_frame))
+    let over_range = squares(heatmap.range_window.weights(radar.samples_per_chirp));
+    let over_doppler = squares(heatmap.doppler_window.weights(radar.loops_per_frame));
+    // Two components; or one, whose amplitude the maps double.
+    over_range * over_doppler * if radar.sampling == Sampling::Real { 4.0 } else { 2.0 }
 }
 
 fn median(values: &[f64]) -> f64 {

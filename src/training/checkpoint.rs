@@ -21,6 +21,7 @@ use crate::{
     },
     error::{Error, Result},
     features::Extent,
+    heatmap::HeatmapConfig,
     person::Placement,
     radar::Radar,
     room::Room,
@@ -62,6 +63,9 @@ pub struct CheckpointState {
     pub version: String,
     pub seed: u64,
     pub simulator: SimulatorConfig,
+    /// The maps that the loss compared.
+    #[serde(default)]
+    pub heatmap: HeatmapConfig,
     pub site: Site,
     pub progress: Progress,
 }

@@ -31,7 +31,9 @@ impl LoadedRecording {
             refuse_ambiguous_ranges(folder, &recording)?;
         }
         let scene = Scene::new(&recording.radar, recording.room.as_ref(), recording.person(), config)?;
-        Ok(Self { folder: folder.into(), recording, scene })
+        let loaded = Self { folder: folder.into(), recording, scene };
+        loaded.refuse_frames_outside_the_motion()?;
+        Ok(loaded)
     }
 
     /// Where the person's motion stands, if a motion is what moves the person.
@@ -42,20 +44,43 @@ impl LoadedRecording {
         }
     }
 
-    /// What a simulator trained on this recording must remember of it.
-    pub fn site(&self, config: &SimulatorConfig) -> Site {
-        let canonical = self.scene.body.as_ref().map(|body| body.canonical_vertices()).unwrap_or_default();
-        Site {
-            radar: self.recording.radar.clone(),
-            room: self.recording.room.clone(),
-            placement: self.placement(),
-            body_extent: Extent::around(canonical, config.triplane.margin),
+    /// Before hours are spent: every frame must lie within the motion.
+    fn refuse_frames_outside_the_motion(&self) -> Result<()> {
+        let Some(body) = &self.scene.body else { return Ok(()) };
+        let (start, end) = body.span_s();
+        let last = self.scene.radar.frames - 1;
+        let times = [self.scene.chirp_times_s(0), self.scene.chirp_times_s(last)].concat();
+        let first_s = times.iter().copied().fold(f64::INFINITY, f64::min);
+        let last_s = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if first_s >= start - 1e-9 && last_s <= end + 1e-9 {
+            return Ok(());
         }
+        Err(Error::field(
+            self.folder.join("recording.toml"),
+            "motion",
+            format!("from {start:.3} s to {end:.3} s"),
+            format!("a motion over all frames, from {first_s:.3} s to {last_s:.3} s"),
+        )
+        .with_hint("lower radar.frames, give a longer motion, or shift it with motion.start_s"))
     }
 
     /// The measured samples of a frame, `[tx, rx, loop, sample]`.
     pub fn target(&self, frame: usize, device: &Device) -> Result<Complex<4>> {
         Ok(signal_tensor(&self.recording.frame(frame)?, device))
+    }
+}
+
+/// What a simulator trained on these recordings must remember of them: the first radar, room and placement, and the
+/// box around all of their bodies.
+pub fn site(recordings: &[LoadedRecording], config: &SimulatorConfig) -> Site {
+    let first = &recordings[0];
+    let bodies = recordings.iter().filter_map(|recording| recording.scene.body.as_ref());
+    let canonical: Vec<[f64; 3]> = bodies.flat_map(|body| body.canonical_vertices().iter().copied()).collect();
+    Site {
+        radar: first.recording.radar.clone(),
+        room: first.recording.room.clone(),
+        placement: recordings.iter().find_map(LoadedRecording::placement),
+        body_extent: Extent::around(&canonical, config.triplane.margin),
     }
 }
 
@@ -82,10 +107,17 @@ pub fn load_recordings(folders: &[PathBuf], config: &SimulatorConfig) -> Result<
             return Err(Error::field(file, "room", "missing", "a room, or a body with its motion")
                 .with_hint("without either there is nothing to simulate"));
         }
-        let same_radar = Radar { frames: first.scene.radar.frames, ..other.scene.radar.clone() };
+        let first_radar = &first.scene.radar;
+        let same_radar =
+            Radar { frames: first_radar.frames, full_scale_codes: first_radar.full_scale_codes, ..other.scene.radar.clone() };
         if same_radar != first.scene.radar {
             return Err(Error::field(file, "radar", "another radar", format!("that of {}", first.folder.display()))
                 .with_hint("one simulator learns one site: train other radars on their own"));
+        }
+        let is_mesh = |loaded: &LoadedRecording| matches!(loaded.recording.person(), Some(Person::Meshes { .. }));
+        if is_mesh(other) && loaded.len() > 1 {
+            return Err(Error::field(file, "files.vertices", "a sequence of meshes", "a skinned body")
+                .with_hint("meshes have no common rest pose: a simulator can learn one such recording only"));
         }
         if other.recording.room != first.recording.room {
             return Err(Error::field(file, "room", "another room", format!("that of {}", first.folder.display()))

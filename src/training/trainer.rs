@@ -109,6 +109,11 @@ impl Trainer<'_> {
             validation_frames: split.validation.len(),
         });
         for epoch in progress.epochs_done..self.config.epochs {
+            let without_better = epoch.saturating_sub(progress.best_epoch + 1);
+            if self.config.patience_epochs > 0 && without_better >= self.config.patience_epochs {
+                emit(Event::StoppedEarly { epoch: epoch - 1, best_epoch: progress.best_epoch });
+                break;
+            }
             let order = split.epoch_order(self.seed, epoch);
             let mut sum = 0.0;
             let mut learning_rate = self.config.learning_rate;
@@ -140,10 +145,6 @@ impl Trainer<'_> {
                 self.save("best", &simulator, &optimizer, &progress, emit)?;
             }
             self.save("last", &simulator, &optimizer, &progress, emit)?;
-            if self.config.patience_epochs > 0 && epoch - progress.best_epoch >= self.config.patience_epochs {
-                emit(Event::StoppedEarly { epoch, best_epoch: progress.best_epoch });
-                break;
-            }
         }
         Ok(Outcome { simulator, progress })
     }
@@ -161,6 +162,7 @@ impl Trainer<'_> {
             version: env!("CARGO_PKG_VERSION").into(),
             seed: self.seed,
             simulator: self.simulator_config.clone(),
+            heatmap: self.config.heatmap.clone(),
             site: self.site.clone(),
             progress: progress.clone(),
         };
