@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::{
     complex::Complex,
+    data::Recording,
     error::Result,
     heatmap::{Analysis, HeatmapConfig, Map, Samples, StaticRemoval, remove_static},
     metrics::{DbWindow, MetricsConfig, Scores, Spread, person_cells, scores},
@@ -50,8 +51,8 @@ fn to_host(signal: Complex<4>) -> Vec<Complex32> {
 }
 
 /// The measured samples of a frame, `[tx, rx, loop, sample]`.
-pub fn measured_frame(recording: &LoadedRecording, frame: usize) -> Result<Vec<Complex32>> {
-    let samples = recording.recording.frame(frame)?;
+pub fn measured_frame(recording: &Recording, frame: usize) -> Result<Vec<Complex32>> {
+    let samples = recording.frame(frame)?;
     let im = samples.im.iter().flatten().copied().chain(std::iter::repeat(0.0));
     Ok(samples.re.iter().copied().zip(im).map(|(re, im)| Complex32::new(re, im)).collect())
 }
@@ -95,7 +96,7 @@ pub struct FrameMaps {
     pub simulated: Map,
 }
 
-/// Compares frames one by one, so that memory stays that of one frame.
+/// Compares frames one by one.
 ///
 /// `observe` sees the maps of every frame: all cells, then static-removed ones.
 pub fn evaluate(
@@ -112,7 +113,7 @@ pub fn evaluate(
     let dims = [1, tx, rx, loops, samples];
     let mut found: [Vec<Scores>; 3] = Default::default();
     for &frame in frames {
-        let (measured, simulated) = (measured_frame(recording, frame)?, simulation.frame(frame)?);
+        let (measured, simulated) = (measured_frame(&recording.recording, frame)?, simulation.frame(frame)?);
         let moving = |signal: &[Complex32]| remove_static(Samples::new(signal, dims), StaticRemoval::Loops);
         let maps = [
             [analysis.range_doppler(&measured), analysis.range_doppler(&simulated)],

@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::Common;
+use super::{Common, Out, report};
 use crate::{
     config::Config,
-    data::Recording,
+    data::{Recording, atomic::AtomicFolder},
     error::Result,
+    evaluation,
+    heatmap::HeatmapConfig,
     radar::{self, Radar},
     room::Room,
     training::checkpoint,
@@ -18,6 +20,8 @@ use crate::{
 pub(crate) struct Arguments {
     /// A config file, a recording folder or a checkpoint folder
     path: PathBuf,
+    #[command(flatten)]
+    out: Out,
 }
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -34,7 +38,11 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         return Ok(());
     }
     if path.is_dir() {
-        return show_recording(path);
+        let recording = show_recording(path)?;
+        if let Some(out) = &arguments.out.out {
+            draw(&recording, out)?;
+        }
+        return Ok(());
     }
     let config = Config::read(path, &common.set)?;
     for recording in &config.data.recordings {
@@ -49,7 +57,21 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     Ok(())
 }
 
-fn show_recording(folder: &Path) -> Result<()> {
+/// Heatmaps of what was measured, for `--out`.
+fn draw(recording: &Recording, out: &Path) -> Result<()> {
+    let folder = AtomicFolder::create(out)?;
+    let frames = recording.frames().min(MOST_DRAWN);
+    let samples = (0..frames).map(|frame| evaluation::measured_frame(recording, frame)).collect::<Result<Vec<_>>>()?.concat();
+    report::Pictures::new(&recording.radar, &HeatmapConfig::default()).show(folder.path(), &samples)?;
+    folder.finish()?;
+    println!("  heatmaps           {}", out.display());
+    Ok(())
+}
+
+/// Frames that pictures over time show at most: they are held in memory together.
+const MOST_DRAWN: usize = 600;
+
+fn show_recording(folder: &Path) -> Result<Recording> {
     let recording = Recording::open(folder)?;
     println!("recording: {}", folder.display());
     show_radar(&recording.radar, recording.room.as_ref());
@@ -74,7 +96,7 @@ fn show_recording(folder: &Path) -> Result<()> {
         recording.frame(frame)?;
     }
     println!("  samples            all {} frames can be read", recording.radar.frames);
-    Ok(())
+    Ok(recording)
 }
 
 fn show_radar(radar: &Radar, room: Option<&Room>) {

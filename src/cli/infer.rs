@@ -130,7 +130,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut pictures = report::Pictures::new(&radar, &state.heatmap);
     match &measured {
         Some(recording) => {
-            let samples = (0..radar.frames).map(|frame| measured_frame(recording, frame)).collect::<Result<Vec<_>>>()?.concat();
+            let samples =
+                (0..radar.frames).map(|frame| measured_frame(&recording.recording, frame)).collect::<Result<Vec<_>>>()?.concat();
             pictures.compare(folder.path(), &samples, &simulated)?;
         }
         None => pictures.show(folder.path(), &simulated)?,

@@ -48,8 +48,8 @@ pub(crate) struct Common {
 enum Command {
     /// Read a config, a recording or a checkpoint, and show what it describes
     ///
-    /// Shows what follows from the radar's settings (resolutions, limits), holds its rules against the room and the
-    /// motion, and says which parts are missing.
+    /// Shows what follows from the radar's settings (resolutions, limits), holds its rules against the room, and says
+    /// which parts are missing. With --out, draws the heatmaps of a recording.
     Check(check::Arguments),
     /// Make a recording of a person in a room, in a world that shares nothing with the simulator
     ///

@@ -140,6 +140,11 @@ impl Pictures {
         if frames > 1 {
             maps.push(("time_doppler.png", "Time-Doppler, static removed", self.analysis.time_doppler(moving, &everywhere)));
             maps.push(("time_range.png", "Time-range, static removed", self.analysis.time_range(moving, &everywhere)));
+            if tx * rx > 1 {
+                let scan = Scan::azimuth(60.0, 2.0);
+                let map = self.analysis.time_angle(moving, &scan, &everywhere);
+                maps.push(("time_azimuth.png", "Time-azimuth, static removed", map));
+            }
         }
         maps
     }
@@ -224,7 +229,8 @@ impl RunReport<'_> {
             let moving = remove_static(Samples::new(&signal, dims), StaticRemoval::Loops);
             analysis.time_doppler(Samples::new(&moving, dims), &Gate::default())
         };
-        let measured = map((0..frames).map(|frame| measured_frame(recording, frame)).collect::<Result<Vec<_>>>()?.concat());
+        let measured =
+            map((0..frames).map(|frame| measured_frame(&recording.recording, frame)).collect::<Result<Vec<_>>>()?.concat());
         let simulated = map((0..frames).map(|frame| simulation.frame(frame)).collect::<Result<Vec<_>>>()?.concat());
         let floor = self.config.training.heatmap.floor_amplitude(measured.max().sqrt());
         let (measured, simulated) = (measured.db(floor), simulated.db(floor));

@@ -9,7 +9,7 @@
 //! - [`visibility`], [`mirror`]: who is seen, directly and over the walls
 //! - [`material`], [`amplitude`]: physical optics with Fresnel reflection and roughness
 //! - [`chirp`], [`scatter`]: delays while the chirp runs, the reference sum and the fast one
-//! - [`surroundings`]: rough walls, mirror images of the radar, furniture
+//! - `surroundings`: rough walls, mirror images of the radar, furniture
 //! - [`receiver`]: unknown phase, thermal noise, converter
 //!
 //! Not modelled: shadows of the body on the walls, diffraction around its edges, returns that meet the body twice,
