@@ -30,7 +30,7 @@ pub struct NoiseConfig {
     pub law: NoiseLaw,
     /// σ of each component over the signal's mean amplitude; where learning starts.
     pub rate: f64,
-    /// σ of each component for `constant`, in the signal's unit.
+    /// σ of each component for `constant`, in the signal's unit; zero: measured from the recording and learned.
     pub level: f64,
 }
 
@@ -50,16 +50,13 @@ impl NoiseConfig {
         if !(self.level.is_finite() && self.level >= 0.0) {
             return Err(Error::setting(format!("{key}.level"), self.level, "a level of zero or more"));
         }
-        if self.law == NoiseLaw::Constant && self.level == 0.0 {
-            return Err(Error::setting(format!("{key}.level"), self.level, "a level above zero for law = \"constant\"")
-                .with_hint("in the recording's unit (ADC codes), per component; law = \"none\" is a signal without noise"));
-        }
         Ok(())
     }
 
     pub fn init(&self, device: &Device) -> Noise {
         Noise {
             raw_rate: (self.law == NoiseLaw::Learned).then(|| raw_rate(self.rate, device)),
+            log_level: (self.law == NoiseLaw::Constant && self.level == 0.0).then(|| log_level(1.0, device)),
             law: self.law,
             rate: self.rate,
             level: self.level,
@@ -72,6 +69,8 @@ impl NoiseConfig {
 pub struct Noise {
     /// `[1]`; the rate is its softplus. Only with the learned law.
     pub raw_rate: Option<Param<Tensor<1>>>,
+    /// `[1]`; σ is its exponential. Only with the constant law and no level given.
+    pub log_level: Option<Param<Tensor<1>>>,
     #[module(skip)]
     law: NoiseLaw,
     #[module(skip)]
@@ -86,10 +85,18 @@ fn raw_rate(rate: f64, device: &Device) -> Param<Tensor<1>> {
     Param::from_tensor(Tensor::from_data([raw as f32], device))
 }
 
+fn log_level(level: f64, device: &Device) -> Param<Tensor<1>> {
+    Param::from_tensor(Tensor::from_data([level.ln() as f32], device))
+}
+
 impl Noise {
-    /// The same noise, learning from another rate on; laws that do not learn stay as they are.
-    pub fn starting_at(self, rate: f64, device: &Device) -> Self {
-        Self { raw_rate: self.raw_rate.is_some().then(|| raw_rate(rate, device)), ..self }
+    /// The same noise, learning from another rate or level (σ of each component) on; what does not learn stays.
+    pub fn starting_at(self, rate: f64, level: f64, device: &Device) -> Self {
+        Self {
+            raw_rate: self.raw_rate.is_some().then(|| raw_rate(rate, device)),
+            log_level: self.log_level.is_some().then(|| log_level(level, device)),
+            ..self
+        }
     }
 
     /// σ over the signal's mean amplitude `[1]`, with the gradient to the parameter; `None` for a law without a rate.
@@ -112,7 +119,13 @@ impl Noise {
         assert_eq!(signal.dims(), normals.dims(), "noise: signal {:?}, normals {:?}", signal.dims(), normals.dims());
         match self.law {
             NoiseLaw::None => signal,
-            NoiseLaw::Constant => signal.add(normals.scale_by(self.level)),
+            NoiseLaw::Constant => match &self.log_level {
+                Some(log_level) => {
+                    let deviation = log_level.val().exp().cast(signal.re.dtype()).reshape([1; D]);
+                    signal.add(Complex::new(normals.re * deviation.clone(), normals.im * deviation))
+                }
+                None => signal.add(normals.scale_by(self.level)),
+            },
             NoiseLaw::Learned | NoiseLaw::Fixed => {
                 let rate = self.rate(&signal.device()).expect("this law has a rate").cast(signal.re.dtype());
                 let deviation = (rate * mean_amplitude(signal.clone())).reshape([1; D]);
@@ -232,6 +245,23 @@ mod tests {
             let wanted = (at(1e-6) - at(-1e-6)) / 2e-6;
             assert!((found - wanted).abs() < 1e-6 * wanted.abs().max(1.0), "element {i}: {found}, wanted {wanted}");
         }
+    }
+
+    #[test]
+    fn a_constant_level_is_learned_when_none_is_given() {
+        let device = Device::flex();
+        let autodiff = device.clone().autodiff();
+        let noise =
+            NoiseConfig { law: NoiseLaw::Constant, rate: 0.1, level: 0.0 }.init(&autodiff).starting_at(0.1, 2.5, &autodiff);
+        let silence = Complex::<2>::zeros([40, 50], &autodiff);
+        let noisy = noise.add_to(silence, normals(3, [40, 50], &autodiff, DType::F32));
+        let power = noisy.power().mean();
+        let found = f64::from(power.clone().into_scalar::<f32>()) / 2.0;
+        assert!((found.sqrt() - 2.5).abs() < 0.1, "σ {}", found.sqrt());
+        // d(σ²·mean)/d(ln σ) = 2 σ²·mean.
+        let gradients = power.clone().backward();
+        let gradient = noise.log_level.as_ref().unwrap().val().grad(&gradients).unwrap().into_scalar::<f32>();
+        assert!((gradient / (2.0 * power.into_scalar::<f32>()) - 1.0).abs() < 1e-4, "{gradient}");
     }
 
     #[test]

@@ -84,9 +84,9 @@ pub fn fit_levels(
         amplitude += f64::from((clean.power() + 1e-30).sqrt().mean().into_scalar::<f32>());
     }
     if levels.noise > 0.0 && amplitude > 0.0 {
-        let rate = (levels.noise / levels.frames).sqrt() / (amplitude / levels.frames);
+        let deviation = (levels.noise / levels.frames).sqrt();
         let device = simulator.device();
-        simulator.noise = simulator.noise.starting_at(rate, &device);
+        simulator.noise = simulator.noise.starting_at(deviation / (amplitude / levels.frames), deviation, &device);
     }
     Ok(simulator)
 }
