@@ -19,7 +19,7 @@ use hybridsim::{
         procedural::{self, PersonConfig},
     },
     radar::Radar,
-    room::Room,
+    recorder::RecorderConfig,
     simulator::{Mode, PathModel, Scene, Simulator, SimulatorConfig},
 };
 
@@ -38,14 +38,7 @@ fn main() {
 
 fn measure(paths: PathModel, device: &Device) {
     let radar = Radar { tx_m: vec![[0.0; 3]], chirp_period_s: 216e-6, ..Radar::mmmesh(2) };
-    let room = Room {
-        left_m: Some(1.9),
-        right_m: Some(2.4),
-        front_m: Some(5.6),
-        back_m: Some(0.6),
-        floor_m: Some(1.0),
-        ceiling_m: Some(1.7),
-    };
+    let room = RecorderConfig::default().room;
     let model = procedural::person(&PersonConfig { edge_m: 0.0198, ..Default::default() }).expect("a person");
     let vertices = model.template.len();
     let motion =

@@ -1,7 +1,5 @@
 //! One trained checkpoint gives the same signal and the same gradients on every backend.
 
-mod support;
-
 use std::path::Path;
 
 use burn::{

@@ -3,10 +3,12 @@
 //! The wanted numbers were found with NumPy, independently of this crate. The recordings lie in `$HYBRIDSIM_SHARED`, or in
 //! `../shared` beside the crate; without them these tests say so and pass.
 
-use std::path::{Path, PathBuf};
+mod support;
 
+use hybridsim::data::Recording;
+use hybridsim::evaluation::measured_frame;
 use hybridsim::heatmap::{Analysis, Gate, HeatmapConfig, Map, Samples, Scan, StaticRemoval, remove_static};
-use hybridsim::radar::{Radar, Sampling};
+use hybridsim::radar::Radar;
 use num_complex::Complex32;
 
 struct Capture {
@@ -16,22 +18,10 @@ struct Capture {
 
 impl Capture {
     fn read(name: &str) -> Option<Self> {
-        let shared = std::env::var_os("HYBRIDSIM_SHARED")
-            .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
-        let folder = shared.join("recordings/real").join(name);
-        if !folder.exists() {
-            eprintln!("{} is absent: nothing was tested", folder.display());
-            return None;
-        }
-        let text = std::fs::read_to_string(folder.join("recording.toml")).unwrap();
-        let table: toml::Table = text.parse().unwrap();
-        let radar: Radar = table["radar"].clone().try_into().unwrap();
-        let bytes = std::fs::read(folder.join("if.npy")).unwrap();
-        let codes: Vec<i16> = npyz::NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap();
-        let values = match radar.sampling {
-            Sampling::Complex => codes.chunks_exact(2).map(|iq| Complex32::new(iq[0].into(), iq[1].into())).collect(),
-            Sampling::Real => codes.iter().map(|&code| Complex32::new(code.into(), 0.0)).collect(),
-        };
+        let recording = Recording::open(support::shared(&format!("recordings/real/{name}"))?).unwrap();
+        let frame = |index| measured_frame(&recording, index).unwrap();
+        let values = (0..recording.frames()).flat_map(frame).collect();
+        let radar = recording.radar;
         Some(Self { radar, values })
     }
 

@@ -1,9 +1,8 @@
 //! Recordings, bodies and motions made by others: `../shared`, or where HYBRIDSIM_SHARED points to.
 
-use std::{
-    path::{Path, PathBuf},
-    process::Command,
-};
+mod support;
+
+use std::{path::Path, process::Command};
 
 use hybridsim::{
     config::Config,
@@ -12,19 +11,9 @@ use hybridsim::{
     training::{Event, Trainer, load_recordings, site},
 };
 
-fn shared() -> Option<PathBuf> {
-    let folder = std::env::var_os("HYBRIDSIM_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: {} is not there", folder.display());
-    None
-}
-
 #[test]
 fn training_on_a_planted_recording_lowers_its_loss() {
-    let Some(shared) = shared() else { return };
+    let Some(shared) = support::shared("") else { return };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/recording.toml");
     let sets = ["training.epochs=2", "simulator.room.patches=400", "training.validation_fraction=0.7"].map(String::from);
     let mut config = Config::read(&path, &sets).unwrap();
@@ -56,7 +45,7 @@ fn training_on_a_planted_recording_lowers_its_loss() {
 
 #[test]
 fn every_recording_opens_and_every_frame_can_be_read() {
-    let Some(shared) = shared() else { return };
+    let Some(shared) = support::shared("") else { return };
     for kind in ["planted", "real"] {
         for entry in std::fs::read_dir(shared.join("recordings").join(kind)).unwrap() {
             let folder = entry.unwrap().path();
@@ -71,7 +60,7 @@ fn every_recording_opens_and_every_frame_can_be_read() {
 /// CMU walks as BVH and as npz, on three bodies, through the model that ships here.
 #[test]
 fn captured_motions_are_simulated_on_bodies_of_others() {
-    let Some(shared) = shared() else { return };
+    let Some(shared) = support::shared("") else { return };
     let out = tempfile::tempdir().unwrap();
     let checkpoint = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/quickstart");
     for (index, (motion, body)) in
@@ -102,7 +91,7 @@ fn captured_motions_are_simulated_on_bodies_of_others() {
 
 #[test]
 fn every_captured_motion_is_read_for_every_body() {
-    let Some(shared) = shared() else { return };
+    let Some(shared) = support::shared("") else { return };
     for body in ["neutral_lite", "male_lite", "female_lite"] {
         let model = read_body(shared.join("bodies").join(format!("{body}.npz"))).unwrap();
         for file in ["cmu/02_01.bvh", "cmu/02_02.bvh", "cmu/02_02_smpl24.npz", "procedural/walk_back_forth_armswing_s1.bvh"] {

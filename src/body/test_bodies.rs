@@ -1,7 +1,5 @@
 //! Small bodies and meshes that the tests pose, and the shared ones where they are present.
 
-use std::path::PathBuf;
-
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -100,12 +98,5 @@ fn outward(vertices: &[[f64; 3]], [a, b, c]: [usize; 3]) -> [usize; 3] {
 
 /// A body of the shared data, or `None` and a message where that is absent.
 pub fn shared_body(name: &str) -> Option<BodyModel> {
-    let root =
-        std::env::var_os("HYBRIDSIM_SHARED").map_or(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
-    let path = root.join("bodies").join(format!("{name}.npz"));
-    if !path.exists() {
-        eprintln!("skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(crate::data::read_body(path).unwrap())
+    crate::support::shared(&format!("bodies/{name}.npz")).map(|path| crate::data::read_body(path).unwrap())
 }

@@ -121,6 +121,7 @@ impl Pictures {
         let moving = Samples::new(&moving, dims);
         let middle = frames / 2;
         let everywhere = Gate::default();
+        let scan = Scan::azimuth(60.0, 2.0);
         let mut maps = vec![
             ("range_doppler.png", "Range-Doppler, middle frame", self.analysis.range_doppler(still.frame(middle))),
             (
@@ -130,7 +131,6 @@ impl Pictures {
             ),
         ];
         if tx * rx > 1 {
-            let scan = Scan::azimuth(60.0, 2.0);
             maps.push((
                 "range_azimuth.png",
                 "Range-azimuth, middle frame, static removed",
@@ -141,7 +141,6 @@ impl Pictures {
             maps.push(("time_doppler.png", "Time-Doppler, static removed", self.analysis.time_doppler(moving, &everywhere)));
             maps.push(("time_range.png", "Time-range, static removed", self.analysis.time_range(moving, &everywhere)));
             if tx * rx > 1 {
-                let scan = Scan::azimuth(60.0, 2.0);
                 let map = self.analysis.time_angle(moving, &scan, &everywhere);
                 maps.push(("time_azimuth.png", "Time-azimuth, static removed", map));
             }

@@ -1,6 +1,6 @@
 //! What the tests of this layer share.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::person::{BodyModel, Motion};
 
@@ -12,17 +12,7 @@ pub fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// A file of the shared third-party data, or `None` with a message where that is absent.
-pub fn shared(path: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("HYBRIDSIM_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
-    let found = root.join(path);
-    if !found.exists() {
-        eprintln!("skipped: {} is absent; HYBRIDSIM_SHARED names the folder of shared data", found.display());
-        return None;
-    }
-    Some(found)
-}
+pub use crate::support::shared;
 
 /// Two joints, four vertices, one shape, no symmetry that could hide a mistake.
 pub fn small_body() -> BodyModel {

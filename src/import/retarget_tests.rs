@@ -1,19 +1,8 @@
-use std::{collections::BTreeMap, path::PathBuf};
+use std::collections::BTreeMap;
 
 use super::*;
 use crate::person::procedural;
-
-/// Third-party files, where they are at hand.
-fn shared(path: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("HYBRIDSIM_SHARED").map(PathBuf::from);
-    let folder = folder.unwrap_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"));
-    let path = folder.join(path);
-    if !path.exists() {
-        println!("skipped: {} is not here", path.display());
-        return None;
-    }
-    Some(path)
-}
+use crate::support::shared;
 
 fn person() -> BodyModel {
     procedural::person(&procedural::PersonConfig { edge_m: 0.032, ..Default::default() }).unwrap()

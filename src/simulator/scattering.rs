@@ -14,17 +14,27 @@ use crate::{
     scatterers::{microfacet, patches, tangent::Frame},
 };
 
-/// Scatterers that move together, with what they return in one direction.
-struct Group<'a> {
+/// Scatterers of body or room that a viewpoint sees.
+struct Visible<'a> {
     scene: &'a Scene,
     view: &'a FrameView,
     kind: Kind,
     points: &'a [usize],
     reference_m: Vec<[f64; 3]>,
+}
+
+/// What scatterers return in one direction.
+struct Response {
     /// `[point, 1]`
     amplitude: Tensor<2>,
     /// `[point, xyz]`, of the Gaussian patches from their surface.
     offset_m: Option<Tensor<2>>,
+}
+
+/// Scatterers that move together, with what they return.
+struct Group<'a> {
+    visible: Visible<'a>,
+    response: Response,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -37,16 +47,17 @@ impl Simulator {
     /// Eq. 2 for all transmitters: `[tx, rx, loop, sample]`.
     pub(super) fn direct_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
         let centre = scene.radar.centre_m();
-        let groups = self.groups(scene, view, surfaces, &view.direct, |group, surface| match self.config.paths {
-            PathModel::Coupled => self.patch_amplitude(group, surface, centre),
-            _ => self.microfacet_amplitude(group, surface),
+        let groups = self.groups(scene, view, surfaces, &view.direct, |visible, surface| match self.config.paths {
+            PathModel::Coupled => self.patch_response(visible, surface, centre),
+            _ => self.microfacet_response(visible, surface),
         });
         self.transmitters(scene, |tx, device| {
             let radar = &scene.radar;
             let parts = groups.iter().map(|group| {
                 let displacement = group.displacement(tx, device);
                 let amplitude = group.facet_amplitude(&displacement, tx, device);
-                let points = Points { reference_m: &group.reference_m, displacement: &displacement, amplitude: &amplitude };
+                let points =
+                    Points { reference_m: &group.visible.reference_m, displacement: &displacement, amplitude: &amplitude };
                 direct_signal(points, radar, tx, self.config.dechirp, self.config.sum)
             });
             parts.reduce(Complex::add)
@@ -58,8 +69,8 @@ impl Simulator {
         let walls: Vec<(usize, Vec<Group<'_>>)> = (0..scene.proxies.len())
             .map(|wall| {
                 let place = scene.proxies[wall].position_m;
-                let groups = self.groups(scene, view, surfaces, &view.proxies[wall], |group, surface| {
-                    self.patch_amplitude(group, surface, place)
+                let groups = self.groups(scene, view, surfaces, &view.proxies[wall], |visible, surface| {
+                    self.patch_response(visible, surface, place)
                 });
                 (wall, groups)
             })
@@ -68,8 +79,9 @@ impl Simulator {
             let parts =
                 walls.iter().flat_map(|(wall, groups)| groups.iter().map(move |group| (wall, group))).map(|(wall, group)| {
                     let displacement = group.displacement(tx, device);
-                    let amplitude = Amplitude::real(group.amplitude.clone());
-                    let points = Points { reference_m: &group.reference_m, displacement: &displacement, amplitude: &amplitude };
+                    let amplitude = Amplitude::real(group.response.amplitude.clone());
+                    let points =
+                        Points { reference_m: &group.visible.reference_m, displacement: &displacement, amplitude: &amplitude };
                     let place = scene.proxies[*wall].position_m;
                     indirect_signal(points, place, &scene.radar, tx, self.config.dechirp, self.config.sum)
                 });
@@ -90,14 +102,15 @@ impl Simulator {
         Complex::cat(parts.collect(), 0)
     }
 
-    /// The visible scatterers of body and room, each with the amplitude that `amplitude` finds for it.
+    /// The visible scatterers of body and room, each with the response that `respond` finds for it, weighted by area
+    /// and gain.
     fn groups<'a>(
         &self,
         scene: &'a Scene,
         view: &'a FrameView,
         surfaces: &Surfaces,
         seen: &'a Seen,
-        amplitude: impl Fn(&Group<'a>, &Surface) -> (Tensor<2>, Option<Tensor<2>>),
+        respond: impl Fn(&Visible<'a>, &Surface) -> Response,
     ) -> Vec<Group<'a>> {
         let device = self.device();
         let sides = [(Kind::Body, &seen.body, &surfaces.body), (Kind::Room, &seen.room, &surfaces.room)];
@@ -109,50 +122,56 @@ impl Simulator {
                 Kind::Room => &scene.patches.position_m,
             };
             let reference_m = points.iter().map(|&point| all[point]).collect();
-            let amplitude_of = Tensor::zeros([1, 1], &device);
-            let mut group = Group { scene, view, kind, points, reference_m, amplitude: amplitude_of, offset_m: None };
+            let visible = Visible { scene, view, kind, points, reference_m };
             let picked = rows(points, all.len(), &device);
             let surface = Surface { material: surface.material.pick(&picked), patch: surface.patch.pick(&picked) };
-            (group.amplitude, group.offset_m) = amplitude(&group, &surface);
+            let mut response = respond(&visible, &surface);
             let gain = match kind {
                 Kind::Body => &self.decoders.body_gain,
                 Kind::Room => &self.decoders.room_gain,
             };
-            let weight = column(group.areas_m2().into_iter(), &device) * gain.factor().reshape([1, 1]);
-            group.amplitude = group.amplitude.clone() * weight;
-            groups.push(group);
+            let weight = column(visible.areas_m2().into_iter(), &device) * gain.factor().reshape([1, 1]);
+            response.amplitude = response.amplitude * weight;
+            groups.push(Group { visible, response });
         }
         groups
     }
 
-    /// L_p of the direct path, `[point, 1]`.
-    fn microfacet_amplitude(&self, group: &Group<'_>, surface: &Surface) -> (Tensor<2>, Option<Tensor<2>>) {
-        let device = self.device();
-        let radar = &group.scene.radar;
-        let incident = towards(group.reference_m.iter().copied(), mean(&radar.tx_m, radar.position_m), &device);
-        let outgoing = towards(group.reference_m.iter().copied(), mean(&radar.rx_m, radar.position_m), &device);
-        let normal = vectors(group.normals().into_iter(), &device);
-        (microfacet::amplitude(&surface.material, normal, incident, outgoing, self.config.response), None)
+    /// L_p of the direct path.
+    fn microfacet_response(&self, visible: &Visible<'_>, surface: &Surface) -> Response {
+        let radar = &visible.scene.radar;
+        let (normal, incident) = self.illumination(visible);
+        let outgoing = self.towards(visible, mean(&radar.rx_m, radar.position_m));
+        let amplitude = microfacet::amplitude(&surface.material, normal, incident, outgoing, self.config.response);
+        Response { amplitude, offset_m: None }
     }
 
-    /// SH_{p,k} towards a place, `[point, 1]`, and the patches' offsets.
-    fn patch_amplitude(&self, group: &Group<'_>, surface: &Surface, place: [f64; 3]) -> (Tensor<2>, Option<Tensor<2>>) {
-        let device = self.device();
-        let radar = &group.scene.radar;
-        let incident = towards(group.reference_m.iter().copied(), mean(&radar.tx_m, radar.position_m), &device);
-        let outgoing = towards(group.reference_m.iter().copied(), place, &device);
-        let normal = vectors(group.normals().into_iter(), &device);
-        let frame = match group.tangents() {
-            Some(tangents) => Frame::along(normal, vectors(tangents.into_iter(), &device)),
+    /// SH_{p,k} towards a place, from the patches' offset positions.
+    fn patch_response(&self, visible: &Visible<'_>, surface: &Surface, place: [f64; 3]) -> Response {
+        let (normal, incident) = self.illumination(visible);
+        let outgoing = self.towards(visible, place);
+        let frame = match visible.tangents() {
+            Some(tangents) => Frame::along(normal, vectors(tangents.into_iter(), &self.device())),
             None => Frame::from_normal(normal),
         };
-        let wavenumber = std::f64::consts::TAU / radar.wavelength_m();
+        let wavenumber = std::f64::consts::TAU / visible.scene.radar.wavelength_m();
         let amplitude = patches::amplitude(&surface.patch, &frame, incident, outgoing, wavenumber);
-        (amplitude, Some(surface.patch.offset_m.clone()))
+        Response { amplitude, offset_m: Some(surface.patch.offset_m.clone()) }
+    }
+
+    /// Normals, and directions towards the transmitters' centre; each `[point, 1, xyz]`.
+    fn illumination(&self, visible: &Visible<'_>) -> (Tensor<3>, Tensor<3>) {
+        let radar = &visible.scene.radar;
+        let normal = vectors(visible.normals().into_iter(), &self.device());
+        (normal, self.towards(visible, mean(&radar.tx_m, radar.position_m)))
+    }
+
+    fn towards(&self, visible: &Visible<'_>, place: [f64; 3]) -> Tensor<3> {
+        towards(visible.reference_m.iter().copied(), place, &self.device())
     }
 }
 
-impl Group<'_> {
+impl Visible<'_> {
     fn pick<T: Copy>(&self, of_body: impl Fn() -> Vec<T>, of_room: &[T]) -> Vec<T> {
         match self.kind {
             Kind::Body => of_body(),
@@ -177,39 +196,42 @@ impl Group<'_> {
         let values = values(self.view.body.as_ref().expect("a body's group"));
         self.points.iter().map(|&point| values[point]).collect()
     }
+}
 
+impl Group<'_> {
     /// How the points move around their references in the chirps of a transmitter.
     fn displacement(&self, tx: usize, device: &Device) -> Displacement {
-        let loops = self.scene.radar.loops_per_frame;
-        match (self.kind, &self.scene.body, &self.view.body) {
-            (Kind::Body, Some(body), Some(frame)) => {
-                body.displacement(frame, self.points, tx * loops..(tx + 1) * loops, self.offset_m.clone(), device)
+        let Visible { scene, view, kind, points, .. } = &self.visible;
+        let loops = scene.radar.loops_per_frame;
+        let offset_m = self.response.offset_m.clone();
+        match (kind, &scene.body, &view.body, offset_m) {
+            (Kind::Body, Some(body), Some(frame), offset_m) => {
+                body.displacement(frame, points, tx * loops..(tx + 1) * loops, offset_m, device)
             }
-            _ => match &self.offset_m {
-                Some(offset) => {
-                    let along = |axis: usize| offset.clone().narrow(1, axis, 1);
-                    Displacement { x: along(0), y: along(1), z: along(2) }
-                }
-                None => Displacement::still(self.points.len(), device, DType::F32),
-            },
+            (_, _, _, Some(offset_m)) => {
+                let along = |axis: usize| offset_m.clone().narrow(1, axis, 1);
+                Displacement { x: along(0), y: along(1), z: along(2) }
+            }
+            (_, _, _, None) => Displacement::still(points.len(), device, DType::F32),
         }
     }
 
     /// The amplitude with the closed-form integral over each facet, where facets are what is sampled.
     fn facet_amplitude(&self, displacement: &Displacement, tx: usize, device: &Device) -> Amplitude {
-        let (Kind::Body, Some(body), Some(frame)) = (self.kind, &self.scene.body, &self.view.body) else {
-            return Amplitude::real(self.amplitude.clone());
-        };
-        if !self.scene.facets {
-            return Amplitude::real(self.amplitude.clone());
+        let Visible { scene, view, kind, points, reference_m } = &self.visible;
+        let amplitude = self.response.amplitude.clone();
+        match (kind, &scene.body, &view.body) {
+            (Kind::Body, Some(body), Some(frame)) if scene.facets => {
+                let radar = &scene.radar;
+                let loops = radar.loops_per_frame;
+                let antennas = [radar.tx_position_m(tx), mean(&radar.rx_m, radar.position_m)];
+                let wavevector = facets::wavevector(reference_m, displacement, antennas, radar.wavelength_m());
+                let edges = body.facet_edges(frame, points, tx * loops..(tx + 1) * loops, device);
+                let integral = facets::facet_integral(&edges, &wavevector);
+                Amplitude { re: integral.re * amplitude.clone(), im: Some(integral.im * amplitude) }
+            }
+            _ => Amplitude::real(amplitude),
         }
-        let radar = &self.scene.radar;
-        let loops = radar.loops_per_frame;
-        let antennas = [radar.tx_position_m(tx), mean(&radar.rx_m, radar.position_m)];
-        let wavevector = facets::wavevector(&self.reference_m, displacement, antennas, radar.wavelength_m());
-        let edges = body.facet_edges(frame, self.points, tx * loops..(tx + 1) * loops, device);
-        let integral = facets::facet_integral(&edges, &wavevector);
-        Amplitude { re: integral.re * self.amplitude.clone(), im: Some(integral.im * self.amplitude.clone()) }
     }
 }
 

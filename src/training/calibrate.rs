@@ -8,7 +8,7 @@ use std::f64::consts::LN_2;
 
 use burn::{module::Module, tensor::Tensor};
 
-use super::{FrameId, LoadedRecording};
+use super::{FrameId, LoadedRecording, trainer::Prepared};
 use crate::{
     complex::Complex,
     error::{Error, Result},
@@ -44,14 +44,17 @@ struct Levels {
 pub fn fit_levels(
     mut simulator: Simulator,
     recordings: &[LoadedRecording],
+    prepared: &[Prepared],
     frames: &[FrameId],
     heatmap: &HeatmapConfig,
 ) -> Result<Simulator> {
     let plain = simulator.clone().valid();
     let mut levels = Levels::default();
     let looked_at: Vec<FrameId> = frames.iter().copied().step_by(frames.len().div_ceil(FRAMES).max(1)).collect();
+    let surfaces = decode(&plain, prepared);
     for id in &looked_at {
-        levels.add(&plain, &recordings[id.recording], id.frame, heatmap)?;
+        let transform = prepared[id.recording].loss.transform();
+        levels.add(&plain, &recordings[id.recording], id.frame, &surfaces[id.recording], transform, heatmap)?;
     }
     let measured = levels.measured_moving + levels.measured_still;
     if !(measured.is_finite() && measured > 0.0) {
@@ -79,8 +82,7 @@ pub fn fit_levels(
     let mut amplitude = 0.0;
     for id in &looked_at {
         let scene = &recordings[id.recording].scene;
-        let surfaces = plain.surfaces(&plain.constants(scene), Mode::Inference);
-        let clean = plain.clean_signal(scene, &*scene.view(id.frame)?, &surfaces);
+        let clean = plain.clean_signal(scene, &*scene.view(id.frame)?, &surfaces[id.recording]);
         amplitude += f64::from((clean.power() + 1e-30).sqrt().mean().into_scalar::<f32>());
     }
     if levels.noise > 0.0 && amplitude > 0.0 {
@@ -91,12 +93,24 @@ pub fn fit_levels(
     Ok(simulator)
 }
 
+/// The surfaces of every recording, which the gains do not change.
+fn decode(plain: &Simulator, prepared: &[Prepared]) -> Vec<Surfaces> {
+    prepared.iter().map(|prepared| plain.surfaces(&prepared.constants, Mode::Inference)).collect()
+}
+
 impl Levels {
-    fn add(&mut self, plain: &Simulator, recording: &LoadedRecording, frame: usize, heatmap: &HeatmapConfig) -> Result<()> {
+    fn add(
+        &mut self,
+        plain: &Simulator,
+        recording: &LoadedRecording,
+        frame: usize,
+        surfaces: &Surfaces,
+        transform: &RangeDoppler,
+        heatmap: &HeatmapConfig,
+    ) -> Result<()> {
         let device = plain.device();
         let scene = &recording.scene;
         let radar = &scene.radar;
-        let transform = RangeDoppler::new(radar.loops_per_frame, radar.samples_per_chirp, radar.sampling, heatmap, &device);
         let power = |signal: Complex<4>| values(transform.map(signal).power());
 
         // A receiver without quadrature sees the real part alone.
@@ -106,7 +120,7 @@ impl Levels {
         };
         let measured = recording.target(frame, &device)?;
         let view = scene.view(frame)?;
-        let Surfaces { body, room } = plain.surfaces(&plain.constants(scene), Mode::Inference);
+        let Surfaces { body, room } = surfaces.clone();
         let alone = |surfaces: Surfaces| plain.clean_signal(scene, &view, &surfaces);
         let of_body = sampled(alone(Surfaces { body, room: None }));
         let of_room = sampled(alone(Surfaces { body: None, room }));

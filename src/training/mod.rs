@@ -1,6 +1,6 @@
 //! Training: the loop, its split of frames, its checkpoints. It emits events and prints nothing.
 
-pub mod calibrate;
+mod calibrate;
 pub mod checkpoint;
 mod config;
 mod metrics;

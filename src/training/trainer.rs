@@ -41,9 +41,9 @@ pub struct Outcome {
 }
 
 /// What training keeps of each recording beside its scene.
-struct Prepared {
-    loss: DbLoss,
-    constants: SceneConstants,
+pub(super) struct Prepared {
+    pub loss: DbLoss,
+    pub constants: SceneConstants,
 }
 
 /// Everything a run needs; `run` does it.
@@ -71,9 +71,9 @@ impl Trainer<'_> {
         let steps_per_epoch = split.training.len().div_ceil(self.config.frames_per_step);
         let steps = self.config.epochs * steps_per_epoch;
         let device = self.device.clone().autodiff();
-        let losses = self.losses(&split)?;
 
         let mut simulator = checkpoint::with_stable_ids(self.simulator_config.init(self.site.body_extent, self.seed, &device));
+        let prepared = self.prepare(&simulator, &split)?;
         let mut optimizer = ModuleOptimizer::from(AdamConfig::new().with_epsilon(1e-8).build())
             .with_grad_clipping(GradientClipping::Norm(self.config.gradient_clip as f32));
         let mut progress =
@@ -92,15 +92,10 @@ impl Trainer<'_> {
                 progress = state.progress;
             }
             None => {
-                simulator = calibrate::fit_levels(simulator, self.recordings, &split.training, &self.config.heatmap)?;
+                simulator = calibrate::fit_levels(simulator, self.recordings, &prepared, &split.training, &self.config.heatmap)?;
                 simulator = checkpoint::with_stable_ids(simulator);
             }
         }
-        let prepared: Vec<Prepared> = losses
-            .into_iter()
-            .zip(self.recordings)
-            .map(|(loss, recording)| Prepared { loss, constants: simulator.constants(&recording.scene) })
-            .collect();
 
         emit(Event::Started {
             steps,
@@ -226,9 +221,9 @@ impl Trainer<'_> {
         Ok(sum.expect("a batch has frames") / frames.len() as f64)
     }
 
-    /// The loss of every recording; its floors refer to the recording's first training frame.
-    fn losses(&self, split: &FrameSplit) -> Result<Vec<DbLoss>> {
-        let mut losses = Vec::new();
+    /// Loss and constants of every recording; the loss's floors refer to the recording's first training frame.
+    fn prepare(&self, simulator: &Simulator, split: &FrameSplit) -> Result<Vec<Prepared>> {
+        let mut prepared = Vec::new();
         for (index, recording) in self.recordings.iter().enumerate() {
             let radar = &recording.scene.radar;
             let frame = split.training.iter().find(|id| id.recording == index).map_or(0, |id| id.frame);
@@ -240,9 +235,12 @@ impl Trainer<'_> {
                 &self.device,
             );
             let peak = transform.peak_amplitude(recording.target(frame, &self.device)?);
-            losses.push(DbLoss::new(radar, &self.config.heatmap, &self.config.loss, peak, &self.device)?);
+            prepared.push(Prepared {
+                loss: DbLoss::new(radar, &self.config.heatmap, &self.config.loss, peak, &self.device)?,
+                constants: simulator.constants(&recording.scene),
+            });
         }
-        Ok(losses)
+        Ok(prepared)
     }
 
     /// Loss on held-out frames as at inference, without gradients; the same noise in every epoch.

@@ -7,8 +7,22 @@
 //! sign in two outputs cannot cancel.
 #![allow(dead_code)]
 
+use std::path::{Path, PathBuf};
+
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{DType, Device, Tensor, TensorData};
+
+/// A file or folder of the shared third-party data (`""` is all of it), or `None` with a message where that is absent.
+pub fn shared(path: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("HYBRIDSIM_SHARED")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+    let found = root.join(path);
+    if !found.exists() {
+        eprintln!("skipped: {} is absent; HYBRIDSIM_SHARED names the folder of shared data", found.display());
+        return None;
+    }
+    Some(found)
+}
 
 /// A named input of the function under test, row by row.
 pub struct Input {
