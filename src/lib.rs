@@ -28,6 +28,8 @@ pub mod simulator;
 pub mod training;
 pub mod evaluation;
 pub mod pictures;
+// why a recording and the simulator disagree
+pub mod diagnosis;
 pub mod config;
 pub mod cli;
 

@@ -1,0 +1,215 @@
+//! All samples of a recording in memory, and which of them are held out.
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+use rustfft::FftPlanner;
+
+use crate::data::Recording;
+use crate::error::{Error, Result};
+use crate::radar::{Radar, Sampling};
+
+/// IF samples, `[frame, tx, rx, loop, sample]`. Samples of a receiver without quadrature are made analytic: their
+/// negative beat frequencies are zero and the positive ones doubled.
+#[derive(Clone, Debug)]
+pub struct Cube {
+    pub dims: [usize; 5],
+    pub samples: Vec<Complex64>,
+}
+
+/// What is fitted on and what is judged on, as frames of a [`Cube`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Split {
+    pub training: Vec<usize>,
+    pub held_out: Vec<usize>,
+    /// A recording with too few frames is cut into blocks of this many loops, which then take the place of frames.
+    pub block_loops: Option<usize>,
+}
+
+/// A recording in memory, with the radar as its frames now are.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    pub cube: Cube,
+    pub radar: Radar,
+    pub split: Split,
+    /// Radar time at which each frame (or block of loops) begins.
+    pub starts_s: Vec<f64>,
+    /// Of the raw components, for the converter's rail.
+    pub extremes: [f64; 2],
+}
+
+/// Fewest frames (or blocks of loops) that can be split.
+const FEWEST_FRAMES: usize = 4;
+/// Every so many-th frame is held out.
+const HELD_OUT_EVERY: usize = 4;
+/// Fewest loops in a block.
+const FEWEST_LOOPS: usize = 8;
+
+impl Cube {
+    pub fn new(dims: [usize; 5], samples: Vec<Complex64>) -> Self {
+        assert_eq!(samples.len(), dims.iter().product::<usize>(), "cube: {} samples for {dims:?}", samples.len());
+        Self { dims, samples }
+    }
+
+    pub fn channels(&self) -> usize {
+        self.dims[1] * self.dims[2]
+    }
+
+    /// `[loop, sample]` of one frame and channel (tx · rx count + rx).
+    pub fn channel(&self, frame: usize, channel: usize) -> &[Complex64] {
+        let length = self.dims[3] * self.dims[4];
+        let start = (frame * self.channels() + channel) * length;
+        &self.samples[start..start + length]
+    }
+
+    /// Changes every chirp; `f` gets frame, channel and loop.
+    pub fn each_chirp(&mut self, f: impl Fn([usize; 3], &mut [Complex64]) + Sync) {
+        let (loops, channels) = (self.dims[3], self.channels());
+        self.samples.par_chunks_exact_mut(self.dims[4]).enumerate().for_each(|(chirp, samples)| {
+            f([chirp / (loops * channels), chirp / loops % channels, chirp % loops], samples);
+        });
+    }
+
+    /// Mean over all chirps of some frames, `[tx · rx, sample]`.
+    pub fn still(&self, frames: &[usize]) -> Vec<Complex64> {
+        let (channels, samples) = (self.channels(), self.dims[4]);
+        let mut mean = vec![Complex64::ZERO; channels * samples];
+        for &frame in frames {
+            for channel in 0..channels {
+                for chirp in self.channel(frame, channel).chunks_exact(samples) {
+                    mean[channel * samples..][..samples].iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value);
+                }
+            }
+        }
+        let count = (frames.len() * self.dims[3]).max(1) as f64;
+        mean.iter_mut().for_each(|value| *value /= count);
+        mean
+    }
+}
+
+impl Loaded {
+    /// Reads a recording, at most `most_frames` of it.
+    ///
+    /// # Errors
+    /// Samples that cannot be read; too few chirps to say anything.
+    pub fn read(recording: &Recording, most_frames: usize) -> Result<Self> {
+        let mut radar = recording.radar.clone();
+        radar.frames = radar.frames.min(most_frames);
+        let (mut samples, mut extremes) = (Vec::new(), [f64::INFINITY, f64::NEG_INFINITY]);
+        for index in 0..radar.frames {
+            let frame = recording.frame(index)?;
+            for &value in frame.re.iter().chain(frame.im.iter().flatten()) {
+                extremes = [extremes[0].min(f64::from(value)), extremes[1].max(f64::from(value))];
+            }
+            match &frame.im {
+                Some(im) => samples.extend(frame.re.iter().zip(im).map(|(&re, &im)| Complex64::new(re.into(), im.into()))),
+                None => samples.extend(analytic(&frame.re, radar.samples_per_chirp)),
+            }
+        }
+        let cube = Cube::new(radar.dims(), samples);
+        let (cube, radar, block_loops) = if radar.frames >= FEWEST_FRAMES {
+            (cube, radar, None)
+        } else {
+            let (cube, radar, loops) = in_blocks(&cube, &radar).ok_or_else(|| {
+                Error::field(
+                    recording.folder.join("recording.toml"),
+                    "radar.frames",
+                    format!("{} frames of {} loops", radar.frames, radar.loops_per_frame),
+                    format!("{FEWEST_FRAMES} frames, or that many blocks of {FEWEST_LOOPS} loops"),
+                )
+                .with_hint("a part must be held out to judge by; record longer")
+            })?;
+            (cube, radar, Some(loops))
+        };
+        let starts_s = match block_loops {
+            None => (0..radar.frames).map(|frame| radar.chirp_time_s(frame, 0, 0)).collect(),
+            Some(loops) => {
+                let whole = &recording.radar;
+                let blocks = radar.frames / whole.frames.min(most_frames);
+                (0..radar.frames).map(|block| whole.chirp_time_s(block / blocks, 0, block % blocks * loops)).collect()
+            }
+        };
+        let (held_out, training) = (0..radar.frames).partition(|frame| frame % HELD_OUT_EVERY == HELD_OUT_EVERY / 2);
+        Ok(Self { cube, radar, split: Split { training, held_out, block_loops }, starts_s, extremes })
+    }
+
+    pub fn is_real(&self) -> bool {
+        self.radar.sampling == Sampling::Real
+    }
+}
+
+/// The analytic signal of real chirps.
+fn analytic(values: &[f32], samples: usize) -> Vec<Complex64> {
+    let mut planner = FftPlanner::new();
+    let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
+    let mut signal: Vec<Complex64> = values.iter().map(|&value| Complex64::from(f64::from(value))).collect();
+    forward.process(&mut signal);
+    for chirp in signal.chunks_exact_mut(samples) {
+        for (bin, value) in chirp.iter_mut().enumerate() {
+            // The zero and the Nyquist frequency are their own images.
+            let factor = if bin == 0 || 2 * bin == samples {
+                1.0
+            } else if 2 * bin < samples {
+                2.0
+            } else {
+                0.0
+            };
+            *value *= factor / samples as f64;
+        }
+    }
+    inverse.process(&mut signal);
+    signal
+}
+
+/// Few long frames as several short ones.
+fn in_blocks(cube: &Cube, radar: &Radar) -> Option<(Cube, Radar, usize)> {
+    let [frames, tx, rx, loops, samples] = cube.dims;
+    let dropped = |blocks: usize| loops % blocks;
+    let most = (loops / FEWEST_LOOPS).min(10);
+    let blocks = (2..=most)
+        .rev()
+        .filter(|blocks| blocks * frames >= FEWEST_FRAMES)
+        .min_by_key(|&blocks| (dropped(blocks), 10 - blocks))?;
+    let short = loops / blocks;
+    let mut samples_out = Vec::with_capacity(cube.samples.len());
+    for frame in 0..frames {
+        for block in 0..blocks {
+            for channel in 0..cube.channels() {
+                samples_out
+                    .extend_from_slice(&cube.channel(frame, channel)[block * short * samples..(block + 1) * short * samples]);
+            }
+        }
+    }
+    let mut radar = radar.clone();
+    radar.frame_period_s = short as f64 * radar.loop_period_s();
+    radar.frames = frames * blocks;
+    radar.loops_per_frame = short;
+    Some((Cube::new([radar.frames, tx, rx, short, samples], samples_out), radar, short))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_long_frame_becomes_blocks_of_loops_in_order() {
+        let mut radar = Radar::small(1);
+        radar.loops_per_frame = 85;
+        radar.samples_per_chirp = 2;
+        let dims = radar.dims();
+        let samples = (0..dims.iter().product::<usize>()).map(|i| Complex64::from(i as f64)).collect();
+        let cube = Cube::new(dims, samples);
+        let (blocks, short, loops) = in_blocks(&cube, &radar).unwrap();
+        assert_eq!((short.frames, loops), (5, 17));
+        assert_eq!(blocks.channel(1, 2)[0], cube.channel(0, 2)[17 * 2]);
+        radar.loops_per_frame = 20;
+        assert!(in_blocks(&Cube::new(radar.dims(), vec![Complex64::ZERO; radar.dims().iter().product()]), &radar).is_none());
+    }
+
+    #[test]
+    fn an_analytic_cosine_has_no_negative_frequency() {
+        let values: Vec<f32> = (0..32).map(|n| (std::f32::consts::TAU * 5.0 * n as f32 / 32.0).cos()).collect();
+        for (n, value) in analytic(&values, 32).iter().enumerate() {
+            assert!((value - Complex64::cis(std::f64::consts::TAU * 5.0 * n as f64 / 32.0)).norm() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! A recording as far as it is explained so far, and what every suspect needs of it.
+
+use std::sync::{Arc, OnceLock};
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+use rustfft::{Fft, FftPlanner};
+
+use super::cube::{Cube, Loaded, Split};
+use super::prediction::BodyPrediction;
+use super::statistics;
+use crate::radar::{Radar, Sampling};
+use crate::room::Room;
+
+/// What the suspects look at. Cheap products are computed once and shared.
+pub struct Evidence {
+    /// Its frames are those of the cube.
+    pub radar: Radar,
+    pub room: Option<Room>,
+    pub cube: Cube,
+    pub split: Split,
+    /// Radar time at which each frame begins.
+    pub starts_s: Vec<f64>,
+    pub body: Option<BodyPrediction>,
+    /// Ids that were accepted, oldest first.
+    pub accepted: Vec<&'static str>,
+    pub extremes: [f64; 2],
+    noise: OnceLock<Vec<f64>>,
+    still: OnceLock<Vec<Complex64>>,
+    maps: OnceLock<Vec<f32>>,
+}
+
+impl Evidence {
+    pub fn new(loaded: Loaded, room: Option<Room>, body: Option<BodyPrediction>) -> Self {
+        let Loaded { cube, radar, split, starts_s, extremes } = loaded;
+        Self {
+            radar,
+            room,
+            cube,
+            split,
+            starts_s,
+            body,
+            accepted: vec![],
+            extremes,
+            noise: OnceLock::new(),
+            still: OnceLock::new(),
+            maps: OnceLock::new(),
+        }
+    }
+
+    /// The same after samples or prediction changed: nothing computed is kept.
+    pub fn changed(self) -> Self {
+        Self { noise: OnceLock::new(), still: OnceLock::new(), maps: OnceLock::new(), ..self }
+    }
+
+    pub fn is_real(&self) -> bool {
+        self.radar.sampling == Sampling::Real
+    }
+
+    /// Beat frequencies that mean something: all, or the positive half.
+    pub fn range_bins(&self) -> usize {
+        let samples = self.cube.dims[4];
+        if self.is_real() { samples / 2 } else { samples }
+    }
+
+    /// Mean over all chirps of the training frames, `[tx · rx, sample]`: what stands still.
+    pub fn still(&self) -> &[Complex64] {
+        self.still.get_or_init(|| self.cube.still(&self.split.training))
+    }
+
+    /// Variance of the noise in a complex sample, by channel (tx · rx); from the quieter cells of the range-Doppler
+    /// maps, so that movers and lines do not count.
+    pub fn noise(&self) -> &[f64] {
+        self.noise.get_or_init(|| {
+            let [_, _, _, loops, _] = self.cube.dims;
+            (0..self.cube.channels())
+                .into_par_iter()
+                .map(|channel| {
+                    let mut powers: Vec<f64> = self
+                        .split
+                        .training
+                        .iter()
+                        .flat_map(|&frame| {
+                            let map = self.range_doppler(frame, channel);
+                            let bins = self.range_bins();
+                            let samples = self.cube.dims[4];
+                            // Neighbours of the zero Doppler hold what the mean could not remove.
+                            (0..loops)
+                                .filter(move |&doppler| doppler.min(loops - doppler) > 2 || loops < 8)
+                                .flat_map(move |doppler| (0..bins).map(move |range| doppler * samples + range))
+                                .map(move |cell| map[cell].norm_sqr())
+                                .collect::<Vec<_>>()
+                        })
+                        .collect();
+                    statistics::exponential_scale(&mut powers, 0.35)
+                })
+                .collect()
+        })
+    }
+
+    /// One frame and channel after the transforms with Hann windows of unit energy (white noise keeps its variance),
+    /// what stands still over the training frames removed: `[doppler, range]`, velocities and ranges in FFT order.
+    pub fn range_doppler(&self, frame: usize, channel: usize) -> Vec<Complex64> {
+        let samples = self.cube.dims[4];
+        let still = &self.still()[channel * samples..][..samples];
+        let moving: Vec<Complex64> = self
+            .cube
+            .channel(frame, channel)
+            .chunks_exact(samples)
+            .flat_map(|chirp| chirp.iter().zip(still).map(|(value, mean)| value - mean))
+            .collect();
+        transform(&moving, samples)
+    }
+
+    /// Power of [`Self::range_doppler`] over the noise's variance, mean over the channels, `[frame, doppler, range]`.
+    pub fn maps(&self) -> &[f32] {
+        self.maps.get_or_init(|| {
+            let [frames, _, _, loops, samples] = self.cube.dims;
+            let (channels, noise) = (self.cube.channels(), self.noise().to_vec());
+            (0..frames)
+                .into_par_iter()
+                .flat_map_iter(|frame| {
+                    let mut sum = vec![0.0f32; loops * samples];
+                    for (channel, variance) in noise.iter().enumerate() {
+                        let weight = 1.0 / (variance.max(f64::MIN_POSITIVE) * channels as f64);
+                        let map = self.range_doppler(frame, channel);
+                        sum.iter_mut().zip(map).for_each(|(sum, value)| *sum += (value.norm_sqr() * weight) as f32);
+                    }
+                    sum
+                })
+                .collect()
+        })
+    }
+}
+
+/// Periodic Hann window of unit energy.
+pub fn hann(length: usize) -> Vec<f64> {
+    let window: Vec<f64> = (0..length).map(|i| (std::f64::consts::PI * (i as f64 + 0.5) / length as f64).sin().powi(2)).collect();
+    let energy: f64 = window.iter().map(|w| w * w).sum::<f64>().sqrt();
+    window.iter().map(|w| w / energy).collect()
+}
+
+/// Range-Doppler transform of `[loop, sample]` with Hann windows of unit energy: `[doppler, range]` in FFT order.
+pub fn transform(signal: &[Complex64], samples: usize) -> Vec<Complex64> {
+    let loops = signal.len() / samples;
+    let (slow, fast) = (hann(loops), hann(samples));
+    let mut map: Vec<Complex64> =
+        signal.iter().enumerate().map(|(i, value)| value * (slow[i / samples] * fast[i % samples])).collect();
+    let mut planner = FftPlanner::new();
+    planner.plan_fft_forward(samples).process(&mut map);
+    let doppler: Arc<dyn Fft<f64>> = planner.plan_fft_forward(loops);
+    let mut column = vec![Complex64::ZERO; loops];
+    for range in 0..samples {
+        for (i, value) in column.iter_mut().enumerate() {
+            *value = map[i * samples + range];
+        }
+        doppler.process(&mut column);
+        for (i, value) in column.iter().enumerate() {
+            map[i * samples + range] = *value;
+        }
+    }
+    map
+}

@@ -1,0 +1,130 @@
+//! What a suspect says: which effect, how large, where, how sure, and how to take it into account.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::cube::Cube;
+use super::prediction::BodyPrediction;
+
+/// A parameter of an effect, or a list of them, with 90 % intervals.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// As in FORMATS.md's table.
+    pub name: &'static str,
+    pub values: Vec<f64>,
+    pub ci90: Vec<[f64; 2]>,
+}
+
+impl Estimate {
+    /// A value with the standard deviation of its error.
+    pub fn normal(name: &'static str, value: f64, deviation: f64) -> Self {
+        Self::list(name, &[value], &[deviation])
+    }
+
+    pub fn list(name: &'static str, values: &[f64], deviations: &[f64]) -> Self {
+        let ci90 = values.iter().zip(deviations).map(|(value, sigma)| [value - 1.645 * sigma, value + 1.645 * sigma]).collect();
+        Self { name, values: values.to_vec(), ci90 }
+    }
+}
+
+/// `where` of a report; what is absent was not localised along that axis: the effect acts everywhere on it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    pub stage: String,
+    pub range_m: Option<[f64; 2]>,
+    pub velocity_mps: Option<[f64; 2]>,
+    pub azimuth_deg: Option<[f64; 2]>,
+    pub position_m: Option<[f64; 3]>,
+    pub boundary: Option<String>,
+    pub frames: Option<Vec<usize>>,
+    pub chirps: Option<Vec<usize>>,
+    pub samples: Option<Vec<usize>>,
+    pub tx: Option<Vec<usize>>,
+    pub rx: Option<Vec<usize>>,
+    pub body_part: Option<String>,
+}
+
+impl Place {
+    pub fn at(stage: &str) -> Self {
+        Self { stage: stage.into(), ..Self::default() }
+    }
+}
+
+/// The capacity ladder of DIAGNOSIS.md 3.0: how much freedom of the amplitudes a finding survives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Rung {
+    /// A common gain.
+    A,
+    /// Amplitudes that stay the same over time.
+    B,
+    /// And pose and time.
+    C,
+    /// And real amplitudes that are free in every frame: no BRDF can have made it.
+    D,
+    /// And complex amplitudes that are free in every frame: no error of the mesh can have made it.
+    E,
+    /// And radial velocities.
+    F,
+}
+
+/// How an accepted effect is taken into account.
+#[derive(Clone)]
+pub enum Correction {
+    /// Undone in the samples, of all frames: subtracted or inverted.
+    Samples(Arc<dyn Fn(&mut Cube) + Send + Sync>),
+    /// Changes what is predicted of the body.
+    Body(Arc<dyn Fn(&mut BodyPrediction) + Send + Sync>),
+    /// Explains power where it was not expected: (frame, doppler, range) masks are kept by whoever needs them.
+    None,
+}
+
+/// A curve to draw, such as a filter's response.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Curve {
+    pub title: String,
+    pub x_label: String,
+    pub y_label: String,
+    /// Name, x, y.
+    pub series: Vec<(String, Vec<f64>, Vec<f64>)>,
+}
+
+/// One thing that may have been left out.
+#[derive(Clone)]
+pub struct Candidate {
+    /// As in FORMATS.md; none: outside the library.
+    pub id: Option<&'static str>,
+    /// "slow-time gain", "additive fast-time", "path-like" and so on.
+    pub behaves_like: &'static str,
+    pub estimates: Vec<Estimate>,
+    /// A boundary or a part of the body.
+    pub choice: Option<String>,
+    pub place: Place,
+    /// Under the null, corrected for everything that this suspect looked at.
+    pub p_value: f64,
+    /// Log-likelihood that held-out frames gain, nats.
+    pub gain: f64,
+    pub rung: Rung,
+    /// Effects that would do the same to this recording, as far as it can tell.
+    pub look_alikes: Vec<&'static str>,
+    /// Plain words with numbers: what was left out, where, how large.
+    pub statement: String,
+    pub curve: Option<Curve>,
+    /// Energy of the effect over all samples (of the kind the cube holds: sum of |sample|²).
+    pub energy: f64,
+    pub correction: Correction,
+}
+
+impl std::fmt::Debug for Candidate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{} p {:.1e} gain {:.1} {:?} {}",
+            self.id.unwrap_or(self.behaves_like),
+            self.p_value,
+            self.gain,
+            self.estimates.iter().map(|e| (e.name, &e.values)).collect::<Vec<_>>(),
+            self.statement
+        )
+    }
+}

@@ -1,0 +1,71 @@
+//! Small statistics that several suspects need; distributions come from `statrs`.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, Gamma, Normal};
+use statrs::function::beta::inv_beta_reg;
+
+/// Scale of an exponential distribution from its lower `quantile` (between 0 and 1): large values do not count.
+pub fn exponential_scale(values: &mut [f64], quantile: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let index = ((values.len() - 1) as f64 * quantile) as usize;
+    let (_, value, _) = values.select_nth_unstable_by(index, f64::total_cmp);
+    *value / -(1.0 - quantile).ln()
+}
+
+/// Probability that a χ² of so many degrees of freedom exceeds a value.
+pub fn chi2_tail(value: f64, freedom: f64) -> f64 {
+    if value <= 0.0 { 1.0 } else { ChiSquared::new(freedom).map_or(1.0, |law| law.sf(value)) }
+}
+
+/// Probability that the mean of `count` independent powers of mean 1 (exponential) exceeds a value.
+pub fn mean_power_tail(mean: f64, count: f64) -> f64 {
+    if mean <= 0.0 { 1.0 } else { Gamma::new(count, count).map_or(1.0, |law| law.sf(mean)) }
+}
+
+/// Probability that a standard normal deviates by more than this, both ways.
+pub fn normal_tails(z: f64) -> f64 {
+    2.0 * Normal::standard().sf(z.abs())
+}
+
+/// The smallest of `tried` independent p-values, made a p-value again (Šidák).
+pub fn corrected(p: f64, tried: f64) -> f64 {
+    // 1 − (1 − p)^n without cancellation.
+    (-(tried * (-p.clamp(0.0, 1.0)).ln_1p()).exp_m1()).clamp(0.0, 1.0)
+}
+
+/// Exact (Clopper–Pearson) interval of a share.
+pub fn binomial_interval(hits: usize, of: usize, confidence: f64) -> [f64; 2] {
+    if of == 0 {
+        return [0.0, 1.0];
+    }
+    let (k, n, tail) = (hits as f64, of as f64, 0.5 * (1.0 - confidence));
+    let low = if hits == 0 { 0.0 } else { inv_beta_reg(k, n - k + 1.0, tail) };
+    let high = if hits == of { 1.0 } else { inv_beta_reg(k + 1.0, n - k, 1.0 - tail) };
+    [low, high]
+}
+
+pub fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_values() {
+        assert!((chi2_tail(3.841, 1.0) - 0.05).abs() < 1e-4);
+        assert!((normal_tails(1.96) - 0.05).abs() < 1e-4);
+        assert!((mean_power_tail(2.0, 1.0) - (-2.0f64).exp()).abs() < 1e-9);
+        assert!((corrected(1e-12, 10.0) - 1e-11).abs() < 1e-16);
+        let [low, high] = binomial_interval(0, 300, 0.95);
+        assert!(low == 0.0 && (high - 0.01222).abs() < 1e-4, "{high}");
+        let mut values: Vec<f64> = (1..=1000).map(|i| -(1.0 - (i as f64 - 0.5) / 1000.0f64).ln() * 3.0).collect();
+        assert!((exponential_scale(&mut values, 0.35) - 3.0).abs() < 0.05);
+    }
+}
