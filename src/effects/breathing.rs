@@ -1,0 +1,19 @@
+//! The chest's breathing (card T1).
+
+use super::info::{EffectInfo, Stage, parameter};
+
+pub static INFO: EffectInfo = EffectInfo {
+    id: "breathing",
+    card: "T1",
+    stage: Stage::Body,
+    title: "the chest's breathing",
+    explanation: "The torso's surface moves in and out by a few millimetres as the person breathes, which the motion does not hold.",
+    equation: "p → p + n_p amplitude_m sin(2π rate_hz T + phase_rad) on the torso",
+    parameters: &[
+        parameter("rate_hz", "Hz", 0.25, 0.1, 0.7),
+        parameter("amplitude_m", "m", 0.0, 0.0, 0.012),
+        parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
+    ],
+    look_alikes: &["pose_offset", "clock_drift", "radar_vibration"],
+    separate_by: "a person who stands still, and a breath held on command",
+};

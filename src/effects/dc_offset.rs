@@ -1,0 +1,19 @@
+//! A constant offset of the receivers (card R2).
+
+use super::info::{EffectInfo, Stage, parameter};
+
+pub static INFO: EffectInfo = EffectInfo {
+    id: "dc_offset",
+    card: "R2",
+    stage: Stage::Receiver,
+    title: "a constant offset of the receivers",
+    explanation: "Each receiver's output has a constant offset: a line at range zero and speed zero.",
+    equation: "s_r → s_r + reference (i_r + j q_r)",
+    parameters: &[
+        parameter("i", "of the reference", 0.0, -1.0, 1.0),
+        parameter("q", "of the reference", 0.0, -1.0, 1.0),
+        parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
+    ],
+    look_alikes: &["tx_leakage"],
+    separate_by: "several transmitters: an offset is the same for all of them, leakage is not",
+};

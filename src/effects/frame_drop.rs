@@ -1,0 +1,15 @@
+//! Frames that were lost (card G4).
+
+use super::info::{EffectInfo, Stage, parameter};
+
+pub static INFO: EffectInfo = EffectInfo {
+    id: "frame_drop",
+    card: "G4",
+    stage: Stage::Timing,
+    title: "frames that were lost",
+    explanation: "Frames are missing from the recording, so that from there on every frame shows the body later than its number says.",
+    equation: "T_k → T_k + count·T_F for k ≥ at",
+    parameters: &[parameter("at", "frame", 0.0, 0.0, 1000000.0), parameter("count", "frames", 0.0, 0.0, 1000.0)],
+    look_alikes: &["clock_offset", "clock_drift"],
+    separate_by: "the frames' own time stamps, or a motion with a sharp event on either side of the gap",
+};

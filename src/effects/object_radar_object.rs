@@ -1,0 +1,19 @@
+//! A second trip between the scene and the radar (card R6).
+
+use super::info::{EffectInfo, Stage, parameter};
+
+pub static INFO: EffectInfo = EffectInfo {
+    id: "object_radar_object",
+    card: "R6",
+    stage: Stage::Propagation,
+    title: "a second trip between the scene and the radar",
+    explanation: "Part of the echo is reflected by the radar itself and goes to the scene once more: everything appears again at twice the range and twice the speed, in every pair.",
+    equation: "s_{t,r} → s_{t,r} + coefficient s_{t,0} s_{0,r} / reference",
+    parameters: &[
+        parameter("coefficient", "1", 0.0, -1.0, 1.0),
+        parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
+        parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
+    ],
+    look_alikes: &["second_harmonic", "wall_ghost"],
+    separate_by: "step out of the boresight: a harmonic doubles the phases across the array, the second trip does not; or lower the transmit power by 6 dB",
+};

@@ -1,0 +1,15 @@
+//! An error in the time between the transmitters' slots (card G5).
+
+use super::info::{EffectInfo, Stage, parameter};
+
+pub static INFO: EffectInfo = EffectInfo {
+    id: "tdm_phase",
+    card: "G5",
+    stage: Stage::Timing,
+    title: "an error in the time between the transmitters' slots",
+    explanation: "The transmitters fire one after the other, later than assumed; a moving part gains a phase from one transmitter to the next, which turns its direction.",
+    equation: "τ_p → τ_p + τ̇_p · j · slot_s for transmitter j",
+    parameters: &[parameter("slot_s", "s", 0.0, -0.001, 0.001)],
+    look_alikes: &["channel_mismatch"],
+    separate_by: "two directions of walking: the phase changes sign with the velocity, a transmitter's own phase does not",
+};
