@@ -5,6 +5,7 @@
 
 mod check;
 mod device;
+mod diagnose;
 mod evaluate;
 mod infer;
 mod progress;
@@ -72,6 +73,11 @@ enum Command {
     /// PSNR, SSIM and dB error over all cells, with what is static removed, and on the cells that the person
     /// occupies, as mean and standard deviation over frames; --out writes them with their 95 % intervals as JSON.
     Evaluate(evaluate::Arguments),
+    /// Find out why a recording and the simulator disagree
+    ///
+    /// Says what physics was left out, where, how large and how sure, what it cannot tell apart, and how much better
+    /// held-out data fit once it is modelled. Writes report.html for people and report.json for programs.
+    Diagnose(diagnose::Arguments),
 }
 
 /// Where results go.
@@ -97,6 +103,7 @@ pub fn main() -> ExitCode {
         Command::Train(arguments) => train::run(arguments, &cli.common),
         Command::Infer(arguments) => infer::run(arguments, &cli.common),
         Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
+        Command::Diagnose(arguments) => diagnose::run(arguments, &cli.common),
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,

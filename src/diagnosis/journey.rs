@@ -1,0 +1,106 @@
+//! From a recording to a diagnosis: read, audit, explain in rounds, report.
+
+use super::audit;
+use super::cube::Loaded;
+use super::evidence::Evidence;
+use super::misfit::Misfit;
+use super::prediction::BodyPrediction;
+use super::report::{FORMAT, Findings, Fit, HeldOut, Report, Verdict, moving_energy, never_detectable, probability_of_nothing};
+use super::select::{Explanation, Thresholds, explain};
+use crate::data::Recording;
+use crate::error::{Error, Result};
+use crate::person::Person;
+use crate::radar::Radar;
+
+/// Most frames that are looked at: memory and time stay bounded.
+const MOST_FRAMES: usize = 256;
+/// Most samples in memory (16 bytes each).
+const MOST_SAMPLES: usize = 40_000_000;
+
+/// The answer, and what pictures of it need.
+pub struct Diagnosis {
+    pub report: Report,
+    pub radar: Radar,
+    /// The recording as it was read.
+    pub original: Evidence,
+    /// Absent when nothing could be decided.
+    pub explanation: Option<Explanation>,
+}
+
+/// Looks at a recording; `progress` hears what happens, in plain words.
+///
+/// # Errors
+/// A recording that cannot be read, is too short to hold anything out, or whose motion does not cover its frames.
+pub fn diagnose(recording: &Recording, thresholds: &Thresholds, progress: &mut dyn FnMut(&str)) -> Result<Diagnosis> {
+    let per_frame: usize = recording.radar.dims()[1..].iter().product();
+    let most_frames = MOST_FRAMES.min((MOST_SAMPLES / per_frame.max(1)).max(1));
+    let mut notes = recording.notes.clone();
+    if recording.radar.frames > most_frames {
+        notes.push(format!("the first {most_frames} of {} frames were looked at", recording.radar.frames));
+    }
+    progress("reading");
+    let loaded = Loaded::read(recording, most_frames)?;
+    let body = recording.person().map(|person| prediction(recording, person, &loaded)).transpose()?;
+    notes.extend(audit::limits(&loaded, body.is_some(), recording.room.is_some()));
+    let radar = loaded.radar.clone();
+    let held_out = HeldOut::of(&loaded.split);
+    let original = Evidence::new(loaded, recording.room.clone(), body);
+    progress("checking conventions");
+    let checks = audit::audit(&original);
+    let mut report = Report {
+        format: FORMAT,
+        recording: recording.folder.display().to_string(),
+        held_out,
+        verdict: Verdict::Undecided,
+        reason: String::new(),
+        probability_nothing_missing: 0.5,
+        audit: checks,
+        effects: vec![],
+        unexplained: vec![],
+        not_detectable: vec![],
+        fit: Fit { before: Misfit::default(), after: Misfit::default() },
+        notes,
+        simulator: None,
+        settings: format!("{thresholds:?}"),
+    };
+    if let Some(reason) = audit::undecidable(&original, &report.audit) {
+        report.reason = reason;
+        return Ok(Diagnosis { report, radar, original, explanation: None });
+    }
+    if let Some(wrong) = report.audit.iter().find(|check| !check.ok && audit::is_convention(check)) {
+        // Physics fitted under a wrong convention would only imitate it.
+        report.reason = format!("a convention is wrong, which comes before any physics: {}", wrong.found);
+        return Ok(Diagnosis { report, radar, original, explanation: None });
+    }
+    progress("looking for what was left out");
+    let explanation = explain(original.clone(), thresholds, progress);
+    let findings = Findings::of(&explanation, moving_energy(&original));
+    report.verdict = findings.verdict;
+    report.reason = findings.reason;
+    report.effects = findings.effects;
+    report.unexplained = findings.unexplained;
+    report.not_detectable = never_detectable();
+    report.probability_nothing_missing = match report.verdict {
+        Verdict::NoMismatch => 1.0 - 0.5 * (1.0 - probability_of_nothing(explanation.p_value)),
+        _ => probability_of_nothing(explanation.p_value),
+    };
+    report.fit = Fit { before: explanation.before, after: explanation.after };
+    Ok(Diagnosis { report, radar, original, explanation: Some(explanation) })
+}
+
+fn prediction(recording: &Recording, person: &Person, loaded: &Loaded) -> Result<BodyPrediction> {
+    let times = person.pose_times_s();
+    let (first, last) = (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));
+    let start = loaded.starts_s.first().copied().unwrap_or(0.0);
+    let end = loaded.starts_s.last().copied().unwrap_or(0.0) + loaded.radar.frame_duration_s();
+    if start < first - 1e-9 || end > last + 1e-9 {
+        return Err(Error::field(
+            recording.folder.join("recording.toml"),
+            "motion",
+            format!("from {first:.3} s to {last:.3} s"),
+            format!("a motion over all frames, from {start:.3} s to {end:.3} s"),
+        )
+        .with_hint("shift it with motion.start_s, give a longer motion, or lower radar.frames"));
+    }
+    BodyPrediction::new(person, &loaded.radar, &loaded.starts_s)
+}

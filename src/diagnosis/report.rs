@@ -1,0 +1,258 @@
+//! `report.json`, as FORMATS.md fixes it, and what of it is words.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::audit::Check;
+use super::cube::Split;
+use super::finding::{Place, Rung};
+use super::misfit::Misfit;
+use super::select::{Accepted, Explanation};
+use crate::effects;
+
+/// Version of the report's format.
+pub const FORMAT: u32 = 1;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    Explained,
+    PartlyExplained,
+    Unexplained,
+    NoMismatch,
+    Undecided,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// `frames` or `loops`.
+    pub axis: String,
+    pub indices: Vec<usize>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// A number, or a list of them.
+    pub value: serde_json::Value,
+    /// `[low, high]`, or a list of such pairs.
+    pub ci90: serde_json::Value,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    pub held_out_loglik_gain: f64,
+    pub held_out_db_mse_before: f64,
+    pub held_out_db_mse_after: f64,
+    pub p_value: f64,
+    pub rung: Rung,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Effect {
+    pub id: String,
+    pub probability: f64,
+    pub indistinguishable_from: Vec<String>,
+    pub statement: String,
+    pub equation: String,
+    pub parameters: BTreeMap<String, Parameter>,
+    #[serde(rename = "where")]
+    pub place: Place,
+    pub evidence: Evidence,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub separate_by: Option<String>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Unexplained {
+    #[serde(rename = "where")]
+    pub place: Place,
+    pub p_value: f64,
+    pub behaves_like: String,
+    pub fraction_of_energy_db: f64,
+    pub statement: String,
+    pub held_out_loglik_gain: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NotDetectable {
+    pub id: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_most_db: Option<f64>,
+    pub reason: String,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fit {
+    pub before: Misfit,
+    pub after: Misfit,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    pub format: u32,
+    pub recording: String,
+    pub held_out: HeldOut,
+    pub verdict: Verdict,
+    pub reason: String,
+    pub probability_nothing_missing: f64,
+    pub audit: Vec<Check>,
+    pub effects: Vec<Effect>,
+    pub unexplained: Vec<Unexplained>,
+    pub not_detectable: Vec<NotDetectable>,
+    pub fit: Fit,
+    /// What this recording does not allow to look for, and notes about how it was read.
+    #[serde(default)]
+    pub notes: Vec<String>,
+    /// The trained simulator on the held-out frames, where a body or a room is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulator: Option<Fit>,
+    /// Settings that shaped the answer, and their hash.
+    #[serde(default)]
+    pub settings: String,
+}
+
+impl HeldOut {
+    pub fn of(split: &Split) -> Self {
+        match split.block_loops {
+            None => Self { axis: "frames".into(), indices: split.held_out.clone() },
+            Some(loops) => {
+                let indices = split.held_out.iter().flat_map(|block| block * loops..(block + 1) * loops).collect();
+                Self { axis: "loops".into(), indices }
+            }
+        }
+    }
+}
+
+/// Energy of what moves in the recording: without what stands still over all frames.
+pub fn moving_energy(evidence: &super::Evidence) -> f64 {
+    let cube = &evidence.cube;
+    let all: Vec<usize> = (0..cube.dims[0]).collect();
+    let still: f64 = cube.still(&all).iter().map(|value| value.norm_sqr()).sum();
+    let total: f64 = cube.samples.iter().map(|value| value.norm_sqr()).sum();
+    total - still * (cube.dims[0] * cube.dims[3]) as f64
+}
+
+fn decibels(ratio: f64) -> f64 {
+    10.0 * ratio.max(1e-30).log10()
+}
+
+/// A bound on how probable it is that nothing is missing, from a p-value (Sellke, Bayarri and Berger 2001), equal
+/// odds beforehand.
+pub fn probability_of_nothing(p_value: f64) -> f64 {
+    let p = p_value.clamp(1e-300, 1.0);
+    if p >= (-1.0f64).exp() {
+        return 0.5;
+    }
+    let bound = -std::f64::consts::E * p * p.ln();
+    bound / (1.0 + bound)
+}
+
+impl Effect {
+    fn of(accepted: &Accepted, id: &str) -> Self {
+        let candidate = &accepted.candidate;
+        let info = effects::info(id);
+        let parameters = candidate.estimates.iter().map(|estimate| {
+            let single = estimate.values.len() == 1;
+            let value = if single { estimate.values[0].into() } else { estimate.values.clone().into() };
+            let ci90 = if single { serde_json::json!(estimate.ci90[0]) } else { serde_json::json!(estimate.ci90) };
+            (estimate.name.to_string(), Parameter { value, ci90 })
+        });
+        let mut parameters: BTreeMap<String, Parameter> = parameters.collect();
+        // FORMATS.md counts a boundary and a part of the body among the parameters.
+        for (name, choice) in [("boundary", &candidate.place.boundary), ("body_part", &candidate.place.body_part)] {
+            if let Some(choice) = choice {
+                let value = serde_json::Value::from(choice.clone());
+                parameters.insert(name.into(), Parameter { value, ci90: serde_json::Value::Null });
+            }
+        }
+        let mut place = candidate.place.clone();
+        if place.stage.is_empty() {
+            place.stage = info.map(|info| stage(info.stage).to_string()).unwrap_or_default();
+        }
+        Self {
+            id: id.into(),
+            probability: accepted.probability * (1.0 - candidate.p_value),
+            indistinguishable_from: accepted.rivals.iter().map(|&rival| rival.to_string()).collect(),
+            statement: candidate.statement.clone(),
+            equation: info.map_or_else(String::new, |info| info.equation.into()),
+            parameters,
+            place,
+            evidence: Evidence {
+                held_out_loglik_gain: candidate.gain,
+                held_out_db_mse_before: accepted.before.db_mse,
+                held_out_db_mse_after: accepted.after.db_mse,
+                p_value: candidate.p_value,
+                rung: candidate.rung,
+            },
+            separate_by: info.filter(|_| !accepted.rivals.is_empty()).map(|info| info.separate_by.into()),
+        }
+    }
+}
+
+/// As FORMATS.md writes a stage.
+pub fn stage(stage: effects::Stage) -> &'static str {
+    use effects::Stage;
+    match stage {
+        Stage::Scene => "scene",
+        Stage::Body => "body",
+        Stage::Propagation => "propagation",
+        Stage::Antenna => "antenna",
+        Stage::Waveform => "waveform",
+        Stage::Receiver => "receiver",
+        Stage::Timing => "timing",
+        Stage::Noise => "noise",
+    }
+}
+
+/// Effects, what has no name, and the verdict, from what the rounds found.
+pub struct Findings {
+    pub effects: Vec<Effect>,
+    pub unexplained: Vec<Unexplained>,
+    pub verdict: Verdict,
+    pub reason: String,
+}
+
+impl Findings {
+    /// `moving_energy`: of the untouched recording.
+    pub fn of(explanation: &Explanation, moving_energy: f64) -> Self {
+        let mut effects = vec![];
+        let mut unexplained = vec![];
+        let mut accepted: Vec<&Accepted> = explanation.accepted.iter().collect();
+        accepted.sort_by(|a, b| b.candidate.gain.total_cmp(&a.candidate.gain));
+        for effect in accepted {
+            let candidate = &effect.candidate;
+            match candidate.id {
+                Some(id) => effects.push(Effect::of(effect, id)),
+                None => unexplained.push(Unexplained {
+                    place: candidate.place.clone(),
+                    p_value: candidate.p_value,
+                    behaves_like: candidate.behaves_like.into(),
+                    fraction_of_energy_db: decibels(candidate.energy / moving_energy.max(f64::MIN_POSITIVE)),
+                    statement: candidate.statement.clone(),
+                    held_out_loglik_gain: candidate.gain,
+                }),
+            }
+        }
+        let (verdict, reason) = match (effects.is_empty(), unexplained.is_empty()) {
+            (true, true) => (Verdict::NoMismatch, "nothing is significant beyond body, static room and noise".to_string()),
+            (false, true) => (Verdict::Explained, "every significant mismatch has a name".to_string()),
+            (false, false) => (Verdict::PartlyExplained, "some of the mismatch has no name in the library".to_string()),
+            (true, false) => {
+                (Verdict::Unexplained, "the mismatch is located, but nothing in the library explains it".to_string())
+            }
+        };
+        Self { effects, unexplained, verdict, reason }
+    }
+}
+
+/// Effects that no recording of this kind can show, whatever their size.
+pub fn never_detectable() -> Vec<NotDetectable> {
+    vec![NotDetectable {
+        id: "part_reflectivity".into(),
+        at_most_db: None,
+        reason:
+            "a wrong reflectivity is only another amplitude, and amplitudes are free: no recording can show it without a prior"
+                .into(),
+    }]
+}

@@ -1,0 +1,188 @@
+//! Rounds of suspicion: all look, the best explanation is accepted and taken into account, all look again.
+//!
+//! A finding must be significant (family-wise over all suspects and places) *and* predict held-out frames better. What
+//! was accepted early may only have mimicked what was found later, so at the end each one is asked to stand again with
+//! all others taken into account.
+
+use rayon::prelude::*;
+
+use super::evidence::Evidence;
+use super::finding::{Candidate, Correction};
+use super::misfit::Misfit;
+use super::suspects::{SUSPECTS, Suspect};
+
+/// When something is claimed. All of it is fixed before any sealed recording is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thresholds {
+    /// Family-wise chance of a false claim on a recording with nothing missing.
+    pub alarm: f64,
+    /// Least gain of the log-likelihood on held-out frames, nats.
+    pub gain: f64,
+    /// Alternatives within so many nats of the best are not told apart.
+    pub tie: f64,
+    /// Most effects that are accepted.
+    pub most: usize,
+}
+
+impl Default for Thresholds {
+    fn default() -> Self {
+        Self { alarm: 0.01, gain: 6.0, tie: 4.6, most: 10 }
+    }
+}
+
+impl Thresholds {
+    /// Of one suspect's p-value.
+    pub fn p_value(&self) -> f64 {
+        self.alarm / SUSPECTS.len().max(1) as f64
+    }
+
+    fn passes(&self, candidate: &Candidate) -> bool {
+        candidate.p_value <= self.p_value() && candidate.gain >= self.gain && candidate.gain.is_finite()
+    }
+}
+
+/// An accepted candidate with what it changed.
+#[derive(Clone, Debug)]
+pub struct Accepted {
+    pub suspect: usize,
+    pub candidate: Candidate,
+    /// What else would have explained this as well, as ids.
+    pub rivals: Vec<&'static str>,
+    /// Share of belief in this name among its rivals.
+    pub probability: f64,
+    /// Of the held-out frames, without and with it.
+    pub before: Misfit,
+    pub after: Misfit,
+}
+
+/// What the rounds left behind.
+pub struct Explanation {
+    pub accepted: Vec<Accepted>,
+    /// The recording with everything taken into account.
+    pub evidence: Evidence,
+    /// Smallest p-value of all suspects on the untouched recording, corrected for their number.
+    pub p_value: f64,
+    pub before: Misfit,
+    pub after: Misfit,
+}
+
+/// Runs the rounds; `progress` hears what was found.
+pub fn explain(evidence: Evidence, thresholds: &Thresholds, progress: &mut dyn FnMut(&str)) -> Explanation {
+    let before = Misfit::of(&evidence);
+    let original = evidence;
+    let mut current: Option<Evidence> = None;
+    let mut accepted: Vec<Accepted> = vec![];
+    let mut p_value = None;
+    // Candidates of the round before that could still turn out to be the same thing as what was accepted in it.
+    let mut pending: Vec<Candidate> = vec![];
+    let mut misfit = before;
+    for _ in 0..=thresholds.most {
+        let evidence = current.as_ref().unwrap_or(&original);
+        let found = suspicions(evidence);
+        p_value.get_or_insert_with(|| {
+            let smallest = found.iter().map(|(_, candidate)| candidate.p_value).fold(1.0, f64::min);
+            super::statistics::corrected(smallest, SUSPECTS.len() as f64)
+        });
+        let passing: Vec<&(usize, Candidate)> = found.iter().filter(|(_, candidate)| thresholds.passes(candidate)).collect();
+        if let Some(last) = accepted.last_mut() {
+            settle_rivals(last, &pending, &passing, thresholds);
+        }
+        let Some((suspect, best)) = passing.iter().max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).map(|best| (&best.0, &best.1))
+        else {
+            break;
+        };
+        if accepted.len() == thresholds.most {
+            break;
+        }
+        progress(&best.statement);
+        pending = passing.iter().map(|(_, other)| other.clone()).filter(|other| !std::ptr::eq(other, best)).collect();
+        let next = evidence.with(best);
+        let after = Misfit::of(&next);
+        accepted.push(Accepted {
+            suspect: *suspect,
+            candidate: best.clone(),
+            rivals: best.look_alikes.clone(),
+            probability: 1.0,
+            before: misfit,
+            after,
+        });
+        misfit = after;
+        current = Some(next);
+    }
+    let accepted = verified(&original, accepted, thresholds);
+    let evidence = accepted.iter().fold(original, |evidence, effect| evidence.with(&effect.candidate));
+    let after = Misfit::of(&evidence);
+    Explanation { accepted, evidence, p_value: p_value.unwrap_or(1.0), before, after }
+}
+
+/// What every suspect has to say.
+fn suspicions(evidence: &Evidence) -> Vec<(usize, Candidate)> {
+    // The shared products first, so that suspects do not wait for one another.
+    evidence.maps();
+    let ask = |(index, suspect): (usize, &Suspect)| -> Vec<(usize, Candidate)> {
+        (suspect.find)(evidence).into_iter().map(|candidate| (index, candidate)).collect()
+    };
+    SUSPECTS.par_iter().enumerate().flat_map_iter(ask).collect()
+}
+
+/// Rivals of the effect accepted last: they passed beside it and have nothing left to say now that it is in place.
+fn settle_rivals(last: &mut Accepted, pending: &[Candidate], passing: &[&(usize, Candidate)], thresholds: &Thresholds) {
+    let mut weight = 1.0 + last.candidate.look_alikes.len() as f64;
+    for rival in pending {
+        let Some(id) = rival.id else { continue };
+        let silent = !passing.iter().any(|(_, candidate)| candidate.id == Some(id));
+        if silent && Some(id) != last.candidate.id {
+            let behind = last.candidate.gain - rival.gain;
+            weight += (-behind).exp().min(1.0);
+            if behind <= thresholds.tie && !last.rivals.contains(&id) {
+                last.rivals.push(id);
+            }
+        }
+    }
+    last.probability = 1.0 / weight;
+}
+
+/// Asks everyone accepted to stand again with all others taken into account; the fallen go, the weakest first, and the
+/// rest keep the parameters of this last fit.
+fn verified(original: &Evidence, mut accepted: Vec<Accepted>, thresholds: &Thresholds) -> Vec<Accepted> {
+    if accepted.len() < 2 {
+        return accepted;
+    }
+    let mut index = accepted.len();
+    while index > 0 {
+        index -= 1;
+        let others = accepted.iter().enumerate().filter(|&(other, _)| other != index);
+        let evidence = others.fold(original.clone(), |evidence, (_, effect)| evidence.with(&effect.candidate));
+        let again = (SUSPECTS[accepted[index].suspect].find)(&evidence);
+        let same = |candidate: &&Candidate| {
+            candidate.id == accepted[index].candidate.id
+                && candidate.choice == accepted[index].candidate.choice
+                && thresholds.passes(candidate)
+        };
+        match again.iter().filter(same).max_by(|a, b| a.gain.total_cmp(&b.gain)) {
+            Some(candidate) => accepted[index].candidate = candidate.clone(),
+            None => {
+                accepted.remove(index);
+            }
+        }
+    }
+    accepted
+}
+
+impl Evidence {
+    /// The same with one more effect taken into account.
+    pub fn with(&self, candidate: &Candidate) -> Self {
+        let mut next = self.clone().changed();
+        match &candidate.correction {
+            Correction::Samples(undo) => undo(&mut next.cube),
+            Correction::Body(change) => {
+                if let Some(body) = &mut next.body {
+                    change(body);
+                }
+            }
+            Correction::None => {}
+        }
+        next.accepted.push(candidate.id.unwrap_or(candidate.behaves_like));
+        next
+    }
+}
