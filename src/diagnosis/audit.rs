@@ -41,7 +41,7 @@ pub fn audit(evidence: &Evidence) -> Vec<Check> {
     checks.extend(body_place(evidence));
     checks.extend(transmitter_order(evidence));
     checks.extend(room_ranges(evidence));
-    checks.push(noise_scale(evidence));
+    checks.extend(numerics(evidence));
     checks
 }
 
@@ -304,31 +304,21 @@ fn room_ranges(evidence: &Evidence) -> Option<Check> {
     ))
 }
 
-/// Self-test of windows and normalisation: empty cells must have the noise's variance, whatever the window.
-fn noise_scale(evidence: &Evidence) -> Check {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let mut ratios: Vec<f64> = (0..evidence.cube.channels())
-        .map(|channel| {
-            // Differences of neighbouring chirps in the time domain know no window; movers are slow against a loop.
-            let mut powers: Vec<f64> = evidence
-                .split
-                .training
-                .iter()
-                .flat_map(|&frame| {
-                    let values = evidence.cube.channel(frame, channel);
-                    (1..loops.saturating_sub(1)).flat_map(move |index| {
-                        let at = move |index: usize, bin: usize| values[index * samples + bin];
-                        (0..samples).map(move |n| (at(index + 1, n) - at(index, n) * 2.0 + at(index - 1, n)).norm_sqr() / 6.0)
-                    })
-                })
-                .collect();
-            super::statistics::exponential_scale(&mut powers, 0.35) / evidence.noise()[channel].max(f64::MIN_POSITIVE)
-        })
-        .collect();
-    let ratio = super::statistics::median(&mut ratios);
-    let db = 10.0 * ratio.max(1e-30).log10();
-    let ok = evidence.is_real() || db.abs() < 3.0;
-    Check::new("noise_scale", "noise of the maps equals that of the samples", format!("{db:+.2} dB"), ok)
+/// What the answer rests on numerically.
+fn numerics(evidence: &Evidence) -> Vec<Check> {
+    let mut checks = vec![Check::new("precision", "double precision", "all sums and transforms in double precision", true)];
+    if let Some(body) = &evidence.body {
+        let (points, area) = body.frames.iter().flatten().fold((0.0, 0.0), |(n, sum), point| (n + 1.0, sum + point.area_m2));
+        let spacing = if points > 0.0 { f64::sqrt(area / points) } else { 0.0 };
+        let bin = evidence.radar.range_resolution_m();
+        checks.push(Check::new(
+            "surface_sampling",
+            format!("points of the body much closer than a range bin of {:.0} mm", 1e3 * bin),
+            format!("{:.0} mm apart; only powers and delays are predicted from them, no carrier phases", 1e3 * spacing),
+            points > 0.0 && spacing < 0.5 * bin,
+        ));
+    }
+    checks
 }
 
 fn spectrum(chirp: &[Complex64]) -> Vec<Complex64> {

@@ -14,6 +14,8 @@ pub enum Split {
     Last,
     /// Frames drawn from the whole recording.
     Random,
+    /// Evenly spaced frames.
+    Interleaved,
 }
 
 /// A frame of one of several recordings.
@@ -44,6 +46,11 @@ impl FrameSplit {
             let mut order: Vec<usize> = (0..count).collect();
             if split == Split::Random {
                 order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed ^ (recording as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)));
+            }
+            if split == Split::Interleaved {
+                // To the back, in the middle of each of `held_out` equal stretches.
+                let is_held = |frame: &usize| (0..held_out).any(|part| (2 * part + 1) * count / (2 * held_out) == *frame);
+                order.sort_by_key(is_held);
             }
             let (train, held) = order.split_at(count - held_out);
             training.extend(train.iter().map(|&frame| FrameId { recording, frame }));
@@ -89,6 +96,13 @@ mod tests {
         assert!(split.validation.iter().all(|id| !split.training.contains(id)));
         assert_eq!(split, FrameSplit::new(&[40], 0.25, Split::Random, 7));
         assert_ne!(split, FrameSplit::new(&[40], 0.25, Split::Random, 8));
+    }
+
+    #[test]
+    fn an_interleaved_split_holds_out_every_fourth_frame() {
+        let split = FrameSplit::new(&[12], 0.25, Split::Interleaved, 1);
+        assert_eq!(split.validation.iter().map(|id| id.frame).collect::<Vec<_>>(), [2, 6, 10]);
+        assert_eq!(split.training.len(), 9);
     }
 
     #[test]

@@ -1,0 +1,136 @@
+//! The trained simulator on the held-out frames: as it is, and with the effects that were found.
+
+use std::path::{Path, PathBuf};
+
+use burn::tensor::Device;
+
+use super::misfit::Misfit;
+use super::report::Fit;
+use crate::data::atomic::AtomicFolder;
+use crate::effects::EffectSetting;
+use crate::error::Result;
+use crate::evaluation::{Simulation, evaluate};
+use crate::heatmap::{HeatmapConfig, Map};
+use crate::metrics::MetricsConfig;
+use crate::simulator::{Simulator, SimulatorConfig};
+use crate::training::{Event, LoadedRecording, Split, Trainer, TrainingConfig, checkpoint, site};
+
+/// How the simulator is trained within a diagnosis.
+#[derive(Clone, Debug)]
+pub struct Training {
+    pub epochs: usize,
+    pub seed: u64,
+    pub device: Device,
+    /// A simulator that is trained already.
+    pub checkpoint: Option<PathBuf>,
+}
+
+/// Both simulators, and what they are worth.
+pub struct Simulated {
+    pub fit: Fit,
+    /// Static-removed maps of the held-out frames: measured, baseline, with the effects; dB.
+    pub maps: [Map; 3],
+}
+
+/// Trains (or opens) the baseline, then the same with the effects, and compares both with the frames that neither saw.
+/// The second one's checkpoint goes to `keep`. `None` without body and room: nothing to simulate.
+///
+/// # Errors
+/// What training refuses; a checkpoint of another radar.
+pub fn before_and_after(
+    folder: &Path,
+    effects: &[EffectSetting],
+    training: &Training,
+    keep: &Path,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Option<Simulated>> {
+    let mut config = SimulatorConfig::default();
+    if let Some(checkpoint) = &training.checkpoint {
+        config = checkpoint::read_state(checkpoint)?.simulator;
+    } else {
+        config.room.patches = 1000;
+    }
+    let recordings = [LoadedRecording::open(folder, &config, false)?];
+    let frames = recordings[0].scene.radar.frames;
+    if (recordings[0].recording.person().is_none() && recordings[0].recording.room.is_none()) || frames < 4 {
+        return Ok(None);
+    }
+    let held_out: Vec<usize> = (0..frames).filter(|frame| frame % 4 == 2).collect();
+    let learning = TrainingConfig {
+        epochs: training.epochs,
+        validation_fraction: held_out.len() as f64 / frames as f64,
+        split: Split::Interleaved,
+        ..TrainingConfig::default()
+    };
+    let scratch = AtomicFolder::create(keep)?;
+    let mut train = |config: &SimulatorConfig, name: &str| -> Result<Simulator> {
+        let folder = scratch.path().join(name);
+        let trainer = Trainer {
+            config: &learning,
+            simulator_config: config,
+            seed: training.seed,
+            recordings: &recordings,
+            site: site(&recordings, config),
+            config_toml: "",
+            folder: &folder,
+            device: training.device.clone(),
+        };
+        let outcome = trainer.run(None, &mut |event| {
+            if let Event::Epoch(metrics) = event {
+                progress(&format!("training the simulator {name} the effects: epoch {}", metrics.epoch + 1));
+            }
+        })?;
+        Ok(outcome.simulator)
+    };
+    let baseline = match &training.checkpoint {
+        Some(folder) => checkpoint::open(folder, &training.device)?.0,
+        None => train(&config, "without")?,
+    };
+    let before = Held::of(&recordings[0], &baseline, &held_out, training.seed)?;
+    let with = SimulatorConfig { effects: effects.to_vec(), ..config };
+    let after = if effects.is_empty() { None } else { Some(Held::of(&recordings[0], &train(&with, "with")?, &held_out, training.seed)?) };
+    let after = after.as_ref().unwrap_or(&before);
+    let maps = [before.measured.clone(), before.simulated.clone(), after.simulated.clone()];
+    let fit = Fit { before: before.misfit, after: after.misfit };
+    if !effects.is_empty() {
+        scratch.finish()?;
+    }
+    Ok(Some(Simulated { fit, maps }))
+}
+
+/// A simulator's maps of the held-out frames.
+struct Held {
+    misfit: Misfit,
+    measured: Map,
+    simulated: Map,
+}
+
+impl Held {
+    fn of(recording: &LoadedRecording, simulator: &Simulator, held_out: &[usize], seed: u64) -> Result<Self> {
+        let simulation = Simulation::new(simulator, &recording.scene, seed, true);
+        let (mut squares, mut cells) = (0.0, 0.0f64);
+        let mut sums: Option<(Map, Map)> = None;
+        let heatmap = HeatmapConfig::default();
+        let found =
+            evaluate(recording, &simulation, held_out, &heatmap, &MetricsConfig::default(), &mut |_, all, moving| {
+                let pairs = all.measured.values.iter().zip(&all.simulated.values);
+                squares += pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+                cells += all.measured.values.len() as f64;
+                match &mut sums {
+                    None => sums = Some((moving.measured, moving.simulated)),
+                    Some((measured, simulated)) => {
+                        for (sum, map) in [(measured, &moving.measured), (simulated, &moving.simulated)] {
+                            sum.values.iter_mut().zip(&map.values).for_each(|(sum, value)| *sum = sum.max(*value));
+                        }
+                    }
+                }
+            })?;
+        let psnr_db = found.global.as_ref().map_or(0.0, |scores| scores.psnr_db.mean);
+        let (measured, simulated) = sums.expect("at least one frame is held out");
+        Ok(Self {
+            misfit: Misfit { loglik_per_sample: 0.0, db_mse: squares / cells.max(1.0), psnr_db },
+            measured,
+            simulated,
+        })
+    }
+}
