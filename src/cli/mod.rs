@@ -5,6 +5,7 @@
 
 mod check;
 mod device;
+mod effects;
 mod evaluate;
 mod infer;
 mod progress;
