@@ -57,7 +57,7 @@ fn measure(paths: PathModel, device: &Device) {
     let constants = plain.constants(&scene);
     let inference_s = median(|| {
         let surfaces = plain.surfaces(&constants, Mode::Inference);
-        let signal = plain.with_noise(plain.clean_signal(&scene, &view, &surfaces), 1);
+        let signal = plain.with_noise(&scene.radar, plain.clean_signal(&scene, &view, &surfaces), 1);
         assert!(signal.power().sum().into_scalar::<f32>() > 0.0);
     });
 
@@ -68,7 +68,7 @@ fn measure(paths: PathModel, device: &Device) {
     let step_s = median(|| {
         let current = simulator.take().expect("put back below");
         let surfaces = current.surfaces(&constants, Mode::Training { seed: 3 });
-        let signal = current.with_noise(current.clean_signal(&scene, &view, &surfaces), 1);
+        let signal = current.with_noise(&scene.radar, current.clean_signal(&scene, &view, &surfaces), 1);
         let loss = power_db(transform.map(signal).power(), 1e-6).powi_scalar(2).mean();
         let mut gradients = loss.backward();
         let gradients = GradientsParams::from_module(&mut gradients, &current);

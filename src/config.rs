@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     data::settings,
+    diagnosis::DiagnosisConfig,
     error::{Error, Result},
     recorder::RecorderConfig,
     simulator::SimulatorConfig,
@@ -20,6 +21,7 @@ pub struct Config {
     pub data: DataConfig,
     pub simulator: SimulatorConfig,
     pub training: TrainingConfig,
+    pub diagnosis: DiagnosisConfig,
     /// A recording to make, where none is at hand.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub record: Option<RecorderConfig>,
@@ -44,6 +46,16 @@ impl Config {
         }
         config.training.check()?;
         config.simulator.check()?;
+        config.diagnosis.check()?;
+        Ok(config)
+    }
+
+    /// The settings that apply without a file, changed by `--set key=value`.
+    pub fn defaults(sets: &[String]) -> Result<Self> {
+        let config: Self = settings::settings_from_table(toml::Table::new(), "the defaults", sets)?;
+        config.training.check()?;
+        config.simulator.check()?;
+        config.diagnosis.check()?;
         Ok(config)
     }
 

@@ -37,7 +37,7 @@ impl<'a> Simulation<'a> {
         let view = self.scene.view(frame)?;
         let clean = self.simulator.clean_signal(self.scene, &view, &self.surfaces);
         let signal = match self.noise {
-            true => self.simulator.with_noise(clean, step_rng(self.seed, frame, 0x51A1).random()),
+            true => self.simulator.with_noise(&self.scene.radar, clean, step_rng(self.seed, frame, 0x51A1).random()),
             false => clean,
         };
         Ok(to_host(signal))

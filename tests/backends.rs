@@ -47,7 +47,7 @@ fn answer(device: &Device) -> Answer {
     let flat = |tensor: Tensor<4>| tensor.into_data().convert::<f64>().try_into_vec::<f64>().unwrap();
     let mut signal = flat(clean.re.clone());
     signal.extend(flat(clean.im.clone()));
-    let noisy = simulator.with_noise(clean, 7);
+    let noisy = simulator.with_noise(&radar, clean, 7);
     let transform = RangeDoppler::new(16, 32, radar.sampling, &HeatmapConfig::default(), &device);
     let loss = power_db(transform.map(noisy).power(), 1e-3).powi_scalar(2).mean();
     let mut backward = loss.backward();

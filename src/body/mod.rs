@@ -120,6 +120,16 @@ impl PosedBody {
         &self.surface
     }
 
+    /// The joint that moves each point most, `[point]`; nothing where meshes move them.
+    pub fn joints(&self) -> Vec<usize> {
+        let Source::Skinned { body, .. } = &self.source else { return Vec::new() };
+        let nearest = |(corners, weights): (&[usize; 3], &[f64; 3])| {
+            let largest = (0..3).max_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap_or(0);
+            body.joint(corners[largest])
+        };
+        self.surface.corners.iter().zip(&self.surface.weights).map(nearest).collect()
+    }
+
     /// The mesh at one pose of the motion, `[vertex, xyz]`, metres, radar frame.
     pub fn vertices_at_pose(&self, pose: usize) -> Vec<[f64; 3]> {
         match &self.source {

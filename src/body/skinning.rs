@@ -93,6 +93,12 @@ impl SkinnedBody {
         Vector::new(axis(0), axis(1), axis(2))
     }
 
+    /// The joint with the largest weight at a vertex.
+    pub fn joint(&self, vertex: usize) -> usize {
+        let weights = self.skinning[vertex].iter();
+        weights.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |&(joint, _)| joint)
+    }
+
     /// Blended rotation at a vertex, from the joints' (`[joint, pose]` of [`Poses`]).
     pub fn blended_rotation(&self, vertex: usize, pose: usize, poses: &Poses) -> Matrix {
         self.skinning[vertex].iter().map(|&(joint, weight)| poses.rotations[joint * poses.count + pose] * weight).sum()

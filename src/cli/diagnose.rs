@@ -4,10 +4,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Common, progress::Progress};
+use super::{Common, device, progress::Progress};
 use crate::{
+    config::Config,
     data::{Recording, atomic},
-    diagnosis::{self, select::Thresholds},
+    diagnosis::{
+        self, Diagnosis,
+        simulate::{Simulated, Start, before_and_after},
+    },
     error::{Error, Result},
 };
 
@@ -15,23 +19,70 @@ use crate::{
 pub(crate) struct Arguments {
     /// A recording folder
     recording: PathBuf,
-    /// Folder for report.json and report.html
+    /// A simulator trained on such recordings, to be held against them in place of one trained now
+    #[arg(long, value_name = "DIR")]
+    checkpoint: Option<PathBuf>,
+    /// Settings: [diagnosis], [simulator] and [training] of a config file
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Folder for report.html, report.json and, where a simulator was trained, its checkpoint with the effects
     #[arg(short, long, value_name = "DIR", default_value = "diagnosis")]
     out: PathBuf,
 }
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
+    let config = match &arguments.config {
+        Some(path) => Config::read(path, &common.set)?,
+        None => Config::defaults(&common.set)?,
+    };
     let recording = Recording::open(&arguments.recording)?;
-    let progress = Progress::new("diagnosing", Thresholds::default().most, common.quiet);
-    let mut rounds = 0;
-    let diagnosis = diagnosis::diagnose(&recording, &Thresholds::default(), &mut |text| {
-        rounds += 1;
+    let progress = Progress::new("diagnosing", config.diagnosis.most + 2 * config.diagnosis.epochs, common.quiet);
+    let mut steps = 0;
+    let mut tell = |text: &str| {
+        steps += 1;
         progress.line(text);
-        progress.set(rounds);
-    })?;
-    let html = diagnosis::html::html(&diagnosis)?;
+        progress.set(steps);
+    };
+    let mut diagnosis = diagnosis::diagnose(&recording, &config.diagnosis, &mut tell)?;
+    std::fs::create_dir_all(&arguments.out).map_err(|error| Error::write(&arguments.out, error))?;
+    let simulated = simulate(arguments, common, &config, &mut diagnosis, &mut tell)?;
+    let html = diagnosis::html::html(&diagnosis, simulated.as_ref())?;
     progress.finish();
-    write(&arguments.out, &diagnosis.report, &html)?;
+    write(&arguments.out, &diagnosis, &html)?;
+    tell_result(&diagnosis, &arguments.out);
+    Ok(())
+}
+
+/// The trained simulator, without and with what was found.
+fn simulate(
+    arguments: &Arguments,
+    common: &Common,
+    config: &Config,
+    diagnosis: &mut Diagnosis,
+    tell: &mut dyn FnMut(&str),
+) -> Result<Option<Simulated>> {
+    let Some(explanation) = diagnosis.explanation.as_ref().filter(|_| config.diagnosis.epochs > 0) else { return Ok(None) };
+    let effects: Vec<_> = explanation.accepted.iter().filter_map(|effect| effect.candidate.setting()).collect();
+    let start = Start {
+        simulator: &config.simulator,
+        learning: &config.training,
+        epochs: config.diagnosis.epochs,
+        seed: config.diagnosis.seed,
+        device: &device(&common.device)?,
+        checkpoint: arguments.checkpoint.as_deref(),
+    };
+    let simulated = before_and_after(&arguments.recording, &effects, &start, &arguments.out.join("simulator"), tell)?;
+    diagnosis.report.simulator = simulated.as_ref().map(|simulated| simulated.fit);
+    Ok(simulated)
+}
+
+/// The page first: whoever finds report.json finds both.
+fn write(out: &Path, diagnosis: &Diagnosis, html: &str) -> Result<()> {
+    atomic::write_text(out.join("report.html"), html)?;
+    atomic::write_text(out.join("report.json"), &serde_json::to_string_pretty(&diagnosis.report).expect("plain data"))
+}
+
+fn tell_result(diagnosis: &Diagnosis, out: &Path) {
     println!("{}", diagnosis::html::lead(&diagnosis.report));
     for effect in &diagnosis.report.effects {
         println!("  {:<24} {:>4.0} %  {}", effect.id, 100.0 * effect.probability, effect.statement);
@@ -39,13 +90,5 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     for unexplained in &diagnosis.report.unexplained {
         println!("  {:<24}         {}", "(no name)", unexplained.statement);
     }
-    println!("report: {}", arguments.out.join("report.html").display());
-    Ok(())
-}
-
-/// The page first: whoever finds report.json finds both.
-fn write(out: &Path, report: &diagnosis::report::Report, html: &str) -> Result<()> {
-    std::fs::create_dir_all(out).map_err(|error| Error::write(out, error))?;
-    atomic::write_text(out.join("report.html"), html)?;
-    atomic::write_text(out.join("report.json"), &serde_json::to_string_pretty(report).expect("plain data"))
+    println!("report: {}", out.join("report.html").display());
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Common, Out, device, progress::Progress, report};
+use super::{Common, Out, device, effects::WithoutEffects, progress::Progress, report};
 use crate::{
     data::atomic,
     error::{Error, Result},
@@ -25,6 +25,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "RANGE", value_parser = parse_range)]
     frames: Option<(usize, usize)>,
     #[command(flatten)]
+    without: WithoutEffects,
+    #[command(flatten)]
     out: Out,
 }
 
@@ -38,7 +40,8 @@ fn parse_range(text: &str) -> std::result::Result<(usize, usize), String> {
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let device = device(&common.device)?;
-    let (simulator, state) = checkpoint::open(&arguments.checkpoint, &device)?;
+    let (mut simulator, state) = checkpoint::open(&arguments.checkpoint, &device)?;
+    arguments.without.switch_off(&mut simulator)?;
     let mut results = serde_json::Map::new();
     for folder in &arguments.recordings {
         let recording = LoadedRecording::open(folder, &state.simulator, false)?;

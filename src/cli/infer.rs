@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use num_complex::Complex32;
 
-use super::{Common, Out, device, progress::Progress, report};
+use super::{Common, Out, device, effects::WithoutEffects, progress::Progress, report};
 use crate::{
     data::{IfFrame, IfLayout, RecordingContents, atomic::AtomicFolder, read_body, settings::read_settings, write_recording},
     error::{Error, Result},
@@ -58,6 +58,8 @@ pub(crate) struct Arguments {
     #[arg(long)]
     clean: bool,
     #[command(flatten)]
+    without: WithoutEffects,
+    #[command(flatten)]
     out: Out,
 }
 
@@ -76,7 +78,8 @@ fn parse_action(name: &str) -> std::result::Result<Action, String> {
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let device = device(&common.device)?;
-    let (simulator, state) = checkpoint::open(&arguments.checkpoint, &device)?;
+    let (mut simulator, state) = checkpoint::open(&arguments.checkpoint, &device)?;
+    arguments.without.switch_off(&mut simulator)?;
     let out = arguments.out.out.clone().unwrap_or_else(|| "runs/inferred".into());
     let folder = AtomicFolder::create(&out)?;
 

@@ -6,6 +6,7 @@
 mod check;
 mod device;
 mod diagnose;
+mod effects;
 mod evaluate;
 mod infer;
 mod progress;

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cube::Cube;
 use super::prediction::BodyPrediction;
+use crate::effects::EffectSetting;
 
 /// A parameter of an effect, or a list of them, with 90 % intervals.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,6 +114,14 @@ pub struct Candidate {
     /// Energy of the effect over all samples (of the kind the cube holds: sum of |sample|²).
     pub energy: f64,
     pub correction: Correction,
+}
+
+impl Candidate {
+    /// As the simulator takes it; `None` for what has no name.
+    pub fn setting(&self) -> Option<EffectSetting> {
+        let parameters = self.estimates.iter().map(|estimate| (estimate.name.to_string(), estimate.values.clone())).collect();
+        Some(EffectSetting { id: self.id?.into(), enabled: true, parameters, choice: self.choice.clone() })
+    }
 }
 
 impl std::fmt::Debug for Candidate {

@@ -10,6 +10,7 @@ use super::evidence::{Evidence, transform};
 use super::finding::{Curve, Place};
 use super::journey::Diagnosis;
 use super::report::{Effect, Report, Unexplained, Verdict};
+use super::simulate::Simulated;
 use super::support::Support;
 use crate::error::{Error, Result};
 use crate::heatmap::{Axis, Map, range_axis, velocity_axis};
@@ -28,9 +29,9 @@ code{background:#f3f3f3;padding:0 .2rem}.small{color:#555;font-size:.9rem}";
 ///
 /// # Errors
 /// When pictures cannot be drawn (no temporary folder).
-pub fn html(diagnosis: &Diagnosis) -> Result<String> {
+pub fn html(diagnosis: &Diagnosis, simulated: Option<&Simulated>) -> Result<String> {
     let report = &diagnosis.report;
-    let pictures = Pictures::draw(diagnosis)?;
+    let pictures = Pictures::draw(diagnosis, simulated)?;
     let mut page = String::new();
     let _ = write!(
         page,
@@ -155,15 +156,21 @@ fn without_name(page: &mut String, unexplained: &Unexplained, curve: Option<&str
 fn fit(page: &mut String, report: &Report, pictures: &Pictures) {
     let _ = write!(page, "<h2>Held-out data, before and after</h2><p>{} were never used to fit anything.</p>", held_out(report));
     page.push_str("<table><tr><th><th>log-likelihood per sample<th>error, dB²<th>PSNR, dB");
-    let mut rows = vec![("baseline", report.fit.before), ("with the effects", report.fit.after)];
-    if let Some(simulator) = &report.simulator {
-        rows.extend([("trained simulator", simulator.before), ("trained simulator with the effects", simulator.after)]);
-    }
+    let rows = vec![("baseline", report.fit.before), ("with the effects", report.fit.after)];
     for (name, misfit) in rows {
         let _ =
             write!(page, "<tr><td>{name}<td>{:.4}<td>{:.2}<td>{:.2}", misfit.loglik_per_sample, misfit.db_mse, misfit.psnr_db);
     }
     page.push_str("</table>");
+    if let Some(simulator) = &report.simulator {
+        page.push_str("<p>The trained simulator, with its own learned reflectivities:</p><table><tr><th><th>error, dB²<th>PSNR, dB<th>SSIM<th>person's cells, dB");
+        for (name, scores) in [("as it was", simulator.before), ("with the effects", simulator.after)] {
+            let person = scores.person_error_db.map_or("–".into(), |error| format!("{error:.2}"));
+            let _ =
+                write!(page, "<tr><td>{name}<td>{:.2}<td>{:.2}<td>{:.3}<td>{person}", scores.db_mse, scores.psnr_db, scores.ssim);
+        }
+        page.push_str("</table>");
+    }
     for (title, picture) in &pictures.maps {
         let _ = write!(page, "<p>{}<br><img alt=\"{}\" src=\"{picture}\">", escape(title), escape(title));
     }
@@ -281,7 +288,7 @@ struct Pictures {
 }
 
 impl Pictures {
-    fn draw(diagnosis: &Diagnosis) -> Result<Self> {
+    fn draw(diagnosis: &Diagnosis, simulated: Option<&Simulated>) -> Result<Self> {
         let folder = tempfile::tempdir().map_err(|error| Error::write(std::env::temp_dir(), error))?;
         let mut pictures = Self { maps: vec![], curves: vec![] };
         let Some(explanation) = &diagnosis.explanation else { return Ok(pictures) };
@@ -297,6 +304,13 @@ impl Pictures {
             let window = DbWindow { low_db: -5.0, high_db: measured.max().max(20.0) };
             comparison(&path, "", &measured, &expected, window)?;
             pictures.maps.push((title.into(), address(&path)?));
+        }
+        if let Some(Simulated { maps: [measured, before, after], .. }) = simulated {
+            let window = DbWindow::below(measured.max(), 60.0);
+            for (title, map) in [("The trained simulator", before), ("The trained simulator with the effects", after)] {
+                comparison(&path, "", measured, map, window)?;
+                pictures.maps.push((title.into(), address(&path)?));
+            }
         }
         for accepted in &explanation.accepted {
             if let Some(curve) = &accepted.candidate.curve {

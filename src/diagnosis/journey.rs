@@ -1,12 +1,13 @@
 //! From a recording to a diagnosis: read, audit, explain in rounds, report.
 
 use super::audit;
+use super::config::DiagnosisConfig;
 use super::cube::Loaded;
 use super::evidence::Evidence;
 use super::misfit::Misfit;
 use super::prediction::BodyPrediction;
 use super::report::{FORMAT, Findings, Fit, HeldOut, Report, Verdict, moving_energy, never_detectable, probability_of_nothing};
-use super::select::{Explanation, Thresholds, explain};
+use super::select::{Explanation, explain};
 use crate::data::Recording;
 use crate::error::{Error, Result};
 use crate::person::Person;
@@ -31,13 +32,14 @@ pub struct Diagnosis {
 ///
 /// # Errors
 /// A recording that cannot be read, is too short to hold anything out, or whose motion does not cover its frames.
-pub fn diagnose(recording: &Recording, thresholds: &Thresholds, progress: &mut dyn FnMut(&str)) -> Result<Diagnosis> {
+pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut dyn FnMut(&str)) -> Result<Diagnosis> {
     let per_frame: usize = recording.radar.dims()[1..].iter().product();
     let most_frames = MOST_FRAMES.min((MOST_SAMPLES / per_frame.max(1)).max(1));
     let mut notes = recording.notes.clone();
     if recording.radar.frames > most_frames {
         notes.push(format!("the first {most_frames} of {} frames were looked at", recording.radar.frames));
     }
+    config.check()?;
     progress("reading");
     let loaded = Loaded::read(recording, most_frames)?;
     let body = recording.person().map(|person| prediction(recording, person, &loaded)).transpose()?;
@@ -61,7 +63,7 @@ pub fn diagnose(recording: &Recording, thresholds: &Thresholds, progress: &mut d
         fit: Fit { before: Misfit::default(), after: Misfit::default() },
         notes,
         simulator: None,
-        settings: format!("{thresholds:?}"),
+        settings: config.fingerprint(),
     };
     if let Some(reason) = audit::undecidable(&original, &report.audit) {
         report.reason = reason;
@@ -73,7 +75,7 @@ pub fn diagnose(recording: &Recording, thresholds: &Thresholds, progress: &mut d
         return Ok(Diagnosis { report, radar, original, explanation: None });
     }
     progress("looking for what was left out");
-    let explanation = explain(original.clone(), thresholds, progress);
+    let explanation = explain(original.clone(), config, progress);
     let findings = Findings::of(&explanation, moving_energy(&original));
     report.verdict = findings.verdict;
     report.reason = findings.reason;

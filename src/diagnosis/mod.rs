@@ -6,6 +6,7 @@
 //! predicted, and all look again, until nobody has anything significant left to say.
 
 pub mod audit;
+pub mod config;
 pub mod cube;
 pub mod evidence;
 pub mod finding;
@@ -15,10 +16,12 @@ pub mod misfit;
 pub mod prediction;
 pub mod report;
 pub mod select;
+pub mod simulate;
 pub mod statistics;
 pub mod support;
 pub mod suspects;
 
+pub use config::DiagnosisConfig;
 pub use cube::{Cube, Split};
 pub use evidence::Evidence;
 pub use finding::{Candidate, Correction, Estimate, Place, Rung};

@@ -88,6 +88,23 @@ pub struct Fit {
     pub after: Misfit,
 }
 
+/// The trained simulator's heatmaps against those of held-out frames.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SimulatorScores {
+    /// All cells.
+    pub db_mse: f64,
+    pub psnr_db: f64,
+    pub ssim: f64,
+    /// Mean error on the cells that the person occupies.
+    pub person_error_db: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SimulatorFit {
+    pub before: SimulatorScores,
+    pub after: SimulatorScores,
+}
+
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     pub format: u32,
@@ -106,7 +123,7 @@ pub struct Report {
     pub notes: Vec<String>,
     /// The trained simulator on the held-out frames, where a body or a room is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub simulator: Option<Fit>,
+    pub simulator: Option<SimulatorFit>,
     /// Settings that shaped the answer, and their hash.
     #[serde(default)]
     pub settings: String,

@@ -6,31 +6,13 @@
 
 use rayon::prelude::*;
 
+use super::config::DiagnosisConfig;
 use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
 use super::suspects::{SUSPECTS, Suspect};
 
-/// When something is claimed. All of it is fixed before any sealed recording is looked at.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Thresholds {
-    /// Family-wise chance of a false claim on a recording with nothing missing.
-    pub alarm: f64,
-    /// Least gain of the log-likelihood on held-out frames, nats.
-    pub gain: f64,
-    /// Alternatives within so many nats of the best are not told apart.
-    pub tie: f64,
-    /// Most effects that are accepted.
-    pub most: usize,
-}
-
-impl Default for Thresholds {
-    fn default() -> Self {
-        Self { alarm: 0.01, gain: 6.0, tie: 4.6, most: 10 }
-    }
-}
-
-impl Thresholds {
+impl DiagnosisConfig {
     /// Of one suspect's p-value.
     pub fn p_value(&self) -> f64 {
         self.alarm / SUSPECTS.len().max(1) as f64
@@ -67,7 +49,7 @@ pub struct Explanation {
 }
 
 /// Runs the rounds; `progress` hears what was found.
-pub fn explain(evidence: Evidence, thresholds: &Thresholds, progress: &mut dyn FnMut(&str)) -> Explanation {
+pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut dyn FnMut(&str)) -> Explanation {
     let before = Misfit::of(&evidence);
     let original = evidence;
     let mut current: Option<Evidence> = None;
@@ -126,7 +108,7 @@ fn suspicions(evidence: &Evidence) -> Vec<(usize, Candidate)> {
 }
 
 /// Rivals of the effect accepted last: they passed beside it and have nothing left to say now that it is in place.
-fn settle_rivals(last: &mut Accepted, pending: &[Candidate], passing: &[&(usize, Candidate)], thresholds: &Thresholds) {
+fn settle_rivals(last: &mut Accepted, pending: &[Candidate], passing: &[&(usize, Candidate)], thresholds: &DiagnosisConfig) {
     let mut weight = 1.0 + last.candidate.look_alikes.len() as f64;
     for rival in pending {
         let Some(id) = rival.id else { continue };
@@ -144,7 +126,7 @@ fn settle_rivals(last: &mut Accepted, pending: &[Candidate], passing: &[&(usize,
 
 /// Asks everyone accepted to stand again with all others taken into account; the fallen go, the weakest first, and the
 /// rest keep the parameters of this last fit.
-fn verified(original: &Evidence, mut accepted: Vec<Accepted>, thresholds: &Thresholds) -> Vec<Accepted> {
+fn verified(original: &Evidence, mut accepted: Vec<Accepted>, thresholds: &DiagnosisConfig) -> Vec<Accepted> {
     if accepted.len() < 2 {
         return accepted;
     }

@@ -1,11 +1,10 @@
 //! The trained simulator on the held-out frames: as it is, and with the effects that were found.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use burn::tensor::Device;
 
-use super::misfit::Misfit;
-use super::report::Fit;
+use super::report::{SimulatorFit, SimulatorScores};
 use crate::data::atomic::AtomicFolder;
 use crate::effects::EffectSetting;
 use crate::error::Result;
@@ -15,41 +14,42 @@ use crate::metrics::MetricsConfig;
 use crate::simulator::{Simulator, SimulatorConfig};
 use crate::training::{Event, LoadedRecording, Split, Trainer, TrainingConfig, checkpoint, site};
 
-/// How the simulator is trained within a diagnosis.
-#[derive(Clone, Debug)]
-pub struct Training {
+/// What the simulators start from.
+pub struct Start<'a> {
+    pub simulator: &'a SimulatorConfig,
+    pub learning: &'a TrainingConfig,
     pub epochs: usize,
     pub seed: u64,
-    pub device: Device,
-    /// A simulator that is trained already.
-    pub checkpoint: Option<PathBuf>,
+    pub device: &'a Device,
+    /// A simulator that is trained already, in place of the baseline.
+    pub checkpoint: Option<&'a Path>,
 }
 
 /// Both simulators, and what they are worth.
 pub struct Simulated {
-    pub fit: Fit,
+    pub fit: SimulatorFit,
     /// Static-removed maps of the held-out frames: measured, baseline, with the effects; dB.
     pub maps: [Map; 3],
 }
 
 /// Trains (or opens) the baseline, then the same with the effects, and compares both with the frames that neither saw.
-/// The second one's checkpoint goes to `keep`. `None` without body and room: nothing to simulate.
+/// The second one's checkpoint goes to `keep`. `None` without body and room, where there is nothing to simulate.
+///
+/// `learning`: how long and how fast; which frames are held out is the diagnosis' choice.
 ///
 /// # Errors
-/// What training refuses; a checkpoint of another radar.
+/// What training refuses; a checkpoint that cannot be read.
 pub fn before_and_after(
     folder: &Path,
     effects: &[EffectSetting],
-    training: &Training,
+    start: &Start<'_>,
     keep: &Path,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Option<Simulated>> {
-    let mut config = SimulatorConfig::default();
-    if let Some(checkpoint) = &training.checkpoint {
-        config = checkpoint::read_state(checkpoint)?.simulator;
-    } else {
-        config.room.patches = 1000;
-    }
+    let config = match start.checkpoint {
+        Some(checkpoint) => checkpoint::read_state(checkpoint)?.simulator,
+        None => start.simulator.clone(),
+    };
     let recordings = [LoadedRecording::open(folder, &config, false)?];
     let frames = recordings[0].scene.radar.frames;
     if (recordings[0].recording.person().is_none() && recordings[0].recording.room.is_none()) || frames < 4 {
@@ -57,10 +57,10 @@ pub fn before_and_after(
     }
     let held_out: Vec<usize> = (0..frames).filter(|frame| frame % 4 == 2).collect();
     let learning = TrainingConfig {
-        epochs: training.epochs,
+        epochs: start.epochs,
         validation_fraction: held_out.len() as f64 / frames as f64,
         split: Split::Interleaved,
-        ..TrainingConfig::default()
+        ..start.learning.clone()
     };
     let scratch = AtomicFolder::create(keep)?;
     let mut train = |config: &SimulatorConfig, name: &str| -> Result<Simulator> {
@@ -68,12 +68,12 @@ pub fn before_and_after(
         let trainer = Trainer {
             config: &learning,
             simulator_config: config,
-            seed: training.seed,
+            seed: start.seed,
             recordings: &recordings,
             site: site(&recordings, config),
             config_toml: "",
             folder: &folder,
-            device: training.device.clone(),
+            device: start.device.clone(),
         };
         let outcome = trainer.run(None, &mut |event| {
             if let Event::Epoch(metrics) = event {
@@ -82,16 +82,17 @@ pub fn before_and_after(
         })?;
         Ok(outcome.simulator)
     };
-    let baseline = match &training.checkpoint {
-        Some(folder) => checkpoint::open(folder, &training.device)?.0,
+    let baseline = match start.checkpoint {
+        Some(folder) => checkpoint::open(folder, start.device)?.0,
         None => train(&config, "without")?,
     };
-    let before = Held::of(&recordings[0], &baseline, &held_out, training.seed)?;
+    let before = Held::of(&recordings[0], &baseline, &held_out, start.seed)?;
     let with = SimulatorConfig { effects: effects.to_vec(), ..config };
-    let after = if effects.is_empty() { None } else { Some(Held::of(&recordings[0], &train(&with, "with")?, &held_out, training.seed)?) };
+    let after =
+        if effects.is_empty() { None } else { Some(Held::of(&recordings[0], &train(&with, "with")?, &held_out, start.seed)?) };
     let after = after.as_ref().unwrap_or(&before);
     let maps = [before.measured.clone(), before.simulated.clone(), after.simulated.clone()];
-    let fit = Fit { before: before.misfit, after: after.misfit };
+    let fit = SimulatorFit { before: before.scores, after: after.scores };
     if !effects.is_empty() {
         scratch.finish()?;
     }
@@ -100,7 +101,7 @@ pub fn before_and_after(
 
 /// A simulator's maps of the held-out frames.
 struct Held {
-    misfit: Misfit,
+    scores: SimulatorScores,
     measured: Map,
     simulated: Map,
 }
@@ -111,24 +112,29 @@ impl Held {
         let (mut squares, mut cells) = (0.0, 0.0f64);
         let mut sums: Option<(Map, Map)> = None;
         let heatmap = HeatmapConfig::default();
-        let found =
-            evaluate(recording, &simulation, held_out, &heatmap, &MetricsConfig::default(), &mut |_, all, moving| {
-                let pairs = all.measured.values.iter().zip(&all.simulated.values);
-                squares += pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-                cells += all.measured.values.len() as f64;
-                match &mut sums {
-                    None => sums = Some((moving.measured, moving.simulated)),
-                    Some((measured, simulated)) => {
-                        for (sum, map) in [(measured, &moving.measured), (simulated, &moving.simulated)] {
-                            sum.values.iter_mut().zip(&map.values).for_each(|(sum, value)| *sum = sum.max(*value));
-                        }
+        let found = evaluate(recording, &simulation, held_out, &heatmap, &MetricsConfig::default(), &mut |_, all, moving| {
+            let pairs = all.measured.values.iter().zip(&all.simulated.values);
+            squares += pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            cells += all.measured.values.len() as f64;
+            match &mut sums {
+                None => sums = Some((moving.measured, moving.simulated)),
+                Some((measured, simulated)) => {
+                    for (sum, map) in [(measured, &moving.measured), (simulated, &moving.simulated)] {
+                        sum.values.iter_mut().zip(&map.values).for_each(|(sum, value)| *sum = sum.max(*value));
                     }
                 }
-            })?;
-        let psnr_db = found.global.as_ref().map_or(0.0, |scores| scores.psnr_db.mean);
+            }
+        })?;
+        let global = found.global.as_ref();
+        let person = found.person.as_ref();
         let (measured, simulated) = sums.expect("at least one frame is held out");
         Ok(Self {
-            misfit: Misfit { loglik_per_sample: 0.0, db_mse: squares / cells.max(1.0), psnr_db },
+            scores: SimulatorScores {
+                db_mse: squares / cells.max(1.0),
+                psnr_db: global.map_or(0.0, |scores| scores.psnr_db.mean),
+                ssim: global.map_or(0.0, |scores| scores.ssim.mean),
+                person_error_db: person.map(|scores| scores.mean_absolute_error_db.mean),
+            },
             measured,
             simulated,
         })

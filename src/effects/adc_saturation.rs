@@ -1,6 +1,13 @@
 //! The converter's saturation (card R4).
 
-use super::info::{EffectInfo, Stage, parameter};
+use burn::tensor::Tensor;
+
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "adc_saturation",
@@ -16,3 +23,27 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["compression", "interference"],
     separate_by: "a lower receiver gain; the samples' histogram shows a pile at the rail",
 };
+
+/// Both components are clamped.
+///
+/// Broken: the gradient to the signal is passed straight through where samples are clamped, so that a strong echo can
+/// still learn.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let _ = context;
+    let rail = values.reference(&signal).reshape([1, 1, 1, 1]) * values.scalar::<4>("level");
+    let clip = |part: Tensor<4>| {
+        let rail = rail.clone().expand(part.dims());
+        let above = part.clone().detach().greater(rail.clone().detach());
+        let below = part.clone().detach().lower(-rail.clone().detach());
+        // The value of the rail, and the gradient of both: that of the signal is passed straight through.
+        let over = (rail.clone() - part.clone().detach()).mask_fill(above.bool_not(), 0.0);
+        let under = (-rail - part.clone().detach()).mask_fill(below.bool_not(), 0.0);
+        part + over + under
+    };
+    Complex::new(clip(signal.re), clip(signal.im))
+}

@@ -1,6 +1,12 @@
 //! The antennas' directivity (card C3).
 
-use super::info::{EffectInfo, Stage, parameter};
+use burn::tensor::Tensor;
+
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::BodyPoints,
+    values::Values,
+};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "antenna_pattern",
@@ -13,3 +19,16 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["part_reflectivity"],
     separate_by: "a walk sideways, and the same body part seen under several directions",
 };
+
+/// One exponent for both ways and both planes, taken at the radar's centre. The walls' echoes by way of their proxies are
+/// left as they are.
+///
+/// `[point, 1]` → the same.
+///
+/// # Gradient
+/// Flows to the amplitude and to the values.
+pub fn weigh(amplitude: Tensor<2>, values: &Values, points: &BodyPoints<'_>) -> Tensor<2> {
+    let logs: Vec<f64> = points.off_boresight().into_iter().map(|cosine| cosine.max(0.01).ln()).collect();
+    let count = logs.len();
+    amplitude * (values.tensor::<2>(logs, [count, 1]) * values.scalar::<2>("exponent")).exp()
+}

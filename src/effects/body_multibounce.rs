@@ -1,6 +1,14 @@
 //! Echoes between parts of the body (card T9).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::host_value,
+    values::Values,
+};
+use crate::{
+    complex::Complex,
+    radar::{Radar, SPEED_OF_LIGHT},
+};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "body_multibounce",
@@ -17,3 +25,25 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["floor_bounce", "wall_ghost"],
     separate_by: "arms held away from the body, legs apart",
 };
+
+/// The late echo of the body's signal, `[rx, chirp, sample]` → the same.
+///
+/// The crudest form: the whole body once more at a fixed extra range, for paths between its parts that lengthen by about as
+/// much; Doppler and direction stay those of the body.
+///
+/// # Gradient
+/// Flows to the signal and the values.
+pub fn echo(signal: Complex<3>, values: &Values, radar: &Radar) -> Complex<3> {
+    let extra_m = values.first("extra_m");
+    let start_m = host_value(&extra_m);
+    let turns = |metres: f64, sample: usize| {
+        let frequency_hz = radar.carrier_hz() + radar.slope_hz_per_s * sample as f64 / radar.sample_rate_hz;
+        2.0 * metres / SPEED_OF_LIGHT * frequency_hz
+    };
+    let count = radar.samples_per_chirp;
+    let at_start = values.constant(&(0..count).map(|sample| turns(start_m, sample).fract()).collect::<Vec<_>>());
+    let per_metre = values.constant(&(0..count).map(|sample| turns(1.0, sample)).collect::<Vec<_>>());
+    let turns = at_start + per_metre * (extra_m.clone() - extra_m.detach());
+    let coefficient = values.phase::<3>().scale(values.scalar("coefficient"));
+    signal.mul(Complex::unit(turns.reshape([1, 1, count]))).mul(coefficient)
+}

@@ -1,6 +1,13 @@
 //! The chest's breathing (card T1).
 
-use super::info::{EffectInfo, Stage, parameter};
+use std::f64::consts::TAU;
+
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::{BodyPoints, TORSO},
+    values::Values,
+};
+use crate::body::Displacement;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "breathing",
@@ -17,3 +24,15 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["pose_offset", "clock_drift", "radar_vibration"],
     separate_by: "a person who stands still, and a breath held on command",
 };
+
+/// One sine along the surface's normals, the same phase everywhere on the torso.
+///
+/// `[point, chirp]`, metres → the same.
+///
+/// # Gradient
+/// Flows to the displacement and to the values.
+pub fn displace(displacement: Displacement, values: &Values, points: &BodyPoints<'_>) -> Displacement {
+    let angle = values.tensor(points.times_s.to_vec(), [1, points.times_s.len()]) * values.scalar::<2>("rate_hz") * TAU;
+    let swing = (angle + values.scalar::<2>("phase_rad")).sin() * values.scalar::<2>("amplitude_m");
+    points.along_normals(displacement, swing, &TORSO, values)
+}

@@ -1,6 +1,16 @@
 //! An object that the person carries.
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::{
+    body::Displacement,
+    complex::Complex,
+    if_signal::{SumForm, direct_signal},
+    paths::{Amplitude, Dechirp, Points},
+    radar::Radar,
+};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "carried_reflector",
@@ -8,7 +18,7 @@ pub static INFO: EffectInfo = EffectInfo {
     stage: Stage::Scene,
     title: "an object that the person carries",
     explanation: "The person carries something that reflects, such as a telephone or keys: an echo that moves with one part of the body.",
-    equation: "+ amplitude e^{jφ} exp j2π(f_c τ + S t τ) / (d_tx d_rx), τ from the body part's point that is nearest to the radar",
+    equation: "+ amplitude e^{jφ} exp j2π(f_c τ + S t τ) / (d_tx d_rx), τ from the point in the middle of the body part",
     parameters: &[
         parameter("amplitude", "recording's unit·m²", 0.0, -1000000000.0, 1000000000.0),
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
@@ -16,3 +26,21 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["part_reflectivity", "clothing_delay"],
     separate_by: "the same motion with empty hands and pockets",
 };
+
+/// One transmitter's signal of the object, `[rx, chirp, sample]`, from where the body's point is that carries it.
+///
+/// # Gradient
+/// Flows to amplitude, phase and displacement.
+pub fn signal(
+    values: &Values,
+    reference_m: [f64; 3],
+    displacement: &Displacement,
+    radar: &Radar,
+    tx: usize,
+    dechirp: Dechirp,
+    form: SumForm,
+) -> Complex<3> {
+    let strength = values.phase::<2>().scale(values.scalar("amplitude"));
+    let amplitude = Amplitude { re: strength.re, im: Some(strength.im) };
+    direct_signal(Points { reference_m: &[reference_m], displacement, amplitude: &amplitude }, radar, tx, dechirp, form)
+}

@@ -1,6 +1,11 @@
 //! Different gains and phases of the channels (card C1).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "channel_mismatch",
@@ -13,3 +18,17 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["tdm_phase", "antenna_position", "mutual_coupling"],
     separate_by: "a strong reflector at several directions: gains and phases stay, an antenna's misplacement changes with direction",
 };
+
+/// `gain_db` and `phase_deg` are for each channel (tx by tx), for each receiver, or for all.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let per_db = std::f64::consts::LN_10 / 20.0;
+    let gain = values.channels((values.get("gain_db") * per_db).exp(), context.channels());
+    let angle = values.channels(values.get("phase_deg") * (std::f64::consts::PI / 180.0), context.channels());
+    let re = angle.clone().cos() * gain.clone();
+    signal.mul(Complex::new(re, angle.sin() * gain))
+}

@@ -1,6 +1,13 @@
 //! A change of gain along the chirp (card R9).
 
-use super::info::{EffectInfo, Stage, parameter};
+use std::f64::consts::LN_10;
+
+use super::{
+    context::{Context, legendre},
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "chirp_droop",
@@ -13,3 +20,24 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["chirp_nonlinearity", "if_highpass"],
     separate_by: "a strong reflector at two ranges: the same shape at both, where a bent chirp's grows with range",
 };
+
+/// The first number of `db` is the fall from the first sample to the last, the others are Legendre polynomials of the
+/// second order on.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let along = context.along_the_chirp();
+    let decibels = values.get("db");
+    let [orders] = decibels.dims();
+    let mut gain_db = values.constant(&vec![0.0; along.len()]);
+    for order in 0..orders {
+        let weight = if order == 0 { -0.5 } else { 1.0 };
+        let shape: Vec<f64> = along.iter().map(|&x| weight * legendre(order + 1, x)).collect();
+        gain_db = gain_db + values.constant(&shape) * decibels.clone().narrow(0, order, 1);
+    }
+    let gain = (gain_db * (LN_10 / 20.0)).exp();
+    signal.scale(gain.reshape([1, 1, 1, along.len()]))
+}

@@ -1,6 +1,11 @@
 //! A bend of the chirp (card W6).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::{Context, legendre},
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "chirp_nonlinearity",
@@ -13,3 +18,22 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["chirp_droop", "chirp_ripple"],
     separate_by: "a strong reflector at two ranges: this smear grows with the range, a receiver's does not",
 };
+
+/// A warp of the chirp's time by Legendre polynomials from the second order on; those below are the start frequency and
+/// the slope.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let along = context.along_the_chirp();
+    let peaks = values.get("peak_hz");
+    let [orders] = peaks.dims();
+    let mut error_hz = values.constant(&vec![0.0; along.len()]);
+    for order in 0..orders {
+        let shape: Vec<f64> = along.iter().map(|&x| legendre(order + 2, x)).collect();
+        error_hz = error_hz + values.constant(&shape) * peaks.clone().narrow(0, order, 1);
+    }
+    context.tones(values).warp(signal, context.samples_of_frequency(error_hz))
+}

@@ -1,6 +1,13 @@
 //! A ripple of the chirp's frequency (card W7).
 
-use super::info::{EffectInfo, Stage, parameter};
+use std::f64::consts::TAU;
+
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "chirp_ripple",
@@ -17,3 +24,17 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["wall_ghost", "spur", "chirp_nonlinearity"],
     separate_by: "move the target: the pair keeps its distance and grows with range; a spur stays where it is",
 };
+
+/// A periodic warp of the chirp's time, t from the window's start.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let radar = context.radar;
+    let times: Vec<f64> = (0..radar.samples_per_chirp).map(|sample| sample as f64 / radar.sample_rate_hz).collect();
+    let angle = values.constant(&times) * values.first("ripple_hz") * TAU + values.first("phase_rad");
+    let error_hz = angle.sin() * values.first("deviation_hz");
+    context.tones(values).warp(signal, context.samples_of_frequency(error_hz))
+}

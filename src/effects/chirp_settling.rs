@@ -1,6 +1,11 @@
 //! Chirps that settle at the start of a frame.
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "chirp_settling",
@@ -13,3 +18,15 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["gain_drift", "phase_noise"],
     separate_by: "longer frames: the first chirps change, the later ones do not",
 };
+
+/// An exponential approach, from anew in every frame.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let counts = context.per_chirp(context.chirp_counts(), values);
+    let decay = (-counts / values.scalar::<4>("chirps").clamp_min(0.1)).exp();
+    signal.scale(-decay * values.scalar::<4>("depth") + 1.0)
+}

@@ -1,6 +1,13 @@
 //! A jitter of the chirps' starts (card W9).
 
-use super::info::{EffectInfo, Stage, parameter};
+use rand::RngExt;
+
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "chirp_start_jitter",
@@ -13,3 +20,16 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["phase_noise"],
     separate_by: "a strong wall: the phases take two values here, and spread evenly with phase noise",
 };
+
+/// Every chirp is late with probability ½; the draws of a frame are the same whenever it is simulated.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let mut random = context.random(0x51A7);
+    let late = context.chirp_counts().iter().map(|_| if random.random_bool(0.5) { 1.0 } else { 0.0 }).collect();
+    let shift = context.per_chirp(late, values) * values.scalar::<4>("jitter_s") * context.radar.sample_rate_hz;
+    context.tones(values).shift(signal, shift)
+}

@@ -1,6 +1,11 @@
 //! A difference in rate between the radar's clock and the motion's (card G3).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::BodyPoints,
+    values::Values,
+};
+use crate::body::Displacement;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "clock_drift",
@@ -13,3 +18,14 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["clock_offset", "breathing"],
     separate_by: "a longer recording: the drift's error grows with time, an offset's does not",
 };
+
+/// As a clock's offset that grows with the radar's time from zero on.
+///
+/// `[point, chirp]`, metres → the same.
+///
+/// # Gradient
+/// Flows to the displacement and to the values.
+pub fn displace(displacement: Displacement, values: &Values, points: &BodyPoints<'_>) -> Displacement {
+    let times = values.tensor(points.times_s.to_vec(), [1, points.times_s.len()]);
+    points.later(displacement, times * values.scalar::<2>("relative"))
+}

@@ -1,6 +1,11 @@
 //! An offset between the radar's clock and the motion's (card G2).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::BodyPoints,
+    values::Values,
+};
+use crate::body::Displacement;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "clock_offset",
@@ -13,3 +18,14 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["pose_offset", "tdm_phase"],
     separate_by: "a motion that starts, stops and turns back: the offset's error changes sign with the velocity, a displaced pose's does not",
 };
+
+/// Along the velocity, to first order: an acceleration of 10 m/s² errs by 5 µm for 1 ms, by 0.5 mm for 10 ms. Normals and
+/// visibility stay.
+///
+/// `[point, chirp]`, metres → the same.
+///
+/// # Gradient
+/// Flows to the displacement and to the values.
+pub fn displace(displacement: Displacement, values: &Values, points: &BodyPoints<'_>) -> Displacement {
+    points.later(displacement, values.scalar::<2>("offset_s"))
+}

@@ -1,6 +1,11 @@
 //! An extra delay on clothed parts of the body (card T3).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::{BodyPoints, TORSO},
+    values::Values,
+};
+use crate::body::Displacement;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "clothing_delay",
@@ -13,3 +18,15 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["pose_offset", "range_bias"],
     separate_by: "the same motion with and without the coat",
 };
+
+/// A displacement away from the radar of the body part that is chosen, or of the torso.
+///
+/// `[point, chirp]`, metres → the same.
+///
+/// # Gradient
+/// Flows to the displacement and to the values.
+pub fn displace(displacement: Displacement, values: &Values, points: &BodyPoints<'_>) -> Displacement {
+    let part = values.choice.as_deref();
+    let parts = part.as_slice();
+    points.along_sight(displacement, values.scalar::<2>("extra_m"), if parts.is_empty() { &TORSO } else { parts }, values)
+}

@@ -1,6 +1,11 @@
 //! The receiver's compression (card R4).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "compression",
@@ -16,3 +21,17 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["gain_drift", "adc_saturation"],
     separate_by: "lower the transmit power by 6 dB: products fall by 18 dB",
 };
+
+/// Third order: `level` is the share of a sample's amplitude that is lost where it equals the reference.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let _ = context;
+    let reference = values.reference(&signal).reshape([1, 1, 1, 1]);
+    let share = signal.clone().power() / (reference.clone() * reference) * values.scalar::<4>("level");
+    let lost = signal.clone().scale(share);
+    signal.sub(lost)
+}

@@ -1,6 +1,10 @@
 //! Noise that the receivers have in common (card V4).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::{complex::Complex, if_signal::noise, radar::Radar};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "correlated_noise",
@@ -13,3 +17,16 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["mutual_coupling"],
     separate_by: "a recording without transmission",
 };
+
+/// Standard normal noise `[tx, rx, loop, sample]` → noise with this effect.
+///
+/// # Gradient
+/// Flows to the values.
+pub fn shape(normals: Complex<4>, values: &Values, radar: &Radar, seed: u64) -> Complex<4> {
+    let _ = radar;
+    let [tx, rx, loops, samples] = normals.dims();
+    let common = noise::normals(seed ^ 0xC033, [tx, 1, loops, samples], &values.device, values.dtype);
+    let common = common.scale(values.scalar::<4>("coefficient"));
+    let all = |part: burn::tensor::Tensor<4>| part.expand([tx, rx, loops, samples]);
+    normals.add(Complex::new(all(common.re), all(common.im)))
+}

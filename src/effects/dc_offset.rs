@@ -1,6 +1,11 @@
 //! A constant offset of the receivers (card R2).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::{Values, repeated},
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "dc_offset",
@@ -17,3 +22,18 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["tx_leakage"],
     separate_by: "several transmitters: an offset is the same for all of them, leakage is not",
 };
+
+/// `i` and `q` for each receiver, or for all.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let reference = values.reference(&signal).reshape([1, 1, 1, 1]);
+    let receivers = |name: &str| {
+        let [_, rx] = context.channels();
+        repeated(values.get(name), rx).reshape([1, rx, 1, 1]) * reference.clone()
+    };
+    signal.add(Complex::new(receivers("i"), receivers("q")))
+}

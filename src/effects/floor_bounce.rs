@@ -1,6 +1,17 @@
 //! The body's reflection in the floor (card P6).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    mirror::{mirrored_rx, mirrored_tx},
+    values::Values,
+};
+use crate::{
+    complex::Complex,
+    if_signal::{SumForm, direct_signal},
+    paths::{Dechirp, Points},
+    radar::Radar,
+    room::{Boundary, Room},
+};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "floor_bounce",
@@ -13,3 +24,35 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["wall_ghost", "part_reflectivity", "body_multibounce"],
     separate_by: "a carpet or absorber on the floor between radar and person",
 };
+
+/// What one transmitter receives of these points by way of the floor, once or both ways, `[rx, chirp, sample]`; nothing
+/// in a room without a floor.
+///
+/// By image theory, the floor flat and its reflection the same for all angles; the points' amplitudes and who is seen are
+/// those of the direct path.
+///
+/// # Gradient
+/// Flows to the points and the values.
+pub fn signal(
+    points: Points,
+    values: &Values,
+    room: &Room,
+    radar: &Radar,
+    tx: usize,
+    dechirp: Dechirp,
+    form: SumForm,
+) -> Option<Complex<3>> {
+    let distance_m = room.distance_m(Boundary::Floor)?;
+    let rx = mirrored_rx(radar, Boundary::Floor, distance_m);
+    let once = direct_signal(points, &rx, tx, dechirp, form).add(direct_signal(
+        points,
+        &mirrored_tx(radar, Boundary::Floor, distance_m),
+        tx,
+        dechirp,
+        form,
+    ));
+    let twice = direct_signal(points, &mirrored_tx(&rx, Boundary::Floor, distance_m), tx, dechirp, form);
+    let coefficient = values.phase::<3>().scale(values.scalar("coefficient"));
+    let square = coefficient.clone().mul(coefficient.clone());
+    Some(once.mul(coefficient).add(twice.mul(square)))
+}

@@ -1,6 +1,9 @@
 //! Frames that were lost (card G4).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "frame_drop",
@@ -13,3 +16,8 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["clock_offset", "clock_drift"],
     separate_by: "the frames' own time stamps, or a motion with a sharp event on either side of the gap",
 };
+
+/// How many frames later than its number a frame shows the scene. No gradient.
+pub fn shift(values: &Values, frame: usize) -> usize {
+    if frame as f64 >= values.host("at")[0] { values.host("count")[0].max(0.0).round() as usize } else { 0 }
+}

@@ -1,6 +1,11 @@
 //! A gain that changes with time (card W10).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "gain_drift",
@@ -13,3 +18,25 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["chirp_settling", "part_reflectivity", "compression"],
     separate_by: "a wall in view: its echo changes along with the body's; a step has a date, a drift has none",
 };
+
+/// One number is the change from the first frame to the last, about the middle; several are the gains at knots that are
+/// spread evenly over the frames.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let decibels = values.get("db");
+    let [knots] = decibels.dims();
+    let progress = context.frame as f64 / (context.radar.frames.max(2) - 1) as f64;
+    let gain_db = if knots == 1 {
+        decibels * (progress - 0.5)
+    } else {
+        let place = (progress * (knots - 1) as f64).clamp(0.0, (knots - 1) as f64);
+        let before = (place.floor() as usize).min(knots - 2);
+        let share = place - before as f64;
+        decibels.clone().narrow(0, before, 1) * (1.0 - share) + decibels.narrow(0, before + 1, 1) * share
+    };
+    signal.scale((gain_db * (std::f64::consts::LN_10 / 20.0)).exp().reshape([1, 1, 1, 1]))
+}

@@ -1,6 +1,11 @@
 //! A delay in the IF chain (card W3).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "if_delay",
@@ -13,3 +18,13 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["start_frequency_error", "adc_start_error", "if_lowpass"],
     separate_by: "the same scene with another slope; never from one setting of the radar",
 };
+
+/// A constant shift of the chirp's time.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    context.tones(values).warp(signal, context.samples_of(-values.first("delay_s")))
+}

@@ -1,6 +1,11 @@
 //! The receiver's IF high-pass filter (card R7).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "if_highpass",
@@ -13,3 +18,25 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["if_lowpass", "start_frequency_error", "antenna_pattern"],
     separate_by: "a reflector at 0.3 to 1 m, or another filter setting of the chip; the noise floor has the filter's shape too",
 };
+
+/// The filter's steady answer to every tone; its settling at the ramp's start is left out. `order` sections of first
+/// order with the same corner.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let order = values.host("order")[0].round().max(1.0) as usize;
+    let tones = context.tones(values);
+    let beat_hz = tones.cycles() * context.radar.sample_rate_hz;
+    let corner_hz = values.first("corner_hz");
+    // j x / (1 + j x) with x = f/f_c, written with f² + f_c² so that f_c = 0 gives exactly one.
+    let floor_hz2 = 1e-6 * context.radar.sample_rate_hz;
+    let power = beat_hz.clone() * beat_hz.clone();
+    let below = power.clone() + corner_hz.clone() * corner_hz.clone() + floor_hz2;
+    let section = Complex::new((power + floor_hz2) / below.clone(), beat_hz * corner_hz / below);
+    let response = (1..order).fold(section.clone(), |response, _| response.mul(section.clone()));
+    let [count] = response.dims();
+    tones.filter(signal, response.reshape([1, 1, 1, count]))
+}

@@ -1,6 +1,11 @@
 //! The receiver's IF low-pass filter (card R8).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "if_lowpass",
@@ -13,3 +18,25 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["start_frequency_error", "if_delay", "if_highpass"],
     separate_by: "the shape of the noise floor over range in an empty room",
 };
+
+/// The filter's steady answer to every tone.
+///
+/// Broken: a corner of zero stands for no filter and carries no gradient.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let tones = context.tones(values);
+    let beat_hz = tones.cycles() * context.radar.sample_rate_hz;
+    let corner_hz = values.first("corner_hz");
+    // 1/f_c, which is zero for the neutral corner: no filter.
+    let open = corner_hz.clone().detach().equal_elem(0.0);
+    let inverse = (corner_hz.mask_fill(open.clone(), 1.0)).recip().mask_fill(open, 0.0);
+    let ratio = beat_hz * inverse;
+    let below = ratio.clone() * ratio.clone() + 1.0;
+    let response = Complex::new(below.clone().recip(), -ratio / below);
+    let [count] = response.dims();
+    tones.filter(signal, response.reshape([1, 1, 1, count]))
+}

@@ -1,6 +1,14 @@
 //! Noise with rare strong samples (card V3).
 
-use super::info::{EffectInfo, Stage, parameter};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::host_value,
+    values::Values,
+};
+use crate::{complex::Complex, radar::Radar};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "impulsive_noise",
@@ -13,3 +21,19 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["interference"],
     separate_by: "a recording without transmission; bursts last several samples, impulses one",
 };
+
+/// Samples are hit alike in both components. Broken: `probability` decides by lot and carries no gradient.
+///
+/// Standard normal noise `[tx, rx, loop, sample]` → noise with this effect.
+///
+/// # Gradient
+/// Flows to the values.
+pub fn shape(normals: Complex<4>, values: &Values, radar: &Radar, seed: u64) -> Complex<4> {
+    let _ = radar;
+    let probability = host_value(&values.first("probability")).clamp(0.0, 1.0);
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x1397);
+    let dims = normals.dims();
+    let hit = (0..dims.iter().product()).map(|_| f64::from(u8::from(random.random_bool(probability)))).collect();
+    let factor = values.tensor::<4>(hit, dims) * values.scalar::<4>("excess") + 1.0;
+    normals.scale(factor)
+}

@@ -4,8 +4,15 @@
 //! An effect is neutral until its parameters leave their neutral values; then it is part of the simulator like any
 //! other stage, with gradients to its parameters.
 
+mod chain;
+mod context;
+mod effect;
 mod info;
+mod mirror;
+mod points;
 mod setting;
+mod tones;
+mod values;
 
 pub mod adc_saturation;
 pub mod adc_start_error;
@@ -56,8 +63,14 @@ pub mod static_reflector;
 pub mod tdm_phase;
 pub mod tx_leakage;
 pub mod wall_ghost;
+pub use chain::Effects;
+pub use context::Context;
+pub use effect::{Effect, Parameter};
 pub use info::{EffectInfo, ParameterInfo, Stage};
+pub use points::BodyPoints;
 pub use setting::EffectSetting;
+pub use tones::Tones;
+pub use values::Values;
 
 /// All effects, in the order of the signal's way: when a chirp sees the scene, what is there, how it reflects, which
 /// ways the waves take, the chirp, the antennas, the receiver, the noise.
@@ -123,5 +136,7 @@ pub fn info(id: &str) -> Option<&'static EffectInfo> {
     LIBRARY.iter().find(|info| info.id == id).copied()
 }
 
+#[cfg(test)]
+mod test_support;
 #[cfg(test)]
 mod tests;

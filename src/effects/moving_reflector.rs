@@ -1,6 +1,19 @@
 //! An object that moves by itself (card P2).
 
-use super::info::{EffectInfo, Stage, parameter};
+use std::f64::consts::TAU;
+
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::place,
+    values::Values,
+};
+use crate::{
+    body::Displacement,
+    complex::Complex,
+    if_signal::{SumForm, direct_signal},
+    paths::{Amplitude, Dechirp, Points},
+    radar::Radar,
+};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "moving_reflector",
@@ -21,3 +34,24 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["wall_ghost", "second_harmonic", "object_radar_object"],
     separate_by: "a recording of the room without the person: the object still moves, a ghost of the person does not",
 };
+
+/// One transmitter's signal of the object, `[rx, chirp, sample]`; `times_s` are those of the transmitter's chirps.
+///
+/// # Gradient
+/// Flows to all values.
+pub fn signal(values: &Values, times_s: &[f64], radar: &Radar, tx: usize, dechirp: Dechirp, form: SumForm) -> Complex<3> {
+    let (reference_m, still) = place(values.vector("position_m"));
+    let angle = values.tensor(times_s.to_vec(), [1, times_s.len()]) * values.scalar::<2>("rate_hz") * TAU;
+    let swing = (angle + values.scalar::<2>("motion_rad")).sin() * values.scalar::<2>("swing_m");
+    // Without an axis, to and from the radar.
+    let [x, y, z] = if values.has("axis") {
+        values.vector("axis").map(|part| part.reshape([1, 1]))
+    } else {
+        [0.0, 1.0, 0.0].map(|part| values.tensor(vec![part], [1, 1]))
+    };
+    let displacement = Displacement { x: still.x + x * swing.clone(), y: still.y + y * swing.clone(), z: still.z + z * swing };
+    let strength = values.phase::<2>().scale(values.scalar("amplitude"));
+    let amplitude = Amplitude { re: strength.re, im: Some(strength.im) };
+    let points = Points { reference_m: &[reference_m], displacement: &displacement, amplitude: &amplitude };
+    direct_signal(points, radar, tx, dechirp, form)
+}

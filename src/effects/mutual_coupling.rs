@@ -1,6 +1,13 @@
 //! Coupling between neighbouring receivers (card C4).
 
-use super::info::{EffectInfo, Stage, parameter};
+use burn::tensor::Tensor;
+
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "mutual_coupling",
@@ -17,3 +24,23 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["channel_mismatch"],
     separate_by: "a strong reflector at several directions",
 };
+
+/// Receivers next to each other in the list couple, all alike; transmitters do not.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let [_, rx] = context.channels();
+    if rx < 2 {
+        return signal;
+    }
+    let strength = values.amplitude();
+    let one = |list: Tensor<1>| list.narrow(0, 0, 1).reshape([1, 1, 1, 1]);
+    let silent = signal.clone().narrow(1, 0, 1).scale_by(0.0);
+    let from_before = Complex::cat(vec![silent.clone(), signal.clone().narrow(1, 0, rx - 1)], 1);
+    let from_after = Complex::cat(vec![signal.clone().narrow(1, 1, rx - 1), silent], 1);
+    let heard = from_before.add(from_after).mul(Complex::new(one(strength.re), one(strength.im)));
+    signal.add(heard)
+}

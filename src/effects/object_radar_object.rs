@@ -1,6 +1,11 @@
 //! A second trip between the scene and the radar (card R6).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "object_radar_object",
@@ -17,3 +22,20 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["second_harmonic", "wall_ghost"],
     separate_by: "step out of the boresight: a harmonic doubles the phases across the array, the second trip does not; or lower the transmit power by 6 dB",
 };
+
+/// A product of two beams: the way out ends at the radar's board, where the first receiver stands for it, and the second
+/// trip starts there, where the first transmitter stands for it. Exact for a board that is small against the range's
+/// Fresnel zone, but for the cross term of the residual video phase.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let _ = context;
+    let reference = values.reference(&signal).reshape([1, 1, 1, 1]);
+    let strength = values.phase::<4>().scale(values.scalar::<4>("coefficient") / reference);
+    let out = signal.clone().narrow(1, 0, 1);
+    let back = signal.clone().narrow(0, 0, 1);
+    signal.add(out.mul(back).mul(strength))
+}

@@ -1,6 +1,12 @@
 //! Another reflectivity of one part of the body (card T4).
 
-use super::info::{EffectInfo, Stage, parameter};
+use burn::tensor::Tensor;
+
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::{BodyPoints, TORSO},
+    values::Values,
+};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "part_reflectivity",
@@ -13,3 +19,15 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["carried_reflector"],
     separate_by: "none with one person: it cannot be told from the learned reflectivity; the same garment on several persons hints at it",
 };
+
+/// On the body part that is chosen, or the torso.
+///
+/// `[point, 1]` → the same.
+///
+/// # Gradient
+/// Flows to the amplitude and to the values.
+pub fn weigh(amplitude: Tensor<2>, values: &Values, points: &BodyPoints<'_>) -> Tensor<2> {
+    let part = values.choice.as_deref();
+    let mask = points.mask(if part.is_none() { &TORSO } else { part.as_slice() }, values);
+    amplitude * (mask * values.scalar::<2>("db") * (std::f64::consts::LN_10 / 20.0)).exp()
+}

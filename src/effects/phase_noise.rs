@@ -1,6 +1,18 @@
 //! The oscillator's phase noise (card W8).
 
-use super::info::{EffectInfo, Stage, parameter};
+use std::f64::consts::TAU;
+
+use rand_distr::{Distribution, StandardNormal};
+
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
+
+/// Range that `per_chirp_rad` refers to.
+const REFERENCE_M: f64 = 3.0;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "phase_noise",
@@ -13,3 +25,20 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["chirp_start_jitter", "radar_vibration", "gain_drift"],
     separate_by: "two walls at different ranges: this phase grows with range, a vibration's does not",
 };
+
+/// Only the part that is slower than a chirp: a frequency error of its own for every chirp, drawn at random, the same
+/// for all receivers. The draws of a frame are the same whenever it is simulated; they are not those of a recording.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let mut random = context.random(0x9A5E);
+    let draws = context.chirp_counts().iter().map(|_| StandardNormal.sample(&mut random)).collect();
+    // A phase φ at 3 m is a shift of the chirp's time by φ / (2π S τ_3m).
+    let beat_hz = context.radar.slope_hz_per_s * 2.0 * REFERENCE_M / SPEED_OF_LIGHT;
+    let samples_per_rad = context.radar.sample_rate_hz / (TAU * beat_hz);
+    let shift = context.per_chirp(draws, values) * values.scalar::<4>("per_chirp_rad") * samples_per_rad;
+    context.tones(values).shift(signal, shift)
+}

@@ -1,6 +1,11 @@
 //! An offset of the body's place (card G1).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::BodyPoints,
+    values::Values,
+};
+use crate::body::Displacement;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "pose_offset",
@@ -13,3 +18,27 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["range_bias", "clock_offset", "clothing_delay"],
     separate_by: "a walk through many directions: a shift of the body changes range in front and direction at the side, a range bias changes range alone",
 };
+
+/// Normals and visibility stay those of the motion.
+///
+/// `[point, chirp]`, metres → the same.
+///
+/// # Gradient
+/// Flows to the displacement and to the values.
+pub fn displace(displacement: Displacement, values: &Values, points: &BodyPoints<'_>) -> Displacement {
+    let [x, y, z] = values.vector("offset_m").map(|part| part.reshape([1, 1]));
+    let centre = points.centre_m;
+    let angle = values.scalar::<2>("yaw_deg") * (std::f64::consts::PI / 180.0);
+    let (sine, less) = (angle.clone().sin(), angle.cos() - 1.0);
+    let from_centre = |axis: usize| {
+        let along = points.reference_m.iter().map(|point| point[axis] - centre[axis]).collect();
+        values.tensor::<2>(along, [points.reference_m.len(), 1])
+    };
+    let (right, ahead) = (from_centre(0), from_centre(1));
+    let (right, ahead) = (right + displacement.x.clone(), ahead + displacement.y.clone());
+    Displacement {
+        x: displacement.x + right.clone() * less.clone() - ahead.clone() * sine.clone() + x,
+        y: displacement.y + right * sine + ahead * less + y,
+        z: displacement.z + z,
+    }
+}

@@ -1,6 +1,13 @@
 //! A vibration of the radar (card I2).
 
-use super::info::{EffectInfo, Stage, parameter};
+use std::f64::consts::TAU;
+
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "radar_vibration",
@@ -17,3 +24,17 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["phase_noise", "breathing"],
     separate_by: "a wall at another range: a vibration moves both alike, phase noise in proportion to the range; the radar on a soft mount",
 };
+
+/// Along the boresight: one phase for all echoes of a chirp, the cosine of their direction left out.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let middle_s = context.radar.sample_time_s(context.radar.samples_per_chirp / 2);
+    let times = context.ramp_times_s().into_iter().map(|time| time + middle_s).collect();
+    let angle = context.per_chirp(times, values) * values.scalar::<4>("frequency_hz") * TAU + values.scalar::<4>("phase_rad");
+    let turns = angle.sin() * values.scalar::<4>("amplitude_m") * (2.0 / context.radar.wavelength_m());
+    signal.mul(Complex::unit(turns))
+}

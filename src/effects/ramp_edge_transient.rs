@@ -1,6 +1,13 @@
 //! A transient at the ramp's edge.
 
-use super::info::{EffectInfo, Stage, parameter};
+use burn::tensor::Tensor;
+
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::{Values, repeated},
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "ramp_edge_transient",
@@ -19,3 +26,24 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["spur", "interference", "chirp_droop"],
     separate_by: "a shorter sampling window inside the ramp: the transient disappears",
 };
+
+/// The same in all chirps and channels; `re` and `im` are for each of the edge's samples, or for all.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let samples = context.radar.samples_per_chirp;
+    let asked = values.host("samples")[0];
+    let count = (asked.abs().round().max(1.0) as usize).min(samples);
+    let strength = values.amplitude();
+    let reference = values.reference(&signal);
+    let at_edge = |list: Tensor<1>| {
+        let edge = repeated(list, count) * reference.clone();
+        let rest = values.constant(&vec![0.0; samples - count]);
+        let all = if asked < 0.0 { vec![edge, rest] } else { vec![rest, edge] };
+        Tensor::cat(all.into_iter().filter(|part| part.dims()[0] > 0).collect(), 0).reshape([1, 1, 1, samples])
+    };
+    signal.add(Complex::new(at_edge(strength.re), at_edge(strength.im)))
+}

@@ -1,6 +1,11 @@
 //! An echo from beyond the unambiguous range (card P8).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "range_alias",
@@ -19,3 +24,22 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["static_reflector", "spur"],
     separate_by: "change the sample rate by 5 %: the alias moves, a near object does not",
 };
+
+/// A tone at the true range's beat frequency; that it is folded is the sampling's doing. An echo at rest: the simplest
+/// form, which a static reflector beyond the unambiguous range would give too. The carrier's phase is in `re` and `im`.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let radar = context.radar;
+    let strength = values.amplitude();
+    let reference = values.reference(&signal).reshape([1, 1, 1, 1]);
+    let re = values.channels(strength.re, context.channels()) * reference.clone();
+    let im = values.channels(strength.im, context.channels()) * reference;
+    let times: Vec<f64> = (0..radar.samples_per_chirp).map(|sample| sample as f64 / radar.sample_rate_hz).collect();
+    let count = times.len();
+    let turns = values.constant(&times) * values.first("range_m") * (2.0 * radar.slope_hz_per_s / SPEED_OF_LIGHT);
+    signal.add(Complex::unit(turns.reshape([1, 1, 1, count])).mul(Complex::new(re, im)))
+}

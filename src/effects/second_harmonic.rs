@@ -1,6 +1,11 @@
 //! The receiver's second harmonic (card R5).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "second_harmonic",
@@ -18,3 +23,19 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["object_radar_object", "wall_ghost"],
     separate_by: "step out of the boresight: a harmonic doubles the phases across the array, a second trip does not; or lower the transmit power by 6 dB",
 };
+
+/// κ s² / reference: the level is that of the harmonic of a sample as strong as the reference.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let _ = context;
+    let strength = values.amplitude();
+    let reference = values.reference(&signal).reshape([1, 1, 1, 1]);
+    let re = strength.re.narrow(0, 0, 1).reshape([1, 1, 1, 1]) / reference.clone();
+    let im = strength.im.narrow(0, 0, 1).reshape([1, 1, 1, 1]) / reference;
+    let square = signal.clone().mul(signal.clone());
+    signal.add(square.mul(Complex::new(re, im)))
+}

@@ -5,7 +5,11 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::{info, library};
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    person::JOINT_NAMES,
+    room::Boundary,
+};
 
 /// Values of one effect. A parameter that is not named keeps its neutral value and does not learn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,9 +30,6 @@ pub struct EffectSetting {
 fn yes() -> bool {
     true
 }
-
-/// The boundaries that a choice may name.
-pub(super) const BOUNDARIES: [&str; 6] = ["left", "right", "front", "back", "floor", "ceiling"];
 
 impl EffectSetting {
     /// An effect at its neutral values.
@@ -71,11 +72,16 @@ impl EffectSetting {
                 return Err(Error::setting(field, value, expected));
             }
         }
+        let boundaries = || Boundary::ALL.map(Boundary::name).join(", ");
+        let key = format!("{key}.choice");
         match (self.id.as_str(), self.choice.as_deref()) {
-            ("wall_ghost", Some(choice)) if !BOUNDARIES.contains(&choice) => {
-                Err(Error::setting(format!("{key}.choice"), choice, format!("one of {}", BOUNDARIES.join(", "))))
+            ("wall_ghost", Some(choice)) if !Boundary::ALL.iter().any(|boundary| boundary.name() == choice) => {
+                Err(Error::setting(key, choice, format!("one of {}", boundaries())))
             }
-            ("wall_ghost", None) => Err(Error::setting(format!("{key}.choice"), "missing", "the wall, such as \"right\"")),
+            ("wall_ghost", None) => Err(Error::setting(key, "missing", format!("one of {}", boundaries()))),
+            ("clothing_delay" | "part_reflectivity" | "carried_reflector", Some(choice)) if !JOINT_NAMES.contains(&choice) => {
+                Err(Error::setting(key, choice, format!("one of {}", JOINT_NAMES.join(", "))))
+            }
             _ => Ok(()),
         }
     }

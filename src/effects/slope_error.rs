@@ -1,6 +1,11 @@
 //! An error of the chirp's slope (card W5).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "slope_error",
@@ -13,3 +18,16 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["range_bias", "pose_offset"],
     separate_by: "two reflectors at known ranges of 1 m and 6 m",
 };
+
+/// t → t (1 + relative), t from the ramp's start.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let radar = context.radar;
+    let from_ramp = (0..radar.samples_per_chirp).map(|sample| radar.sample_time_s(sample)).collect::<Vec<_>>();
+    let shift_s = values.constant(&from_ramp) * values.first("relative");
+    context.tones(values).warp(signal, context.samples_of(shift_s))
+}

@@ -1,6 +1,12 @@
 //! Waves that bend around the body's edges (card T7).
 
-use super::info::{EffectInfo, Stage, parameter};
+use burn::tensor::Tensor;
+
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::BodyPoints,
+    values::Values,
+};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "soft_occlusion",
@@ -13,3 +19,19 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["part_reflectivity"],
     separate_by: "the same edge passed from either side",
 };
+
+/// Only the body's own horizon: points that turn away fade before hidden point removal drops them. What another part
+/// covers still goes at once.
+///
+/// `[point, 1]` → the same.
+///
+/// # Gradient
+/// Flows to the amplitude and to the values.
+pub fn weigh(amplitude: Tensor<2>, values: &Values, points: &BodyPoints<'_>) -> Tensor<2> {
+    let cosines = points.facing();
+    let width = values.scalar::<2>("width");
+    let squares = values.tensor::<2>(cosines.iter().map(|cosine| cosine * cosine).collect(), [cosines.len(), 1]);
+    // The floor keeps a width of zero finite and exactly neutral but for surfaces seen on edge.
+    let hidden = (-(squares + 1e-9) / (width.clone() * width + 1e-12)).exp();
+    amplitude * (-hidden + 1.0)
+}

@@ -1,6 +1,12 @@
 //! A spur (card R12).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    points::host_value,
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "spur",
@@ -19,3 +25,28 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["static_reflector", "interference", "range_alias"],
     separate_by: "transmit nothing: the spur stays",
 };
+
+/// A tone that runs on between chirps, T being the radar's time. `re` and `im` are for each channel, each receiver, or all.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let radar = context.radar;
+    let frequency_hz = values.first("frequency_hz");
+    // Thousands of turns on the host in f64; on the device, the small change with the learned frequency.
+    let start_hz = host_value(&frequency_hz);
+    let (tx, loops, samples) = (radar.tx_m.len(), radar.loops_per_frame, radar.samples_per_chirp);
+    let times: Vec<f64> =
+        context.ramp_times_s().iter().flat_map(|ramp| (0..samples).map(move |n| ramp + radar.sample_time_s(n))).collect();
+    let dims = [tx, 1, loops, samples];
+    let turns = values.tensor(times.iter().map(|time| (start_hz * time).fract()).collect(), dims);
+    let change = (frequency_hz.clone() - frequency_hz.detach()).reshape([1, 1, 1, 1]);
+    let turns = turns + values.tensor(times, dims) * change;
+    let strength = values.amplitude();
+    let reference = values.reference(&signal).reshape([1, 1, 1, 1]);
+    let re = values.channels(strength.re, context.channels()) * reference.clone();
+    let im = values.channels(strength.im, context.channels()) * reference;
+    signal.add(Complex::unit(turns).mul(Complex::new(re, im)))
+}

@@ -1,6 +1,11 @@
 //! An error of the chirp's start frequency (card W3).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::complex::Complex;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "start_frequency_error",
@@ -13,3 +18,14 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["adc_start_error", "if_delay", "if_lowpass"],
     separate_by: "the same scene with another slope: a delay in the receiver counts in proportion to the slope, the start frequency does not; never from one setting of the radar",
 };
+
+/// A constant shift of the chirp's time by δf/S.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let error_hz = values.first("relative") * context.radar.start_frequency_hz;
+    context.tones(values).warp(signal, context.samples_of_frequency(error_hz))
+}

@@ -1,6 +1,16 @@
 //! An object at rest that the scene does not know (card P1).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::place,
+    values::Values,
+};
+use crate::{
+    complex::Complex,
+    if_signal::{SumForm, direct_signal},
+    paths::{Amplitude, Dechirp, Points},
+    radar::Radar,
+};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "static_reflector",
@@ -17,3 +27,15 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["tx_leakage", "range_alias", "wall_ghost"],
     separate_by: "turn the radar: leakage stays in place, the object turns with the room; or change the sample rate, which moves an alias",
 };
+
+/// One transmitter's signal of the object, `[rx, 1, sample]`.
+///
+/// # Gradient
+/// Flows to place, amplitude and phase.
+pub fn signal(values: &Values, radar: &Radar, tx: usize, dechirp: Dechirp, form: SumForm) -> Complex<3> {
+    let (reference_m, displacement) = place(values.vector("position_m"));
+    let strength = values.phase::<2>().scale(values.scalar("amplitude"));
+    let amplitude = Amplitude { re: strength.re, im: Some(strength.im) };
+    let points = Points { reference_m: &[reference_m], displacement: &displacement, amplitude: &amplitude };
+    direct_signal(points, radar, tx, dechirp, form)
+}

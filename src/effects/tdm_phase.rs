@@ -1,6 +1,11 @@
 //! An error in the time between the transmitters' slots (card G5).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    points::BodyPoints,
+    values::Values,
+};
+use crate::body::Displacement;
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "tdm_phase",
@@ -13,3 +18,13 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["channel_mismatch"],
     separate_by: "two directions of walking: the phase changes sign with the velocity, a transmitter's own phase does not",
 };
+
+/// A clock's offset that grows from transmitter to transmitter.
+///
+/// `[point, chirp]`, metres → the same.
+///
+/// # Gradient
+/// Flows to the displacement and to the values.
+pub fn displace(displacement: Displacement, values: &Values, points: &BodyPoints<'_>) -> Displacement {
+    points.later(displacement, values.scalar::<2>("slot_s") * points.tx as f64)
+}

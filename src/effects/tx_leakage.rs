@@ -1,6 +1,11 @@
 //! Leakage from transmitters to receivers (card R1).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    context::Context,
+    info::{EffectInfo, Stage, parameter},
+    values::Values,
+};
+use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "tx_leakage",
@@ -19,3 +24,21 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["dc_offset", "static_reflector"],
     separate_by: "turn the radar: leakage stays, the room moves; a cover of absorber on the radar takes the room away",
 };
+
+/// The same in every chirp. `re` and `im` are for each channel, each receiver, or all; the carrier's phase is in them.
+///
+/// `[tx, rx, loop, sample]` → the same.
+///
+/// # Gradient
+/// Flows to the signal and to the values.
+pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let radar = context.radar;
+    let strength = values.amplitude();
+    let reference = values.reference(&signal).reshape([1, 1, 1, 1]);
+    let re = values.channels(strength.re, context.channels()) * reference.clone();
+    let im = values.channels(strength.im, context.channels()) * reference;
+    let times: Vec<f64> = (0..radar.samples_per_chirp).map(|sample| sample as f64 / radar.sample_rate_hz).collect();
+    let count = times.len();
+    let turns = values.constant(&times) * values.first("range_m") * (2.0 * radar.slope_hz_per_s / SPEED_OF_LIGHT);
+    signal.add(Complex::unit(turns.reshape([1, 1, 1, count])).mul(Complex::new(re, im)))
+}

@@ -1,6 +1,17 @@
 //! The body's reflection in a wall (card P4, P5).
 
-use super::info::{EffectInfo, Stage, parameter};
+use super::{
+    info::{EffectInfo, Stage, parameter},
+    mirror::{mirrored_rx, mirrored_tx},
+    values::Values,
+};
+use crate::{
+    complex::Complex,
+    if_signal::{SumForm, direct_signal},
+    paths::{Dechirp, Points},
+    radar::Radar,
+    room::{Boundary, Room},
+};
 
 pub static INFO: EffectInfo = EffectInfo {
     id: "wall_ghost",
@@ -13,3 +24,28 @@ pub static INFO: EffectInfo = EffectInfo {
     look_alikes: &["moving_reflector", "body_multibounce", "floor_bounce"],
     separate_by: "stand at another distance from the wall: the ghost's delay follows the mirror law, a second person's does not",
 };
+
+/// What one transmitter receives of these points by way of the wall, `[rx, chirp, sample]`; nothing where the room has no
+/// such wall.
+///
+/// First order by image theory, the wall flat and its reflection the same for all angles; the points' amplitudes and who
+/// is seen are those of the direct path. The second order (out and back by the wall) is left out.
+///
+/// # Gradient
+/// Flows to the points and the values.
+pub fn signal(
+    points: Points,
+    values: &Values,
+    room: &Room,
+    radar: &Radar,
+    tx: usize,
+    dechirp: Dechirp,
+    form: SumForm,
+) -> Option<Complex<3>> {
+    let boundary = Boundary::ALL.into_iter().find(|boundary| Some(boundary.name()) == values.choice.as_deref())?;
+    let distance_m = room.distance_m(boundary)?;
+    let back = direct_signal(points, &mirrored_rx(radar, boundary, distance_m), tx, dechirp, form);
+    let out = direct_signal(points, &mirrored_tx(radar, boundary, distance_m), tx, dechirp, form);
+    let coefficient = values.phase::<3>().scale(values.scalar("coefficient"));
+    Some(back.add(out).mul(coefficient))
+}

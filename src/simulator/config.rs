@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     body::{Interpolation, Sampling, SurfaceConfig},
+    effects::EffectSetting,
     error::{Error, Result},
     features::{EncodingConfig, GcnConfig, TriPlaneConfig},
     if_signal::{NoiseConfig, SumForm},
@@ -59,6 +60,9 @@ pub struct SimulatorConfig {
     /// What of the microfacet model is the amplitude.
     pub response: Response,
     pub noise: NoiseConfig,
+    /// Physics beyond the plain model; the values are where learning starts.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<EffectSetting>,
 }
 
 impl Default for SimulatorConfig {
@@ -77,6 +81,7 @@ impl Default for SimulatorConfig {
             decoders: DecodersConfig::default(),
             response: Response::default(),
             noise: NoiseConfig::default(),
+            effects: Vec::new(),
         }
     }
 }
@@ -91,6 +96,9 @@ impl SimulatorConfig {
         self.graph.check("simulator.graph")?;
         self.decoders.check("simulator.decoders")?;
         self.noise.check("simulator.noise")?;
+        for (index, effect) in self.effects.iter().enumerate() {
+            effect.check(&format!("simulator.effects.{index}"))?;
+        }
         if self.paths == PathModel::Coupled && self.surface.sampling == Sampling::Facets {
             return Err(Error::setting(
                 "simulator.surface.sampling",

@@ -7,6 +7,7 @@
 //! and antenna. A body part that turns at 5 rad/s turns by 8° within a 27 ms frame.
 
 mod config;
+mod points;
 mod scattering;
 mod scene;
 mod surfaces;
@@ -24,8 +25,10 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::{
     complex::Complex,
+    effects::{Context, Effects},
     features::{Extent, Gcn, TriPlane, draw},
     if_signal::{Noise, noise},
+    radar::Radar,
     scatterers::decoders::Decoders,
 };
 
@@ -36,6 +39,8 @@ pub struct Simulator {
     pub graph: Gcn,
     pub decoders: Decoders,
     pub noise: Noise,
+    /// Physics beyond the plain model.
+    pub effects: Effects,
     #[module(skip)]
     config: SimulatorConfig,
     /// The box that canonical points are looked up in.
@@ -65,6 +70,7 @@ impl SimulatorConfig {
             graph: self.graph.init(body_features, &mut rng, device),
             decoders: self.decoders.init(body_features, self.encoding.features_out(), &mut rng, device),
             noise: self.noise.init(device),
+            effects: Effects::new(&self.effects, device),
             config: self.clone(),
             extent,
         }
@@ -124,7 +130,7 @@ impl Simulator {
         }
     }
 
-    /// The signal before noise: direct and indirect paths, as the settings have it.
+    /// The signal before noise: direct and indirect paths, as the settings have it, and what the effects make of them.
     ///
     /// # Shapes
     /// - result: `[tx, rx, loop, sample]`, in the units of the recordings it was trained on
@@ -132,6 +138,25 @@ impl Simulator {
     /// # Gradient
     /// Flows to everything that learns.
     pub fn clean_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
+        if self.effects.is_empty() {
+            return self.paths_signal(scene, view, surfaces);
+        }
+        let frame = view.frame;
+        // After lost frames a later one is seen, as far as the motion lasts.
+        let later = match self.effects.frame_shift(frame, &self.device()) {
+            0 => None,
+            shift => scene.view(frame + shift).ok(),
+        };
+        let seen = later.as_deref().unwrap_or(view);
+        let mut signal = self.paths_signal(scene, seen, surfaces);
+        if let Some(reflectors) = self.reflectors_signal(scene, frame, seen) {
+            signal = signal.add(reflectors);
+        }
+        self.effects.apply(signal, &Context { radar: &scene.radar, frame, farthest_m: scene.farthest_m() })
+    }
+
+    /// The sum of direct and indirect paths.
+    fn paths_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
         let mut sum: Option<Complex<4>> = None;
         let mut add = |part: Complex<4>| {
             sum = Some(match sum.take() {
@@ -152,8 +177,9 @@ impl Simulator {
     }
 
     /// Adds noise; equal seeds give equal noise on every backend.
-    pub fn with_noise(&self, clean: Complex<4>, seed: u64) -> Complex<4> {
+    pub fn with_noise(&self, radar: &Radar, clean: Complex<4>, seed: u64) -> Complex<4> {
         let normals = noise::normals(seed, clean.dims(), &clean.device(), DType::F32);
+        let normals = self.effects.shape_noise(normals, radar, seed);
         self.noise.add_to(clean, normals)
     }
 
@@ -197,7 +223,10 @@ impl Simulator {
             return Some("indirect path");
         }
         let clean = self.clean_signal(scene, view, &surfaces);
-        (!finite(self.with_noise(clean, 0))).then_some("noise")
+        if !finite(clean.clone()) {
+            return Some("effects");
+        }
+        (!finite(self.with_noise(&scene.radar, clean, 0))).then_some("noise")
     }
 }
 

@@ -9,36 +9,36 @@ use super::{
 use crate::{
     body::{Displacement, facets},
     complex::Complex,
-    if_signal::{direct_signal, indirect_signal},
+    if_signal::indirect_signal,
     paths::{Amplitude, Points},
     scatterers::{microfacet, patches, tangent::Frame},
 };
 
 /// Scatterers of body or room that a viewpoint sees.
-struct Visible<'a> {
-    scene: &'a Scene,
-    view: &'a FrameView,
-    kind: Kind,
-    points: &'a [usize],
-    reference_m: Vec<[f64; 3]>,
+pub(super) struct Visible<'a> {
+    pub scene: &'a Scene,
+    pub view: &'a FrameView,
+    pub kind: Kind,
+    pub points: &'a [usize],
+    pub reference_m: Vec<[f64; 3]>,
 }
 
 /// What scatterers return in one direction.
-struct Response {
+pub(super) struct Response {
     /// `[point, 1]`
-    amplitude: Tensor<2>,
+    pub amplitude: Tensor<2>,
     /// `[point, xyz]`, of the Gaussian patches from their surface.
     offset_m: Option<Tensor<2>>,
 }
 
 /// Scatterers that move together, with what they return.
-struct Group<'a> {
-    visible: Visible<'a>,
-    response: Response,
+pub(super) struct Group<'a> {
+    pub visible: Visible<'a>,
+    pub response: Response,
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+pub(super) enum Kind {
     Body,
     Room,
 }
@@ -54,11 +54,20 @@ impl Simulator {
         self.transmitters(scene, |tx, device| {
             let radar = &scene.radar;
             let parts = groups.iter().map(|group| {
-                let displacement = group.displacement(tx, device);
-                let amplitude = group.facet_amplitude(&displacement, tx, device);
+                let (displacement, weighed) = self.as_seen(group, tx, device);
+                let amplitude = group.facet_amplitude(weighed, &displacement, tx, device);
                 let points =
                     Points { reference_m: &group.visible.reference_m, displacement: &displacement, amplitude: &amplitude };
-                direct_signal(points, radar, tx, self.config.dechirp, self.config.sum)
+                let (dechirp, form) = (self.config.dechirp, self.config.sum);
+                let direct = self.effects.direct_signal(points, radar, tx, dechirp, form);
+                let further = match group.visible.kind {
+                    Kind::Body => self.effects.further_paths(points, &direct, scene.room.as_ref(), radar, tx, dechirp, form),
+                    Kind::Room => None,
+                };
+                match further {
+                    Some(further) => direct.add(further),
+                    None => direct,
+                }
             });
             parts.reduce(Complex::add)
         })
@@ -78,8 +87,8 @@ impl Simulator {
         self.transmitters(scene, |tx, device| {
             let parts =
                 walls.iter().flat_map(|(wall, groups)| groups.iter().map(move |group| (wall, group))).map(|(wall, group)| {
-                    let displacement = group.displacement(tx, device);
-                    let amplitude = Amplitude::real(group.response.amplitude.clone());
+                    let (displacement, weighed) = self.as_seen(group, tx, device);
+                    let amplitude = Amplitude::real(weighed);
                     let points =
                         Points { reference_m: &group.visible.reference_m, displacement: &displacement, amplitude: &amplitude };
                     let place = scene.proxies[*wall].position_m;
@@ -90,7 +99,7 @@ impl Simulator {
     }
 
     /// `[rx, chirp, sample]` of every transmitter, stacked; what stands still has one chirp and is repeated.
-    fn transmitters(&self, scene: &Scene, signal: impl Fn(usize, &Device) -> Option<Complex<3>>) -> Complex<4> {
+    pub(super) fn transmitters(&self, scene: &Scene, signal: impl Fn(usize, &Device) -> Option<Complex<3>>) -> Complex<4> {
         let device = self.device();
         let [_, tx, rx, loops, samples] = scene.radar.dims();
         let silent = || Complex::zeros([rx, loops, samples], &device);
@@ -179,7 +188,7 @@ impl Visible<'_> {
         }
     }
 
-    fn normals(&self) -> Vec<[f64; 3]> {
+    pub fn normals(&self) -> Vec<[f64; 3]> {
         self.pick(|| self.of_frame(|frame| &frame.normal), &self.scene.patches.normal)
     }
 
@@ -200,7 +209,7 @@ impl Visible<'_> {
 
 impl Group<'_> {
     /// How the points move around their references in the chirps of a transmitter.
-    fn displacement(&self, tx: usize, device: &Device) -> Displacement {
+    pub fn displacement(&self, tx: usize, device: &Device) -> Displacement {
         let Visible { scene, view, kind, points, .. } = &self.visible;
         let loops = scene.radar.loops_per_frame;
         let offset_m = self.response.offset_m.clone();
@@ -217,9 +226,8 @@ impl Group<'_> {
     }
 
     /// The amplitude with the closed-form integral over each facet, where facets are what is sampled.
-    fn facet_amplitude(&self, displacement: &Displacement, tx: usize, device: &Device) -> Amplitude {
+    fn facet_amplitude(&self, amplitude: Tensor<2>, displacement: &Displacement, tx: usize, device: &Device) -> Amplitude {
         let Visible { scene, view, kind, points, reference_m } = &self.visible;
-        let amplitude = self.response.amplitude.clone();
         match (kind, &scene.body, &view.body) {
             (Kind::Body, Some(body), Some(frame)) if scene.facets => {
                 let radar = &scene.radar;

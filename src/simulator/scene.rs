@@ -12,7 +12,7 @@ use super::SimulatorConfig;
 use crate::{
     body::{BodyFrame, PosedBody, Sampling},
     error::Result,
-    person::Person,
+    person::{JOINT_NAMES, Person},
     radar::Radar,
     room::Room,
     scatterers::{
@@ -44,10 +44,13 @@ pub struct FrameView {
 pub struct Scene {
     pub radar: Radar,
     pub body: Option<PosedBody>,
+    pub room: Option<Room>,
     pub patches: RoomPatches,
     pub proxies: Vec<Proxy>,
     /// Whether every scatterer of the body stands for a whole facet.
     pub facets: bool,
+    /// `[point]` of the body: the joint that moves it most; empty for meshes.
+    pub(super) joints: Vec<&'static str>,
     flip_exponent: f64,
     /// `[point]` of the body: the canonical axis that lies flattest on its surface.
     flattest: Vec<usize>,
@@ -57,6 +60,10 @@ pub struct Scene {
 
 /// Views that are kept: a few MB each.
 const KEPT_VIEWS: usize = 200;
+
+fn joint_names(body: &PosedBody) -> Vec<&'static str> {
+    body.joints().into_iter().map(|joint| JOINT_NAMES.get(joint).copied().unwrap_or("")).collect()
+}
 
 impl Scene {
     /// # Errors
@@ -71,7 +78,9 @@ impl Scene {
         });
         Ok(Self {
             radar: radar.clone(),
+            joints: body.as_ref().map(joint_names).unwrap_or_default(),
             body,
+            room: room.cloned(),
             patches,
             proxies,
             facets: config.surface.sampling == Sampling::Facets,
@@ -79,6 +88,14 @@ impl Scene {
             flattest,
             views: Mutex::new(VecDeque::new()),
         })
+    }
+
+    /// Range of the farthest echo that the scene can hold, metres.
+    pub fn farthest_m(&self) -> f64 {
+        // Without a room, the body and some space behind it.
+        let known = self.room.as_ref().and_then(Room::farthest_m).unwrap_or(6.0);
+        // Ghosts by way of a wall come from farther away than the wall.
+        1.5 * known
     }
 
     /// Times of all chirps of a frame, seconds: transmitter by transmitter, loop by loop; each at the middle of its

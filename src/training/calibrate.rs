@@ -3,6 +3,9 @@
 //! Body, room and noise are each brought to their power in the recording: the body in the moving cells that stand
 //! out of the noise, the room to all that is at rest (leakage and furniture included), the noise in the median cell.
 //! Training refines them.
+//!
+//! Effects stay in place meanwhile. What they add to silence (leakage, offsets, spurs) is taken out of both sides, so that
+//! no level is measured on it.
 
 use std::f64::consts::LN_2;
 
@@ -48,7 +51,9 @@ pub fn fit_levels(
     frames: &[FrameId],
     heatmap: &HeatmapConfig,
 ) -> Result<Simulator> {
-    let plain = simulator.clone().valid();
+    // In the units of before, what is not linear would answer to the wrong amplitudes.
+    let mut plain = simulator.clone().valid();
+    plain.effects.switch_off_nonlinear();
     let mut levels = Levels::default();
     let looked_at: Vec<FrameId> = frames.iter().copied().step_by(frames.len().div_ceil(FRAMES).max(1)).collect();
     let surfaces = decode(&plain, prepared);
@@ -118,10 +123,20 @@ impl Levels {
             Sampling::Complex => signal,
             Sampling::Real => Complex::new(signal.re, signal.im.zeros_like()),
         };
-        let measured = recording.target(frame, &device)?;
+        let mut measured = recording.target(frame, &device)?;
         let view = scene.view(frame)?;
         let Surfaces { body, room } = surfaces.clone();
-        let alone = |surfaces: Surfaces| plain.clean_signal(scene, &view, &surfaces);
+        let whole = |surfaces: Surfaces| plain.clean_signal(scene, &view, &surfaces);
+        // What is there without body and room.
+        let added = (!plain.effects.is_empty()).then(|| whole(Surfaces { body: None, room: None }));
+        let less = |signal: Complex<4>| match &added {
+            Some(added) => signal.sub(added.clone()),
+            None => signal,
+        };
+        if let Some(added) = added.clone() {
+            measured = measured.sub(sampled(added));
+        }
+        let alone = |surfaces: Surfaces| less(whole(surfaces));
         let of_body = sampled(alone(Surfaces { body, room: None }));
         let of_room = sampled(alone(Surfaces { body: None, room }));
 

@@ -25,6 +25,8 @@ pub struct TrainingConfig {
     pub split: Split,
     /// Stop after this many epochs without a better validation loss; zero never stops early.
     pub patience_epochs: usize,
+    /// Whether the simulator's effects learn too.
+    pub learn_effects: bool,
     pub heatmap: HeatmapConfig,
     pub loss: LossConfig,
 }
@@ -40,6 +42,7 @@ impl Default for TrainingConfig {
             validation_fraction: 0.2,
             split: Split::Last,
             patience_epochs: 0,
+            learn_effects: true,
             heatmap: HeatmapConfig::default(),
             loss: LossConfig::default(),
         }

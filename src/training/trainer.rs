@@ -96,6 +96,9 @@ impl Trainer<'_> {
                 simulator = checkpoint::with_stable_ids(simulator);
             }
         }
+        if !self.config.learn_effects {
+            simulator.effects = simulator.effects.no_grad();
+        }
 
         emit(Event::Started {
             steps,
@@ -209,7 +212,7 @@ impl Trainer<'_> {
             for frame in frames {
                 let view = recording.scene.view(frame)?;
                 let clean = simulator.clean_signal(&recording.scene, &view, &surfaces);
-                let signal = simulator.with_noise(clean, rng.random());
+                let signal = simulator.with_noise(&recording.scene.radar, clean, rng.random());
                 let measured = loss.maps_db(one_frame(recording.target(frame, &self.device)?));
                 let value = loss.loss(one_frame(signal), measured);
                 sum = Some(match sum {

@@ -1,0 +1,53 @@
+//! Settings of a diagnosis.
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::error::{Error, Result};
+
+/// When something is claimed, and what is done to show it. Every report names these settings and their hash.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DiagnosisConfig {
+    /// Family-wise chance of a false claim on a recording with nothing missing.
+    pub alarm: f64,
+    /// Least gain of the log-likelihood on held-out frames, nats.
+    pub gain: f64,
+    /// Alternatives within so many nats of the best are not told apart.
+    pub tie: f64,
+    /// Most effects that are accepted.
+    pub most: usize,
+    /// Epochs for which the simulator is trained, without and with the effects; zero: it is not.
+    pub epochs: usize,
+    /// Of the simulator's training.
+    pub seed: u64,
+}
+
+impl Default for DiagnosisConfig {
+    fn default() -> Self {
+        Self { alarm: 0.01, gain: 6.0, tie: 4.6, most: 10, epochs: 8, seed: 1 }
+    }
+}
+
+impl DiagnosisConfig {
+    /// Refuses settings that cannot work.
+    pub fn check(&self) -> Result<()> {
+        if !(self.alarm > 0.0 && self.alarm < 1.0) {
+            return Err(Error::setting("diagnosis.alarm", self.alarm, "a probability between 0 and 1"));
+        }
+        for (key, value) in [("gain", self.gain), ("tie", self.tie)] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(Error::setting(format!("diagnosis.{key}"), value, "nats, 0 or more"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The settings as text, with their hash.
+    pub fn fingerprint(&self) -> String {
+        let text = toml::to_string(self).expect("plain data").replace('\n', "; ");
+        let digest = Sha256::digest(text.as_bytes());
+        let hash: String = digest.iter().take(6).map(|byte| format!("{byte:02x}")).collect();
+        format!("{} (sha256 {hash})", text.trim_end_matches("; "))
+    }
+}
