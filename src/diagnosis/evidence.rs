@@ -1,5 +1,6 @@
 //! A recording as far as it is explained so far, and what every suspect needs of it.
 
+use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
 use num_complex::Complex64;
@@ -7,6 +8,7 @@ use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 
 use super::cube::{Cube, Loaded, Split};
+use super::power::PowerModel;
 use super::prediction::BodyPrediction;
 use super::statistics;
 use crate::radar::{Radar, Sampling};
@@ -29,6 +31,7 @@ pub struct Evidence {
     noise: OnceLock<Vec<f64>>,
     still: OnceLock<Vec<Complex64>>,
     maps: OnceLock<Vec<f32>>,
+    power: OnceLock<Option<Arc<PowerModel>>>,
 }
 
 impl Evidence {
@@ -46,12 +49,13 @@ impl Evidence {
             noise: OnceLock::new(),
             still: OnceLock::new(),
             maps: OnceLock::new(),
+            power: OnceLock::new(),
         }
     }
 
     /// The same after samples or prediction changed: nothing computed is kept.
     pub fn changed(self) -> Self {
-        Self { noise: OnceLock::new(), still: OnceLock::new(), maps: OnceLock::new(), ..self }
+        Self { noise: OnceLock::new(), still: OnceLock::new(), maps: OnceLock::new(), power: OnceLock::new(), ..self }
     }
 
     pub fn is_real(&self) -> bool {
@@ -101,8 +105,16 @@ impl Evidence {
 
     /// Power that moving things are expected to have in a frame's cells, over the noise's variance and with the noise,
     /// `[doppler, range]`.
-    pub fn expected(&self, _frame: usize) -> Vec<f32> {
-        vec![1.0; self.cube.dims[3] * self.cube.dims[4]]
+    pub fn expected(&self, frame: usize) -> Cow<'_, [f32]> {
+        match self.power() {
+            Some(model) => model.expected(frame).into(),
+            None => vec![1.0; self.cube.dims[3] * self.cube.dims[4]].into(),
+        }
+    }
+
+    /// The power model of the body, where there is one.
+    pub fn power(&self) -> Option<&PowerModel> {
+        self.power.get_or_init(|| PowerModel::new(self).map(Arc::new)).as_deref()
     }
 
     /// One frame and channel after the transforms with Hann windows of unit energy (white noise keeps its variance),

@@ -1,0 +1,253 @@
+//! How much power the body is expected to have in every cell of the range-Doppler maps.
+//!
+//! The fine interference of a body's points cannot be predicted (errors of the mesh are a whole wavelength), so what
+//! arrives in a cell is speckle: its power is a draw from a gamma law whose mean is predicted. That mean is the noise plus
+//! each part of the body's template (visible area, facing, 1/R⁴, spread by the windows) times a weight of its own,
+//! fitted by maximum likelihood: the nonnegative factorisation under the Itakura-Saito divergence (Févotte, Bertin,
+//! Durrieu 2009) with fixed templates. Power is in units of the noise, conventions of [`Evidence::maps`].
+
+mod fit;
+mod spread;
+
+use rayon::prelude::*;
+
+pub use fit::{fit_weights, log_likelihood};
+pub use spread::Cells;
+
+use super::evidence::Evidence;
+use super::prediction::Point;
+use crate::radar::Radar;
+
+/// Doppler bins on either side of zero that hold remains of what stands still.
+const STILL_BINS: usize = 2;
+/// Expected power of a part, over the noise, from which on it counts as support.
+const SUPPORT_LEVEL: f32 = 0.1;
+/// Cells by which the support is widened: accelerations, errors of the mesh, speckle above its mean.
+const SUPPORT_MARGIN: i64 = 2;
+/// A part's power grows with the cosine of the angle to the radar to this power.
+const FACING_EXPONENT: i32 = 2;
+
+/// A map of few cells: indices into `[doppler, range]` and power.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Template {
+    pub cells: Vec<u32>,
+    pub power: Vec<f32>,
+}
+
+impl Template {
+    /// Cells of a dense map that hold more than a millionth of its peak.
+    fn of(map: &[f32]) -> Self {
+        let least = 1e-6 * map.iter().copied().fold(0.0, f32::max);
+        let (cells, power) =
+            map.iter().enumerate().filter(|(_, power)| **power > least).map(|(cell, &power)| (cell as u32, power)).unzip();
+        Self { cells, power }
+    }
+}
+
+/// Expected power of the moving body, part by part.
+pub struct PowerModel {
+    pub cells: Cells,
+    /// `[frame][part]`
+    pub templates: Vec<Vec<Template>>,
+    /// By part, fitted on the training frames.
+    pub weights: Vec<f64>,
+    /// How many independent powers the mean over the channels amounts to, in cells that the body fills.
+    pub independent: f64,
+    expected: Vec<Vec<f32>>,
+    support: Vec<Vec<bool>>,
+    usable: Vec<bool>,
+}
+
+impl PowerModel {
+    /// None without a body, or where nothing of it is in sight.
+    pub fn new(evidence: &Evidence) -> Option<Self> {
+        let body = evidence.body.as_ref()?;
+        let cells = Cells::new(&evidence.radar);
+        let templates: Vec<Vec<Template>> = body
+            .frames
+            .par_iter()
+            .map(|points| part_templates(&evidence.radar, &cells, points, body.parts.len(), |point| point))
+            .collect();
+        if templates.iter().flatten().all(|template| template.cells.is_empty()) {
+            return None;
+        }
+        let usable = usable(&cells);
+        let maps = evidence.maps();
+        let size = cells.loops * cells.samples;
+        let training: Vec<(&[f32], &[Template])> = evidence
+            .split
+            .training
+            .iter()
+            .map(|&frame| (&maps[frame * size..(frame + 1) * size], templates[frame].as_slice()))
+            .collect();
+        let weights = fit_weights(&training, &usable);
+        let expected: Vec<Vec<f32>> = templates.iter().map(|parts| sum(parts, &weights, size)).collect();
+        let support = expected.iter().map(|map| widened(map, &cells)).collect();
+        let independent = independent_channels(evidence, &expected);
+        Some(Self { cells, templates, weights, independent, expected, support, usable })
+    }
+
+    /// Power of some points `[doppler, range]`, spread by the windows: (range in metres, mean of the legs to tx and rx;
+    /// radial velocity in m/s, positive when receding; power in the peak).
+    pub fn template(&self, points: impl Iterator<Item = (f64, f64, f64)>) -> Vec<f32> {
+        let mut map = vec![0.0; self.size()];
+        for (range_m, velocity_mps, power) in points {
+            self.cells.deposit(&mut map, range_m, velocity_mps, power);
+        }
+        map
+    }
+
+    /// Body and noise, `[doppler, range]`, in units of the noise.
+    pub fn expected(&self, frame: usize) -> &[f32] {
+        &self.expected[frame]
+    }
+
+    /// Where the body can be, `[doppler, range]`: all else is empty of it.
+    pub fn support(&self, frame: usize) -> &[bool] {
+        &self.support[frame]
+    }
+
+    /// Cells that mean something, `[doppler, range]`: away from what stands still, and in range of the receiver.
+    pub fn usable(&self) -> &[bool] {
+        &self.usable
+    }
+
+    pub fn size(&self) -> usize {
+        self.cells.loops * self.cells.samples
+    }
+
+    /// Expected power of some parts alone (such as a limb), `[doppler, range]`.
+    pub fn of_parts(&self, frame: usize, parts: impl Fn(usize) -> bool) -> Vec<f32> {
+        let mut map = vec![0.0; self.size()];
+        for (part, template) in self.templates[frame].iter().enumerate().filter(|(part, _)| parts(*part)) {
+            add(&mut map, template, self.weights[part]);
+        }
+        map
+    }
+
+    /// Of the measured powers (of [`Evidence::maps`]) in some frames, with another map expected in each.
+    pub fn log_likelihood<'a>(
+        &'a self,
+        evidence: &Evidence,
+        frames: &[usize],
+        expected: impl Fn(usize) -> &'a [f32] + Sync,
+    ) -> f64 {
+        let (maps, size) = (evidence.maps(), self.size());
+        frames.iter().map(|&frame| log_likelihood(&maps[frame * size..(frame + 1) * size], expected(frame), &self.usable)).sum()
+    }
+}
+
+/// Mean of the legs to all antennas, and how fast it grows.
+pub fn range_and_velocity(radar: &Radar, position_m: [f64; 3], velocity_mps: [f64; 3]) -> (f64, f64) {
+    let mean = |antennas: &[[f64; 3]]| {
+        let (range, speed) = antennas.iter().fold((0.0, 0.0), |(range, speed), antenna| {
+            let offset: [f64; 3] = std::array::from_fn(|axis| position_m[axis] - radar.position_m[axis] - antenna[axis]);
+            let length = norm(offset).max(1e-6);
+            (range + length, speed + dot(offset, velocity_mps) / length)
+        });
+        (range / antennas.len() as f64, speed / antennas.len() as f64)
+    };
+    let (sent, received) = (mean(&radar.tx_m), mean(&radar.rx_m));
+    (0.5 * (sent.0 + received.0), 0.5 * (sent.1 + received.1))
+}
+
+/// Templates of all parts with the points moved first.
+pub fn part_templates(
+    radar: &Radar,
+    cells: &Cells,
+    points: &[Point],
+    parts: usize,
+    moved: impl Fn(Point) -> Point,
+) -> Vec<Template> {
+    let mut maps: Vec<Vec<f32>> = vec![vec![]; parts];
+    let centre = radar.centre_m();
+    for &point in points {
+        let point = moved(point);
+        let (range_m, velocity) = range_and_velocity(radar, point.position_m, point.velocity_mps);
+        let to_radar: [f64; 3] = std::array::from_fn(|axis| centre[axis] - point.position_m[axis]);
+        let facing = (dot(to_radar, point.normal) / norm(to_radar).max(1e-6)).max(0.0);
+        let power = point.area_m2 * facing.powi(FACING_EXPONENT) / range_m.max(0.1).powi(4);
+        let Some(map) = maps.get_mut(point.part) else { continue };
+        if map.is_empty() {
+            *map = vec![0.0; cells.loops * cells.samples];
+        }
+        cells.deposit(map, range_m, velocity, power);
+    }
+    maps.iter().map(|map| Template::of(map)).collect()
+}
+
+/// Noise and weighted templates.
+pub fn sum(parts: &[Template], weights: &[f64], size: usize) -> Vec<f32> {
+    let mut map = vec![1.0; size];
+    for (template, &weight) in parts.iter().zip(weights) {
+        add(&mut map, template, weight);
+    }
+    map
+}
+
+fn add(map: &mut [f32], template: &Template, weight: f64) {
+    for (&cell, power) in template.cells.iter().zip(&template.power) {
+        map[cell as usize] += weight as f32 * power;
+    }
+}
+
+fn usable(cells: &Cells) -> Vec<bool> {
+    let far_from_still = |doppler: usize| cells.loops < 8 || doppler.min(cells.loops - doppler) > STILL_BINS;
+    (0..cells.loops * cells.samples)
+        .map(|cell| far_from_still(cell / cells.samples) && cell % cells.samples < cells.bins)
+        .collect()
+}
+
+/// Cells with body power, and their neighbours.
+fn widened(expected: &[f32], cells: &Cells) -> Vec<bool> {
+    let mut mask = vec![false; expected.len()];
+    for cell in (0..expected.len()).filter(|&cell| expected[cell] > 1.0 + SUPPORT_LEVEL) {
+        for i in -SUPPORT_MARGIN..=SUPPORT_MARGIN {
+            let doppler = ((cell / cells.samples) as i64 + i).rem_euclid(cells.loops as i64) as usize;
+            for j in -SUPPORT_MARGIN..=SUPPORT_MARGIN {
+                let range = ((cell % cells.samples) as i64 + j).rem_euclid(cells.samples as i64) as usize;
+                mask[doppler * cells.samples + range] = true;
+            }
+        }
+    }
+    mask
+}
+
+/// From the scatter of the channels' powers in cells that the body fills: equal powers are one draw.
+fn independent_channels(evidence: &Evidence, expected: &[Vec<f32>]) -> f64 {
+    /// Frames that suffice.
+    const FRAMES: usize = 4;
+    let count = evidence.cube.channels();
+    if count < 2 {
+        return 1.0;
+    }
+    let noise = evidence.noise();
+    let (mut scatter, mut square) = (0.0, 0.0);
+    for &frame in evidence.split.training.iter().take(FRAMES) {
+        let maps: Vec<_> = (0..count).map(|channel| evidence.range_doppler(frame, channel)).collect();
+        for (cell, &mean) in expected[frame].iter().enumerate().filter(|(_, mean)| **mean > 30.0) {
+            let powers = maps.iter().zip(noise).map(|(map, noise)| map[cell].norm_sqr() / noise.max(f64::MIN_POSITIVE));
+            let (first, second) = powers.fold((0.0, 0.0), |(a, b), power| (a + power, b + power * power));
+            let (first, second) = (first / count as f64, second / count as f64);
+            scatter += (second - first * first) / f64::from(mean * mean);
+            square += first * first / f64::from(mean * mean);
+        }
+    }
+    if square <= 0.0 {
+        return 1.0;
+    }
+    // Exponential powers of equal means whose fields correlate by ρ: E[scatter] = (1 − ρ²)(C − 1)/C and
+    // E[square] = 1 + (1 + (C − 1) ρ²)/C.
+    let (ratio, c) = (scatter / square, count as f64);
+    let a = (c - 1.0) / c;
+    let rho2 = ((a - ratio * (1.0 + 1.0 / c)) / (a * (1.0 + ratio))).clamp(0.0, 1.0);
+    c / (1.0 + (c - 1.0) * rho2)
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn norm(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}
