@@ -1,0 +1,223 @@
+//! What `diagnose` says about recordings whose truth is known, and about those of which nothing can be said.
+
+mod support;
+
+use std::path::{Path, PathBuf};
+
+use hybridsim::data::{IfLayout, Recording, RecordingContents, write_recording};
+use hybridsim::diagnosis::report::{Report, Verdict};
+use hybridsim::diagnosis::{DiagnosisConfig, diagnose};
+use hybridsim::recorder::{self, RecorderConfig};
+
+fn config() -> DiagnosisConfig {
+    DiagnosisConfig { epochs: 0, ..DiagnosisConfig::default() }
+}
+
+fn report(folder: &Path) -> Report {
+    let recording = Recording::open(folder).unwrap();
+    diagnose(&recording, &config(), &mut |_| {}).unwrap().report
+}
+
+/// A small recording; `text` is TOML over the recorder's defaults.
+fn recorded(folder: &Path, text: &str) -> PathBuf {
+    let config: RecorderConfig = toml::from_str(&format!("{text}\n{RADAR}")).unwrap();
+    let out = folder.join("recording");
+    recorder::record_to(&config, Path::new("."), &out, &mut |_, _| {}).unwrap();
+    out
+}
+
+const RADAR: &str = r#"
+[radar]
+start_frequency_hz = 77.0e9
+slope_hz_per_s = 60.012e12
+sample_rate_hz = 4.4e6
+samples_per_chirp = 64
+loops_per_frame = 32
+adc_start_s = 6.0e-6
+chirp_period_s = 216.0e-6
+frame_period_s = 0.1
+frames = 8
+tx_m = [[-0.0153, 0.0, 0.0]]
+rx_m = [[0.0, 0.0, 0.0], [0.0019, 0.0, 0.0]]
+"#;
+
+fn planted(name: &str) -> Option<Report> {
+    Some(report(&support::shared(&format!("recordings/planted/{name}"))?))
+}
+
+fn ids(report: &Report) -> Vec<&str> {
+    report.effects.iter().map(|effect| effect.id.as_str()).collect()
+}
+
+/// Named, or among what cannot be told from what was named.
+fn names(report: &Report, id: &str) -> bool {
+    report.effects.iter().any(|effect| effect.id == id || effect.indistinguishable_from.iter().any(|other| other == id))
+}
+
+fn value(report: &Report, id: &str, parameter: &str) -> f64 {
+    let effect = report.effects.iter().find(|effect| effect.id == id).unwrap_or_else(|| panic!("{id} in {:?}", ids(report)));
+    effect.parameters[parameter].value.as_f64().unwrap()
+}
+
+#[track_caller]
+fn close(found: f64, wanted: f64, tolerance: f64) {
+    assert!((found - wanted).abs() <= tolerance, "found {found}, wanted {wanted} ± {tolerance}");
+}
+
+#[test]
+fn nothing_is_claimed_where_nothing_was_planted() {
+    let Some(report) = planted("p1") else { return };
+    assert_eq!(report.verdict, Verdict::NoMismatch, "{:?} {:?}", report.effects, report.unexplained);
+}
+
+#[test]
+fn leakage_is_found_with_its_range() {
+    let Some(report) = planted("p2") else { return };
+    assert_eq!(ids(&report), ["tx_leakage"], "{:?}", report.unexplained);
+    close(value(&report, "tx_leakage", "range_m"), 0.09, 0.02);
+}
+
+#[test]
+fn the_wall_that_mirrors_is_named() {
+    let Some(report) = planted("p3") else { return };
+    assert_eq!(ids(&report), ["wall_ghost"], "{:?}", report.unexplained);
+    assert_eq!(report.effects[0].place.boundary.as_deref(), Some("right"));
+}
+
+#[test]
+fn a_pendulum_is_found_where_it_hangs() {
+    let Some(report) = planted("p4") else { return };
+    assert_eq!(ids(&report), ["moving_reflector"], "{:?}", report.unexplained);
+    close(value(&report, "moving_reflector", "rate_hz"), 0.9, 0.05);
+    let [x, y, _] = report.effects[0].place.position_m.unwrap();
+    close(x, -0.9, 0.3);
+    close(y, 3.4, 0.15);
+}
+
+#[test]
+fn an_ignored_high_pass_is_named() {
+    let Some(report) = planted("p5") else { return };
+    assert_eq!(ids(&report), ["if_highpass"], "{:?}", report.unexplained);
+    close(value(&report, "if_highpass", "corner_hz"), 350e3, 50e3);
+}
+
+#[test]
+fn a_wrong_slope_is_named_or_among_what_looks_the_same() {
+    let Some(report) = planted("p6") else { return };
+    assert!(names(&report, "slope_error"), "{:?} {:?}", report.effects, report.unexplained);
+    assert_eq!(report.effects.len(), 1, "{:?}", ids(&report));
+}
+
+#[test]
+fn two_effects_of_the_receiver_are_told_apart() {
+    let Some(report) = planted("p7") else { return };
+    let mut found = ids(&report);
+    found.sort_unstable();
+    assert_eq!(found, ["iq_imbalance", "ramp_edge_transient"], "{:?}", report.unexplained);
+    close(value(&report, "iq_imbalance", "gain_db").abs(), 0.5, 0.1);
+    close(value(&report, "iq_imbalance", "phase_deg").abs(), 2.0, 0.4);
+    close(value(&report, "ramp_edge_transient", "samples"), 2.0, 0.1);
+}
+
+#[test]
+fn what_has_no_name_is_located_and_left_unnamed() {
+    let Some(report) = planted("p8") else { return };
+    assert_eq!(report.verdict, Verdict::Unexplained, "{:?}", ids(&report));
+    assert!(report.unexplained[0].behaves_like.contains("slow-time gain"), "{:?}", report.unexplained);
+}
+
+#[test]
+fn a_real_room_has_a_bad_ramp_end_and_leakage() {
+    let Some(folder) = support::shared("recordings/real/room_60ghz") else { return };
+    let report = report(&folder);
+    assert!(names(&report, "ramp_edge_transient") && names(&report, "tx_leakage"), "{:?}", ids(&report));
+}
+
+#[test]
+fn a_real_pair_of_people_is_seen_beside_uneven_leakage() {
+    let Some(folder) = support::shared("recordings/real/two_people_77ghz") else { return };
+    let report = report(&folder);
+    assert!(names(&report, "tx_leakage"), "{:?}", ids(&report));
+}
+
+#[test]
+fn a_real_person_breathes_at_fourteen_per_minute() {
+    let Some(folder) = support::shared("recordings/real/breathing_60ghz") else { return };
+    let report = report(&folder);
+    assert!(names(&report, "dc_offset") && names(&report, "tx_leakage") && names(&report, "breathing"), "{:?}", ids(&report));
+    close(60.0 * value(&report, "breathing", "rate_hz"), 14.3, 0.5);
+}
+
+/// Rewrites the samples of a recording.
+fn rewritten(from: &Path, to: &Path, change: impl Fn(usize, &mut [f32], &mut [f32])) {
+    let recording = Recording::open(from).unwrap();
+    let contents = RecordingContents {
+        radar: &recording.radar,
+        room: recording.room.as_ref(),
+        person: recording.person(),
+        body_file: None,
+        labels: recording.labels.clone(),
+        layout: IfLayout::Complex,
+        truth: None,
+    };
+    let mut frame = |index: usize| {
+        let mut frame = recording.frame(index)?;
+        change(index, &mut frame.re, frame.im.as_mut().unwrap());
+        Ok(frame)
+    };
+    write_recording(to, &contents, &mut frame).unwrap();
+}
+
+#[test]
+fn conventions_come_before_physics() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = recorded(folder.path(), "seed = 3");
+    assert!(report(&plain).audit.iter().all(|check| check.ok), "{:?}", report(&plain).audit);
+    // I and Q the other way round: conjugated samples.
+    let swapped = folder.path().join("swapped");
+    rewritten(&plain, &swapped, |_, _, im| im.iter_mut().for_each(|value| *value = -*value));
+    let found = report(&swapped);
+    assert_eq!(found.verdict, Verdict::Undecided);
+    assert!(found.reason.contains("I and Q"), "{}", found.reason);
+}
+
+#[test]
+fn a_recording_that_says_nothing_gets_that_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = recorded(folder.path(), "seed = 4");
+    let noise = folder.path().join("noise");
+    let drawn = support::numbers(5, 2 * 8 * 2 * 32 * 64, -1.0, 1.0);
+    rewritten(&plain, &noise, |frame, re, im| {
+        for (i, (re, im)) in re.iter_mut().zip(im).enumerate() {
+            let at = 2 * (frame * 2 * 32 * 64 + i);
+            (*re, *im) = (drawn[at] as f32, drawn[at + 1] as f32);
+        }
+    });
+    let found = report(&noise);
+    assert_eq!(found.verdict, Verdict::Undecided);
+    assert!(found.reason.contains("too noisy"), "{}", found.reason);
+    let dead = folder.path().join("dead");
+    rewritten(&plain, &dead, |_, re, im| {
+        let half = re.len() / 2;
+        re[half..].fill(0.0);
+        im[half..].fill(0.0);
+    });
+    let found = report(&dead);
+    assert_eq!(found.verdict, Verdict::Undecided);
+    assert!(found.reason.contains("rx 1"), "{}", found.reason);
+}
+
+#[test]
+fn a_body_in_the_wrong_place_is_reported_not_fitted_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = recorded(folder.path(), "seed = 5");
+    let moved = folder.path().join("recording/recording.toml");
+    let text = std::fs::read_to_string(&moved).unwrap();
+    let line = text.lines().find(|line| line.starts_with("origin_m")).unwrap();
+    let origin: Vec<f64> = line.split(['[', ']', ',']).filter_map(|part| part.trim().parse().ok()).collect();
+    let farther = format!("origin_m = [{}, {}, {}]", origin[0], origin[1] + 1.2, origin[2]);
+    std::fs::write(&moved, text.replace(line, &farther)).unwrap();
+    let found = report(&plain);
+    assert_eq!(found.verdict, Verdict::Undecided, "{:?}", found.audit);
+    assert!(found.reason.contains("wrong place"), "{}", found.reason);
+}
