@@ -124,6 +124,35 @@ fn a_run_leaves_pictures_numbers_and_a_model_that_infers_at_once() {
 }
 
 #[test]
+fn effects_are_part_of_the_checkpoint_and_can_be_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let recordings = format!("data.recordings=[{:?}]", recording().display().to_string());
+    let effects = "simulator.effects=[{id=\"if_highpass\",parameters={corner_hz=[4e5]}}]";
+    let sets = ["--set", "training.epochs=1", "--set", &recordings, "--set", effects];
+    let output =
+        hybridsim(&[&["train", &test_config(), "-q", "--device", "flex", "--out", "run"], &sets[..]].concat(), folder.path());
+    assert!(output.status.success(), "{}", err(&output));
+    let infer = |name: &str, more: &[&str]| {
+        let arguments =
+            ["infer", "--checkpoint", "run/best", "--action", "lunge", "--frames", "1", "--clean", "-q", "--out", name];
+        let output = hybridsim(&[&arguments, more].concat(), folder.path());
+        assert!(output.status.success(), "{}", err(&output));
+        std::fs::read(folder.path().join(name).join("recording/if.npy")).unwrap()
+    };
+    let with = infer("with", &[]);
+    let without = infer("without", &["--without-effects"]);
+    assert_ne!(with, without);
+    assert_eq!(without, infer("named", &["--without-effect", "if_highpass"]));
+    let arguments = ["infer", "--checkpoint", "run/best", "--action", "lunge", "--without-effect", "dc_offset"];
+    assert_refused(&hybridsim(&arguments, folder.path()), 2, &["the checkpoint has no such effect", "if_highpass"]);
+    let wrong = ["train", &test_config(), "--set", "simulator.effects=[{id=\"if_hipass\"}]"];
+    assert_refused(&hybridsim(&wrong, folder.path()), 2, &["`simulator.effects.0.id` is if_hipass", "if_highpass"]);
+    let recorded = recording().display().to_string();
+    let output = hybridsim(&["evaluate", "--checkpoint", "run/best", &recorded, "-q", "--without-effects"], folder.path());
+    assert!(output.status.success(), "{}", err(&output));
+}
+
+#[test]
 fn a_misspelt_key_is_named_with_the_one_that_was_meant() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("bad.toml"), "[training]\nepoch = 3\n").unwrap();

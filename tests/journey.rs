@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use hybridsim::{
     config::Config,
+    data::{IfFrame, IfLayout, Recording, RecordingContents, write_recording},
+    effects::EffectSetting,
     error::{Error, Result},
     recorder,
     training::{Event, LoadedRecording, Trainer, checkpoint, load_recordings, site},
@@ -167,4 +169,76 @@ fn truncated_weights_are_refused_by_name() {
     std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     let error = checkpoint::open(&last, &burn::tensor::Device::flex()).unwrap_err();
     assert!(error.to_string().starts_with(&format!("{}: ", path.display())), "{error}");
+}
+
+/// A copy of the recording with leakage: a strong echo at rest in the first range bins, in codes.
+fn leaking(parent: &Path, level: f64) -> PathBuf {
+    let original = Recording::open(&recording()).unwrap();
+    let radar = &original.radar;
+    let contents = RecordingContents {
+        radar,
+        room: original.room.as_ref(),
+        person: original.person(),
+        body_file: None,
+        labels: Default::default(),
+        layout: IfLayout::Complex,
+        truth: None,
+    };
+    let folder = parent.join("leaking");
+    write_recording(&folder, &contents, &mut |frame| {
+        let samples = original.frame(frame)?;
+        let at = |index: usize| std::f64::consts::TAU * LEAK_CYCLES * (index % radar.samples_per_chirp) as f64;
+        let add = |part: &[f32], of: fn(f64) -> f64| {
+            part.iter().enumerate().map(|(index, value)| value + (level * of(at(index))) as f32).collect::<Vec<f32>>()
+        };
+        let im = add(samples.im.as_ref().unwrap(), f64::sin);
+        Ok(IfFrame::new(samples.dims, add(&samples.re, f64::cos), Some(im)))
+    })
+    .unwrap();
+    folder
+}
+
+/// Cycles per sample of an echo at `LEAK_M`.
+const LEAK_M: f64 = 0.08;
+const LEAK_CYCLES: f64 = 60.012e12 * 2.0 * LEAK_M / 299_792_458.0 / 2.2e6;
+
+#[test]
+fn levels_are_found_beside_a_known_leakage_and_learned_effects_survive_the_checkpoint() {
+    let mut config = config();
+    config.training.epochs = 1;
+    let gains = |config: &Config| -> (Vec<f32>, Vec<EffectSetting>) {
+        let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
+        let run = train(config, &recordings, None, None);
+        run.result.as_ref().unwrap();
+        let (simulator, state) = checkpoint::open(&run.folder.path().join("last"), &burn::tensor::Device::flex()).unwrap();
+        assert_eq!(state.simulator, config.simulator);
+        let gains =
+            [&simulator.decoders.body_gain, &simulator.decoders.room_gain].map(|gain| gain.log_gain.val().into_scalar::<f32>());
+        (gains.to_vec(), simulator.effects.settings())
+    };
+    // Without steps worth the name, gains are what the calibration found.
+    config.training.learning_rate = 1e-9;
+    config.training.final_learning_rate = 1e-9;
+    let (wanted, _) = gains(&config);
+    let parent = tempfile::tempdir().unwrap();
+    let level = 4000.0;
+    config.data.recordings = vec![leaking(parent.path(), level)];
+    let (misled, _) = gains(&config);
+    let leak = EffectSetting::neutral("tx_leakage").with("range_m", [LEAK_M]).with("re", [1.0]).with("reference", [level]);
+    config.simulator.effects = vec![leak];
+    let (found, _) = gains(&config);
+    let off = |gains: &[f32]| gains.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(off(&misled) > 0.5, "the leakage should have misled: {misled:?}, {wanted:?}");
+    assert!(off(&found) < 0.02, "{found:?}, wanted {wanted:?}");
+
+    // The amplitude starts 20 % low; it learns, unless it is told not to.
+    config.simulator.effects[0].parameters.insert("re".into(), vec![0.8]);
+    config.training.learning_rate = 2e-2;
+    config.training.final_learning_rate = 2e-2;
+    config.training.epochs = 3;
+    let learned = gains(&config).1[0].parameters["re"][0];
+    assert!(learned > 0.82, "{learned}");
+    config.training.learn_effects = false;
+    let kept = gains(&config).1[0].parameters["re"][0];
+    assert!((kept - 0.8).abs() < 1e-6, "{kept}");
 }

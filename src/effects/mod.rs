@@ -137,6 +137,10 @@ pub fn info(id: &str) -> Option<&'static EffectInfo> {
 }
 
 #[cfg(test)]
+mod known_answer_tests;
+#[cfg(test)]
+mod point_tests;
+#[cfg(test)]
 mod test_support;
 #[cfg(test)]
 mod tests;

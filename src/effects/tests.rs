@@ -154,8 +154,10 @@ fn gradients_of_every_operator_on_the_signal_agree_with_central_differences() {
             let size = start.iter().fold(0.0f64, |size, value| size.max(value.abs()));
             // In shares of the value, so that one step serves micrometres and megahertz.
             let shares: Vec<f64> = start.iter().map(|value| value / size).collect();
+            // A spur's phase has turned a hundred thousand times by now.
+            let step = if *name == "frequency_hz" && case.id == "spur" { 1e-9 } else { 1e-5 };
             eprintln!("{} {name}", case.id);
-            check_gradient(&[input("value", shares)], 1e-5, 1e-5, |inputs| {
+            check_gradient(&[input("value", shares)], step, 1e-5, |inputs| {
                 let all = values_of(&case, &[(name, inputs[0].clone() * size)], &inputs[0]);
                 let constant = tensor(&parts, [parts.len()], &inputs[0].device());
                 flat(apply(&case, &all, signal(constant, &radar), &context(&radar)))
@@ -164,12 +166,11 @@ fn gradients_of_every_operator_on_the_signal_agree_with_central_differences() {
         if case.id == "adc_saturation" {
             continue; // passed straight through, by design
         }
-        let few: Vec<f64> = parts.clone();
-        let weights = crate::support::numbers(5, few.len(), -1.0, 1.0);
+        let weights = crate::support::numbers(5, parts.len(), -1.0, 1.0);
         // Along one random direction: every sample's own derivative would be the same check 384 times.
         check_gradient(&[input("signal", [0.0])], 1e-5, 1e-6, |inputs| {
             let device = inputs[0].device();
-            let moved = tensor(&few, [few.len()], &device) + tensor(&weights, [few.len()], &device) * inputs[0].clone();
+            let moved = tensor(&parts, [parts.len()], &device) + tensor(&weights, [parts.len()], &device) * inputs[0].clone();
             let all = values_of(&case, &[], &inputs[0]);
             flat(apply(&case, &all, signal(moved, &radar), &context(&radar)))
         });

@@ -235,3 +235,6 @@ pub fn is_finite<const D: usize>(tensor: Tensor<D>) -> bool {
     let data = tensor.detach().into_data().convert::<f32>();
     data.as_slice::<f32>().expect("converted").iter().all(|value| value.is_finite())
 }
+
+#[cfg(test)]
+mod effects_tests;
