@@ -1,5 +1,9 @@
 //! One file per family of effects: each looks at the evidence and says what it has found.
 
+pub mod region;
+pub mod slow;
+pub mod vital;
+
 use super::evidence::Evidence;
 use super::finding::Candidate;
 
@@ -10,4 +14,4 @@ pub struct Suspect {
 }
 
 /// All of them. Each answers on its own, within its family; the selection chooses between families.
-pub const SUSPECTS: &[Suspect] = &[];
+pub const SUSPECTS: &[Suspect] = &[Suspect { name: "slow", find: slow::find }, Suspect { name: "vital", find: vital::find }];

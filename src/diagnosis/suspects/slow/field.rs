@@ -1,0 +1,311 @@
+//! What all strong static returns have in common in a chirp: their complex gain relative to their mean over time.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+use rustfft::{Fft, FftPlanner};
+
+use crate::diagnosis::evidence::Evidence;
+
+/// Range cells whose gain is estimated together.
+#[derive(Clone, Debug)]
+pub struct Group {
+    /// Mean delay of its static returns, weighted by their power.
+    pub delay_s: f64,
+    /// Its beat-frequency bins.
+    pub bins: std::ops::Range<usize>,
+}
+
+/// Deviation of the gain of the static returns from one, group by group of ranges.
+pub struct Field {
+    pub frames: usize,
+    pub loops: usize,
+    pub groups: Vec<Group>,
+    /// `[frame, loop, group]`, zero where nothing can be said.
+    deviation: Vec<Complex64>,
+    /// Inverse variance of a complex deviation, `[frame, group]`; zero where nothing can be said.
+    weight: Vec<f64>,
+    /// Radar time of every loop, `[frame, loop]`: the mean over its transmitters.
+    pub times_s: Vec<f64>,
+}
+
+/// Which part of the deviation is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Logarithm of the gain.
+    Gain,
+    /// Phase that is the same at all ranges.
+    Phase,
+    /// Phase in proportion to the delay: an error of the local oscillator. Stated per second of delay.
+    Delay,
+}
+
+/// One number per chirp: the common deviation, with its inverse variance.
+pub struct Series {
+    /// `[frame, loop]`
+    pub value: Vec<f64>,
+    /// `[frame]`: all chirps of a frame are equally sure.
+    pub weight: Vec<f64>,
+    pub loops: usize,
+}
+
+/// Four-term Blackman–Harris window of unit energy: the body is up to 50 dB above the noise, and its side lobes must
+/// not reach the static returns at other ranges.
+fn window(length: usize) -> Vec<f64> {
+    let terms = [0.35875, -0.48829, 0.14128, -0.01168];
+    let raw: Vec<f64> = (0..length)
+        .map(|n| {
+            let phase = std::f64::consts::TAU * (n as f64 + 0.5) / length as f64;
+            terms.iter().enumerate().map(|(i, a)| a * (i as f64 * phase).cos()).sum()
+        })
+        .collect();
+    let energy = raw.iter().map(|w: &f64| w * w).sum::<f64>().sqrt();
+    raw.iter().map(|w| w / energy).collect()
+}
+
+/// Bins between two groups, across which windowed noise is hardly correlated.
+const GAP: usize = 2;
+/// Power over the noise that a cell without a mover may have; its law is narrower than this.
+const CLEAN: f64 = 1.25;
+
+impl Field {
+    /// None where too little of the recording stands still.
+    pub fn new(evidence: &Evidence) -> Option<Self> {
+        let [frames, _, _, loops, samples] = evidence.cube.dims;
+        let channels = evidence.cube.channels();
+        let bins = evidence.range_bins();
+        let taper = window(samples);
+        let fft = FftPlanner::new().plan_fft_forward(samples);
+        let noise = evidence.noise();
+        if noise.iter().any(|v| !v.is_finite() || *v <= 0.0) {
+            return None;
+        }
+        // Static spectra in units of the noise's deviation, `[channel, bin]`.
+        let mut still: Vec<Complex64> = evidence.still().iter().enumerate().map(|(i, v)| v * taper[i % samples]).collect();
+        fft.process(&mut still);
+        for (channel, spectrum) in still.chunks_exact_mut(samples).enumerate() {
+            spectrum.iter_mut().for_each(|v| *v /= noise[channel].sqrt());
+        }
+        let power: Vec<f64> =
+            (0..bins).map(|bin| (0..channels).map(|c| still[c * samples + bin].norm_sqr()).sum::<f64>()).collect();
+        // Static returns that are lost in the noise of a chirp teach nothing.
+        let strong: Vec<bool> = power.iter().map(|p| *p > 3.0 * channels as f64).collect();
+        let width = (bins / 16).max(4 + GAP);
+        let radar = &evidence.radar;
+        let delay_of_bin = radar.sample_rate_hz / (samples as f64 * radar.slope_hz_per_s);
+        let groups: Vec<Group> = (0..bins / width)
+            .filter_map(|g| {
+                let range = g * width..(g + 1) * width - GAP;
+                let sum: f64 = range.clone().filter(|&k| strong[k]).map(|k| power[k]).sum();
+                let mean = range.clone().filter(|&k| strong[k]).map(|k| power[k] * k as f64).sum::<f64>() / sum;
+                (sum > 0.0).then_some(Group { delay_s: mean * delay_of_bin, bins: range })
+            })
+            .collect();
+        if groups.len() < 2 || evidence.split.held_out.is_empty() {
+            return None;
+        }
+        let per_frame: Vec<(Vec<Complex64>, Vec<f64>)> =
+            (0..frames).into_par_iter().map(|frame| of_frame(evidence, frame, &groups, &still, &strong, &taper, &fft)).collect();
+        let (mut deviation, mut weight) = (vec![], vec![]);
+        for (values, weights) in per_frame {
+            deviation.extend(values);
+            weight.extend(weights);
+        }
+        let middle_s = 0.5 * (radar.tx_m.len() as f64 - 1.0) * radar.chirp_period_s;
+        let times_s = (0..frames * loops)
+            .map(|i| evidence.starts_s[i / loops] + (i % loops) as f64 * radar.loop_period_s() + middle_s)
+            .collect();
+        let mut field = Self { frames, loops, groups, deviation, weight, times_s };
+        field.calibrate();
+        let known = (0..frames).filter(|&f| field.weights(f).iter().filter(|w| **w > 0.0).count() >= 2).count();
+        (2 * known > frames).then_some(field)
+    }
+
+    pub fn deviations(&self, frame: usize, index: usize) -> &[Complex64] {
+        &self.deviation[(frame * self.loops + index) * self.groups.len()..][..self.groups.len()]
+    }
+
+    pub fn weights(&self, frame: usize) -> &[f64] {
+        &self.weight[frame * self.groups.len()..][..self.groups.len()]
+    }
+
+    /// Scales the variances to what is left after a common gain and a phase in proportion to the delay: the noise need
+    /// not be as white as it was taken for.
+    fn calibrate(&mut self) {
+        let count = self.groups.len();
+        let (mut sums, mut freedoms) = (vec![0.0; count], vec![0.0; count]);
+        for frame in 0..self.frames {
+            let weights = self.weights(frame).to_vec();
+            let moments = self.moments(&weights);
+            let determinant = moments[0] * moments[2] - moments[1] * moments[1];
+            if weights.iter().filter(|w| **w > 0.0).count() < 4 || determinant <= 1e-9 * moments[0] * moments[2] {
+                continue;
+            }
+            // Share of a group's variance that the fit takes away.
+            let leverage: Vec<f64> = (0..count)
+                .map(|g| {
+                    let tau = self.groups[g].delay_s;
+                    weights[g] * (moments[2] - 2.0 * tau * moments[1] + tau * tau * moments[0]) / determinant
+                })
+                .collect();
+            for index in 0..self.loops {
+                let values = self.deviations(frame, index);
+                let (mut zero, mut first) = (Complex64::ZERO, Complex64::ZERO);
+                for g in 0..count {
+                    zero += values[g] * weights[g];
+                    first += values[g] * (weights[g] * self.groups[g].delay_s);
+                }
+                let constant = (zero * moments[2] - first * moments[1]) / determinant;
+                let slope = (first * moments[0] - zero * moments[1]) / determinant;
+                for g in 0..count {
+                    if weights[g] > 0.0 {
+                        sums[g] += (values[g] - constant - slope * self.groups[g].delay_s).norm_sqr() * weights[g];
+                        freedoms[g] += (1.0 - leverage[g]).max(0.0);
+                    }
+                }
+            }
+        }
+        for frame in 0..self.frames {
+            for g in 0..count {
+                if freedoms[g] > 30.0 {
+                    self.weight[frame * count + g] /= (sums[g] / freedoms[g]).max(0.5);
+                }
+            }
+        }
+    }
+
+    fn moments(&self, weights: &[f64]) -> [f64; 3] {
+        let mut moments = [0.0; 3];
+        for (weight, group) in weights.iter().zip(&self.groups) {
+            for (power, moment) in moments.iter_mut().enumerate() {
+                *moment += weight * group.delay_s.powi(power as i32);
+            }
+        }
+        moments
+    }
+
+    /// The best estimate of one part, from the groups that `wanted` keeps.
+    pub fn series(&self, part: Part, wanted: impl Fn(usize) -> bool) -> Series {
+        let mut value = Vec::with_capacity(self.frames * self.loops);
+        let mut weight = Vec::with_capacity(self.frames);
+        for frame in 0..self.frames {
+            let kept: Vec<f64> = self.weights(frame).iter().enumerate().map(|(g, w)| if wanted(g) { *w } else { 0.0 }).collect();
+            let lever = |g: usize| if part == Part::Delay { self.groups[g].delay_s } else { 1.0 };
+            let information: f64 = kept.iter().enumerate().map(|(g, w)| w * lever(g) * lever(g)).sum();
+            for index in 0..self.loops {
+                let sum: f64 = self
+                    .deviations(frame, index)
+                    .iter()
+                    .enumerate()
+                    .map(|(g, v)| kept[g] * lever(g) * if part == Part::Gain { v.re } else { v.im })
+                    .sum();
+                value.push(if information > 0.0 { sum / information } else { 0.0 });
+            }
+            // Half of a complex variance is in each part.
+            weight.push(2.0 * information);
+        }
+        Series { value, weight, loops: self.loops }
+    }
+}
+
+impl Series {
+    /// Log-likelihood that some frames gain by a prediction, of which `predicted` gives frame, loop and radar time.
+    pub fn gain(&self, field: &Field, frames: &[usize], predicted: impl Fn(usize, usize, f64) -> f64) -> f64 {
+        let mut gain = 0.0;
+        for &frame in frames {
+            for index in 0..self.loops {
+                let i = frame * self.loops + index;
+                let (value, model) = (self.value[i], predicted(frame, index, field.times_s[i]));
+                gain += self.weight[frame] * model * (value - 0.5 * model);
+            }
+        }
+        gain
+    }
+}
+
+/// Deviations `[loop, group]` of a frame and their inverse variances.
+fn of_frame(
+    evidence: &Evidence,
+    frame: usize,
+    groups: &[Group],
+    still: &[Complex64],
+    strong: &[bool],
+    taper: &[f64],
+    fft: &Arc<dyn Fft<f64>>,
+) -> (Vec<Complex64>, Vec<f64>) {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let channels = evidence.cube.channels();
+    let bins = evidence.range_bins();
+    let noise = evidence.noise();
+    // `[channel, loop, bin]`, in units of the noise's deviation, without what stands still.
+    let mut spectra: Vec<Complex64> = Vec::with_capacity(channels * loops * samples);
+    for channel in 0..channels {
+        let scale = 1.0 / noise[channel].sqrt();
+        for chirp in evidence.cube.channel(frame, channel).chunks_exact(samples) {
+            spectra.extend(chirp.iter().zip(taper).map(|(value, w)| value * (w * scale)));
+        }
+    }
+    fft.process(&mut spectra);
+    for (i, value) in spectra.iter_mut().enumerate() {
+        let channel = i / (samples * loops);
+        *value -= still[channel * samples + i % samples];
+    }
+    let at = |channel: usize, index: usize, bin: usize| spectra[(channel * loops + index) * samples + bin];
+    // A mover does not come from where the static return comes from: what is left across the channels shows it, and a
+    // gain that all share does not.
+    let power: Vec<f64> = (0..bins)
+        .map(|bin| {
+            let own: f64 = (0..channels).map(|c| still[c * samples + bin].norm_sqr()).sum();
+            let (mut all, mut along) = (0.0, 0.0);
+            for index in 0..loops {
+                let mut dot = Complex64::ZERO;
+                for channel in 0..channels {
+                    let value = at(channel, index, bin);
+                    all += value.norm_sqr();
+                    dot += still[channel * samples + bin].conj() * value;
+                }
+                along += dot.norm_sqr() / own.max(f64::MIN_POSITIVE);
+            }
+            if channels > 1 { (all - along) / ((channels - 1) * loops) as f64 } else { all / loops as f64 }
+        })
+        .collect();
+    // The law of a mean of so many powers, five deviations wide.
+    let freedom = (loops * (channels - 1).max(1)) as f64;
+    let limit = CLEAN.max(1.0 + 5.0 / freedom.sqrt());
+    let quiet = |bin: usize| power[bin] < limit;
+    let clean: Vec<bool> = (0..bins).map(|bin| strong[bin] && (bin.saturating_sub(1)..(bin + 2).min(bins)).all(quiet)).collect();
+    let (mut values, mut weights) = (vec![Complex64::ZERO; loops * groups.len()], vec![0.0; groups.len()]);
+    for (g, group) in groups.iter().enumerate() {
+        let own: f64 = group
+            .bins
+            .clone()
+            .filter(|&k| clean[k])
+            .map(|k| (0..channels).map(|c| still[c * samples + k].norm_sqr()).sum::<f64>())
+            .sum();
+        if own <= 0.0 {
+            continue;
+        }
+        for index in 0..loops {
+            let mut dot = Complex64::ZERO;
+            for bin in group.bins.clone().filter(|&k| clean[k]) {
+                for channel in 0..channels {
+                    dot += still[channel * samples + bin].conj() * at(channel, index, bin);
+                }
+            }
+            values[index * groups.len() + g] = dot / own;
+        }
+        // Variance of that sum of windowed, hence correlated cells, with white noise in the samples.
+        let mut variance = 0.0;
+        for channel in 0..channels {
+            let mut filter = vec![Complex64::ZERO; samples];
+            for bin in group.bins.clone().filter(|&k| clean[k]) {
+                filter[bin] = still[channel * samples + bin].conj();
+            }
+            fft.process(&mut filter);
+            variance += filter.iter().zip(taper).map(|(h, w)| h.norm_sqr() * w * w).sum::<f64>();
+        }
+        weights[g] = own * own / variance;
+    }
+    (values, weights)
+}

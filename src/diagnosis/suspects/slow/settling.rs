@@ -1,0 +1,108 @@
+//! What depends on the chirp's place in its frame only: the first chirps of every frame before the radar has settled.
+
+use num_complex::Complex64;
+
+use super::field::{Field, Part};
+use crate::diagnosis::statistics;
+
+/// Deviation `amplitude · exp(−i / chirps)` of chirp i of every frame.
+#[derive(Clone, Debug)]
+pub struct Settling {
+    pub amplitude: Complex64,
+    pub amplitude_deviation: f64,
+    /// In loops.
+    pub loops: f64,
+    pub loops_deviation: f64,
+    pub constant: Complex64,
+    pub p_value: f64,
+    pub training_gain: f64,
+    pub held_out_gain: f64,
+    /// What a free function of the loop gains on held-out frames.
+    pub free: Free,
+}
+
+/// A free function of the loop.
+#[derive(Clone, Debug)]
+pub struct Free {
+    /// `[loop]`, its mean over loops is zero.
+    pub values: Vec<Complex64>,
+    pub p_value: f64,
+    pub held_out_gain: f64,
+}
+
+impl Settling {
+    /// Relative to the settled state.
+    pub fn value(&self, index: usize) -> Complex64 {
+        self.amplitude * (-(index as f64) / self.loops).exp()
+    }
+}
+
+pub fn best(field: &Field, training: &[usize], held_out: &[usize]) -> Option<Settling> {
+    let loops = field.loops;
+    if loops < 8 {
+        return None;
+    }
+    let parts = [field.series(Part::Gain, |_| true), field.series(Part::Phase, |_| true)];
+    let weight: f64 = training.iter().map(|&f| parts[0].weight[f]).sum();
+    if weight <= 0.0 {
+        return None;
+    }
+    let mean = |index: usize| {
+        let of = |part: usize| {
+            training.iter().map(|&f| parts[part].weight[f] * parts[part].value[f * loops + index]).sum::<f64>() / weight
+        };
+        Complex64::new(of(0), of(1))
+    };
+    let values: Vec<Complex64> = (0..loops).map(mean).collect();
+    let centre = values.iter().sum::<Complex64>() / loops as f64;
+    let held_gain = |model: &dyn Fn(usize) -> Complex64| {
+        parts[0].gain(field, held_out, |_, index, _| model(index).re)
+            + parts[1].gain(field, held_out, |_, index, _| model(index).im)
+    };
+    let fit = |length: f64| {
+        let shape: Vec<f64> = (0..loops).map(|i| (-(i as f64) / length).exp()).collect();
+        let level = shape.iter().sum::<f64>() / loops as f64;
+        let energy: f64 = shape.iter().map(|s| (s - level).powi(2)).sum();
+        let amplitude = values.iter().zip(&shape).map(|(v, s)| v * (s - level)).sum::<Complex64>() / energy;
+        (amplitude, centre - amplitude * level, 0.5 * weight * amplitude.norm_sqr() * energy, energy)
+    };
+    // Longer than half a frame is a slope.
+    let lengths: Vec<f64> = (0..=60).map(|i| 0.5 * (0.5 * loops as f64 / 0.5).powf(f64::from(i) / 60.0)).collect();
+    let at = (0..lengths.len()).max_by(|&a, &b| fit(lengths[a]).2.total_cmp(&fit(lengths[b]).2))?;
+    let mut length = lengths[at];
+    let mut width = 0.05 * length;
+    while width > 1e-4 * length {
+        let longest = 0.5 * loops as f64;
+        let gain = |l: f64| if (0.3..=longest).contains(&l) { fit(l).2 } else { f64::NEG_INFINITY };
+        if gain(length + width) > gain(length) {
+            length += width;
+        } else if gain(length - width) > gain(length) {
+            length -= width;
+        } else {
+            width *= 0.5;
+        }
+    }
+    let (amplitude, constant, training_gain, energy) = fit(length);
+    let h = 0.1 * length;
+    let curvature = (2.0 * training_gain - fit(length + h).2 - fit(length - h).2) / (h * h);
+    // A decay has a length (about ten are apart) and a complex amplitude.
+    let p_value = statistics::corrected((-training_gain).exp(), 10.0);
+    let centred: Vec<Complex64> = values.iter().map(|v| v - centre).collect();
+    let chi2: f64 = centred.iter().map(|v| weight * v.norm_sqr()).sum();
+    let free = Free {
+        p_value: statistics::chi2_tail(chi2, 2.0 * (loops - 1) as f64),
+        held_out_gain: held_gain(&|index| centred[index]),
+        values: centred,
+    };
+    Some(Settling {
+        amplitude,
+        amplitude_deviation: (1.0 / (weight * energy)).sqrt(),
+        loops: length,
+        loops_deviation: if curvature > 0.0 { curvature.sqrt().recip() } else { length },
+        constant,
+        p_value,
+        training_gain,
+        held_out_gain: held_gain(&|index| amplitude * (-(index as f64) / length).exp() + constant),
+        free,
+    })
+}
