@@ -8,6 +8,7 @@
 pub mod cube;
 pub mod evidence;
 pub mod finding;
+pub mod locate;
 pub mod power;
 pub mod prediction;
 pub mod statistics;

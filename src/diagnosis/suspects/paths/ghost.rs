@@ -26,10 +26,7 @@ pub struct Ghost {
 /// One ghost per boundary of the room.
 pub fn ghosts(scene: &Scene) -> Vec<Ghost> {
     let Some(room) = &scene.evidence.room else { return vec![] };
-    room.boundaries()
-        .into_iter()
-        .filter_map(|boundary| ghost(scene, boundary, room.distance_m(boundary)?))
-        .collect()
+    room.boundaries().into_iter().filter_map(|boundary| ghost(scene, boundary, room.distance_m(boundary)?)).collect()
 }
 
 fn ghost(scene: &Scene, boundary: Boundary, distance_m: f64) -> Option<Ghost> {
@@ -87,13 +84,7 @@ fn templates(scene: &Scene, boundary: Boundary, distance_m: f64, twice: bool) ->
 }
 
 /// Range (half the length of the path), its rate, and power of one point before the part's weight.
-pub fn mirrored_return(
-    radar: &Radar,
-    point: &Point,
-    boundary: Boundary,
-    distance_m: f64,
-    twice: bool,
-) -> (f64, f64, f64) {
+pub fn mirrored_return(radar: &Radar, point: &Point, boundary: Boundary, distance_m: f64, twice: bool) -> (f64, f64, f64) {
     let (axis, sign) = boundary.axis();
     let mut image = *point;
     image.position_m[axis] = 2.0 * sign * distance_m - point.position_m[axis];

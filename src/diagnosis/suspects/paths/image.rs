@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use super::ghost::{Ghost, mirrored_return};
 use super::mover::energy;
-use super::removal::empty_cells;
+use super::removal::{empty_cells, patch};
 use super::scene::Scene;
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Candidate, Correction, Estimate, Place, Rung};
 use crate::room::Boundary;
 
 /// Bodies return this factor more or less in amplitude to one side than to another (standard deviation of the log).
-const SIDE_SPREAD: f64 = 0.25;
+const SIDE_SPREAD: f64 = 0.3;
 /// Log-likelihood within which two boundaries are not told apart.
 const CLOSE: f64 = 4.6;
 
@@ -54,12 +54,11 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
     };
     let cells: Vec<Vec<usize>> = (ghost.templates.iter().enumerate())
         .map(|(frame, template)| {
-            let mut cells: Vec<(usize, f64)> = (template.cells.iter().zip(&template.power))
-                .map(|(&cell, &power)| (cell as usize, ghost.weight * f64::from(power)))
-                .filter(|(cell, power)| *power > 0.1 || *power > 0.01 && scene.map(frame)[*cell] > 4.0)
-                .collect();
-            cells.sort_by(|a, b| b.1.total_cmp(&a.1));
-            cells.into_iter().map(|(cell, _)| cell).collect()
+            let mut expected = vec![0.0; scene.size()];
+            for (&cell, &power) in template.cells.iter().zip(&template.power) {
+                expected[cell as usize] = ghost.weight as f32 * power;
+            }
+            patch(&expected, scene.map(frame), scene.model.support(frame), scene.samples, 0.1)
         })
         .collect();
     let still = evidence.still().to_vec();

@@ -38,17 +38,3 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     found
 }
-#[doc(hidden)]
-pub fn debug(evidence: &Evidence) {
-    let Some(scene) = Scene::new(evidence) else { return };
-    for g in ghost::ghosts(&scene) {
-        println!("   ghost {} gain {:.1} all {:.1} agree {:.2} coef {:.3}", g.boundary.name(), g.gain, g.gain_all, g.agreeing, g.coefficient);
-    }
-    if let Some(t) = track::strongest(&scene) {
-        println!("   track p {:.2e} {} sightings", t.p_value, t.sightings.len());
-        for s in t.sightings.iter().step_by(4) { println!("      {s:?}"); }
-        let base: f64 = scene.base.iter().map(|x| *x as f64).sum::<f64>() / scene.base.len() as f64;
-        println!("   base mean {base:.3} taken {:.3}", scene.taken.iter().filter(|t| **t).count() as f64 / scene.taken.len() as f64);
-        if let Some(m) = mover::Mover::new(&scene, t) { println!("   mover gain {:.1} {:?}", m.gain, m.pendulum); }
-    }
-}

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::pendulum::Pendulum;
-use super::removal::empty_cells;
+use super::removal::{empty_cells, patch};
 use super::scene::Scene;
 use super::track::{Sighting, Track};
 use crate::diagnosis::power::Template;
@@ -19,6 +19,8 @@ const SWING_LEAVES: f64 = 0.15;
 pub struct Mover {
     pub track: Track,
     pub pendulum: Option<Pendulum>,
+    /// What the track behaves like; none: its ranges and its Doppler do not belong together.
+    pub id: Option<&'static str>,
     /// Held-out frames, nats.
     pub gain: f64,
     pub power: f64,
@@ -41,7 +43,8 @@ impl Mover {
                 scene.gain(frame, &template, power)
             })
             .sum();
-        Some(Self { track, pendulum, gain, power })
+        let id = if pendulum.is_some() { Some("moving_reflector") } else { named(scene, &track.sightings) };
+        Some(Self { track, pendulum, id, gain, power })
     }
 
     pub fn candidate(&self, scene: &Scene, tried: f64) -> Candidate {
@@ -74,7 +77,10 @@ impl Mover {
                 values: vec![at[0] + x, at[1] + y, at[2]],
                 ci90: vec![
                     around(at[0] + x, 1.645 * (mean_m * sine_error).hypot(mean_error * sine.abs())),
-                    [at[1] + y - 1.645 * (mean_error + mean_m * sine_error * sine.abs()) - 0.5 * height * height / y.max(0.5), at[1] + y + 1.645 * (mean_error + mean_m * sine_error * sine.abs())],
+                    [
+                        at[1] + y - 1.645 * (mean_error + mean_m * sine_error * sine.abs()) - 0.5 * height * height / y.max(0.5),
+                        at[1] + y + 1.645 * (mean_error + mean_m * sine_error * sine.abs()),
+                    ],
                     around(at[2], 1.0),
                 ],
             });
@@ -90,7 +96,11 @@ impl Mover {
                 let swing = fit.swing_m();
                 let error = 1.645 * fit.deviations[1].max(0.03 * swing);
                 // Only the part along the line of sight is seen.
-                estimates.push(Estimate { name: "swing_m", values: vec![swing], ci90: vec![[swing - error, 1.1 * swing + error]] });
+                estimates.push(Estimate {
+                    name: "swing_m",
+                    values: vec![swing],
+                    ci90: vec![[swing - error, 1.1 * swing + error]],
+                });
                 format!("swings by ±{:.0} mm along the line of sight {:.2} times a second", 1e3 * swing, fit.rate_hz)
             }
             None => format!("moves between {:.2} and {:.2} m", ranges[0], ranges[1]),
@@ -98,8 +108,15 @@ impl Mover {
         let frames: Vec<usize> = sightings.iter().map(|s| s.frame).collect();
         let everywhere = frames.len() == scene.frames();
         place.frames = (!everywhere).then_some(frames);
+        let alias = match self.id {
+            Some("range_alias") => {
+                " Its range falls when its Doppler says that it recedes: it lies beyond the unambiguous range and is folded back."
+            }
+            None => " Its range and its Doppler do not belong together: no single reflector moves so.",
+            _ => "",
+        };
         let statement = format!(
-            "Something {:.2} m away{whereabouts} {motion}, {:.0} dB above the noise; neither the body nor its mirror images can be there.",
+            "Something {:.2} m away{whereabouts} {motion}, {:.0} dB above the noise; neither the body nor its mirror images can be there.{alias}",
             mean_m,
             10.0 * self.power.log10()
         );
@@ -112,14 +129,15 @@ impl Mover {
                     (None, None) => return None,
                 };
                 let power = seen.map_or(self.power, |s| s.power);
-                Some((frame, patch(scene, frame, at, power)))
+                let expected = scene.model.template([(at.0, at.1, power)].into_iter());
+                Some((frame, patch(&expected, scene.map(frame), scene.model.support(frame), scene.samples, 0.05)))
             })
             .collect();
         let still = scene.evidence.still().to_vec();
         Candidate {
-            id: Some("moving_reflector"),
+            id: self.id,
             behaves_like: "path-like",
-            estimates,
+            estimates: if self.id == Some("moving_reflector") { estimates } else { vec![] },
             choice: None,
             place,
             p_value: corrected(self.track.p_value, tried),
@@ -135,6 +153,40 @@ impl Mover {
                 }
             })),
         }
+    }
+}
+
+/// Whether ranges change as Doppler says: as of something that moves, or with the sign of what is folded at the end of
+/// the unambiguous range.
+fn named(scene: &Scene, sightings: &[Sighting]) -> Option<&'static str> {
+    let radar = &scene.evidence.radar;
+    let (period_s, span) = (radar.frame_period_s, scene.loops as f64 / scene.model.cells.doppler_per_mps);
+    let cell_m = scene.range_m(1.0);
+    let pairs: Vec<(f64, f64)> = sightings
+        .windows(2)
+        .filter(|pair| pair[1].frame == pair[0].frame + 1)
+        .map(|pair| (pair[1].range_m - pair[0].range_m, 0.5 * (pair[0].velocity_mps + pair[1].velocity_mps) * period_s))
+        .collect();
+    if pairs.len() < 4 {
+        return None;
+    }
+    let apart = |sign: f64| {
+        let mut steps: Vec<f64> = pairs
+            .iter()
+            .map(|(range, velocity)| {
+                let difference = range - sign * velocity;
+                (difference - span * period_s * (difference / (span * period_s)).round()).abs()
+            })
+            .collect();
+        median(&mut steps) / cell_m
+    };
+    let (with, against) = (apart(1.0), apart(-1.0));
+    if with < 0.5 && with <= against {
+        Some("moving_reflector")
+    } else if against < 0.5 && against < 0.5 * with {
+        Some("range_alias")
+    } else {
+        None
     }
 }
 
@@ -171,21 +223,12 @@ fn template(scene: &Scene, frame: usize, pendulum: Option<&Pendulum>, training: 
             let count = points.len().max(1) as f64;
             let middle = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
             let blur = (-2..=2).flat_map(|slow| (-1..=1).map(move |fast| (f64::from(slow), f64::from(fast))));
-            scene.model.template(blur.map(|(slow, fast)| {
-                point(middle.0 + fast / cells.bins_per_m, middle.1 + slow / cells.doppler_per_mps, 0.1)
-            }))
+            scene.model.template(
+                blur.map(|(slow, fast)| point(middle.0 + fast / cells.bins_per_m, middle.1 + slow / cells.doppler_per_mps, 0.1)),
+            )
         }
     };
     scene.visible(frame, &map)
-}
-
-/// Cells around a place that a tone of this power fills, free of the body.
-fn patch(scene: &Scene, frame: usize, (range_m, velocity_mps): (f64, f64), power: f64) -> Vec<usize> {
-    let support = scene.model.support(frame);
-    let map = scene.model.template([(range_m, velocity_mps, power)].into_iter());
-    let mut cells: Vec<usize> = (0..map.len()).filter(|&cell| map[cell] > 0.2 && !support[cell]).collect();
-    cells.sort_by(|&a, &b| map[b].total_cmp(&map[a]));
-    cells
 }
 
 fn bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {

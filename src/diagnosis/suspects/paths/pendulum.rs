@@ -27,10 +27,7 @@ impl Pendulum {
     pub fn at(&self, time_s: f64) -> (f64, f64) {
         let rate = std::f64::consts::TAU * self.rate_hz;
         let (sine, cosine) = (rate * time_s).sin_cos();
-        (
-            self.mean_m + self.sine_m * sine + self.cosine_m * cosine,
-            rate * (self.sine_m * cosine - self.cosine_m * sine),
-        )
+        (self.mean_m + self.sine_m * sine + self.cosine_m * cosine, rate * (self.sine_m * cosine - self.cosine_m * sine))
     }
 
     /// Least squares on ranges and velocities with their errors; velocities wrap around `span_mps` (twice the greatest
@@ -49,13 +46,10 @@ impl Pendulum {
             .min_by(|a, b| a.1.total_cmp(&b.1))?;
         for fine in [step * 0.1, step * 0.01] {
             let around = rate;
-            rate = (-10..=10)
-                .map(|i| around + f64::from(i) * fine)
-                .filter(|rate| *rate > 0.0)
-                .min_by(|&a, &b| {
-                    let of = |rate| misfit(sightings, times_s, errors, span_mps, rate).1;
-                    of(a).total_cmp(&of(b))
-                })?;
+            rate = (-10..=10).map(|i| around + f64::from(i) * fine).filter(|rate| *rate > 0.0).min_by(|&a, &b| {
+                let of = |rate| misfit(sightings, times_s, errors, span_mps, rate).1;
+                of(a).total_cmp(&of(b))
+            })?;
         }
         let ([mean_m, sine_m, cosine_m], chi2) = misfit(sightings, times_s, errors, span_mps, rate);
         let still = sightings.iter().map(|s| (s.velocity_mps / errors[1]).powi(2)).sum::<f64>();

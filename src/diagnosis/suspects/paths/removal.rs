@@ -44,6 +44,27 @@ pub fn empty_cells(cube: &mut Cube, still: &[Complex64], frame: usize, cells: &[
     }
 }
 
+/// Cells to empty for an expected map, largest first: where it is above `least`, and loud neighbours; never where `kept`.
+pub fn patch(expected: &[f32], measured: &[f32], kept: &[bool], samples: usize, least: f32) -> Vec<usize> {
+    /// Powers over the noise that noise alone hardly has.
+    const LOUD: f32 = 2.5;
+    let loops = expected.len() / samples;
+    let mut chosen = vec![false; expected.len()];
+    for cell in (0..expected.len()).filter(|&cell| expected[cell] > least) {
+        chosen[cell] = true;
+        for slow in -2..=2i64 {
+            let row = ((cell / samples) as i64 + slow).rem_euclid(loops as i64) as usize * samples;
+            for fast in -2..=2i64 {
+                let near = row + ((cell % samples) as i64 + fast).rem_euclid(samples as i64) as usize;
+                chosen[near] |= measured[near] > LOUD;
+            }
+        }
+    }
+    let mut cells: Vec<usize> = (0..expected.len()).filter(|&cell| chosen[cell] && !kept[cell]).collect();
+    cells.sort_by(|&a, &b| (expected[b] + measured[b]).total_cmp(&(expected[a] + measured[a])));
+    cells
+}
+
 fn turn(step: usize, length: usize) -> Complex64 {
     Complex64::cis(std::f64::consts::TAU * (step % length) as f64 / length as f64)
 }

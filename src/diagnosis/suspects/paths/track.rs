@@ -124,12 +124,21 @@ fn sighting(scene: &Scene, frame: usize, cell: usize) -> Sighting {
     };
     let cell = neighbours(cell).into_iter().map(|(_, _, near)| near).max_by(|&a, &b| map[a].total_cmp(&map[b])).unwrap_or(cell);
     let at = |slow: i64, fast: i64| {
-        neighbours(cell).iter().find(|near| near.0 == slow && near.1 == fast).map_or(0.0, |near| (f64::from(map[near.2]) - 1.0).max(0.0))
+        neighbours(cell)
+            .iter()
+            .find(|near| near.0 == slow && near.1 == fast)
+            .map_or(0.0, |near| (f64::from(map[near.2]) - 1.0).max(0.0))
     };
     let shift = |before: f64, middle: f64, after: f64| {
         // Of a Hann window: the ratio of neighbours' amplitudes gives the distance to the peak.
         let (before, middle, after) = (before.sqrt(), middle.sqrt(), after.sqrt());
-        if middle <= 0.0 { 0.0 } else if after >= before { hann_shift(after / middle) } else { -hann_shift(before / middle) }
+        if middle <= 0.0 {
+            0.0
+        } else if after >= before {
+            hann_shift(after / middle)
+        } else {
+            -hann_shift(before / middle)
+        }
     };
     let doppler = (cell / scene.samples) as f64 + shift(at(-1, 0), at(0, 0), at(1, 0));
     let range = (cell % scene.samples) as f64 + shift(at(0, -1), at(0, 0), at(0, 1));
@@ -152,8 +161,7 @@ fn sine(scene: &Scene, frame: usize, cell: usize) -> Option<f64> {
     if rx < 2 || aperture <= 0.0 {
         return None;
     }
-    let values: Vec<Complex64> =
-        (0..tx * rx).map(|channel| scene.evidence.range_doppler(frame, channel)[cell]).collect();
+    let values: Vec<Complex64> = (0..tx * rx).map(|channel| scene.evidence.range_doppler(frame, channel)[cell]).collect();
     let wave = std::f64::consts::TAU * (radar.carrier_hz() + 0.5 * radar.bandwidth_hz()) / SPEED_OF_LIGHT;
     let beam = |sine: f64| -> f64 {
         values
