@@ -13,6 +13,7 @@ pub mod finding;
 pub mod html;
 pub mod journey;
 pub mod misfit;
+pub mod locate;
 pub mod power;
 pub mod prediction;
 pub mod report;

@@ -3,6 +3,7 @@
 pub mod region;
 pub mod slow;
 pub mod vital;
+pub mod paths;
 
 use super::evidence::Evidence;
 use super::finding::Candidate;
@@ -15,3 +16,4 @@ pub struct Suspect {
 
 /// All of them. Each answers on its own, within its family; the selection chooses between families.
 pub const SUSPECTS: &[Suspect] = &[Suspect { name: "slow", find: slow::find }, Suspect { name: "vital", find: vital::find }];
+pub const SUSPECTS: &[Suspect] = &[Suspect { name: "paths", find: paths::find }];

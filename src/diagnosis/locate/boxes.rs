@@ -1,0 +1,165 @@
+//! Dyadic boxes of frame, Doppler and range, and which of them are significant.
+
+use super::Region;
+use super::residual::Residual;
+use crate::diagnosis::Evidence;
+use crate::diagnosis::finding::Place;
+use crate::diagnosis::power::Cells;
+use crate::diagnosis::statistics::mean_power_tail;
+
+/// Share of false boxes among those that are returned.
+const FALSE_SHARE: f64 = 0.05;
+/// Regions that a report can use.
+const MOST: usize = 40;
+
+/// Half-open intervals of the three axes.
+#[derive(Clone, Copy)]
+struct Box3 {
+    low: [usize; 3],
+    high: [usize; 3],
+    sum: f64,
+    count: f64,
+    p_value: f64,
+}
+
+pub fn regions(evidence: &Evidence, residual: &Residual) -> Vec<Region> {
+    let boxes = all(residual);
+    let mut found = significant(boxes);
+    found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value).then(rank(b).total_cmp(&rank(a))));
+    let mut kept: Vec<Box3> = vec![];
+    for candidate in found {
+        if kept.len() < MOST && !kept.iter().any(|other| overlap(other, &candidate)) {
+            kept.push(candidate);
+        }
+    }
+    let cells = Cells::new(&evidence.radar);
+    kept.iter().map(|found| region(evidence, residual, &cells, found)).collect()
+}
+
+/// How far above chance, also where p-values underflow.
+fn rank(found: &Box3) -> f64 {
+    let mean = found.sum / found.count;
+    found.count * (mean - 1.0 - mean.ln())
+}
+
+/// Dyadic boxes whose halves are merged axis by axis, with their sums.
+fn all(residual: &Residual) -> Vec<Box3> {
+    let scales: Vec<Vec<Vec<(usize, usize)>>> = residual.dims.iter().map(|&length| dyadic(length)).collect();
+    let table = summed(residual);
+    let mut boxes = vec![];
+    for frames in scales[0].iter().flatten() {
+        for dopplers in scales[1].iter().flatten() {
+            for ranges in scales[2].iter().flatten().filter(|range| range.0 < residual.bins) {
+                let (low, high) = ([frames.0, dopplers.0, ranges.0], [frames.1, dopplers.1, ranges.1.min(residual.bins)]);
+                let [sum, count] = inside(&table, residual.dims, low, high);
+                if count <= 0.05 {
+                    continue;
+                }
+                let mean = sum / count;
+                // Only excess is sought; the rest counts as a test that was made and failed.
+                let p_value = if mean > 1.0 { mean_power_tail(mean, count.max(0.1)) } else { 1.0 };
+                boxes.push(Box3 { low, high, sum, count, p_value });
+            }
+        }
+    }
+    boxes
+}
+
+/// Intervals of length 1, 2, 4 ... and the whole.
+fn dyadic(length: usize) -> Vec<Vec<(usize, usize)>> {
+    let mut scales = vec![];
+    let mut step = 1;
+    while step < length {
+        scales.push((0..length.div_ceil(step)).map(|i| (i * step, ((i + 1) * step).min(length))).collect());
+        // Fine scales cost most and show little: a cell of a Hann window is four wide.
+        step *= 4;
+    }
+    scales.push(vec![(0, length)]);
+    scales
+}
+
+/// Sums of ratio · count and of count over everything before, `[frame + 1, doppler + 1, range + 1]`.
+fn summed(residual: &Residual) -> Vec<[f64; 2]> {
+    let [frames, loops, samples] = residual.dims;
+    let (wide, deep) = (samples + 1, (loops + 1) * (samples + 1));
+    let mut table = vec![[0.0; 2]; (frames + 1) * deep];
+    for frame in 1..=frames {
+        for doppler in 1..=loops {
+            for range in 1..=samples {
+                let cell = ((frame - 1) * loops + doppler - 1) * samples + range - 1;
+                let count = f64::from(residual.count[cell]);
+                let own = [f64::from(residual.ratio[cell]) * count, count];
+                let at = frame * deep + doppler * wide + range;
+                for k in 0..2 {
+                    table[at][k] = own[k] + table[at - 1][k] + table[at - wide][k] + table[at - deep][k]
+                        - table[at - 1 - wide][k]
+                        - table[at - 1 - deep][k]
+                        - table[at - wide - deep][k]
+                        + table[at - 1 - wide - deep][k];
+                }
+            }
+        }
+    }
+    table
+}
+
+fn inside(table: &[[f64; 2]], dims: [usize; 3], low: [usize; 3], high: [usize; 3]) -> [f64; 2] {
+    let (wide, deep) = (dims[2] + 1, (dims[1] + 1) * (dims[2] + 1));
+    let mut sums = [0.0; 2];
+    for corner in 0..8 {
+        let pick = |axis: usize| if corner >> axis & 1 == 1 { low[axis] } else { high[axis] };
+        let sign = if u32::count_ones(corner) % 2 == 1 { -1.0 } else { 1.0 };
+        let at = pick(0) * deep + pick(1) * wide + pick(2);
+        (0..2).for_each(|k| sums[k] += sign * table[at][k]);
+    }
+    sums
+}
+
+/// Benjamini-Yekutieli.
+fn significant(mut boxes: Vec<Box3>) -> Vec<Box3> {
+    let tests = boxes.len() as f64;
+    let harmonic = tests.max(1.0).ln() + 0.5772;
+    boxes.retain(|found| found.p_value < FALSE_SHARE);
+    boxes.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+    let last = boxes
+        .iter()
+        .enumerate()
+        .rposition(|(i, found)| found.p_value <= FALSE_SHARE * (i + 1) as f64 / (tests * harmonic))
+        .map_or(0, |last| last + 1);
+    boxes.truncate(last);
+    boxes
+}
+
+fn overlap(a: &Box3, b: &Box3) -> bool {
+    (0..3).all(|axis| a.low[axis] < b.high[axis] && b.low[axis] < a.high[axis])
+}
+
+fn region(evidence: &Evidence, residual: &Residual, cells: &Cells, found: &Box3) -> Region {
+    let [frames, loops, _] = residual.dims;
+    let mut place = Place::at("");
+    let mut axes = vec![];
+    if found.high[0] - found.low[0] < frames {
+        axes.push("frame");
+        place.frames = Some((found.low[0]..found.high[0]).collect());
+    }
+    if found.high[1] - found.low[1] < loops {
+        axes.push("doppler");
+        let signed = |bin: f64| if bin > 0.5 * loops as f64 { bin - loops as f64 } else { bin };
+        let (low, high) = (signed(found.low[1] as f64), signed((found.high[1] - 1) as f64));
+        place.velocity_mps = Some([(low.min(high) - 0.5) / cells.doppler_per_mps, (low.max(high) + 0.5) / cells.doppler_per_mps]);
+    }
+    if found.high[2] - found.low[2] < residual.bins {
+        axes.push("range");
+        let low = (found.low[2] as f64 - 0.5).max(0.0) / cells.bins_per_m;
+        place.range_m = Some([low, (found.high[2] as f64 - 0.5) / cells.bins_per_m]);
+    }
+    let mean = found.sum / found.count;
+    let channels = evidence.cube.channels() as f64;
+    Region {
+        axes,
+        place,
+        excess_db: 10.0 * mean.log10(),
+        energy: (found.sum - found.count) * super::residual::CELLS_PER_VALUE / channels,
+        p_value: found.p_value,
+    }
+}

@@ -1,0 +1,95 @@
+//! Excess put back onto the body's parts and onto the walls.
+
+use crate::diagnosis::Evidence;
+use crate::diagnosis::power::{PowerModel, range_and_velocity};
+use crate::diagnosis::statistics::{corrected, mean_power_tail};
+
+use super::residual::Residual;
+
+/// Excess in the cells where something is seen.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// A part of the body or a boundary of the room.
+    pub name: String,
+    /// Measured over expected power, weighted by where its own power is expected.
+    pub excess_db: f64,
+    pub p_value: f64,
+}
+
+/// By part of the body; empty without a body.
+pub fn by_part(evidence: &Evidence) -> Vec<Seen> {
+    let (Some(body), Some(model), Some(residual)) = (&evidence.body, PowerModel::new(evidence), Residual::new(evidence)) else {
+        return vec![];
+    };
+    let maps = (0..body.parts.len()).map(|part| {
+        let per_frame = (0..body.frames.len()).map(|frame| {
+            let template = &model.templates[frame][part];
+            template.cells.iter().copied().zip(template.power.iter().copied()).collect()
+        });
+        (body.parts[part].clone(), per_frame.collect())
+    });
+    let seen: Vec<Seen> = maps.filter_map(|(name, map): (String, Vec<Vec<(u32, f32)>>)| seen(&residual, name, &map)).collect();
+    adjusted(seen)
+}
+
+/// By boundary of the room, in the cells of the body's image there (one reflection); empty without body or room.
+pub fn by_wall(evidence: &Evidence) -> Vec<Seen> {
+    let (Some(body), Some(room), Some(model), Some(residual)) =
+        (&evidence.body, &evidence.room, PowerModel::new(evidence), Residual::new(evidence))
+    else {
+        return vec![];
+    };
+    let radar = &evidence.radar;
+    let walls = room.boundaries().into_iter().filter_map(|boundary| {
+        let (axis, sign) = boundary.axis();
+        let plane = sign * room.distance_m(boundary)?;
+        let per_frame = body.frames.iter().enumerate().map(|(frame, points)| {
+            let map = model.template(points.iter().map(|point| {
+                let (near_m, near_mps) = range_and_velocity(radar, point.position_m, point.velocity_mps);
+                let (mut position, mut velocity) = (point.position_m, point.velocity_mps);
+                position[axis] = 2.0 * plane - position[axis];
+                velocity[axis] *= -1.0;
+                let (far_m, far_mps) = range_and_velocity(radar, position, velocity);
+                (0.5 * (near_m + far_m), 0.5 * (near_mps + far_mps), point.area_m2 / (near_m * far_m).powi(2).max(1e-6))
+            }));
+            let support = model.support(frame);
+            let least = 1e-3 * map.iter().copied().fold(0.0, f32::max);
+            (0..map.len()).filter(|&cell| map[cell] > least && !support[cell]).map(|cell| (cell as u32, map[cell])).collect()
+        });
+        seen(&residual, boundary.name().into(), &per_frame.collect::<Vec<Vec<(u32, f32)>>>())
+    });
+    let seen = walls.collect();
+    adjusted(seen)
+}
+
+fn seen(residual: &Residual, name: String, map: &[Vec<(u32, f32)>]) -> Option<Seen> {
+    let size = residual.dims[1] * residual.dims[2];
+    let (mut sum, mut weight, mut square) = (0.0, 0.0, 0.0);
+    for (frame, cells) in map.iter().enumerate() {
+        let peak = cells.iter().map(|cell| cell.1).fold(0.0, f32::max).max(f32::MIN_POSITIVE);
+        for &(cell, power) in cells {
+            let at = frame * size + cell as usize;
+            let own = f64::from(power / peak);
+            let count = f64::from(residual.count[at]);
+            if count > 0.0 {
+                sum += own * count * f64::from(residual.ratio[at]);
+                weight += own * count;
+                square += own * own * count;
+            }
+        }
+    }
+    if weight <= 0.0 {
+        return None;
+    }
+    let mean: f64 = sum / weight;
+    // A weighted sum of gamma laws is nearly one of as many values as its variance says.
+    let p_value = if mean > 1.0 { mean_power_tail(mean, weight * weight / square) } else { 1.0 };
+    Some(Seen { name, excess_db: 10.0 * mean.max(1e-12).log10(), p_value })
+}
+
+fn adjusted(mut seen: Vec<Seen>) -> Vec<Seen> {
+    let tried = seen.len() as f64;
+    seen.iter_mut().for_each(|seen| seen.p_value = corrected(seen.p_value, tried));
+    seen.sort_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.excess_db.total_cmp(&a.excess_db)));
+    seen
+}

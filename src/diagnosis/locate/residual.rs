@@ -1,0 +1,67 @@
+//! Measured over expected power, cell by cell.
+
+use crate::diagnosis::Evidence;
+use crate::diagnosis::power::PowerModel;
+
+/// Doppler bins around zero that hold remains of what stands still.
+const STILL_BINS: usize = 2;
+/// Σ |correlation|² of neighbouring cells of two Hann windows.
+pub const CELLS_PER_VALUE: f64 = 3.78;
+
+/// Powers of the moving part over what is expected of body and noise, `[frame, doppler, range]`.
+pub struct Residual {
+    pub dims: [usize; 3],
+    /// Beat frequencies that exist.
+    pub bins: usize,
+    /// Mean 1 under the null; NaN never: cells that mean nothing have weight zero.
+    pub ratio: Vec<f32>,
+    /// Independent values that a cell counts for: one per channel where there is noise, fewer where the body's speckle is
+    /// the same in all channels, none where nothing can be said.
+    pub count: Vec<f32>,
+}
+
+impl Residual {
+    /// None for an empty recording.
+    pub fn new(evidence: &Evidence) -> Option<Self> {
+        let [frames, _, _, loops, samples] = evidence.cube.dims;
+        let (size, bins) = (loops * samples, evidence.range_bins());
+        if frames == 0 || size == 0 {
+            return None;
+        }
+        let (maps, model) = (evidence.maps(), PowerModel::new(evidence));
+        let channels = evidence.cube.channels() as f32;
+        let (mut ratio, mut count) = (maps.to_vec(), vec![0.0; maps.len()]);
+        for frame in 0..frames {
+            let expected = model.as_ref().map(|model| model.expected(frame));
+            let support = model.as_ref().map(|model| model.support(frame));
+            for cell in 0..size {
+                let (doppler, range) = (cell / samples, cell % samples);
+                let at = frame * size + cell;
+                let still = loops >= 8 && doppler.min(loops - doppler) <= STILL_BINS;
+                if range >= bins || still || !ratio[at].is_finite() {
+                    ratio[at] = 1.0;
+                    continue;
+                }
+                count[at] = channels / CELLS_PER_VALUE as f32;
+                if let (Some(expected), Some(support)) = (expected, support)
+                    && support[cell]
+                {
+                    // The template is good to a factor, speckle is one draw for many channels: a cell of the body
+                    // counts only for what is far beyond it.
+                    let mean = expected[cell].max(1.0);
+                    ratio[at] = (ratio[at] / (BODY_FACTOR * mean)).min(1e6);
+                    let independent = model.as_ref().map_or(1.0, |model| model.independent as f32);
+                    count[at] = independent / CELLS_PER_VALUE as f32;
+                    if ratio[at] < 1.0 {
+                        // Below the bound nothing is said, neither for nor against.
+                        (ratio[at], count[at]) = (1.0, 0.0);
+                    }
+                }
+            }
+        }
+        Some(Self { dims: [frames, loops, samples], bins, ratio, count })
+    }
+}
+
+/// The body's expected power is trusted to this factor.
+const BODY_FACTOR: f32 = 10.0;

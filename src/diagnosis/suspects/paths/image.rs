@@ -1,0 +1,99 @@
+//! Candidate: the body's mirror image at a boundary.
+
+use std::sync::Arc;
+
+use super::ghost::{Ghost, mirrored_return};
+use super::mover::energy;
+use super::removal::{empty_cells, patch};
+use super::scene::Scene;
+use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::{Candidate, Correction, Estimate, Place, Rung};
+use crate::room::Boundary;
+
+/// Bodies return this factor more or less in amplitude to one side than to another (standard deviation of the log).
+const SIDE_SPREAD: f64 = 0.3;
+/// Log-likelihood within which two boundaries are not told apart.
+const CLOSE: f64 = 4.6;
+
+pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Candidate {
+    let evidence = scene.evidence;
+    let (mut low, mut high, mut slow, mut fast) = (f64::INFINITY, 0.0f64, f64::INFINITY, f64::NEG_INFINITY);
+    if let (Some(body), Some(room)) = (&evidence.body, &evidence.room) {
+        let distance = room.distance_m(ghost.boundary).unwrap_or(0.0);
+        for point in body.frames.iter().flatten() {
+            let (range, velocity, _) = mirrored_return(&evidence.radar, point, ghost.boundary, distance, false);
+            (low, high) = (low.min(range), high.max(range));
+            (slow, fast) = (slow.min(velocity), fast.max(velocity));
+        }
+    }
+    let name = ghost.boundary.name();
+    let floor = ghost.boundary == Boundary::Floor;
+    let mut place = Place::at("propagation");
+    place.range_m = Some([low, high]);
+    place.velocity_mps = Some([slow, fast]);
+    place.boundary = Some(name.into());
+    let peak = scene_power(scene, ghost);
+    let statement = format!(
+        "The body is seen a second time by way of the {name} boundary: power at half the summed lengths of the direct and \
+         the mirrored way, with the mean of both velocities, as a mirror of amplitude {:.2} would send it; its strongest cell \
+         is {:.0} dB over the noise.",
+        ghost.coefficient,
+        10.0 * peak.max(1.0).log10()
+    );
+    let others = all.iter().filter(|other| other.boundary != ghost.boundary && ghost.gain - other.gain < CLOSE);
+    let mut look_alikes: Vec<&'static str> = others
+        .map(|other| if other.boundary == Boundary::Floor { "floor_bounce" } else { "wall_ghost" })
+        .filter(|id| *id != if floor { "floor_bounce" } else { "wall_ghost" })
+        .collect();
+    look_alikes.dedup();
+    let spread = 1.645 * SIDE_SPREAD;
+    let coefficient = Estimate {
+        name: "coefficient",
+        values: vec![ghost.coefficient],
+        ci90: vec![[ghost.coefficient * (-spread).exp(), ghost.coefficient * spread.exp()]],
+    };
+    let cells: Vec<Vec<usize>> = (ghost.templates.iter().enumerate())
+        .map(|(frame, template)| {
+            let mut expected = vec![0.0; scene.size()];
+            for (&cell, &power) in template.cells.iter().zip(&template.power) {
+                expected[cell as usize] = ghost.weight as f32 * power;
+            }
+            patch(&expected, scene.map(frame), scene.model.support(frame), scene.samples, 0.1)
+        })
+        .collect();
+    let still = evidence.still().to_vec();
+    let power: f64 = (ghost.templates.iter())
+        .map(|template| ghost.weight * template.power.iter().map(|&power| f64::from(power)).sum::<f64>())
+        .sum();
+    Candidate {
+        id: Some(if floor { "floor_bounce" } else { "wall_ghost" }),
+        behaves_like: "path-like",
+        estimates: vec![coefficient],
+        choice: Some(name.into()),
+        place,
+        p_value: corrected(chi2_tail(2.0 * ghost.gain_all, 2.0), tried),
+        gain: ghost.gain,
+        rung: Rung::F,
+        look_alikes,
+        statement,
+        curve: None,
+        // The windows' cells hold every tone 2.25 times over.
+        energy: energy(scene, power / 2.25),
+        correction: Correction::Samples(Arc::new(move |cube| {
+            for (frame, cells) in cells.iter().enumerate() {
+                empty_cells(cube, &still, frame, cells);
+            }
+        })),
+    }
+}
+
+/// Strongest measured cell that the ghost expects power in.
+fn scene_power(scene: &Scene, ghost: &Ghost) -> f64 {
+    (ghost.templates.iter().enumerate())
+        .flat_map(|(frame, template)| {
+            template.cells.iter().zip(&template.power).map(move |(&cell, &power)| (frame, cell as usize, power))
+        })
+        .filter(|(_, _, power)| ghost.weight * f64::from(*power) > 0.5)
+        .map(|(frame, cell, _)| f64::from(scene.map(frame)[cell]))
+        .fold(0.0, f64::max)
+}

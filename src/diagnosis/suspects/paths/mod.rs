@@ -1,0 +1,40 @@
+//! Returns from where neither the body nor the static room can be: mirror images, strangers that move, echoes.
+
+mod ghost;
+mod image;
+mod mover;
+mod pendulum;
+mod removal;
+mod scene;
+mod track;
+
+use crate::diagnosis::{Candidate, Evidence};
+
+use scene::Scene;
+
+/// A ghost must predict at least this share of the held-out frames that show it.
+const AGREEING: f64 = 0.6;
+/// Least gain on held-out frames that is worth a name, nats.
+const LEAST_GAIN: f64 = 6.0;
+/// Kinds of answers that this family may give: every one is a chance to be wrong.
+const TRIED: f64 = 4.0;
+
+/// Mirror images of the body at the room's boundaries, and movers that are none.
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let Some(scene) = Scene::new(evidence) else { return vec![] };
+    let ghosts = ghost::ghosts(&scene);
+    let boundaries = ghosts.len().max(1) as f64;
+    let mover = track::strongest(&scene).and_then(|track| mover::Mover::new(&scene, track));
+    let mover_gain = mover.as_ref().map_or(0.0, |mover| mover.gain);
+    let best = ghosts
+        .iter()
+        .filter(|ghost| ghost.gain > LEAST_GAIN && ghost.agreeing >= AGREEING)
+        .max_by(|a, b| a.gain.total_cmp(&b.gain));
+    let mut found = vec![];
+    match (best, mover) {
+        (Some(ghost), _) if ghost.gain > mover_gain => found.push(image::candidate(&scene, ghost, &ghosts, TRIED * boundaries)),
+        (_, Some(mover)) if mover.gain > LEAST_GAIN => found.push(mover.candidate(&scene, TRIED)),
+        _ => {}
+    }
+    found
+}

@@ -1,0 +1,240 @@
+//! Candidate: something that moves, and not with the body (P2).
+
+use std::sync::Arc;
+
+use super::pendulum::Pendulum;
+use super::removal::{empty_cells, patch};
+use super::scene::Scene;
+use super::track::{Sighting, Track};
+use crate::diagnosis::power::Template;
+use crate::diagnosis::statistics::{corrected, median};
+use crate::diagnosis::{Candidate, Correction, Estimate, Place, Rung};
+
+/// Sightings are good to this share of a cell, and no better than that: the windows' law holds for a steady tone.
+const CELL_ERROR: f64 = 0.12;
+/// A swing leaves less than this share of the velocities' variance.
+const SWING_LEAVES: f64 = 0.15;
+
+/// A track that is judged: how far it predicts frames that it was not fitted to.
+pub struct Mover {
+    pub track: Track,
+    pub pendulum: Option<Pendulum>,
+    /// What the track behaves like; none: its ranges and its Doppler do not belong together.
+    pub id: Option<&'static str>,
+    /// Held-out frames, nats.
+    pub gain: f64,
+    pub power: f64,
+}
+
+impl Mover {
+    pub fn new(scene: &Scene, track: Track) -> Option<Self> {
+        let split = &scene.evidence.split;
+        let training: Vec<Sighting> = track.sightings.iter().copied().filter(|s| split.training.contains(&s.frame)).collect();
+        if training.len() < 4 || 3 * training.len() < split.training.len() {
+            return None;
+        }
+        let pendulum = fit(scene, &training);
+        let power = median(&mut training.iter().map(|s| s.power).collect::<Vec<_>>());
+        let gain = split
+            .held_out
+            .iter()
+            .map(|&frame| {
+                let template = template(scene, frame, pendulum.as_ref(), &training);
+                scene.gain(frame, &template, power)
+            })
+            .sum();
+        let id = if pendulum.is_some() { Some("moving_reflector") } else { named(scene, &track.sightings) };
+        Some(Self { track, pendulum, id, gain, power })
+    }
+
+    pub fn candidate(&self, scene: &Scene, tried: f64) -> Candidate {
+        let sightings = &self.track.sightings;
+        let whole = self.pendulum.and_then(|_| fit(scene, sightings)).or(self.pendulum);
+        let ranges = bounds(sightings.iter().map(|s| s.range_m));
+        let velocities = bounds(sightings.iter().map(|s| s.velocity_mps));
+        let cell_m = scene.range_m(1.0);
+        let (mean_m, mean_error) = match &whole {
+            Some(fit) => (fit.mean_m, fit.deviations[0].max(0.05 * cell_m)),
+            None => (0.5 * (ranges[0] + ranges[1]), 0.3 * (ranges[1] - ranges[0]) + 0.2 * cell_m),
+        };
+        let sines: Vec<f64> = sightings.iter().filter_map(|s| s.sine).collect();
+        let mut estimates = vec![];
+        let mut place = Place::at("scene");
+        place.range_m = Some([ranges[0] - 0.5 * cell_m, ranges[1] + 0.5 * cell_m]);
+        place.velocity_mps = Some(velocities);
+        let mut whereabouts = String::new();
+        if !sines.is_empty() {
+            let sine = median(&mut sines.clone());
+            let spread = median(&mut sines.iter().map(|s| (s - sine).abs()).collect::<Vec<_>>()) * 1.48;
+            let sine_error = spread / (sines.len() as f64).sqrt() * 1.25 + 0.01;
+            let azimuth = sine.clamp(-1.0, 1.0).asin();
+            let (x, y) = (mean_m * sine, mean_m * azimuth.cos());
+            let at = scene.evidence.radar.position_m;
+            // A line of receivers does not tell the height: as far up or down as it is off here shortens y.
+            let height = 0.5;
+            estimates.push(Estimate {
+                name: "position_m",
+                values: vec![at[0] + x, at[1] + y, at[2]],
+                ci90: vec![
+                    around(at[0] + x, 1.645 * (mean_m * sine_error).hypot(mean_error * sine.abs())),
+                    [
+                        at[1] + y - 1.645 * (mean_error + mean_m * sine_error * sine.abs()) - 0.5 * height * height / y.max(0.5),
+                        at[1] + y + 1.645 * (mean_error + mean_m * sine_error * sine.abs()),
+                    ],
+                    around(at[2], 1.0),
+                ],
+            });
+            place.position_m = Some([at[0] + x, at[1] + y, at[2]]);
+            let degrees = azimuth.to_degrees();
+            let error = (1.645 * sine_error / azimuth.cos().max(0.1)).to_degrees().max(2.0);
+            place.azimuth_deg = Some([degrees - error, degrees + error]);
+            whereabouts = format!(" at {degrees:.0}° azimuth (its height is not seen)");
+        }
+        let motion = match &whole {
+            Some(fit) => {
+                estimates.push(Estimate::normal("rate_hz", fit.rate_hz, fit.deviations[2].max(0.005)));
+                let swing = fit.swing_m();
+                let error = 1.645 * fit.deviations[1].max(0.03 * swing);
+                // Only the part along the line of sight is seen.
+                estimates.push(Estimate {
+                    name: "swing_m",
+                    values: vec![swing],
+                    ci90: vec![[swing - error, 1.1 * swing + error]],
+                });
+                format!("swings by ±{:.0} mm along the line of sight {:.2} times a second", 1e3 * swing, fit.rate_hz)
+            }
+            None => format!("moves between {:.2} and {:.2} m", ranges[0], ranges[1]),
+        };
+        let frames: Vec<usize> = sightings.iter().map(|s| s.frame).collect();
+        let everywhere = frames.len() == scene.frames();
+        place.frames = (!everywhere).then_some(frames);
+        let alias = match self.id {
+            Some("range_alias") => {
+                " Its range falls when its Doppler says that it recedes: it lies beyond the unambiguous range and is folded back."
+            }
+            None => " Its range and its Doppler do not belong together: no single reflector moves so.",
+            _ => "",
+        };
+        let statement = format!(
+            "Something {:.2} m away{whereabouts} {motion}, {:.0} dB above the noise; neither the body nor its mirror images can be there.{alias}",
+            mean_m,
+            10.0 * self.power.log10()
+        );
+        let cells: Vec<(usize, Vec<usize>)> = (0..scene.frames())
+            .filter_map(|frame| {
+                let seen = sightings.iter().find(|s| s.frame == frame);
+                let at = match (seen, &whole) {
+                    (Some(seen), _) => (seen.range_m, seen.velocity_mps),
+                    (None, Some(fit)) => fit.at(middle_s(scene, frame)),
+                    (None, None) => return None,
+                };
+                let power = seen.map_or(self.power, |s| s.power);
+                let expected = scene.model.template([(at.0, at.1, power)].into_iter());
+                Some((frame, patch(&expected, scene.map(frame), scene.model.support(frame), scene.samples, 0.05)))
+            })
+            .collect();
+        let still = scene.evidence.still().to_vec();
+        Candidate {
+            id: self.id,
+            behaves_like: "path-like",
+            estimates: if self.id == Some("moving_reflector") { estimates } else { vec![] },
+            choice: None,
+            place,
+            p_value: corrected(self.track.p_value, tried),
+            gain: self.gain,
+            rung: Rung::F,
+            look_alikes: vec![],
+            statement,
+            curve: None,
+            energy: energy(scene, sightings.iter().map(|s| s.power).sum()),
+            correction: Correction::Samples(Arc::new(move |cube| {
+                for (frame, cells) in &cells {
+                    empty_cells(cube, &still, *frame, cells);
+                }
+            })),
+        }
+    }
+}
+
+/// Whether ranges change as Doppler says: as of something that moves, or with the sign of what is folded at the end of
+/// the unambiguous range.
+fn named(scene: &Scene, sightings: &[Sighting]) -> Option<&'static str> {
+    let radar = &scene.evidence.radar;
+    let (period_s, span) = (radar.frame_period_s, scene.loops as f64 / scene.model.cells.doppler_per_mps);
+    let cell_m = scene.range_m(1.0);
+    let pairs: Vec<(f64, f64)> = sightings
+        .windows(2)
+        .filter(|pair| pair[1].frame == pair[0].frame + 1)
+        .map(|pair| (pair[1].range_m - pair[0].range_m, 0.5 * (pair[0].velocity_mps + pair[1].velocity_mps) * period_s))
+        .collect();
+    if pairs.len() < 4 {
+        return None;
+    }
+    let apart = |sign: f64| {
+        let mut steps: Vec<f64> = pairs
+            .iter()
+            .map(|(range, velocity)| {
+                let difference = range - sign * velocity;
+                (difference - span * period_s * (difference / (span * period_s)).round()).abs()
+            })
+            .collect();
+        median(&mut steps) / cell_m
+    };
+    let (with, against) = (apart(1.0), apart(-1.0));
+    if with < 0.5 && with <= against {
+        Some("moving_reflector")
+    } else if against < 0.5 && against < 0.5 * with {
+        Some("range_alias")
+    } else {
+        None
+    }
+}
+
+/// Energy of all samples of tones whose peaks in the maps sum to this much over the noise.
+pub fn energy(scene: &Scene, power: f64) -> f64 {
+    // The windows' coherent gains take 1.5 each off the peak.
+    2.25 * power * scene.evidence.noise().iter().sum::<f64>()
+}
+
+pub fn middle_s(scene: &Scene, frame: usize) -> f64 {
+    scene.evidence.starts_s[frame] + 0.5 * scene.evidence.radar.frame_duration_s()
+}
+
+fn fit(scene: &Scene, sightings: &[Sighting]) -> Option<Pendulum> {
+    let times: Vec<f64> = sightings.iter().map(|s| middle_s(scene, s.frame)).collect();
+    let cells = &scene.model.cells;
+    let errors = [CELL_ERROR / cells.bins_per_m, CELL_ERROR / cells.doppler_per_mps];
+    Pendulum::fit(sightings, &times, errors, scene.loops as f64 / cells.doppler_per_mps).filter(|fit| fit.left < SWING_LEAVES)
+}
+
+/// What a frame should show: the swing, or the way between the neighbouring sightings, blurred by what it may be off.
+fn template(scene: &Scene, frame: usize, pendulum: Option<&Pendulum>, training: &[Sighting]) -> Template {
+    let point = |range: f64, velocity: f64, power: f64| (range, velocity, power);
+    let cells = &scene.model.cells;
+    let map = match pendulum {
+        Some(fit) => {
+            let (range, velocity) = fit.at(middle_s(scene, frame));
+            scene.model.template([point(range, velocity, 1.0)].into_iter())
+        }
+        None => {
+            let after = training.partition_point(|s| s.frame < frame);
+            let near = [after.checked_sub(1), Some(after)].into_iter().flatten().filter_map(|i| training.get(i));
+            let points: Vec<(f64, f64)> = near.map(|s| (s.range_m, s.velocity_mps)).collect();
+            let count = points.len().max(1) as f64;
+            let middle = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
+            let blur = (-2..=2).flat_map(|slow| (-1..=1).map(move |fast| (f64::from(slow), f64::from(fast))));
+            scene.model.template(
+                blur.map(|(slow, fast)| point(middle.0 + fast / cells.bins_per_m, middle.1 + slow / cells.doppler_per_mps, 0.1)),
+            )
+        }
+    };
+    scene.visible(frame, &map)
+}
+
+fn bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+}
+
+fn around(value: f64, error: f64) -> [f64; 2] {
+    [value - error, value + error]
+}

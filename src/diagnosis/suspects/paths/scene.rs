@@ -1,0 +1,251 @@
+//! Where neither the body nor anything smeared from what is known can be: the cells that paths are looked for in.
+
+use rayon::prelude::*;
+
+use crate::diagnosis::Evidence;
+use crate::diagnosis::evidence::transform;
+use crate::diagnosis::power::{PowerModel, Template};
+use crate::diagnosis::statistics::median;
+
+/// Doppler bins around zero in which what stands still leaves remains wherever the body was in some frame.
+const STILL_BINS: i64 = 2;
+/// Cells by which the body's support grows along Doppler: accelerations within a frame.
+const DOPPLER_MARGIN: i64 = 2;
+/// Accelerations raise sidelobes above the window's own.
+const SIDELOBE_SAFETY: f64 = 10.0;
+/// Sidelobes below this share of the noise are nothing.
+const SIDELOBE_LEVEL: f64 = 0.3;
+/// Σ |correlation|² of neighbouring cells of two Hann windows: so many cells are one independent value.
+pub const CELLS_PER_VALUE: f64 = 3.78;
+
+/// Powers over the noise, and what is expected of them without any further path, `[frame, doppler, range]`.
+pub struct Scene<'a> {
+    pub evidence: &'a Evidence,
+    pub model: PowerModel,
+    pub loops: usize,
+    pub samples: usize,
+    pub bins: usize,
+    /// Channels that a power is the mean of.
+    pub channels: f64,
+    /// Cells where the body, its sidelobes, or remains of the room can be.
+    pub taken: Vec<bool>,
+    /// Expected power in the other cells: noise, and what other imperfections smear along a range or a Doppler.
+    pub base: Vec<f32>,
+}
+
+impl<'a> Scene<'a> {
+    /// None without a body, or with too few cells to be of use.
+    pub fn new(evidence: &'a Evidence) -> Option<Self> {
+        let [frames, _, _, loops, samples] = evidence.cube.dims;
+        if loops < 16 || evidence.range_bins() < 16 {
+            return None;
+        }
+        let model = PowerModel::new(evidence)?;
+        let (bins, size) = (evidence.range_bins(), loops * samples);
+        let visited = visited_ranges(&model, frames, loops, samples);
+        let clutter = still_power(evidence);
+        let maps = evidence.maps();
+        let (taken, base): (Vec<Vec<bool>>, Vec<Vec<f32>>) = (0..frames)
+            .into_par_iter()
+            .map(|frame| {
+                let map = &maps[frame * size..(frame + 1) * size];
+                let mut taken = sidelobes(map, model.support(frame), loops, samples);
+                for (cell, taken) in taken.iter_mut().enumerate() {
+                    let doppler = (cell / samples).min(loops - cell / samples) as i64;
+                    let range = cell % samples;
+                    *taken |= range >= bins || (doppler <= STILL_BINS && visited[range]) || doppler == 0;
+                }
+                let base = floor(map, &taken, &clutter, loops, samples);
+                (taken, base)
+            })
+            .unzip();
+        let channels = evidence.cube.channels() as f64;
+        Some(Self { evidence, model, loops, samples, bins, channels, taken: taken.concat(), base: base.concat() })
+    }
+
+    pub fn size(&self) -> usize {
+        self.loops * self.samples
+    }
+
+    pub fn frames(&self) -> usize {
+        self.evidence.cube.dims[0]
+    }
+
+    pub fn map(&self, frame: usize) -> &[f32] {
+        &self.evidence.maps()[frame * self.size()..(frame + 1) * self.size()]
+    }
+
+    pub fn taken(&self, frame: usize) -> &[bool] {
+        &self.taken[frame * self.size()..(frame + 1) * self.size()]
+    }
+
+    pub fn base(&self, frame: usize) -> &[f32] {
+        &self.base[frame * self.size()..(frame + 1) * self.size()]
+    }
+
+    /// A map's powers in the cells of a frame that are free to look at.
+    pub fn visible(&self, frame: usize, map: &[f32]) -> Template {
+        let taken = self.taken(frame);
+        let least = 1e-3f32.max(1e-4 * map.iter().copied().fold(0.0, f32::max));
+        let (cells, power) = (map.iter().enumerate())
+            .filter(|(cell, power)| **power > least && !taken[*cell])
+            .map(|(cell, &power)| (cell as u32, power))
+            .unzip();
+        Template { cells, power }
+    }
+
+    /// Log-likelihood that a frame gains when `weight` times a template is expected besides the base, nats.
+    pub fn gain(&self, frame: usize, template: &Template, weight: f64) -> f64 {
+        let (map, base) = (self.map(frame), self.base(frame));
+        let sum: f64 = (template.cells.iter().zip(&template.power))
+            .map(|(&cell, &template)| {
+                let (power, base) = (f64::from(map[cell as usize]), f64::from(base[cell as usize]));
+                let expected = base + weight * f64::from(template);
+                (base / expected).ln() + power / base - power / expected
+            })
+            .sum();
+        sum * self.channels / CELLS_PER_VALUE
+    }
+
+    /// Of some frames, templates by frame.
+    pub fn gains(&self, frames: &[usize], templates: &[Template], weight: f64) -> f64 {
+        frames.iter().map(|&frame| self.gain(frame, &templates[frame], weight)).sum()
+    }
+
+    /// The weight (≥ 0) of templates `[frame]` that some frames' powers make most likely, over a grid of tenths of a
+    /// decade around the ratio of energies.
+    pub fn weight(&self, frames: &[usize], templates: &[Template]) -> f64 {
+        let (mut above, mut below) = (0.0, 0.0);
+        for &frame in frames {
+            for (&cell, &power) in templates[frame].cells.iter().zip(&templates[frame].power) {
+                above += f64::from(self.map(frame)[cell as usize] - self.base(frame)[cell as usize]);
+                below += f64::from(power);
+            }
+        }
+        if above <= 0.0 || below <= 0.0 {
+            return 0.0;
+        }
+        let best = (-10..=8)
+            .into_par_iter()
+            .map(|step| above / below * 10f64.powf(f64::from(step) / 10.0))
+            .map(|weight| (weight, self.gains(frames, templates, weight)))
+            .reduce(|| (0.0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
+        best.0
+    }
+
+    /// Ranges in metres of a box of bins.
+    pub fn range_m(&self, bin: f64) -> f64 {
+        bin / self.model.cells.bins_per_m
+    }
+
+    /// Of a Doppler bin in FFT order, not unwrapped.
+    pub fn velocity_mps(&self, bin: f64) -> f64 {
+        let loops = self.loops as f64;
+        let signed = if bin >= 0.5 * loops { bin - loops } else { bin };
+        signed / self.model.cells.doppler_per_mps
+    }
+}
+
+/// Range bins that the body has power in during some frame.
+fn visited_ranges(model: &PowerModel, frames: usize, loops: usize, samples: usize) -> Vec<bool> {
+    let mut visited = vec![false; samples];
+    for frame in 0..frames {
+        for doppler in 0..loops {
+            let row = &model.support(frame)[doppler * samples..(doppler + 1) * samples];
+            visited.iter_mut().zip(row).for_each(|(visited, support)| *visited |= support);
+        }
+    }
+    visited
+}
+
+/// Power of what stands still over the noise of one frame's map, by range, mean over channels.
+pub fn still_power(evidence: &Evidence) -> Vec<f64> {
+    let samples = evidence.cube.dims[4];
+    let count = evidence.cube.channels() as f64;
+    let mut power = vec![0.0; samples];
+    for (channel, still) in evidence.still().chunks_exact(samples).enumerate() {
+        // One loop: a window of unit energy is one, so that the Doppler transform does nothing.
+        let spectrum = transform(still, samples);
+        let noise = evidence.noise()[channel].max(f64::MIN_POSITIVE);
+        power.iter_mut().zip(spectrum).for_each(|(sum, value)| *sum += value.norm_sqr() / (noise * count));
+    }
+    let gain = evidence.cube.dims[3] as f64 / 1.5;
+    power.iter().map(|power| power * gain).collect()
+}
+
+/// Power of a Hann window far from its peak, an upper bound.
+fn hann_envelope(cells: f64) -> f64 {
+    let x = cells.max(1.5);
+    (1.0 / (std::f64::consts::PI * x * (x * x - 1.0))).powi(2).min(1.0)
+}
+
+/// The support, wider along Doppler, and where sidelobes of the measured power reach.
+fn sidelobes(map: &[f32], support: &[bool], loops: usize, samples: usize) -> Vec<bool> {
+    let mut taken = support.to_vec();
+    let mut lobes = vec![0.0f64; map.len()];
+    for cell in (0..map.len()).filter(|&cell| support[cell]) {
+        let (doppler, range) = (cell / samples, cell % samples);
+        for step in -DOPPLER_MARGIN..=DOPPLER_MARGIN {
+            taken[(doppler as i64 + step).rem_euclid(loops as i64) as usize * samples + range] = true;
+        }
+        let power = f64::from(map[cell]);
+        if power * SIDELOBE_SAFETY * hann_envelope(3.0) < SIDELOBE_LEVEL {
+            continue;
+        }
+        // Away from both axes the product of two envelopes vanishes.
+        for slow in -3..=3i64 {
+            let row = (doppler as i64 + slow).rem_euclid(loops as i64) as usize * samples;
+            let across = if slow.abs() < 2 { 1.0 } else { hann_envelope(slow.abs() as f64) };
+            for other in 0..samples {
+                let apart = other.abs_diff(range).min(samples - other.abs_diff(range));
+                lobes[row + other] += power * across * hann_envelope(apart as f64);
+            }
+        }
+        for fast in -3..=3i64 {
+            let column = (range as i64 + fast).rem_euclid(samples as i64) as usize;
+            let across = if fast.abs() < 2 { 1.0 } else { hann_envelope(fast.abs() as f64) };
+            for other in 0..loops {
+                let apart = other.abs_diff(doppler).min(loops - other.abs_diff(doppler));
+                lobes[other * samples + column] += power * across * hann_envelope(apart as f64);
+            }
+        }
+    }
+    taken.iter_mut().zip(lobes).for_each(|(taken, lobe)| *taken |= lobe * SIDELOBE_SAFETY > SIDELOBE_LEVEL);
+    taken
+}
+
+/// Noise, raised where a whole range or a whole Doppler is louder than noise, or clutter has sidebands: imperfections of
+/// the signal chain do that, and a path does not.
+fn floor(map: &[f32], taken: &[bool], clutter: &[f64], loops: usize, samples: usize) -> Vec<f32> {
+    /// A median below this many times the noise is noise.
+    const LOUD: f64 = 1.35;
+    let raised = |values: &mut Vec<f64>| if values.len() < 8 { 1.0 } else { median(values) };
+    let level = |median: f64| if median > LOUD { 2.0 * median } else { 1.0 };
+    let mut base = vec![1.0f64; map.len()];
+    for doppler in 0..loops {
+        let cells = || (0..samples).filter(|range| !taken[doppler * samples + range]);
+        let mut row: Vec<f64> = cells().map(|range| f64::from(map[doppler * samples + range])).collect();
+        let row = level(raised(&mut row));
+        let mut smear: Vec<f64> = cells()
+            .filter(|&range| clutter[range] > 100.0)
+            .map(|range| (f64::from(map[doppler * samples + range]) - 1.5).max(0.0) / clutter[range])
+            .collect();
+        let smear = if smear.len() < 8 { 0.0 } else { 3.0 * median(&mut smear) };
+        for range in 0..samples {
+            base[doppler * samples + range] = row.max(1.0 + smear * clutter[range]);
+        }
+    }
+    for range in 0..samples {
+        let mut column: Vec<f64> = (0..loops)
+            .map(|doppler| doppler * samples + range)
+            .filter(|&cell| !taken[cell])
+            .map(|cell| f64::from(map[cell]))
+            .collect();
+        let column = level(raised(&mut column));
+        for doppler in 0..loops {
+            let cell = doppler * samples + range;
+            base[cell] = base[cell].max(column);
+        }
+    }
+    base.iter().map(|&value| value as f32).collect()
+}
