@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, de};
 
+use super::effects::EffectsConfig;
 use super::material::Material;
 use super::receiver::ReceiverConfig;
 use super::surface::SurfaceConfig;
@@ -127,6 +128,7 @@ pub struct RecorderConfig {
     /// Effect.
     pub furniture: Vec<Reflector>,
     pub receiver: ReceiverConfig,
+    pub effects: EffectsConfig,
 }
 
 impl Default for RecorderConfig {
@@ -153,6 +155,7 @@ impl Default for RecorderConfig {
             walls: WallsConfig::default(),
             furniture: vec![],
             receiver: ReceiverConfig::default(),
+            effects: EffectsConfig::default(),
         }
     }
 }
@@ -176,6 +179,7 @@ impl RecorderConfig {
             furniture: self.furniture.clone(),
             antenna_exponent: self.antenna_exponent,
             receiver: self.receiver,
+            effects: self.effects.clone(),
             seed: self.seed,
         };
         world.check()?;

@@ -19,6 +19,7 @@ pub mod amplitude;
 pub mod body;
 pub mod chirp;
 pub mod config;
+pub mod effects;
 mod lanes;
 pub mod material;
 pub mod mirror;
@@ -43,6 +44,7 @@ mod laws;
 pub(crate) mod test_support;
 
 pub use config::{ActorConfig, RadarChoice, RecorderConfig};
+pub use effects::EffectsConfig;
 pub use material::Material;
 pub use receiver::ReceiverConfig;
 pub use record::{Recorder, record};

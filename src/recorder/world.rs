@@ -4,6 +4,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
+use super::effects::EffectsConfig;
 use super::material::Material;
 use super::receiver::ReceiverConfig;
 use super::surface::SurfaceConfig;
@@ -79,6 +80,7 @@ pub struct World {
     /// Effect: power gain cos^q of every antenna.
     pub antenna_exponent: f64,
     pub receiver: ReceiverConfig,
+    pub effects: EffectsConfig,
     pub seed: u64,
 }
 
@@ -96,6 +98,7 @@ impl Default for World {
             furniture: vec![],
             antenna_exponent: 0.0,
             receiver: ReceiverConfig::default(),
+            effects: EffectsConfig::default(),
             seed: 0,
         }
     }
@@ -152,6 +155,7 @@ impl World {
         self.room.check("room")?;
         self.surface.check("surface")?;
         self.receiver.check("receiver")?;
+        self.effects.check("effects")?;
         if self.walls.images > 2 {
             return Err(Error::setting("walls.images", self.walls.images, "0, 1 or 2"));
         }
