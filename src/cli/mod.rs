@@ -3,6 +3,7 @@
 //! Results go to standard output, progress and warnings to standard error. Exit status: 0 done, 1 failed,
 //! 2 wrong usage, configuration or input.
 
+mod challenge;
 mod check;
 mod device;
 mod evaluate;
@@ -72,6 +73,11 @@ enum Command {
     /// PSNR, SSIM and dB error over all cells, with what is static removed, and on the cells that the person
     /// occupies, as mean and standard deviation over frames; --out writes them with their 95 % intervals as JSON.
     Evaluate(evaluate::Arguments),
+    /// Prove the detective on concealed data: seal, run, score
+    ///
+    /// `seal` records cases by a secret and commits to their truths; `run` has each diagnosed by a process of its own
+    /// that cannot see them; `score` opens them and holds the reports against them.
+    Challenge(challenge::Arguments),
 }
 
 /// Where results go.
@@ -97,6 +103,7 @@ pub fn main() -> ExitCode {
         Command::Train(arguments) => train::run(arguments, &cli.common),
         Command::Infer(arguments) => infer::run(arguments, &cli.common),
         Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
+        Command::Challenge(arguments) => challenge::run(arguments, &cli.common),
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,
