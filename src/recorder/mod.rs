@@ -23,6 +23,7 @@ pub mod effects;
 mod lanes;
 pub mod material;
 pub mod mirror;
+mod paths;
 pub mod range_grid;
 pub mod receiver;
 mod record;

@@ -4,13 +4,50 @@
 //! The signal meets them in this order: scene, paths, oscillator, antennas, IF filter, nonlinearity, what is added,
 //! noise, converter.
 
+mod antenna;
+mod body;
+mod if_filter;
+mod noise;
+mod outside;
+mod propagation;
+mod receiver;
+mod resample;
+mod scene;
 mod settings;
+mod signal;
+mod stage;
+mod timing;
+mod truth;
+mod waveform;
 
 use serde::{Deserialize, Serialize};
 
+pub use body::{Physiology, garment_m, reflectivity_db};
+pub use noise::shape as shape_noise;
+pub use propagation::{MirrorPlan, Shadow, twice_bounced};
+pub use scene::{Mover, Stage, Swing, movers, static_points, vibration};
 pub use settings::*;
+pub use signal::Signal;
+pub use receiver::Chain;
+pub use stage::{Stages, codes};
+pub use timing::Clock;
+pub use truth::listed;
 
+use super::world::World;
 use crate::error::Result;
+
+/// Streams of random numbers, one per effect that draws some.
+macro_rules! streams {
+    ($($name:ident = $id:literal),*) => { $(pub(super) const $name: u64 = $id;)* };
+}
+
+streams! {
+    CHIRP_RIPPLE = 1, PHASE_NOISE = 2, CHIRP_START_JITTER = 3, TX_LEAKAGE = 4, DC_OFFSET = 5, RAMP_EDGE_TRANSIENT = 6,
+    SPUR = 7, INTERFERENCE = 8, MUTUAL_COUPLING = 9, MOVING_REFLECTOR = 10, RADAR_VIBRATION = 11, RANGE_ALIAS = 12,
+    BREATHING = 13, HEARTBEAT = 14, IMPULSIVE_NOISE = 15, CORRELATED_NOISE = 16,
+    // The entries of `outside` follow each other.
+    OUTSIDE = 100
+}
 
 /// The table `[effects]`: a sub-table per effect id, off where absent.
 macro_rules! effects {
@@ -31,6 +68,19 @@ macro_rules! effects {
                     effect.check(&format!("{key}.{}[{index}]", stringify!($list)))?;
                 })*
                 Ok(())
+            }
+
+            /// Those that are on, as (id, which of its kind, settings).
+            fn listed(&self) -> Vec<(&'static str, usize, serde_json::Value)> {
+                let mut all = vec![];
+                let json = |effect: &dyn Fn() -> serde_json::Result<serde_json::Value>| effect().unwrap_or_default();
+                $(if let Some(effect) = &self.$field {
+                    all.push((stringify!($field), 0, json(&|| serde_json::to_value(effect))));
+                })*
+                $(for (index, effect) in self.$list.iter().enumerate() {
+                    all.push((stringify!($list), index, json(&|| serde_json::to_value(effect))));
+                })*
+                all
             }
         }
     };
@@ -90,8 +140,21 @@ effects! {
 }
 
 impl EffectsConfig {
-    pub fn check(&self, key: &str) -> Result<()> {
-        self.check_bounds(key)
+    /// Whether nothing is planted.
+    pub fn is_off(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Refuses what cannot work in this world; `key` names the table in messages.
+    pub fn check(&self, world: &World, key: &str) -> Result<()> {
+        self.check_bounds(key)?;
+        timing::check(self, &world.radar, key)?;
+        antenna::check(self, &world.radar, key)?;
+        scene::check(world, key)?;
+        propagation::check(world, key)?;
+        receiver::check(world, key)?;
+        noise::check(world, key)?;
+        outside::check(world, key)
     }
 }
 
@@ -112,7 +175,7 @@ mod tests {
             toml::from_str::<EffectsConfig>("[[outside]]\nkind = \"gain_hop\"\nrx = 0\ndb = 1.0\nextra = 1").unwrap_err();
         assert!(unknown.to_string().contains("unknown field `extra`"), "{unknown}");
         let wrong = EffectsConfig { slope_error: Some(SlopeError { relative: f64::NAN }), ..EffectsConfig::default() };
-        let message = wrong.check("effects").unwrap_err().to_string();
+        let message = wrong.check(&World::default(), "effects").unwrap_err().to_string();
         assert!(message.contains("`effects.slope_error.relative` is NaN, expected between -0.2 and 0.2"), "{message}");
     }
 }
