@@ -312,25 +312,29 @@ mod tests {
     use rand::SeedableRng;
 
     use super::*;
+    use crate::recorder::{RadarChoice, RecorderConfig};
 
     #[test]
     fn every_effect_is_within_the_recorders_bounds_at_both_ends() {
-        let room = Room {
-            left_m: Some(1.6),
-            right_m: Some(2.0),
-            front_m: Some(4.4),
-            back_m: Some(0.5),
-            floor_m: Some(1.0),
-            ceiling_m: Some(1.6),
+        let mut world = RecorderConfig { radar: RadarChoice::Preset("small".into()), ..RecorderConfig::default() }
+            .world(std::path::Path::new("."))
+            .unwrap();
+        let at = Surroundings {
+            room: world.room.clone(),
+            distance_m: 2.8,
+            frames: world.radar.frames,
+            receivers: world.radar.rx_m.len(),
+            max_range_m: world.radar.max_range_m(),
+            sample_rate_hz: world.radar.sample_rate_hz,
         };
-        let at = Surroundings { room, distance_m: 2.8, frames: 12, receivers: 4, max_range_m: 10.9, sample_rate_hz: 4.4e6 };
         for graded in library().chain(MASKED).chain(OUTSIDE) {
             for level in [-0.5, 0.0, 0.5, 1.0] {
                 for seed in 0..5 {
                     let mut effects = EffectsConfig::default();
                     (graded.add)(&mut effects, graded.strength(level), &at, &mut ChaCha8Rng::seed_from_u64(seed));
                     assert_ne!(effects, EffectsConfig::default(), "{}", graded.id);
-                    effects.check("effects").unwrap_or_else(|error| panic!("{} at {level}: {error}", graded.id));
+                    world.effects = effects;
+                    world.check().unwrap_or_else(|error| panic!("{} at {level}: {error}", graded.id));
                 }
             }
         }

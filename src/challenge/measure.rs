@@ -22,6 +22,8 @@ pub struct Strength {
     pub d_prime_held_out: f64,
     /// Nine tenths of the effect's energy lie in range-Doppler cells whose return is stronger by at least this, dB.
     pub below_cover_db: f64,
+    /// Of the recording with the effect over the one without, which the receiver scaled on its own.
+    pub gain_db: f64,
 }
 
 /// Decibels that stand for nothing at all, so that JSON needs no infinity.
@@ -95,6 +97,7 @@ pub fn strength(clean: &[IfFrame], planted: &[IfFrame]) -> Strength {
         d_prime: d_prime(total),
         d_prime_held_out: d_prime(kept),
         below_cover_db: below_cover(&cells, noise * channels as f64),
+        gain_db: decibels(gain.norm_sqr()),
     }
 }
 
@@ -172,6 +175,7 @@ mod tests {
         assert!((found.d_prime_held_out / wanted - 0.5).abs() < 0.05);
         assert!((found.effect_to_moving_db - 20.0 * (0.5f64 / 100.0).log10()).abs() < 0.5, "{}", found.effect_to_moving_db);
         assert!(!found.masked());
+        assert!((found.gain_db - 10.0 * 0.73f64.log10()).abs() < 0.05);
     }
 
     #[test]

@@ -8,9 +8,13 @@ use super::config::{ChallengeConfig, Scenes, Stratum};
 use super::library::{self, Graded, Surroundings};
 use super::rules::DECOYS;
 use super::secret::Secret;
+use crate::person::Placement;
 use crate::person::actions::{StyleConfig, placement};
 use crate::recorder::{ActorConfig, EffectsConfig, RadarChoice, RecorderConfig, SurfaceConfig, WallsConfig};
 use crate::room::Room;
+
+/// The motion is under way when the recording starts, in every case: clocks that are wrong find a pose, too.
+const MOTION_START_S: f64 = -0.5;
 
 /// One case before it is recorded.
 #[derive(Clone)]
@@ -133,7 +137,7 @@ fn scene(config: &ChallengeConfig, seed: u64, random: &mut ChaCha8Rng) -> (Recor
             variation: 1.0,
             seed: u64::from(random.random::<u32>()),
         },
-        placement: Some(placement(room.floor_m.unwrap_or(1.0), distance_m)),
+        placement: Some(Placement { start_s: MOTION_START_S, ..placement(room.floor_m.unwrap_or(1.0), distance_m) }),
         ..ActorConfig::default()
     };
     let surface = SurfaceConfig {

@@ -17,6 +17,9 @@ pub struct Report {
     #[serde(default)]
     pub not_detectable: Vec<Limit>,
     pub fit: Fit,
+    /// Of the trained simulator's heatmaps.
+    #[serde(default)]
+    pub simulator: Option<Fit>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -95,6 +98,11 @@ impl Report {
             return Err(crate::Error::field(path, "verdict", &report.verdict, VERDICTS.join(", ")));
         }
         Ok(report)
+    }
+
+    /// The usual measures before anything is explained: those of the trained simulator where there is one.
+    pub fn usual(&self) -> Measures {
+        self.simulator.as_ref().map_or(self.fit.before, |simulator| simulator.before)
     }
 
     /// Whether it says that anything is missing, by name or without.

@@ -161,14 +161,15 @@ fn seal_case(config: &ChallengeConfig, mut plan: Plan, secret: &Secret, out: &Pa
     write_case(&recorded, &case)?;
     let sealed = Sealed { salt: secret.salt(plan.index), truth: truth(&plan, &recorded) };
     write_text(&truth_file, &format!("{:#}\n", serde_json::to_value(&sealed).expect("plain data")))?;
-    Ok(leaf(&sealed, &hash_folder(&case)?))
+    // As it will be read again: the last digit of a number may not survive being written.
+    Ok(leaf(&read_json(&truth_file)?, &hash_folder(&case)?))
 }
 
 /// A case in memory.
-pub struct Recorded {
+struct Recorded {
     /// The scene without effects: what everybody is told about it.
     world: World,
-    pub frames: Vec<IfFrame>,
+    frames: Vec<IfFrame>,
     settings: RecorderConfig,
     strength: Option<Strength>,
 }
@@ -203,7 +204,18 @@ fn frames_of(world: &World) -> Result<Vec<IfFrame>> {
 
 /// The recording without a truth and without labels.
 fn write_case(recorded: &Recorded, case: &Path) -> Result<()> {
-    let world = &recorded.world;
+    write_frames(&recorded.world, &recorded.frames, case)
+}
+
+/// Records the same scene, noise included, without its effects: what a perfect diagnosis would be left with.
+pub fn record_twin(settings: &str, case: &Path) -> Result<()> {
+    let settings: RecorderConfig =
+        toml::from_str(settings).map_err(|error| Error::Parse { path: case.into(), message: error.to_string() })?;
+    let world = RecorderConfig { effects: EffectsConfig::default(), ..settings }.world(Path::new("."))?;
+    write_frames(&world, &frames_of(&world)?, case)
+}
+
+fn write_frames(world: &World, frames: &[IfFrame], case: &Path) -> Result<()> {
     let layout = match world.radar.sampling {
         Sampling::Complex => IfLayout::Codes,
         Sampling::Real => IfLayout::RealCodes,
@@ -217,7 +229,7 @@ fn write_case(recorded: &Recorded, case: &Path) -> Result<()> {
         layout,
         truth: None,
     };
-    write_recording(case, &contents, &mut |frame| Ok(recorded.frames[frame].clone()))?;
+    write_recording(case, &contents, &mut |frame| Ok(frames[frame].clone()))?;
     let entries = fs::read_dir(case).map_err(|source| Error::read(case, source))?;
     for entry in entries.flatten() {
         set_time(&entry.path())?;
@@ -239,7 +251,7 @@ fn truth(plan: &Plan, recorded: &Recorded) -> Value {
         "tier": if settings.surface.returns == Returns::Random { "B" } else { "A" },
         "effects": effects(&settings.effects),
         "strength": recorded.strength,
-        "settings": settings,
+        "settings": toml::to_string(settings).expect("settings are plain data"),
     })
 }
 

@@ -1,4 +1,4 @@
-//! `hybridsim challenge seal | run | score`.
+//! `hybridsim challenge seal | run | twins | score`.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -10,7 +10,9 @@ use crate::{
     challenge::{
         ChallengeConfig,
         answer::{self, RunConfig},
+        score,
         seal::{self, Shard},
+        twins,
     },
     error::{Error, Result},
 };
@@ -27,6 +29,10 @@ enum Step {
     Seal(Seal),
     /// Have every case diagnosed by a process that cannot see the truth
     Run(Run),
+    /// Diagnose every scene once more without its effects, for what a perfect diagnosis would be left with
+    Twins(Twins),
+    /// Open the truths, verify them, and hold the reports against them
+    Score(Score),
 }
 
 #[derive(Args)]
@@ -51,6 +57,40 @@ struct Run {
     /// Folder for the answers; a case that has one is skipped
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    how: How,
+}
+
+#[derive(Args)]
+struct Twins {
+    /// Folder of the challenge
+    challenge: PathBuf,
+    /// Folder of the answers, which must be complete: truths are opened
+    answers: PathBuf,
+    /// Folder for the twins' reports
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    how: How,
+}
+
+#[derive(Args)]
+struct Score {
+    /// Folder of the challenge
+    challenge: PathBuf,
+    /// Folder of the answers
+    answers: PathBuf,
+    /// Folder of the twins' reports; without it no recovered misfit is given
+    #[arg(long, value_name = "DIR")]
+    twins: Option<PathBuf>,
+    /// Folder for results.md, score.json and psychometric.png [default: ANSWERS/score]
+    #[arg(short, long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// How cases are diagnosed.
+#[derive(Args)]
+struct How {
     /// Only part i of n, such as 2/8
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<Shard>,
@@ -69,6 +109,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     match &arguments.step {
         Step::Seal(arguments) => seal(arguments, common),
         Step::Run(arguments) => answer(arguments, common),
+        Step::Twins(arguments) => twins(arguments, common),
+        Step::Score(arguments) => score(arguments, common),
     }
 }
 
@@ -92,18 +134,25 @@ fn seal(arguments: &Seal, common: &Common) -> Result<()> {
     Ok(())
 }
 
+impl How {
+    fn config(&self, common: &Common) -> Result<RunConfig> {
+        let program = match &self.program {
+            Some(program) => program.canonicalize().map_err(|source| Error::read(program, source))?,
+            None => std::env::current_exe().map_err(|source| Error::read("this program", source))?,
+        };
+        let sets = common.set.iter().flat_map(|set| ["--set".to_string(), set.clone()]);
+        Ok(RunConfig {
+            program,
+            arguments: ["--device".to_string(), common.device.clone()].into_iter().chain(sets).collect(),
+            shard: self.shard.unwrap_or(Shard::ALL),
+            most: self.most,
+            limit: Duration::from_secs(self.limit),
+        })
+    }
+}
+
 fn answer(arguments: &Run, common: &Common) -> Result<()> {
-    let program = match &arguments.program {
-        Some(program) => program.canonicalize().map_err(|source| Error::read(program, source))?,
-        None => std::env::current_exe().map_err(|source| Error::read("this program", source))?,
-    };
-    let config = RunConfig {
-        program,
-        arguments: vec!["--device".into(), common.device.clone()],
-        shard: arguments.shard.unwrap_or(Shard::ALL),
-        most: arguments.most,
-        limit: Duration::from_secs(arguments.limit),
-    };
+    let config = arguments.how.config(common)?;
     let progress = Progress::new("diagnosing", answer::waiting(&arguments.challenge, &arguments.out, &config)?, common.quiet);
     let answers = answer::run(&arguments.challenge, &arguments.out, &config, &mut |done| progress.set(done));
     progress.finish();
@@ -114,5 +163,27 @@ fn answer(arguments: &Run, common: &Common) -> Result<()> {
     } else {
         println!("not complete yet: the same command goes on");
     }
+    Ok(())
+}
+
+fn twins(arguments: &Twins, common: &Common) -> Result<()> {
+    let config = arguments.how.config(common)?;
+    let progress = Progress::new("twins", answer::waiting(&arguments.challenge, &arguments.out, &config)?, common.quiet);
+    let done = twins::run(&arguments.challenge, &arguments.answers, &arguments.out, &config, &mut |done| progress.set(done));
+    progress.finish();
+    println!("{} twins diagnosed in {}", done?, arguments.out.display());
+    Ok(())
+}
+
+fn score(arguments: &Score, common: &Common) -> Result<()> {
+    let count = crate::challenge::commitment::Commitment::read_all(&arguments.challenge)?.iter().map(|part| part.cases).sum();
+    let progress = Progress::new("scoring", count, common.quiet);
+    let scored = score::score(&arguments.challenge, &arguments.answers, arguments.twins.as_deref(), &|done| progress.set(done));
+    progress.finish();
+    let scored = scored?;
+    let out = arguments.out.clone().unwrap_or_else(|| arguments.answers.join("score"));
+    scored.write(&out)?;
+    println!("{}", scored.markdown());
+    println!("results: {}", out.join("results.md").display());
     Ok(())
 }
