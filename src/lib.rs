@@ -32,6 +32,8 @@ pub mod pictures;
 // why a recording and the simulator disagree
 pub mod diagnosis;
 pub mod config;
+// the proof on concealed data
+pub mod challenge;
 pub mod cli;
 
 pub use error::{Error, Result};

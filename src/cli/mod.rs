@@ -3,6 +3,7 @@
 //! Results go to standard output, progress and warnings to standard error. Exit status: 0 done, 1 failed,
 //! 2 wrong usage, configuration or input.
 
+mod challenge;
 mod check;
 mod device;
 mod diagnose;
@@ -79,6 +80,11 @@ enum Command {
     /// Says what physics was left out, where, how large and how sure, what it cannot tell apart, and how much better
     /// held-out data fit once it is modelled. Writes report.html for people and report.json for programs.
     Diagnose(diagnose::Arguments),
+    /// Prove the detective on concealed data: seal, run, score
+    ///
+    /// `seal` records cases by a secret and commits to their truths; `run` has each diagnosed by a process of its own
+    /// that cannot see them; `score` opens them and holds the reports against them.
+    Challenge(challenge::Arguments),
 }
 
 /// Where results go.
@@ -105,6 +111,7 @@ pub fn main() -> ExitCode {
         Command::Infer(arguments) => infer::run(arguments, &cli.common),
         Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
         Command::Diagnose(arguments) => diagnose::run(arguments, &cli.common),
+        Command::Challenge(arguments) => challenge::run(arguments, &cli.common),
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -31,6 +31,8 @@ pub enum WallLaw {
 pub struct Laws {
     pub body: Material,
     pub walls: WallLaw,
+    /// Of single boundaries, instead of `walls`.
+    pub wall_coefficients: [Option<f64>; 6],
     /// Power gain cos^q about boresight (y); 0: the same everywhere in front of the board.
     pub antenna_exponent: f64,
 }
@@ -62,8 +64,8 @@ impl Laws {
     }
 
     /// Factor of one mirror reflection at `cosine` from the wall's normal.
-    pub fn wall(&self, cosine: f64, wavenumber: f64) -> Complex64 {
-        match self.walls {
+    pub fn wall(&self, wall: Boundary, cosine: f64, wavenumber: f64) -> Complex64 {
+        match self.wall_coefficients[wall as usize].map_or(self.walls, WallLaw::Constant) {
             WallLaw::Constant(coefficient) => coefficient.into(),
             WallLaw::Fresnel(material) => material.reflection(cosine) * material.coherence(wavenumber, 2.0 * cosine),
         }
@@ -73,7 +75,7 @@ impl Laws {
     fn leg(&self, mirror: &Mirror, to_image: Vector, wavenumber: f64) -> Complex64 {
         let gain = self.antenna_gain(mirror.direction(scale(to_image, -1.0)));
         mirror.walls.iter().fold(gain.into(), |product: Complex64, wall: &Boundary| {
-            product * self.wall(to_image[wall.axis().0].abs(), wavenumber)
+            product * self.wall(*wall, to_image[wall.axis().0].abs(), wavenumber)
         })
     }
 

@@ -3,6 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, UnitSphere};
 
+use super::effects::Physiology;
 use super::skinning::Skinning;
 use super::timeline::{Interpolation, Timeline, Weights};
 use super::vector::{Vector, add, add_scaled, cross, dot, rotate, subtract, unit};
@@ -17,6 +18,8 @@ pub struct MovingBody {
     timeline: Timeline,
     /// `[vertex]`, metres along the vertex normal: how far the recorded surface is from the one that is handed out.
     displacement_m: Option<Vec<f64>>,
+    /// What the handed-out mesh does not do.
+    pub physiology: Physiology,
 }
 
 #[derive(Clone, Debug)]
@@ -36,7 +39,7 @@ impl MovingBody {
             Person::Meshes { vertices, .. } => Source::Meshes(vertices.clone()),
         };
         let timeline = Timeline::new(person.pose_times_s(), interpolation)?;
-        Ok(Self { source, faces: person.faces().to_vec(), timeline, displacement_m: None })
+        Ok(Self { source, faces: person.faces().to_vec(), timeline, displacement_m: None, physiology: Physiology::default() })
     }
 
     /// Moves the surface along its normals by a smooth random field of `rms_m`, the same in every pose:
@@ -77,6 +80,7 @@ impl MovingBody {
                 *vertex = add_scaled(*vertex, normal, step);
             }
         }
+        self.physiology.apply(&mut vertices, &self.faces, self.timeline.time_s(pose));
         vertices
     }
 }

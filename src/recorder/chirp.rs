@@ -69,6 +69,16 @@ impl Chirp {
         }
     }
 
+    /// Adds a path whose delay is `delay_s` at the middle sample and grows by `rate` seconds per second; exact.
+    pub fn add_moving(&self, signal: &mut [Complex64], amplitude: Complex64, delay_s: f64, rate: f64) {
+        let line = self.line(delay_s, rate);
+        for (n, value) in signal.iter_mut().enumerate() {
+            let u = n as f64 - (self.samples / 2) as f64;
+            let bend = line.bend_rad * (u / self.samples as f64).powi(2);
+            *value += amplitude * Complex64::cis(TAU * (line.turns + line.turns_per_sample * u).fract() + bend);
+        }
+    }
+
     /// Adds a path of constant delay to `signal` `[sample]`; exact.
     pub fn add_static(&self, signal: &mut [Complex64], amplitude: Complex64, delay_s: f64) {
         let line = self.line(delay_s, 0.0);
@@ -85,6 +95,20 @@ impl Chirp {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_moving_path_is_the_exact_phase_at_every_sample() {
+        let radar = Radar::mmmesh(1);
+        let chirp = Chirp::new(&radar);
+        let (delay, rate) = (2.0 * 3.0 / 299_792_458.0, 2.0 * 2.5 / 299_792_458.0);
+        let mut signal = vec![Complex64::ZERO; 256];
+        chirp.add_moving(&mut signal, Complex64::ONE, delay, rate);
+        for (sample, value) in signal.iter().enumerate() {
+            let time = radar.sample_time_s(sample);
+            let turns = chirp.exact_turns(time, delay + rate * (time - chirp.middle_s));
+            assert!((value - Complex64::cis(TAU * turns.fract())).norm() < 1e-5, "sample {sample}");
+        }
+    }
 
     #[test]
     fn the_line_is_the_exact_phase_of_a_delay_that_grows_linearly() {

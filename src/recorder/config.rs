@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, de};
 
+use super::effects::{Clock, EffectsConfig};
 use super::material::Material;
 use super::receiver::ReceiverConfig;
 use super::surface::SurfaceConfig;
@@ -114,7 +115,7 @@ pub struct RecorderConfig {
     pub interpolation: Interpolation,
     /// Honest error of the body model, root mean square.
     pub mesh_error_m: f64,
-    /// Effect: power gain cos^q of every antenna.
+    /// Effect: power gain cos^q of every antenna; `effects.antenna_pattern` says the same.
     pub antenna_exponent: f64,
     /// Without it nobody is in the room.
     pub empty: bool,
@@ -127,6 +128,7 @@ pub struct RecorderConfig {
     /// Effect.
     pub furniture: Vec<Reflector>,
     pub receiver: ReceiverConfig,
+    pub effects: EffectsConfig,
 }
 
 impl Default for RecorderConfig {
@@ -153,6 +155,7 @@ impl Default for RecorderConfig {
             walls: WallsConfig::default(),
             furniture: vec![],
             receiver: ReceiverConfig::default(),
+            effects: EffectsConfig::default(),
         }
     }
 }
@@ -163,7 +166,8 @@ impl RecorderConfig {
         let mut radar = self.radar.radar()?;
         radar.frames = self.frames.unwrap_or(radar.frames);
         radar.check("radar")?;
-        let person = if self.empty { None } else { Some(self.person.person(folder, &radar, &self.room)?) };
+        let person =
+            if self.empty { None } else { Some(self.person.person(folder, &radar, &self.room, &Clock::new(&self.effects))?) };
         let world = World {
             radar,
             room: self.room.clone(),
@@ -176,6 +180,7 @@ impl RecorderConfig {
             furniture: self.furniture.clone(),
             antenna_exponent: self.antenna_exponent,
             receiver: self.receiver,
+            effects: self.effects.clone(),
             seed: self.seed,
         };
         world.check()?;
@@ -194,20 +199,20 @@ impl RecorderConfig {
 }
 
 impl ActorConfig {
-    fn person(&self, folder: &Path, radar: &Radar, room: &Room) -> Result<Person> {
+    fn person(&self, folder: &Path, radar: &Radar, room: &Room, clock: &Clock) -> Result<Person> {
+        let (first_s, last_s) = clock.motion_span_s(radar);
         let model = match &self.body {
             Some(path) => read_body(folder.join(path))?,
             None => procedural::person(&procedural::subject(&self.subject)?)?,
         };
         let placement = self.placement.clone().unwrap_or_else(|| {
             // Without a floor the radar is on a table.
-            actions::placement(room.floor_m.unwrap_or(1.0), self.distance_m)
+            Placement { start_s: first_s, ..actions::placement(room.floor_m.unwrap_or(1.0), self.distance_m) }
         });
         let motion: Motion = match &self.motion {
             Some(path) => read_motion(folder.join(path), model.parents.len(), model.shape_directions.len())?.0,
             None => {
-                let end_s = (radar.frames - 1) as f64 * radar.frame_period_s + radar.frame_duration_s();
-                let duration_s = (end_s - placement.start_s).max(1.0 / self.rate_hz);
+                let duration_s = (last_s - placement.start_s).max(1.0 / self.rate_hz);
                 // All of the body's parameters are written, so that no reader has to guess the rest.
                 let mut betas = self.betas.clone();
                 betas.resize(betas.len().max(model.shape_directions.len()), 0.0);

@@ -23,6 +23,8 @@ pub struct NodeShares {
 pub struct Lanes {
     position: [[f64; BLOCK]; 3],
     velocity: [[f64; BLOCK]; 3],
+    /// Of both ways beyond the geometric path, metres.
+    extra: [f64; BLOCK],
     tx_delay: [f64; BLOCK],
     tx_rate: [f64; BLOCK],
     spread: [f64; BLOCK],
@@ -46,6 +48,7 @@ impl Lanes {
         Box::new(Self {
             position: [[0.0; BLOCK]; 3],
             velocity: [[0.0; BLOCK]; 3],
+            extra: [0.0; BLOCK],
             tx_delay: [0.0; BLOCK],
             tx_rate: [0.0; BLOCK],
             spread: [0.0; BLOCK],
@@ -56,6 +59,14 @@ impl Lanes {
             between: [0.0; BLOCK],
             weights: [[0.0; 2 * ORDERS]; BLOCK],
         })
+    }
+
+    /// Extra paths of the block's elements, one way.
+    pub fn delay(&mut self, extra_m: impl Iterator<Item = f64>) {
+        self.extra.fill(0.0);
+        for (own, extra) in self.extra.iter_mut().zip(extra_m) {
+            *own = 2.0 * extra;
+        }
     }
 
     /// Positions and velocities; `poses[pose][axis][element]`, the block starting at `start`, `count` long.
@@ -101,7 +112,7 @@ impl Lanes {
     pub fn transmit(&mut self, antenna: Vector) {
         for i in 0..BLOCK {
             let (distance, rate) = self.leg(antenna, i);
-            self.tx_delay[i] = distance;
+            self.tx_delay[i] = distance + self.extra[i];
             self.tx_rate[i] = rate;
             self.spread[i] = 1.0 / distance;
         }

@@ -59,6 +59,8 @@ pub struct Receiver {
     /// Standard deviation per component, codes.
     pub noise_codes: f64,
     pub adc: bool,
+    /// Whether there is a rail.
+    pub clips: bool,
     pub rail: f64,
 }
 
@@ -83,16 +85,25 @@ impl Receiver {
         }
     }
 
-    /// From the field at the antennas, `[tx, rx, loop, sample]`, to what is written.
-    pub fn receive(&self, field: &[Complex64], dims: [usize; 4], rng: &mut ChaCha8Rng) -> IfFrame {
-        let mut value = |ideal: f64| {
+    /// White noise, codes; without quadrature the imaginary parts are zero.
+    pub fn noise(&self, count: usize, rng: &mut ChaCha8Rng) -> Vec<Complex64> {
+        let mut value = || -> f64 {
             let noise: f64 = if self.noise_codes > 0.0 { StandardNormal.sample(rng) } else { 0.0 };
-            let value = ideal + self.noise_codes * noise;
-            if self.adc { value.round().clamp(-self.rail - 1.0, self.rail) as f32 } else { value as f32 }
+            self.noise_codes * noise
+        };
+        let quadrature = self.sampling == Sampling::Complex;
+        (0..count).map(|_| Complex64::new(value(), if quadrature { value() } else { 0.0 })).collect()
+    }
+
+    /// From the field, `[tx, rx, loop, sample]`, and the noise, codes, to what is written.
+    pub fn convert(&self, field: &[Complex64], noise: &[Complex64], dims: [usize; 4]) -> IfFrame {
+        let value = |value: f64| {
+            let clipped = if self.clips { value.clamp(-self.rail - 1.0, self.rail) } else { value };
+            if self.adc { clipped.round() as f32 } else { clipped as f32 }
         };
         let (mut re, mut im) = (Vec::with_capacity(field.len()), Vec::new());
-        for &sample in field {
-            let scaled = sample * self.gain;
+        for (sample, noise) in field.iter().zip(noise) {
+            let scaled = sample * self.gain + noise;
             re.push(value(scaled.re));
             if self.sampling == Sampling::Complex {
                 im.push(value(scaled.im));
@@ -159,7 +170,11 @@ mod tests {
     use super::*;
 
     fn receiver(adc: bool, noise_codes: f64, sampling: Sampling) -> Receiver {
-        Receiver { sampling, gain: Complex64::new(1000.0, 0.0), noise_codes, adc, rail: 32767.0 }
+        Receiver { sampling, gain: Complex64::new(1000.0, 0.0), noise_codes, adc, clips: adc, rail: 32767.0 }
+    }
+
+    fn receive(receiver: &Receiver, field: &[Complex64], dims: [usize; 4], rng: &mut ChaCha8Rng) -> IfFrame {
+        receiver.convert(field, &receiver.noise(field.len(), rng), dims)
     }
 
     fn field_of(frame: &IfFrame) -> Vec<Complex64> {
@@ -170,7 +185,7 @@ mod tests {
     #[test]
     fn codes_are_rounded_and_clipped_at_the_rail() {
         let field = [Complex64::new(1.2344, -0.0006), Complex64::new(40.0, -40.0)];
-        let receive = |sampling| receiver(true, 0.0, sampling).receive(&field, [1, 1, 1, 2], &mut ChaCha8Rng::seed_from_u64(0));
+        let receive = |sampling| receive(&receiver(true, 0.0, sampling), &field, [1, 1, 1, 2], &mut ChaCha8Rng::seed_from_u64(0));
         let codes = receive(Sampling::Complex);
         assert_eq!((codes.re, codes.im), (vec![1234.0, 32767.0], Some(vec![-1.0, -32768.0])));
         let codes = receive(Sampling::Real);
@@ -181,7 +196,7 @@ mod tests {
     fn noise_has_the_power_that_was_asked_for_and_is_white() {
         let receiver = receiver(false, 3.0, Sampling::Complex);
         let noise =
-            field_of(&receiver.receive(&vec![Complex64::ZERO; 64 * 64], [1, 1, 64, 64], &mut ChaCha8Rng::seed_from_u64(5)));
+            field_of(&receive(&receiver, &vec![Complex64::ZERO; 64 * 64], [1, 1, 64, 64], &mut ChaCha8Rng::seed_from_u64(5)));
         let power: f64 = noise.iter().map(|v| v.norm_sqr()).sum::<f64>() / noise.len() as f64;
         assert!((power / 18.0 - 1.0).abs() < 0.05, "{power}");
         let lag: f64 = noise.windows(2).map(|pair| (pair[0] * pair[1].conj()).re).sum::<f64>() / noise.len() as f64;
@@ -203,7 +218,7 @@ mod tests {
             let mut rng = ChaCha8Rng::seed_from_u64(1);
             for _ in 0..20 {
                 let silence = vec![Complex64::ZERO; loops * samples];
-                let noise = field_of(&receiver.receive(&silence, [1, 1, loops, samples], &mut rng));
+                let noise = field_of(&receive(&receiver, &silence, [1, 1, loops, samples], &mut rng));
                 let map = range_doppler_power(&noise, samples);
                 floor += map.iter().sum::<f64>() / map.len() as f64 / 20.0;
             }

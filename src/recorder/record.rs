@@ -3,16 +3,14 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::amplitude::{Laws, WallLaw};
-use super::body::{MovingBody, smooth_field};
-use super::mirror::Mirror;
+use super::effects::{Chain, Mover, Signal, Stage, Stages, codes, movers, shape_noise, twice_bounced, vibration};
+use super::paths::{Paths, body_scatter};
 use super::receiver::{Receiver, noise_for_snr, rail, random_phase};
-use super::scatter::Scatter;
-use super::surface::elements;
-use super::surroundings::static_signal;
+use super::scatter::{Scatter, widened};
 use super::world::{Draw, World};
 use crate::data::{IfFrame, IfLayout};
 use crate::error::Result;
+use crate::radar::Radar;
 
 /// Frames that are in memory together.
 const MOST_AT_ONCE: usize = 16;
@@ -22,9 +20,16 @@ const PREVIEWS: usize = 6;
 /// Records one world, frame by frame. Equal worlds give equal samples, on any number of threads.
 pub struct Recorder {
     world: World,
-    scatter: Option<Scatter>,
-    /// `[tx, rx, sample]`
-    surroundings: Vec<Complex64>,
+    stages: Stages,
+    paths: Paths,
+    /// The board as a receiver, and as a transmitter (R6).
+    board: Option<[(Paths, Radar); 2]>,
+    movers: Vec<Mover>,
+    /// The peak sample before the receiver, without effects of the receiver: what relative levels are relative to.
+    peak: f64,
+    chain: Chain,
+    /// That nobody knows; the mixer comes before what may be wrong with its two outputs.
+    phase: Complex64,
     receiver: Receiver,
 }
 
@@ -32,15 +37,39 @@ impl Recorder {
     /// Prepares everything that all frames share.
     pub fn new(world: &World) -> Result<Self> {
         world.check()?;
-        let laws = Laws {
-            body: world.skin,
-            walls: world.walls.image_coefficient.map_or(WallLaw::Fresnel(world.walls.material), WallLaw::Constant),
-            antenna_exponent: world.antenna_exponent,
+        let stages = Stages::new(world);
+        let scatter = body_scatter(world, &stages, &stages.radar)?;
+        let previews = preview_frames(world, scatter.is_some());
+        let body = |frame: usize| -> Result<Signal> {
+            let mut signal = Signal::zero(frame, &stages.wide, 1);
+            if let Some(scatter) = &scatter {
+                signal.values = super::paths::body_values(scatter, frame, 1)?;
+            }
+            Ok(signal)
         };
-        let scatter = world.person.is_some().then(|| body_scatter(world, laws)).transpose()?;
-        let surroundings = static_signal(world, &laws);
-        let receiver = settle_receiver(world, scatter.as_ref(), &surroundings)?;
-        Ok(Self { world: world.clone(), scatter, surroundings, receiver })
+        let bodies = previews.iter().map(|&frame| body(frame)).collect::<Result<Vec<Signal>>>()?;
+        let mut level = bodies.iter().map(Signal::root_mean_square).fold(0.0, f64::max);
+        let mut paths = Paths::new(world, scatter, &stages.wide, level)?;
+        if level == 0.0 {
+            level = largest(paths.surroundings.still());
+            paths = Paths::new(world, paths.scatter, &stages.wide, level)?;
+        }
+        let movers = movers(world, paths.scatter.as_ref().map(|scatter| &scatter.body), level)?;
+        let board = if world.effects.object_radar_object.is_some() { Some(board_paths(world, &stages, level)?) } else { None };
+        let chain = stages.chain(world, 0.0);
+        let receiver = Receiver {
+            sampling: world.radar.sampling,
+            gain: Complex64::ONE,
+            noise_codes: 0.0,
+            adc: world.receiver.adc,
+            clips: world.receiver.adc,
+            rail: rail(&world.radar),
+        };
+        let unknown = || random_phase(&mut world.random(Draw::Gain));
+        let phase = if world.receiver.unknown_phase { unknown() } else { Complex64::ONE };
+        let mut recorder = Self { world: world.clone(), stages, paths, board, movers, peak: 0.0, chain, phase, receiver };
+        recorder.settle(&bodies)?;
+        Ok(recorder)
     }
 
     pub fn world(&self) -> &World {
@@ -49,32 +78,76 @@ impl Recorder {
 
     /// The body as the fast path and the reference see it; none in an empty room.
     pub fn scatter(&self) -> Option<&Scatter> {
-        self.scatter.as_ref()
+        self.paths.scatter.as_ref()
     }
 
-    /// Field at the receiving antennas before the receiver, `[tx, rx, loop, sample]`.
+    /// What the effects have prepared.
+    pub fn stages(&self) -> &Stages {
+        &self.stages
+    }
+
+    /// The peak sample that relative levels are relative to, in the unit of [`Recorder::field`].
+    pub fn peak(&self) -> f64 {
+        self.peak
+    }
+
+    /// The IF before noise and converter, `[tx, rx, loop, sample]`, in units of the transmitted wave.
     pub fn field(&self, frame: usize) -> Result<Vec<Complex64>> {
-        let radar = &self.world.radar;
-        let (loops, samples) = (radar.loops_per_frame, radar.samples_per_chirp);
-        let mut field = match &self.scatter {
-            Some(scatter) => scatter.frame(frame)?,
-            None => vec![Complex64::ZERO; radar.dims()[1..].iter().product()],
+        let body = self.paths.body(frame, &self.stages.wide, self.world.radar.loops_per_frame)?;
+        Ok(self.received(body)?.values)
+    }
+
+    /// All paths, wide, for a body that is there already.
+    fn all_paths(&self, mut signal: Signal) -> Result<Signal> {
+        self.stages.multibounce(&self.world.effects, &mut signal);
+        self.paths.add_surroundings(&self.stages, &mut signal)?;
+        Ok(signal)
+    }
+
+    /// From the body's wide signal to the converter's input.
+    fn received(&self, body: Signal) -> Result<Signal> {
+        let (frame, loops) = (body.frame, body.loops);
+        let mut signal = self.all_paths(body)?;
+        let swing = vibration(&self.world);
+        let chirp = super::chirp::Chirp::new(&self.stages.wide);
+        let stage = Stage {
+            radar: &self.stages.radar,
+            chirp: &chirp,
+            clock: &self.stages.clock,
+            body: self.paths.scatter.as_ref().map(|scatter| &scatter.body),
+            vibration: swing.as_ref(),
         };
-        for (channel, still) in field.chunks_exact_mut(loops * samples).zip(self.surroundings.chunks_exact(samples)) {
-            for chirp in channel.chunks_exact_mut(samples) {
-                for (value, echo) in chirp.iter_mut().zip(still) {
-                    *value += echo;
-                }
-            }
+        self.movers.iter().try_for_each(|mover| mover.add(&stage, &mut signal))?;
+        if let (Some([out, back]), Some(effect)) = (&self.board, &self.world.effects.object_radar_object)
+            && self.peak > 0.0
+        {
+            let beam = |(paths, wide): &(Paths, Radar)| -> Result<Signal> {
+                let mut beam = paths.body(frame, wide, loops)?;
+                paths.add_surroundings(&self.stages, &mut beam)?;
+                Ok(beam)
+            };
+            let factor = effect.coefficient / self.peak;
+            let again = twice_bounced(&beam(out)?, &beam(back)?, &self.stages.radar, &self.stages.resampler, factor);
+            signal.values.iter_mut().zip(again.values).for_each(|(value, bounce)| *value += bounce);
         }
-        Ok(field)
+        let mut signal = self.stages.apply(&self.world, self.peak, signal);
+        signal.values.iter_mut().for_each(|value| *value *= self.phase);
+        self.chain.apply(&self.world, &mut signal);
+        Ok(signal)
     }
 
     /// What the receiver makes of a frame.
     pub fn frame(&self, frame: usize) -> Result<IfFrame> {
         let [_, tx, rx, loops, samples] = self.world.radar.dims();
         let mut rng = self.world.random(Draw::Noise { frame });
-        Ok(self.receiver.receive(&self.field(frame)?, [tx, rx, loops, samples], &mut rng))
+        let field = self.field(frame)?;
+        let mut noise = Signal { frame, tx, rx, loops, samples, values: self.receiver.noise(field.len(), &mut rng) };
+        if self.receiver.noise_codes > 0.0 {
+            shape_noise(&self.world, self.receiver.noise_codes, &mut noise);
+        }
+        let mut written = self.receiver.convert(&field, &noise.values, [tx, rx, loops, samples]);
+        codes(&self.world, frame, &mut written);
+        Ok(written)
     }
 
     /// All frames in order, several at a time on all cores. A frame that cannot be recorded ends the sequence with its error.
@@ -90,6 +163,62 @@ impl Recorder {
     pub fn layout(&self) -> IfLayout {
         self.receiver.layout()
     }
+
+    /// Scales the strongest sample to a part of full scale and finds the noise for the signal-to-noise ratio.
+    fn settle(&mut self, bodies: &[Signal]) -> Result<()> {
+        let (world, guard) = (self.world.clone(), self.stages.guard());
+        let (radar, config) = (&world.radar, &world.receiver);
+        let mut peak: f64 = 0.0;
+        for body in bodies {
+            peak = peak.max(self.all_paths(body.clone())?.cropped(guard).peak());
+        }
+        self.peak = peak;
+        self.chain = self.stages.chain(&world, peak);
+        let mut strongest: f64 = 0.0;
+        for body in bodies {
+            strongest = strongest.max(self.received(body.clone())?.peak());
+        }
+        let noise = if !config.noise {
+            0.0
+        } else if self.paths.scatter.is_some() {
+            let body = self.paths.body(0, &self.stages.wide, radar.loops_per_frame)?;
+            noise_for_snr(&body.cropped(guard).values, radar, config.snr_db)
+        } else {
+            // Without a body the ratio is to what stands still.
+            let still = self.paths.surroundings.still().chunks_exact(self.stages.wide.samples_per_chirp);
+            let window = still.map(|chirp| &chirp[guard..guard + radar.samples_per_chirp]);
+            let chirps: Vec<Complex64> = window.flat_map(|chirp| chirp.repeat(radar.loops_per_frame)).collect();
+            noise_for_snr(&chirps, radar, config.snr_db)
+        };
+        let saturation = world.effects.adc_saturation.as_ref().map(|saturation| saturation.level);
+        let fraction = saturation.unwrap_or(config.peak_fraction);
+        let scale = if strongest > 0.0 { fraction * rail(radar) / strongest } else { 1.0 };
+        self.receiver.gain = scale.into();
+        self.receiver.noise_codes = noise * scale;
+        self.receiver.clips = config.adc || saturation.is_some();
+        Ok(())
+    }
+}
+
+fn largest(signal: &[Complex64]) -> f64 {
+    signal.iter().map(|value| value.re.abs().max(value.im.abs())).fold(0.0, f64::max)
+}
+
+fn preview_frames(world: &World, moving: bool) -> Vec<usize> {
+    let frames = world.radar.frames;
+    let count = if moving || !world.effects.is_off() { PREVIEWS.min(frames) } else { 1 };
+    (0..count).map(|preview| preview * (frames - 1) / (count - 1).max(1)).collect()
+}
+
+/// The scene as an antenna at the array's reference receives it, and as it is received from one there.
+fn board_paths(world: &World, stages: &Stages, level: f64) -> Result<[(Paths, Radar); 2]> {
+    let received = Radar { rx_m: vec![[0.0; 3]], ..stages.radar.clone() };
+    let sent = Radar { tx_m: vec![[0.0; 3]; stages.radar.tx_m.len()], ..stages.radar.clone() };
+    let paths = |radar: Radar| -> Result<(Paths, Radar)> {
+        let wide = widened(&radar, stages.guard());
+        Ok((Paths::new(world, body_scatter(world, stages, &radar)?, &wide, level)?, wide))
+    };
+    Ok([paths(received)?, paths(sent)?])
 }
 
 /// All frames of a world; `progress` hears how many of how many are done.
@@ -97,50 +226,4 @@ pub fn record(world: &World, progress: &mut dyn FnMut(usize, usize)) -> Result<V
     let recorder = Recorder::new(world)?;
     let frames = recorder.frames().enumerate();
     frames.map(|(frame, samples)| samples.inspect(|_| progress(frame + 1, world.radar.frames))).collect()
-}
-
-fn body_scatter(world: &World, laws: Laws) -> Result<Scatter> {
-    let Some(person) = &world.person else { unreachable!("asked for only with a person") };
-    let mut body = MovingBody::new(person, world.interpolation)?;
-    body.displace(world.mesh_error_m, &mut world.random(Draw::MeshError));
-    let surface = &world.surface;
-    let mut variation = smooth_field(body.rest(), surface.variation_scale_m, &mut world.random(Draw::Reflectivity));
-    variation.iter_mut().for_each(|db| *db *= surface.variation_db);
-    let elements = elements(body.rest(), &body.faces, &variation, surface, &mut world.random(Draw::Elements));
-    let mut scatter = Scatter::new(&world.radar, body, elements, surface.smoothing, laws);
-    scatter.mirrors = Mirror::images(&world.room, &world.image_walls(), world.walls.images);
-    scatter.order = world.walls.images;
-    Ok(scatter)
-}
-
-/// Scales the strongest sample to a part of full scale and finds the noise for the signal-to-noise ratio.
-fn settle_receiver(world: &World, scatter: Option<&Scatter>, surroundings: &[Complex64]) -> Result<Receiver> {
-    let (radar, config) = (&world.radar, &world.receiver);
-    let samples = radar.samples_per_chirp;
-    let largest = |signal: &[Complex64]| signal.iter().map(|value| value.re.abs().max(value.im.abs())).fold(0.0, f64::max);
-    let mut peak = largest(surroundings);
-    if let Some(scatter) = scatter {
-        let count = PREVIEWS.min(radar.frames);
-        for preview in 0..count {
-            let frame = preview * (radar.frames - 1) / (count - 1).max(1);
-            let mut first = scatter.first_loop(frame)?;
-            for (chirp, still) in first.chunks_exact_mut(samples).zip(surroundings.chunks_exact(samples)) {
-                chirp.iter_mut().zip(still).for_each(|(value, echo)| *value += echo);
-            }
-            peak = peak.max(largest(&first));
-        }
-    }
-    let noise = match scatter {
-        Some(scatter) if config.noise => noise_for_snr(&scatter.frame(0)?, radar, config.snr_db),
-        // Without a body the ratio is to what stands still.
-        None if config.noise => {
-            let chirps: Vec<Complex64> =
-                surroundings.chunks_exact(samples).flat_map(|chirp| chirp.repeat(radar.loops_per_frame)).collect();
-            noise_for_snr(&chirps, radar, config.snr_db)
-        }
-        _ => 0.0,
-    };
-    let scale = if peak > 0.0 { config.peak_fraction * rail(radar) / peak } else { 1.0 };
-    let phase = if config.unknown_phase { random_phase(&mut world.random(Draw::Gain)) } else { Complex64::ONE };
-    Ok(Receiver { sampling: radar.sampling, gain: phase * scale, noise_codes: noise * scale, adc: config.adc, rail: rail(radar) })
 }

@@ -8,15 +8,17 @@ use rayon::prelude::*;
 use super::amplitude::{Laws, View};
 use super::body::MovingBody;
 use super::chirp::Chirp;
+use super::effects::{Clock, Swing};
 use super::lanes::{BLOCK, ChirpWeights, Lanes, NODES, NodeShares};
 use super::mirror::Mirror;
 use super::range_grid::{RangeGrid, ToneWeights};
 use super::surface::{Element, Pose};
 use super::timeline::Weights;
-use super::vector::{Vector, add_scaled, distance};
+use super::vector::{Vector, add, add_scaled, distance};
 use super::visibility::Obstacle;
 use crate::error::Result;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
+use crate::room::Boundary;
 
 /// Amplitudes are evaluated at four instants that span no more than this, and interpolated between them.
 const AMPLITUDE_SPAN_S: f64 = 7.0e-3;
@@ -33,6 +35,11 @@ pub struct Scatter {
     pub mirrors: Vec<Mirror>,
     /// Up to how many wall reflections a path has on its two legs together.
     pub order: usize,
+    /// Of them in each boundary.
+    pub limits: [usize; 6],
+    pub clock: Clock,
+    /// Of the antennas.
+    pub vibration: Option<Swing>,
     chirp: Chirp,
     grid: RangeGrid,
 }
@@ -53,11 +60,29 @@ struct FrameScene {
     lit: Vec<Lit>,
 }
 
+/// One sample of one chirp.
+struct Moment {
+    chirp: usize,
+    time_s: f64,
+    ramp_s: f64,
+}
+
+/// The radar with `guard` more samples before and after its window.
+pub fn widened(radar: &Radar, guard: usize) -> Radar {
+    Radar {
+        samples_per_chirp: radar.samples_per_chirp + 2 * guard,
+        adc_start_s: radar.adc_start_s - guard as f64 / radar.sample_rate_hz,
+        ..radar.clone()
+    }
+}
+
 impl Scatter {
-    pub fn new(radar: &Radar, body: MovingBody, elements: Vec<Element>, smoothing: f64, laws: Laws) -> Self {
+    /// Its signals have `guard` samples more at either end of every chirp.
+    pub fn new(radar: &Radar, guard: usize, body: MovingBody, elements: Vec<Element>, smoothing: f64, laws: Laws) -> Self {
+        let wide = widened(radar, guard);
         Self {
-            chirp: Chirp::new(radar),
-            grid: RangeGrid::new(radar.samples_per_chirp),
+            chirp: Chirp::new(&wide),
+            grid: RangeGrid::new(wide.samples_per_chirp),
             radar: radar.clone(),
             body,
             elements,
@@ -65,13 +90,26 @@ impl Scatter {
             laws,
             mirrors: vec![Mirror::none()],
             order: 0,
+            limits: [2; 6],
+            clock: Clock::default(),
+            vibration: None,
         }
     }
 
     /// Ramp start of the chirp that is the `index`th in time.
     fn chirp_time_s(&self, frame: usize, index: usize) -> f64 {
         let transmitters = self.radar.tx_m.len();
-        self.radar.chirp_time_s(frame, index % transmitters, index / transmitters)
+        self.clock.ramp_s(&self.radar, frame, index % transmitters, index / transmitters)
+    }
+
+    /// Poses and weights at a radar time.
+    fn weights(&self, time_s: f64) -> Result<Weights> {
+        self.body.weights(self.clock.motion_s(time_s))
+    }
+
+    /// Where the vibration has moved the antennas.
+    fn shake(&self, time_s: f64) -> Vector {
+        self.vibration.map_or([0.0; 3], |swing| swing.position(time_s))
     }
 
     fn chirps(&self) -> usize {
@@ -96,7 +134,8 @@ impl Scatter {
 
     /// From `[chirp in time, rx, sample]` to `[tx, rx, loop, sample]`.
     fn ordered(&self, signal: &[Complex64]) -> Vec<Complex64> {
-        let [_, transmitters, receivers, loops, samples] = self.radar.dims();
+        let [_, transmitters, receivers, loops, _] = self.radar.dims();
+        let samples = signal.len() / (transmitters * receivers * loops);
         let mut result = Vec::with_capacity(signal.len());
         for tx in 0..transmitters {
             for rx in 0..receivers {
@@ -112,7 +151,7 @@ impl Scatter {
     fn scene(&self, frame: usize) -> Result<FrameScene> {
         let start = self.chirp_time_s(frame, 0) + self.radar.sample_time_s(0);
         let end = self.chirp_time_s(frame, self.chirps() - 1) + self.radar.sample_time_s(self.radar.samples_per_chirp);
-        let (early, late) = (self.body.weights(start)?, self.body.weights(end)?);
+        let (early, late) = (self.weights(start)?, self.weights(end)?);
         let first_pose = early.iter().map(|&(pose, _)| pose).min().unwrap_or(0);
         let last_pose = late.iter().map(|&(pose, _)| pose).max().unwrap_or(0);
         let poses: Vec<Pose> = (first_pose..=last_pose)
@@ -120,7 +159,7 @@ impl Scatter {
             .map(|pose| Pose::new(self.body.pose(pose), &self.body.faces, self.smoothing))
             .collect();
         let mut scene = FrameScene { first_pose, poses, lit: vec![] };
-        let middle = self.pose_at(&scene, &self.body.weights(0.5 * (start + end))?);
+        let middle = self.pose_at(&scene, &self.weights(0.5 * (start + end))?);
         let obstacle = Obstacle::new(&middle, &self.body.faces, self.smoothing)?;
         let centre = self.radar.centre_m();
         let visible: Vec<Vec<bool>> =
@@ -139,8 +178,23 @@ impl Scatter {
         let count = self.mirrors.len();
         (0..count * count)
             .map(|pair| (pair / count, pair % count))
-            .filter(|&(tx, rx)| self.mirrors[tx].order() + self.mirrors[rx].order() <= self.order)
+            .filter(|&(tx, rx)| {
+                let walls = || self.mirrors[tx].walls.iter().chain(&self.mirrors[rx].walls);
+                let within = |wall: &Boundary| walls().filter(|other| *other == wall).count() <= self.limits[*wall as usize];
+                walls().count() <= self.order && walls().all(within)
+            })
             .collect()
+    }
+
+    /// The body in the middle of a chirp that starts at `time_s`.
+    pub fn pose(&self, time_s: f64) -> Result<Pose> {
+        let mut vertices = vec![[0.0; 3]; self.body.rest().len()];
+        for (pose, weight) in self.weights(time_s + self.chirp.middle_s)? {
+            for (sum, vertex) in vertices.iter_mut().zip(self.body.pose(pose)) {
+                *sum = add_scaled(*sum, vertex, weight);
+            }
+        }
+        Ok(Pose::new(vertices, &self.body.faces, self.smoothing))
     }
 
     fn positions(&self, pose: &Pose, elements: &[u32]) -> [Vec<f64>; 3] {
@@ -163,11 +217,11 @@ impl Scatter {
 
     /// Straight line that fits the motion in a chirp best: through the two Gauss points of the ADC window.
     fn chirp_weights(&self, scene: &FrameScene, time_s: f64) -> Result<ChirpWeights> {
-        let half = self.chirp.window_s / 12f64.sqrt();
+        let half = self.radar.samples_per_chirp as f64 / (self.radar.sample_rate_hz * 12f64.sqrt());
         let middle = time_s + self.chirp.middle_s;
         let mut poses: Vec<(usize, f64, f64)> = vec![];
         for (time, slope) in [(middle - half, -0.5 / half), (middle + half, 0.5 / half)] {
-            for (pose, weight) in self.body.weights(time)? {
+            for (pose, weight) in self.weights(time)? {
                 poses.push((pose - scene.first_pose, 0.5 * weight, slope * weight));
             }
         }
@@ -183,24 +237,26 @@ impl Scatter {
         let shares: Vec<NodeShares> = times.iter().map(|time| self.node_shares(time - first, last - first)).collect();
         let nodes: Vec<Pose> = (0..NODES)
             .map(|node| first + (last - first) * node as f64 / (NODES - 1) as f64)
-            .map(|time| Ok(self.pose_at(scene, &self.body.weights(time + self.chirp.middle_s)?)))
+            .map(|time| Ok(self.pose_at(scene, &self.weights(time + self.chirp.middle_s)?)))
             .collect::<Result<_>>()?;
         let mut storage = vec![0f32; chirps.len() * receivers * self.grid.storage()];
         let mut lanes = Lanes::new();
         for lit in &scene.lit {
             let (tx_mirror, rx_mirror) = (&self.mirrors[lit.tx], &self.mirrors[lit.rx]);
             let view = View::new(tx_mirror, rx_mirror, self.radar.centre_m());
-            let receivers_m: Vec<Vector> = (0..receivers).map(|rx| rx_mirror.point(self.radar.rx_position_m(rx))).collect();
             for start in (0..lit.elements.len()).step_by(BLOCK) {
                 let block = &lit.elements[start..(start + BLOCK).min(lit.elements.len())];
                 let amplitudes = self.amplitudes(block, &nodes, &view);
+                lanes.delay(block.iter().map(|&element| self.elements[element as usize].extra_m));
                 for (index, chirp) in chirps.clone().enumerate() {
-                    let transmitter = self.radar.tx_position_m(chirp % self.radar.tx_m.len());
+                    let shake = self.shake(times[index]);
+                    let transmitter = add(self.radar.tx_position_m(chirp % self.radar.tx_m.len()), shake);
                     lanes.place(&lit.positions, start, block.len(), &weights[index]);
                     lanes.weigh(&amplitudes, &shares[index]);
                     lanes.transmit(tx_mirror.point(transmitter));
                     let grids = storage.chunks_mut(self.grid.storage()).skip(index * receivers);
-                    for (&receiver, grid) in receivers_m.iter().zip(grids) {
+                    for (rx, grid) in (0..receivers).zip(grids) {
+                        let receiver = rx_mirror.point(add(self.radar.rx_position_m(rx), shake));
                         lanes.receive(receiver, block.len(), &self.chirp, &self.grid, grid);
                     }
                 }
@@ -237,8 +293,10 @@ impl Scatter {
     }
 
     /// The definition, slowly: every element at every sample, with its amplitude at that moment and frequency and the
-    /// true transmit phase. Only who is visible is fixed within the frame. `[tx, rx, loop, sample]`.
-    pub fn reference_frame(&self, frame: usize) -> Result<Vec<Complex64>> {
+    /// true transmit phase. Only who is visible is fixed within the frame. `[tx, rx, loop, sample]`, without guard samples.
+    ///
+    /// `extra_turns(chirp in time, time after the ramp's start, delay)` is what the oscillator adds to an ideal ramp.
+    pub fn reference_frame(&self, frame: usize, extra_turns: &(dyn Fn(usize, f64, f64) -> f64 + Sync)) -> Result<Vec<Complex64>> {
         let scene = self.scene(frame)?;
         let (receivers, samples) = (self.radar.rx_m.len(), self.radar.samples_per_chirp);
         let moments: Vec<(usize, usize)> = (0..self.chirps() * samples).map(|i| (i / samples, i % samples)).collect();
@@ -246,8 +304,10 @@ impl Scatter {
             .into_par_iter()
             .map(|(chirp, sample)| {
                 let ramp_s = self.radar.sample_time_s(sample);
-                let weights = self.body.weights(self.chirp_time_s(frame, chirp) + ramp_s)?;
-                Ok(self.reference_sample(&scene, &weights, chirp % self.radar.tx_m.len(), ramp_s))
+                let time_s = self.chirp_time_s(frame, chirp) + ramp_s;
+                let weights = self.weights(time_s)?;
+                let moment = Moment { chirp, time_s, ramp_s };
+                Ok(self.reference_sample(&scene, &weights, moment, extra_turns))
             })
             .collect::<Result<_>>()?;
         // [chirp, sample][rx] to [chirp, rx, sample]
@@ -260,7 +320,14 @@ impl Scatter {
         Ok(self.ordered(&signal))
     }
 
-    fn reference_sample(&self, scene: &FrameScene, weights: &Weights, transmitter: usize, ramp_s: f64) -> Vec<Complex64> {
+    fn reference_sample(
+        &self,
+        scene: &FrameScene,
+        weights: &Weights,
+        Moment { chirp, time_s, ramp_s }: Moment,
+        extra_turns: &(dyn Fn(usize, f64, f64) -> f64 + Sync),
+    ) -> Vec<Complex64> {
+        let (transmitter, shake) = (chirp % self.radar.tx_m.len(), self.shake(time_s));
         let pose = self.pose_at(scene, weights);
         let mut sums = vec![Complex64::ZERO; self.radar.rx_m.len()];
         let frequency_hz = self.chirp.middle_hz + self.chirp.slope_hz_per_s * (ramp_s - self.chirp.middle_s);
@@ -268,7 +335,7 @@ impl Scatter {
         for lit in &scene.lit {
             let (tx_mirror, rx_mirror) = (&self.mirrors[lit.tx], &self.mirrors[lit.rx]);
             let view = View::new(tx_mirror, rx_mirror, self.radar.centre_m());
-            let tx_m = tx_mirror.point(self.radar.tx_position_m(transmitter));
+            let tx_m = tx_mirror.point(add(self.radar.tx_position_m(transmitter), shake));
             for (position, &index) in lit.elements.iter().enumerate() {
                 let element = &self.elements[index as usize];
                 let patch = pose.patch(element, &self.body.faces, self.smoothing);
@@ -278,8 +345,9 @@ impl Scatter {
                 });
                 let to_tx = distance(point, tx_m);
                 for (rx, sum) in sums.iter_mut().enumerate() {
-                    let to_rx = distance(point, rx_mirror.point(self.radar.rx_position_m(rx)));
-                    let turns = self.chirp.exact_turns(ramp_s, (to_tx + to_rx) / SPEED_OF_LIGHT);
+                    let to_rx = distance(point, rx_mirror.point(add(self.radar.rx_position_m(rx), shake)));
+                    let delay = (to_tx + to_rx + 2.0 * element.extra_m) / SPEED_OF_LIGHT;
+                    let turns = self.chirp.exact_turns(ramp_s, delay) + extra_turns(chirp, ramp_s, delay);
                     *sum += amplitude * Complex64::cis(std::f64::consts::TAU * turns.fract()) / (to_tx * to_rx);
                 }
             }

@@ -82,6 +82,8 @@ pub struct Element {
     pub share: f64,
     /// Amplitude relative to the material's.
     pub reflectivity: f64,
+    /// One-way path beyond the geometric one, metres.
+    pub extra_m: f64,
     /// `None`: a point without extent.
     pub cell: Option<Cell>,
 }
@@ -137,7 +139,7 @@ pub fn elements(
         let parts = ((longest / config.edge_m).ceil() as usize).clamp(1, 4096);
         let make = |point: Vector, height_m: f64, share: f64, cell: Option<Cell>| {
             let db: f64 = (0..3).map(|i| point[i] * reflectivity_db[face[i]]).sum();
-            Element { face: index as u32, point, height_m, share, reflectivity: 10f64.powf(db / 20.0), cell }
+            Element { face: index as u32, point, height_m, share, reflectivity: 10f64.powf(db / 20.0), extra_m: 0.0, cell }
         };
         let share = 1.0 / (parts * parts) as f64;
         match config.returns {

@@ -39,6 +39,11 @@ impl Timeline {
         Ok(Self { times_s, interpolation })
     }
 
+    /// When a pose happens.
+    pub fn time_s(&self, pose: usize) -> f64 {
+        self.times_s[pose]
+    }
+
     /// Weights at one time, which must lie within the motion.
     pub fn weights(&self, time_s: f64) -> Result<Weights> {
         let times = &self.times_s;

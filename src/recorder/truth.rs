@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::effects;
 use super::surface::Returns;
 use super::world::World;
 use crate::room::Boundary;
@@ -27,9 +28,10 @@ pub fn truth(world: &World, action: Option<&str>) -> Value {
             "rcs_m2": thing.rcs_m2,
         }));
     }
-    if world.antenna_exponent > 0.0 {
+    if world.antenna_exponent > 0.0 && world.effects.antenna_pattern.is_none() {
         effects.push(json!({ "id": "antenna_exponent", "name": "antenna_pattern", "exponent": world.antenna_exponent }));
     }
+    effects.extend(effects::listed(world));
     json!({
         "action": action,
         "tier": if world.surface.returns == Returns::Random { "B" } else { "A" },

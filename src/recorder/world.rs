@@ -1,9 +1,10 @@
 //! Everything that a recording is made of, each part switched separately.
 
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
+use super::effects::EffectsConfig;
 use super::material::Material;
 use super::receiver::ReceiverConfig;
 use super::surface::SurfaceConfig;
@@ -79,6 +80,7 @@ pub struct World {
     /// Effect: power gain cos^q of every antenna.
     pub antenna_exponent: f64,
     pub receiver: ReceiverConfig,
+    pub effects: EffectsConfig,
     pub seed: u64,
 }
 
@@ -96,6 +98,7 @@ impl Default for World {
             furniture: vec![],
             antenna_exponent: 0.0,
             receiver: ReceiverConfig::default(),
+            effects: EffectsConfig::default(),
             seed: 0,
         }
     }
@@ -109,7 +112,14 @@ pub enum Draw {
     Elements,
     Clutter,
     Gain,
-    Noise { frame: usize },
+    Noise {
+        frame: usize,
+    },
+    /// What an effect draws in a frame.
+    Effect {
+        id: u64,
+        frame: usize,
+    },
 }
 
 impl World {
@@ -141,10 +151,16 @@ impl World {
             Draw::Clutter => 4,
             Draw::Gain => 5,
             Draw::Noise { frame } => 1000 + frame as u64,
+            Draw::Effect { id, frame } => ((1 + id) << 40) + frame as u64,
         };
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(stream);
         rng
+    }
+
+    /// A phase that an effect has, radians; `index` tells its instances apart.
+    pub fn phase(&self, id: u64, index: usize) -> f64 {
+        self.random(Draw::Effect { id, frame: (1 << 30) + index }).random_range(0.0..std::f64::consts::TAU)
     }
 
     pub fn check(&self) -> Result<()> {
@@ -152,6 +168,7 @@ impl World {
         self.room.check("room")?;
         self.surface.check("surface")?;
         self.receiver.check("receiver")?;
+        self.effects.check(self, "effects")?;
         if self.walls.images > 2 {
             return Err(Error::setting("walls.images", self.walls.images, "0, 1 or 2"));
         }

@@ -15,5 +15,8 @@ pub struct Suspect {
 }
 
 /// All of them. Each answers on its own, within its family; the selection chooses between families.
-pub const SUSPECTS: &[Suspect] = &[Suspect { name: "slow", find: slow::find }, Suspect { name: "vital", find: vital::find }];
-pub const SUSPECTS: &[Suspect] = &[Suspect { name: "paths", find: paths::find }];
+pub const SUSPECTS: &[Suspect] = &[
+    Suspect { name: "slow", find: slow::find },
+    Suspect { name: "vital", find: vital::find },
+    Suspect { name: "paths", find: paths::find },
+];

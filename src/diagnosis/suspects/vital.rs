@@ -90,8 +90,9 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     let channels = evidence.cube.channels();
     let bins = data.bins;
-    let mean: Vec<Complex64> =
-        (0..channels * bins).map(|i| training.iter().map(|&f| data.values[f][i]).sum::<Complex64>() / training.len() as f64).collect();
+    let mean: Vec<Complex64> = (0..channels * bins)
+        .map(|i| training.iter().map(|&f| data.values[f][i]).sum::<Complex64>() / training.len() as f64)
+        .collect();
     // Power of what changes over the noise, by range.
     let change: Vec<f64> = (0..bins)
         .map(|bin| {
@@ -110,7 +111,8 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     }
     let near = strongest.saturating_sub(NEIGHBOURS + 1)..(strongest + NEIGHBOURS + 2).min(bins);
     // A neighbour may be the cleaner circle: where other parts of the body are not at the same range.
-    let fits: Vec<Reflector> = near.filter(|&bin| change[bin] > 10.0).filter_map(|bin| reflector(&data, &mean, bin, training)).collect();
+    let fits: Vec<Reflector> =
+        near.filter(|&bin| change[bin] > 10.0).filter_map(|bin| reflector(&data, &mean, bin, training)).collect();
     let share = |r: &Reflector| {
         let left: f64 = r.variance.iter().sum();
         r.amplitude.iter().map(|a| a.norm_sqr()).sum::<f64>() / left
@@ -173,10 +175,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
             None => "which is no breathing's",
         }
     );
-    let region = Region {
-        range: [ends[0].saturating_sub(1) as f64, (ends[1] + 1) as f64],
-        doppler: [-1.0, 1.0],
-    };
+    let region = Region { range: [ends[0].saturating_sub(1) as f64, (ends[1] + 1) as f64], doppler: [-1.0, 1.0] };
     let still = evidence.still().to_vec();
     let energy: f64 = change.iter().map(|c| (c - 1.0).max(0.0)).sum::<f64>()
         * data.noise.iter().sum::<f64>()
@@ -224,10 +223,8 @@ fn reflector(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize]) 
         .iter()
         .enumerate()
         .map(|(i, &cell)| {
-            let product: Complex64 = training
-                .iter()
-                .map(|&f| (data.values[f][cell] - still[i]) * (data.values[f][reference] - still[0]).conj())
-                .sum();
+            let product: Complex64 =
+                training.iter().map(|&f| (data.values[f][cell] - still[i]) * (data.values[f][reference] - still[0]).conj()).sum();
             let power: f64 = training.iter().map(|&f| (data.values[f][reference] - still[0]).norm_sqr()).sum();
             product / power.max(f64::MIN_POSITIVE)
         })
@@ -251,8 +248,7 @@ fn reflector(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize]) 
             return None;
         }
         for (i, &cell) in cells.iter().enumerate() {
-            let product =
-                training.iter().map(|&f| data.values[f][cell] * (turned[f] - centre).conj()).sum::<Complex64>() / count;
+            let product = training.iter().map(|&f| data.values[f][cell] * (turned[f] - centre).conj()).sum::<Complex64>() / count;
             amplitude[i] = product / spread;
             still[i] = mean[cell] - amplitude[i] * centre;
         }
@@ -261,7 +257,8 @@ fn reflector(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize]) 
         .iter()
         .enumerate()
         .map(|(i, &cell)| {
-            let left: f64 = training.iter().map(|&f| (data.values[f][cell] - still[i] - amplitude[i] * turned[f]).norm_sqr()).sum();
+            let left: f64 =
+                training.iter().map(|&f| (data.values[f][cell] - still[i] - amplitude[i] * turned[f]).norm_sqr()).sum();
             (left / training.len() as f64).max(data.noise[i])
         })
         .collect();
@@ -300,7 +297,11 @@ struct Rhythm {
 fn rhythm(times: &[f64], phase: &[f64], training: &[usize], held_out: &[usize]) -> Option<Rhythm> {
     let duration = times[times.len() - 1] - times[0];
     let interval = duration / (times.len() - 1) as f64;
-    let frames: Vec<usize> = { let mut all = [training, held_out].concat(); all.sort_unstable(); all };
+    let frames: Vec<usize> = {
+        let mut all = [training, held_out].concat();
+        all.sort_unstable();
+        all
+    };
     let lowest = (FEWEST_PERIODS / duration).max(0.5 * BREATHING_HZ[0]);
     let highest = HEART_HZ[1].min(0.4 / interval);
     // A straight line is the body's slow sway.
@@ -332,7 +333,8 @@ fn rhythm(times: &[f64], phase: &[f64], training: &[usize], held_out: &[usize]) 
         return None;
     }
     let total = fit(None).0;
-    let best = (0..=steps as usize).map(|i| lowest + i as f64 * step).min_by(|a, b| fit(Some(*a)).0.total_cmp(&fit(Some(*b)).0))?;
+    let best =
+        (0..=steps as usize).map(|i| lowest + i as f64 * step).min_by(|a, b| fit(Some(*a)).0.total_cmp(&fit(Some(*b)).0))?;
     let mut frequency_hz = best;
     let mut width = 0.5 * step;
     while width > 1e-3 * step {

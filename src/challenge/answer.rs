@@ -1,0 +1,209 @@
+//! Has every case diagnosed by a process of its own, which is shown a copy of the case and nothing else.
+//!
+//! Only `commitment*.json` and `cases/` are opened here, never `sealed/`: a challenge whose sealed folder was moved to
+//! another machine is answered just the same. A process that crashes, takes too long or leaves a report that is none has
+//! failed, and the failure stands; who wants it repeated removes its folder.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::commitment::{Commitment, canonical, hash_file, joint_root, read_json, sha256};
+use super::report::Report;
+use super::seal::Shard;
+use crate::data::atomic::{AtomicFolder, write_text};
+use crate::error::{Error, Result};
+
+/// How the cases are to be diagnosed.
+#[derive(Clone, Debug)]
+pub struct RunConfig {
+    /// Called as `PROGRAM diagnose CASE --out FOLDER --quiet`, then `arguments`.
+    pub program: PathBuf,
+    pub arguments: Vec<String>,
+    pub shard: Shard,
+    /// Cases to diagnose now; those with an answer do not count.
+    pub most: Option<usize>,
+    /// Longest time for one case.
+    pub limit: Duration,
+}
+
+/// `answers.json`: to be published before the truths are opened.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Answers {
+    pub format: i64,
+    /// Root of what was committed to.
+    pub challenge: String,
+    /// Of the program that diagnosed.
+    pub program_sha256: String,
+    /// Whether every case has an answer or a failure.
+    pub complete: bool,
+    /// Name of the case → SHA-256 of its report.
+    pub reports: BTreeMap<String, String>,
+    /// Name of the case → what went wrong.
+    pub failures: BTreeMap<String, String>,
+    /// Of all the above, as canonical JSON.
+    pub sha256: String,
+}
+
+/// `failure.json`.
+#[derive(Serialize, Deserialize)]
+struct Failure {
+    reason: String,
+}
+
+impl Answers {
+    fn digest(&self) -> String {
+        let mut value = serde_json::to_value(self).expect("plain data");
+        value.as_object_mut().expect("a struct").remove("sha256");
+        sha256(canonical(&value))
+    }
+
+    /// Reads the answers and holds them against their own hash and the reports against theirs.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let path = folder.join("answers.json");
+        let answers: Self = read_json(&path)?;
+        if answers.digest() != answers.sha256 {
+            return Err(Error::field(&path, "sha256", "not the hash of the answers", "untouched answers"));
+        }
+        for (name, hash) in &answers.reports {
+            if hash_file(&folder.join(name).join("report.json"))? != *hash {
+                return Err(Error::Usage {
+                    message: format!("case {name}: its report is not the one that was committed to"),
+                    hint: Some("the answers were changed after the run; nothing is scored".into()),
+                });
+            }
+        }
+        Ok(answers)
+    }
+}
+
+/// Diagnoses what has no answer yet and writes `answers.json`. `progress` hears how many are done.
+pub fn run(challenge: &Path, out: &Path, config: &RunConfig, progress: &mut dyn FnMut(usize)) -> Result<Answers> {
+    let commitments = Commitment::read_all(challenge)?;
+    let names: Vec<&String> = commitments.iter().flat_map(|commitment| commitment.leaves.keys()).collect();
+    fs::create_dir_all(out).map_err(|source| Error::write(out, source))?;
+    let mut done = 0;
+    for name in names.iter().enumerate().filter(|(index, _)| config.shard.holds(*index)).map(|(_, name)| name) {
+        if answered(&out.join(name)) {
+            continue;
+        }
+        if config.most.is_some_and(|most| done >= most) {
+            break;
+        }
+        diagnose(&challenge.join("cases").join(name), &out.join(name), config)?;
+        done += 1;
+        progress(done);
+    }
+    gather(&names, out, &commitments, &config.program)
+}
+
+/// Cases of this shard that have no answer yet.
+pub fn waiting(challenge: &Path, out: &Path, config: &RunConfig) -> Result<usize> {
+    let commitments = Commitment::read_all(challenge)?;
+    let names = commitments.iter().flat_map(|commitment| commitment.leaves.keys());
+    let open = names.enumerate().filter(|(index, name)| config.shard.holds(*index) && !answered(&out.join(name))).count();
+    Ok(config.most.map_or(open, |most| open.min(most)))
+}
+
+fn answered(folder: &Path) -> bool {
+    folder.join("report.json").is_file() || folder.join("failure.json").is_file()
+}
+
+/// One case in a process of its own; whatever becomes of it is kept in `out`.
+pub fn diagnose(case: &Path, out: &Path, config: &RunConfig) -> Result<()> {
+    let workplace =
+        tempfile::Builder::new().prefix("case-").tempdir().map_err(|source| Error::write("a temporary folder", source))?;
+    let (copy, answer) = (workplace.path().join("recording"), workplace.path().join("answer"));
+    fs::create_dir(&copy).map_err(|source| Error::write(&copy, source))?;
+    for entry in fs::read_dir(case).map_err(|source| Error::read(case, source))?.flatten() {
+        fs::copy(entry.path(), copy.join(entry.file_name())).map_err(|source| Error::read(entry.path(), source))?;
+    }
+    let outcome = start(&copy, &answer, workplace.path(), config)
+        .and_then(|()| Report::read(&answer.join("report.json")).map(drop).map_err(|error| format!("bad report: {error}")));
+    let folder = AtomicFolder::replacing(out)?;
+    match outcome {
+        Ok(()) => {
+            for file in ["report.json", "report.html"].map(|file| (answer.join(file), folder.path().join(file))) {
+                if file.0.is_file() {
+                    fs::copy(&file.0, &file.1).map_err(|source| Error::write(&file.1, source))?;
+                }
+            }
+        }
+        Err(reason) => {
+            let text = serde_json::to_string(&Failure { reason }).expect("a text");
+            write_text(folder.path().join("failure.json"), &text)?;
+        }
+    }
+    folder.finish()
+}
+
+/// Runs the program; the reason if it did not do its work.
+fn start(copy: &Path, answer: &Path, workplace: &Path, config: &RunConfig) -> std::result::Result<(), String> {
+    let complaints = workplace.join("stderr");
+    let stderr = fs::File::create(&complaints).map_err(|error| error.to_string())?;
+    let mut process = Command::new(&config.program)
+        .arg("diagnose")
+        .arg(copy)
+        .arg("--out")
+        .arg(answer)
+        .arg("--quiet")
+        .args(&config.arguments)
+        .current_dir(workplace)
+        // Nothing that says where the challenge lies.
+        .env_remove("PWD")
+        .env_remove("OLDPWD")
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(stderr)
+        .spawn()
+        .map_err(|error| format!("{}: cannot be started: {error}", config.program.display()))?;
+    let begun = Instant::now();
+    let status = loop {
+        match process.try_wait().map_err(|error| error.to_string())? {
+            Some(status) => break status,
+            None if begun.elapsed() > config.limit => {
+                let _ = process.kill();
+                let _ = process.wait();
+                return Err(format!("not done after {:.0} s", config.limit.as_secs_f64()));
+            }
+            None => std::thread::sleep(Duration::from_millis(20)),
+        }
+    };
+    if status.success() { Ok(()) } else { Err(complaint(status, &complaints)) }
+}
+
+fn complaint(status: ExitStatus, stderr: &Path) -> String {
+    let text = fs::read(stderr).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).unwrap_or_default();
+    let last: String = text.lines().last().unwrap_or_default().chars().take(300).collect();
+    format!("{status}: {last}")
+}
+
+fn gather(names: &[&String], out: &Path, commitments: &[Commitment], program: &Path) -> Result<Answers> {
+    let (mut reports, mut failures) = (BTreeMap::new(), BTreeMap::new());
+    for &name in names {
+        let folder = out.join(name);
+        if folder.join("report.json").is_file() {
+            reports.insert(name.clone(), hash_file(&folder.join("report.json"))?);
+        } else if folder.join("failure.json").is_file() {
+            failures.insert(name.clone(), read_json::<Failure>(&folder.join("failure.json"))?.reason);
+        }
+    }
+    let mut answers = Answers {
+        format: 1,
+        challenge: joint_root(commitments),
+        program_sha256: hash_file(program)?,
+        complete: reports.len() + failures.len() == names.len(),
+        reports,
+        failures,
+        sha256: String::new(),
+    };
+    answers.sha256 = answers.digest();
+    let value: Value = serde_json::to_value(&answers).expect("plain data");
+    write_text(out.join("answers.json"), &format!("{value:#}\n"))?;
+    Ok(answers)
+}

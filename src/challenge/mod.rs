@@ -1,0 +1,30 @@
+//! The proof on concealed data: cases drawn by a secret, committed to before anybody diagnoses them, answered by
+//! separate processes that cannot see the truth, and scored by rules that were fixed beforehand.
+//!
+//! The way of a case, in the order of the files:
+//! - [`config`], [`secret`]: what may be drawn, and by which random numbers
+//! - [`library`], [`rules`]: graded effects; look-alike sets and thresholds, fixed before any sealed run
+//! - [`plan`], [`measure`], [`seal`]: a case is drawn, recorded, its effect measured, and everything committed to
+//! - [`commitment`]: leaves, their Merkle root, and their verification
+//! - [`answer`]: one process per case, and what it answered
+//! - [`twins`]: the same scenes without their effects, for what a perfect diagnosis would be left with
+//! - [`report`], [`judge`], [`psychometric`], [`baselines`], [`table`], [`score`]: reports held against truths
+
+pub mod answer;
+pub mod baselines;
+pub mod commitment;
+pub mod config;
+pub mod judge;
+pub mod library;
+pub mod measure;
+pub mod plan;
+pub mod psychometric;
+pub mod report;
+pub mod rules;
+pub mod score;
+pub mod seal;
+pub mod secret;
+pub mod table;
+pub mod twins;
+
+pub use config::ChallengeConfig;

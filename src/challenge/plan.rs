@@ -1,0 +1,229 @@
+//! Which case is what: kinds, effects, strengths and scenes, all from the secret.
+
+use rand::RngExt;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+use super::config::{ChallengeConfig, Scenes, Stratum};
+use super::library::{self, Graded, Surroundings};
+use super::rules::DECOYS;
+use super::secret::Secret;
+use crate::person::Placement;
+use crate::person::actions::{StyleConfig, placement};
+use crate::recorder::{ActorConfig, EffectsConfig, RadarChoice, RecorderConfig, SurfaceConfig, WallsConfig};
+use crate::room::Room;
+
+/// The motion is under way when the recording starts, in every case: clocks that are wrong find a pose, too.
+const MOTION_START_S: f64 = -0.5;
+
+/// One case before it is recorded.
+#[derive(Clone)]
+pub struct Plan {
+    pub index: usize,
+    pub stratum: Stratum,
+    /// Effects, each with its place between its weakest (0) and its strongest (1).
+    pub effects: Vec<(&'static Graded, f64)>,
+    /// The scene without effects.
+    pub scene: RecorderConfig,
+    distance_m: f64,
+    /// Of what the effects draw, the same at every strength.
+    details: ChaCha8Rng,
+}
+
+/// All cases of a challenge, in the order of their numbers.
+pub fn plans(config: &ChallengeConfig, secret: &Secret) -> Vec<Plan> {
+    let mut strata: Vec<Stratum> =
+        Stratum::ALL.into_iter().zip(config.counts()).flat_map(|(stratum, count)| vec![stratum; count]).collect();
+    let mut random = secret.random("order", 0);
+    strata.shuffle(&mut random);
+    let mut decks = Decks::new(random);
+    strata
+        .into_iter()
+        .enumerate()
+        .map(|(index, stratum)| {
+            let mut random = secret.random("scene", index);
+            let effects = decks.draw(stratum);
+            let (scene, distance_m) = scene(config, secret.world_seed(index), &mut random);
+            Plan { index, stratum, effects, scene, distance_m, details: secret.random("effect", index) }
+        })
+        .collect()
+}
+
+/// Effects are dealt like cards, so that none is forgotten and none comes too often.
+struct Decks {
+    random: ChaCha8Rng,
+    library: Vec<&'static Graded>,
+    masked: Vec<&'static Graded>,
+    absorbed: Vec<&'static Graded>,
+    look_alikes: Vec<&'static Graded>,
+    outside: Vec<&'static Graded>,
+}
+
+impl Decks {
+    fn new(random: ChaCha8Rng) -> Self {
+        Self { random, library: vec![], masked: vec![], absorbed: vec![], look_alikes: vec![], outside: vec![] }
+    }
+
+    fn draw(&mut self, stratum: Stratum) -> Vec<(&'static Graded, f64)> {
+        let (deck, levels) = match stratum {
+            Stratum::Null => return vec![],
+            Stratum::Single => (&mut self.library, [0.0, 1.0]),
+            Stratum::Undetectable => (&mut self.library, [-0.2, 0.0]),
+            Stratum::Pair => (&mut self.library, [0.5, 1.0]),
+            Stratum::Masked => (&mut self.masked, [0.2, 1.0]),
+            Stratum::Absorbed => (&mut self.absorbed, [0.3, 1.0]),
+            Stratum::LookAlike => (&mut self.look_alikes, [0.6, 1.0]),
+            Stratum::Outside => (&mut self.outside, [0.3, 1.0]),
+        };
+        let mut drawn: Vec<(&'static Graded, f64)> = vec![];
+        let count = if stratum == Stratum::Pair { 2 } else { 1 };
+        while drawn.len() < count {
+            if deck.is_empty() {
+                *deck = match stratum {
+                    Stratum::Masked => library::MASKED.iter().collect(),
+                    Stratum::Absorbed => library::ABSORBED.iter().filter_map(|id| library::graded(id)).collect(),
+                    Stratum::LookAlike => DECOYS.concat().into_iter().filter_map(library::graded).collect(),
+                    Stratum::Outside => library::OUTSIDE.iter().collect(),
+                    _ => library::library().collect(),
+                };
+                deck.shuffle(&mut self.random);
+            }
+            let graded = deck.pop().expect("just filled");
+            // d′ means nothing for what only changes the noise.
+            let unfit = stratum == Stratum::Undetectable && !scalable(graded.id);
+            if !unfit && drawn.iter().all(|(other, _)| other.id != graded.id) {
+                let level = levels[0] + (levels[1] - levels[0]) * self.random.random::<f64>();
+                drawn.push((graded, level));
+            }
+        }
+        drawn
+    }
+}
+
+/// Whether an effect has an amplitude that can be made as small as one likes and a d′ that follows it.
+pub fn scalable(id: &str) -> bool {
+    !matches!(id, "coloured_noise" | "impulsive_noise" | "correlated_noise" | "frame_drop" | "soft_occlusion" | "adc_saturation")
+}
+
+fn between(bounds: [f64; 2], random: &mut ChaCha8Rng) -> f64 {
+    bounds[0] + (bounds[1] - bounds[0]) * random.random::<f64>()
+}
+
+fn one<'a, T>(of: &'a [T], random: &mut ChaCha8Rng) -> &'a T {
+    &of[random.random_range(0..of.len())]
+}
+
+/// A scene that holds nothing but the baseline, and how far away the person is.
+fn scene(config: &ChallengeConfig, seed: u64, random: &mut ChaCha8Rng) -> (RecorderConfig, f64) {
+    let scenes: &Scenes = &config.scenes;
+    let room = Room {
+        left_m: Some(between(scenes.side_m, random)),
+        right_m: Some(between(scenes.side_m, random)),
+        front_m: Some(between(scenes.front_m, random)),
+        back_m: Some(between(scenes.back_m, random)),
+        floor_m: Some(between(scenes.floor_m, random)),
+        ceiling_m: Some(between(scenes.ceiling_m, random)),
+    };
+    let farthest = room.front_m.unwrap_or(f64::MAX) - 1.5;
+    let nearest = scenes.distance_m[0].min(farthest);
+    let distance_m = between([nearest, scenes.distance_m[1].min(farthest)], random);
+    let person = ActorConfig {
+        subject: one(&scenes.subjects, random).clone(),
+        action: *one(&scenes.actions, random),
+        style: StyleConfig {
+            tempo: between([0.8, 1.25], random),
+            amplitude: between([0.8, 1.2], random),
+            path_scale: between([0.7, 1.0], random),
+            variation: 1.0,
+            seed: u64::from(random.random::<u32>()),
+        },
+        placement: Some(Placement { start_s: MOTION_START_S, ..placement(room.floor_m.unwrap_or(1.0), distance_m) }),
+        ..ActorConfig::default()
+    };
+    let surface = SurfaceConfig {
+        returns: *one(&scenes.tiers, random),
+        variation_db: between(scenes.variation_db, random),
+        edge_m: scenes.edge_m,
+        ..SurfaceConfig::default()
+    };
+    let walls = WallsConfig { clutter_gamma: 10f64.powf(between([-2.0, -1.3], random)), ..WallsConfig::default() };
+    let mut scene = RecorderConfig {
+        seed,
+        mesh_error_m: between(scenes.mesh_error_m, random),
+        radar: RadarChoice::Full(Box::new(config.radar.clone())),
+        room,
+        person,
+        surface,
+        walls,
+        ..RecorderConfig::default()
+    };
+    scene.receiver.snr_db = between(scenes.snr_db, random);
+    (scene, distance_m)
+}
+
+impl Plan {
+    /// The scene's effects at their strengths.
+    pub fn planted(&self, config: &ChallengeConfig) -> EffectsConfig {
+        let radar = &config.radar;
+        let at = Surroundings {
+            room: self.scene.room.clone(),
+            distance_m: self.distance_m,
+            frames: radar.frames,
+            receivers: radar.rx_m.len(),
+            max_range_m: radar.max_range_m(),
+            sample_rate_hz: radar.sample_rate_hz,
+        };
+        let mut effects = EffectsConfig::default();
+        for &(graded, level) in &self.effects {
+            (graded.add)(&mut effects, graded.strength(level), &at, &mut self.details.clone());
+        }
+        effects
+    }
+
+    /// Makes every effect weaker by a factor of its amplitude.
+    pub fn weaken(&mut self, factor: f64) {
+        for (graded, level) in &mut self.effects {
+            *level -= factor.ln() / (graded.strongest / graded.weakest).ln();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::radar::Radar;
+
+    fn config(cases: usize) -> ChallengeConfig {
+        ChallengeConfig { cases, shares: Default::default(), scenes: Scenes::default(), radar: Radar::small(12) }
+    }
+
+    #[test]
+    fn equal_secrets_give_equal_plans_and_every_effect_is_dealt() {
+        let (config, secret) = (config(400), Secret::new(Some("x")));
+        let (a, b) = (plans(&config, &secret), plans(&config, &secret));
+        assert!(a.iter().zip(&b).all(|(a, b)| a.scene == b.scene && a.planted(&config) == b.planted(&config)));
+        let singles: std::collections::BTreeSet<_> =
+            a.iter().filter(|plan| plan.stratum == Stratum::Single).flat_map(|plan| &plan.effects).map(|(e, _)| e.id).collect();
+        assert!(singles.len() > 40, "{}", singles.len());
+        for plan in &a {
+            assert_eq!(plan.effects.is_empty(), plan.stratum == Stratum::Null);
+            assert!(plan.distance_m + 1.0 < plan.scene.room.front_m.unwrap());
+            assert_eq!(plan.scene.effects, EffectsConfig::default());
+        }
+        let rooms: std::collections::BTreeSet<_> = a.iter().map(|p| format!("{:?}", p.scene.room)).collect();
+        assert_eq!(rooms.len(), 400);
+    }
+
+    #[test]
+    fn a_weakened_effect_keeps_everything_but_its_strength() {
+        let config = config(200);
+        let plan = plans(&config, &Secret::new(Some("y")));
+        let mut plan =
+            plan.into_iter().find(|plan| plan.effects.first().is_some_and(|(e, _)| e.id == "static_reflector")).unwrap();
+        let before = plan.planted(&config).static_reflector[0].clone();
+        plan.weaken(10.0);
+        let after = plan.planted(&config).static_reflector[0].clone();
+        assert_eq!(after.position_m, before.position_m);
+        assert!((before.amplitude / after.amplitude - 10.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,150 @@
+//! A report as far as scoring needs it. What it holds beyond that is tolerated; what must be there and is not, is named.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Deserializer};
+use serde_json::Value;
+
+use super::commitment::read_json;
+use crate::error::Result;
+
+#[derive(Clone, Debug, Deserialize)]
+pub struct Report {
+    pub verdict: String,
+    pub effects: Vec<Effect>,
+    pub unexplained: Vec<Unexplained>,
+    #[serde(default)]
+    pub not_detectable: Vec<Limit>,
+    pub fit: Fit,
+    /// Of the trained simulator's heatmaps.
+    #[serde(default)]
+    pub simulator: Option<Fit>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+pub struct Effect {
+    pub id: String,
+    pub probability: f64,
+    #[serde(default)]
+    pub indistinguishable_from: Vec<String>,
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Parameter>,
+    #[serde(rename = "where", default, deserialize_with = "or_default")]
+    pub place: Place,
+}
+
+/// Numbers or lists of numbers, as they come.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Parameter {
+    pub value: Value,
+    #[serde(default)]
+    pub ci90: Value,
+}
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Place {
+    pub stage: Option<String>,
+    pub range_m: Option<[f64; 2]>,
+    pub position_m: Option<[f64; 3]>,
+    pub boundary: Option<String>,
+    pub frames: Option<Vec<usize>>,
+    pub rx: Option<Vec<usize>>,
+    pub body_part: Option<String>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+pub struct Unexplained {
+    #[serde(rename = "where", default, deserialize_with = "or_default")]
+    pub place: Place,
+    #[serde(default)]
+    pub behaves_like: String,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+pub struct Limit {
+    pub id: String,
+    pub at_most_db: Option<f64>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+pub struct Fit {
+    #[serde(deserialize_with = "or_default")]
+    pub before: Measures,
+    #[serde(deserialize_with = "or_default")]
+    pub after: Measures,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct Measures {
+    pub loglik_per_sample: Option<f64>,
+    pub db_mse: Option<f64>,
+    pub psnr_db: Option<f64>,
+    pub ssim: Option<f64>,
+}
+
+fn or_default<'de, D: Deserializer<'de>, T: Deserialize<'de> + Default>(deserializer: D) -> std::result::Result<T, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or_default())
+}
+
+const VERDICTS: [&str; 5] = ["explained", "partly_explained", "unexplained", "no_mismatch", "undecided"];
+
+impl Report {
+    pub fn read(path: &Path) -> Result<Self> {
+        let report: Self = read_json(path)?;
+        if !VERDICTS.contains(&report.verdict.as_str()) {
+            return Err(crate::Error::field(path, "verdict", &report.verdict, VERDICTS.join(", ")));
+        }
+        Ok(report)
+    }
+
+    /// The usual measures before anything is explained: those of the trained simulator where there is one.
+    pub fn usual(&self) -> Measures {
+        self.simulator.as_ref().map_or(self.fit.before, |simulator| simulator.before)
+    }
+
+    /// Whether it says that anything is missing, by name or without.
+    pub fn claims(&self) -> bool {
+        !self.effects.is_empty()
+            || !self.unexplained.is_empty()
+            || matches!(self.verdict.as_str(), "explained" | "partly_explained" | "unexplained")
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    pub fn report(value: Value) -> Report {
+        serde_json::from_value(value).unwrap()
+    }
+
+    #[test]
+    fn unknown_fields_are_tolerated_and_missing_ones_named() {
+        let whole = json!({
+            "format": 1, "verdict": "no_mismatch", "effects": [], "unexplained": [], "later": 7,
+            "fit": {"before": {"psnr_db": 20.0, "new": 1}, "after": {}}
+        });
+        let read = report(whole.clone());
+        assert!(!read.claims());
+        assert_eq!(read.fit.before.psnr_db, Some(20.0));
+        let mut broken = whole;
+        broken.as_object_mut().unwrap().remove("effects");
+        let message = serde_json::from_value::<Report>(broken).unwrap_err().to_string();
+        assert!(message.contains("missing field `effects`"), "{message}");
+    }
+
+    #[test]
+    fn a_name_an_unexplained_rest_or_the_verdict_is_a_claim() {
+        let with = |verdict: &str, unexplained: Value| {
+            report(json!({"verdict": verdict, "effects": [], "unexplained": unexplained, "fit": {"before": {}, "after": {}}}))
+        };
+        assert!(!with("undecided", json!([])).claims());
+        assert!(with("unexplained", json!([])).claims());
+        assert!(with("no_mismatch", json!([{"where": null, "p_value": 1e-4}])).claims());
+    }
+}

@@ -1,0 +1,457 @@
+//! All cases together: verified, judged, counted.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::answer::Answers;
+use super::baselines::{self, Statistics, TEMPLATES, quantile};
+use super::commitment::{Commitment, joint_root, open, read_json, sha256};
+use super::config::Stratum;
+use super::judge::{Judgement, Truth, judge};
+use super::plan::scalable;
+use super::psychometric::{Logistic, chart};
+use super::report::{Measures, Report};
+use super::rules::*;
+use super::secret::Secret;
+use super::table::{Aim, Row, markdown, middle, share};
+use crate::data::atomic::write_text;
+use crate::data::{Recording, read_toml};
+use crate::error::{Error, Result};
+
+/// A misfit per sample below this, nats, is nothing that could be removed.
+const LEAST_REMOVABLE: f64 = 2.0e-3;
+
+/// A case with everything that was found out about it.
+struct Case {
+    judgement: Judgement,
+    before: Measures,
+    after: Measures,
+    /// Of the twin.
+    oracle: Option<Measures>,
+    baseline: Option<Statistics>,
+    concealed: bool,
+}
+
+/// The whole result, as `score.json` keeps it.
+#[derive(Debug, Serialize)]
+pub struct Score {
+    pub challenge: String,
+    pub answers: String,
+    pub cases: usize,
+    pub rows: Vec<Row>,
+    /// Against log₁₀ d′.
+    pub psychometric: Option<Logistic>,
+    pub judgements: Vec<Judgement>,
+    /// What did not go as it should, in words.
+    pub failures: Vec<String>,
+    #[serde(skip)]
+    points: Vec<(f64, bool)>,
+}
+
+/// Verifies and scores. `twins`: the folder of [`super::twins`], where there is one.
+///
+/// # Errors
+/// Anything that is not as it was committed to; the message names the case.
+pub fn score(challenge: &Path, answers_folder: &Path, twins: Option<&Path>, progress: &(dyn Fn(usize) + Sync)) -> Result<Score> {
+    let commitments = Commitment::read_all(challenge)?;
+    let answers = Answers::read(answers_folder)?;
+    let root = joint_root(&commitments);
+    if answers.challenge != root {
+        return Err(Error::Usage {
+            message: format!("the answers are to {}, the challenge is {root}", answers.challenge),
+            hint: Some("score the folder that was answered".into()),
+        });
+    }
+    verify_secret(challenge, &commitments)?;
+    let leaves: Vec<(&String, &String)> = commitments.iter().flat_map(|commitment| &commitment.leaves).collect();
+    nothing_else(challenge, &leaves)?;
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let mut cases: Vec<Case> = leaves
+        .par_iter()
+        .map(|(name, leaf)| {
+            let case = one(challenge, answers_folder, twins, &answers, name, leaf)?;
+            progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1);
+            Ok(case)
+        })
+        .collect::<Result<_>>()?;
+    mark_concealed(&mut cases);
+    let points = points(&cases);
+    let psychometric = Logistic::fit(&points);
+    Ok(Score {
+        challenge: root,
+        answers: answers.sha256,
+        cases: cases.len(),
+        rows: rows(&cases, psychometric),
+        psychometric,
+        failures: cases.iter().filter_map(|case| failure(&case.judgement)).collect(),
+        judgements: cases.into_iter().map(|case| case.judgement).collect(),
+        points,
+    })
+}
+
+fn verify_secret(challenge: &Path, commitments: &[Commitment]) -> Result<()> {
+    let path = challenge.join("sealed/secret.toml");
+    let secret: Secret = read_toml(&path)?;
+    if commitments.iter().any(|commitment| commitment.secret_sha256 != sha256(&secret.seed)) {
+        return Err(Error::field(path, "seed", "another one", "the seed that was committed to"));
+    }
+    Ok(())
+}
+
+/// The registry is closed: nothing was planted that was not committed to.
+fn nothing_else(challenge: &Path, leaves: &[(&String, &String)]) -> Result<()> {
+    let folder = challenge.join("cases");
+    for entry in std::fs::read_dir(&folder).map_err(|source| Error::read(&folder, source))?.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if !leaves.iter().any(|(leaf, _)| **leaf == name) {
+            return Err(Error::Usage { message: format!("case {name}: was never committed to"), hint: None });
+        }
+    }
+    Ok(())
+}
+
+fn one(challenge: &Path, folder: &Path, twins: Option<&Path>, answers: &Answers, name: &str, leaf: &str) -> Result<Case> {
+    let sealed = open(challenge, name, leaf)?;
+    let truth = Truth::of(&sealed).map_err(|found| Error::field(name, "truth", found, "a truth of this version"))?;
+    let report = match (answers.reports.get(name), answers.failures.get(name)) {
+        (Some(_), _) => Report::read(&folder.join(name).join("report.json")).map_err(|error| error.to_string()),
+        (None, Some(reason)) => Err(reason.clone()),
+        (None, None) => Err("no answer".into()),
+    };
+    let fit = report.as_ref().map(|report| (report.usual(), report.fit.before, report.fit.after)).unwrap_or_default();
+    let oracle =
+        twins.and_then(|twins| read_json::<Report>(&twins.join(name).join("report.json")).ok()).map(|twin| twin.fit.before);
+    let baseline = Recording::open(challenge.join("cases").join(name)).and_then(|case| baselines::statistics(&case)).ok();
+    let (usual, before, after) = fit;
+    Ok(Case {
+        judgement: judge(name, &truth, &report),
+        before: Measures { loglik_per_sample: before.loglik_per_sample, ..usual },
+        after: Measures { ..after },
+        oracle,
+        baseline,
+        concealed: false,
+    })
+}
+
+impl Case {
+    fn is(&self, stratum: Stratum) -> bool {
+        self.judgement.stratum == stratum
+    }
+
+    fn planted(&self) -> bool {
+        !self.is(Stratum::Null)
+    }
+
+    fn d_prime(&self) -> f64 {
+        self.judgement.strength.map_or(0.0, |strength| strength.d_prime)
+    }
+
+    /// One effect of the library whose d′ says how hard it is.
+    fn graded_single(&self) -> bool {
+        let kinds = [Stratum::Single, Stratum::Masked, Stratum::Absorbed, Stratum::LookAlike, Stratum::Undetectable];
+        kinds.contains(&self.judgement.stratum) && self.judgement.truth.iter().all(|id| scalable(id))
+    }
+
+    fn undetectable(&self) -> bool {
+        self.planted() && self.d_prime() < UNDETECTABLE_D_PRIME && self.judgement.truth.iter().all(|id| scalable(id))
+    }
+
+    /// (before − after) / (before − oracle) on held-out data; none where there was nothing to remove.
+    fn recovered(&self) -> Option<f64> {
+        let level = |measures: &Measures| measures.loglik_per_sample.map(|likelihood| -likelihood);
+        // The receiver scales each recording on its own, and a density has the unit of its samples.
+        let scale = self.judgement.strength?.gain_db / 10.0 * 10f64.ln();
+        let (before, after) = (level(&self.before)?, level(&self.after)?);
+        let oracle = level(self.oracle.as_ref()?)? + scale;
+        (before - oracle > LEAST_REMOVABLE).then(|| (before - after) / (before - oracle))
+    }
+}
+
+/// Concealed: the trained simulator is as good as on the nulls by every usual measure, or a return covers the effect.
+/// What nobody could detect is no proof of anything.
+fn mark_concealed(cases: &mut [Case]) {
+    let usual: [fn(&Measures) -> Option<f64>; 3] = [|m| m.db_mse, |m| m.psnr_db, |m| m.ssim];
+    let bands: Vec<Option<[f64; 2]>> = usual
+        .iter()
+        .map(|measure| {
+            let nulls: Vec<f64> =
+                cases.iter().filter(|case| case.is(Stratum::Null)).filter_map(|case| measure(&case.before)).collect();
+            (!nulls.is_empty()).then(|| NULL_BAND.map(|part| quantile(&nulls, part)))
+        })
+        .collect();
+    for case in cases.iter_mut() {
+        let inside: Vec<bool> = usual
+            .iter()
+            .zip(&bands)
+            .filter_map(|(measure, band)| Some((measure(&case.before)?, (*band)?)))
+            .map(|(value, [low, high])| (low..=high).contains(&value))
+            .collect();
+        let absorbed = !inside.is_empty() && inside.iter().all(|&inside| inside);
+        let masked = case.judgement.strength.is_some_and(|strength| strength.masked());
+        case.concealed = case.planted() && case.d_prime() >= OBVIOUS_D_PRIME && (absorbed || masked);
+    }
+}
+
+fn points(cases: &[Case]) -> Vec<(f64, bool)> {
+    cases
+        .iter()
+        .filter(|case| case.graded_single())
+        .map(|case| (case.d_prime().max(1e-3).log10(), case.judgement.claims))
+        .collect()
+}
+
+fn rows(cases: &[Case], psychometric: Option<Logistic>) -> Vec<Row> {
+    let all = |keep: &dyn Fn(&Case) -> bool| -> Vec<&Case> { cases.iter().filter(|case| keep(case)).collect() };
+    let nulls = all(&|case| case.is(Stratum::Null));
+    let singles = all(&|case| case.graded_single() && !case.undetectable());
+    let detected: Vec<&Case> = singles.iter().copied().filter(|case| case.judgement.claims).collect();
+    let pairs = all(&|case| case.is(Stratum::Pair) && case.d_prime() >= OBVIOUS_D_PRIME);
+    let outside = all(&|case| case.is(Stratum::Outside) && case.d_prime() >= OBVIOUS_D_PRIME);
+    let decoys = all(&|case| case.is(Stratum::LookAlike) && case.d_prime() >= OBVIOUS_D_PRIME);
+    let undetectable = all(&|case| case.undetectable());
+    let concealed = all(&|case| case.concealed);
+    let concealed_library: Vec<&Case> = concealed.iter().copied().filter(|case| !case.is(Stratum::Outside)).collect();
+    let over = |case: &&Case| !case.judgement.overclaims.is_empty();
+    let mut rows = vec![
+        share(
+            "nulls on which anything is claimed (false alarms)",
+            nulls.iter().map(|case| case.judgement.claims),
+            Aim::AtMost(0.02),
+        ),
+        share("nulls with a confident wrong name", nulls.iter().map(over), Aim::AtMost(0.01)),
+        share(
+            "nulls answered `no_mismatch`",
+            nulls.iter().map(|case| case.judgement.verdict == "no_mismatch"),
+            Aim::AtLeast(0.95),
+        ),
+    ];
+    for (low, high, aim) in [(2.0, 8.0, Aim::None), (8.0, 30.0, Aim::AtLeast(0.8)), (30.0, f64::INFINITY, Aim::AtLeast(0.95))] {
+        let within = singles.iter().filter(|case| (low..high).contains(&case.d_prime()));
+        let name = if high.is_finite() {
+            format!("single effects detected, d′ {low} to {high}")
+        } else {
+            format!("single effects detected, d′ ≥ {low}")
+        };
+        rows.push(share(name, within.map(|case| case.judgement.claims), aim));
+    }
+    if let Some(fit) = psychometric {
+        for part in [0.5, 0.9] {
+            let level = 10f64.powf(fit.level(part));
+            rows.push(Row {
+                what: format!("d′ at which {:.0} % are detected (logistic fit)", 100.0 * part),
+                n: singles.len() + undetectable.len(),
+                estimate: level.is_finite().then_some(level),
+                interval: None,
+                aim: Aim::None,
+            });
+        }
+    }
+    rows.extend([
+        share(
+            "detected singles whose first name is right, look-alikes allowed",
+            detected.iter().map(|case| case.judgement.first_right),
+            Aim::AtLeast(0.85),
+        ),
+        share(
+            "detected singles whose first name is the very effect",
+            detected.iter().map(|case| case.judgement.first_exact),
+            Aim::None,
+        ),
+        share(
+            "detected singles that are named at all",
+            detected.iter().map(|case| case.judgement.found.iter().all(|&found| found)),
+            Aim::None,
+        ),
+        share(
+            "planted cases with a confident wrong name (overclaims)",
+            cases.iter().filter(|case| case.planted()).map(|case| over(&case)),
+            Aim::AtMost(0.05),
+        ),
+        share(
+            "planted cases that name a twin as the only possibility",
+            cases.iter().filter(|case| case.planted()).map(|case| !case.judgement.twins_overclaimed.is_empty()),
+            Aim::AtMost(0.02),
+        ),
+        share("look-alikes with a confident wrong name", decoys.iter().map(over), Aim::AtMost(0.05)),
+        share("pairs, both named", pairs.iter().map(|case| case.judgement.found.iter().all(|&found| found)), Aim::None),
+        share(
+            "pairs, at least one named",
+            pairs.iter().map(|case| case.judgement.found.iter().any(|&found| found)),
+            Aim::AtLeast(0.8),
+        ),
+        share("named effects at the right place", cases.iter().filter_map(|case| case.judgement.located), Aim::AtLeast(0.9)),
+        share(
+            "90 % intervals that hold the truth",
+            cases.iter().flat_map(|case| &case.judgement.parameters).map(|p| p.covered),
+            Aim::Between(0.85, 0.95),
+        ),
+        share(
+            "outside the library: found, at its place, left unnamed",
+            outside.iter().map(|case| case.judgement.left_unnamed == Some(true)),
+            Aim::AtLeast(0.8),
+        ),
+        share("outside the library: detected in any way", outside.iter().map(|case| case.judgement.claims), Aim::None),
+        share("outside the library: confident wrong name", outside.iter().map(over), Aim::AtMost(0.05)),
+        share(
+            "undetectable effects answered with silence",
+            undetectable.iter().map(|case| case.judgement.failure.is_none() && !case.judgement.claims),
+            Aim::AtLeast(0.95),
+        ),
+        share(
+            "limits on undetected effects that hold",
+            cases.iter().filter_map(|case| case.judgement.limit_holds),
+            Aim::AtLeast(0.9),
+        ),
+        middle(
+            "removable held-out misfit recovered, median",
+            cases.iter().filter(|case| !case.is(Stratum::Outside)).filter_map(Case::recovered),
+            Aim::AtLeast(0.9),
+        ),
+        share("concealed effects detected", concealed.iter().map(|case| case.judgement.claims), Aim::AtLeast(0.8)),
+        share(
+            "concealed effects of the library, detected and named, look-alikes allowed",
+            concealed_library.iter().map(|case| case.judgement.found.iter().all(|&found| found)),
+            Aim::None,
+        ),
+        share("cases without a usable report", cases.iter().map(|case| case.judgement.failure.is_some()), Aim::AtMost(0.0)),
+    ]);
+    rows.extend(baseline_rows(cases, &nulls, &singles, &concealed));
+    rows
+}
+
+/// Each baseline with the threshold that the nulls of this very set give it.
+fn baseline_rows(cases: &[Case], nulls: &[&Case], singles: &[&Case], concealed: &[&Case]) -> Vec<Row> {
+    let part = 1.0 - BASELINE_FALSE_ALARMS;
+    let over_nulls =
+        |of: &dyn Fn(&Case) -> Option<f64>| quantile(&nulls.iter().filter_map(|case| of(case)).collect::<Vec<_>>(), part);
+    let strong: Vec<&&Case> = singles.iter().filter(|case| case.d_prime() >= OBVIOUS_D_PRIME).collect();
+    // Each template against its own nulls: how far beyond them.
+    let limits: Vec<f64> =
+        (0..TEMPLATES.len()).map(|k| over_nulls(&|case| case.baseline.as_ref().map(|b| b.templates[k]))).collect();
+    let best = |case: &Case| -> Option<(usize, f64)> {
+        let ratios =
+            case.baseline.as_ref()?.templates.iter().zip(&limits).map(|(value, limit)| value / limit.max(1.0)).enumerate();
+        ratios.max_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let sparse = |case: &Case| -> Option<(usize, f64)> {
+        let picked = case.baseline.as_ref()?.sparse.iter().map(|&(k, gain)| (k, gain / limits[k].max(1.0)));
+        Some(picked.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0)))
+    };
+    let global = |case: &Case| case.before.db_mse;
+    let chi2 = |case: &Case| case.baseline.as_ref().map(|b| b.chi2);
+    let mut rows = vec![];
+    let mut add = |name: &str, value: &dyn Fn(&Case) -> Option<f64>, pick: Option<&dyn Fn(&Case) -> Option<(usize, f64)>>| {
+        let limit = over_nulls(value);
+        let alarm = |case: &Case| value(case).is_some_and(|value| value > limit);
+        rows.push(share(
+            format!("{name}: singles with d′ ≥ {OBVIOUS_D_PRIME} detected"),
+            strong.iter().map(|case| alarm(case)),
+            Aim::None,
+        ));
+        rows.push(share(format!("{name}: concealed effects detected"), concealed.iter().map(|case| alarm(case)), Aim::None));
+        if let Some(pick) = pick {
+            let named =
+                |case: &Case| pick(case).is_some_and(|(k, _)| case.judgement.truth.iter().any(|id| look_alike(TEMPLATES[k], id)));
+            let all = strong.iter().filter(|case| alarm(case));
+            rows.push(share(format!("{name}: of those, the right name"), all.map(|case| named(case)), Aim::None));
+            let wrong = cases.iter().filter(|case| case.planted() && alarm(case)).map(|case| !named(case));
+            rows.push(share(format!("{name}: planted alarms with a wrong name"), wrong, Aim::None));
+        }
+    };
+    add("baseline, error of the trained simulator", &global, None);
+    add("baseline, χ² outside the scene", &chi2, None);
+    add("baseline, templates one by one", &|case| best(case).map(|(_, ratio)| ratio), Some(&best));
+    add("baseline, sparse regression", &|case| sparse(case).map(|(_, ratio)| ratio), Some(&sparse));
+    rows
+}
+
+/// What went wrong with a case, in a line; none if nothing did.
+fn failure(judgement: &Judgement) -> Option<String> {
+    let d_prime = judgement.strength.map_or(0.0, |strength| strength.d_prime);
+    let reason = if let Some(reason) = &judgement.failure {
+        format!("no usable report: {reason}")
+    } else if judgement.stratum == Stratum::Null {
+        if !judgement.claims {
+            return None;
+        }
+        format!("false alarm, named {:?}", judgement.named)
+    } else if !judgement.overclaims.is_empty() {
+        format!("confident wrong name {:?}", judgement.overclaims)
+    } else if judgement.stratum == Stratum::Undetectable || d_prime < UNDETECTABLE_D_PRIME {
+        if !judgement.claims {
+            return None;
+        }
+        format!("claims what nobody can see, named {:?}", judgement.named)
+    } else if !judgement.claims && d_prime >= OBVIOUS_D_PRIME {
+        "missed".into()
+    } else if judgement.stratum == Stratum::Outside {
+        if judgement.left_unnamed == Some(true) || d_prime < OBVIOUS_D_PRIME {
+            return None;
+        }
+        format!("not left unnamed at its place, named {:?}", judgement.named)
+    } else if judgement.claims && !judgement.found.iter().all(|&found| found) {
+        format!("not named, but {:?}", judgement.named)
+    } else if judgement.located == Some(false) {
+        "named at a wrong place".into()
+    } else {
+        return None;
+    };
+    Some(format!(
+        "`{}` ({}, tier {}, {}, d′ {d_prime:.1}): {reason}",
+        judgement.case,
+        judgement.stratum.name(),
+        judgement.tier,
+        judgement.truth.join(" + ")
+    ))
+}
+
+impl Score {
+    /// `results.md`, `score.json` and `psychometric.png` in a folder.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        std::fs::create_dir_all(folder).map_err(|source| Error::write(folder, source))?;
+        write_text(folder.join("results.md"), &self.markdown())?;
+        let value = serde_json::to_value(self).expect("plain data");
+        write_text(folder.join("score.json"), &format!("{value:#}\n"))?;
+        chart(&self.points, self.psychometric).save(&folder.join("psychometric.png"))
+    }
+
+    pub fn markdown(&self) -> String {
+        let mut text = format!(
+            "## Concealed data\n\n{} cases, committed to as `{}`; answers committed to as `{}` before the truths were opened.\n\n{}",
+            self.cases,
+            self.challenge,
+            self.answers,
+            markdown(&self.rows)
+        );
+        let _ = write!(text, "\n![Detection against strength](psychometric.png)\n\n### By effect\n\n{}", self.by_effect());
+        let _ = write!(text, "\n### Every failure ({})\n\n", self.failures.len());
+        for failure in &self.failures {
+            let _ = writeln!(text, "- {failure}");
+        }
+        text
+    }
+
+    /// How each single effect that could be detected fared.
+    fn by_effect(&self) -> String {
+        let mut counts: BTreeMap<&str, [usize; 3]> = BTreeMap::new();
+        for judgement in &self.judgements {
+            let strong = judgement.strength.is_some_and(|strength| strength.d_prime >= OBVIOUS_D_PRIME);
+            if let ([truth], true) = (&judgement.truth[..], strong) {
+                let count = counts.entry(truth).or_default();
+                count[0] += 1;
+                count[1] += usize::from(judgement.claims);
+                count[2] += usize::from(judgement.found[0] || judgement.left_unnamed == Some(true));
+            }
+        }
+        let mut text =
+            format!("Cases with d′ ≥ {OBVIOUS_D_PRIME}.\n\n| effect | cases | detected | right |\n|---|---|---|---|\n");
+        for (effect, [n, detected, right]) in counts {
+            let _ = writeln!(text, "| {effect} | {n} | {detected} | {right} |");
+        }
+        text
+    }
+}

@@ -1,0 +1,299 @@
+//! Records the cases, locks their truths away and publishes the commitment.
+//!
+//! A challenge is a folder: `cases/NAME/` for everybody, `sealed/` for nobody before the answers are committed, and
+//! `commitment.json`, which is written last. The names are random, all cases have the same files of the same form, all
+//! times of files are equal, and the person's files are those of the scene without its effects.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, SystemTime};
+
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use super::commitment::{Commitment, Sealed, hash_file, hash_folder, leaf, merkle_root, read_json, sha256};
+use super::config::{ChallengeConfig, Stratum};
+use super::measure::{Strength, strength};
+use super::plan::{Plan, plans};
+use super::rules::UNDETECTABLE_D_PRIME;
+use super::secret::Secret;
+use crate::data::atomic::write_text;
+use crate::data::{IfFrame, IfLayout, RecordingContents, read_toml, write_recording};
+use crate::error::{Error, Result};
+use crate::radar::Sampling;
+use crate::recorder::{EffectsConfig, Recorder, RecorderConfig, Returns, World};
+
+/// All files of all cases were last changed then (1 January 2026), so that nothing is learned from when.
+const TIME_OF_FILES: u64 = 1_767_225_600;
+/// Weakenings after which an effect is taken as it is.
+const MOST_WEAKENINGS: usize = 3;
+/// An undetectable effect is brought to this d′.
+const WEAK_D_PRIME: f64 = 1.0;
+
+/// Which part of the cases is dealt with: number (from 1) and count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    pub number: usize,
+    pub of: usize,
+}
+
+impl Shard {
+    pub const ALL: Self = Self { number: 1, of: 1 };
+
+    pub fn holds(&self, index: usize) -> bool {
+        index % self.of == self.number - 1
+    }
+}
+
+/// Seals a challenge into `out`; one that was interrupted goes on. `progress` hears how many cases are done.
+///
+/// # Errors
+/// A commitment that is there already, another seed than the one begun with, and whatever the recorder refuses.
+pub fn seal(
+    config: &ChallengeConfig,
+    seed: Option<&str>,
+    out: &Path,
+    shard: Shard,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<Commitment> {
+    let published = out.join(match shard.of {
+        1 => "commitment.json".to_string(),
+        of => format!("commitment_{}_of_{of}.json", shard.number),
+    });
+    if published.exists() {
+        return Err(Error::Usage {
+            message: format!("{}: is committed to already", published.display()),
+            hint: Some("seal into another folder".into()),
+        });
+    }
+    let sealed = out.join("sealed");
+    create(&sealed)?;
+    create(&out.join("cases"))?;
+    private(&sealed);
+    let secret = settle_secret(&sealed, config, seed, shard)?;
+    let chosen: Vec<Plan> = plans(config, &secret).into_iter().filter(|plan| shard.holds(plan.index)).collect();
+    let (done, leaves) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
+    chosen.into_par_iter().try_for_each(|plan| -> Result<()> {
+        let name = secret.name(plan.index);
+        let leaf = seal_case(config, plan, &secret, out)?;
+        leaves.lock().expect("nobody panics while holding it").insert(name, leaf);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+        Ok(())
+    })?;
+    let leaves = leaves.into_inner().expect("all threads are done");
+    let commitment = Commitment {
+        format: 1,
+        shard: [shard.number, shard.of],
+        cases: leaves.len(),
+        config_sha256: sha256(config.to_toml()),
+        executable_sha256: executable_hash()?,
+        secret_sha256: sha256(&secret.seed),
+        root: merkle_root(&leaves),
+        leaves,
+    };
+    set_time(&out.join("cases"))?;
+    write_text(&published, &format!("{:#}\n", serde_json::to_value(&commitment).expect("plain data")))?;
+    Ok(commitment)
+}
+
+/// Of the program that runs.
+pub fn executable_hash() -> Result<String> {
+    let path = std::env::current_exe().map_err(|source| Error::read("this program", source))?;
+    hash_file(&path)
+}
+
+fn create(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder).map_err(|source| Error::write(folder, source))
+}
+
+/// For the owner alone, where the system knows owners.
+fn private(folder: &Path) {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let _ = fs::set_permissions(folder, fs::Permissions::from_mode(0o700));
+    }
+    #[cfg(not(unix))]
+    let _ = folder;
+}
+
+/// The secret of this folder: begun before, given, or new.
+fn settle_secret(sealed: &Path, config: &ChallengeConfig, seed: Option<&str>, shard: Shard) -> Result<Secret> {
+    let path = sealed.join("secret.toml");
+    let settings = sealed.join("config.toml");
+    if path.exists() {
+        let begun: Secret = read_toml(&path)?;
+        let same_config = fs::read_to_string(&settings).is_ok_and(|text| text == config.to_toml());
+        if !same_config || seed.is_some_and(|seed| Secret::new(Some(seed)) != begun) {
+            return Err(Error::Usage {
+                message: format!("{}: was begun with another seed or other settings", sealed.display()),
+                hint: Some("seal into another folder".into()),
+            });
+        }
+        return Ok(begun);
+    }
+    if shard.of > 1 && seed.is_none() {
+        return Err(Error::Usage {
+            message: "shards without a seed would be different challenges".into(),
+            hint: Some("give all shards the same --seed, and keep it secret".into()),
+        });
+    }
+    let secret = Secret::new(seed);
+    write_text(&settings, &config.to_toml())?;
+    write_text(&path, &toml::to_string(&secret).expect("a text"))?;
+    Ok(secret)
+}
+
+/// Records one case, unless it is there already, and returns its leaf.
+fn seal_case(config: &ChallengeConfig, mut plan: Plan, secret: &Secret, out: &Path) -> Result<String> {
+    let name = secret.name(plan.index);
+    let (case, truth_file) = (out.join("cases").join(&name), out.join("sealed").join(format!("{name}.json")));
+    if case.is_dir() && truth_file.is_file() {
+        return Ok(leaf(&read_json(&truth_file)?, &hash_folder(&case)?));
+    }
+    if case.is_dir() {
+        fs::remove_dir_all(&case).map_err(|source| Error::write(&case, source))?;
+    }
+    let recorded = record(config, &mut plan)?;
+    write_case(&recorded, &case)?;
+    let sealed = Sealed { salt: secret.salt(plan.index), truth: truth(&plan, &recorded) };
+    write_text(&truth_file, &format!("{:#}\n", serde_json::to_value(&sealed).expect("plain data")))?;
+    // As it will be read again: the last digit of a number may not survive being written.
+    Ok(leaf(&read_json(&truth_file)?, &hash_folder(&case)?))
+}
+
+/// A case in memory.
+struct Recorded {
+    /// The scene without effects: what everybody is told about it.
+    world: World,
+    frames: Vec<IfFrame>,
+    settings: RecorderConfig,
+    strength: Option<Strength>,
+}
+
+/// Records a plan, and weakens what must not be detectable until it is not.
+fn record(config: &ChallengeConfig, plan: &mut Plan) -> Result<Recorded> {
+    let mut scene = plan.scene.clone();
+    // What the converter does is not seen in samples that it never touched.
+    scene.receiver.adc = plan.effects.iter().any(|(graded, _)| matches!(graded.id, "adc_saturation" | "lsb_stuck"));
+    let world = scene.world(Path::new("."))?;
+    let clean = frames_of(&world)?;
+    if plan.stratum == Stratum::Null {
+        return Ok(Recorded { world, frames: clean, settings: scene, strength: None });
+    }
+    let mut weakenings = 0;
+    loop {
+        let settings = RecorderConfig { effects: plan.planted(config), ..scene.clone() };
+        let frames = frames_of(&settings.world(Path::new("."))?)?;
+        let strength = strength(&clean, &frames);
+        let too_strong = plan.stratum == Stratum::Undetectable && strength.d_prime >= UNDETECTABLE_D_PRIME;
+        if !too_strong || weakenings == MOST_WEAKENINGS {
+            return Ok(Recorded { world, frames, settings, strength: Some(strength) });
+        }
+        plan.weaken(strength.d_prime / WEAK_D_PRIME);
+        weakenings += 1;
+    }
+}
+
+fn frames_of(world: &World) -> Result<Vec<IfFrame>> {
+    Recorder::new(world)?.frames().collect()
+}
+
+/// The recording without a truth and without labels.
+fn write_case(recorded: &Recorded, case: &Path) -> Result<()> {
+    write_frames(&recorded.world, &recorded.frames, case)
+}
+
+/// Records the same scene, noise included, without its effects: what a perfect diagnosis would be left with.
+pub fn record_twin(settings: &str, case: &Path) -> Result<()> {
+    let settings: RecorderConfig =
+        toml::from_str(settings).map_err(|error| Error::Parse { path: case.into(), message: error.to_string() })?;
+    let world = RecorderConfig { effects: EffectsConfig::default(), ..settings }.world(Path::new("."))?;
+    write_frames(&world, &frames_of(&world)?, case)
+}
+
+fn write_frames(world: &World, frames: &[IfFrame], case: &Path) -> Result<()> {
+    let layout = match world.radar.sampling {
+        Sampling::Complex => IfLayout::Codes,
+        Sampling::Real => IfLayout::RealCodes,
+    };
+    let contents = RecordingContents {
+        radar: &world.radar,
+        room: Some(&world.room),
+        person: world.person.as_ref(),
+        body_file: None,
+        labels: BTreeMap::new(),
+        layout,
+        truth: None,
+    };
+    write_recording(case, &contents, &mut |frame| Ok(frames[frame].clone()))?;
+    let entries = fs::read_dir(case).map_err(|source| Error::read(case, source))?;
+    for entry in entries.flatten() {
+        set_time(&entry.path())?;
+    }
+    set_time(case)
+}
+
+fn set_time(path: &Path) -> Result<()> {
+    let time = SystemTime::UNIX_EPOCH + Duration::from_secs(TIME_OF_FILES);
+    File::open(path).and_then(|file| file.set_modified(time)).map_err(|source| Error::write(path, source))
+}
+
+fn truth(plan: &Plan, recorded: &Recorded) -> Value {
+    let settings = &recorded.settings;
+    json!({
+        "format": 1,
+        "index": plan.index,
+        "stratum": plan.stratum,
+        "tier": if settings.surface.returns == Returns::Random { "B" } else { "A" },
+        "effects": effects(&settings.effects),
+        "strength": recorded.strength,
+        "settings": toml::to_string(settings).expect("settings are plain data"),
+    })
+}
+
+/// Every effect with its id (none: outside the library) and the recorder's numbers.
+pub fn effects(config: &EffectsConfig) -> Vec<Value> {
+    let Ok(Value::Object(tables)) = serde_json::to_value(config) else { unreachable!("a struct") };
+    let mut found = vec![];
+    for (key, value) in tables {
+        let entries = match value {
+            Value::Array(entries) => entries,
+            one => vec![one],
+        };
+        for mut entry in entries {
+            let members = entry.as_object_mut().expect("every effect is a table");
+            let id = if key == "outside" { Value::Null } else { key.as_str().into() };
+            members.insert("name".into(), id);
+            found.push(entry);
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn truths_name_effects_by_id_and_the_rest_by_nothing() {
+        let text = "[iq_imbalance]\ngain_db = 0.5\nphase_deg = 2.0\n\n[[outside]]\nkind = \"lo_pulling\"\npeak_rad = 0.1\n";
+        let found = effects(&toml::from_str(text).unwrap());
+        assert_eq!(found.len(), 2);
+        assert_eq!((found[0]["name"].as_str(), found[0]["gain_db"].as_f64()), (Some("iq_imbalance"), Some(0.5)));
+        assert_eq!((&found[1]["name"], found[1]["kind"].as_str()), (&Value::Null, Some("lo_pulling")));
+        assert!(effects(&EffectsConfig::default()).is_empty());
+    }
+
+    #[test]
+    fn shards_hold_every_case_once() {
+        for index in 0..20 {
+            let holders = (1..=3).filter(|&number| Shard { number, of: 3 }.holds(index)).count();
+            assert_eq!(holders, 1);
+        }
+        assert!((0..9).all(|index| Shard::ALL.holds(index)));
+    }
+}

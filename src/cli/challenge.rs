@@ -1,0 +1,189 @@
+//! `hybridsim challenge seal | run | twins | score`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, Subcommand};
+
+use super::{Common, progress::Progress};
+use crate::{
+    challenge::{
+        ChallengeConfig,
+        answer::{self, RunConfig},
+        score,
+        seal::{self, Shard},
+        twins,
+    },
+    error::{Error, Result},
+};
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    step: Step,
+}
+
+#[derive(Subcommand)]
+enum Step {
+    /// Record cases with concealed effects, lock their truths away, and publish what commits to them
+    Seal(Seal),
+    /// Have every case diagnosed by a process that cannot see the truth
+    Run(Run),
+    /// Diagnose every scene once more without its effects, for what a perfect diagnosis would be left with
+    Twins(Twins),
+    /// Open the truths, verify them, and hold the reports against them
+    Score(Score),
+}
+
+#[derive(Args)]
+struct Seal {
+    /// A config such as configs/challenge.toml
+    config: PathBuf,
+    /// Folder of the challenge
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+    /// Secret text that everything is drawn from [default: from the operating system]
+    #[arg(long, value_name = "TEXT")]
+    seed: Option<String>,
+    /// Only part i of n, such as 2/8
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    shard: Option<Shard>,
+}
+
+#[derive(Args)]
+struct Run {
+    /// Folder of the challenge; its sealed part need not be there
+    challenge: PathBuf,
+    /// Folder for the answers; a case that has one is skipped
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    how: How,
+}
+
+#[derive(Args)]
+struct Twins {
+    /// Folder of the challenge
+    challenge: PathBuf,
+    /// Folder of the answers, which must be complete: truths are opened
+    answers: PathBuf,
+    /// Folder for the twins' reports
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    how: How,
+}
+
+#[derive(Args)]
+struct Score {
+    /// Folder of the challenge
+    challenge: PathBuf,
+    /// Folder of the answers
+    answers: PathBuf,
+    /// Folder of the twins' reports; without it no recovered misfit is given
+    #[arg(long, value_name = "DIR")]
+    twins: Option<PathBuf>,
+    /// Folder for results.md, score.json and psychometric.png [default: ANSWERS/score]
+    #[arg(short, long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// How cases are diagnosed.
+#[derive(Args)]
+struct How {
+    /// Only part i of n, such as 2/8
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    shard: Option<Shard>,
+    /// Stop after so many cases
+    #[arg(long, value_name = "N")]
+    most: Option<usize>,
+    /// Longest time for one case, in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 900)]
+    limit: u64,
+    /// Another program that understands `diagnose RECORDING --out DIR --quiet` [default: this one]
+    #[arg(long, value_name = "FILE")]
+    program: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
+    match &arguments.step {
+        Step::Seal(arguments) => seal(arguments, common),
+        Step::Run(arguments) => answer(arguments, common),
+        Step::Twins(arguments) => twins(arguments, common),
+        Step::Score(arguments) => score(arguments, common),
+    }
+}
+
+fn shard(text: &str) -> std::result::Result<Shard, String> {
+    let (number, of) = text.split_once('/').ok_or("write i/n, such as 2/8")?;
+    let parse = |part: &str| part.parse::<usize>().map_err(|_| format!("{part} is no whole number"));
+    let shard = Shard { number: parse(number)?, of: parse(of)? };
+    if (1..=shard.of).contains(&shard.number) { Ok(shard) } else { Err("i must be between 1 and n".into()) }
+}
+
+fn seal(arguments: &Seal, common: &Common) -> Result<()> {
+    let config = ChallengeConfig::read(&arguments.config, &common.set)?;
+    let shard = arguments.shard.unwrap_or(Shard::ALL);
+    let count = (0..config.cases).filter(|&index| shard.holds(index)).count();
+    let progress = Progress::new("sealing", count, common.quiet);
+    let sealed = seal::seal(&config, arguments.seed.as_deref(), &arguments.out, shard, &|done| progress.set(done));
+    progress.finish();
+    let commitment = sealed?;
+    println!("sealed {} cases in {}", commitment.cases, arguments.out.display());
+    println!("publish before anybody diagnoses: root {}", commitment.root);
+    Ok(())
+}
+
+impl How {
+    fn config(&self, common: &Common) -> Result<RunConfig> {
+        let program = match &self.program {
+            Some(program) => program.canonicalize().map_err(|source| Error::read(program, source))?,
+            None => std::env::current_exe().map_err(|source| Error::read("this program", source))?,
+        };
+        let sets = common.set.iter().flat_map(|set| ["--set".to_string(), set.clone()]);
+        Ok(RunConfig {
+            program,
+            arguments: ["--device".to_string(), common.device.clone()].into_iter().chain(sets).collect(),
+            shard: self.shard.unwrap_or(Shard::ALL),
+            most: self.most,
+            limit: Duration::from_secs(self.limit),
+        })
+    }
+}
+
+fn answer(arguments: &Run, common: &Common) -> Result<()> {
+    let config = arguments.how.config(common)?;
+    let progress = Progress::new("diagnosing", answer::waiting(&arguments.challenge, &arguments.out, &config)?, common.quiet);
+    let answers = answer::run(&arguments.challenge, &arguments.out, &config, &mut |done| progress.set(done));
+    progress.finish();
+    let answers = answers?;
+    println!("{} reports, {} failures in {}", answers.reports.len(), answers.failures.len(), arguments.out.display());
+    if answers.complete {
+        println!("publish before the truths are opened: {}", answers.sha256);
+    } else {
+        println!("not complete yet: the same command goes on");
+    }
+    Ok(())
+}
+
+fn twins(arguments: &Twins, common: &Common) -> Result<()> {
+    let config = arguments.how.config(common)?;
+    let progress = Progress::new("twins", answer::waiting(&arguments.challenge, &arguments.out, &config)?, common.quiet);
+    let done = twins::run(&arguments.challenge, &arguments.answers, &arguments.out, &config, &mut |done| progress.set(done));
+    progress.finish();
+    println!("{} twins diagnosed in {}", done?, arguments.out.display());
+    Ok(())
+}
+
+fn score(arguments: &Score, common: &Common) -> Result<()> {
+    let count = crate::challenge::commitment::Commitment::read_all(&arguments.challenge)?.iter().map(|part| part.cases).sum();
+    let progress = Progress::new("scoring", count, common.quiet);
+    let scored = score::score(&arguments.challenge, &arguments.answers, arguments.twins.as_deref(), &|done| progress.set(done));
+    progress.finish();
+    let scored = scored?;
+    let out = arguments.out.clone().unwrap_or_else(|| arguments.answers.join("score"));
+    scored.write(&out)?;
+    println!("{}", scored.markdown());
+    println!("results: {}", out.join("results.md").display());
+    Ok(())
+}
