@@ -122,6 +122,22 @@ const STAGES: &[(&str, &str, Calculus, &str, &str)] = &[
         "gradients_agree_with_central_differences_for_every_setting",
     ),
     (
+        "effects on the signal",
+        "signal, values",
+        Broken("clipping is passed straight through; a low-pass corner of zero stands for none; lots carry no gradient"),
+        "effects/tests.rs",
+        "gradients_of_every_operator_on_the_signal_agree_with_central_differences",
+    ),
+    ("effects on points", "values", Smooth, "effects/point_tests.rs", "effects_on_points_are_neutral_and_differentiable"),
+    ("effects on paths", "values", Smooth, "effects/point_tests.rs", "effects_on_paths_are_differentiable"),
+    (
+        "effects on noise",
+        "values",
+        Broken("the probability of impulses decides by lot"),
+        "effects/point_tests.rs",
+        "noise_is_neutral_differentiable_and_has_the_spectrum_or_tails_or_coherence_asked_for",
+    ),
+    (
         "visibility",
         "positions",
         Constant("a point is seen or not; its hull has no useful derivative"),

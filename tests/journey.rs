@@ -221,7 +221,7 @@ fn levels_are_found_beside_a_known_leakage_and_learned_effects_survive_the_check
     config.training.final_learning_rate = 1e-9;
     let (wanted, _) = gains(&config);
     let parent = tempfile::tempdir().unwrap();
-    let level = 4000.0;
+    let level = 12000.0;
     config.data.recordings = vec![leaking(parent.path(), level)];
     let (misled, _) = gains(&config);
     let leak = EffectSetting::neutral("tx_leakage").with("range_m", [LEAK_M]).with("re", [1.0]).with("reference", [level]);

@@ -20,8 +20,8 @@ pub static INFO: EffectInfo = EffectInfo {
     separate_by: "a walk sideways, and the same body part seen under several directions",
 };
 
-/// One exponent for both ways and both planes, taken at the radar's centre. The walls' echoes by way of their proxies are
-/// left as they are.
+/// On the body alone: the room's own responses are learned where they stand. One exponent for both ways and both planes,
+/// taken at the radar's centre; the same on the body's paths by way of the walls.
 ///
 /// `[point, 1]` → the same.
 ///

@@ -27,12 +27,16 @@ pub struct Parameter {
 
 impl Parameter {
     /// The scale is the size of what the values start from, so that a step of the optimiser is a share of it; or half
-    /// the prior's width where they start neutral.
+    /// the prior's width where they start neutral (1 where only the recording knows the unit).
     fn new(name: &str, values: &[f64], info: &EffectInfo, device: &Device) -> Self {
         let parameter = info.parameter(name).unwrap_or_else(|| panic!("{} has no parameter {name}", info.id));
         let away: Vec<f64> = values.iter().map(|value| value - parameter.neutral).collect();
         let size = (away.iter().map(|x| x * x).sum::<f64>() / away.len() as f64).sqrt();
-        let scale = if size > 0.0 { size } else { 0.5 * (parameter.most - parameter.least) };
+        let scale = match size {
+            size if size > 0.0 => size,
+            _ if parameter.is_relative() => 1.0,
+            _ => 0.5 * (parameter.most - parameter.least),
+        };
         let raw: Vec<f32> = away.iter().map(|away| (away / scale) as f32).collect();
         let raw = Tensor::from_data(TensorData::new(raw, [values.len()]), device);
         Self { raw: Param::from_tensor(raw), name: name.into(), neutral: parameter.neutral, scale }

@@ -16,6 +16,13 @@ pub struct ParameterInfo {
     pub most: f64,
 }
 
+impl ParameterInfo {
+    /// Whether it is in a unit that only the recording knows, so that its prior says nothing about its size.
+    pub fn is_relative(&self) -> bool {
+        self.unit.contains("reference") || self.unit.contains("recording")
+    }
+}
+
 pub(super) const fn parameter(name: &'static str, unit: &'static str, neutral: f64, least: f64, most: f64) -> ParameterInfo {
     ParameterInfo { name, unit, neutral, least, most }
 }

@@ -1,6 +1,20 @@
 //! Physics that recordings hold and the plain simulator leaves out: the library of effects, one file each, in the
 //! order in which the signal meets them.
 //!
+//! In a config, `[[simulator.effects]]` with an id and values, such as
+//!
+//! ```toml
+//! [[simulator.effects]]
+//! id = "wall_ghost"
+//! choice = "right"
+//! parameters = { coefficient = [0.35] }
+//! ```
+//!
+//! Levels (`level_db`, `re`, `im`, `level`) are relative to the parameter `reference`, an amplitude in the recording's unit;
+//! without it, to the strongest sample of each simulated frame. Give it, so that a receiver's property does not follow the
+//! scene. Lists are for each channel (tx by tx) or each receiver, and are repeated where they are too short. Operators act
+//! on the complex signal, also where a receiver without quadrature then keeps the real part alone.
+//!
 //! An effect is neutral until its parameters leave their neutral values; then it is part of the simulator like any
 //! other stage, with gradients to its parameters.
 

@@ -257,6 +257,51 @@ fn a_wall_ghost_is_the_path_by_way_of_the_mirrored_body() {
 }
 
 #[test]
+fn the_floor_returns_once_by_each_way_and_twice_by_both() {
+    let (radar, device) = (radar(), Device::flex());
+    let distance = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
+    let place = PLACES[1];
+    let image = [place[0], place[1], -1.8 - place[2]];
+    let displacement = Displacement::still(1, &device, DType::F64);
+    let amplitude = Amplitude::real(tensor(&[1.0], [1, 1], &device));
+    let point = Points { reference_m: &[place], displacement: &displacement, amplitude: &amplitude };
+    let values = values(&of("floor_bounce").with("coefficient", [-0.4]));
+    let found = floor_bounce::signal(point, &values, &room(), &radar, 0, Dechirp::Paper, SumForm::Exact).unwrap();
+    let (re, im) = (host(&found.re), host(&found.im));
+    let (tx, rx) = (radar.tx_position_m(0), radar.rx_position_m(1));
+    let ways = [(place, image, -0.4), (image, place, -0.4), (image, image, 0.16)];
+    for n in 0..radar.samples_per_chirp {
+        let hz = radar.carrier_hz() + radar.slope_hz_per_s * n as f64 / radar.sample_rate_hz;
+        let (mut wanted_re, mut wanted_im) = (0.0, 0.0);
+        for (out, back, weight) in ways {
+            let (out, back) = (distance(tx, out), distance(back, rx));
+            let turns = (hz * (out + back) / crate::radar::SPEED_OF_LIGHT).fract();
+            let (sin, cos) = (std::f64::consts::TAU * turns).sin_cos();
+            wanted_re += weight * cos / (out * back);
+            wanted_im += weight * sin / (out * back);
+        }
+        let at = radar.samples_per_chirp + n;
+        assert!((re[at] - wanted_re).abs() < 1e-6 && (im[at] - wanted_im).abs() < 1e-6, "sample {n}");
+    }
+}
+
+#[test]
+fn echoes_within_the_body_come_from_behind_it() {
+    let (radar, device) = (radar(), Device::flex());
+    let signal_of = |range: f64| {
+        let displacement = Displacement::still(1, &device, DType::F64);
+        let amplitude = Amplitude::real(tensor(&[range * range], [1, 1], &device));
+        let single = crate::radar::Radar { position_m: [0.0; 3], tx_m: vec![[0.0; 3]], rx_m: vec![[0.0; 3]], ..radar.clone() };
+        let place = [[0.0, range, 0.0]];
+        let point = Points { reference_m: &place, displacement: &displacement, amplitude: &amplitude };
+        direct_signal(point, &single, 0, Dechirp::Paper, SumForm::Exact)
+    };
+    let values = values(&of("body_multibounce").with("extra_m", [0.35]).with("coefficient", [0.25]));
+    let found = host(&flat(body_multibounce::echo(signal_of(2.0), &values, &radar)));
+    assert_close("echo", &found, &host(&flat(signal_of(2.35).scale_by(0.25))), 1e-6);
+}
+
+#[test]
 fn moved_antennas_see_what_a_radar_built_so_would_see() {
     let (built, device) = (radar(), Device::flex());
     let offsets = numbers(4, 12, -3e-4, 3e-4);

@@ -66,7 +66,8 @@ impl EffectSetting {
             if values.is_empty() {
                 return Err(Error::setting(field, "empty", "at least one number"));
             }
-            let within = |value: f64| (parameter.least..=parameter.most).contains(&value) || value == parameter.neutral;
+            let prior = if parameter.is_relative() { f64::MIN..=f64::MAX } else { parameter.least..=parameter.most };
+            let within = |value: f64| prior.contains(&value) || value == parameter.neutral;
             if let Some(value) = values.iter().find(|value| !within(**value)) {
                 let expected = format!("{} to {} {}", parameter.least, parameter.most, parameter.unit);
                 return Err(Error::setting(field, value, expected));
@@ -108,9 +109,12 @@ mod tests {
         let wrong = refused(EffectSetting::neutral("dc_offset").with("j", [0.0]));
         assert_eq!(wrong, "`simulator.effects.0.parameters.j` is unknown, expected one of i, q, reference");
         for value in [f64::NAN, f64::INFINITY, 2.0] {
-            assert!(EffectSetting::neutral("dc_offset").with("i", [value]).check("e").is_err(), "{value}");
+            assert!(EffectSetting::neutral("slope_error").with("relative", [value]).check("e").is_err(), "{value}");
         }
         assert!(EffectSetting::neutral("dc_offset").with("i", []).check("e").is_err());
+        // In the recording's own units anything finite may be.
+        assert!(EffectSetting::neutral("dc_offset").with("i", [3e4]).check("e").is_ok());
+        assert!(EffectSetting::neutral("dc_offset").with("i", [f64::NAN]).check("e").is_err());
         assert!(refused(EffectSetting::neutral("wall_ghost").choosing("rght")).contains("one of left, right"));
     }
 }
