@@ -2,6 +2,7 @@
 
 pub mod region;
 pub mod slow;
+pub mod untracked;
 pub mod vital;
 
 use super::evidence::Evidence;
@@ -14,4 +15,8 @@ pub struct Suspect {
 }
 
 /// All of them. Each answers on its own, within its family; the selection chooses between families.
-pub const SUSPECTS: &[Suspect] = &[Suspect { name: "slow", find: slow::find }, Suspect { name: "vital", find: vital::find }];
+pub const SUSPECTS: &[Suspect] = &[
+    Suspect { name: "untracked", find: untracked::find },
+    Suspect { name: "slow", find: slow::find },
+    Suspect { name: "vital", find: vital::find },
+];

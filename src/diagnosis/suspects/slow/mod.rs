@@ -33,7 +33,10 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let mut found = vec![];
     for part in [Part::Gain, Part::Phase, Part::Delay] {
         let series = field.series(part, |_| true);
-        if let Some(line) = lines::strongest(&field, &series, training, held_out) {
+        // A radian at the farthest group.
+        let farthest_s = field.groups.iter().map(|g| g.delay_s).fold(0.0, f64::max);
+        let largest = if part == Part::Delay { 1.0 / farthest_s } else { 1.0 };
+        if let Some(line) = lines::strongest(&field, &series, training, held_out, largest) {
             found.push(candidates::of_line(evidence, &field, part, &line));
         }
         if let Some(drift) = drift::best(&field, &series, training, held_out) {
