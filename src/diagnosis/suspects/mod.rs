@@ -4,6 +4,7 @@ pub mod region;
 pub mod slow;
 pub mod untracked;
 pub mod vital;
+pub mod waveform;
 
 use super::evidence::Evidence;
 use super::finding::Candidate;
@@ -19,4 +20,5 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect { name: "untracked", find: untracked::find },
     Suspect { name: "slow", find: slow::find },
     Suspect { name: "vital", find: vital::find },
+    Suspect { name: "waveform", find: waveform::find },
 ];
