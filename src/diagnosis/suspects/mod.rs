@@ -2,8 +2,10 @@
 
 pub mod region;
 pub mod slow;
+pub mod untracked;
 pub mod vital;
 pub mod paths;
+pub mod waveform;
 
 use super::evidence::Evidence;
 use super::finding::Candidate;
@@ -19,4 +21,6 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect { name: "slow", find: slow::find },
     Suspect { name: "vital", find: vital::find },
     Suspect { name: "paths", find: paths::find },
+    Suspect { name: "untracked", find: untracked::find },
+    Suspect { name: "waveform", find: waveform::find },
 ];

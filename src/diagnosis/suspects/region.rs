@@ -1,6 +1,7 @@
 //! A region of ranges and Doppler frequencies, and what moves in it taken out of the samples.
 
 use num_complex::Complex64;
+use rayon::prelude::*;
 
 use crate::diagnosis::cube::Cube;
 
@@ -48,34 +49,26 @@ pub fn remove(cube: &mut Cube, still: &[Complex64], regions: &[Region]) {
     for region in regions {
         let (fast, slow) = (tones(samples, region.range), tones(loops, region.doppler));
         let block = loops * samples;
-        rayon::iter::ParallelIterator::for_each(
-            rayon::iter::IndexedParallelIterator::enumerate(rayon::slice::ParallelSliceMut::par_chunks_exact_mut(
-                cube.samples.as_mut_slice(),
-                block,
-            )),
-            |(chunk, values)| {
-                let mean = &still[chunk % channels * samples..][..samples];
-                // `[loop][fast tone]`
-                let along: Vec<Vec<Complex64>> = values
-                    .chunks_exact(samples)
-                    .map(|chirp| {
-                        fast.iter()
-                            .map(|tone| chirp.iter().zip(mean).zip(tone).map(|((v, m), t)| (v - m) * t.conj()).sum())
-                            .collect()
-                    })
-                    .collect();
-                for s in &slow {
-                    let shares: Vec<Complex64> =
-                        (0..fast.len()).map(|i| along.iter().zip(s).map(|(a, s)| a[i] * s.conj()).sum()).collect();
-                    for (chirp, s) in values.chunks_exact_mut(samples).zip(s) {
-                        for (tone, share) in fast.iter().zip(&shares) {
-                            let factor = share * s;
-                            chirp.iter_mut().zip(tone).for_each(|(v, t)| *v -= factor * t);
-                        }
+        cube.samples.par_chunks_exact_mut(block).enumerate().for_each(|(chunk, values)| {
+            let mean = &still[chunk % channels * samples..][..samples];
+            // `[loop][fast tone]`
+            let along: Vec<Vec<Complex64>> = values
+                .chunks_exact(samples)
+                .map(|chirp| {
+                    fast.iter().map(|tone| chirp.iter().zip(mean).zip(tone).map(|((v, m), t)| (v - m) * t.conj()).sum()).collect()
+                })
+                .collect();
+            for s in &slow {
+                let shares: Vec<Complex64> =
+                    (0..fast.len()).map(|i| along.iter().zip(s).map(|(a, s)| a[i] * s.conj()).sum()).collect();
+                for (chirp, s) in values.chunks_exact_mut(samples).zip(s) {
+                    for (tone, share) in fast.iter().zip(&shares) {
+                        let factor = share * s;
+                        chirp.iter_mut().zip(tone).for_each(|(v, t)| *v -= factor * t);
                     }
                 }
-            },
-        );
+            }
+        });
     }
 }
 

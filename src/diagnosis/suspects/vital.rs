@@ -10,7 +10,6 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rustfft::FftPlanner;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::region::{Region, remove};
 use crate::diagnosis::evidence::{Evidence, hann};
@@ -20,11 +19,14 @@ use crate::diagnosis::statistics;
 /// Rates of breathing and of a heart, Hz.
 const BREATHING_HZ: [f64; 2] = [0.1, 0.7];
 const HEART_HZ: [f64; 2] = [0.8, 2.2];
-/// Displacements that a chest makes at a heartbeat, m.
+/// Displacements of a chest in a breath and in a heartbeat, m.
+const LARGEST_BREATH_M: f64 = 0.03;
 const LARGEST_HEARTBEAT_M: f64 = 0.8e-3;
 /// A rhythm needs so many periods.
 const FEWEST_PERIODS: f64 = 2.5;
 const FEWEST_FRAMES: usize = 24;
+/// Nearer ranges belong to leakage and offsets.
+const NEAREST_BIN: usize = 3;
 /// Ranges on each side that may belong to the same reflector.
 const NEIGHBOURS: usize = 1;
 /// Share of the phase's variance that a rhythm must hold.
@@ -105,7 +107,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
             sum / (channels * (training.len() - 1)) as f64
         })
         .collect();
-    let strongest = (1..bins.saturating_sub(1)).max_by(|&a, &b| change[a].total_cmp(&change[b]))?;
+    let strongest = (NEAREST_BIN..bins.saturating_sub(1)).max_by(|&a, &b| change[a].total_cmp(&change[b]))?;
     if change[strongest] < 10.0 {
         return None;
     }
@@ -119,17 +121,18 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     };
     let best = fits.into_iter().max_by(|a, b| share(a).total_cmp(&share(b)))?;
     let times: Vec<f64> = evidence.starts_s.clone();
-    let rhythm = rhythm(&times, &best.phase, training, held_out)?;
+    let rhythm = rhythm(&times, &best.phase, training, held_out);
     let metres = evidence.radar.wavelength_m() / (4.0 * PI);
-    let amplitude_m = rhythm.amplitude * metres;
-    let named = if BREATHING_HZ[0] <= rhythm.frequency_hz && rhythm.frequency_hz <= BREATHING_HZ[1] && amplitude_m < 0.03 {
-        Some("breathing")
-    } else if HEART_HZ[0] <= rhythm.frequency_hz && rhythm.frequency_hz <= HEART_HZ[1] && amplitude_m < LARGEST_HEARTBEAT_M {
-        Some("heartbeat")
-    } else {
-        None
-    }
-    .filter(|_| rhythm.share > RHYTHMIC && rhythm.p_value < 1e-3);
+    let named = rhythm.as_ref().filter(|r| r.share > RHYTHMIC && r.p_value < 1e-3).and_then(|r| {
+        let (rate, amplitude_m) = (r.frequency_hz, r.amplitude * metres);
+        if BREATHING_HZ[0] <= rate && rate <= BREATHING_HZ[1] && amplitude_m < LARGEST_BREATH_M {
+            Some(("breathing", r))
+        } else if HEART_HZ[0] <= rate && rate <= HEART_HZ[1] && amplitude_m < LARGEST_HEARTBEAT_M {
+            Some(("heartbeat", r))
+        } else {
+            None
+        }
+    });
     // A held-out frame lies between two training frames; its phase is between theirs.
     let gain: f64 = held_out
         .iter()
@@ -150,11 +153,11 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
                 .sum::<f64>()
         })
         .sum();
-    if gain <= 3.0 || rhythm.p_value > 0.01 {
+    if gain <= 3.0 {
         return None;
     }
     let reach = |mut bin: usize, step: isize| {
-        while change[bin] > 2.0 && bin > 0 && bin + 1 < bins {
+        while change[bin] > 2.0 && bin > NEAREST_BIN && bin + 1 < bins {
             bin = bin.wrapping_add_signed(step);
         }
         bin
@@ -174,27 +177,49 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
             Some(_) => "as a heart has",
             None => "which is no breathing's",
         }
+    let displacement: Vec<f64> = best.phase.iter().map(|p| 1e3 * p * metres).collect();
+    let swing = displacement.iter().fold([f64::MAX, f64::MIN], |[low, high], &d| [low.min(d), high.max(d)]);
+    let statement = match named {
+        Some((id, r)) => format!(
+            "At {range_m:.2} m something moves to and fro {:.1} times a minute ({:.3} Hz) by {:.2} mm (amplitude of the \
+             fundamental); {:.0} % of its motion has this rhythm, as {} has.",
+            60.0 * r.frequency_hz,
+            r.frequency_hz,
+            1e3 * r.amplitude * metres,
+            100.0 * r.share,
+            if id == "breathing" { "a breathing chest" } else { "a beating heart" }
+        ),
+        None => format!(
+            "At {range_m:.2} m something moves slowly, over {:.1} mm during the recording, without a rhythm that would show \
+             within its length.",
+            swing[1] - swing[0]
+        ),
+    };
+    // Of the change alone; the rhythm has its own.
+    let changed = statistics::corrected(
+        statistics::mean_power_tail(change[strongest], (channels * (training.len() - 1)) as f64),
+        bins as f64,
     );
     let region = Region { range: [ends[0].saturating_sub(1) as f64, (ends[1] + 1) as f64], doppler: [-1.0, 1.0] };
     let still = evidence.still().to_vec();
     let energy: f64 = change.iter().map(|c| (c - 1.0).max(0.0)).sum::<f64>()
         * data.noise.iter().sum::<f64>()
         * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
-    let displacement: Vec<f64> = best.phase.iter().map(|p| 1e3 * p * metres).collect();
     Some(Candidate {
-        id: named,
+        id: named.map(|n| n.0),
         behaves_like: "path-like",
-        estimates: if named.is_some() {
+        estimates: named.map_or(vec![], |(_, r)| {
             vec![
-                Estimate::normal("rate_hz", rate, rhythm.frequency_deviation_hz),
-                Estimate::normal("amplitude_m", amplitude_m, rhythm.amplitude_deviation * metres),
+                Estimate::normal("rate_hz", r.frequency_hz, r.frequency_deviation_hz),
+                Estimate::normal("amplitude_m", r.amplitude * metres, r.amplitude_deviation * metres),
             ]
-        } else {
-            vec![]
-        },
+        }),
         choice: None,
-        place: Place { range_m: Some([ends[0] as f64 * bin_m, ends[1] as f64 * bin_m]), ..Place::at("body") },
-        p_value: statistics::corrected(rhythm.p_value, 4.0),
+        place: Place {
+            range_m: Some([ends[0] as f64 * bin_m, ends[1] as f64 * bin_m]),
+            ..Place::at(if named.is_some() { "body" } else { "scene" })
+        },
+        p_value: named.map_or(changed, |(_, r)| statistics::corrected(r.p_value, 4.0)),
         gain,
         rung: Rung::D,
         // A curtain in the wind does the same; so does whatever swings there.
@@ -348,18 +373,30 @@ fn rhythm(times: &[f64], phase: &[f64], training: &[usize], held_out: &[usize]) 
         }
     }
     let (misfit, amplitude, left) = fit(Some(frequency_hz));
-    let variance = misfit / left.len() as f64;
-    // The rest of the motion is smooth: so many independent values are in it.
-    let lag = left.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / misfit.max(f64::MIN_POSITIVE);
-    let independent = (left.len() as f64 * (1.0 - lag.clamp(0.0, 0.99)) / (1.0 + lag.clamp(0.0, 0.99))).max(5.0);
     let share = 1.0 - misfit / total.max(f64::MIN_POSITIVE);
-    let below = (independent - 4.0).max(1.0);
-    let ratio = (share / 2.0) / ((1.0 - share).max(1e-9) / below);
-    let p = FisherSnedecor::new(2.0, below).map_or(1.0, |law| law.sf(ratio));
-    let deviation = (2.0 * variance / independent).sqrt();
+    // The rest of the motion is slow as well: what counts is how far the line stands out of the frequencies around it,
+    // its harmonics left out.
+    let reach = if frequency_hz < HEART_HZ[0] { [0.0, HEART_HZ[0]] } else { [frequency_hz - 0.5, frequency_hz + 0.5] };
+    let mut around = vec![];
+    for k in 1..(0.5 * duration / interval) as usize {
+        let f = k as f64 / duration;
+        let harmonic = (f / frequency_hz).round().max(1.0) * frequency_hz;
+        if f >= reach[0] && f <= reach[1] && (f - harmonic).abs() > 1.0 / duration {
+            let sum: Complex64 = left.iter().zip(&frames).map(|(l, &i)| l * Complex64::cis(-TAU * f * times[i])).sum();
+            around.push((2.0 * sum.norm() / left.len() as f64).powi(2));
+        }
+    }
+    if around.len() < 3 {
+        return None;
+    }
+    let count = around.len() as f64;
+    let background = (around.iter().sum::<f64>() / count).max(1e-12);
+    let p = (1.0 + amplitude * amplitude / background / count).powf(-count);
+    let deviation = (0.5 * background).sqrt();
     Some(Rhythm {
         frequency_hz,
-        frequency_deviation_hz: deviation / amplitude.max(1e-9) * (6.0f64).sqrt() / (2.0 * PI * duration) * 2.0,
+        // Of a sinusoid in noise of that density, twice the variance because no body keeps time exactly.
+        frequency_deviation_hz: deviation / amplitude.max(1e-9) * 12.0f64.sqrt() / (PI * duration),
         amplitude,
         amplitude_deviation: deviation,
         share,

@@ -46,8 +46,8 @@ impl Line {
     }
 }
 
-/// The strongest line of a series, fitted to the training frames.
-pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &[usize]) -> Option<Line> {
+/// The strongest line of a series, fitted to the training frames; of `largest` amplitude at most.
+pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &[usize], largest: f64) -> Option<Line> {
     let frames: Vec<usize> = training.iter().copied().filter(|&f| series.weight[f] > 0.0).collect();
     if frames.len() < 3 {
         return None;
@@ -67,19 +67,31 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
     let padded = (loops * PADDING).next_power_of_two();
     let total: f64 = frames.iter().map(|&f| series.weight[f] * loops as f64).sum();
     let mean = frames.iter().zip(&spectra).map(|(_, spectrum)| spectrum[0].re).sum::<f64>() / total;
+    let middles: Vec<f64> =
+        frames.iter().map(|f| 0.5 * (field.times_s[f * loops] + field.times_s[f * loops + loops - 1])).collect();
+    let period = field.times_s[loops] - field.times_s[0];
     // With a free constant: frames may see the same part of every period.
     let power = |index: usize| {
         let frequency = lowest + index as f64 * step;
         let place = frequency * loop_s * padded as f64;
         let (below, share) = (place.floor() as usize, place.fract());
+        let kernels = [dirichlet(frequency * loop_s, loops), dirichlet(2.0 * frequency * loop_s, loops)];
         let [mut data, mut once, mut twice] = [Complex64::ZERO; 3];
-        for (&frame, spectrum) in frames.iter().zip(&spectra) {
+        let (mut turn, mut last_s) = (Complex64::ONE, 0.0);
+        let once_more = Complex64::cis(-std::f64::consts::TAU * frequency * period);
+        for (at, (&frame, spectrum)) in frames.iter().zip(&spectra).enumerate() {
             let value = spectrum[below % padded] * (1.0 - share) + spectrum[(below + 1) % padded] * share;
-            let middle_s = 0.5 * (field.times_s[frame * loops] + field.times_s[frame * loops + loops - 1]);
-            let turn = Complex64::cis(-std::f64::consts::TAU * frequency * middle_s);
+            // Frames follow each other regularly: most turns are products of known ones.
+            let steps = (middles[at] - last_s) / period;
+            turn = if at > 0 && steps < 2.5 && (steps - steps.round()).abs() < 1e-6 {
+                if steps < 1.5 { turn * once_more } else { turn * once_more * once_more }
+            } else {
+                Complex64::cis(-std::f64::consts::TAU * frequency * middles[at])
+            };
+            last_s = middles[at];
             data += value * turn;
-            once += turn * (series.weight[frame] * dirichlet(frequency * loop_s, loops));
-            twice += turn * turn * (series.weight[frame] * dirichlet(2.0 * frequency * loop_s, loops));
+            once += turn * (series.weight[frame] * kernels[0]);
+            twice += turn * turn * (series.weight[frame] * kernels[1]);
         }
         let (cosine, sine) = (once.re, -once.im);
         let cc = 0.5 * (total + twice.re) - cosine * cosine / total;
@@ -94,7 +106,7 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
         }
     };
     let best = (0..count).into_par_iter().map(|i| (i, power(i))).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let gain = |f: f64| fit(field, series, &frames, f, 1).2;
+    let gain = |f: f64| if (lowest..=highest).contains(&f) { fit(field, series, &frames, f, 1).2 } else { f64::NEG_INFINITY };
     // The peak is a parabola near its top.
     let refined = |mut frequency: f64| {
         let (mut width, mut centre) = (step, gain(frequency));
@@ -113,10 +125,11 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
     let (mut frequency, mut centre) = refined(lowest + best.0 as f64 * step);
     // Frames sample slow vibrations: of frequencies that only the short frames could tell apart, the lowest is taken.
     let frame_rate = 1.0 / (field.times_s[loops] - field.times_s[0]);
+    let gaps = frame_rate * loop_s * (loops as f64) < 0.9;
     let nearest = (frequency / frame_rate).round();
     let mut aliases: Vec<f64> = (0..=3).map(|k| (frequency - (nearest - f64::from(k)) * frame_rate).abs()).collect();
     aliases.sort_by(f64::total_cmp);
-    for alias in aliases.into_iter().filter(|alias| *alias > lowest + step && *alias < 0.9 * frequency) {
+    for alias in aliases.into_iter().filter(|alias| gaps && *alias > lowest + step && *alias < 0.9 * frequency) {
         let (found, value) = refined(alias);
         if value > centre - ALIAS_GAIN {
             (frequency, centre) = (found, value);
@@ -139,6 +152,10 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
         let h = 0.05 / duration_s;
         (2.0 * centre - gain(frequency - h) - gain(frequency + h)) / (h * h)
     };
+    // Not small: no modulation of static returns, but something else.
+    if amplitudes.iter().any(|[cosine, sine]| cosine.hypot(*sine) > largest) {
+        return None;
+    }
     let mut line = Line {
         frequency_hz: frequency,
         amplitudes,
@@ -146,7 +163,11 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
         training_gain,
         held_out_gain: 0.0,
         tried: (highest - lowest) * duration_s * 3.0,
-        frequency_deviation_hz: if curvature > 0.0 { curvature.sqrt().recip() } else { 0.5 / duration_s },
+        frequency_deviation_hz: if curvature.is_finite() && curvature > 0.0 {
+            curvature.sqrt().recip()
+        } else {
+            0.5 / duration_s
+        },
         amplitude_deviation: (2.0 / total).sqrt(),
     };
     // What leaks from movers is no line: it raises the spectra of single frames at that frequency.

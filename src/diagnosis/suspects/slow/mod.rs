@@ -10,6 +10,8 @@ pub mod field;
 pub mod lines;
 pub mod random;
 pub mod settling;
+#[cfg(test)]
+mod tests;
 mod undo;
 
 use field::{Field, Part};
@@ -22,38 +24,50 @@ use crate::diagnosis::statistics;
 const LOOKS: f64 = 10.0;
 /// Gain (nats) below which nothing is worth telling.
 const LEAST_GAIN: f64 = 3.0;
-/// A named effect may gain so much less than a nameless field.
-const NAMED_SHARE: f64 = 0.8;
+/// Share of the gain that what is simpler, or has a name, needs.
+const NEARLY: f64 = 0.8;
 /// p-value below which a candidate is passed on.
 const PASSED_ON: f64 = 0.01;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(field) = Field::new(evidence) else { return vec![] };
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
-    let mut found = vec![];
+    // Of a few parameters, and those that are free in every chirp.
+    let (mut found, mut free) = (vec![], vec![]);
     for part in [Part::Gain, Part::Phase, Part::Delay] {
         let series = field.series(part, |_| true);
-        if let Some(line) = lines::strongest(&field, &series, training, held_out) {
+        // A radian at the farthest group.
+        let farthest_s = field.groups.iter().map(|g| g.delay_s).fold(0.0, f64::max);
+        let largest = if part == Part::Delay { 1.0 / farthest_s } else { 1.0 };
+        if let Some(line) = lines::strongest(&field, &series, training, held_out, largest) {
             found.push(candidates::of_line(evidence, &field, part, &line));
         }
         if let Some(drift) = drift::best(&field, &series, training, held_out) {
             found.push(candidates::of_drift(evidence, &field, part, &drift));
         }
         if let Some(random) = random::best(&field, part, training, held_out) {
-            found.push(candidates::of_random(evidence, &field, part, &random));
+            free.push(candidates::of_random(evidence, &field, part, &random));
         }
     }
     if let Some(settling) = settling::best(&field, training, held_out) {
-        found.push(candidates::of_settling(evidence, &field, &settling));
+        let candidate = candidates::of_settling(evidence, &field, &settling);
+        if candidate.id.is_some() { found.push(candidate) } else { free.push(candidate) }
     }
-    for candidate in &mut found {
-        candidate.p_value = statistics::corrected(candidate.p_value, LOOKS);
+    for candidates in [&mut found, &mut free] {
+        for candidate in candidates.iter_mut() {
+            candidate.p_value = statistics::corrected(candidate.p_value, LOOKS);
+        }
+        candidates
+            .retain(|c| c.p_value < PASSED_ON && c.gain > LEAST_GAIN && c.id.is_none_or(|id| !evidence.accepted.contains(&id)));
     }
-    found.retain(|c| c.p_value < PASSED_ON && c.gain > LEAST_GAIN && c.id.is_none_or(|id| !evidence.accepted.contains(&id)));
-    // One cause shows in several looks; a name wins where it explains nearly as much as the best of them.
-    let best = found.iter().map(|c| c.gain).fold(0.0, f64::max);
-    let best_named = found.iter().filter(|c| c.id.is_some()).map(|c| c.gain).fold(0.0, f64::max);
-    if best_named > NAMED_SHARE * best {
+    // One cause shows in several looks. A law of few parameters wins where it explains nearly as much as what is free in
+    // every chirp, and a name where it explains nearly as much as what has none.
+    let most = |of: &[Candidate]| of.iter().map(|c| c.gain).fold(0.0, f64::max);
+    if found.is_empty() || most(&found) < NEARLY * most(&free) {
+        found.append(&mut free);
+    }
+    let best = most(&found);
+    if found.iter().any(|c| c.id.is_some() && c.gain > NEARLY * best) {
         found.retain(|c| c.id.is_some());
     }
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));

@@ -1,0 +1,140 @@
+//! Static returns in white noise, with and without something that all of them share.
+
+use num_complex::Complex64;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::find;
+use crate::diagnosis::cube::{Cube, Loaded, Split};
+use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::finding::{Candidate, Correction};
+use crate::radar::Radar;
+
+/// Frames of 32 loops and 64 samples, four channels, returns all over the ranges about 30 dB above the noise.
+fn evidence(seed: u64, change: impl Fn(f64, usize, usize, f64) -> Complex64) -> Evidence {
+    let mut radar = Radar::small(12);
+    radar.loops_per_frame = 32;
+    radar.samples_per_chirp = 64;
+    radar.frame_period_s = 0.1;
+    radar.tx_m = vec![[0.0; 3]];
+    radar.rx_m = (0..4).map(|i| [0.0019 * f64::from(i), 0.0, 0.0]).collect();
+    let dims = radar.dims();
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let returns: Vec<(f64, Vec<Complex64>)> =
+        (0..40).map(|i| (5.0 + f64::from(i) * 1.1, (0..4).map(|_| 3.0 * Complex64::new(normal(), normal())).collect())).collect();
+    let delay_of_bin = radar.sample_rate_hz / (64.0 * radar.slope_hz_per_s);
+    let mut samples = vec![];
+    for frame in 0..dims[0] {
+        for rx in 0..4 {
+            for index in 0..32 {
+                let time_s = radar.chirp_time_s(frame, 0, index);
+                for n in 0..64 {
+                    let value: Complex64 = returns
+                        .iter()
+                        .map(|(bin, amplitude)| {
+                            let tone = Complex64::cis(std::f64::consts::TAU * bin * f64::from(n) / 64.0);
+                            amplitude[rx] * tone * change(time_s, frame, index, bin * delay_of_bin)
+                        })
+                        .sum();
+                    samples.push(value + Complex64::new(normal(), normal()));
+                }
+            }
+        }
+    }
+    let (held_out, training) = (0..dims[0]).partition(|f| f % 4 == 2);
+    let starts_s = (0..dims[0]).map(|f| radar.chirp_time_s(f, 0, 0)).collect();
+    let loaded = Loaded {
+        cube: Cube::new(dims, samples),
+        radar,
+        split: Split { training, held_out, block_loops: None },
+        starts_s,
+        extremes: [-1e3, 1e3],
+    };
+    Evidence::new(loaded, None, None)
+}
+
+fn best(evidence: &Evidence) -> Option<Candidate> {
+    find(evidence).into_iter().filter(|c| c.p_value < 5e-4).max_by(|a, b| a.gain.total_cmp(&b.gain))
+}
+
+/// Found and undone, nothing is left to find.
+fn found_once(mut evidence: Evidence) -> Candidate {
+    let candidate = best(&evidence).expect("nothing found");
+    let Correction::Samples(undo) = &candidate.correction else { panic!("no correction of samples") };
+    undo(&mut evidence.cube);
+    let again = best(&evidence.changed());
+    assert!(again.is_none(), "after {candidate:?} still {again:?}");
+    candidate
+}
+
+fn within(candidate: &Candidate, name: &str, truth: f64) {
+    let estimate = candidate.estimates.iter().find(|e| e.name == name).unwrap_or_else(|| panic!("no {name}: {candidate:?}"));
+    let [low, high] = estimate.ci90[0];
+    // Three deviations instead of 1.645: one draw of the noise must not fail.
+    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * 3.0 / 1.645);
+    assert!((truth - middle).abs() < half, "{name}: {truth} not within {low} … {high}");
+    assert!(half < 0.25 * truth.abs(), "{name}: {half} is no measurement of {truth}");
+}
+
+#[test]
+fn nothing_is_found_where_nothing_changes() {
+    for seed in 0..4 {
+        let found = best(&evidence(seed, |_, _, _, _| Complex64::ONE));
+        assert!(found.is_none(), "{found:?}");
+    }
+}
+
+#[test]
+fn a_ripple_of_the_gain_has_no_name_but_a_frequency() {
+    let found = found_once(evidence(1, |t, _, _, _| (1.0 + 0.04 * (std::f64::consts::TAU * 100.0 * t + 0.4).sin()).into()));
+    assert_eq!((found.id, found.behaves_like), (None, "slow-time gain"));
+    assert!(found.statement.contains("at 100.0") || found.statement.contains("at 99.9"), "{}", found.statement);
+}
+
+#[test]
+fn a_common_phase_is_a_vibration_and_one_in_proportion_to_the_delay_is_none() {
+    let swing = |t: f64| (std::f64::consts::TAU * 83.0 * t).sin();
+    let found = found_once(evidence(2, |t, _, _, _| Complex64::cis(0.05 * swing(t))));
+    assert_eq!(found.id, Some("radar_vibration"));
+    within(&found, "frequency_hz", 83.0);
+    let found = found_once(evidence(3, |t, _, _, delay| Complex64::cis(2.5e6 * delay * swing(t))));
+    assert_eq!((found.id, found.behaves_like), (None, "delay-proportional phase"));
+}
+
+#[test]
+fn a_drift_and_a_step_are_measured() {
+    let db = |db: f64| Complex64::from(10f64.powf(db / 20.0));
+    within(&found_once(evidence(4, |_, frame, _, _| db(0.4 * frame as f64 / 11.0))), "db", 0.4);
+    let step = found_once(evidence(5, |_, frame, _, _| db(if frame >= 7 { 0.3 } else { 0.0 })));
+    within(&step, "db", 0.3);
+    // Frame 6 is held out.
+    assert!(step.place.frames.as_ref().is_some_and(|f| [6, 7].contains(&f[0])), "{:?}", step.place);
+}
+
+#[test]
+fn the_first_chirps_of_a_frame_settle() {
+    let found = found_once(evidence(6, |_, _, index, _| (1.0 - 0.1 * (-(index as f64) / 5.0).exp()).into()));
+    assert_eq!(found.id, Some("chirp_settling"));
+    within(&found, "depth", 0.1);
+    within(&found, "chirps", 5.0);
+}
+
+#[test]
+fn random_chirps_are_phase_noise_or_jitter() {
+    let mut random = ChaCha8Rng::seed_from_u64(9);
+    let bell: Vec<f64> = (0..12 * 32).map(|_| StandardNormal.sample(&mut random)).collect();
+    let at_stated = 2.0 * 3.0 / crate::radar::SPEED_OF_LIGHT;
+    let noisy = |scale: f64, values: Vec<f64>| {
+        move |_: f64, frame: usize, index: usize, delay: f64| Complex64::cis(scale * delay * values[frame * 32 + index])
+    };
+    let found = found_once(evidence(7, noisy(0.05 / at_stated, bell.clone())));
+    assert_eq!(found.id, Some("phase_noise"));
+    within(&found, "per_chirp_rad", 0.05);
+    let two: Vec<f64> = bell.iter().map(|v| if *v > 0.0 { 1.0 } else { 0.0 }).collect();
+    let slope = Radar::small(1).slope_hz_per_s;
+    let found = found_once(evidence(8, noisy(std::f64::consts::TAU * slope * 1.2e-8, two)));
+    assert_eq!(found.id, Some("chirp_start_jitter"));
+    within(&found, "jitter_s", 1.2e-8);
+}

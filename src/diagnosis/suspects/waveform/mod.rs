@@ -1,0 +1,10 @@
+//! Errors of the chirp's frequency within a chirp: they act in proportion to the delay.
+
+pub mod ripple;
+
+use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::finding::Candidate;
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    ripple::find(evidence).into_iter().collect()
+}
