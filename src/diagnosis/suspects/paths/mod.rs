@@ -1,5 +1,6 @@
 //! Returns from where neither the body nor the static room can be: mirror images, strangers that move, echoes.
 
+mod echo;
 mod ghost;
 mod image;
 mod mover;
@@ -7,6 +8,9 @@ mod pendulum;
 mod removal;
 mod scene;
 mod track;
+
+#[cfg(test)]
+mod tests;
 
 use crate::diagnosis::{Candidate, Evidence};
 
@@ -17,7 +21,10 @@ const AGREEING: f64 = 0.6;
 /// Least gain on held-out frames that is worth a name, nats.
 const LEAST_GAIN: f64 = 6.0;
 /// Kinds of answers that this family may give: every one is a chance to be wrong.
-const TRIED: f64 = 4.0;
+const TRIED: f64 = 6.0;
+
+/// Effects of which there may be several.
+const MANY: [&str; 3] = ["wall_ghost", "floor_bounce", "moving_reflector"];
 
 /// Mirror images of the body at the room's boundaries, and movers that are none.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -36,5 +43,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         (_, Some(mover)) if mover.gain > LEAST_GAIN => found.push(mover.candidate(&scene, TRIED)),
         _ => {}
     }
+    let echoes = [echo::multibounce(&scene, TRIED), echo::object_radar_object(&scene, TRIED)];
+    found.extend(echoes.into_iter().flatten());
+    found.retain(|found| found.id.is_none_or(|id| MANY.contains(&id) || !evidence.accepted.contains(&id)));
     found
 }

@@ -44,6 +44,7 @@ impl Mover {
             })
             .sum();
         let id = if pendulum.is_some() { Some("moving_reflector") } else { named(scene, &track.sightings) };
+        let id = id.map(|id| if outside(scene, &track.sightings) { "range_alias" } else { id });
         Some(Self { track, pendulum, id, gain, power })
     }
 
@@ -143,7 +144,7 @@ impl Mover {
             p_value: corrected(self.track.p_value, tried),
             gain: self.gain,
             rung: Rung::F,
-            look_alikes: vec![],
+            look_alikes: if self.id == Some("range_alias") { vec!["moving_reflector"] } else { vec![] },
             statement,
             curve: None,
             energy: energy(scene, sightings.iter().map(|s| s.power).sum()),
@@ -154,6 +155,13 @@ impl Mover {
             })),
         }
     }
+}
+
+/// Whether the room is too small for what was seen: farther than its farthest corner.
+fn outside(scene: &Scene, sightings: &[Sighting]) -> bool {
+    let farthest = scene.evidence.room.as_ref().and_then(|room| room.farthest_m());
+    let range = median(&mut sightings.iter().map(|s| s.range_m).collect::<Vec<_>>());
+    farthest.is_some_and(|farthest| range > farthest + 2.0 * scene.range_m(1.0))
 }
 
 /// Whether ranges change as Doppler says: as of something that moves, or with the sign of what is folded at the end of

@@ -154,7 +154,6 @@ mod tests {
                     velocity_mps: velocity - 5.0 * (velocity / 5.0).round(),
                     power: 100.0,
                     sine: None,
-                    cell: 0,
                 }
             })
             .collect();

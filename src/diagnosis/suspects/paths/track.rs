@@ -19,7 +19,6 @@ pub struct Sighting {
     pub power: f64,
     /// x over range of the direction that the receivers see it in; none with one receiver.
     pub sine: Option<f64>,
-    pub cell: usize,
 }
 
 pub struct Track {
@@ -144,7 +143,7 @@ fn sighting(scene: &Scene, frame: usize, cell: usize) -> Sighting {
     let range = (cell % scene.samples) as f64 + shift(at(0, -1), at(0, 0), at(0, 1));
     let velocity = scene.velocity_mps(doppler.rem_euclid(scene.loops as f64));
     let range_m = scene.range_m(range - velocity * scene.model.cells.bins_per_mps);
-    Sighting { frame, range_m, velocity_mps: velocity, power: f64::from(map[cell]), sine: sine(scene, frame, cell), cell }
+    Sighting { frame, range_m, velocity_mps: velocity, power: f64::from(map[cell]), sine: sine(scene, frame, cell) }
 }
 
 /// Distance of a tone from a Hann cell whose neighbour has this share of its amplitude.

@@ -1,0 +1,135 @@
+//! A rough little body in a room, made path by path.
+
+use num_complex::Complex64;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::find;
+use crate::diagnosis::cube::Loaded;
+use crate::diagnosis::{BodyPrediction, Candidate, Correction, Cube, Evidence, Point, Split};
+use crate::radar::{Radar, SPEED_OF_LIGHT};
+use crate::room::Room;
+
+const FRAMES: usize = 12;
+const RIGHT_M: f64 = 2.4;
+
+/// Adds a path of this length (tx to rx, at the frame's start) and its rate.
+fn path(cube: &mut Cube, radar: &Radar, frame: usize, rx: usize, length: (f64, f64), amplitude: Complex64) {
+    let [_, _, receivers, loops, samples] = cube.dims;
+    for i in 0..loops {
+        let delay = (length.0 + length.1 * i as f64 * radar.loop_period_s()) / SPEED_OF_LIGHT;
+        let start = amplitude * Complex64::cis(std::f64::consts::TAU * (radar.carrier_hz() * delay).fract());
+        let turn = Complex64::cis(std::f64::consts::TAU * radar.slope_hz_per_s * delay / radar.sample_rate_hz);
+        let at = ((frame * receivers + rx) * loops + i) * samples;
+        let mut value = start;
+        for sample in &mut cube.samples[at..at + samples] {
+            *sample += value;
+            value *= turn;
+        }
+    }
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Body walking away, with a mirror on the right, a swinging stranger, or neither.
+fn evidence(mirror: f64, stranger: f64) -> Evidence {
+    let mut radar = Radar { samples_per_chirp: 64, loops_per_frame: 32, frames: FRAMES, ..Radar::mmmesh(FRAMES) };
+    radar.tx_m.truncate(1);
+    radar.chirp_period_s *= 3.0;
+    radar.rx_m.truncate(2);
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mut cube = Cube::new(radar.dims(), vec![Complex64::ZERO; radar.dims().iter().product()]);
+    let mut frames = vec![];
+    let period_s = radar.loop_period_s();
+    for frame in 0..FRAMES {
+        let time_s = frame as f64 * radar.frame_period_s;
+        let mut points = vec![];
+        for _ in 0..40 {
+            let mut between = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
+            let velocity = [0.1, 1.2 + between(-0.2, 0.2), 0.0];
+            let position = [0.3 + between(-0.2, 0.2), 1.6 + 0.8 * time_s + between(-0.1, 0.1), between(-0.5, 0.5)];
+            let amplitude = Complex64::from_polar(1.0, between(0.0, 6.3));
+            for rx in 0..2 {
+                let (tx_m, rx_m) = (radar.tx_position_m(0), radar.rx_position_m(rx));
+                let length = |mirrored: [bool; 2], later: f64| {
+                    let at: [f64; 3] = std::array::from_fn(|axis| position[axis] + velocity[axis] * later);
+                    let image = [2.0 * RIGHT_M - at[0], at[1], at[2]];
+                    let seen = |mirrored: bool| if mirrored { image } else { at };
+                    distance(tx_m, seen(mirrored[0])) + distance(seen(mirrored[1]), rx_m)
+                };
+                for (mirrored, gain) in [([false, false], 1.0), ([true, false], mirror), ([false, true], mirror)] {
+                    if gain > 0.0 {
+                        let (start, end) = (length(mirrored, 0.0), length(mirrored, period_s));
+                        path(&mut cube, &radar, frame, rx, (start, (end - start) / period_s), amplitude * gain);
+                    }
+                }
+            }
+            let middle: [f64; 3] = std::array::from_fn(|axis| position[axis] + velocity[axis] * 0.5 * radar.frame_duration_s());
+            let facing = distance(middle, [0.0; 3]);
+            let normal = middle.map(|x| -x / facing);
+            points.push(Point { position_m: middle, velocity_mps: velocity, normal, area_m2: 0.01, part: 0 });
+        }
+        frames.push(points);
+        if stranger > 0.0 {
+            let phase = std::f64::consts::TAU * 0.8 * time_s;
+            let (range, velocity) = (1.0 + 0.12 * phase.sin(), 0.12 * std::f64::consts::TAU * 0.8 * phase.cos());
+            for rx in 0..2 {
+                path(&mut cube, &radar, frame, rx, (2.0 * range, 2.0 * velocity), Complex64::from(stranger));
+            }
+        }
+    }
+    for value in &mut cube.samples {
+        let (level, angle) = ((-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt(), random.random::<f64>());
+        *value += Complex64::from_polar(level, std::f64::consts::TAU * angle);
+    }
+    let starts_s: Vec<f64> = (0..FRAMES).map(|frame| frame as f64 * radar.frame_period_s).collect();
+    let middle_s = starts_s.iter().map(|start| start + 0.5 * radar.frame_duration_s()).collect();
+    let (held_out, training) = (0..FRAMES).partition(|frame| frame % 4 == 2);
+    let split = Split { training, held_out, block_loops: None };
+    let room = Room { left_m: Some(1.3), right_m: Some(RIGHT_M), front_m: Some(4.0), ..Room::default() };
+    let body = BodyPrediction { parts: vec!["body".into()], frames, middle_s };
+    Evidence::new(Loaded { cube, radar, split, starts_s, extremes: [-1.0, 1.0] }, Some(room), Some(body))
+}
+
+/// What is believed of what was found.
+fn believed(evidence: &Evidence) -> Vec<Candidate> {
+    find(evidence).into_iter().filter(|found| found.p_value < 5e-4).collect()
+}
+
+fn corrected(mut evidence: Evidence, found: &Candidate) -> Evidence {
+    if let Correction::Samples(correct) = &found.correction {
+        correct(&mut evidence.cube);
+    }
+    evidence.accepted.extend(found.id);
+    evidence.changed()
+}
+
+#[test]
+fn a_body_alone_is_no_path() {
+    assert!(believed(&evidence(0.0, 0.0)).is_empty());
+}
+
+#[test]
+fn a_mirror_on_the_right_is_found_and_removed() {
+    let evidence = evidence(0.4, 0.0);
+    let found = believed(&evidence);
+    assert_eq!((found.len(), found[0].id, found[0].choice.as_deref()), (1, Some("wall_ghost"), Some("right")), "{found:?}");
+    let [low, high] = found[0].estimates[0].ci90[0];
+    assert!(low < 0.4 && 0.4 < high, "{low} {high}");
+    assert!(found[0].gain > 20.0);
+    let after = believed(&corrected(evidence, &found[0]));
+    assert!(after.is_empty(), "{after:?}");
+}
+
+#[test]
+fn a_swinging_stranger_is_found_and_removed() {
+    let evidence = evidence(0.0, 1.0);
+    let found = believed(&evidence);
+    assert_eq!((found.len(), found[0].id), (1, Some("moving_reflector")), "{found:?}");
+    let of = |name: &str| found[0].estimates.iter().find(|estimate| estimate.name == name).unwrap();
+    assert!((of("rate_hz").values[0] - 0.8).abs() < 0.05 && (of("swing_m").values[0] - 0.12).abs() < 0.02, "{found:?}");
+    let after = believed(&corrected(evidence, &found[0]));
+    assert!(after.is_empty(), "{after:?}");
+}
