@@ -120,7 +120,7 @@ fn who_diagnoses_sees_the_case_and_nothing_else() {
     let seen = parent.path().join("seen");
     let mut config = silent(parent.path());
     let script = fs::read_to_string(&config.program).unwrap();
-    let spy = format!("{{ pwd; ls -R . ..; env | grep -v CARGO; echo \"$@\"; }} >> {} 2>/dev/null", seen.display());
+    let spy = format!("{{ pwd; ls -R .; env | grep -v CARGO; echo \"$@\"; }} >> {} 2>/dev/null", seen.display());
     fs::write(&config.program, format!("{script}\n{spy}\n")).unwrap();
     config.most = Some(2);
     // The sealed part is elsewhere: running needs none of it.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use hybridsim::challenge::ChallengeConfig;
 use hybridsim::config::Config;
 
 #[test]
@@ -13,11 +14,18 @@ fn all_configs_parse_and_resolve_to_themselves() {
         if path.extension().is_none_or(|extension| extension != "toml") {
             continue;
         }
-        let config = Config::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
         let again = tempfile::tempdir().unwrap();
         let resolved = again.path().join("config.toml");
-        std::fs::write(&resolved, config.to_toml()).unwrap();
-        assert_eq!(Config::read(&resolved, &[]).unwrap(), config, "{}", path.display());
+        // A challenge is no experiment and has settings of its own.
+        if path.file_name().unwrap().to_str().unwrap().starts_with("challenge") {
+            let config = ChallengeConfig::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+            std::fs::write(&resolved, config.to_toml()).unwrap();
+            assert_eq!(ChallengeConfig::read(&resolved, &[]).unwrap(), config, "{}", path.display());
+        } else {
+            let config = Config::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+            std::fs::write(&resolved, config.to_toml()).unwrap();
+            assert_eq!(Config::read(&resolved, &[]).unwrap(), config, "{}", path.display());
+        }
         let listed = std::fs::read_to_string(folder.join("README.md")).unwrap();
         let name = path.file_name().unwrap().to_str().unwrap();
         assert!(listed.contains(&format!("`{name}`")), "configs/README.md does not list {name}");

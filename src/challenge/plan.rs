@@ -28,6 +28,7 @@ pub struct Plan {
     distance_m: f64,
     /// Of what the effects draw, the same at every strength.
     details: ChaCha8Rng,
+    redrawn: u64,
 }
 
 /// All cases of a challenge, in the order of their numbers.
@@ -44,7 +45,7 @@ pub fn plans(config: &ChallengeConfig, secret: &Secret) -> Vec<Plan> {
             let mut random = secret.random("scene", index);
             let effects = decks.draw(stratum);
             let (scene, distance_m) = scene(config, secret.world_seed(index), &mut random);
-            Plan { index, stratum, effects, scene, distance_m, details: secret.random("effect", index) }
+            Plan { index, stratum, effects, scene, distance_m, details: secret.random("effect", index), redrawn: 0 }
         })
         .collect()
 }
@@ -174,10 +175,17 @@ impl Plan {
             sample_rate_hz: radar.sample_rate_hz,
         };
         let mut effects = EffectsConfig::default();
-        for &(graded, level) in &self.effects {
-            (graded.add)(&mut effects, graded.strength(level), &at, &mut self.details.clone());
+        for (place, &(graded, level)) in self.effects.iter().enumerate() {
+            let mut random = self.details.clone();
+            random.set_stream(2 * self.redrawn + place as u64);
+            (graded.add)(&mut effects, graded.strength(level), &at, &mut random);
         }
         effects
+    }
+
+    /// The same effects at other places.
+    pub fn redraw(&mut self) {
+        self.redrawn += 1;
     }
 
     /// Makes every effect weaker by a factor of its amplitude.

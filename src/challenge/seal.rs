@@ -18,7 +18,7 @@ use super::commitment::{Commitment, Sealed, hash_file, hash_folder, leaf, merkle
 use super::config::{ChallengeConfig, Stratum};
 use super::measure::{Strength, strength};
 use super::plan::{Plan, plans};
-use super::rules::UNDETECTABLE_D_PRIME;
+use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
 use super::secret::Secret;
 use crate::data::atomic::write_text;
 use crate::data::{IfFrame, IfLayout, RecordingContents, read_toml, write_recording};
@@ -28,8 +28,9 @@ use crate::recorder::{EffectsConfig, Recorder, RecorderConfig, Returns, World};
 
 /// All files of all cases were last changed then (1 January 2026), so that nothing is learned from when.
 const TIME_OF_FILES: u64 = 1_767_225_600;
-/// Weakenings after which an effect is taken as it is.
-const MOST_WEAKENINGS: usize = 3;
+/// Attempts at what a kind of case asks for, after which the effect is taken as it is; what it then counts as is decided
+/// by what was measured, not by what was meant.
+const MOST_ATTEMPTS: usize = 4;
 /// An undetectable effect is brought to this d′.
 const WEAK_D_PRIME: f64 = 1.0;
 
@@ -174,7 +175,7 @@ struct Recorded {
     strength: Option<Strength>,
 }
 
-/// Records a plan, and weakens what must not be detectable until it is not.
+/// Records a plan, and again until an undetectable effect is undetectable and a masked one masked.
 fn record(config: &ChallengeConfig, plan: &mut Plan) -> Result<Recorded> {
     let mut scene = plan.scene.clone();
     // What the converter does is not seen in samples that it never touched.
@@ -184,17 +185,36 @@ fn record(config: &ChallengeConfig, plan: &mut Plan) -> Result<Recorded> {
     if plan.stratum == Stratum::Null {
         return Ok(Recorded { world, frames: clean, settings: scene, strength: None });
     }
-    let mut weakenings = 0;
+    let mut attempts = 1;
     loop {
         let settings = RecorderConfig { effects: plan.planted(config), ..scene.clone() };
         let frames = frames_of(&settings.world(Path::new("."))?)?;
         let strength = strength(&clean, &frames);
-        let too_strong = plan.stratum == Stratum::Undetectable && strength.d_prime >= UNDETECTABLE_D_PRIME;
-        if !too_strong || weakenings == MOST_WEAKENINGS {
+        if attempts == MOST_ATTEMPTS || as_meant(plan, &strength) {
             return Ok(Recorded { world, frames, settings, strength: Some(strength) });
         }
-        plan.weaken(strength.d_prime / WEAK_D_PRIME);
-        weakenings += 1;
+        attempts += 1;
+    }
+}
+
+/// Whether an effect came out as its kind of case asks for; if not, the plan is changed towards it.
+fn as_meant(plan: &mut Plan, strength: &Strength) -> bool {
+    match plan.stratum {
+        Stratum::Undetectable if strength.d_prime >= UNDETECTABLE_D_PRIME => {
+            plan.weaken(strength.d_prime / WEAK_D_PRIME);
+            false
+        }
+        Stratum::Masked if !strength.masked() || strength.d_prime < OBVIOUS_D_PRIME => {
+            // Some more than the measured shortfall, as far as a detectable effect remains.
+            let missing_db = MASKED_DB + 3.0 - strength.below_cover_db;
+            let spare_db = 20.0 * (strength.d_prime / (1.5 * OBVIOUS_D_PRIME)).log10();
+            if missing_db > spare_db {
+                plan.redraw();
+            }
+            plan.weaken(10f64.powf(missing_db.min(spare_db) / 20.0));
+            false
+        }
+        _ => true,
     }
 }
 
