@@ -166,7 +166,8 @@ impl RecorderConfig {
         let mut radar = self.radar.radar()?;
         radar.frames = self.frames.unwrap_or(radar.frames);
         radar.check("radar")?;
-        let person = if self.empty { None } else { Some(self.person.person(folder, &radar, &self.room, &Clock::new(&self.effects))?) };
+        let person =
+            if self.empty { None } else { Some(self.person.person(folder, &radar, &self.room, &Clock::new(&self.effects))?) };
         let world = World {
             radar,
             room: self.room.clone(),

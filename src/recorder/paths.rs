@@ -4,9 +4,7 @@ use num_complex::Complex64;
 
 use super::amplitude::{Laws, WallLaw};
 use super::body::{MovingBody, smooth_field};
-use super::effects::{
-    MirrorPlan, Physiology, Shadow, Signal, Stages, garment_m, reflectivity_db, static_points, vibration,
-};
+use super::effects::{MirrorPlan, Physiology, Shadow, Signal, Stages, garment_m, reflectivity_db, static_points, vibration};
 use super::mirror::Mirror;
 use super::scatter::Scatter;
 use super::surface::elements;

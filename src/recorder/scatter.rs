@@ -296,11 +296,7 @@ impl Scatter {
     /// true transmit phase. Only who is visible is fixed within the frame. `[tx, rx, loop, sample]`, without guard samples.
     ///
     /// `extra_turns(chirp in time, time after the ramp's start, delay)` is what the oscillator adds to an ideal ramp.
-    pub fn reference_frame(
-        &self,
-        frame: usize,
-        extra_turns: &(dyn Fn(usize, f64, f64) -> f64 + Sync),
-    ) -> Result<Vec<Complex64>> {
+    pub fn reference_frame(&self, frame: usize, extra_turns: &(dyn Fn(usize, f64, f64) -> f64 + Sync)) -> Result<Vec<Complex64>> {
         let scene = self.scene(frame)?;
         let (receivers, samples) = (self.radar.rx_m.len(), self.radar.samples_per_chirp);
         let moments: Vec<(usize, usize)> = (0..self.chirps() * samples).map(|i| (i / samples, i % samples)).collect();

@@ -47,8 +47,16 @@ pub struct Surroundings {
 /// A part that changes from chirp to chirp, as sums `[tx, rx, sample]` with a weight for every time.
 enum Stirring {
     /// One sum per displacement of [`NODES`].
-    Swaying { swing: Swing, sums: Vec<Vec<Complex64>> },
-    Blinking { rate_hz: f64, phase_rad: f64, depth: f64, sum: Vec<Complex64> },
+    Swaying {
+        swing: Swing,
+        sums: Vec<Vec<Complex64>>,
+    },
+    Blinking {
+        rate_hz: f64,
+        phase_rad: f64,
+        depth: f64,
+        sum: Vec<Complex64>,
+    },
 }
 
 impl Surroundings {
@@ -59,9 +67,7 @@ impl Surroundings {
         let from_rcs = |rcs_m2: f64| wavelength * rcs_m2.sqrt() / (4.0 * PI).powf(1.5);
         let mut echoes: Vec<Echo> = if world.walls.clutter { clutter(world, from_rcs) } else { vec![] };
         let things = world.furniture.iter().map(|thing| (thing.position_m, from_rcs(thing.rcs_m2).into()));
-        echoes.extend(
-            things.chain(points.iter().copied()).map(|(position_m, amplitude)| Echo { position_m, amplitude }),
-        );
+        echoes.extend(things.chain(points.iter().copied()).map(|(position_m, amplitude)| Echo { position_m, amplitude }));
         let mirrors = if world.walls.specular {
             Mirror::images(&world.room, &Boundary::ALL, 1).into_iter().filter(|mirror| mirror.order() == 1).collect()
         } else {
@@ -90,8 +96,8 @@ impl Surroundings {
     /// I2 and those outside the library that touch the room.
     fn stir(&mut self, world: &World) -> Result<()> {
         if let Some(swing) = vibration(world) {
-            let sums = NODES
-                .map(|node| difference(self.sum(|_| 1.0, |_| 1.0, scale(swing.amplitude_m, node), [0.0; 3]), &self.still));
+            let sums =
+                NODES.map(|node| difference(self.sum(|_| 1.0, |_| 1.0, scale(swing.amplitude_m, node), [0.0; 3]), &self.still));
             self.stirring.push(Stirring::Swaying { swing, sums: sums.to_vec() });
         }
         for (entry, effect) in world.effects.outside.iter().enumerate() {

@@ -98,7 +98,15 @@ mod tests {
         let pose = Pose::new(vertices, &faces, 0.0);
         let obstacle = Obstacle::new(&pose, &faces, 0.0).unwrap();
         let elements: Vec<Element> = (0..faces.len() as u32)
-            .map(|face| Element { face, point: [1.0 / 3.0; 3], height_m: 0.0, share: 1.0, reflectivity: 1.0, extra_m: 0.0, cell: None })
+            .map(|face| Element {
+                face,
+                point: [1.0 / 3.0; 3],
+                height_m: 0.0,
+                share: 1.0,
+                reflectivity: 1.0,
+                extra_m: 0.0,
+                cell: None,
+            })
             .collect();
         let visible = obstacle.visible(&elements, [0.0; 3]).iter().filter(|&&v| v).count() as f64 / faces.len() as f64;
         // A cap of height a (1 − a/d) over a sphere of height 2a.

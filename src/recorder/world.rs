@@ -112,9 +112,14 @@ pub enum Draw {
     Elements,
     Clutter,
     Gain,
-    Noise { frame: usize },
+    Noise {
+        frame: usize,
+    },
     /// What an effect draws in a frame.
-    Effect { id: u64, frame: usize },
+    Effect {
+        id: u64,
+        frame: usize,
+    },
 }
 
 impl World {

@@ -28,9 +28,11 @@ impl Channels {
                 })
                 .collect()
         });
-        let coupling = world.effects.mutual_coupling.as_ref().map(|coupling| {
-            Complex64::from_polar(10f64.powf(coupling.level_db / 20.0), world.phase(MUTUAL_COUPLING, 0))
-        });
+        let coupling = world
+            .effects
+            .mutual_coupling
+            .as_ref()
+            .map(|coupling| Complex64::from_polar(10f64.powf(coupling.level_db / 20.0), world.phase(MUTUAL_COUPLING, 0)));
         Self { factors, coupling }
     }
 

@@ -98,7 +98,8 @@ pub fn part_weights(person: &Person, parts: &[impl AsRef<str>], key: &str) -> Re
 
 fn joint(name: &str, key: &str) -> Result<usize> {
     JOINT_NAMES.iter().position(|known| *known == name).ok_or_else(|| {
-        Error::setting(key, format!("`{name}`"), "the name of an SMPL joint").with_hint(format!("one of {}", JOINT_NAMES.join(", ")))
+        Error::setting(key, format!("`{name}`"), "the name of an SMPL joint")
+            .with_hint(format!("one of {}", JOINT_NAMES.join(", ")))
     })
 }
 

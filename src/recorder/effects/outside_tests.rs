@@ -5,10 +5,10 @@ use num_complex::Complex64;
 use super::receiver::from_db;
 use super::test_support::*;
 use super::*;
-use crate::recorder::world::World;
 use crate::recorder::receiver::ReceiverConfig;
 use crate::recorder::record::Recorder;
 use crate::recorder::truth;
+use crate::recorder::world::World;
 
 fn with(effect: Outside) -> World {
     point_world(EffectsConfig { outside: vec![effect], ..Default::default() })
@@ -21,15 +21,14 @@ fn plain() -> World {
 #[test]
 fn gains_ripple_with_the_mains_and_hop_in_the_frames_of_the_truth() {
     let world = with(Outside::MainsGainRipple { rate_hz: 100.0, depth: 0.05 });
-    let phase = truth(&world, None)["effects"][0]["phase_rad"].as_f64().unwrap();
+    let phase = planted(&world)["phase_rad"].as_f64().unwrap();
     for index in [0, 7, 15] {
         let found = (field(&world, 2)[index * 128] / field(&plain(), 2)[index * 128]).re;
         let time = world.radar.chirp_time_s(2, 0, index);
         assert!((found - 1.0 - 0.05 * (TAU * 100.0 * time + phase).cos()).abs() < 1e-9);
     }
     let world = with(Outside::GainHop { rx: 1, db: 1.0 });
-    let drawn: Vec<u64> =
-        truth(&world, None)["effects"][0]["drawn_frames"].as_array().unwrap().iter().map(|k| k.as_u64().unwrap()).collect();
+    let drawn: Vec<u64> = planted(&world)["drawn_frames"].as_array().unwrap().iter().map(|k| k.as_u64().unwrap()).collect();
     for frame in 0..4 {
         let (a, b) = (field(&world, frame), field(&plain(), frame));
         assert_eq!(chirp(&a, &world.radar, 0), chirp(&b, &world.radar, 0));
@@ -46,7 +45,7 @@ fn a_shared_converter_skews_and_mixes_and_remembers() {
     let skewed = field(&with(Outside::RxMuxSkew { fraction: 0.25 }), 0);
     let turn = chirp(&skewed, &radar, 1)[50] / chirp(&base, &radar, 1)[50];
     assert!((turn - Complex64::cis(TAU * 0.25 * beat)).norm() < 1e-3, "{turn}");
-    assert_eq!(chirp(&skewed, &radar, 0), chirp(&base, &radar, 0));
+    assert!(difference_db(chirp(&skewed, &radar, 0), chirp(&base, &radar, 0), energy(chirp(&base, &radar, 0))) < -200.0);
     let mixed = field(&with(Outside::MuxCrosstalk { level_db: -20.0 }), 0);
     let left = (chirp(&mixed, &radar, 1)[5] - chirp(&base, &radar, 1)[5]) / chirp(&base, &radar, 0)[5];
     assert!((left - 0.1).norm() < 1e-9);
@@ -60,15 +59,14 @@ fn the_room_blinks_and_sways_where_it_is_told_to() {
     let place = |effect: fn([f64; 3], f64) -> Outside, at: [f64; 3]| with(effect(at, 0.5));
     let lamp = |position_m, radius_m| Outside::LampModulation { position_m, radius_m, rate_hz: 100.0, depth: 0.2 };
     let world = place(lamp, POINT_M);
-    let phase = truth(&world, None)["effects"][0]["phase_rad"].as_f64().unwrap();
+    let phase = planted(&world)["phase_rad"].as_f64().unwrap();
     let base = field(&plain(), 1);
     let time = world.radar.chirp_time_s(1, 0, 4) + world.radar.sample_time_s(64);
     let found = (field(&world, 1)[4 * 128] / base[4 * 128]).re;
     assert!((found - 1.0 - 0.2 * (TAU * 100.0 * time + phase).cos()).abs() < 1e-6, "{found}");
-    let curtain =
-        |position_m, radius_m| Outside::MovingCurtain { position_m, radius_m, rate_hz: 0.5, swing_m: 3e-4 };
+    let curtain = |position_m, radius_m| Outside::MovingCurtain { position_m, radius_m, rate_hz: 0.5, swing_m: 3e-4 };
     let world = place(curtain, POINT_M);
-    let phase = truth(&world, None)["effects"][0]["phase_rad"].as_f64().unwrap();
+    let phase = planted(&world)["phase_rad"].as_f64().unwrap();
     let turn = (field(&world, 1)[4 * 128] / base[4 * 128]).arg();
     let cosine = 3.0 / (0.09f64 + 9.0 + 0.01).sqrt();
     let carrier = world.radar.carrier_hz();
@@ -156,7 +154,10 @@ fn everything_at_once_records_finite_samples_and_is_listed() {
 #[test]
 fn impossible_effects_are_refused_with_their_key() {
     let cases: Vec<(&str, World)> = vec![
-        ("effects.frame_drop.at", point_world(EffectsConfig { frame_drop: Some(FrameDrop { at: 9, count: 1 }), ..Default::default() })),
+        (
+            "effects.frame_drop.at",
+            point_world(EffectsConfig { frame_drop: Some(FrameDrop { at: 9, count: 1 }), ..Default::default() }),
+        ),
         ("effects.tdm_phase", point_world(EffectsConfig { tdm_phase: Some(TdmPhase { slot_s: 1e-5 }), ..Default::default() })),
         (
             "effects.antenna_position.offset_m",
@@ -169,10 +170,22 @@ fn impossible_effects_are_refused_with_their_key() {
                 ..Default::default()
             }),
         ),
-        ("effects.soft_occlusion", point_world(EffectsConfig { soft_occlusion: Some(SoftOcclusion { width: 1.0 }), ..Default::default() })),
-        ("effects.breathing", ball_world(EffectsConfig { breathing: Some(Breathing { rate_hz: 0.3, amplitude_m: 0.0 }), ..Default::default() })),
-        ("effects.coloured_noise", point_world(EffectsConfig { coloured_noise: Some(ColouredNoise { knee_hz: 1e5, power: 1.0 }), ..Default::default() })),
-        ("effects.if_delay.delay_s", point_world(EffectsConfig { if_delay: Some(IfDelay { delay_s: 2e-6 }), ..Default::default() })),
+        (
+            "effects.soft_occlusion",
+            point_world(EffectsConfig { soft_occlusion: Some(SoftOcclusion { width: 1.0 }), ..Default::default() }),
+        ),
+        (
+            "effects.breathing",
+            ball_world(EffectsConfig { breathing: Some(Breathing { rate_hz: 0.3, amplitude_m: 0.0 }), ..Default::default() }),
+        ),
+        (
+            "effects.coloured_noise",
+            point_world(EffectsConfig { coloured_noise: Some(ColouredNoise { knee_hz: 1e5, power: 1.0 }), ..Default::default() }),
+        ),
+        (
+            "effects.if_delay.delay_s",
+            point_world(EffectsConfig { if_delay: Some(IfDelay { delay_s: 2e-6 }), ..Default::default() }),
+        ),
         ("effects.outside[0].rx", with(Outside::GainHop { rx: 7, db: 1.0 })),
         ("effects.outside[0]", with(Outside::LsbStuck { rx: 0, bit: 0 })),
         ("effects.outside[0].depth", with(Outside::MainsGainRipple { rate_hz: 100.0, depth: 1.5 })),
@@ -190,5 +203,32 @@ fn impossible_effects_are_refused_with_their_key() {
         }
         let message = Recorder::new(&world).err().map(|error| error.to_string()).unwrap_or_default();
         assert!(message.contains(key), "{key}: {message}");
+    }
+}
+
+#[test]
+#[ignore = "a measurement, seconds of CPU: cargo test --release recorder::effects -- --ignored --nocapture"]
+fn a_case_of_twelve_frames_takes_seconds() {
+    use crate::recorder::{RadarChoice, RecorderConfig, Returns};
+    let radar = crate::radar::Radar {
+        samples_per_chirp: 128,
+        loops_per_frame: 32,
+        rx_m: crate::radar::Radar::mmmesh(12).rx_m,
+        ..crate::radar::Radar::small(12)
+    };
+    for (returns, edge_m) in [(Returns::Vertices, 5e-3), (Returns::Random, 5e-3), (Returns::Random, 1e-2)] {
+        let mut config = RecorderConfig { radar: RadarChoice::Full(Box::new(radar.clone())), ..RecorderConfig::default() };
+        config.surface.returns = returns;
+        config.surface.edge_m = edge_m;
+        let world = config.world(std::path::Path::new(".")).unwrap();
+        let start = std::time::Instant::now();
+        let recorder = Recorder::new(&world).unwrap();
+        let prepared = start.elapsed().as_secs_f64();
+        let frames = recorder.frames().filter(|frame| frame.is_ok()).count();
+        let elements = recorder.scatter().unwrap().elements.len();
+        println!(
+            "{returns:?} at {edge_m} m, {elements} elements: {prepared:.2} s + {:.2} s for {frames} frames",
+            start.elapsed().as_secs_f64() - prepared
+        );
     }
 }

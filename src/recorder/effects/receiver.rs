@@ -57,7 +57,8 @@ pub fn bursts(world: &World) -> Vec<Burst> {
             index: rng.random_range(0..radar.loops_per_frame),
             sample: rng.random_range(0.0..radar.samples_per_chirp as f64),
             // Across the whole band in one to eight samples.
-            slope_hz_per_s: radar.sample_rate_hz.powi(2) / rng.random_range(1.0..8.0) * if rng.random::<bool>() { 1.0 } else { -1.0 },
+            slope_hz_per_s: radar.sample_rate_hz.powi(2) / rng.random_range(1.0..8.0)
+                * if rng.random::<bool>() { 1.0 } else { -1.0 },
             relative: effect.relative * rng.random_range(0.5..1.0),
             phase_rad: TAU * rng.random::<f64>(),
         })

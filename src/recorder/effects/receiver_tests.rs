@@ -48,8 +48,7 @@ fn the_image_of_an_imbalance_lies_at_the_mirrored_bin_with_the_predicted_level()
 
 #[test]
 fn a_second_harmonic_appears_at_twice_the_range_and_compression_costs_its_level() {
-    let (with, world, _) =
-        one(EffectsConfig { second_harmonic: Some(SecondHarmonic { level_db: -40.0 }), ..Default::default() });
+    let (with, world, _) = one(EffectsConfig { second_harmonic: Some(SecondHarmonic { level_db: -40.0 }), ..Default::default() });
     let (plain, ..) = one(EffectsConfig::default());
     let turns = beat(&world.radar);
     let extra: Vec<Complex64> = with.iter().zip(&plain).map(|(a, b)| a - b).collect();
@@ -129,12 +128,9 @@ fn what_is_added_is_where_it_should_be_and_nowhere_else() {
     let level = db(tone(chirp(&spur, radar, 1), 1.1e6 / radar.sample_rate_hz).norm() / peak);
     assert!((level + 10.0).abs() < 1e-6 && plain.len() == 128, "{level}");
     // Interference: only in the chirps of the truth, the same on all receivers.
-    let bursts = EffectsConfig {
-        interference: Some(Interference { bursts: 3, relative: 2.0, azimuth_deg: 20.0 }),
-        ..Default::default()
-    };
-    let truth = crate::recorder::truth(&point_world(bursts.clone()), None);
-    let drawn = truth["effects"][0]["drawn"].as_array().unwrap().clone();
+    let bursts =
+        EffectsConfig { interference: Some(Interference { bursts: 3, relative: 2.0, azimuth_deg: 20.0 }), ..Default::default() };
+    let drawn = planted(&point_world(bursts.clone()))["drawn"].as_array().unwrap().clone();
     let mut hit = std::collections::BTreeSet::new();
     for burst in &drawn {
         hit.insert((burst["frame"].as_u64().unwrap() as usize, burst["loop"].as_u64().unwrap() as usize));
@@ -206,7 +202,8 @@ fn noise_is_coloured_impulsive_or_shared_as_asked() {
     let shared: Complex64 = a.iter().zip(&b).map(|(x, y)| x * y.conj()).sum();
     assert!((shared.re / (energy(&a) * energy(&b)).sqrt() - 0.4).abs() < 0.03);
     assert!((power(&a) / power(&white) - 1.0).abs() < 0.05);
-    let coloured = noisy(EffectsConfig { coloured_noise: Some(ColouredNoise { knee_hz: 3e5, power: 1.0 }), ..Default::default() });
+    let coloured =
+        noisy(EffectsConfig { coloured_noise: Some(ColouredNoise { knee_hz: 3e5, power: 1.0 }), ..Default::default() });
     let by_range = |signal: &[Complex64], bin: usize| {
         let map = range_doppler_power(&signal[..64 * 128], 128);
         (0..64).map(|doppler| map[doppler * 128 + bin]).sum::<f64>()
@@ -217,7 +214,8 @@ fn noise_is_coloured_impulsive_or_shared_as_asked() {
         let wanted = 1.0 + 3e5 / (bin as f64 * bin_hz);
         assert!((found / wanted - 1.0).abs() < 0.5, "bin {bin}: {found} against {wanted}");
     }
-    let impulses = noisy(EffectsConfig { impulsive_noise: Some(ImpulsiveNoise { rate: 0.01, strength: 20.0 }), ..Default::default() });
+    let impulses =
+        noisy(EffectsConfig { impulsive_noise: Some(ImpulsiveNoise { rate: 0.01, strength: 20.0 }), ..Default::default() });
     let wanted = 0.99 + 0.01 * 400.0;
     assert!((power(&impulses) / power(&white) / wanted - 1.0).abs() < 0.2);
 }

@@ -50,7 +50,10 @@ pub struct Mover {
 
 #[derive(Clone, Debug)]
 enum Track {
-    Swinging { rest_m: Vector, swing: Swing },
+    Swinging {
+        rest_m: Vector,
+        swing: Swing,
+    },
     /// Weights of the vertices, `[(vertex, weight)]`.
     Carried(Vec<(usize, f64)>),
 }

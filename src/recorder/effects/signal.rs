@@ -41,9 +41,10 @@ impl Signal {
     /// All chirps with their places, in the order of the samples.
     pub fn chirps_mut(&mut self) -> impl Iterator<Item = (Place, &mut [Complex64])> {
         let (rx, loops, samples) = (self.rx, self.loops, self.samples);
-        self.values.chunks_exact_mut(samples).enumerate().map(move |(i, chirp)| {
-            (Place { tx: i / (rx * loops), rx: i / loops % rx, index: i % loops }, chirp)
-        })
+        self.values
+            .chunks_exact_mut(samples)
+            .enumerate()
+            .map(move |(i, chirp)| (Place { tx: i / (rx * loops), rx: i / loops % rx, index: i % loops }, chirp))
     }
 
     /// The same for what every receiver got in one chirp: `mix(tx, index, [rx] values)` for each sample.

@@ -93,8 +93,7 @@ pub fn path(radar: &Radar, delay_s: f64) -> Vec<Complex64> {
 }
 
 pub fn delay(radar: &Radar, position_m: [f64; 3], rx: usize) -> f64 {
-    let distance =
-        |antenna: [f64; 3]| (0..3).map(|axis| (position_m[axis] - antenna[axis]).powi(2)).sum::<f64>().sqrt();
+    let distance = |antenna: [f64; 3]| (0..3).map(|axis| (position_m[axis] - antenna[axis]).powi(2)).sum::<f64>().sqrt();
     (distance(radar.tx_position_m(0)) + distance(radar.rx_position_m(rx))) / SPEED_OF_LIGHT
 }
 
@@ -102,4 +101,10 @@ pub fn delay(radar: &Radar, position_m: [f64; 3], rx: usize) -> f64 {
 pub fn tone(signal: &[Complex64], turns_per_sample: f64) -> Complex64 {
     let sum: Complex64 = signal.iter().enumerate().map(|(n, v)| v * Complex64::cis(-TAU * turns_per_sample * n as f64)).sum();
     sum / signal.len() as f64
+}
+
+/// What the truth says of the effect that was planted last.
+pub fn planted(world: &World) -> serde_json::Value {
+    let truth = crate::recorder::truth(world, None);
+    truth["effects"].as_array().and_then(|effects| effects.last().cloned()).unwrap()
 }

@@ -23,8 +23,7 @@ fn a_clock_offset_of_a_frame_is_the_next_frame_and_drift_is_an_offset_that_grows
     let late = ball_world(EffectsConfig { clock_offset: Some(ClockOffset { offset_s: period }), ..Default::default() });
     same(&field(&late, 1), &field(&plain, 2));
     let drifting = ball_world(EffectsConfig { clock_drift: Some(ClockDrift { relative: 0.1 }), ..Default::default() });
-    let shifted =
-        ball_world(EffectsConfig { clock_offset: Some(ClockOffset { offset_s: 0.2 * period }), ..Default::default() });
+    let shifted = ball_world(EffectsConfig { clock_offset: Some(ClockOffset { offset_s: 0.2 * period }), ..Default::default() });
     // Within the frame the drift also speeds the body up by a tenth: a part of the phase of one frame.
     let (a, b) = (field(&drifting, 2), field(&shifted, 2));
     let first = |signal: &[num_complex::Complex64]| chirp(signal, &plain.radar, 0).to_vec();

@@ -18,18 +18,15 @@ fn errors_of_the_ramp_change_the_phase_as_the_definition_says() {
     let amplitude = chirp(&plain, &base.radar, 1)[0].norm();
     type Change = fn(&mut crate::radar::Radar);
     let cases: [(EffectsConfig, Change); 4] = [
-        (
-            EffectsConfig { start_frequency_error: Some(StartFrequencyError { relative: 2e-5 }), ..Default::default() },
-            |r| r.start_frequency_hz *= 1.0 + 2e-5,
-        ),
-        (
-            EffectsConfig { adc_start_error: Some(AdcStartError { offset_s: 1e-7 }), ..Default::default() },
-            |r| r.adc_start_s += 1e-7,
-        ),
-        (
-            EffectsConfig { slope_error: Some(SlopeError { relative: 4e-3 }), ..Default::default() },
-            |r| r.slope_hz_per_s *= 1.0 + 4e-3,
-        ),
+        (EffectsConfig { start_frequency_error: Some(StartFrequencyError { relative: 2e-5 }), ..Default::default() }, |r| {
+            r.start_frequency_hz *= 1.0 + 2e-5
+        }),
+        (EffectsConfig { adc_start_error: Some(AdcStartError { offset_s: 1e-7 }), ..Default::default() }, |r| {
+            r.adc_start_s += 1e-7
+        }),
+        (EffectsConfig { slope_error: Some(SlopeError { relative: 4e-3 }), ..Default::default() }, |r| {
+            r.slope_hz_per_s *= 1.0 + 4e-3
+        }),
         (EffectsConfig { if_delay: Some(IfDelay { delay_s: 5e-8 }), ..Default::default() }, |r| r.adc_start_s -= 5e-8),
     ];
     for (effects, change_radar) in cases {
