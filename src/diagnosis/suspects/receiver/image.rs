@@ -90,6 +90,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
 fn of_frame(evidence: &Evidence, frame: usize) -> Vec<Sums> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let empty = empty_bins(evidence);
+    // A leakage or an offset is no parent: its own tail reaches its image's cells.
+    let near = (beat_hz(evidence, 0.5) / evidence.radar.sample_rate_hz * samples as f64).ceil() as usize + LOBE;
     let still = evidence.cube.still(&[frame]);
     (0..evidence.cube.channels())
         .map(|channel| {
@@ -100,7 +102,7 @@ fn of_frame(evidence: &Evidence, frame: usize) -> Vec<Sums> {
                 for range in 0..samples {
                     let parent = map[doppler * samples + range];
                     let mirrored = (samples - range) % samples;
-                    if parent.norm_sqr() < STRONG * noise || !empty[mirrored] || empty[range] {
+                    if parent.norm_sqr() < STRONG * noise || !empty[mirrored] || empty[range] || range < near {
                         continue;
                     }
                     // The windows are symmetric about the middle of the chirp, not about its first sample: the image of a
@@ -116,7 +118,7 @@ fn of_frame(evidence: &Evidence, frame: usize) -> Vec<Sums> {
             let spectrum = spectrum(&still[channel * samples..][..samples]);
             for range in 0..samples {
                 let (parent, mirrored) = (spectrum[range], (samples - range) % samples);
-                if parent.norm_sqr() > STRONG * noise && empty[mirrored] && !empty[range] {
+                if parent.norm_sqr() > STRONG * noise && empty[mirrored] && !empty[range] && range >= near {
                     let image = spectrum[mirrored];
                     sums.cross += parent * image / noise;
                     sums.parent += parent.norm_sqr() / noise;
@@ -130,14 +132,14 @@ fn of_frame(evidence: &Evidence, frame: usize) -> Vec<Sums> {
 }
 
 /// Of one chirp, with a Hann window of unit energy.
-fn spectrum(chirp: &[Complex64]) -> Vec<Complex64> {
+pub fn spectrum(chirp: &[Complex64]) -> Vec<Complex64> {
     let mut windowed: Vec<Complex64> = chirp.iter().zip(hann(chirp.len())).map(|(value, weight)| value * weight).collect();
     FftPlanner::new().plan_fft_forward(chirp.len()).process(&mut windowed);
     windowed
 }
 
 /// Beat frequencies, as bins, that hold neither room nor body.
-fn empty_bins(evidence: &Evidence) -> Vec<bool> {
+pub fn empty_bins(evidence: &Evidence) -> Vec<bool> {
     let samples = evidence.cube.dims[4];
     match ranges_m(evidence) {
         Some([low, high]) => {

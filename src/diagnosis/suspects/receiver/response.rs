@@ -13,7 +13,8 @@ use rayon::prelude::*;
 use rustfft::FftPlanner;
 
 use super::field::{Field, add, orthonormal};
-use super::support::{dot, energy};
+use super::support::{beat_hz, dot, tone};
+use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
@@ -64,9 +65,9 @@ impl Shape {
             (0..count).map(move |i| low * (high / low).powf(i as f64 / (count as f64 - 1.0))).collect::<Vec<_>>()
         };
         match self {
-            Self::Highpass { .. } => geometric(0.3 * rate / samples as f64, 0.3 * rate, 14),
-            Self::Lowpass { .. } => geometric(0.15 * rate, 30.0 * rate, 10),
-            Self::Delay { .. } => (-8..=8).filter(|&i| i != 0).map(|i| 0.25 * f64::from(i) / rate).collect(),
+            Self::Highpass { .. } => geometric(0.4 * rate / samples as f64, 0.25 * rate, 9),
+            Self::Lowpass { .. } => geometric(0.15 * rate, 20.0 * rate, 6),
+            Self::Delay { .. } => (-4..=4).filter(|&i| i != 0).map(|i| 0.4 * f64::from(i) / rate).collect(),
         }
     }
 }
@@ -88,21 +89,25 @@ const SHAPES: [Shape; 10] = [
 pub struct Found {
     pub candidate: Candidate,
     pub likelihood: f64,
+    /// The same of an additive term instead.
+    pub additive: f64,
 }
 
 /// The best of the library's responses.
-pub fn find(evidence: &Evidence, field: &Field) -> Option<Found> {
+///
+/// `without`: the still chirps less an additive term that competes with it.
+pub fn find(evidence: &Evidence, field: &Field, without: &[Vec<Complex64>]) -> Option<Found> {
     let samples = evidence.cube.dims[4];
     let rate = evidence.radar.sample_rate_hz;
-    let likelihood = |shape: Shape, value: f64| {
-        let basis = orthonormal(&space(field, shape, value, rate));
-        (0..field.channels())
-            .map(|channel| {
-                let chirp = &field.still[channel];
-                field.weight(channel) * (outside(&field.support.inside, chirp) - outside(&basis, chirp))
-            })
-            .sum::<f64>()
-    };
+    let band = |range: f64| beat_hz(evidence, range) / rate;
+    let process = Process::new(field, band(field.support.low_m), band(field.support.high_m));
+    let training = evidence.split.training.len() as f64;
+    let of_mean: Vec<f64> = field.variance.iter().map(|variance| variance / training).collect();
+    let nothing = process.likelihood(&field.still, &of_mean, None, rate);
+    // What an additive term would make of the same scene.
+    let additive = process.likelihood(without, &of_mean, None, rate) - nothing;
+    let likelihood =
+        |shape: Shape, value: f64| process.likelihood(&field.still, &of_mean, Some((shape, value)), rate) - nothing;
     let tried: Vec<(f64, Shape, f64)> = SHAPES
         .iter()
         .filter(|shape| !evidence.accepted.contains(&shape.id()))
@@ -119,7 +124,7 @@ pub fn find(evidence: &Evidence, field: &Field) -> Option<Found> {
         best.extend(of_shape.copied());
     }
     best.sort_by(|a, b| b.0.total_cmp(&a.0));
-    best.truncate(4);
+    best.truncate(3);
     let mut best: Vec<(f64, Shape, f64)> = best
         .into_par_iter()
         .map(|(_, shape, value)| {
@@ -133,21 +138,11 @@ pub fn find(evidence: &Evidence, field: &Field) -> Option<Found> {
         return None;
     }
     let p_value = corrected(chi2_tail(2.0 * top, 3.0), count);
-    let basis = orthonormal(&space(field, shape, value, rate));
-    let gain: f64 = field
-        .held_out()
-        .par_iter()
-        .map(|&frame| {
-            let still = evidence.cube.still(&[frame]);
-            still
-                .chunks_exact(samples)
-                .enumerate()
-                .map(|(channel, chirp)| {
-                    (outside(&field.support.inside, chirp) - outside(&basis, chirp)) / field.variance[channel]
-                })
-                .sum::<f64>()
-        })
-        .sum();
+    let held_out: Vec<Vec<Complex64>> =
+        evidence.cube.still(field.held_out()).chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
+    let of_held_out: Vec<f64> = field.variance.iter().map(|variance| variance / field.held_out().len().max(1) as f64).collect();
+    let gain = process.likelihood(&held_out, &of_held_out, Some((shape, value)), rate)
+        - process.likelihood(&held_out, &of_held_out, None, rate);
     let step = 0.01 * value.abs();
     let curvature = (2.0 * top - likelihood(shape, value + step) - likelihood(shape, value - step)) / (step * step);
     let error = if curvature > 0.0 { curvature.recip().sqrt().max(2e-3 * value.abs()) } else { 0.1 * value.abs() };
@@ -190,7 +185,7 @@ pub fn find(evidence: &Evidence, field: &Field) -> Option<Found> {
         energy,
         correction: undo(&response, fitted, still),
     };
-    Some(Found { candidate, likelihood: top })
+    Some(Found { candidate, likelihood: top, additive })
 }
 
 fn described(shape: Shape, value: f64, error: f64) -> (Vec<Estimate>, String) {
@@ -218,8 +213,101 @@ fn described(shape: Shape, value: f64, error: f64) -> (Vec<Estimate>, String) {
     }
 }
 
-fn outside(basis: &[Vec<Complex64>], chirp: &[Complex64]) -> f64 {
-    energy(chirp) - basis.iter().map(|direction| dot(direction, chirp).norm_sqr()).sum::<f64>()
+/// The still scene as a Gaussian process: tones over the room's delays with the density that is measured.
+///
+/// A response that takes tails away is seen by their absence, which needs how strong they should have been.
+struct Process {
+    /// Beat frequencies in turns per sample and the measured density there.
+    tones: Vec<(f64, f64)>,
+    samples: usize,
+}
+
+impl Process {
+    fn new(field: &Field, low: f64, high: f64) -> Self {
+        let samples = field.still[0].len();
+        let window = hann(samples);
+        let long = 2 * samples;
+        let mut density = vec![0.0; long];
+        for chirp in &field.still {
+            let mut padded = vec![Complex64::ZERO; long];
+            (0..samples).for_each(|n| padded[n] = chirp[n] * window[n]);
+            FftPlanner::new().plan_fft_forward(long).process(&mut padded);
+            density.iter_mut().zip(&padded).for_each(|(sum, value)| *sum += value.norm_sqr() / field.still.len() as f64);
+        }
+        let noise = field.variance.iter().sum::<f64>() / field.variance.len() as f64;
+        let (first, last) = ((low * long as f64).floor() as usize, (high * long as f64).ceil() as usize);
+        let tones = (first..=last)
+            .map(|bin| {
+                // A few neighbours, since a density is a mean.
+                let sum: f64 = (0..5).map(|i| density[(bin + long + i - 2) % long]).sum();
+                // White noise of unit variance has the density 1: half of it per tone, which are half a bin apart.
+                (bin as f64 / long as f64, 0.5 * (sum / 5.0).max(1e-3 * noise) / samples as f64)
+            })
+            .collect();
+        Self { tones, samples }
+    }
+
+    /// Log-likelihood of chirps, of a variance of the noise each, behind a response.
+    fn likelihood(&self, chirps: &[Vec<Complex64>], variance: &[f64], shape: Option<(Shape, f64)>, rate: f64) -> f64 {
+        let samples = self.samples;
+        let noise = variance.iter().sum::<f64>() / variance.len() as f64;
+        let mut columns: Vec<Vec<Complex64>> = self
+            .tones
+            .iter()
+            .map(|&(turns, density)| {
+                let mut column = tone(turns, samples);
+                column.iter_mut().for_each(|value| *value *= density.sqrt());
+                column
+            })
+            .collect();
+        match shape {
+            Some((Shape::Highpass { order, from_rest: true }, value)) => {
+                let power: f64 = self.tones.iter().map(|(_, density)| density).sum();
+                columns.extend((0..order).map(|exponent| decay(value / rate, exponent, samples, power.sqrt())));
+            }
+            Some((shape, value)) => {
+                let response = shape.response(value, samples, rate);
+                let filter = Filter::new(&response);
+                for (column, &(turns, _)) in columns.iter_mut().zip(&self.tones) {
+                    filter.apply(column);
+                    // The measured density already has the response in it.
+                    let at = response[(turns * samples as f64).round() as usize % samples].norm().max(0.05);
+                    column.iter_mut().for_each(|value| *value /= at);
+                }
+            }
+            None => {}
+        }
+        let rows: Vec<Vec<Complex64>> =
+            (0..samples).map(|row| columns.iter().map(|column| column[row].conj()).collect()).collect();
+        // Only the lower triangle is read.
+        let mut covariance = DMatrix::zeros(samples, samples);
+        for row in 0..samples {
+            for column in 0..=row {
+                covariance[(row, column)] = dot(&rows[row], &rows[column]);
+            }
+            covariance[(row, row)] += Complex64::from(noise);
+        }
+        let Some(factor) = covariance.cholesky() else { return f64::NEG_INFINITY };
+        let lower = factor.l_dirty();
+        let log_determinant: f64 = (0..samples).map(|n| 2.0 * lower[(n, n)].re.max(1e-300).ln()).sum();
+        chirps
+            .iter()
+            .map(|chirp| {
+                let chirp = DVector::from_column_slice(chirp);
+                let whitened = factor.l().solve_lower_triangular(&chirp).unwrap_or_else(|| DVector::zeros(samples));
+                -whitened.norm_squared() - log_determinant
+            })
+            .sum()
+    }
+}
+
+fn decay(turns_per_sample: f64, power: i32, samples: usize, amplitude: f64) -> Vec<Complex64> {
+    (0..samples)
+        .map(|n| {
+            let turns = turns_per_sample * n as f64;
+            Complex64::from(amplitude * (TAU * turns).powi(power) * (-TAU * turns).exp())
+        })
+        .collect()
 }
 
 /// What the still scene can look like behind the response.
@@ -227,14 +315,7 @@ fn space(field: &Field, shape: Shape, value: f64, rate: f64) -> Vec<Vec<Complex6
     let inside = &field.support.inside;
     let samples = inside[0].len();
     if let Shape::Highpass { order, from_rest: true } = shape {
-        let transients = (0..order).map(|power| {
-            (0..samples)
-                .map(|n| {
-                    let turns = value * n as f64 / rate;
-                    Complex64::from(turns.powi(power) * (-TAU * turns).exp())
-                })
-                .collect()
-        });
+        let transients = (0..order).map(|power| decay(value / rate, power, samples, 1.0));
         return inside.iter().cloned().chain(transients).collect();
     }
     let filter = Filter::new(&shape.response(value, samples, rate));
@@ -318,7 +399,7 @@ fn refine(shape: Shape, at: f64, samples: usize, rate: f64, value: impl Fn(f64) 
     let grid = shape.grid(samples, rate);
     let index = grid.iter().position(|&point| point == at).unwrap_or(0);
     let (mut low, mut high) = (grid[index.saturating_sub(1)], grid[(index + 1).min(grid.len() - 1)]);
-    for _ in 0..14 {
+    for _ in 0..11 {
         let (a, b) = (high - RATIO * (high - low), low + RATIO * (high - low));
         if value(a) > value(b) { high = b } else { low = a }
     }

@@ -49,11 +49,14 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let explained = field.gain(None, &fitted.predicted);
     let named = elements.iter().any(|element| !matches!(element, Element::Image | Element::Square));
     let spent: f64 = elements.iter().map(|element| unknowns(element, field.channels())).sum();
-    let filter = response::find(evidence, &field);
+    let without = residual(&elements, &fitted, &field, &images);
+    // A field far stronger than any filter's traces needs no second thought.
+    let plain = explained >= 0.98 * free_gain && fitted.likelihood > 1e5;
+    let filter = if plain { None } else { response::find(evidence, &field, &without) };
     // A filter has one unknown where a field has many: by the information criterion's price for each.
     if let Some(found) = &filter
-        && found.candidate.gain >= ENOUGH * free_gain.max(explained)
-        && (!named || found.likelihood - fitted.likelihood > penalty(&field) * (2.0 - spent))
+        && found.likelihood > 12.0
+        && (!named || found.likelihood - found.additive > penalty(&field) * (2.0 - spent))
     {
         return vec![found.candidate.clone()];
     }
@@ -62,7 +65,22 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             .filter_map(|index| candidate(evidence, &field, &images, &elements, &fitted, index))
             .collect();
     }
+    // A converter at its rail bends everything; what remains of it has no shape of its own.
+    if free_gain < 20.0 || evidence.accepted.contains(&"adc_saturation") {
+        return vec![];
+    }
     unexplained(evidence, &field, p_free, free_gain).into_iter().collect()
+}
+
+/// Still chirps less what the elements make of them.
+fn residual(elements: &[Element], fitted: &Fitted, field: &Field, images: &Images) -> Vec<Vec<Complex64>> {
+    let templates = templates(elements, images);
+    let mut rest = field.still.clone();
+    for (channel, chirp) in rest.iter_mut().enumerate() {
+        templates.own.iter().zip(&fitted.own[channel]).for_each(|(template, amplitude)| add(chirp, template, -amplitude));
+        templates.common.iter().zip(&fitted.common).for_each(|(template, amplitude)| add(chirp, &template[channel], -amplitude));
+    }
+    rest
 }
 
 /// Price in nats of another complex number.
