@@ -1,0 +1,176 @@
+//! Non-linear receivers: the second harmonic s + κ s² and compression s − κ |s|² s (cards R5, R4).
+//!
+//! What was measured is the best prediction of what drives them: its square and its cube are transformed like the signal
+//! itself, and in cells where neither room nor body can be, one complex number must relate the two everywhere.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::image::{empty_bins, spectrum};
+use crate::diagnosis::evidence::transform;
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::{Cube, Evidence};
+
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    cross: Complex64,
+    template: f64,
+    found: f64,
+    cells: usize,
+}
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    if evidence.is_real() || evidence.accepted.contains(&"adc_saturation") {
+        return vec![];
+    }
+    let square = (!evidence.accepted.contains(&"second_harmonic")).then(|| tested(evidence, false));
+    let cube = (!evidence.accepted.contains(&"compression")).then(|| tested(evidence, true));
+    square.into_iter().chain(cube).flatten().collect()
+}
+
+fn power_of(value: Complex64, cubic: bool) -> Complex64 {
+    if cubic { value * value.norm_sqr() } else { value * value }
+}
+
+fn tested(evidence: &Evidence, cubic: bool) -> Option<Candidate> {
+    let empty = empty_bins(evidence);
+    if !empty.contains(&true) {
+        return None;
+    }
+    let frames = evidence.cube.dims[0];
+    let peak = evidence.cube.samples.iter().map(Complex64::norm_sqr).fold(0.0, f64::max).sqrt();
+    if peak <= 0.0 {
+        return None;
+    }
+    let sums: Vec<Sums> = (0..frames).into_par_iter().map(|frame| of_frame(evidence, frame, &empty, cubic, peak)).collect();
+    let over = |frames: &[usize]| {
+        frames.iter().fold(Sums::default(), |a, &frame| Sums {
+            cross: a.cross + sums[frame].cross,
+            template: a.template + sums[frame].template,
+            found: a.found + sums[frame].found,
+            cells: a.cells + sums[frame].cells,
+        })
+    };
+    let training = over(&evidence.split.training);
+    if training.template <= 0.0 {
+        return None;
+    }
+    let kappa = training.cross / training.template;
+    let rest = (training.found - kappa.norm_sqr() * training.template) / training.cells.max(1) as f64;
+    // Windowed neighbours share their noise; other things in the cells count as more of it.
+    let widening = 2.25 * rest.max(1.0);
+    let variance = widening / training.template;
+    let p_value = corrected(chi2_tail(2.0 * kappa.norm_sqr() / variance, 2.0), 2.0);
+    let held_out = over(&evidence.split.held_out);
+    let gain = (2.0 * (kappa.conj() * held_out.cross).re - kappa.norm_sqr() * held_out.template) / widening;
+    // A receiver that expands instead of compressing, or turns phases more than amplitudes, is none.
+    if gain <= 0.0 || (cubic && kappa.re > 0.0) {
+        return None;
+    }
+    let scatter = (jackknife(&sums, &evidence.split.training)).max(variance.sqrt());
+    let level = kappa.norm();
+    let level_db = 20.0 * level.log10();
+    let id = if cubic { "compression" } else { "second_harmonic" };
+    let (estimate, statement) = if cubic {
+        (
+            Estimate::normal("level", -kappa.re, 0.71 * scatter),
+            format!(
+                "strong samples come out too small: the receiver compresses, the strongest sample by {:.2} %; its third-order \
+                 products lie where neither the room nor the body can be",
+                -100.0 * kappa.re
+            ),
+        )
+    } else {
+        (
+            Estimate::normal("level_db", level_db, 8.7 * 0.71 * scatter / level),
+            format!(
+                "everything has a second harmonic, at twice its beat frequency and velocity: {level_db:.1} dB at the strongest \
+                 sample; it follows the square of the measured signal in phase"
+            ),
+        )
+    };
+    let energy = evidence.cube.samples.iter().map(|value| power_of(*value, cubic).norm_sqr()).sum::<f64>()
+        * (level / if cubic { peak * peak } else { peak }).powi(2);
+    let factor = if cubic { kappa / (peak * peak) } else { kappa / peak };
+    Some(Candidate {
+        id: Some(id),
+        behaves_like: "non-linear",
+        estimates: vec![estimate],
+        choice: None,
+        place: Place::at("receiver"),
+        p_value,
+        gain,
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement,
+        curve: None,
+        energy,
+        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+            cube.each_chirp(|_, chirp| {
+                chirp.iter_mut().for_each(|value| {
+                    let found = *value;
+                    // The distortion of the undistorted signal: two steps are enough for what is small.
+                    let first = found - factor * power_of(found, cubic);
+                    *value = found - factor * power_of(first, cubic);
+                });
+            });
+        })),
+    })
+}
+
+/// Templates are scaled by the peak sample, so that κ is a share of it.
+fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool], cubic: bool, peak: f64) -> Sums {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let scale = if cubic { 1.0 / (peak * peak) } else { 1.0 / peak };
+    let mut sums = Sums::default();
+    for channel in 0..evidence.cube.channels() {
+        let noise = evidence.noise()[channel].max(1e-300);
+        let signal = evidence.cube.channel(frame, channel);
+        let mut template: Vec<Complex64> = signal.iter().map(|value| power_of(*value, cubic) * scale).collect();
+        let mut mean = vec![Complex64::ZERO; samples];
+        let mut still = vec![Complex64::ZERO; samples];
+        for (template, chirp) in template.chunks_exact(samples).zip(signal.chunks_exact(samples)) {
+            mean.iter_mut().zip(template).for_each(|(sum, value)| *sum += value / loops as f64);
+            still.iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value / loops as f64);
+        }
+        for chirp in template.chunks_exact_mut(samples) {
+            chirp.iter_mut().zip(&mean).for_each(|(value, mean)| *value -= mean);
+        }
+        let moving: Vec<Complex64> =
+            signal.iter().enumerate().map(|(i, value)| value - still[i % samples]).collect();
+        let (found, expected) = (transform(&moving, samples), transform(&template, samples));
+        let (still, mean) = (spectrum(&still), spectrum(&mean));
+        let mut count = |found: Complex64, expected: Complex64, noise: f64| {
+            // Strangers far above what could be predicted are left out by a bound on their say.
+            let bounded = found * (6.0 * (noise + 0.01 * expected.norm_sqr()).sqrt() / found.norm().max(1e-300)).min(1.0);
+            sums.cross += expected.conj() * bounded / noise;
+            sums.template += expected.norm_sqr() / noise;
+            sums.found += bounded.norm_sqr() / noise;
+            sums.cells += 1;
+        };
+        for range in (0..samples).filter(|&range| empty[range]) {
+            for doppler in 1..loops {
+                count(found[doppler * samples + range], expected[doppler * samples + range], noise);
+            }
+            // An offset or a leakage is near zero; what stands still elsewhere counts.
+            if range > 8 && range + 8 < samples {
+                count(still[range], mean[range], noise / loops as f64);
+            }
+        }
+    }
+    sums
+}
+
+fn jackknife(sums: &[Sums], training: &[usize]) -> f64 {
+    let all = training.iter().fold((Complex64::ZERO, 0.0), |a, &f| (a.0 + sums[f].cross, a.1 + sums[f].template));
+    let count = training.len() as f64;
+    let spread: f64 = training
+        .iter()
+        .filter(|&&f| all.1 > sums[f].template)
+        .map(|&f| ((all.0 - sums[f].cross) / (all.1 - sums[f].template) - all.0 / all.1).norm_sqr())
+        .sum();
+    (spread * (count - 1.0) / count).sqrt()
+}

@@ -1,0 +1,205 @@
+//! Noise that is not white over beat frequency, or not independent between receivers (cards V2, V4).
+//!
+//! Read from cells where neither room nor body can be; low quantiles and a bound on power keep strangers out.
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::image::empty_bins;
+use crate::diagnosis::Evidence;
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
+use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale};
+
+/// Cells of a Hann-windowed map per independent one, with reserve for the quantile's inefficiency.
+const SHARED: f64 = 4.0;
+/// A cell's power over the noise, beyond which it is a stranger's.
+const STRANGER: f64 = 8.0;
+
+/// Windows' maps of the cells that are looked at, `[channel][cell]`.
+type Cells = Vec<Vec<Complex64>>;
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let empty = empty_bins(evidence);
+    let samples = evidence.cube.dims[4];
+    let bins: Vec<usize> = (2..samples - 1).filter(|&bin| empty[bin]).collect();
+    if bins.len() < 8 || evidence.cube.dims[3] < 16 {
+        return vec![];
+    }
+    let filtered = ["if_highpass", "if_lowpass", "coloured_noise"].iter().any(|id| evidence.accepted.contains(id));
+    let colour = if filtered { None } else { coloured(evidence, &bins) };
+    let correlation = if evidence.accepted.contains(&"correlated_noise") { None } else { correlated(evidence, &bins) };
+    colour.into_iter().chain(correlation).collect()
+}
+
+/// Power over beat frequency, `[bin]`.
+fn spectrum(evidence: &Evidence, frames: &[usize], bins: &[usize]) -> Vec<f64> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let channels = evidence.cube.channels();
+    let mut powers: Vec<Vec<f64>> = vec![vec![]; bins.len()];
+    for &frame in frames {
+        for channel in 0..channels {
+            let map = evidence.range_doppler(frame, channel);
+            let noise = evidence.noise()[channel].max(1e-300);
+            for (bin, powers) in bins.iter().zip(&mut powers) {
+                powers.extend((3..loops - 2).map(|doppler| map[doppler * samples + bin].norm_sqr() / noise));
+            }
+        }
+    }
+    powers.par_iter_mut().map(|powers| exponential_scale(powers, 0.5)).collect()
+}
+
+fn coloured(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let rate = evidence.radar.sample_rate_hz;
+    let hertz: Vec<f64> = bins.iter().map(|&bin| bin.min(samples - bin) as f64 * rate / samples as f64).collect();
+    let per_frame = (evidence.cube.channels() * (loops - 5)) as f64 / SHARED;
+    let found = spectrum(evidence, &evidence.split.training, bins);
+    let held = spectrum(evidence, &evidence.split.held_out, bins);
+    let count = per_frame * evidence.split.training.len() as f64;
+    let fit = |knee: f64, power: f64| {
+        let shape: Vec<f64> = hertz.iter().map(|f| 1.0 + (knee / f).powf(power)).collect();
+        let level = found.iter().zip(&shape).map(|(p, s)| p / s).sum::<f64>() / bins.len() as f64;
+        let likelihood: f64 = found.iter().zip(&shape).map(|(p, s)| -(level * s).ln() - p / (level * s)).sum::<f64>() * count;
+        (likelihood, level, shape)
+    };
+    let (white, white_level, _) = fit(0.0, 1.0);
+    let grid: Vec<(f64, f64)> = (0..40)
+        .flat_map(|i| (1..=10).map(move |j| (i, j)))
+        .map(|(i, j)| (0.05 * rate / samples as f64 * 1.22f64.powi(i), 0.25 * f64::from(j)))
+        .filter(|&(knee, _)| knee < 0.5 * rate)
+        .collect();
+    let fits: Vec<(f64, f64, f64)> = grid.iter().map(|&(knee, power)| (fit(knee, power).0, knee, power)).collect();
+    let &(best, knee, power) = fits.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let p_value = corrected(chi2_tail(2.0 * (best - white), 2.0), 20.0);
+    if p_value > 1e-3 {
+        return None;
+    }
+    let (_, level, shape) = fit(knee, power);
+    let held_count = per_frame * evidence.split.held_out.len() as f64;
+    let gain: f64 = held
+        .iter()
+        .zip(&shape)
+        .map(|(p, s)| -(level * s).ln() - p / (level * s) + white_level.ln() + p / white_level)
+        .sum::<f64>()
+        * held_count;
+    let near: Vec<&(f64, f64, f64)> = fits.iter().filter(|fit| best - fit.0 < 2.0).collect();
+    let range = |value: fn(&(f64, f64, f64)) -> f64, step: [f64; 2]| {
+        let (low, high) = near.iter().fold((f64::INFINITY, 0.0f64), |(a, b), fit| (a.min(value(fit)), b.max(value(fit))));
+        [low * step[0], high * step[1]]
+    };
+    let excess = found.iter().sum::<f64>() / bins.len() as f64 / level - 1.0;
+    let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
+    Some(Candidate {
+        id: Some("coloured_noise"),
+        behaves_like: "noise over beat frequency",
+        estimates: vec![
+            Estimate { name: "knee_hz", values: vec![knee], ci90: vec![range(|fit| fit.1, [0.9, 1.1])] },
+            Estimate { name: "power", values: vec![power], ci90: vec![range(|fit| fit.2, [0.9, 1.1])] },
+        ],
+        choice: None,
+        place: Place::at("noise"),
+        p_value,
+        gain,
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement: format!(
+            "the noise rises towards low beat frequencies, by 3 dB at {:.0} kHz and with the power {power:.2} of the frequency below: \
+             thermal noise would be level",
+            knee * 1e-3
+        ),
+        curve: Some(Curve {
+            title: "Noise over beat frequency".into(),
+            x_label: "beat frequency, Hz".into(),
+            y_label: "power over the median, dB".into(),
+            series: vec![
+                ("measured".into(), hertz.clone(), found.iter().map(|p| 10.0 * p.max(1e-12).log10()).collect()),
+                ("fitted".into(), hertz, shape.iter().map(|s| 10.0 * (level * s).log10()).collect()),
+            ],
+        }),
+        energy: excess.max(0.0) * level * noise * evidence.cube.samples.len() as f64,
+        correction: Correction::None,
+    })
+}
+
+/// Whitened by each channel's own power; cells with a stranger in any channel are left out.
+fn cells(evidence: &Evidence, frame: usize, bins: &[usize]) -> Cells {
+    let [_, _, rx, loops, samples] = evidence.cube.dims;
+    let maps: Vec<Vec<Complex64>> = (0..rx).map(|channel| evidence.range_doppler(frame, channel)).collect();
+    let mut cells = vec![vec![]; rx];
+    for &bin in bins {
+        for doppler in 3..loops - 2 {
+            let at = doppler * samples + bin;
+            let ordinary = (0..rx).all(|c| maps[c][at].norm_sqr() < STRANGER * evidence.noise()[c]);
+            if ordinary {
+                (0..rx).for_each(|c| cells[c].push(maps[c][at] / evidence.noise()[c].max(1e-300).sqrt()));
+            }
+        }
+    }
+    cells
+}
+
+fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
+    let rx = evidence.cube.dims[2];
+    if rx < 2 {
+        return None;
+    }
+    let covariance = |frames: &[usize]| {
+        let of: Vec<(DMatrix<Complex64>, f64)> = frames
+            .par_iter()
+            .map(|&frame| {
+                let cells = cells(evidence, frame, bins);
+                let matrix = DMatrix::from_fn(rx, rx, |a, b| cells[a].iter().zip(&cells[b]).map(|(a, b)| a * b.conj()).sum());
+                (matrix, cells[0].len() as f64)
+            })
+            .collect();
+        let zero = (DMatrix::zeros(rx, rx), 0.0);
+        of.into_iter().fold(zero, |(sum, count), (matrix, cells)| (sum + matrix, count + cells))
+    };
+    let (sum, count) = covariance(&evidence.split.training);
+    if count < 100.0 {
+        return None;
+    }
+    let scale: Vec<f64> = (0..rx).map(|c| (sum[(c, c)].re / count).max(1e-300).sqrt()).collect();
+    let of = |sum: &DMatrix<Complex64>, count: f64| DMatrix::from_fn(rx, rx, |a, b| sum[(a, b)] / (count * scale[a] * scale[b]));
+    let found = of(&sum, count);
+    // Independent cells: windows share 2.25 of them.
+    let independent = count / 2.25;
+    let pairs = (rx * (rx - 1) / 2) as f64;
+    let total: f64 = (0..rx).flat_map(|a| (0..a).map(move |b| (a, b))).map(|(a, b)| found[(a, b)].norm_sqr()).sum();
+    let p_value = chi2_tail(2.0 * independent * total, 2.0 * pairs);
+    let rho = (total / pairs).sqrt();
+    // Far below a hundredth it is nobody's business, and strangers' tails begin to count.
+    if p_value > 1e-3 || rho < 0.005 {
+        return None;
+    }
+    let (sum, held) = covariance(&evidence.split.held_out);
+    let held_found = of(&sum, held.max(1.0));
+    let inverse = found.clone().try_inverse()?;
+    let determinant = found.determinant().re;
+    if determinant <= 0.0 {
+        return None;
+    }
+    let trace: f64 = (0..rx).map(|a| held_found[(a, a)].re).sum();
+    let gain = held / 2.25 * (trace - (&inverse * &held_found).trace().re - determinant.ln());
+    let error = (2.0 * independent * pairs).sqrt().recip() + 0.02 * rho;
+    let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
+    Some(Candidate {
+        id: Some("correlated_noise"),
+        behaves_like: "noise shared by receivers",
+        estimates: vec![Estimate::normal("rho", rho, error)],
+        choice: None,
+        place: Place::at("noise"),
+        p_value,
+        gain,
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement: format!(
+            "the receivers' noise is not independent: where nothing is, they agree with a correlation of {rho:.3} (root mean square \
+             over pairs), like a target in one fixed direction in every cell"
+        ),
+        curve: None,
+        energy: rho * noise * evidence.cube.samples.len() as f64,
+        correction: Correction::None,
+    })
+}

@@ -1,0 +1,250 @@
+//! Receiver fields of recordings whose room is unknown, or without quadrature: an offset, a leakage that dwarfs what is
+//! near, a transient that dwarfs the whole chirp. Without a room, only what stands out by its shape can be named.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use rustfft::FftPlanner;
+
+use super::still::subtract;
+use super::support::{beat_hz, energy, range_m, ranges_m, tone};
+use crate::diagnosis::evidence::hann;
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::{Cube, Evidence};
+
+/// A leakage's cluster of returns ends here.
+const NEAR_M: f64 = 0.3;
+/// Depth of the valley behind it.
+const VALLEY_DB: f64 = 10.0;
+/// Power of a transient over the strongest sample between the edges.
+const WILD: f64 = 4.0;
+const ZERO_PADDING: usize = 4;
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    if ranges_m(evidence).is_some() && !evidence.is_real() || evidence.cube.dims[4] < 16 {
+        return vec![];
+    }
+    let samples = evidence.cube.dims[4];
+    let still: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
+    if !evidence.accepted.contains(&"ramp_edge_transient") {
+        let edge: Vec<Candidate> = [false, true].into_iter().filter_map(|at_end| edge(evidence, &still, at_end)).collect();
+        let edge: Vec<Candidate> = edge.into_iter().filter(|edge| edge.p_value < 1e-6).collect();
+        if !edge.is_empty() {
+            return edge;
+        }
+    }
+    if evidence.is_real() && !evidence.accepted.contains(&"dc_offset") {
+        let offset = offset(evidence, &still);
+        if offset.is_some() {
+            return offset.into_iter().collect();
+        }
+    }
+    if evidence.accepted.contains(&"tx_leakage") { vec![] } else { leakage(evidence, &still).into_iter().collect() }
+}
+
+/// Held-out log-likelihood gained by taking a still term away, samples outside `range` untouched.
+fn gain(evidence: &Evidence, term: &[Vec<Complex64>]) -> f64 {
+    let [.., loops, samples] = evidence.cube.dims;
+    let mut gain = 0.0;
+    for &frame in &evidence.split.held_out {
+        let found = evidence.cube.still(&[frame]);
+        for (channel, term) in term.iter().enumerate() {
+            let found = &found[channel * samples..][..samples];
+            let better: f64 = found.iter().zip(term).map(|(value, term)| value.norm_sqr() - (value - term).norm_sqr()).sum();
+            gain += better * loops as f64 / evidence.noise()[channel].max(1e-300);
+        }
+    }
+    gain
+}
+
+fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<Candidate> {
+    let samples = evidence.cube.dims[4];
+    let power: Vec<f64> = (0..samples)
+        .map(|n| {
+            // Without quadrature a constant is no transient.
+            let centre = |chirp: &Vec<Complex64>| {
+                if evidence.is_real() { chirp.iter().sum::<Complex64>() / samples as f64 } else { Complex64::ZERO }
+            };
+            still.iter().map(|chirp| (chirp[n] - centre(chirp)).norm_sqr()).sum::<f64>() / still.len() as f64
+        })
+        .collect();
+    let between = &power[samples / 8..samples - samples / 8];
+    let (largest, mean) = (between.iter().fold(0.0f64, |a, &b| a.max(b)), between.iter().sum::<f64>() / between.len() as f64);
+    let at = |i: usize| if at_end { samples - 1 - i } else { i };
+    let count = (0..samples / 8).rev().find(|&i| power[at(i)] > WILD * largest)? + 1;
+    let wildest = (0..count).map(|i| power[at(i)]).fold(0.0, f64::max);
+    let indices: Vec<usize> = if at_end { (samples - count..samples).collect() } else { (0..count).collect() };
+    let term: Vec<Vec<Complex64>> = still
+        .iter()
+        .map(|chirp| (0..samples).map(|n| if indices.contains(&n) { chirp[n] } else { Complex64::ZERO }).collect())
+        .collect();
+    let nothing = vec![vec![Complex64::ZERO; samples]; still.len()];
+    let inner = if at_end { samples - count..samples } else { 0..count };
+    let peak = super::still::peak_without(&evidence.cube, &nothing, inner);
+    let level_db = 20.0 * (wildest.sqrt() / peak.max(1e-300)).log10();
+    let affected = indices.clone();
+    Some(Candidate {
+        id: Some("ramp_edge_transient"),
+        behaves_like: "additive fast-time",
+        estimates: vec![
+            Estimate { name: "samples", values: vec![count as f64], ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]] },
+            Estimate::normal("level_db", level_db, 8.7 * (mean / wildest).sqrt() + 0.3),
+        ],
+        choice: None,
+        place: Place { samples: Some(indices), ..Place::at("receiver") },
+        p_value: corrected((-wildest / mean.max(1e-300)).exp(), samples as f64),
+        gain: gain(evidence, &term),
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement: format!(
+            "the {} {count} sample{} of every chirp jump to {:.0} codes, {:.0} dB above the strongest sample in between, \
+             in all channels: the ADC runs into the {} of the ramp",
+            if at_end { "last" } else { "first" },
+            if count == 1 { "" } else { "s" },
+            wildest.sqrt(),
+            10.0 * (wildest / largest).log10(),
+            if at_end { "end" } else { "beginning" },
+        ),
+        curve: None,
+        energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
+        // They change from chirp to chirp too and hold nothing that can be used.
+        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+            cube.each_chirp(|_, chirp| affected.iter().for_each(|&n| chirp[n] = Complex64::ZERO));
+        })),
+    })
+}
+
+/// The constant of a converter without quadrature.
+fn offset(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
+    let [_, tx, rx, _, samples] = evidence.cube.dims;
+    // The window keeps what is near zero, but not at it, from tilting the mean.
+    let window = hann(samples);
+    let sum: f64 = window.iter().sum();
+    let mean = |chirp: &Vec<Complex64>| chirp.iter().zip(&window).map(|(value, w)| value.re * w).sum::<f64>() / sum;
+    let values: Vec<f64> =
+        (0..rx).map(|receiver| (0..tx).map(|t| mean(&still[t * rx + receiver])).sum::<f64>() / tx as f64).collect();
+    let rest: Vec<f64> = still
+        .iter()
+        .map(|chirp| {
+            let mean = mean(chirp);
+            (chirp.iter().map(|value| (value.re - mean).powi(2)).sum::<f64>() / samples as f64).sqrt()
+        })
+        .collect();
+    let smallest = values.iter().fold(f64::INFINITY, |a, b| a.min(b.abs()));
+    let swing = rest.iter().fold(0.0f64, |a, &b| a.max(b));
+    // A tone near zero beat frequency swings about zero: a constant that is larger than any swing is none.
+    if smallest < 2.0 * swing || smallest <= 0.0 {
+        return None;
+    }
+    let term: Vec<Vec<Complex64>> = (0..tx * rx).map(|c| vec![Complex64::from(values[c % rx]); samples]).collect();
+    let deviation: Vec<f64> = (0..rx).map(|receiver| 0.3 * rest[receiver]).collect();
+    Some(Candidate {
+        id: Some("dc_offset"),
+        behaves_like: "additive fast-time",
+        estimates: vec![Estimate::list("i", &values, &deviation), Estimate::list("q", &vec![0.0; rx], &vec![0.0; rx])],
+        choice: None,
+        place: Place { range_m: Some([0.0, 0.0]), ..Place::at("receiver") },
+        p_value: corrected((-0.5 * (smallest / swing.max(1e-300)).powi(2) * samples as f64).exp(), 1.0),
+        gain: gain(evidence, &term),
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement: format!(
+            "every sample has a constant of about {:.0} codes added (all receivers within {:.0}), {:.0} times what else stands \
+             still: the codes' zero is not the signal's",
+            values.iter().sum::<f64>() / rx as f64,
+            values.iter().fold(0.0f64, |a, &b| a.max(b)) - values.iter().fold(f64::INFINITY, |a, &b| a.min(b)),
+            smallest / swing.max(1e-300)
+        ),
+        curve: None,
+        energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
+        correction: subtract(term),
+    })
+}
+
+fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let rate = evidence.radar.sample_rate_hz;
+    let long = samples * ZERO_PADDING;
+    let window = hann(samples);
+    let spectra: Vec<Vec<f64>> = still
+        .iter()
+        .map(|chirp| {
+            let mut padded = vec![Complex64::ZERO; long];
+            for n in 0..samples {
+                padded[n] = chirp[n] * window[n];
+            }
+            FftPlanner::new().plan_fft_forward(long).process(&mut padded);
+            padded.iter().map(Complex64::norm_sqr).collect()
+        })
+        .collect();
+    let mean: Vec<f64> = (0..long).map(|bin| spectra.iter().map(|s| s[bin]).sum::<f64>() / spectra.len() as f64).collect();
+    let bin_m = range_m(evidence, rate / long as f64);
+    let near = (NEAR_M / bin_m).floor() as usize;
+    let last = if evidence.is_real() { long / 2 } else { long - 4 * ZERO_PADDING };
+    if near < 2 || near + 8 >= last {
+        return None;
+    }
+    let best = |range: std::ops::Range<usize>| range.max_by(|&a, &b| mean[a].total_cmp(&mean[b]));
+    let peak = best(0..near)?;
+    let valley_end = (2.5 * NEAR_M / bin_m) as usize;
+    let valley = (peak..valley_end.min(last)).min_by(|&a, &b| mean[a].total_cmp(&mean[b]))?;
+    let far = best(valley..last)?;
+    let decibels = |ratio: f64| 10.0 * ratio.max(1e-30).log10();
+    let white = evidence.noise().iter().sum::<f64>()
+        / evidence.noise().len() as f64
+        / (loops * evidence.split.training.len()) as f64;
+    let over_noise = mean[peak] / white.max(1e-300);
+    if decibels(mean[peak] / mean[valley]) < VALLEY_DB || mean[peak] < 0.1 * mean[far] || decibels(over_noise) < 20.0 {
+        return None;
+    }
+    let spread = |bin: usize| {
+        let (low, high) = spectra.iter().fold((f64::INFINITY, 0.0f64), |(low, high), s| (low.min(s[bin]), high.max(s[bin])));
+        decibels(high / low.max(1e-300))
+    };
+    let (near_spread, far_spread) = (spread(peak), spread(far));
+    let range = (peak as f64 * bin_m).max(0.0);
+    // Several short paths over the board: tones half a bin apart, weighted by the window against what is far.
+    let highest = (beat_hz(evidence, range_m(evidence, valley as f64 * rate / long as f64)) / rate * samples as f64).min(10.0);
+    let lowest = -1.0;
+    let count = ((highest - lowest) * 2.0).ceil() as usize;
+    let tones: Vec<Vec<Complex64>> = (0..=count).map(|i| tone((lowest + 0.5 * i as f64) / samples as f64, samples)).collect();
+    let matrix = DMatrix::from_fn(samples, tones.len(), |n, k| tones[k][n] * window[n]).svd(true, true);
+    let term: Vec<Vec<Complex64>> = still
+        .iter()
+        .map(|chirp| {
+            let weighted = DVector::from_fn(samples, |n, _| chirp[n] * window[n]);
+            let cut = 1e-2 * matrix.singular_values.max();
+            let solved = matrix.solve(&weighted, cut).unwrap_or_else(|_| DVector::zeros(tones.len()));
+            (0..samples).map(|n| tones.iter().zip(solved.iter()).map(|(tone, a)| tone[n] * a).sum()).collect()
+        })
+        .collect();
+    let largest = term.iter().flatten().map(|value| value.norm()).fold(0.0, f64::max);
+    let peak_sample = super::still::peak_without(&evidence.cube, &term, 0..0);
+    let level_db = 20.0 * (largest / peak_sample.max(1e-300)).log10();
+    let resolution = range_m(evidence, rate / samples as f64);
+    let channels = still.len();
+    Some(Candidate {
+        id: Some("tx_leakage"),
+        behaves_like: "additive fast-time",
+        estimates: vec![Estimate::normal("range_m", range, 0.3 * resolution), Estimate::normal("level_db", level_db, 1.0)],
+        choice: None,
+        place: Place { range_m: Some([0.0, valley as f64 * bin_m]), ..Place::at("receiver") },
+        p_value: chi2_tail(2.0 * over_noise * channels as f64, 2.0 * channels as f64),
+        gain: gain(evidence, &term),
+        rung: Rung::F,
+        // A still reflector is seen alike by neighbouring receivers.
+        look_alikes: if near_spread > far_spread + 3.0 { vec![] } else { vec!["static_reflector"] },
+        statement: format!(
+            "a strong return {range:.2} m away that never changes, {:.0} dB above the valley behind it; it differs by \
+             {near_spread:.0} dB between the {channels} channels, while the strongest far return ({:.1} m) differs by \
+             {far_spread:.0} dB: the transmitters leak into the receivers",
+            decibels(mean[peak] / mean[valley]),
+            far as f64 * bin_m,
+        ),
+        curve: None,
+        energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * loops) as f64,
+        correction: subtract(term),
+    })
+}

@@ -1,0 +1,76 @@
+//! The converter's rail: components pile up at one value (card R4).
+
+use num_complex::Complex64;
+
+use crate::diagnosis::Evidence;
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::statistics::corrected;
+
+/// Fewest components at the rail.
+const FEWEST: usize = 8;
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    // Clipping cannot be undone: it is looked for once, in the samples as they were recorded.
+    if !evidence.accepted.is_empty() || evidence.is_real() {
+        return vec![];
+    }
+    let parts = |value: &Complex64| [value.re, value.im];
+    let mut candidates = vec![];
+    let largest = evidence.extremes[1].max(-evidence.extremes[0]);
+    if largest <= 0.0 {
+        return candidates;
+    }
+    // Within half a code, or a hair of the largest for samples that are no codes.
+    let tolerance = 1e-6 * largest;
+    let slab = 0.02 * largest;
+    let (mut at, mut below, mut held_at) = (0usize, 0usize, 0usize);
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let per_frame = evidence.cube.channels() * loops * samples;
+    let mut hit_frames = vec![0usize; evidence.cube.dims[0]];
+    for (index, value) in evidence.cube.samples.iter().enumerate() {
+        for part in parts(value) {
+            let magnitude = part.abs();
+            if magnitude >= largest - tolerance {
+                at += 1;
+                hit_frames[index / per_frame] += 1;
+                held_at += usize::from(evidence.split.held_out.contains(&(index / per_frame)));
+            } else if magnitude >= largest - slab {
+                below += 1;
+            }
+        }
+    }
+    // A density that falls towards its end has fewer values in the last code than in any code of the slab before it.
+    let codes = slab.max(1.0);
+    let expected = (below as f64 / codes).max(0.2);
+    if at < FEWEST || (at as f64) < 5.0 * expected {
+        return candidates;
+    }
+    let excess = at as f64 * (at as f64 / expected).ln() - (at as f64 - expected);
+    let held_share = held_at as f64 / at as f64;
+    let share = at as f64 / (2 * evidence.cube.samples.len()) as f64;
+    // How far the signal would have gone: from its root mean square and the share beyond, as for a Gaussian.
+    let rms = (evidence.cube.samples.iter().map(Complex64::norm_sqr).sum::<f64>() / (2 * evidence.cube.samples.len()) as f64).sqrt();
+    let level = (rms * (2.0 * (2.0 * evidence.cube.samples.len() as f64).ln()).sqrt() / largest).max(1.0);
+    let frames: Vec<usize> = (0..hit_frames.len()).filter(|&frame| hit_frames[frame] > 0).collect();
+    let everywhere = frames.len() == hit_frames.len();
+    candidates.push(Candidate {
+        id: Some("adc_saturation"),
+        behaves_like: "amplitude",
+        estimates: vec![Estimate { name: "level", values: vec![level], ci90: vec![[0.6 * level, 1.8 * level]] }],
+        choice: None,
+        place: Place { frames: (!everywhere).then_some(frames), ..Place::at("receiver") },
+        p_value: corrected((-excess).exp(), 2.0),
+        gain: excess * held_share,
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement: format!(
+            "{at} of the recorded components ({:.3} %) lie exactly at ±{largest:.0}, where {expected:.1} would by the values just \
+             below: the converter is at its rail and cuts the signal",
+            100.0 * share
+        ),
+        curve: None,
+        energy: at as f64 * (0.1 * largest).powi(2),
+        correction: Correction::None,
+    });
+    candidates
+}

@@ -1,0 +1,443 @@
+//! Additive fields that stand still outside the delays of the room: offsets, leakage, transients at the chirps' edges.
+//!
+//! Elements are chosen one after the other by their log-likelihood on the training frames less the Bayesian information
+//! criterion's penalty, together with the images that non-linear receivers make of the still scene (which belong to
+//! other suspects, but must not be taken for a leakage). Named elements are believed only if all together explain most
+//! of what a free field does.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+
+use super::field::{Field, Fitted, Templates, add, orthonormal, remove};
+use super::response;
+use super::support::{beat_hz, dot, energy, range_m, tone};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::{Cube, Evidence};
+
+/// Leakage over the board is nearer than this.
+const NEAR_M: f64 = 0.5;
+/// Longest transient at an edge, samples.
+const LONGEST_EDGE: usize = 16;
+/// Share of what a free field explains that named elements must reach.
+const ENOUGH: f64 = 0.8;
+const MOST_ELEMENTS: usize = 8;
+
+#[derive(Clone, Debug, PartialEq)]
+enum Element {
+    Offset,
+    /// Beat frequency in turns per sample.
+    Leakage(f64),
+    Start(usize),
+    End(usize),
+    Image,
+    Square,
+}
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let Some(field) = Field::new(evidence) else { return vec![] };
+    let free = field.free_likelihood();
+    let p_free = chi2_tail(2.0 * free, field.freedom());
+    if p_free > 1e-4 {
+        return vec![];
+    }
+    let images = Images::new(evidence, &field);
+    let elements = choose(evidence, &field, &images);
+    let fitted = field.fit(&templates(&elements, &images));
+    let free_gain = field.gain(None, &field.mean);
+    let explained = field.gain(None, &fitted.predicted);
+    let named = elements.iter().any(|element| !matches!(element, Element::Image | Element::Square));
+    let spent: f64 = elements.iter().map(|element| unknowns(element, field.channels())).sum();
+    let without = residual(&elements, &fitted, &field, &images);
+    // A field far stronger than any filter's traces needs no second thought.
+    let plain = explained >= 0.98 * free_gain && fitted.likelihood > 1e5;
+    let filter = if plain { None } else { response::find(evidence, &field, &without) };
+    // A filter has one unknown where a field has many: by the information criterion's price for each.
+    if let Some(found) = &filter
+        && found.likelihood > 12.0
+        && (!named || found.likelihood - found.additive > penalty(&field) * (2.0 - spent))
+    {
+        return vec![found.candidate.clone()];
+    }
+    if explained >= ENOUGH * free_gain {
+        return (0..elements.len())
+            .filter_map(|index| candidate(evidence, &field, &images, &elements, &fitted, index))
+            .collect();
+    }
+    // A converter at its rail bends everything; what remains of it has no shape of its own.
+    if free_gain < 20.0 || evidence.accepted.contains(&"adc_saturation") {
+        return vec![];
+    }
+    unexplained(evidence, &field, p_free, free_gain).into_iter().collect()
+}
+
+/// Still chirps less what the elements make of them.
+fn residual(elements: &[Element], fitted: &Fitted, field: &Field, images: &Images) -> Vec<Vec<Complex64>> {
+    let templates = templates(elements, images);
+    let mut rest = field.still.clone();
+    for (channel, chirp) in rest.iter_mut().enumerate() {
+        templates.own.iter().zip(&fitted.own[channel]).for_each(|(template, amplitude)| add(chirp, template, -amplitude));
+        templates.common.iter().zip(&fitted.common).for_each(|(template, amplitude)| add(chirp, &template[channel], -amplitude));
+    }
+    rest
+}
+
+/// Price in nats of another complex number.
+fn penalty(field: &Field) -> f64 {
+    1.5 * field.freedom().ln().max(4.0)
+}
+
+/// What non-linear receivers make of the still scene, `[channel][sample]`.
+struct Images {
+    conjugate: Vec<Vec<Complex64>>,
+    square: Vec<Vec<Complex64>>,
+}
+
+impl Images {
+    fn new(evidence: &Evidence, field: &Field) -> Self {
+        let conjugate = field.still.iter().map(|chirp| chirp.iter().map(Complex64::conj).collect()).collect();
+        let samples = evidence.cube.dims[4];
+        let mut square = vec![vec![Complex64::ZERO; samples]; field.channels()];
+        // A few chirps of each frame are enough: the scene's own square hardly changes within it.
+        let loops = evidence.cube.dims[3];
+        let step = loops.div_ceil(8);
+        let count = (evidence.split.training.len() * loops.div_ceil(step)) as f64;
+        for &frame in &evidence.split.training {
+            for (channel, sum) in square.iter_mut().enumerate() {
+                for chirp in evidence.cube.channel(frame, channel).chunks_exact(samples).step_by(step) {
+                    sum.iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value * value / count);
+                }
+            }
+        }
+        Self { conjugate, square }
+    }
+}
+
+fn templates(elements: &[Element], images: &Images) -> Templates {
+    let samples = images.conjugate[0].len();
+    let mut templates = Templates::default();
+    for element in elements {
+        match element {
+            Element::Image => templates.common.push(images.conjugate.clone()),
+            Element::Square => templates.common.push(images.square.clone()),
+            own => templates.own.extend(columns(own, samples)),
+        }
+    }
+    templates
+}
+
+/// Fast-time templates with an amplitude in every channel.
+fn columns(element: &Element, samples: usize) -> Vec<Vec<Complex64>> {
+    let impulse = |at: usize| (0..samples).map(|n| if n == at { Complex64::ONE } else { Complex64::ZERO }).collect();
+    match *element {
+        Element::Offset => vec![vec![Complex64::ONE; samples]],
+        Element::Leakage(turns) => vec![tone(turns, samples)],
+        Element::Start(count) => (0..count).map(impulse).collect(),
+        Element::End(count) => (samples - count..samples).map(impulse).collect(),
+        Element::Image | Element::Square => vec![],
+    }
+}
+
+/// Complex numbers that an element adds.
+fn unknowns(element: &Element, channels: usize) -> f64 {
+    match element {
+        Element::Offset => channels as f64,
+        Element::Leakage(_) => channels as f64 + 0.5,
+        Element::Start(count) | Element::End(count) => (count * channels) as f64,
+        Element::Image | Element::Square => 1.0,
+    }
+}
+
+fn choose(evidence: &Evidence, field: &Field, images: &Images) -> Vec<Element> {
+    let samples = evidence.cube.dims[4];
+    let channels = field.channels();
+    let penalty = penalty(field);
+    let highest = beat_hz(evidence, NEAR_M) / evidence.radar.sample_rate_hz;
+    let lowest = beat_hz(evidence, 0.01) / evidence.radar.sample_rate_hz;
+    let grid = (highest * samples as f64 * 12.0).ceil().max(2.0) as usize;
+    let near: Vec<f64> = (0..=grid).map(|i| lowest + (highest - lowest) * i as f64 / grid as f64).collect();
+    let mut chosen: Vec<Element> = vec![];
+    while chosen.len() < MOST_ELEMENTS {
+        let fitted = field.fit(&templates(&chosen, images));
+        let rest: Vec<Vec<Complex64>> = field
+            .mean
+            .iter()
+            .zip(&fitted.predicted)
+            .map(|(found, predicted)| found.iter().zip(predicted).map(|(found, predicted)| found - predicted).collect())
+            .collect();
+        let basis = orthonormal(&templates(&chosen, images).own.iter().map(|own| field.project(own)).collect::<Vec<_>>());
+        let score = |element: &Element| {
+            let mut columns: Vec<Vec<Complex64>> =
+                columns(element, samples).iter().map(|column| field.project(column)).collect();
+            columns.iter_mut().for_each(|column| remove(column, &basis));
+            let directions = orthonormal(&columns);
+            (0..channels)
+                .map(|channel| {
+                    field.weight(channel) * directions.iter().map(|d| dot(d, &rest[channel]).norm_sqr()).sum::<f64>()
+                })
+                .sum::<f64>()
+                - penalty * unknowns(element, channels)
+        };
+        let mut options: Vec<(f64, Element)> = vec![];
+        if !chosen.contains(&Element::Offset) {
+            options.push((score(&Element::Offset), Element::Offset));
+        }
+        if chosen.iter().filter(|element| matches!(element, Element::Leakage(_))).count() < 3 {
+            let best = near.iter().map(|&turns| (score(&Element::Leakage(turns)), turns)).max_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((_, turns)) = best {
+                let turns = refine(turns, near[1] - near[0], |turns| score(&Element::Leakage(turns)));
+                options.push((score(&Element::Leakage(turns)), Element::Leakage(turns)));
+            }
+        }
+        for edge in [Element::Start as fn(usize) -> Element, Element::End] {
+            if chosen.iter().any(|element| std::mem::discriminant(element) == std::mem::discriminant(&edge(1))) {
+                continue;
+            }
+            for count in 1..=LONGEST_EDGE.min(samples / 8) {
+                options.push((score(&edge(count)), edge(count)));
+            }
+        }
+        for image in [Element::Image, Element::Square] {
+            if !chosen.contains(&image) {
+                let with: Vec<Element> = chosen.iter().cloned().chain([image.clone()]).collect();
+                let gain = field.fit(&templates(&with, images)).likelihood - fitted.likelihood;
+                options.push((gain - penalty, image));
+            }
+        }
+        let best = options.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        match best {
+            Some((score, element)) if score > 0.0 => chosen.push(element),
+            _ => break,
+        }
+        if chosen.iter().filter(|element| matches!(element, Element::Leakage(_))).count() > 0 && chosen.len() > 1 {
+            improve(field, images, &mut chosen, near[1] - near[0]);
+        }
+    }
+    chosen
+}
+
+/// Moves each leakage's beat frequency where all elements together fit best.
+fn improve(field: &Field, images: &Images, chosen: &mut [Element], step: f64) {
+    for index in 0..chosen.len() {
+        if let Element::Leakage(turns) = chosen[index] {
+            let mut tried = chosen.to_vec();
+            let best = refine(turns, step, |turns| {
+                tried[index] = Element::Leakage(turns);
+                field.fit(&templates(&tried, images)).likelihood
+            });
+            chosen[index] = Element::Leakage(best);
+        }
+    }
+}
+
+/// Golden-section search of a maximum near a grid's best.
+fn refine(at: f64, step: f64, mut value: impl FnMut(f64) -> f64) -> f64 {
+    const RATIO: f64 = 0.618_033_988_749_895;
+    let (mut low, mut high) = (at - step, at + step);
+    for _ in 0..18 {
+        let (a, b) = (high - RATIO * (high - low), low + RATIO * (high - low));
+        if value(a) > value(b) { high = b } else { low = a }
+    }
+    0.5 * (low + high)
+}
+
+fn candidate(
+    evidence: &Evidence,
+    field: &Field,
+    images: &Images,
+    elements: &[Element],
+    fitted: &Fitted,
+    index: usize,
+) -> Option<Candidate> {
+    let element = &elements[index];
+    let mut others = elements.to_vec();
+    others.remove(index);
+    let without = field.fit(&templates(&others, images));
+    let channels = field.channels();
+    let freedom = 2.0 * unknowns(element, channels);
+    let p_value = corrected(chi2_tail(2.0 * (fitted.likelihood - without.likelihood).max(0.0), freedom), 200.0);
+    let gain = field.gain(Some(&without.predicted), &fitted.predicted);
+    let first: usize =
+        elements[..index].iter().map(|element| columns(element, 1 + 2 * LONGEST_EDGE).len()).sum();
+    let samples = evidence.cube.dims[4];
+    let own = columns(element, samples);
+    if own.is_empty() {
+        return None;
+    }
+    let term: Vec<Vec<Complex64>> = (0..channels)
+        .map(|channel| {
+            let mut sum = vec![Complex64::ZERO; samples];
+            own.iter().enumerate().for_each(|(i, column)| add(&mut sum, column, fitted.own[channel][first + i]));
+            sum
+        })
+        .collect();
+    let amplitudes: Vec<f64> = (0..channels).map(|channel| fitted.own[channel][first].norm()).collect();
+    let skipped = match *element {
+        Element::Start(count) => 0..count,
+        Element::End(count) => samples - count..samples,
+        _ => 0..0,
+    };
+    let peak = peak_without(&evidence.cube, &term, skipped.clone());
+    let scene = (field.still.iter().map(|chirp| energy(chirp)).sum::<f64>() / (channels * samples) as f64).sqrt();
+    let largest = term.iter().flatten().map(|value| value.norm()).fold(0.0, f64::max);
+    // Of the strongest sample, mean over the channels: single ones hold the scene's own value too.
+    let level = (0..samples)
+        .map(|n| (term.iter().map(|chirp| chirp[n].norm_sqr()).sum::<f64>() / channels as f64).sqrt())
+        .fold(0.0, f64::max);
+    let level_db = 20.0 * (level / peak.max(1e-300)).log10();
+    let spread_db = 20.0
+        * (amplitudes.iter().fold(0.0f64, |a, &b| a.max(b)) / amplitudes.iter().fold(f64::INFINITY, |a, &b| a.min(b)).max(1e-300))
+            .log10();
+    let mut place = Place::at("receiver");
+    let deviation = (field.variance.iter().sum::<f64>() / channels as f64 / evidence.split.training.len() as f64).sqrt();
+    let (id, estimates, statement) = match *element {
+        Element::Offset => {
+            let rx = evidence.cube.dims[2];
+            let each = |part: fn(&Complex64) -> f64| -> Vec<f64> {
+                (0..rx)
+                    .map(|receiver| {
+                        (0..channels).filter(|c| c % rx == receiver).map(|c| part(&fitted.own[c][first])).sum::<f64>()
+                            / (channels / rx) as f64
+                    })
+                    .collect()
+            };
+            let error = vec![deviation * 3.0 / (samples as f64).sqrt(); rx];
+            place.range_m = Some([0.0, 0.0]);
+            let (i, q) = (each(|a| a.re), each(|a| a.im));
+            let statement = format!(
+                "a constant was left out that each receiver adds to all its samples: {} codes in the largest, {level_db:.1} dB \
+                 to the signal's peak sample; it lies at beat frequency zero exactly and does not change over time",
+                digits(largest)
+            );
+            ("dc_offset", vec![Estimate::list("i", &i, &error), Estimate::list("q", &q, &error)], statement)
+        }
+        Element::Leakage(turns) => {
+            let rate = evidence.radar.sample_rate_hz;
+            let range = range_m(evidence, turns * rate);
+            let step = beat_hz(evidence, 0.002) / rate;
+            let at = |turns: f64| {
+                let mut moved = elements.to_vec();
+                moved[index] = Element::Leakage(turns);
+                field.fit(&templates(&moved, images)).likelihood
+            };
+            let curvature = (2.0 * fitted.likelihood - at(turns + step) - at(turns - step)) / (0.002f64 * 0.002);
+            let error = if curvature > 0.0 { curvature.recip().sqrt() } else { 0.05 };
+            place.range_m = Some([range, range]);
+            let statement = format!(
+                "a return {range:.3} m away, nearer than anything in the room, that never changes: the transmitters leak into \
+                 the receivers over the board, {level_db:.1} dB to the signal's peak sample, {spread_db:.1} dB apart between \
+                 channels"
+            );
+            (
+                "tx_leakage",
+                vec![Estimate::normal("range_m", range, error.max(5e-4)), Estimate::normal("level_db", level_db, 0.2)],
+                statement,
+            )
+        }
+        Element::Start(count) | Element::End(count) => {
+            let at_end = matches!(element, Element::End(_));
+            let indices: Vec<usize> = if at_end { (samples - count..samples).collect() } else { (0..count).collect() };
+            let statement = format!(
+                "the {} {count} sample{} of every chirp hold{} a value that is added and never changes, up to {} codes \
+                 ({level_db:.1} dB to the signal's peak sample): the ADC runs into the {} of the ramp",
+                if at_end { "last" } else { "first" },
+                if count == 1 { "" } else { "s" },
+                if count == 1 { "s" } else { "" },
+                digits(largest),
+                if at_end { "end" } else { "beginning" },
+            );
+            place.samples = Some(indices);
+            (
+                "ramp_edge_transient",
+                vec![
+                    Estimate { name: "samples", values: vec![count as f64], ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]] },
+                    Estimate::normal("level_db", level_db, 8.7 * 0.7 * scene / (level * (channels as f64).sqrt()) + 0.3),
+                ],
+                statement,
+            )
+        }
+        Element::Image | Element::Square => return None,
+    };
+    let energy = term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
+    Some(Candidate {
+        id: Some(id),
+        behaves_like: "additive fast-time",
+        estimates,
+        choice: None,
+        place,
+        p_value,
+        gain,
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement,
+        curve: None,
+        energy,
+        correction: subtract(term),
+    })
+}
+
+/// What remains that no name explains.
+fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, gain: f64) -> Option<Candidate> {
+    let samples = evidence.cube.dims[4];
+    let term: Vec<Vec<Complex64>> = field
+        .mean
+        .iter()
+        .map(|coordinates| {
+            let mut sum = vec![Complex64::ZERO; samples];
+            field.support.outside.iter().zip(coordinates).for_each(|(direction, value)| add(&mut sum, direction, *value));
+            sum
+        })
+        .collect();
+    let energy_of_chirp = term.iter().map(|chirp| energy(chirp)).sum::<f64>();
+    let power_db = 10.0 * (energy_of_chirp / field.still.iter().map(|chirp| energy(chirp)).sum::<f64>().max(1e-300)).log10();
+    Some(Candidate {
+        id: None,
+        behaves_like: "additive fast-time",
+        estimates: vec![],
+        choice: None,
+        place: Place::at("receiver"),
+        p_value,
+        gain,
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement: format!(
+            "every chirp holds something that never changes at beat frequencies where the room ({:.1} to {:.1} m) has nothing, \
+             {power_db:.1} dB to all that stands still; no effect of the library explains its shape",
+            field.support.low_m, field.support.high_m
+        ),
+        curve: None,
+        energy: energy_of_chirp * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
+        correction: subtract(term),
+    })
+}
+
+/// Takes a still chirp away from every chirp of its channel.
+pub fn subtract(term: Vec<Vec<Complex64>>) -> Correction {
+    Correction::Samples(Arc::new(move |cube: &mut Cube| {
+        cube.each_chirp(|[_, channel, _], chirp| chirp.iter_mut().zip(&term[channel]).for_each(|(value, term)| *value -= term));
+    }))
+}
+
+/// Largest sample once a still term is taken away, some samples of every chirp not counted.
+pub fn peak_without(cube: &Cube, term: &[Vec<Complex64>], skipped: std::ops::Range<usize>) -> f64 {
+    let [frames, .., samples] = cube.dims;
+    let mut peak = 0.0f64;
+    for frame in 0..frames {
+        for (channel, term) in term.iter().enumerate() {
+            for chirp in cube.channel(frame, channel).chunks_exact(samples) {
+                for (n, (value, term)) in chirp.iter().zip(term).enumerate() {
+                    if !skipped.contains(&n) {
+                        peak = peak.max((value - term).norm_sqr());
+                    }
+                }
+            }
+        }
+    }
+    peak.sqrt()
+}
+
+/// A number with three significant digits.
+fn digits(value: f64) -> String {
+    if value >= 100.0 { format!("{value:.0}") } else { format!("{value:.2}") }
+}

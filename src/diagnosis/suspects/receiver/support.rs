@@ -1,0 +1,146 @@
+//! Where in beat frequency the still scene can be, and the directions of fast time in which it cannot be.
+//!
+//! Tones between two beat frequencies span, over N samples, a space of about N · bandwidth / sample rate dimensions; its
+//! best orthonormal basis are the discrete prolate spheroidal sequences (Slepian 1978). Beyond that number their share λ
+//! of energy within the band falls fast: there, a static room and a body leave λ times their density and thermal noise.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, SymmetricEigen};
+use num_complex::Complex64;
+
+use crate::diagnosis::Evidence;
+use crate::radar::SPEED_OF_LIGHT;
+
+/// Clearance before the nearest and behind the farthest surface: antennas off the reference point, surfaces that are
+/// not quite where they are said to be.
+const CLEARANCE_M: f64 = 0.3;
+/// The same behind the farthest, for a slope that is not quite as stated.
+const CLEARANCE_SHARE: f64 = 0.05;
+/// Chirps longer than this would take too long.
+const MOST_SAMPLES: usize = 512;
+
+/// The scene's density may exceed its mean over the band by this.
+const UNEVEN: f64 = 10.0;
+
+/// Fast-time directions of the still scene's beat frequencies, `[direction][sample]`, orthogonal.
+pub struct Support {
+    /// Where the scene exceeds the noise, of unit length.
+    pub inside: Vec<Vec<Complex64>>,
+    /// Where noise counts; of length √(noise / (noise + scene)), so that coordinates have the noise's variance at most.
+    pub outside: Vec<Vec<Complex64>>,
+    pub low_m: f64,
+    pub high_m: f64,
+}
+
+/// Round-trip beat frequency of a range.
+pub fn beat_hz(evidence: &Evidence, range_m: f64) -> f64 {
+    2.0 * range_m * evidence.radar.slope_hz_per_s / SPEED_OF_LIGHT
+}
+
+pub fn range_m(evidence: &Evidence, beat_hz: f64) -> f64 {
+    beat_hz * SPEED_OF_LIGHT / (2.0 * evidence.radar.slope_hz_per_s)
+}
+
+/// exp(j2π f n) with the frequency in turns per sample.
+pub fn tone(turns_per_sample: f64, samples: usize) -> Vec<Complex64> {
+    (0..samples).map(|n| Complex64::cis(TAU * (turns_per_sample * n as f64).fract())).collect()
+}
+
+/// Σ conj(a) b.
+pub fn dot(a: &[Complex64], b: &[Complex64]) -> Complex64 {
+    a.iter().zip(b).map(|(a, b)| a.conj() * b).sum()
+}
+
+pub fn energy(a: &[Complex64]) -> f64 {
+    a.iter().map(Complex64::norm_sqr).sum()
+}
+
+/// Ranges of still surfaces: none unless the room is closed in front and on both sides.
+pub fn ranges_m(evidence: &Evidence) -> Option<[f64; 2]> {
+    let room = evidence.room.as_ref()?;
+    room.front_m.and(room.left_m).and(room.right_m)?;
+    let nearest = room.boundaries().into_iter().filter_map(|boundary| room.distance_m(boundary)).fold(f64::INFINITY, f64::min);
+    let farthest = room.farthest_m()?;
+    Some([(nearest - CLEARANCE_M).max(0.5 * nearest), farthest * (1.0 + CLEARANCE_SHARE) + CLEARANCE_M])
+}
+
+/// `contrast`: energy of a still chirp over the variance of the noise in a sample of it.
+pub fn support(evidence: &Evidence, contrast: f64) -> Option<Support> {
+    let samples = evidence.cube.dims[4];
+    if evidence.is_real() || samples > MOST_SAMPLES || samples < 16 || evidence.radar.slope_hz_per_s <= 0.0 {
+        return None;
+    }
+    let [low_m, high_m] = ranges_m(evidence)?;
+    let rate = evidence.radar.sample_rate_hz;
+    let (low, high) = (beat_hz(evidence, low_m) / rate, beat_hz(evidence, high_m) / rate);
+    let width = high - low;
+    if width >= 0.85 {
+        return None;
+    }
+    let (real, share_of) = prolate(samples, 0.5 * width);
+    let carrier = tone(0.5 * (low + high), samples);
+    let density = UNEVEN * contrast / (width * samples as f64);
+    let mut inside = vec![];
+    let mut outside = vec![];
+    for (vector, within) in real.into_iter().zip(share_of) {
+        let complex: Vec<Complex64> = vector.iter().zip(&carrier).map(|(value, carrier)| carrier * *value).collect();
+        let scene = density * within.max(0.0);
+        if scene < 1e4 {
+            let length = (1.0 + scene).sqrt().recip();
+            outside.push(complex.iter().map(|value| value * length).collect());
+        }
+        if scene > 1.0 {
+            inside.push(complex);
+        }
+    }
+    (outside.len() >= 4).then_some(Support { inside, outside, low_m, high_m })
+}
+
+/// Discrete prolate spheroidal sequences of a half bandwidth in turns per sample, and their energy within it.
+fn prolate(samples: usize, half: f64) -> (Vec<Vec<f64>>, Vec<f64>) {
+    // The tridiagonal matrix that commutes with the sinc kernel has the same eigenvectors, well separated.
+    let mut matrix = DMatrix::zeros(samples, samples);
+    for n in 0..samples {
+        matrix[(n, n)] = (0.5 * (samples as f64 - 1.0) - n as f64).powi(2) * (TAU * half).cos();
+        if n + 1 < samples {
+            let off = 0.5 * (n + 1) as f64 * (samples - n - 1) as f64;
+            matrix[(n, n + 1)] = off;
+            matrix[(n + 1, n)] = off;
+        }
+    }
+    let eigen = SymmetricEigen::new(matrix);
+    let kernel: Vec<f64> = (0..samples)
+        .map(|lag| {
+            if lag == 0 { 2.0 * half } else { (TAU * half * lag as f64).sin() / (std::f64::consts::PI * lag as f64) }
+        })
+        .collect();
+    let vectors: Vec<Vec<f64>> = (0..samples).map(|k| eigen.eigenvectors.column(k).iter().copied().collect()).collect();
+    let within = vectors
+        .iter()
+        .map(|vector| {
+            (0..samples).map(|n| vector[n] * (0..samples).map(|m| kernel[n.abs_diff(m)] * vector[m]).sum::<f64>()).sum::<f64>()
+        })
+        .collect();
+    (vectors, within)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tones_of_the_band_do_not_reach_the_directions_outside() {
+        let (vectors, within) = prolate(64, 0.2);
+        let tone = tone(0.15, 64);
+        let (mut inside, mut outside) = (0.0, 0.0);
+        for (vector, share) in vectors.iter().zip(&within) {
+            let value: Complex64 = vector.iter().zip(&tone).map(|(v, t)| t * *v).sum();
+            if *share < 1e-8 { outside += value.norm_sqr() } else { inside += value.norm_sqr() }
+        }
+        assert!((inside + outside - 64.0).abs() < 1e-9);
+        assert!(outside < 64.0 * 1e-5, "{outside}");
+        let count = within.iter().filter(|share| **share < 1e-8).count();
+        assert!((24..38).contains(&count), "{count}");
+    }
+}
