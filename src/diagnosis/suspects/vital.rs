@@ -165,18 +165,6 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let ends = [reach(strongest, -1), reach(strongest, 1)];
     let bin_m = evidence.radar.range_resolution_m();
     let range_m = strongest as f64 * bin_m;
-    let rate = rhythm.frequency_hz;
-    let statement = format!(
-        "At {range_m:.2} m something moves to and fro {:.1} times a minute ({rate:.3} Hz) by {:.2} mm (amplitude of the fundamental): \
-         {:.0} % of its motion has this rhythm, {}.",
-        60.0 * rate,
-        1e3 * amplitude_m,
-        100.0 * rhythm.share,
-        match named {
-            Some("breathing") => "as somebody's breathing has",
-            Some(_) => "as a heart has",
-            None => "which is no breathing's",
-        }
     let displacement: Vec<f64> = best.phase.iter().map(|p| 1e3 * p * metres).collect();
     let swing = displacement.iter().fold([f64::MAX, f64::MIN], |[low, high], &d| [low.min(d), high.max(d)]);
     let statement = match named {

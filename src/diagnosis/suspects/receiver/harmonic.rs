@@ -139,8 +139,7 @@ fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool], cubic: bool, peak
         for chirp in template.chunks_exact_mut(samples) {
             chirp.iter_mut().zip(&mean).for_each(|(value, mean)| *value -= mean);
         }
-        let moving: Vec<Complex64> =
-            signal.iter().enumerate().map(|(i, value)| value - still[i % samples]).collect();
+        let moving: Vec<Complex64> = signal.iter().enumerate().map(|(i, value)| value - still[i % samples]).collect();
         let (found, expected) = (transform(&moving, samples), transform(&template, samples));
         let (still, mean) = (spectrum(&still), spectrum(&mean));
         let mut count = |found: Complex64, expected: Complex64, noise: f64| {

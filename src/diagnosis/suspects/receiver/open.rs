@@ -192,9 +192,8 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
     let valley = (peak..valley_end.min(last)).min_by(|&a, &b| mean[a].total_cmp(&mean[b]))?;
     let far = best(valley..last)?;
     let decibels = |ratio: f64| 10.0 * ratio.max(1e-30).log10();
-    let white = evidence.noise().iter().sum::<f64>()
-        / evidence.noise().len() as f64
-        / (loops * evidence.split.training.len()) as f64;
+    let white =
+        evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64 / (loops * evidence.split.training.len()) as f64;
     let over_noise = mean[peak] / white.max(1e-300);
     if decibels(mean[peak] / mean[valley]) < VALLEY_DB || mean[peak] < 0.1 * mean[far] || decibels(over_noise) < 20.0 {
         return None;
