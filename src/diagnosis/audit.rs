@@ -123,8 +123,8 @@ fn iq_order(evidence: &Evidence) -> Check {
         }
     }
     let ratio = 10.0 * (positive.max(1e-30) / negative.max(1e-30)).log10();
-    // Far returns fill the upper half of a long room: only a room that should be in the lower half tells.
-    let reaches = far_m(evidence).is_none_or(|far| far < 0.45 * evidence.radar.max_range_m());
+    // Far returns fill the upper half of a long or unknown room: only a room that should be in the lower half tells.
+    let reaches = far_m(evidence).is_some_and(|far| far < 0.45 * evidence.radar.max_range_m());
     let ok = ratio > -CLEARLY_DB || !reaches;
     let hint = if ok { "" } else { ": I and Q are swapped, or the samples conjugated" };
     Check::new(

@@ -14,6 +14,11 @@ use super::statistics;
 use crate::radar::{Radar, Sampling};
 use crate::room::Room;
 
+/// Neighbouring range bins over which the noise's shape is taken together.
+const SHAPE_BINS: usize = 5;
+/// Ratio to the mean from which on the noise counts as shaped.
+const SHAPED: f32 = 1.3;
+
 /// What the suspects look at. Cheap products are computed once and shared.
 #[derive(Clone)]
 pub struct Evidence {
@@ -132,23 +137,63 @@ impl Evidence {
     }
 
     /// Power of [`Self::range_doppler`] over the noise's variance, mean over the channels, `[frame, doppler, range]`.
+    /// Noise that a filter (or undoing one) has shaped over the beat frequency is made flat.
     pub fn maps(&self) -> &[f32] {
         self.maps.get_or_init(|| {
-            let [frames, _, _, loops, samples] = self.cube.dims;
-            let (channels, noise) = (self.cube.channels(), self.noise().to_vec());
-            (0..frames)
-                .into_par_iter()
-                .flat_map_iter(|frame| {
-                    let mut sum = vec![0.0f32; loops * samples];
-                    for (channel, variance) in noise.iter().enumerate() {
-                        let weight = 1.0 / (variance.max(f64::MIN_POSITIVE) * channels as f64);
-                        let map = self.range_doppler(frame, channel);
-                        sum.iter_mut().zip(map).for_each(|(sum, value)| *sum += (value.norm_sqr() * weight) as f32);
-                    }
-                    sum
-                })
-                .collect()
+            let mut maps = self.unshaped_maps();
+            let samples = self.cube.dims[4];
+            if let Some(shape) = self.noise_shape(&maps) {
+                maps.par_chunks_exact_mut(samples).for_each(|row| {
+                    row.iter_mut().zip(&shape).for_each(|(value, shape)| *value /= *shape);
+                });
+            }
+            maps
         })
+    }
+
+    /// The noise's variance in each range bin over its mean; `None` where it is flat.
+    fn noise_shape(&self, maps: &[f32]) -> Option<Vec<f32>> {
+        let [_, _, _, loops, samples] = self.cube.dims;
+        let rows: Vec<usize> = self
+            .split
+            .training
+            .iter()
+            .flat_map(|&frame| (0..loops).map(move |doppler| (doppler, frame * loops + doppler)))
+            .filter(|&(doppler, _)| doppler.min(loops - doppler) > 2 || loops < 8)
+            .map(|(_, row)| row)
+            .collect();
+        let level = |range: usize| {
+            let mut values: Vec<f64> = rows.iter().map(|row| f64::from(maps[row * samples + range])).collect();
+            let index = ((values.len().max(1) - 1) as f64 * 0.35) as usize;
+            if values.is_empty() { 1.0 } else { *values.select_nth_unstable_by(index, f64::total_cmp).1 }
+        };
+        let levels: Vec<f64> = (0..samples).into_par_iter().map(level).collect();
+        let middle = statistics::median(&mut levels[..self.range_bins()].to_vec()).max(f64::MIN_POSITIVE);
+        let smooth: Vec<f32> = (0..samples)
+            .map(|range| {
+                let mut near: Vec<f64> =
+                    (0..SHAPE_BINS).map(|i| levels[(range + samples + i - SHAPE_BINS / 2) % samples]).collect();
+                (statistics::median(&mut near) / middle).max(1e-6) as f32
+            })
+            .collect();
+        smooth[..self.range_bins()].iter().any(|shape| !(1.0 / SHAPED..SHAPED).contains(shape)).then_some(smooth)
+    }
+
+    fn unshaped_maps(&self) -> Vec<f32> {
+        let [frames, _, _, loops, samples] = self.cube.dims;
+        let (channels, noise) = (self.cube.channels(), self.noise().to_vec());
+        (0..frames)
+            .into_par_iter()
+            .flat_map_iter(|frame| {
+                let mut sum = vec![0.0f32; loops * samples];
+                for (channel, variance) in noise.iter().enumerate() {
+                    let weight = 1.0 / (variance.max(f64::MIN_POSITIVE) * channels as f64);
+                    let map = self.range_doppler(frame, channel);
+                    sum.iter_mut().zip(map).for_each(|(sum, value)| *sum += (value.norm_sqr() * weight) as f32);
+                }
+                sum
+            })
+            .collect()
     }
 }
 
