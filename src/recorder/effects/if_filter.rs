@@ -106,14 +106,13 @@ impl IfFilter {
         planner.plan_fft_forward(count).process(window);
         for (bin, value) in window.iter_mut().enumerate() {
             let frequency = self.sample_rate_hz * bin as f64 / count as f64;
-            let factor: Complex64 = self.sections.iter().map(|section| section.response(frequency)).product();
-            *value *= factor / count as f64;
+            *value *= self.response(frequency) / count as f64;
         }
         planner.plan_fft_inverse(count).process(window);
     }
 
     /// What a tone becomes.
-    pub fn response(&self, frequency_hz: f64) -> Complex64 {
+    fn response(&self, frequency_hz: f64) -> Complex64 {
         self.sections.iter().map(|section| section.response(frequency_hz)).product()
     }
 }
