@@ -132,7 +132,29 @@ pub fn best(field: &Field, series: &Series, training: &[usize], held_out: &[usiz
         held_out_gain: 0.0,
         frames: field.frames,
     };
-    let held_out_gain = series.gain(field, held_out, |frame, _, _| drift.value(frame)) / excess;
+    // Between the last training frame before a step and the first one after it, the date is open.
+    let open = |frame: usize| match drift.shape {
+        Shape::Step(_, at) => {
+            let before = training.iter().copied().filter(|&f| f < at).max().unwrap_or(0);
+            let after = training.iter().copied().filter(|&f| f >= at).min().unwrap_or(field.frames);
+            before < frame && frame < after
+        }
+        Shape::Smooth(_) => false,
+    };
+    let predicted = |frame: usize| match drift.shape {
+        Shape::Step([before, after], _) if open(frame) => 0.5 * (before + after),
+        _ => drift.value(frame),
+    };
+    let held_out_gain = series.gain(field, held_out, |frame, _, _| predicted(frame)) / excess;
+    // Judged without it, the date is then read from those frames as well.
+    if let Shape::Step([before, after], at) = drift.shape {
+        let late = |frame: usize| {
+            let mean = series.value[frame * series.loops..(frame + 1) * series.loops].iter().sum::<f64>() / loops;
+            (mean - after).abs() < (mean - before).abs()
+        };
+        let date = (0..field.frames).find(|&f| if open(f) { late(f) } else { f >= at }).unwrap_or(at);
+        return Some(Drift { shape: Shape::Step([before, after], date), held_out_gain, ..drift });
+    }
     Some(Drift { held_out_gain, ..drift })
 }
 

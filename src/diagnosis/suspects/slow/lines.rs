@@ -123,17 +123,23 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
         (frequency, centre)
     };
     let (mut frequency, mut centre) = refined(lowest + best.0 as f64 * step);
-    // Frames sample slow vibrations: of frequencies that only the short frames could tell apart, the lowest is taken.
+    // Gaps between frames make a comb of nearly equal peaks, a frame rate apart; the grid may have missed its top.
     let frame_rate = 1.0 / (field.times_s[loops] - field.times_s[0]);
-    let gaps = frame_rate * loop_s * (loops as f64) < 0.9;
-    let nearest = (frequency / frame_rate).round();
-    let mut aliases: Vec<f64> = (0..=3).map(|k| (frequency - (nearest - f64::from(k)) * frame_rate).abs()).collect();
-    aliases.sort_by(f64::total_cmp);
-    for alias in aliases.into_iter().filter(|alias| gaps && *alias > lowest + step && *alias < 0.9 * frequency) {
-        let (found, value) = refined(alias);
-        if value > centre - ALIAS_GAIN {
-            (frequency, centre) = (found, value);
-            break;
+    if frame_rate * loop_s * (loops as f64) < 0.9 {
+        let first = frequency;
+        for k in [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0] {
+            let (found, value) = refined(first + k * frame_rate);
+            if value > centre {
+                (frequency, centre) = (found, value);
+            }
+        }
+        // Of frequencies that only the short frames could tell apart, the lowest is taken.
+        let nearest = (frequency / frame_rate).round();
+        let mut aliases: Vec<f64> = (0..=3).map(|k| (frequency - (nearest - f64::from(k)) * frame_rate).abs()).collect();
+        aliases.sort_by(f64::total_cmp);
+        let slower = aliases.into_iter().filter(|alias| *alias > lowest + step && *alias < 0.9 * frequency).map(refined);
+        if let Some(found) = slower.into_iter().find(|(_, value)| *value > centre - ALIAS_GAIN) {
+            (frequency, centre) = found;
         }
     }
     let mut harmonics = 1;

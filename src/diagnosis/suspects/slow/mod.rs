@@ -66,10 +66,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if found.is_empty() || most(&found) < NEARLY * most(&free) {
         found.append(&mut free);
     }
-    let best = most(&found);
-    if found.iter().any(|c| c.id.is_some() && c.gain > NEARLY * best) {
-        found.retain(|c| c.id.is_some());
-    }
+    let names: Vec<(&str, f64)> = found.iter().filter(|c| c.id.is_some()).map(|c| (c.behaves_like, c.gain)).collect();
+    found.retain(|c| c.id.is_some() || !names.iter().any(|(like, gain)| *like == c.behaves_like && *gain > NEARLY * c.gain));
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let rivals: Vec<(Option<&'static str>, f64)> = found.iter().map(|c| (c.id, c.gain)).collect();
     for candidate in &mut found {
