@@ -75,19 +75,34 @@ impl Pendulum {
 
 /// Mean, sine and cosine at a rate, and the weighted sum of squares that they leave.
 fn misfit(sightings: &[Sighting], times_s: &[f64], errors: [f64; 2], span_mps: f64, rate_hz: f64) -> ([f64; 3], f64) {
-    let omega = std::f64::consts::TAU * rate_hz;
+    // From velocities as measured, and from ranges alone where velocities wrap.
+    let starts = [errors, [errors[0], 1e3 * span_mps]];
+    starts
+        .map(|start| unwrapped(sightings, times_s, [start, errors], span_mps, std::f64::consts::TAU * rate_hz))
+        .into_iter()
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .unwrap_or(([0.0; 3], f64::INFINITY))
+}
+
+/// Least squares with the first errors, then with the second and velocities unwrapped about the fit.
+fn unwrapped(
+    sightings: &[Sighting],
+    times_s: &[f64],
+    [first, errors]: [[f64; 2]; 2],
+    span_mps: f64,
+    omega: f64,
+) -> ([f64; 3], f64) {
     let rows = |time: f64| {
         let (sine, cosine) = (omega * time).sin_cos();
         ([1.0, sine, cosine], [0.0, omega * cosine, -omega * sine])
     };
     let mut best = ([0.0; 3], f64::INFINITY);
     let mut velocities: Vec<f64> = sightings.iter().map(|s| s.velocity_mps).collect();
-    // Once as measured, then unwrapped about the fit.
-    for _ in 0..3 {
+    for weights in [first, errors, errors, errors] {
         let (mut matrix, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
         for ((sighting, &time), &velocity) in sightings.iter().zip(times_s).zip(&velocities) {
             let (range, rate) = rows(time);
-            for (row, value, error) in [(range, sighting.range_m, errors[0]), (rate, velocity, errors[1])] {
+            for (row, value, error) in [(range, sighting.range_m, weights[0]), (rate, velocity, weights[1])] {
                 let weight = error.powi(-2);
                 for i in 0..3 {
                     right[i] += weight * row[i] * value;
@@ -105,10 +120,9 @@ fn misfit(sightings: &[Sighting], times_s: &[f64], errors: [f64; 2], span_mps: f
             *velocity = sighting.velocity_mps + span_mps * ((dot(rate) - sighting.velocity_mps) / span_mps).round();
             chi2 += ((sighting.range_m - dot(range)) / errors[0]).powi(2) + ((*velocity - dot(rate)) / errors[1]).powi(2);
         }
-        if chi2 >= best.1 {
-            break;
+        if chi2 < best.1 {
+            best = (solution, chi2);
         }
-        best = (solution, chi2);
     }
     best
 }
