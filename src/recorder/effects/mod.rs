@@ -159,6 +159,19 @@ impl EffectsConfig {
 }
 
 #[cfg(test)]
+mod outside_tests;
+#[cfg(test)]
+mod receiver_tests;
+#[cfg(test)]
+mod scene_tests;
+#[cfg(test)]
+mod test_support;
+#[cfg(test)]
+mod timing_tests;
+#[cfg(test)]
+mod waveform_tests;
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
