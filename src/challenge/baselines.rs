@@ -224,13 +224,13 @@ mod tests {
     fn each_kind_of_trace_is_told_by_its_template_and_silence_by_none() {
         let radar = Radar::small(4);
         let bins = outside_bins(&radar, 0.5 * radar.max_range_m());
-        let best = |spoil: &dyn Fn(Complex64, usize) -> Complex64| {
-            let found = of_samples(&radar, &bins, &frames(&radar, spoil));
-            found.sparse.first().map(|&(k, _)| TEMPLATES[k])
-        };
-        assert_eq!(best(&|y, _| y), None);
-        assert_eq!(best(&|y, _| y + y.conj() * 0.03), Some("iq_imbalance"));
-        assert_eq!(best(&|y, _| y + 5.0), Some("dc_offset"));
+        let seen = |spoil: &dyn Fn(Complex64, usize) -> Complex64| of_samples(&radar, &bins, &frames(&radar, spoil));
+        let at = |id: &str| TEMPLATES.iter().position(|template| *template == id).unwrap();
+        for (id, found) in [("iq_imbalance", seen(&|y, _| y + y.conj() * 0.03)), ("dc_offset", seen(&|y, _| y + 5.0))] {
+            assert_eq!(found.sparse.first().map(|&(k, _)| TEMPLATES[k]), Some(id));
+            let silent = seen(&|y, _| y).templates[at(id)];
+            assert!(found.templates[at(id)] > 100.0 && silent < 20.0, "{id}: {} against {silent}", found.templates[at(id)]);
+        }
         let clean = of_samples(&radar, &bins, &frames(&radar, |y, _| y));
         assert!((clean.chi2 - 1.0).abs() < 0.1, "{}", clean.chi2);
     }

@@ -49,8 +49,9 @@ fn between(low: f64, high: f64, random: &mut ChaCha8Rng) -> f64 {
     low + (high - low) * random.random::<f64>()
 }
 
+/// Not below what the recorder takes.
 fn db(amplitude: f64) -> f64 {
-    20.0 * amplitude.log10()
+    (20.0 * amplitude.log10()).max(-119.0)
 }
 
 /// A place in the room away from its boundaries, in front of the radar.
@@ -129,8 +130,8 @@ const SINGLE: &[Graded] = graded! {
     compression 3e-4 0.25 |s, at, random| Compression { level: s };
     adc_saturation 1e-2 3.0 |s, at, random| AdcSaturation { level: 1.0 + s };
     second_harmonic 3e-4 0.2 |s, at, random| SecondHarmonic { level_db: db(s) };
-    if_highpass 3e3 5e5 |s, at, random| IfHighpass { corner_hz: s, order: random.random_range(1..=2), settled: true, circular: false };
-    if_lowpass 1e-3 1.0 |s, at, random| IfLowpass { corner_hz: 1e6 / s };
+    if_highpass 3e3 5e5 |s, at, random| IfHighpass { corner_hz: s.max(1.1e3), order: random.random_range(1..=2), settled: true, circular: false };
+    if_lowpass 1e-3 1.0 |s, at, random| IfLowpass { corner_hz: (1e6 / s).min(9.9e8) };
     if_delay 3e-10 3e-7 |s, at, random| IfDelay { delay_s: s };
     chirp_droop 1e-2 4.0 |s, at, random| ChirpDroop { db: s };
     ramp_edge_transient 1e-3 3.0 |s, at, random| RampEdgeTransient { samples: random.random_range(1..=4), level_db: db(s) };
