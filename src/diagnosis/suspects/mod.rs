@@ -1,5 +1,7 @@
 //! One file per family of effects: each looks at the evidence and says what it has found.
 
+pub mod receiver;
+
 use super::evidence::Evidence;
 use super::finding::Candidate;
 
@@ -10,4 +12,14 @@ pub struct Suspect {
 }
 
 /// All of them. Each answers on its own, within its family; the selection chooses between families.
-pub const SUSPECTS: &[Suspect] = &[];
+pub const SUSPECTS: &[Suspect] = &[
+    Suspect { name: "still field", find: receiver::still::find },
+    Suspect { name: "still field, room unknown", find: receiver::open::find },
+    Suspect { name: "quadrature image", find: receiver::image::find },
+    Suspect { name: "non-linear receiver", find: receiver::harmonic::find },
+    Suspect { name: "converter's rail", find: receiver::rail::find },
+    Suspect { name: "spur", find: receiver::spur::find },
+    Suspect { name: "bursts", find: receiver::bursts::find },
+    Suspect { name: "noise", find: receiver::noise::find },
+    Suspect { name: "droop", find: receiver::droop::find },
+];

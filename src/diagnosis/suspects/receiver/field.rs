@@ -135,11 +135,8 @@ impl Field {
             vector
         };
         // Common amplitudes from what the channels' own templates cannot be.
-        let common: Vec<Vec<Vec<Complex64>>> = templates
-            .common
-            .iter()
-            .map(|template| template.iter().map(|chirp| self.project(chirp)).collect())
-            .collect();
+        let common: Vec<Vec<Vec<Complex64>>> =
+            templates.common.iter().map(|template| template.iter().map(|chirp| self.project(chirp)).collect()).collect();
         let count = common.len();
         let mut amplitudes = vec![Complex64::ZERO; count];
         if count > 0 {

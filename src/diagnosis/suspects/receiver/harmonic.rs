@@ -129,7 +129,10 @@ fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool], cubic: bool, peak
     for channel in 0..evidence.cube.channels() {
         let noise = evidence.noise()[channel].max(1e-300);
         let signal = evidence.cube.channel(frame, channel);
-        let mut template: Vec<Complex64> = signal.iter().map(|value| power_of(*value, cubic) * scale).collect();
+        // |s + n|² (s + n) holds 2 |s|² n, which is the noise that is looked at: its mean is taken away.
+        let mean_power = signal.iter().map(Complex64::norm_sqr).sum::<f64>() / signal.len() as f64;
+        let own = if cubic { 2.0 * mean_power } else { 0.0 };
+        let mut template: Vec<Complex64> = signal.iter().map(|value| (power_of(*value, cubic) - value * own) * scale).collect();
         let mut mean = vec![Complex64::ZERO; samples];
         let mut still = vec![Complex64::ZERO; samples];
         for (template, chirp) in template.chunks_exact(samples).zip(signal.chunks_exact(samples)) {
@@ -139,8 +142,7 @@ fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool], cubic: bool, peak
         for chirp in template.chunks_exact_mut(samples) {
             chirp.iter_mut().zip(&mean).for_each(|(value, mean)| *value -= mean);
         }
-        let moving: Vec<Complex64> =
-            signal.iter().enumerate().map(|(i, value)| value - still[i % samples]).collect();
+        let moving: Vec<Complex64> = signal.iter().enumerate().map(|(i, value)| value - still[i % samples]).collect();
         let (found, expected) = (transform(&moving, samples), transform(&template, samples));
         let (still, mean) = (spectrum(&still), spectrum(&mean));
         let mut count = |found: Complex64, expected: Complex64, noise: f64| {

@@ -28,7 +28,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let samples = evidence.cube.dims[4];
     let still: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
-    if !evidence.accepted.contains(&"ramp_edge_transient") {
+    // The fit of a leakage is poor at the edges, and what it leaves there is no transient.
+    if !["ramp_edge_transient", "tx_leakage"].iter().any(|id| evidence.accepted.contains(id)) {
         let edge: Vec<Candidate> = [false, true].into_iter().filter_map(|at_end| edge(evidence, &still, at_end)).collect();
         let edge: Vec<Candidate> = edge.into_iter().filter(|edge| edge.p_value < 1e-6).collect();
         if !edge.is_empty() {
@@ -139,7 +140,7 @@ fn offset(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         return None;
     }
     let term: Vec<Vec<Complex64>> = (0..tx * rx).map(|c| vec![Complex64::from(values[c % rx]); samples]).collect();
-    let deviation: Vec<f64> = (0..rx).map(|receiver| 0.3 * rest[receiver]).collect();
+    let deviation: Vec<f64> = (0..rx).map(|receiver| rest[receiver]).collect();
     Some(Candidate {
         id: Some("dc_offset"),
         behaves_like: "additive fast-time",
@@ -192,9 +193,8 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
     let valley = (peak..valley_end.min(last)).min_by(|&a, &b| mean[a].total_cmp(&mean[b]))?;
     let far = best(valley..last)?;
     let decibels = |ratio: f64| 10.0 * ratio.max(1e-30).log10();
-    let white = evidence.noise().iter().sum::<f64>()
-        / evidence.noise().len() as f64
-        / (loops * evidence.split.training.len()) as f64;
+    let white =
+        evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64 / (loops * evidence.split.training.len()) as f64;
     let over_noise = mean[peak] / white.max(1e-300);
     if decibels(mean[peak] / mean[valley]) < VALLEY_DB || mean[peak] < 0.1 * mean[far] || decibels(over_noise) < 20.0 {
         return None;

@@ -49,7 +49,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let held_share = held_at as f64 / at as f64;
     let share = at as f64 / (2 * evidence.cube.samples.len()) as f64;
     // How far the signal would have gone: from its root mean square and the share beyond, as for a Gaussian.
-    let rms = (evidence.cube.samples.iter().map(Complex64::norm_sqr).sum::<f64>() / (2 * evidence.cube.samples.len()) as f64).sqrt();
+    let rms =
+        (evidence.cube.samples.iter().map(Complex64::norm_sqr).sum::<f64>() / (2 * evidence.cube.samples.len()) as f64).sqrt();
     let level = (rms * (2.0 * (2.0 * evidence.cube.samples.len() as f64).ln()).sqrt() / largest).max(1.0);
     let frames: Vec<usize> = (0..hit_frames.len()).filter(|&frame| hit_frames[frame] > 0).collect();
     let everywhere = frames.len() == hit_frames.len();

@@ -26,10 +26,17 @@ const MOST_GAIN: f64 = 2.0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
-    Highpass { order: i32, from_rest: bool },
+    Highpass {
+        order: i32,
+        from_rest: bool,
+    },
     /// `wrapped`: beat frequencies above half the sample rate count as negative.
-    Lowpass { wrapped: bool },
-    Delay { wrapped: bool },
+    Lowpass {
+        wrapped: bool,
+    },
+    Delay {
+        wrapped: bool,
+    },
 }
 
 impl Shape {
@@ -106,8 +113,7 @@ pub fn find(evidence: &Evidence, field: &Field, without: &[Vec<Complex64>]) -> O
     let nothing = process.likelihood(&field.still, &of_mean, None, rate);
     // What an additive term would make of the same scene.
     let additive = process.likelihood(without, &of_mean, None, rate) - nothing;
-    let likelihood =
-        |shape: Shape, value: f64| process.likelihood(&field.still, &of_mean, Some((shape, value)), rate) - nothing;
+    let likelihood = |shape: Shape, value: f64| process.likelihood(&field.still, &of_mean, Some((shape, value)), rate) - nothing;
     let tried: Vec<(f64, Shape, f64)> = SHAPES
         .iter()
         .filter(|shape| !evidence.accepted.contains(&shape.id()))
@@ -204,7 +210,10 @@ fn described(shape: Shape, value: f64, error: f64) -> (Vec<Estimate>, String) {
         ),
         Shape::Lowpass { .. } => (
             vec![Estimate::normal("corner_hz", value, error)],
-            format!("the receiver weakens and delays high beat frequencies: a low-pass filter with its corner at {:.2} MHz", value * 1e-6),
+            format!(
+                "the receiver weakens and delays high beat frequencies: a low-pass filter with its corner at {:.2} MHz",
+                value * 1e-6
+            ),
         ),
         Shape::Delay { .. } => (
             vec![Estimate::normal("delay_s", value, error)],

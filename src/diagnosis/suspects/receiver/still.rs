@@ -61,9 +61,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         return vec![found.candidate.clone()];
     }
     if explained >= ENOUGH * free_gain {
-        return (0..elements.len())
-            .filter_map(|index| candidate(evidence, &field, &images, &elements, &fitted, index))
-            .collect();
+        return (0..elements.len()).filter_map(|index| candidate(evidence, &field, &images, &elements, &fitted, index)).collect();
     }
     // A converter at its rail bends everything; what remains of it has no shape of its own.
     if free_gain < 20.0 || evidence.accepted.contains(&"adc_saturation") {
@@ -168,14 +166,11 @@ fn choose(evidence: &Evidence, field: &Field, images: &Images) -> Vec<Element> {
             .collect();
         let basis = orthonormal(&templates(&chosen, images).own.iter().map(|own| field.project(own)).collect::<Vec<_>>());
         let score = |element: &Element| {
-            let mut columns: Vec<Vec<Complex64>> =
-                columns(element, samples).iter().map(|column| field.project(column)).collect();
+            let mut columns: Vec<Vec<Complex64>> = columns(element, samples).iter().map(|column| field.project(column)).collect();
             columns.iter_mut().for_each(|column| remove(column, &basis));
             let directions = orthonormal(&columns);
             (0..channels)
-                .map(|channel| {
-                    field.weight(channel) * directions.iter().map(|d| dot(d, &rest[channel]).norm_sqr()).sum::<f64>()
-                })
+                .map(|channel| field.weight(channel) * directions.iter().map(|d| dot(d, &rest[channel]).norm_sqr()).sum::<f64>())
                 .sum::<f64>()
                 - penalty * unknowns(element, channels)
         };
@@ -258,8 +253,7 @@ fn candidate(
     let freedom = 2.0 * unknowns(element, channels);
     let p_value = corrected(chi2_tail(2.0 * (fitted.likelihood - without.likelihood).max(0.0), freedom), 200.0);
     let gain = field.gain(Some(&without.predicted), &fitted.predicted);
-    let first: usize =
-        elements[..index].iter().map(|element| columns(element, 1 + 2 * LONGEST_EDGE).len()).sum();
+    let first: usize = elements[..index].iter().map(|element| columns(element, 1 + 2 * LONGEST_EDGE).len()).sum();
     let samples = evidence.cube.dims[4];
     let own = columns(element, samples);
     if own.is_empty() {
@@ -287,8 +281,9 @@ fn candidate(
         .fold(0.0, f64::max);
     let level_db = 20.0 * (level / peak.max(1e-300)).log10();
     let spread_db = 20.0
-        * (amplitudes.iter().fold(0.0f64, |a, &b| a.max(b)) / amplitudes.iter().fold(f64::INFINITY, |a, &b| a.min(b)).max(1e-300))
-            .log10();
+        * (amplitudes.iter().fold(0.0f64, |a, &b| a.max(b))
+            / amplitudes.iter().fold(f64::INFINITY, |a, &b| a.min(b)).max(1e-300))
+        .log10();
     let mut place = Place::at("receiver");
     let deviation = (field.variance.iter().sum::<f64>() / channels as f64 / evidence.split.training.len() as f64).sqrt();
     let (id, estimates, statement) = match *element {
@@ -351,7 +346,11 @@ fn candidate(
             (
                 "ramp_edge_transient",
                 vec![
-                    Estimate { name: "samples", values: vec![count as f64], ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]] },
+                    Estimate {
+                        name: "samples",
+                        values: vec![count as f64],
+                        ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]],
+                    },
                     Estimate::normal("level_db", level_db, 8.7 * 0.7 * scene / (level * (channels as f64).sqrt()) + 0.3),
                 ],
                 statement,

@@ -111,9 +111,7 @@ fn prolate(samples: usize, half: f64) -> (Vec<Vec<f64>>, Vec<f64>) {
     }
     let eigen = SymmetricEigen::new(matrix);
     let kernel: Vec<f64> = (0..samples)
-        .map(|lag| {
-            if lag == 0 { 2.0 * half } else { (TAU * half * lag as f64).sin() / (std::f64::consts::PI * lag as f64) }
-        })
+        .map(|lag| if lag == 0 { 2.0 * half } else { (TAU * half * lag as f64).sin() / (std::f64::consts::PI * lag as f64) })
         .collect();
     let vectors: Vec<Vec<f64>> = (0..samples).map(|k| eigen.eigenvectors.column(k).iter().copied().collect()).collect();
     let within = vectors
