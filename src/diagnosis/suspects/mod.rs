@@ -1,11 +1,12 @@
 //! One file per family of effects: each looks at the evidence and says what it has found.
 
+pub mod geometry;
+pub mod paths;
 pub mod receiver;
 pub mod region;
 pub mod slow;
 pub mod untracked;
 pub mod vital;
-pub mod paths;
 pub mod waveform;
 
 use super::evidence::Evidence;
@@ -22,14 +23,16 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect { name: "still field", find: receiver::still::find },
     Suspect { name: "still field, room unknown", find: receiver::open::find },
     Suspect { name: "quadrature image", find: receiver::image::find },
-    Suspect { name: "bursts", find: receiver::bursts::find },
     Suspect { name: "non-linear receiver", find: receiver::harmonic::find },
+    Suspect { name: "converter's rail", find: receiver::rail::find },
+    Suspect { name: "spur", find: receiver::spur::find },
+    Suspect { name: "bursts", find: receiver::bursts::find },
     Suspect { name: "noise", find: receiver::noise::find },
     Suspect { name: "droop", find: receiver::droop::find },
-    Suspect { name: "converter's rail", find: receiver::rail::find },
-    Suspect { name: "slow", find: slow::find },
-    Suspect { name: "vital", find: vital::find },
-    Suspect { name: "paths", find: paths::find },
-    Suspect { name: "untracked", find: untracked::find },
-    Suspect { name: "waveform", find: waveform::find },
+    Suspect { name: "slow time", find: slow::find },
+    Suspect { name: "chirp", find: waveform::find },
+    Suspect { name: "vital signs", find: vital::find },
+    Suspect { name: "untracked movers", find: untracked::find },
+    Suspect { name: "extra paths", find: paths::find },
+    Suspect { name: "geometry", find: geometry::find },
 ];

@@ -129,7 +129,10 @@ fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool], cubic: bool, peak
     for channel in 0..evidence.cube.channels() {
         let noise = evidence.noise()[channel].max(1e-300);
         let signal = evidence.cube.channel(frame, channel);
-        let mut template: Vec<Complex64> = signal.iter().map(|value| power_of(*value, cubic) * scale).collect();
+        // |s + n|² (s + n) holds 2 |s|² n, which is the noise that is looked at: its mean is taken away.
+        let mean_power = signal.iter().map(Complex64::norm_sqr).sum::<f64>() / signal.len() as f64;
+        let own = if cubic { 2.0 * mean_power } else { 0.0 };
+        let mut template: Vec<Complex64> = signal.iter().map(|value| (power_of(*value, cubic) - value * own) * scale).collect();
         let mut mean = vec![Complex64::ZERO; samples];
         let mut still = vec![Complex64::ZERO; samples];
         for (template, chirp) in template.chunks_exact(samples).zip(signal.chunks_exact(samples)) {

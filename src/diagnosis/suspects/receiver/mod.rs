@@ -9,5 +9,6 @@ pub mod noise;
 pub mod open;
 pub mod rail;
 pub mod response;
+pub mod spur;
 pub mod still;
 pub mod support;

@@ -1,0 +1,150 @@
+//! A continuous tone in the intermediate frequency: one beat frequency, one phase advance from chirp to chirp, in all
+//! frames alike (card R12).
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::image::empty_bins;
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
+use crate::diagnosis::{Cube, Evidence};
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let [frames, _, _, loops, samples] = evidence.cube.dims;
+    if evidence.accepted.iter().filter(|id| **id == "spur").count() > 2 {
+        return vec![];
+    }
+    let empty = empty_bins(evidence);
+    let maps = evidence.maps();
+    let training = &evidence.split.training;
+    let channels = evidence.cube.channels();
+    let at = |frame: usize, doppler: usize, range: usize| f64::from(maps[(frame * loops + doppler) * samples + range]);
+    let cells: Vec<(usize, usize)> =
+        (1..loops).flat_map(|doppler| (0..samples).map(move |range| (doppler, range))).filter(|cell| empty[cell.1]).collect();
+    // The median over the frames: a mover crosses a cell, a line stays.
+    let best = cells
+        .par_iter()
+        .map(|&(doppler, range)| {
+            let mut powers: Vec<f64> = training.iter().map(|&frame| at(frame, doppler, range)).collect();
+            (median(&mut powers), doppler, range)
+        })
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((power, doppler, range)) = best else { return vec![] };
+    // The median exceeds a bound only if half of the frames do.
+    let each = mean_power_tail(power, channels as f64).max(1e-300);
+    let half = 0.5 * training.len() as f64;
+    let p_value = corrected((half * (each.ln() + 2.0 * std::f64::consts::LN_2)).exp().min(1.0), cells.len() as f64);
+    if p_value > 1e-4 || power < 3.0 {
+        return vec![];
+    }
+    let start = (doppler as f64 / loops as f64, range as f64 / samples as f64);
+    let (slow, fast) = refined(evidence, start);
+    let amplitudes = amplitudes_of(&evidence.cube, slow, fast);
+    let noise = evidence.noise();
+    let count = (loops * samples) as f64;
+    let gain: f64 = evidence
+        .split
+        .held_out
+        .iter()
+        .map(|&frame| {
+            let of_frame = &amplitudes[frame * channels..(frame + 1) * channels];
+            // An amplitude per frame and channel is fitted: one nat each is chance.
+            of_frame.iter().zip(noise).map(|(a, noise)| a.norm_sqr() * count / noise.max(1e-300) - 1.0).sum::<f64>()
+        })
+        .sum();
+    let strength = (amplitudes.iter().map(Complex64::norm_sqr).sum::<f64>() / amplitudes.len() as f64).sqrt();
+    let peak = evidence.cube.samples.iter().map(Complex64::norm_sqr).fold(0.0, f64::max).sqrt();
+    let level_db = 20.0 * (strength / (peak - strength).max(1e-300)).log10();
+    let rate = evidence.radar.sample_rate_hz;
+    let wrapped = if fast > 0.5 { fast - 1.0 } else { fast };
+    let frequency_hz = fast * rate;
+    Some(Candidate {
+        id: Some("spur"),
+        behaves_like: "tone",
+        estimates: vec![
+            Estimate::normal("frequency_hz", frequency_hz, 0.02 * rate / samples as f64),
+            Estimate::normal("level_db", level_db, 0.3),
+        ],
+        choice: None,
+        place: Place::at("receiver"),
+        p_value,
+        gain,
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement: format!(
+            "a continuous tone at {:.4} MHz (or {:.4} MHz, as sampled), {level_db:.1} dB to the peak sample, runs through all frames \
+             where neither the room nor the body can be; its phase advances by {:.3} turns per chirp",
+            frequency_hz * 1e-6,
+            wrapped * rate * 1e-6,
+            slow
+        ),
+        curve: None,
+        energy: strength * strength * (frames * channels) as f64 * count,
+        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+            let samples = cube.dims[4];
+            let channels = cube.channels();
+            let amplitudes = amplitudes_of(cube, slow, fast);
+            cube.each_chirp(|[frame, channel, chirp], values| {
+                let amplitude = amplitudes[frame * channels + channel];
+                for (n, value) in values.iter_mut().enumerate().take(samples) {
+                    *value -= amplitude * Complex64::cis(TAU * (slow * chirp as f64 + fast * n as f64));
+                }
+            });
+        })),
+    })
+    .into_iter()
+    .collect()
+}
+
+/// Least squares of the tone in every frame and channel, `[frame][channel]`, once what stands still is away.
+fn amplitudes_of(cube: &Cube, slow: f64, fast: f64) -> Vec<Complex64> {
+    let [frames, _, _, _, samples] = cube.dims;
+    let channels = cube.channels();
+    (0..frames * channels)
+        .into_par_iter()
+        .map(|index| {
+            let signal = cube.channel(index / channels, index % channels);
+            let loops = signal.len() / samples;
+            let in_chirp: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(-TAU * fast * n as f64)).collect();
+            let window = crate::diagnosis::evidence::hann(samples);
+            let slow_window = crate::diagnosis::evidence::hann(loops);
+            let mut sum = Complex64::ZERO;
+            for (chirp, values) in signal.chunks_exact(samples).enumerate() {
+                let of_chirp: Complex64 =
+                    values.iter().zip(&in_chirp).zip(&window).map(|((value, turn), weight)| value * turn * *weight).sum();
+                sum += of_chirp * Complex64::cis(-TAU * slow * chirp as f64) * slow_window[chirp];
+            }
+            sum / (window.iter().sum::<f64>() * slow_window.iter().sum::<f64>())
+        })
+        .collect()
+}
+
+/// Frequencies over slow and fast time, turns per chirp and per sample, where the tone is strongest.
+fn refined(evidence: &Evidence, start: (f64, f64)) -> (f64, f64) {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let few = Cube::new(
+        [2, 1, 1, loops, samples],
+        evidence.split.training.iter().take(2).flat_map(|&frame| evidence.cube.channel(frame, 0).to_vec()).collect(),
+    );
+    let power = |slow: f64, fast: f64| amplitudes_of(&few, slow, fast).iter().map(Complex64::norm_sqr).sum::<f64>();
+    let mut best = start;
+    let mut step = (0.25 / loops as f64, 0.25 / samples as f64);
+    for _ in 0..9 {
+        let centre = best;
+        let mut highest = f64::NEG_INFINITY;
+        for i in -2..=2 {
+            for j in -2..=2 {
+                let at = (centre.0 + f64::from(i) * step.0, centre.1 + f64::from(j) * step.1);
+                let found = power(at.0, at.1);
+                if found > highest {
+                    (highest, best) = (found, at);
+                }
+            }
+        }
+        step = (0.5 * step.0, 0.5 * step.1);
+    }
+    best
+}
