@@ -1,5 +1,7 @@
 //! One file per family of effects: each looks at the evidence and says what it has found.
 
+pub mod geometry;
+
 use super::evidence::Evidence;
 use super::finding::Candidate;
 
@@ -10,4 +12,4 @@ pub struct Suspect {
 }
 
 /// All of them. Each answers on its own, within its family; the selection chooses between families.
-pub const SUSPECTS: &[Suspect] = &[];
+pub const SUSPECTS: &[Suspect] = &[Suspect { name: "geometry", find: geometry::find }];
