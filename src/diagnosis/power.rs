@@ -11,7 +11,7 @@ mod spread;
 
 use rayon::prelude::*;
 
-pub use fit::{fit_weights, log_likelihood};
+pub use fit::{Reach, fit_weights, improve, log_likelihood};
 pub use spread::Cells;
 
 use super::evidence::Evidence;
@@ -49,7 +49,7 @@ impl Template {
 pub struct PowerModel {
     pub cells: Cells,
     /// `[frame][part · 2 + lobe]`
-    pub templates: Vec<Vec<Template>>,
+    pub lobes: Vec<Vec<Template>>,
     /// By part and lobe, fitted on the training frames.
     pub weights: Vec<f64>,
     /// How many independent powers the mean over the channels amounts to, in cells that the body fills.
@@ -64,11 +64,8 @@ impl PowerModel {
     pub fn new(evidence: &Evidence) -> Option<Self> {
         let body = evidence.body.as_ref()?;
         let cells = Cells::new(&evidence.radar);
-        let templates: Vec<Vec<Template>> = body
-            .frames
-            .par_iter()
-            .map(|points| part_templates(&evidence.radar, &cells, points, body.parts.len(), |point| point))
-            .collect();
+        let templates: Vec<Vec<Template>> =
+            body.frames.par_iter().map(|points| part_templates(&evidence.radar, &cells, points, body.parts.len())).collect();
         if templates.iter().flatten().all(|template| template.cells.is_empty()) {
             return None;
         }
@@ -85,7 +82,7 @@ impl PowerModel {
         let expected: Vec<Vec<f32>> = templates.iter().map(|parts| sum(parts, &weights, size)).collect();
         let support = expected.iter().map(|map| widened(map, &cells)).collect();
         let independent = independent_channels(evidence, &expected);
-        Some(Self { cells, templates, weights, independent, expected, support, usable })
+        Some(Self { cells, lobes: templates, weights, independent, expected, support, usable })
     }
 
     /// Power of some points `[doppler, range]`, spread by the windows: (range in metres, mean of the legs to tx and rx;
@@ -120,7 +117,7 @@ impl PowerModel {
     /// Expected power of some parts alone (such as a limb), `[doppler, range]`.
     pub fn of_parts(&self, frame: usize, parts: impl Fn(usize) -> bool) -> Vec<f32> {
         let mut map = vec![0.0; self.size()];
-        for (part, template) in self.templates[frame].iter().enumerate().filter(|(index, _)| parts(index / LOBES.len())) {
+        for (part, template) in self.lobes[frame].iter().enumerate().filter(|(index, _)| parts(index / LOBES.len())) {
             add(&mut map, template, self.weights[part]);
         }
         map
@@ -152,18 +149,11 @@ pub fn range_and_velocity(radar: &Radar, position_m: [f64; 3], velocity_mps: [f6
     (0.5 * (sent.0 + received.0), 0.5 * (sent.1 + received.1))
 }
 
-/// Templates of all parts and lobes with the points moved first, `[part · 2 + lobe]`.
-pub fn part_templates(
-    radar: &Radar,
-    cells: &Cells,
-    points: &[Point],
-    parts: usize,
-    moved: impl Fn(Point) -> Point,
-) -> Vec<Template> {
+/// Templates of all parts and lobes of some points, `[part · 2 + lobe]`.
+pub fn part_templates(radar: &Radar, cells: &Cells, points: &[Point], parts: usize) -> Vec<Template> {
     let mut maps: Vec<Vec<f32>> = vec![vec![]; parts * LOBES.len()];
     let centre = radar.centre_m();
     for &point in points {
-        let point = moved(point);
         let (range_m, velocity) = range_and_velocity(radar, point.position_m, point.velocity_mps);
         let to_radar: [f64; 3] = std::array::from_fn(|axis| centre[axis] - point.position_m[axis]);
         let facing = (dot(to_radar, point.normal) / norm(to_radar).max(1e-6)).max(0.0);

@@ -22,10 +22,13 @@ const ALIKE_NATS: f64 = 4.6;
 const RANGE_GRID_M: [f64; 9] = [-0.3, -0.2, -0.12, -0.06, 0.0, 0.06, 0.12, 0.2, 0.3];
 /// Times looked at first, in frame periods.
 const CLOCK_GRID: [f64; 11] = [-3.0, -2.0, -1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0, 2.0, 3.0];
+/// Rates of clocks looked at first.
+const DRIFT_GRID: [f64; 5] = [-0.1, -0.03, 0.0, 0.03, 0.1];
 /// Most frames lost at once that are looked for.
 const MOST_LOST: usize = 4;
-/// Places, times and kinds that are tried, for the correction of the p-value.
-const TRIED: f64 = 40.0;
+/// Kinds of change that are tried, and places of a step, for the correction of the p-value.
+const KINDS: f64 = 6.0;
+const STEPS: f64 = 80.0;
 
 /// An alternative, fitted.
 struct Fitted {
@@ -47,31 +50,49 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
     }
     let every: Vec<usize> = (0..evidence.cube.dims[0]).collect();
     let coarse: Vec<usize> = training.iter().copied().step_by(training.len().div_ceil(10)).collect();
-    let null = trial.score(Change::Range(0.0), &every);
-    let body = evidence.body.as_ref().expect("a power model has a body");
+    let null = trial.score(Change::Range(0.0), &every, true);
+    let body = trial.body;
     let period = frame_period_s(body);
     let range_m = mean_range_m(trial);
 
+    let interesting = |fit: &Option<Fitted>| fit.as_ref().is_some_and(|fit| p_value(fit, &null, training) < 0.05);
     let mut fitted = vec![];
     let at = best_of(trial, &coarse, RANGE_GRID_M.into_iter(), Change::Range);
     let range = refine(trial, "range_bias", at, 0.03, RANGE_FLOOR_M, Change::Range);
-    if let Some(range) = range {
-        let near = range.value / range_m;
-        fitted.extend(refine(trial, "slope_error", near, 0.03 / range_m, RANGE_FLOOR_M / range_m, Change::Scale));
+    if interesting(&range) {
+        let offset = range.as_ref().map_or(0.0, |range| range.value);
         let along = |offset: f64| Change::Offset([0.0, offset, 0.0]);
-        fitted.extend(refine(trial, "pose_offset", range.value, 0.03, RANGE_FLOOR_M, along));
-        fitted.push(range);
+        fitted.extend(refine(trial, "slope_error", offset / range_m, 0.03 / range_m, RANGE_FLOOR_M / range_m, Change::Scale));
+        fitted.extend(range);
+        fitted.extend(refine(trial, "pose_offset", offset, 0.03, RANGE_FLOOR_M, along));
     }
     let at = best_of(trial, &coarse, CLOCK_GRID.into_iter().map(|step| step * period), Change::Clock);
-    fitted.extend(refine(trial, "clock_offset", at, 0.12 * period, CLOCK_FLOOR_S, Change::Clock));
+    let clock = refine(trial, "clock_offset", at, 0.12 * period, CLOCK_FLOOR_S, Change::Clock);
     let duration = (body.middle_s[every.len() - 1] - body.middle_s[0]).max(period);
-    let rates = [-0.1, -0.04, 0.0, 0.04, 0.1].into_iter();
-    let at = best_of(trial, &coarse, rates, Change::Drift);
-    fitted.extend(refine(trial, "clock_drift", at, 0.24 * period / duration, 2.0 * CLOCK_FLOOR_S / duration, Change::Drift));
+    let rate = best_of(trial, &coarse, DRIFT_GRID.into_iter(), Change::Drift);
+    if interesting(&clock) || rate != 0.0 {
+        let floor = 2.0 * CLOCK_FLOOR_S / duration;
+        fitted.extend(refine(trial, "clock_drift", rate, 0.24 * period / duration, floor, Change::Drift));
+    }
+    fitted.extend(clock);
     fitted.extend(lost_frames(trial, &null));
     fitted.retain(|fit| !evidence.accepted.contains(&fit.id));
 
     let gain = |fit: &Fitted| fit.score.gain_over(&null, training);
+    for fit in &fitted {
+        if std::env::var("TRY").is_ok() {
+            println!(
+                "   {:?} {} ± {} inflation {:.1} gain {:.1} held {:.1} p {:.1e}",
+                fit.score.change,
+                fit.value,
+                fit.deviation,
+                fit.inflation,
+                gain(fit),
+                fit.score.gain_over(&null, &evidence.split.held_out),
+                p_value(fit, &null, training)
+            );
+        }
+    }
     let Some(best) = (0..fitted.len()).max_by(|&a, &b| gain(&fitted[a]).total_cmp(&gain(&fitted[b]))) else { return vec![] };
     let best_fit = &fitted[best];
     let p_value = p_value(best_fit, &null, training);
@@ -81,18 +102,15 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
     }
     let close =
         |fit: &&Fitted| fit.id != best_fit.id && best_fit.score.gain_over(&fit.score, &every) / best_fit.inflation < ALIKE_NATS;
-    let mut look_alikes: Vec<&'static str> = fitted.iter().filter(close).map(|fit| fit.id).collect();
-    if best_fit.id == "range_bias" && look_alikes.contains(&"slope_error") && look_alikes.contains(&"pose_offset") {
-        look_alikes.sort_unstable();
-    }
+    let look_alikes: Vec<&'static str> = fitted.iter().filter(close).map(|fit| fit.id).collect();
     vec![candidate(trial, best_fit, look_alikes, p_value, held_out)]
 }
 
 /// The best of some values on a few frames.
 fn best_of(trial: &Trial, frames: &[usize], values: impl Iterator<Item = f64>, change: impl Fn(f64) -> Change) -> f64 {
-    let none = trial.score(change(0.0), frames);
+    let none = trial.score(change(0.0), frames, false);
     values
-        .map(|value| (value, trial.score(change(value), frames).gain_over(&none, frames)))
+        .map(|value| (value, trial.score(change(value), frames, false).gain_over(&none, frames)))
         .fold((0.0, 0.0), |best, tried| if tried.1 > best.1 { tried } else { best })
         .0
 }
@@ -105,7 +123,7 @@ fn refine(trial: &Trial, id: &'static str, start: f64, step: f64, floor: f64, ch
     let (mut value, mut step) = (start, step);
     for round in 0..ROUNDS {
         let last = round + 1 == ROUNDS;
-        let [low, middle, high] = [value - step, value, value + step].map(|value| trial.score(change(value), training));
+        let [low, middle, high] = [value - step, value, value + step].map(|value| trial.score(change(value), training, true));
         let slope = |frame: usize| (high.by_frame[frame] - low.by_frame[frame]) / (2.0 * step);
         let bend = |frame: usize| (2.0 * middle.by_frame[frame] - high.by_frame[frame] - low.by_frame[frame]) / (step * step);
         let used: Vec<usize> =
@@ -130,7 +148,7 @@ fn refine(trial: &Trial, id: &'static str, start: f64, step: f64, floor: f64, ch
             let count = used.len() as f64;
             let deviation = (scatter * count / (count - 1.0)).sqrt() / information;
             let inflation = (deviation * deviation * information).max(1.0);
-            return Some(Fitted { id, value, deviation, floor, inflation, score: trial.score(change(value), &every) });
+            return Some(Fitted { id, value, deviation, floor, inflation, score: trial.score(change(value), &every, true) });
         }
         step *= 0.5;
     }
@@ -144,7 +162,7 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
     let mut best: Option<(f64, Change)> = None;
     for count in 1..=MOST_LOST.min(frames.len() / 4) {
         // All frames later by so many: what follows the step, whenever it is.
-        let later = trial.score(Change::Drop { at: 0, count }, training);
+        let later = trial.score(Change::Drop { at: 0, count }, training, false);
         for at in 2..frames.len().saturating_sub(count + 1) {
             let after: Vec<usize> = training.iter().copied().filter(|&frame| frame >= at).collect();
             let gain = later.gain_over(null, &after);
@@ -155,7 +173,7 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
     }
     let (_, change) = best?;
     let Change::Drop { count, .. } = change else { return None };
-    let score = trial.score(change, &frames);
+    let score = trial.score(change, &frames, true);
     // A step is all or nothing: its scatter is that of the frames' gains.
     let gains: Vec<f64> = training
         .iter()
@@ -182,19 +200,19 @@ fn p_value(fit: &Fitted, null: &Score, training: &[usize]) -> f64 {
             let count = changed.len() as f64;
             let mean = changed.iter().sum::<f64>() / count.max(1.0);
             let variance = changed.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-            (mean / (variance / count.max(1.0)).sqrt().max(1e-12), count - 1.0)
+            (mean / (variance / count.max(1.0)).sqrt().max(1e-12), count - 1.0, STEPS)
         }
         _ => {
             let excess = (fit.value.abs() - fit.floor).max(0.0);
-            (excess / fit.deviation.max(1e-12), gains.len() as f64 - 1.0)
+            (excess / fit.deviation.max(1e-12), gains.len() as f64 - 1.0, KINDS)
         }
     };
-    let (t, freedom) = sign;
+    let (t, freedom, tried) = sign;
     if freedom < 3.0 || !t.is_finite() {
         return 1.0;
     }
     let tail = StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| 2.0 * law.sf(t.max(0.0)));
-    crate::diagnosis::statistics::corrected(tail.min(1.0), TRIED)
+    crate::diagnosis::statistics::corrected(tail.min(1.0), tried)
 }
 
 fn mean_range_m(trial: &Trial) -> f64 {
@@ -258,12 +276,11 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
             format!("From frame {at} on the body is {count} frame(s) later in its motion: frames were lost there."),
         ),
     };
-    let body = evidence.body.as_ref().expect("a power model has a body");
     let frames = match fit.score.change {
         Change::Drop { at, .. } => Some((at..evidence.cube.dims[0]).collect()),
         _ => None,
     };
-    let (moves, change) = (Moves::new(body, evidence.radar.centre_m()), fit.score.change);
+    let (moves, change) = (Moves::new(trial.body, evidence.radar.centre_m()), fit.score.change);
     Candidate {
         id: Some(fit.id),
         behaves_like: if stage == "timing" { "time offset" } else { "range offset" },
@@ -283,7 +300,6 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
 
 /// Energy that is misplaced: all that moves.
 fn energy(evidence: &Evidence) -> f64 {
-    let channels = evidence.cube.channels();
     let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
-    total * evidence.noise().iter().sum::<f64>() * channels as f64 / channels.max(1) as f64
+    total * evidence.noise().iter().sum::<f64>()
 }

@@ -4,7 +4,6 @@ mod change;
 mod displaced;
 mod trial;
 
-use change::Moves;
 use trial::Trial;
 
 use crate::diagnosis::power::PowerModel;
@@ -14,8 +13,7 @@ use crate::diagnosis::{Candidate, Evidence};
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(model) = PowerModel::new(evidence) else { return vec![] };
     let Some(body) = evidence.body.as_ref() else { return vec![] };
-    let moves = Moves::new(body, evidence.radar.centre_m());
-    displaced::find(&Trial { evidence, model: &model, moves })
+    displaced::find(&Trial::new(evidence, &model, body))
 }
 
 #[cfg(test)]

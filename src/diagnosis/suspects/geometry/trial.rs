@@ -3,17 +3,23 @@
 use rayon::prelude::*;
 
 use super::change::{Change, Moves};
-use crate::diagnosis::Evidence;
-use crate::diagnosis::power::{PowerModel, Template, fit_weights, part_templates, sum};
+use crate::diagnosis::power::{PowerModel, Reach, improve, part_templates};
+use crate::diagnosis::{BodyPrediction, Evidence};
 
 /// Degrees of freedom of the heavy tail: the expected power itself is uncertain.
-const TAIL: f64 = 2.0;
+const TAIL: f32 = 2.0;
+
+/// Steps from the unchanged body's weights.
+const STEPS: usize = 12;
 
 /// Judges changes on one recording.
 pub struct Trial<'a> {
     pub evidence: &'a Evidence,
     pub model: &'a PowerModel,
+    pub body: &'a BodyPrediction,
     pub moves: Moves,
+    /// Log-likelihood of every frame without a body.
+    empty: Vec<f64>,
 }
 
 /// Log-likelihood of every frame under a change, with the parts' weights fitted on the training frames.
@@ -36,51 +42,54 @@ impl Score {
     }
 }
 
-impl Trial<'_> {
-    /// `among`: frames to look at; others stay zero and outside.
-    pub fn score(&self, change: Change, among: &[usize]) -> Score {
-        let body = self.evidence.body.as_ref().expect("a power model has a body");
-        let (maps, size) = (self.evidence.maps(), self.model.size());
-        let made: Vec<(usize, Vec<Template>, bool)> = among
-            .par_iter()
-            .map(|&frame| {
-                let (points, inside) = self.moves.points(body, frame, change);
-                let templates = part_templates(&self.evidence.radar, &self.model.cells, &points, body.parts.len(), |point| point);
-                (frame, templates, inside)
+impl<'a> Trial<'a> {
+    pub fn new(evidence: &'a Evidence, model: &'a PowerModel, body: &'a BodyPrediction) -> Self {
+        let (maps, size) = (evidence.maps(), model.size());
+        let empty = maps
+            .par_chunks_exact(size)
+            .map(|map| {
+                let usable = map.iter().zip(model.usable()).filter(|(_, usable)| **usable);
+                usable.map(|(&power, _)| heavy_tailed(power, 1.0)).sum()
             })
             .collect();
-        let measured = |frame: usize| &maps[frame * size..(frame + 1) * size];
-        let training: Vec<(&[f32], &[Template])> = made
-            .iter()
-            .filter(|(frame, _, inside)| *inside && self.evidence.split.training.contains(frame))
-            .map(|(frame, templates, _)| (measured(*frame), templates.as_slice()))
+        Self { evidence, model, body, moves: Moves::new(body, evidence.radar.centre_m()), empty }
+    }
+
+    /// `among`: frames to look at; others stay zero and outside. `refit`: the weights, else those of the unchanged body
+    /// are kept.
+    pub fn score(&self, change: Change, among: &[usize], refit: bool) -> Score {
+        let (maps, size) = (self.evidence.maps(), self.model.size());
+        let made: Vec<(usize, Reach, bool)> = among
+            .par_iter()
+            .map(|&frame| {
+                let (points, inside) = self.moves.points(self.body, frame, change);
+                let templates = part_templates(&self.evidence.radar, &self.model.cells, &points, self.body.parts.len());
+                (frame, Reach::new(&maps[frame * size..(frame + 1) * size], &templates, self.model.usable()), inside)
+            })
             .collect();
-        let weights = fit_weights(&training, self.model.usable());
+        let mut weights = self.model.weights.clone();
+        if refit {
+            let fitted_on = |(frame, _, inside): &&(usize, Reach, bool)| *inside && self.evidence.split.training.contains(frame);
+            let training: Vec<&Reach> = made.iter().filter(fitted_on).map(|(_, reach, _)| reach).collect();
+            improve(&training, &mut weights, STEPS);
+        }
         let frames = self.evidence.cube.dims[0];
         let mut score = Score { change, by_frame: vec![0.0; frames], inside: vec![false; frames] };
-        let values: Vec<f64> = made
-            .par_iter()
-            .map(|(frame, templates, _)| heavy_tailed(measured(*frame), &sum(templates, &weights, size), self.model.usable()))
-            .collect();
-        for ((frame, _, inside), value) in made.iter().zip(values) {
-            score.by_frame[*frame] = value;
-            score.inside[*frame] = *inside;
+        for (frame, reach, inside) in made {
+            let expected = reach.expected(&weights);
+            let change = expected
+                .iter()
+                .zip(&reach.measured)
+                .map(|(&expected, &power)| heavy_tailed(power, expected) - heavy_tailed(power, 1.0));
+            score.by_frame[frame] = self.empty[frame] + change.sum::<f64>();
+            score.inside[frame] = inside;
         }
         score
     }
 }
 
-/// Exponential powers whose mean is itself uncertain (Lomax law with the same scale): what the model leaves out counts by
-/// its logarithm only.
-fn heavy_tailed(measured: &[f32], expected: &[f32], usable: &[bool]) -> f64 {
-    let of = |power: f32, expected: f32| {
-        -f64::from(expected).ln() - (TAIL + 1.0) * (f64::from(power) / (TAIL * f64::from(expected))).ln_1p()
-    };
-    measured
-        .iter()
-        .zip(expected)
-        .zip(usable)
-        .filter(|(_, usable)| **usable)
-        .map(|((&power, &expected), _)| of(power, expected))
-        .sum()
+/// Logarithm of the density of a power that is exponential about a mean which is itself uncertain (Lomax law): what the
+/// model leaves out counts by its logarithm only.
+fn heavy_tailed(power: f32, expected: f32) -> f64 {
+    f64::from(-expected.ln() - (TAIL + 1.0) * (power / (TAIL * expected)).ln_1p())
 }
