@@ -2,8 +2,8 @@
 //!
 //! The fine interference of a body's points cannot be predicted (errors of the mesh are a whole wavelength), so what
 //! arrives in a cell is speckle: its power is a draw from a gamma law whose mean is predicted. That mean is the noise plus
-//! each part of the body's template (visible area, facing, 1/R⁴, spread by the windows) times a weight of its own,
-//! fitted by maximum likelihood: the nonnegative factorisation under the Itakura-Saito divergence (Févotte, Bertin,
+//! the templates of each part of the body (visible area, a broad and a narrow lobe, 1/R⁴, spread by the windows) times
+//! weights of their own, fitted by maximum likelihood: the nonnegative factorisation under the Itakura-Saito divergence (Févotte, Bertin,
 //! Durrieu 2009) with fixed templates. Power is in units of the noise, conventions of [`Evidence::maps`].
 
 mod fit;
@@ -11,7 +11,7 @@ mod spread;
 
 use rayon::prelude::*;
 
-pub use fit::{fit_weights, log_likelihood};
+pub use fit::{Reach, fit_weights, improve, log_likelihood};
 pub use spread::Cells;
 
 use super::evidence::Evidence;
@@ -24,8 +24,9 @@ const STILL_BINS: usize = 2;
 const SUPPORT_LEVEL: f32 = 0.1;
 /// Cells by which the support is widened: accelerations, errors of the mesh, speckle above its mean.
 const SUPPORT_MARGIN: i64 = 2;
-/// A part's power grows with the cosine of the angle to the radar to this power.
-const FACING_EXPONENT: i32 = 2;
+/// A part reflects with a broad and a narrow lobe, each of its own weight: powers of the cosine of the angle between the
+/// normal and the radar. One lobe of a wrong width shifts a whole body by 5 mm.
+const LOBES: [i32; 2] = [1, 8];
 
 /// A map of few cells: indices into `[doppler, range]` and power.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,9 +48,9 @@ impl Template {
 /// Expected power of the moving body, part by part.
 pub struct PowerModel {
     pub cells: Cells,
-    /// `[frame][part]`
-    pub templates: Vec<Vec<Template>>,
-    /// By part, fitted on the training frames.
+    /// `[frame][part · 2 + lobe]`
+    pub lobes: Vec<Vec<Template>>,
+    /// By part and lobe, fitted on the training frames.
     pub weights: Vec<f64>,
     /// How many independent powers the mean over the channels amounts to, in cells that the body fills.
     pub independent: f64,
@@ -63,11 +64,8 @@ impl PowerModel {
     pub fn new(evidence: &Evidence) -> Option<Self> {
         let body = evidence.body.as_ref()?;
         let cells = Cells::new(&evidence.radar);
-        let templates: Vec<Vec<Template>> = body
-            .frames
-            .par_iter()
-            .map(|points| part_templates(&evidence.radar, &cells, points, body.parts.len(), |point| point))
-            .collect();
+        let templates: Vec<Vec<Template>> =
+            body.frames.par_iter().map(|points| part_templates(&evidence.radar, &cells, points, body.parts.len())).collect();
         if templates.iter().flatten().all(|template| template.cells.is_empty()) {
             return None;
         }
@@ -84,7 +82,7 @@ impl PowerModel {
         let expected: Vec<Vec<f32>> = templates.iter().map(|parts| sum(parts, &weights, size)).collect();
         let support = expected.iter().map(|map| widened(map, &cells)).collect();
         let independent = independent_channels(evidence, &expected);
-        Some(Self { cells, templates, weights, independent, expected, support, usable })
+        Some(Self { cells, lobes: templates, weights, independent, expected, support, usable })
     }
 
     /// Power of some points `[doppler, range]`, spread by the windows: (range in metres, mean of the legs to tx and rx;
@@ -119,7 +117,7 @@ impl PowerModel {
     /// Expected power of some parts alone (such as a limb), `[doppler, range]`.
     pub fn of_parts(&self, frame: usize, parts: impl Fn(usize) -> bool) -> Vec<f32> {
         let mut map = vec![0.0; self.size()];
-        for (part, template) in self.templates[frame].iter().enumerate().filter(|(part, _)| parts(*part)) {
+        for (part, template) in self.lobes[frame].iter().enumerate().filter(|(index, _)| parts(index / LOBES.len())) {
             add(&mut map, template, self.weights[part]);
         }
         map
@@ -151,27 +149,22 @@ pub fn range_and_velocity(radar: &Radar, position_m: [f64; 3], velocity_mps: [f6
     (0.5 * (sent.0 + received.0), 0.5 * (sent.1 + received.1))
 }
 
-/// Templates of all parts with the points moved first.
-pub fn part_templates(
-    radar: &Radar,
-    cells: &Cells,
-    points: &[Point],
-    parts: usize,
-    moved: impl Fn(Point) -> Point,
-) -> Vec<Template> {
-    let mut maps: Vec<Vec<f32>> = vec![vec![]; parts];
+/// Templates of all parts and lobes of some points, `[part · 2 + lobe]`.
+pub fn part_templates(radar: &Radar, cells: &Cells, points: &[Point], parts: usize) -> Vec<Template> {
+    let mut maps: Vec<Vec<f32>> = vec![vec![]; parts * LOBES.len()];
     let centre = radar.centre_m();
     for &point in points {
-        let point = moved(point);
         let (range_m, velocity) = range_and_velocity(radar, point.position_m, point.velocity_mps);
         let to_radar: [f64; 3] = std::array::from_fn(|axis| centre[axis] - point.position_m[axis]);
         let facing = (dot(to_radar, point.normal) / norm(to_radar).max(1e-6)).max(0.0);
-        let power = point.area_m2 * facing.powi(FACING_EXPONENT) / range_m.max(0.1).powi(4);
-        let Some(map) = maps.get_mut(point.part) else { continue };
-        if map.is_empty() {
-            *map = vec![0.0; cells.loops * cells.samples];
+        let power = point.area_m2 / range_m.max(0.1).powi(4);
+        for (lobe, &exponent) in LOBES.iter().enumerate() {
+            let Some(map) = maps.get_mut(point.part * LOBES.len() + lobe) else { continue };
+            if map.is_empty() {
+                *map = vec![0.0; cells.loops * cells.samples];
+            }
+            cells.deposit(map, range_m, velocity, power * facing.powi(exponent));
         }
-        cells.deposit(map, range_m, velocity, power);
     }
     maps.iter().map(|map| Template::of(map)).collect()
 }

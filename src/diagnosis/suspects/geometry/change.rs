@@ -1,0 +1,159 @@
+//! Ways in which the body may be elsewhere, or at another time, than predicted.
+
+use crate::diagnosis::prediction::{BodyPrediction, Point};
+
+/// One of the effects that move the body in the maps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Change {
+    /// All ranges are longer by this, metres.
+    Range(f64),
+    /// All ranges are longer by this share of them.
+    Scale(f64),
+    /// The body stands elsewhere, metres.
+    Offset([f64; 3]),
+    /// The body is this much later in its motion, seconds.
+    Clock(f64),
+    /// The motion runs faster by this share.
+    Drift(f64),
+    /// From frame `at` on, `count` frames later.
+    Drop { at: usize, count: usize },
+}
+
+/// The body with changes of place and time.
+pub struct Moves {
+    /// Mean acceleration by frame and part.
+    acceleration: Vec<Vec<[f64; 3]>>,
+    centre_m: [f64; 3],
+}
+
+impl Moves {
+    /// `centre_m`: of the antennas.
+    pub fn new(body: &BodyPrediction, centre_m: [f64; 3]) -> Self {
+        let velocity: Vec<Vec<Option<[f64; 3]>>> =
+            body.frames.iter().map(|points| mean_velocities(points, body.parts.len())).collect();
+        let acceleration = (0..velocity.len())
+            .map(|frame| {
+                let (before, after) = (frame.saturating_sub(1), (frame + 1).min(velocity.len() - 1));
+                let time = body.middle_s[after] - body.middle_s[before];
+                (0..body.parts.len())
+                    .map(|part| match (velocity[before][part], velocity[after][part]) {
+                        (Some(a), Some(b)) if time > 0.0 => std::array::from_fn(|axis| (b[axis] - a[axis]) / time),
+                        _ => [0.0; 3],
+                    })
+                    .collect()
+            })
+            .collect();
+        Self { acceleration, centre_m }
+    }
+
+    /// How much later in its motion a frame shows the body.
+    fn delay_s(&self, body: &BodyPrediction, frame: usize, change: Change) -> f64 {
+        match change {
+            Change::Clock(delay) => delay,
+            Change::Drift(rate) => rate * body.middle_s[frame],
+            Change::Drop { at, count } if frame >= at => count as f64 * frame_period_s(body),
+            _ => 0.0,
+        }
+    }
+
+    /// Points of a frame after the change, and whether they are still a prediction: beyond the recording's ends, points are
+    /// only carried on as they moved.
+    pub fn points(&self, body: &BodyPrediction, frame: usize, change: Change) -> (Vec<Point>, bool) {
+        let delay = self.delay_s(body, frame, change);
+        if delay != 0.0 {
+            return self.later(body, frame, delay);
+        }
+        let moved = |point: &Point| {
+            let sight: [f64; 3] = std::array::from_fn(|axis| point.position_m[axis] - self.centre_m[axis]);
+            let range = sight.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
+            let shift: [f64; 3] = match change {
+                Change::Range(offset) => sight.map(|x| x / range * offset),
+                Change::Scale(relative) => sight.map(|x| x * relative),
+                Change::Offset(offset) => offset,
+                _ => [0.0; 3],
+            };
+            Point { position_m: std::array::from_fn(|axis| point.position_m[axis] + shift[axis]), ..*point }
+        };
+        (body.frames[frame].iter().map(moved).collect(), true)
+    }
+
+    /// From the nearest frame in time, carried on with the parts' velocities and accelerations.
+    fn later(&self, body: &BodyPrediction, frame: usize, delay: f64) -> (Vec<Point>, bool) {
+        let time = body.middle_s[frame] + delay;
+        let apart = |frame: &usize| (body.middle_s[*frame] - time).abs();
+        let nearest = (0..body.frames.len()).min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(frame);
+        let rest = time - body.middle_s[nearest];
+        // A step of a whole frame is that frame, up to rounding.
+        let inside = rest.abs() <= 0.51 * frame_period_s(body);
+        let rest = rest.clamp(-frame_period_s(body), frame_period_s(body));
+        let points = body.frames[nearest].iter().map(|point| {
+            let acceleration = self.acceleration[nearest].get(point.part).copied().unwrap_or_default();
+            let step = |axis: usize| rest * (point.velocity_mps[axis] + 0.5 * rest * acceleration[axis]);
+            Point {
+                position_m: std::array::from_fn(|axis| point.position_m[axis] + step(axis)),
+                velocity_mps: std::array::from_fn(|axis| point.velocity_mps[axis] + rest * acceleration[axis]),
+                ..*point
+            }
+        });
+        (points.collect(), inside)
+    }
+
+    /// The whole prediction after the change.
+    pub fn apply(&self, body: &mut BodyPrediction, change: Change) {
+        body.frames = (0..body.frames.len()).map(|frame| self.points(body, frame, change).0).collect();
+    }
+}
+
+/// Median step between frames.
+pub fn frame_period_s(body: &BodyPrediction) -> f64 {
+    let mut steps: Vec<f64> = body.middle_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    crate::diagnosis::statistics::median(&mut steps)
+}
+
+fn mean_velocities(points: &[Point], parts: usize) -> Vec<Option<[f64; 3]>> {
+    let mut sums = vec![([0.0; 3], 0usize); parts];
+    for point in points {
+        if let Some((sum, count)) = sums.get_mut(point.part) {
+            sum.iter_mut().zip(point.velocity_mps).for_each(|(sum, value)| *sum += value);
+            *count += 1;
+        }
+    }
+    sums.into_iter().map(|(sum, count)| (count > 0).then(|| sum.map(|value| value / count as f64))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One point that accelerates along boresight.
+    fn falling() -> BodyPrediction {
+        let point = |time: f64| Point {
+            position_m: [0.0, 2.0 + 0.5 * time * time, 0.0],
+            velocity_mps: [0.0, time, 0.0],
+            normal: [0.0, -1.0, 0.0],
+            area_m2: 1.0,
+            part: 0,
+        };
+        let middle_s: Vec<f64> = (0..8).map(|frame| frame as f64 * 0.1).collect();
+        BodyPrediction { parts: vec!["body".into()], frames: middle_s.iter().map(|&time| vec![point(time)]).collect(), middle_s }
+    }
+
+    #[test]
+    fn a_later_body_is_where_it_will_be() {
+        let body = falling();
+        let moves = Moves::new(&body, [0.0; 3]);
+        for delay in [0.03, -0.04, 0.17] {
+            let (points, inside) = moves.points(&body, 3, Change::Clock(delay));
+            let time = 0.3 + delay;
+            assert!(inside && (points[0].position_m[1] - 2.0 - 0.5 * time * time).abs() < 1e-9);
+            assert!((points[0].velocity_mps[1] - time).abs() < 1e-9);
+        }
+        let drop = Change::Drop { at: 4, count: 2 };
+        assert_eq!(moves.points(&body, 3, drop).0, body.frames[3]);
+        assert!((moves.points(&body, 4, drop).0[0].position_m[1] - body.frames[6][0].position_m[1]).abs() < 1e-9);
+        assert!(!moves.points(&body, 7, drop).1);
+        assert!(
+            (moves.points(&body, 2, Change::Range(0.1)).0[0].position_m[1] - body.frames[2][0].position_m[1] - 0.1).abs() < 1e-9
+        );
+    }
+}

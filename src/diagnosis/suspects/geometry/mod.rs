@@ -1,0 +1,46 @@
+//! Geometry and time: the body is not where or when it was predicted.
+
+mod change;
+mod displaced;
+mod trial;
+
+use trial::Trial;
+
+use crate::diagnosis::power::PowerModel;
+use crate::diagnosis::{Candidate, Evidence};
+
+/// At most one candidate for a change of the body's place or time.
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let Some(model) = PowerModel::new(evidence) else { return vec![] };
+    let Some(body) = evidence.body.as_ref() else { return vec![] };
+    displaced::find(&Trial::new(evidence, &model, body))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Instant;
+
+    use super::*;
+    use crate::data::Recording;
+    use crate::diagnosis::BodyPrediction;
+    use crate::diagnosis::cube::Loaded;
+
+    #[test]
+    #[ignore]
+    fn try_out() {
+        let list = std::env::var("TRY").unwrap();
+        for path in list.split(' ') {
+            let recording = Recording::open(path).unwrap();
+            let loaded = Loaded::read(&recording, 64).unwrap();
+            let body = recording.person().map(|person| BodyPrediction::new(person, &loaded.radar, &loaded.starts_s).unwrap());
+            let evidence = Evidence::new(loaded, recording.room.clone(), body);
+            evidence.maps();
+            let start = Instant::now();
+            let found = find(&evidence);
+            println!("{path} {:.2} s", start.elapsed().as_secs_f64());
+            for candidate in found {
+                println!("   {candidate:?} look-alikes {:?}", candidate.look_alikes);
+            }
+        }
+    }
+}
