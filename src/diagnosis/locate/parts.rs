@@ -1,7 +1,7 @@
 //! Excess put back onto the body's parts and onto the walls.
 
 use crate::diagnosis::Evidence;
-use crate::diagnosis::power::{PowerModel, range_and_velocity};
+use crate::diagnosis::power::range_and_velocity;
 use crate::diagnosis::statistics::{corrected, mean_power_tail};
 
 use super::residual::Residual;
@@ -18,13 +18,13 @@ pub struct Seen {
 
 /// By part of the body; empty without a body.
 pub fn by_part(evidence: &Evidence) -> Vec<Seen> {
-    let (Some(body), Some(model), Some(residual)) = (&evidence.body, PowerModel::new(evidence), Residual::new(evidence)) else {
+    let (Some(body), Some(model), Some(residual)) = (&evidence.body, evidence.power(), Residual::new(evidence)) else {
         return vec![];
     };
     let maps = (0..body.parts.len()).map(|part| {
         let per_frame = (0..body.frames.len()).map(|frame| {
-            let template = &model.templates[frame][part];
-            template.cells.iter().copied().zip(template.power.iter().copied()).collect()
+            let map = model.of_parts(frame, |other| other == part);
+            map.iter().enumerate().filter(|(_, power)| **power > 0.0).map(|(cell, &power)| (cell as u32, power)).collect()
         });
         (body.parts[part].clone(), per_frame.collect())
     });
@@ -35,7 +35,7 @@ pub fn by_part(evidence: &Evidence) -> Vec<Seen> {
 /// By boundary of the room, in the cells of the body's image there (one reflection); empty without body or room.
 pub fn by_wall(evidence: &Evidence) -> Vec<Seen> {
     let (Some(body), Some(room), Some(model), Some(residual)) =
-        (&evidence.body, &evidence.room, PowerModel::new(evidence), Residual::new(evidence))
+        (&evidence.body, &evidence.room, evidence.power(), Residual::new(evidence))
     else {
         return vec![];
     };

@@ -1,7 +1,6 @@
 //! Measured over expected power, cell by cell.
 
 use crate::diagnosis::Evidence;
-use crate::diagnosis::power::PowerModel;
 
 /// Doppler bins around zero that hold remains of what stands still.
 const STILL_BINS: usize = 2;
@@ -28,7 +27,7 @@ impl Residual {
         if frames == 0 || size == 0 {
             return None;
         }
-        let (maps, model) = (evidence.maps(), PowerModel::new(evidence));
+        let (maps, model) = (evidence.maps(), evidence.power());
         let channels = evidence.cube.channels() as f32;
         let (mut ratio, mut count) = (maps.to_vec(), vec![0.0; maps.len()]);
         for frame in 0..frames {

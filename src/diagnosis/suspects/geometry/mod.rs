@@ -6,12 +6,11 @@ mod trial;
 
 use trial::Trial;
 
-use crate::diagnosis::power::PowerModel;
 use crate::diagnosis::{Candidate, Evidence};
 
 /// At most one candidate for a change of the body's place or time.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let Some(model) = PowerModel::new(evidence) else { return vec![] };
+    let Some(model) = evidence.power() else { return vec![] };
     let Some(body) = evidence.body.as_ref() else { return vec![] };
     displaced::find(&Trial::new(evidence, &model, body))
 }

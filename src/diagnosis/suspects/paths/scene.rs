@@ -21,7 +21,7 @@ pub const CELLS_PER_VALUE: f64 = 3.78;
 /// Powers over the noise, and what is expected of them without any further path, `[frame, doppler, range]`.
 pub struct Scene<'a> {
     pub evidence: &'a Evidence,
-    pub model: PowerModel,
+    pub model: &'a PowerModel,
     pub loops: usize,
     pub samples: usize,
     pub bins: usize,
@@ -40,7 +40,7 @@ impl<'a> Scene<'a> {
         if loops < 16 || evidence.range_bins() < 16 {
             return None;
         }
-        let model = PowerModel::new(evidence)?;
+        let model = evidence.power()?;
         let (bins, size) = (evidence.range_bins(), loops * samples);
         let visited = visited_ranges(&model, frames, loops, samples);
         let clutter = still_power(evidence);
