@@ -20,6 +20,8 @@ use scene::Scene;
 const AGREEING: f64 = 0.6;
 /// Least gain on held-out frames that is worth a name, nats.
 const LEAST_GAIN: f64 = 6.0;
+/// Of a track that follows no law of motion: remains of a strong path that was taken out look like that.
+const LEAST_GAIN_UNNAMED: f64 = 25.0;
 /// Kinds of answers that this family may give: every one is a chance to be wrong.
 const TRIED: f64 = 6.0;
 
@@ -40,7 +42,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let mut found = vec![];
     match (best, mover) {
         (Some(ghost), _) if ghost.gain > mover_gain => found.push(image::candidate(&scene, ghost, &ghosts, TRIED * boundaries)),
-        (_, Some(mover)) if mover.gain > LEAST_GAIN => found.push(mover.candidate(&scene, TRIED)),
+        (_, Some(mover)) if mover.gain > if mover.id.is_some() { LEAST_GAIN } else { LEAST_GAIN_UNNAMED } => {
+            found.push(mover.candidate(&scene, TRIED))
+        }
         _ => {}
     }
     let echoes = [echo::multibounce(&scene, TRIED), echo::object_radar_object(&scene, TRIED)];

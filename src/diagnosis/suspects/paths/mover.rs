@@ -12,6 +12,8 @@ use crate::diagnosis::{Candidate, Correction, Estimate, Place, Rung};
 
 /// Sightings are good to this share of a cell, and no better than that: the windows' law holds for a steady tone.
 const CELL_ERROR: f64 = 0.12;
+/// A sighting so much weaker than the others is noise or a sidelobe on the way.
+const CHANCE_SHARE: f64 = 0.03;
 /// A swing leaves less than this share of the velocities' variance.
 const SWING_LEAVES: f64 = 0.15;
 
@@ -27,7 +29,9 @@ pub struct Mover {
 }
 
 impl Mover {
-    pub fn new(scene: &Scene, track: Track) -> Option<Self> {
+    pub fn new(scene: &Scene, mut track: Track) -> Option<Self> {
+        let usual = median(&mut track.sightings.iter().map(|s| s.power).collect::<Vec<_>>());
+        track.sightings.retain(|s| s.power > CHANCE_SHARE * usual);
         let split = &scene.evidence.split;
         let training: Vec<Sighting> = track.sightings.iter().copied().filter(|s| split.training.contains(&s.frame)).collect();
         if training.len() < 4 || 3 * training.len() < split.training.len() {
