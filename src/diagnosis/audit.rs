@@ -27,6 +27,8 @@ impl Check {
 
 /// How much stronger a wrong convention must fit before it is believed, dB of energy at the predicted cells.
 const CLEARLY_DB: f64 = 6.0;
+/// Largest shift of the body that counts as an effect and not as a wrong scene.
+const CALIBRATION_M: f64 = 0.6;
 /// A cell counts as a return above this many times the noise.
 const RETURN: f64 = 20.0;
 
@@ -201,7 +203,7 @@ fn body_place(evidence: &Evidence) -> Option<Check> {
     };
     let here = level(0.0);
     let step = evidence.radar.range_resolution_m().max(0.1);
-    let shifts = (-30..=30).map(|i| i as f64 * step).filter(|shift| shift.abs() > 0.35);
+    let shifts = (-30..=30).map(|i| i as f64 * step);
     let (best_m, best) =
         shifts.map(|shift| (shift, level(shift))).fold((0.0, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });
     let moves = body
@@ -212,7 +214,8 @@ fn body_place(evidence: &Evidence) -> Option<Check> {
     if !moves {
         return None;
     }
-    let ok = best - here < CLEARLY_DB;
+    // Nearer than that it is a matter of calibration, which has effects of its own.
+    let ok = best - here < CLEARLY_DB || best_m.abs() < CALIBRATION_M;
     let found = if ok {
         format!("{here:.1} dB over the noise at the predicted ranges and velocities")
     } else {
