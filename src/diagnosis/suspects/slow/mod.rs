@@ -26,6 +26,8 @@ const LOOKS: f64 = 10.0;
 const LEAST_GAIN: f64 = 3.0;
 /// Share of the gain that what is simpler, or has a name, needs.
 const NEARLY: f64 = 0.8;
+/// Difference of gains (nats) that decides nothing.
+const UNDECIDED: f64 = 4.6;
 /// p-value below which a candidate is passed on.
 const PASSED_ON: f64 = 0.01;
 
@@ -66,14 +68,18 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if found.is_empty() || most(&found) < NEARLY * most(&free) {
         found.append(&mut free);
     }
+    // Of another kind it wins only where the recording cannot tell.
     let names: Vec<(&str, f64)> = found.iter().filter(|c| c.id.is_some()).map(|c| (c.behaves_like, c.gain)).collect();
-    found.retain(|c| c.id.is_some() || !names.iter().any(|(like, gain)| *like == c.behaves_like && *gain > NEARLY * c.gain));
+    let taken = |c: &Candidate| {
+        names.iter().any(|(like, gain)| (*like == c.behaves_like && *gain > NEARLY * c.gain) || *gain > c.gain - UNDECIDED)
+    };
+    found.retain(|c| c.id.is_some() || !taken(c));
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let rivals: Vec<(Option<&'static str>, f64)> = found.iter().map(|c| (c.id, c.gain)).collect();
     for candidate in &mut found {
         for &(id, gain) in &rivals {
             if let Some(id) = id {
-                if Some(id) != candidate.id && (gain - candidate.gain).abs() < 4.6 && !candidate.look_alikes.contains(&id) {
+                if Some(id) != candidate.id && (gain - candidate.gain).abs() < UNDECIDED && !candidate.look_alikes.contains(&id) {
                     candidate.look_alikes.push(id);
                 }
             }
