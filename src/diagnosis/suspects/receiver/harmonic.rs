@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::image::{empty_bins, spectrum};
-use crate::diagnosis::evidence::transform;
+use crate::diagnosis::evidence::{hann, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
@@ -63,14 +63,15 @@ fn tested(evidence: &Evidence, cubic: bool) -> Option<Candidate> {
     // Windowed neighbours share their noise; other things in the cells count as more of it.
     let widening = 2.25 * rest.max(1.0);
     let variance = widening / training.template;
-    let p_value = corrected(chi2_tail(2.0 * kappa.norm_sqr() / variance, 2.0), 2.0);
+    // Frames must agree on it as well as the noise lets expect.
+    let scatter = jackknife(&sums, &evidence.split.training).max(variance.sqrt());
+    let p_value = corrected(chi2_tail(2.0 * kappa.norm_sqr() / (scatter * scatter), 2.0), 2.0);
     let held_out = over(&evidence.split.held_out);
     let gain = (2.0 * (kappa.conj() * held_out.cross).re - kappa.norm_sqr() * held_out.template) / widening;
     // A receiver that expands instead of compressing, or turns phases more than amplitudes, is none.
     if gain <= 0.0 || (cubic && kappa.re > 0.0) {
         return None;
     }
-    let scatter = (jackknife(&sums, &evidence.split.training)).max(variance.sqrt());
     let level = kappa.norm();
     let level_db = 20.0 * level.log10();
     let id = if cubic { "compression" } else { "second_harmonic" };
@@ -125,12 +126,15 @@ fn tested(evidence: &Evidence, cubic: bool) -> Option<Candidate> {
 fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool], cubic: bool, peak: f64) -> Sums {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let scale = if cubic { 1.0 / (peak * peak) } else { 1.0 / peak };
+    let (slow, fast) = (hann(loops), hann(samples));
     let mut sums = Sums::default();
     for channel in 0..evidence.cube.channels() {
         let noise = evidence.noise()[channel].max(1e-300);
         let signal = evidence.cube.channel(frame, channel);
         // |s + n|² (s + n) holds 2 |s|² n, which is the noise that is looked at: its mean is taken away.
-        let mean_power = signal.iter().map(Complex64::norm_sqr).sum::<f64>() / signal.len() as f64;
+        // Weighted as the transform weights the noise; windows of unit energy make this a mean.
+        let mean_power: f64 =
+            signal.iter().enumerate().map(|(i, value)| value.norm_sqr() * (slow[i / samples] * fast[i % samples]).powi(2)).sum();
         let own = if cubic { 2.0 * mean_power } else { 0.0 };
         let mut template: Vec<Complex64> = signal.iter().map(|value| (power_of(*value, cubic) - value * own) * scale).collect();
         let mut mean = vec![Complex64::ZERO; samples];
