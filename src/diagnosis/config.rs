@@ -13,6 +13,8 @@ pub struct DiagnosisConfig {
     pub alarm: f64,
     /// Least gain of the log-likelihood on held-out frames, nats.
     pub gain: f64,
+    /// The same for what has no name in the library.
+    pub nameless_gain: f64,
     /// Alternatives within so many nats of the best are not told apart.
     pub tie: f64,
     /// Most effects that are accepted.
@@ -25,7 +27,7 @@ pub struct DiagnosisConfig {
 
 impl Default for DiagnosisConfig {
     fn default() -> Self {
-        Self { alarm: 0.01, gain: 6.0, tie: 4.6, most: 10, epochs: 8, seed: 1 }
+        Self { alarm: 0.01, gain: 6.0, nameless_gain: 15.0, tie: 4.6, most: 10, epochs: 8, seed: 1 }
     }
 }
 
@@ -35,7 +37,7 @@ impl DiagnosisConfig {
         if !(self.alarm > 0.0 && self.alarm < 1.0) {
             return Err(Error::setting("diagnosis.alarm", self.alarm, "a probability between 0 and 1"));
         }
-        for (key, value) in [("gain", self.gain), ("tie", self.tie)] {
+        for (key, value) in [("gain", self.gain), ("nameless_gain", self.nameless_gain), ("tie", self.tie)] {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(Error::setting(format!("diagnosis.{key}"), value, "nats, 0 or more"));
             }

@@ -41,6 +41,8 @@ pub struct Loaded {
 const FEWEST_FRAMES: usize = 4;
 /// Every so many-th frame is held out.
 const HELD_OUT_EVERY: usize = 4;
+/// One in so many loops may be lost when a frame is cut into blocks.
+const MOST_LOST_SHARE: usize = 25;
 /// Fewest loops in a block.
 const FEWEST_LOOPS: usize = 8;
 
@@ -165,10 +167,10 @@ fn in_blocks(cube: &Cube, radar: &Radar) -> Option<(Cube, Radar, usize)> {
     let [frames, tx, rx, loops, samples] = cube.dims;
     let dropped = |blocks: usize| loops % blocks;
     let most = (loops / FEWEST_LOOPS).min(10);
+    // Long blocks resolve velocities; so few of them, and few loops lost.
     let blocks = (2..=most)
-        .rev()
         .filter(|blocks| blocks * frames >= FEWEST_FRAMES)
-        .min_by_key(|&blocks| (dropped(blocks), 10 - blocks))?;
+        .min_by_key(|&blocks| (dropped(blocks) * MOST_LOST_SHARE / loops, blocks))?;
     let short = loops / blocks;
     let mut samples_out = Vec::with_capacity(cube.samples.len());
     for frame in 0..frames {
@@ -199,8 +201,8 @@ mod tests {
         let samples = (0..dims.iter().product::<usize>()).map(|i| Complex64::from(i as f64)).collect();
         let cube = Cube::new(dims, samples);
         let (blocks, short, loops) = in_blocks(&cube, &radar).unwrap();
-        assert_eq!((short.frames, loops), (5, 17));
-        assert_eq!(blocks.channel(1, 2)[0], cube.channel(0, 2)[17 * 2]);
+        assert_eq!((short.frames, loops), (4, 21));
+        assert_eq!(blocks.channel(1, 2)[0], cube.channel(0, 2)[21 * 2]);
         radar.loops_per_frame = 20;
         assert!(in_blocks(&Cube::new(radar.dims(), vec![Complex64::ZERO; radar.dims().iter().product()]), &radar).is_none());
     }

@@ -18,10 +18,15 @@ impl DiagnosisConfig {
         self.alarm / SUSPECTS.len().max(1) as f64
     }
 
+    /// What has no name may be anything, so it must gain more.
     fn passes(&self, candidate: &Candidate) -> bool {
-        candidate.p_value <= self.p_value() && candidate.gain >= self.gain && candidate.gain.is_finite()
+        let least = if candidate.id.is_some() { self.gain } else { self.nameless_gain };
+        candidate.p_value <= self.p_value() && candidate.gain >= least && candidate.gain.is_finite()
     }
 }
+
+/// Two instances of an effect closer than this are one.
+const NEAR_M: f64 = 0.3;
 
 /// An accepted candidate with what it changed.
 #[derive(Clone, Debug)]
@@ -65,7 +70,9 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
             let smallest = found.iter().map(|(_, candidate)| candidate.p_value).fold(1.0, f64::min);
             super::statistics::corrected(smallest, SUSPECTS.len() as f64)
         });
-        let passing: Vec<&(usize, Candidate)> = found.iter().filter(|(_, candidate)| thresholds.passes(candidate)).collect();
+        let known = |candidate: &Candidate| accepted.iter().any(|effect| is_same(&effect.candidate, candidate));
+        let passing: Vec<&(usize, Candidate)> =
+            found.iter().filter(|(_, candidate)| thresholds.passes(candidate) && !known(candidate)).collect();
         if let Some(last) = accepted.last_mut() {
             settle_rivals(last, &pending, &passing, thresholds);
         }
@@ -95,6 +102,23 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     let evidence = accepted.iter().fold(original, |evidence, effect| evidence.with(&effect.candidate));
     let after = Misfit::of(&evidence);
     Explanation { accepted, evidence, p_value: p_value.unwrap_or(1.0), before, after }
+}
+
+/// Whether a candidate is what was accepted already and could not be removed in full: a second instance of an effect must
+/// lie at another place.
+fn is_same(accepted: &Candidate, candidate: &Candidate) -> bool {
+    let apart = |a: Option<[f64; 2]>, b: Option<[f64; 2]>| matches!((a, b), (Some(a), Some(b)) if a[1] < b[0] || b[1] < a[0]);
+    let (old, new) = (&accepted.place, &candidate.place);
+    accepted.id == candidate.id
+        && accepted.behaves_like == candidate.behaves_like
+        && old.boundary == new.boundary
+        && old.body_part == new.body_part
+        && old.rx == new.rx
+        && !apart(old.range_m, new.range_m)
+        && !apart(old.velocity_mps, new.velocity_mps)
+        && old.position_m.is_none_or(|old| {
+            new.position_m.is_none_or(|new| (0..3).map(|axis| (old[axis] - new[axis]).powi(2)).sum::<f64>() < NEAR_M * NEAR_M)
+        })
 }
 
 /// What every suspect has to say.

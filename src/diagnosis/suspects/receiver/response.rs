@@ -21,8 +21,8 @@ use crate::diagnosis::{Cube, Evidence};
 
 /// Tales within this many nats of the best cannot be told from it.
 const INDISTINGUISHABLE: f64 = 4.6;
-/// Weak beat frequencies are amplified by this at most: beyond, there is only noise.
-const MOST_GAIN: f64 = 2.0;
+/// Power that a response must let through to be undone in full.
+const LEAST_POWER: f64 = 0.25;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
@@ -365,8 +365,8 @@ fn restored(field: &Field, shape: Shape, value: f64, rate: f64) -> (Vec<Vec<Comp
 
 /// Moving parts are amplified back where the response is not too weak; the still part is replaced by its fit.
 fn undo(response: &[Complex64], fitted: Vec<Vec<Complex64>>, still: Vec<Vec<Complex64>>) -> Correction {
-    let inverse: Vec<Complex64> =
-        response.iter().map(|h| if h.norm() * MOST_GAIN >= 1.0 { h.inv() } else { Complex64::ONE }).collect();
+    // Where hardly anything comes through, the inverse would raise nothing but noise: it falls off instead.
+    let inverse: Vec<Complex64> = response.iter().map(|h| h.conj() / h.norm_sqr().max(LEAST_POWER)).collect();
     let filter = Filter::new(&inverse);
     Correction::Samples(Arc::new(move |cube: &mut Cube| {
         cube.each_chirp(|[_, channel, _], chirp| {
