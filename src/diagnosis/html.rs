@@ -9,6 +9,7 @@ use base64::prelude::BASE64_STANDARD;
 use super::evidence::{Evidence, transform};
 use super::finding::{Curve, Place};
 use super::journey::Diagnosis;
+use super::locate;
 use super::report::{Effect, Report, Unexplained, Verdict};
 use super::simulate::Simulated;
 use super::support::Support;
@@ -48,6 +49,7 @@ pub fn html(diagnosis: &Diagnosis, simulated: Option<&Simulated>) -> Result<Stri
     }
     if diagnosis.explanation.is_some() {
         fit(&mut page, report, &pictures);
+        location(&mut page, report, &pictures);
     }
     audit(&mut page, report);
     limits(&mut page, report);
@@ -187,6 +189,40 @@ fn held_out(report: &Report) -> String {
     format!("{axis} {}{more}", list.join(", "))
 }
 
+/// Where the untouched recording differs.
+fn location(page: &mut String, report: &Report, pictures: &Pictures) {
+    page.push_str("<h2>Where the recording holds more than expected</h2>");
+    if report.located.regions.is_empty() {
+        page.push_str("<p>No place in range, velocity and time stands out (false-discovery rate 5 %).</p>");
+    } else {
+        page.push_str("<table><tr><th>where<th>excess<th>chance");
+        for region in report.located.regions.iter().take(10) {
+            let _ = write!(
+                page,
+                "<tr><td>{}<td>{:.1} dB<td>{}",
+                escape(&place_text(&region.place)),
+                region.excess_db,
+                probability(region.p_value)
+            );
+        }
+        page.push_str("</table>");
+    }
+    for (title, shares) in [("Parts of the body", &report.located.body_parts), ("Walls", &report.located.walls)] {
+        let standing_out: Vec<_> = shares.iter().filter(|share| share.p_value < 0.01 && share.excess_db > 0.0).collect();
+        if !standing_out.is_empty() {
+            let _ = write!(page, "<p>{title} at whose cells there is more than expected:</p><table>");
+            for share in standing_out {
+                let name = escape(&share.name.replace('_', " "));
+                let _ = write!(page, "<tr><td>{name}<td>{:.1} dB<td>{}", share.excess_db, probability(share.p_value));
+            }
+            page.push_str("</table>");
+        }
+    }
+    for (title, picture) in &pictures.profiles {
+        let _ = write!(page, "<p><img alt=\"{}\" src=\"{picture}\">", escape(title));
+    }
+}
+
 fn audit(page: &mut String, report: &Report) {
     page.push_str("<h2>Conventions and numerics</h2><table><tr><th>check<th>expected<th>found");
     for check in &report.audit {
@@ -285,12 +321,13 @@ fn escape(text: &str) -> String {
 struct Pictures {
     maps: Vec<(String, String)>,
     curves: Vec<(String, String)>,
+    profiles: Vec<(String, String)>,
 }
 
 impl Pictures {
     fn draw(diagnosis: &Diagnosis, simulated: Option<&Simulated>) -> Result<Self> {
         let folder = tempfile::tempdir().map_err(|error| Error::write(std::env::temp_dir(), error))?;
-        let mut pictures = Self { maps: vec![], curves: vec![] };
+        let mut pictures = Self { maps: vec![], curves: vec![], profiles: vec![] };
         let Some(explanation) = &diagnosis.explanation else { return Ok(pictures) };
         let path = folder.path().join("picture.png");
         for (title, evidence) in [
@@ -318,6 +355,22 @@ impl Pictures {
                 let name = accepted.candidate.id.unwrap_or(accepted.candidate.behaves_like);
                 pictures.curves.push((name.into(), address(&path)?));
             }
+        }
+        let (before, after) = (locate::profiles(&diagnosis.original), locate::profiles(&explanation.evidence));
+        for (before, after) in
+            before.iter().zip(&after).filter(|(before, _)| ["range", "velocity", "frame"].contains(&before.axis))
+        {
+            let series = |name: &str, profile: &locate::Profile| Series {
+                name: name.into(),
+                points: profile.at.iter().zip(&profile.excess_db).map(|(&x, &y)| [x, y]).collect(),
+            };
+            let unit = if before.unit.is_empty() { String::new() } else { format!(" ({})", before.unit) };
+            let mut lines = vec![series("before", before)];
+            lines.extend((!explanation.accepted.is_empty()).then(|| series("with the effects", after)));
+            let title = format!("Power over what is expected, along the {}", before.axis);
+            let x_label = format!("{}{unit}", before.axis);
+            Chart { title: title.clone(), x_label, y_label: "excess (dB)".into(), series: lines }.save(&path)?;
+            pictures.profiles.push((title, address(&path)?));
         }
         Ok(pictures)
     }

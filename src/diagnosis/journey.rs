@@ -6,7 +6,9 @@ use super::cube::Loaded;
 use super::evidence::Evidence;
 use super::misfit::Misfit;
 use super::prediction::BodyPrediction;
-use super::report::{FORMAT, Findings, Fit, HeldOut, Report, Verdict, moving_energy, never_detectable, probability_of_nothing};
+use super::report::{
+    FORMAT, Findings, Fit, HeldOut, Location, Report, Verdict, moving_energy, never_detectable, probability_of_nothing,
+};
 use super::select::{Explanation, explain};
 use crate::data::Recording;
 use crate::error::{Error, Result};
@@ -61,6 +63,7 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         unexplained: vec![],
         not_detectable: vec![],
         fit: Fit { before: Misfit::default(), after: Misfit::default() },
+        located: Location::default(),
         notes,
         simulator: None,
         settings: config.fingerprint(),
@@ -74,6 +77,8 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         report.reason = format!("a convention is wrong, which comes before any physics: {}", wrong.found);
         return Ok(Diagnosis { report, radar, original, explanation: None });
     }
+    progress("locating the residual");
+    report.located = Location::of(&original);
     progress("looking for what was left out");
     let explanation = explain(original.clone(), config, progress);
     let findings = Findings::of(&explanation, moving_energy(&original));

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::audit::Check;
 use super::cube::Split;
 use super::finding::{Place, Rung};
+use super::locate;
 use super::misfit::Misfit;
 use super::select::{Accepted, Explanation};
 use crate::effects;
@@ -88,6 +89,46 @@ pub struct Fit {
     pub after: Misfit,
 }
 
+/// A place with more power than the baseline expects, before anything was taken into account.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Located {
+    #[serde(rename = "where")]
+    pub place: Place,
+    pub excess_db: f64,
+    pub p_value: f64,
+}
+
+/// The residual by parts of the body and by walls.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Share {
+    pub name: String,
+    pub excess_db: f64,
+    pub p_value: f64,
+}
+
+/// Where the untouched recording holds more than is expected.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Location {
+    pub regions: Vec<Located>,
+    pub body_parts: Vec<Share>,
+    pub walls: Vec<Share>,
+}
+
+impl Location {
+    pub fn of(evidence: &super::Evidence) -> Self {
+        let shares = |seen: Vec<locate::Seen>| {
+            seen.into_iter().map(|seen| Share { name: seen.name, excess_db: seen.excess_db, p_value: seen.p_value }).collect()
+        };
+        let located =
+            |region: locate::Region| Located { place: region.place, excess_db: region.excess_db, p_value: region.p_value };
+        Self {
+            regions: locate::locate(evidence).into_iter().map(located).collect(),
+            body_parts: shares(locate::by_part(evidence)),
+            walls: shares(locate::by_wall(evidence)),
+        }
+    }
+}
+
 /// The trained simulator's heatmaps against those of held-out frames.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SimulatorScores {
@@ -118,6 +159,9 @@ pub struct Report {
     pub unexplained: Vec<Unexplained>,
     pub not_detectable: Vec<NotDetectable>,
     pub fit: Fit,
+    /// Where the untouched recording holds more power than the baseline expects.
+    #[serde(default)]
+    pub located: Location,
     /// What this recording does not allow to look for, and notes about how it was read.
     #[serde(default)]
     pub notes: Vec<String>,
