@@ -15,6 +15,8 @@ use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
 /// Errors of the prediction that are no finding: metres of range, seconds.
 const RANGE_FLOOR_M: f64 = 4e-3;
 const CLOCK_FLOOR_S: f64 = 2e-3;
+/// Standard deviation of a clock's offset from accelerations, in frame periods.
+const CLOCK_ROUGH: f64 = 0.08;
 /// Alternatives within so many nats are said to be indistinguishable.
 const ALIKE_NATS: f64 = 4.6;
 /// Ranges looked at first.
@@ -164,7 +166,15 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
         }
     }
     let (_, change) = best?;
-    let Change::Drop { count, .. } = change else { return None };
+    let Change::Drop { at, count } = change else { return None };
+    // The weights were those of the unchanged body: with their own, neighbouring places may be better.
+    let interesting = null.gain_over(&trial.score(change, training, true), training) < 0.0;
+    let reach = if interesting { 4 } else { 0 };
+    let near = (at.saturating_sub(reach).max(1)..=at + reach).map(|at| Change::Drop { at, count });
+    let change = near
+        .map(|change| (trial.score(change, training, true).gain_over(null, training), change))
+        .max_by(|a, b| a.0.total_cmp(&b.0))?
+        .1;
     let score = trial.score(change, &frames, true);
     // A step is all or nothing: its scatter is that of the frames' gains.
     let gains: Vec<f64> = training
@@ -219,8 +229,16 @@ fn mean_range_m(trial: &Trial) -> f64 {
 
 fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, gain: f64) -> Candidate {
     let evidence = trial.evidence;
-    // Half of the floor is a standard deviation of what the power model does not know.
-    let deviation = fit.deviation.hypot(0.5 * fit.floor);
+    // Half of the floor is a standard deviation of what the power model does not know; between frames, the parts'
+    // accelerations are known roughly only, which pulls a clock's offset by several milliseconds.
+    let rough = match fit.score.change {
+        Change::Clock(_) => CLOCK_ROUGH * frame_period_s(trial.body),
+        Change::Drift(_) => {
+            CLOCK_ROUGH * frame_period_s(trial.body) / trial.body.middle_s.last().map_or(1.0, |end| end.max(1e-3))
+        }
+        _ => 0.0,
+    };
+    let deviation = fit.deviation.hypot(0.5 * fit.floor).hypot(rough);
     let normal = |name| vec![Estimate::normal(name, fit.value, deviation)];
     let (estimates, stage, rung, statement) = match fit.score.change {
         Change::Range(_) => (
@@ -262,7 +280,7 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
             format!("The motion's clock runs {:.2} % faster than the radar's.", 1e2 * fit.value),
         ),
         Change::Drop { at, count } => (
-            vec![Estimate::normal("at", at as f64, 0.5), Estimate::normal("count", count as f64, 0.0)],
+            vec![Estimate::normal("at", at as f64, 1.5), Estimate::normal("count", count as f64, 0.0)],
             "timing",
             Rung::D,
             format!("From frame {at} on the body is {count} frame(s) later in its motion: frames were lost there."),

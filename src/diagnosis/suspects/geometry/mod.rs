@@ -1,18 +1,22 @@
 //! Geometry and time: the body is not where or when it was predicted.
 
 mod change;
+mod channels;
 mod displaced;
 mod trial;
 
+use change::Moves;
 use trial::Trial;
 
 use crate::diagnosis::{Candidate, Evidence};
 
-/// At most one candidate for a change of the body's place or time.
+/// At most one candidate for a change of the body's place or time, and one for what differs between receivers.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(model) = evidence.power() else { return vec![] };
     let Some(body) = evidence.body.as_ref() else { return vec![] };
-    displaced::find(&Trial::new(evidence, &model, body))
+    let mut found = displaced::find(&Trial::new(evidence, &model, body));
+    found.extend(channels::find(evidence, &model, body, Moves::new(body, evidence.radar.centre_m())));
+    found
 }
 
 #[cfg(test)]
@@ -24,10 +28,11 @@ mod tests {
     use crate::diagnosis::BodyPrediction;
     use crate::diagnosis::cube::Loaded;
 
+    /// Looks at the recordings that `HYBRIDSIM_TRY` names, separated by spaces.
     #[test]
     #[ignore]
     fn try_out() {
-        let list = std::env::var("TRY").unwrap();
+        let Ok(list) = std::env::var("HYBRIDSIM_TRY") else { return };
         for path in list.split(' ') {
             let recording = Recording::open(path).unwrap();
             let loaded = Loaded::read(&recording, 64).unwrap();

@@ -1,0 +1,277 @@
+//! Receivers that differ, and bodies that stand to one side: phases and powers between receivers in the body's cells.
+//!
+//! Every cell that the body fills comes from a direction that the prediction knows, so what remains of the phase between
+//! two receivers belongs to the receivers. A phase that grows in proportion to the receivers' places is a direction, and
+//! might as well be the body's; anything else, and any difference of power, cannot be. Neither depends on amplitudes.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::change::{Change, Moves};
+use crate::diagnosis::power::{PowerModel, part_templates};
+use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, Rung, statistics};
+
+/// Expected power over the noise from which on a cell is used.
+const LEAST_POWER: f32 = 10.0;
+/// What the power model's errors do to a phase and to a power between neighbouring receivers (half a wavelength).
+const PHASE_FLOOR_RAD: f64 = 1.5 * PI / 180.0;
+const GAIN_FLOOR_DB: f64 = 0.2;
+/// Cells that one independent draw is spread over by two Hann windows.
+const CELLS_PER_DRAW: f64 = 2.25;
+
+/// Sums over the cells of a frame, by receiver: cross power with the first receiver after the predicted steering, own
+/// power, and the first receiver's.
+#[derive(Clone, Debug)]
+struct Sums {
+    cross: Vec<Complex64>,
+    own: Vec<f64>,
+    cells: f64,
+    range_m: f64,
+}
+
+/// A mean over frames and the standard error of it.
+#[derive(Clone, Copy, Debug)]
+struct Mean {
+    value: f64,
+    deviation: f64,
+}
+
+pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, moves: Moves) -> Vec<Candidate> {
+    let receivers = evidence.radar.rx_m.len();
+    if receivers < 2 || evidence.accepted.contains(&"channel_mismatch") {
+        return vec![];
+    }
+    let sums: Vec<Option<Sums>> =
+        (0..evidence.cube.dims[0]).into_par_iter().map(|frame| sums(evidence, model, body, frame)).collect();
+    let of = |frames: &[usize]| frames.iter().filter_map(|&frame| sums[frame].clone()).collect::<Vec<Sums>>();
+    let (training, held_out) = (of(&evidence.split.training), of(&evidence.split.held_out));
+    if training.len() < 6 || held_out.is_empty() {
+        return vec![];
+    }
+    let freedom = training.len() as f64 - 1.0;
+    let phases: Vec<Mean> = (1..receivers).map(|rx| phase(&training, rx)).collect();
+    let gains: Vec<Mean> = (1..receivers).map(|rx| gain_db(&training, rx)).collect();
+    // The part that is a direction: least squares through the receivers' places, of every frame on its own.
+    let places: Vec<f64> = evidence.radar.rx_m.iter().map(|rx| rx[0] - evidence.radar.rx_m[0][0]).collect();
+    let wave = TAU / evidence.radar.wavelength_m();
+    let spread: f64 = places.iter().map(|x| x * x).sum();
+    let sine = |phases: &[f64]| -phases.iter().zip(&places[1..]).map(|(phase, x)| phase * x).sum::<f64>() / (spread * wave);
+    let values: Vec<f64> = phases.iter().map(|phase| phase.value).collect();
+    let direction = if spread > 0.0 { sine(&values) } else { 0.0 };
+    let rest: Vec<f64> = values.iter().zip(&places[1..]).map(|(phase, x)| phase + direction * wave * x).collect();
+
+    let p = |value: f64, floor: f64, deviation: f64| tail((value.abs() - floor) / deviation.max(1e-12), freedom);
+    let own = rest
+        .iter()
+        .zip(&phases)
+        .map(|(rest, phase)| p(*rest, PHASE_FLOOR_RAD, phase.deviation))
+        .chain(gains.iter().map(|gain| p(gain.value, GAIN_FLOOR_DB, gain.deviation)))
+        .fold(1.0, f64::min);
+    let tried = 2.0 * receivers as f64;
+    let own = statistics::corrected(own, tried);
+    let bearing = {
+        // One direction for all: its error from those of the phases, as if they erred together.
+        let deviation =
+            phases.iter().zip(&places[1..]).map(|(phase, x)| phase.deviation * x.abs()).sum::<f64>() / (spread * wave);
+        Mean { value: direction, deviation }
+    };
+    let floor = PHASE_FLOOR_RAD / PI;
+    let aside = if spread > 0.0 { statistics::corrected(p(bearing.value, floor, bearing.deviation), tried) } else { 1.0 };
+    if own < 0.05 {
+        let amplitudes: Vec<Complex64> = std::iter::once(Complex64::ONE)
+            .chain(values.iter().zip(&gains).map(|(&phase, gain)| Complex64::from_polar(10f64.powf(gain.value / 20.0), phase)))
+            .collect();
+        let gain = likelihood_gain(&training, &held_out, &amplitudes);
+        return (gain > 0.0).then(|| mismatch(evidence, &phases, &gains, amplitudes, own, gain)).into_iter().collect();
+    }
+    if aside < 0.05 {
+        let amplitudes: Vec<Complex64> = places.iter().map(|x| Complex64::cis(-direction * wave * x)).collect();
+        let gain = likelihood_gain(&training, &held_out, &amplitudes);
+        let range_m = training.iter().map(|sums| sums.range_m).sum::<f64>() / training.len() as f64;
+        return (gain > 0.0).then(|| displaced(evidence, bearing, range_m, moves, aside, gain)).into_iter().collect();
+    }
+    vec![]
+}
+
+fn tail(t: f64, freedom: f64) -> f64 {
+    if t <= 0.0 { 1.0 } else { StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| 2.0 * law.sf(t)) }
+}
+
+/// None where the body fills too few cells.
+fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: usize) -> Option<Sums> {
+    let radar = &evidence.radar;
+    let (receivers, transmitters) = (radar.rx_m.len(), radar.tx_m.len());
+    let expected = model.expected(frame);
+    let cells: Vec<usize> = (0..model.size()).filter(|&cell| model.usable()[cell] && expected[cell] > LEAST_POWER).collect();
+    if cells.len() < 10 {
+        return None;
+    }
+    let points = &body.frames[frame];
+    let (centre, wave) = (radar.centre_m(), TAU / radar.wavelength_m());
+    // Mean direction and range of each cell: templates weighted with them. The centre may lie aside: sines need no care.
+    let range = |position: [f64; 3]| (0..3).map(|axis| (position[axis] - centre[axis]).powi(2)).sum::<f64>().sqrt().max(1e-6);
+    let mean = |of: &dyn Fn([f64; 3]) -> f64| -> Vec<f32> {
+        let shifted: Vec<_> = points
+            .iter()
+            .map(|point| crate::diagnosis::Point { area_m2: point.area_m2 * (of(point.position_m) + 2.0), ..*point })
+            .collect();
+        let templates = part_templates(radar, &model.cells, &shifted, body.parts.len());
+        let map = crate::diagnosis::power::sum(&templates, &model.weights, model.size());
+        cells.iter().map(|&cell| (map[cell] - 1.0) / (expected[cell] - 1.0) - 2.0).collect()
+    };
+    let direction: [Vec<f32>; 3] =
+        std::array::from_fn(|axis| mean(&|position| (position[axis] - centre[axis]) / range(position)));
+    let range_m = points.iter().map(|point| range(point.position_m)).sum::<f64>() / points.len().max(1) as f64;
+    let noise = evidence.noise();
+    let mut result = Sums { cross: vec![Complex64::ZERO; receivers], own: vec![0.0; receivers], cells: 0.0, range_m };
+    for tx in 0..transmitters {
+        let maps: Vec<_> = (0..receivers).map(|rx| evidence.range_doppler(frame, tx * receivers + rx)).collect();
+        for (index, &cell) in cells.iter().enumerate() {
+            let weight = 1.0 / (f64::from(expected[cell]) * noise[tx * receivers].max(f64::MIN_POSITIVE));
+            result.cells += 1.0;
+            for rx in 0..receivers {
+                let phase: f64 = (0..3)
+                    .map(|axis| (radar.rx_m[rx][axis] - radar.rx_m[0][axis]) * f64::from(direction[axis][index]) * wave)
+                    .sum();
+                let value = maps[rx][cell];
+                result.cross[rx] += value * maps[0][cell].conj() * Complex64::cis(phase) * weight;
+                result.own[rx] += value.norm_sqr() * weight;
+            }
+        }
+    }
+    Some(result)
+}
+
+/// Phase of a receiver against the first, radians.
+fn phase(frames: &[Sums], rx: usize) -> Mean {
+    let total: Complex64 = frames.iter().map(|sums| sums.cross[rx]).sum();
+    let turned = |sums: &Sums| (sums.cross[rx] * total.conj() / total.norm().max(f64::MIN_POSITIVE)).im;
+    let scatter: f64 = frames.iter().map(|sums| turned(sums).powi(2)).sum();
+    let count = frames.len() as f64;
+    Mean { value: total.arg(), deviation: (scatter * count / (count - 1.0)).sqrt() / total.norm().max(f64::MIN_POSITIVE) }
+}
+
+/// Power of a receiver against the first, decibels.
+fn gain_db(frames: &[Sums], rx: usize) -> Mean {
+    let (own, first): (f64, f64) = frames.iter().fold((0.0, 0.0), |(own, first), sums| (own + sums.own[rx], first + sums.own[0]));
+    let ratio = (own / first.max(f64::MIN_POSITIVE)).max(f64::MIN_POSITIVE);
+    let scatter: f64 = frames.iter().map(|sums| (sums.own[rx] - ratio * sums.own[0]).powi(2)).sum();
+    let count = frames.len() as f64;
+    let db = 10.0 / std::f64::consts::LN_10;
+    Mean { value: db * ratio.ln(), deviation: db * (scatter * count / (count - 1.0)).sqrt() / own.max(f64::MIN_POSITIVE) }
+}
+
+/// Of held-out frames, pair by pair with the first receiver: circular Gaussian fields with equal powers and a real
+/// correlation, against the same with the amplitudes put in.
+fn likelihood_gain(training: &[Sums], held_out: &[Sums], amplitudes: &[Complex64]) -> f64 {
+    let mut gain = 0.0;
+    for (rx, amplitude) in amplitudes.iter().enumerate().skip(1) {
+        let undone = |sums: &[Sums], amplitude: Complex64| {
+            let cells: f64 = sums.iter().map(|sums| sums.cells).sum::<f64>().max(1.0);
+            let first = sums.iter().map(|sums| sums.own[0]).sum::<f64>() / cells;
+            let own = sums.iter().map(|sums| sums.own[rx]).sum::<f64>() / (cells * amplitude.norm_sqr());
+            let cross = sums.iter().map(|sums| sums.cross[rx]).sum::<Complex64>() / (amplitude * cells);
+            (cells, 0.5 * (first + own), cross.re)
+        };
+        let log_likelihood = |amplitude: Complex64| {
+            let (_, power, cross) = undone(training, amplitude);
+            let (cells, seen, seen_cross) = undone(held_out, amplitude);
+            let determinant = (power * power - cross * cross).max(1e-9 * power * power).max(f64::MIN_POSITIVE);
+            let fit = 2.0 * (power * seen - cross * seen_cross) / determinant;
+            // The Jacobian of the amplitude counts, too.
+            -cells * (determinant.ln() + amplitude.norm_sqr().ln() + fit)
+        };
+        gain += log_likelihood(*amplitude) - log_likelihood(Complex64::ONE);
+    }
+    gain / CELLS_PER_DRAW
+}
+
+fn mismatch(
+    evidence: &Evidence,
+    phases: &[Mean],
+    gains: &[Mean],
+    amplitudes: Vec<Complex64>,
+    p_value: f64,
+    gain: f64,
+) -> Candidate {
+    let list = |name, means: &[Mean], unit: f64, floor: f64| {
+        let values: Vec<f64> = std::iter::once(0.0).chain(means.iter().map(|mean| mean.value * unit)).collect();
+        let deviations: Vec<f64> =
+            std::iter::once(0.0).chain(means.iter().map(|mean| (mean.deviation * unit).hypot(0.5 * floor))).collect();
+        Estimate::list(name, &values, &deviations)
+    };
+    let degrees = 180.0 / PI;
+    let text =
+        |values: Vec<f64>, digits: usize| values.iter().map(|value| format!("{value:.digits$}")).collect::<Vec<_>>().join(", ");
+    let receivers = amplitudes.len();
+    // Where the receivers' mean stays, gains are put back to the first one's.
+    let inverse: Vec<Complex64> = amplitudes.iter().map(|amplitude| 1.0 / amplitude).collect();
+    let energy = (0..evidence.cube.dims[0])
+        .flat_map(|frame| (0..evidence.cube.channels()).map(move |channel| (frame, channel)))
+        .map(|(frame, channel)| {
+            let error = (1.0 - inverse[channel % receivers]).norm_sqr();
+            error * evidence.cube.channel(frame, channel).iter().map(|value| value.norm_sqr()).sum::<f64>()
+        })
+        .sum();
+    Candidate {
+        id: Some("channel_mismatch"),
+        behaves_like: "channel gain",
+        estimates: vec![
+            list("gain_db", gains, 1.0, GAIN_FLOOR_DB),
+            list("phase_deg", phases, degrees, PHASE_FLOOR_RAD * degrees),
+        ],
+        choice: None,
+        place: Place { rx: Some((1..receivers).collect()), ..Place::at("antenna") },
+        p_value,
+        gain,
+        rung: Rung::E,
+        look_alikes: vec![],
+        statement: format!(
+            "The receivers differ: against the first, receivers 1 to {} are {} dB stronger and {}° ahead, which no direction of the body explains.",
+            receivers - 1,
+            text(gains.iter().map(|gain| gain.value).collect(), 2),
+            text(phases.iter().map(|phase| phase.value * degrees).collect(), 1),
+        ),
+        curve: None,
+        energy,
+        correction: Correction::Samples(Arc::new(move |cube| {
+            cube.each_chirp(|[_, channel, _], samples| {
+                samples.iter_mut().for_each(|value| *value *= inverse[channel % receivers]);
+            });
+        })),
+    }
+}
+
+fn displaced(evidence: &Evidence, bearing: Mean, range_m: f64, moves: Moves, p_value: f64, gain: f64) -> Candidate {
+    let (offset, deviation) = (bearing.value * range_m, bearing.deviation.hypot(0.5 * PHASE_FLOOR_RAD / PI) * range_m);
+    let change = Change::Offset([offset, 0.0, 0.0]);
+    let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
+    Candidate {
+        id: Some("pose_offset"),
+        behaves_like: "direction offset",
+        estimates: vec![
+            Estimate::list("offset_m", &[offset, 0.0, 0.0], &[deviation, 0.05, 0.2]),
+            Estimate::normal("yaw_deg", 0.0, 1.0),
+        ],
+        choice: None,
+        place: Place::at("scene"),
+        p_value,
+        gain,
+        rung: Rung::D,
+        // A phase in proportion to the receivers' places is a direction, whoever makes it.
+        look_alikes: vec!["channel_mismatch"],
+        statement: format!(
+            "The body is seen {:.1}° to the {} of where it stands: {:.0} mm at its mean range, or the radar or its receivers are turned by that much.",
+            bearing.value.clamp(-1.0, 1.0).asin().abs() * 180.0 / PI,
+            if bearing.value > 0.0 { "right" } else { "left" },
+            1e3 * offset.abs()
+        ),
+        curve: None,
+        energy: total * evidence.noise().iter().sum::<f64>() * (bearing.value * PI).powi(2),
+        correction: Correction::Body(Arc::new(move |body| moves.apply(body, change))),
+    }
+}
