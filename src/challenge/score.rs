@@ -323,6 +323,9 @@ fn rows(cases: &[Case], psychometric: Option<Logistic>) -> Vec<Row> {
     rows
 }
 
+/// A baseline's favourite template and how far it stands out.
+type Pick<'a> = &'a dyn Fn(&Case) -> Option<(usize, f64)>;
+
 /// Each baseline with the threshold that the nulls of this very set give it.
 fn baseline_rows(cases: &[Case], nulls: &[&Case], singles: &[&Case], concealed: &[&Case]) -> Vec<Row> {
     let part = 1.0 - BASELINE_FALSE_ALARMS;
@@ -352,7 +355,7 @@ fn baseline_rows(cases: &[Case], nulls: &[&Case], singles: &[&Case], concealed: 
     let global = |case: &Case| case.before.db_mse;
     let chi2 = |case: &Case| case.baseline.as_ref().map(|b| b.chi2);
     let mut rows = vec![];
-    let mut add = |name: &str, value: &dyn Fn(&Case) -> Option<f64>, pick: Option<&dyn Fn(&Case) -> Option<(usize, f64)>>| {
+    let mut add = |name: &str, value: &dyn Fn(&Case) -> Option<f64>, pick: Option<Pick>| {
         let limit = over_nulls(value);
         let alarm = |case: &Case| value(case).is_some_and(|value| value > limit);
         rows.push(share(
