@@ -216,9 +216,9 @@ pub const MASKED: &[Graded] = &[
         strongest: 0.1,
         add: |effects, strength, at, random| {
             // Just before the wall ahead, whose own return covers it.
-            let y = at.room.front_m.unwrap_or(5.0) - between(0.03, 0.15, random);
+            let y = at.room.front_m.unwrap_or(5.0) - between(0.0, 0.04, random);
             effects.static_reflector.push(StaticReflector {
-                position_m: [between(-0.3, 0.3, random), y, between(-0.2, 0.2, random)],
+                position_m: [between(-0.1, 0.1, random), y, between(-0.1, 0.1, random)],
                 amplitude: strength,
             });
         },

@@ -323,28 +323,39 @@ fn rows(cases: &[Case], psychometric: Option<Logistic>) -> Vec<Row> {
     rows
 }
 
+/// A baseline's favourite template and how far it stands out.
+type Pick<'a> = &'a dyn Fn(&Case) -> Option<(usize, f64)>;
+
 /// Each baseline with the threshold that the nulls of this very set give it.
 fn baseline_rows(cases: &[Case], nulls: &[&Case], singles: &[&Case], concealed: &[&Case]) -> Vec<Row> {
     let part = 1.0 - BASELINE_FALSE_ALARMS;
     let over_nulls =
         |of: &dyn Fn(&Case) -> Option<f64>| quantile(&nulls.iter().filter_map(|case| of(case)).collect::<Vec<_>>(), part);
     let strong: Vec<&&Case> = singles.iter().filter(|case| case.d_prime() >= OBVIOUS_D_PRIME).collect();
-    // Each template against its own nulls: how far beyond them.
-    let limits: Vec<f64> =
-        (0..TEMPLATES.len()).map(|k| over_nulls(&|case| case.baseline.as_ref().map(|b| b.templates[k]))).collect();
+    // Each template on the scale of its own nulls: by the middle and the spread of their logarithms, not by their largest,
+    // beyond which one of many templates soon is.
+    let scales: Vec<[f64; 2]> = (0..TEMPLATES.len())
+        .map(|k| {
+            let logs: Vec<f64> =
+                nulls.iter().filter_map(|case| Some(case.baseline.as_ref()?.templates[k].max(1e-3).ln())).collect();
+            let [low, centre, high] = [0.16, 0.5, 0.84].map(|part| quantile(&logs, part));
+            [centre, (0.5 * (high - low)).max(0.1)]
+        })
+        .collect();
+    let beyond = |k: usize, value: f64| (value.max(1e-3).ln() - scales[k][0]) / scales[k][1];
     let best = |case: &Case| -> Option<(usize, f64)> {
-        let ratios =
-            case.baseline.as_ref()?.templates.iter().zip(&limits).map(|(value, limit)| value / limit.max(1.0)).enumerate();
-        ratios.max_by(|a, b| a.1.total_cmp(&b.1))
+        let all = case.baseline.as_ref()?.templates.iter().enumerate().map(|(k, &value)| (k, beyond(k, value)));
+        all.max_by(|a, b| a.1.total_cmp(&b.1))
     };
     let sparse = |case: &Case| -> Option<(usize, f64)> {
-        let picked = case.baseline.as_ref()?.sparse.iter().map(|&(k, gain)| (k, gain / limits[k].max(1.0)));
-        Some(picked.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0)))
+        let picked = case.baseline.as_ref()?.sparse.iter().map(|&(k, gain)| (k, beyond(k, gain)));
+        // Nothing picked is as far from an alarm as can be.
+        Some(picked.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::MIN)))
     };
     let global = |case: &Case| case.before.db_mse;
     let chi2 = |case: &Case| case.baseline.as_ref().map(|b| b.chi2);
     let mut rows = vec![];
-    let mut add = |name: &str, value: &dyn Fn(&Case) -> Option<f64>, pick: Option<&dyn Fn(&Case) -> Option<(usize, f64)>>| {
+    let mut add = |name: &str, value: &dyn Fn(&Case) -> Option<f64>, pick: Option<Pick>| {
         let limit = over_nulls(value);
         let alarm = |case: &Case| value(case).is_some_and(|value| value > limit);
         rows.push(share(
