@@ -131,6 +131,23 @@ impl Effects {
         }
     }
 
+    /// Switches off what adds to silence.
+    pub fn switch_off_additive(&mut self) {
+        for id in [
+            "static_reflector",
+            "moving_reflector",
+            "carried_reflector",
+            "range_alias",
+            "tx_leakage",
+            "interference",
+            "spur",
+            "ramp_edge_transient",
+            "dc_offset",
+        ] {
+            self.switch_off(Some(id));
+        }
+    }
+
     fn enabled(&self) -> impl Iterator<Item = &Effect> {
         self.list.iter().filter(|effect| effect.is_enabled())
     }

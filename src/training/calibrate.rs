@@ -4,8 +4,8 @@
 //! out of the noise, the room to all that is at rest (leakage and furniture included), the noise in the median cell.
 //! Training refines them.
 //!
-//! Effects stay in place meanwhile. What they add to silence (leakage, offsets, spurs) is taken out of both sides, so that
-//! no level is measured on it.
+//! Effects stay in place meanwhile. What they add to silence (leakage, offsets, spurs) is taken out of the recording and left
+//! out of the simulation, so that no level is measured on it.
 
 use std::f64::consts::LN_2;
 
@@ -126,17 +126,15 @@ impl Levels {
         let mut measured = recording.target(frame, &device)?;
         let view = scene.view(frame)?;
         let Surfaces { body, room } = surfaces.clone();
-        let whole = |surfaces: Surfaces| plain.clean_signal(scene, &view, &surfaces);
-        // What is there without body and room.
-        let added = (!plain.effects.is_empty()).then(|| whole(Surfaces { body: None, room: None }));
-        let less = |signal: Complex<4>| match &added {
-            Some(added) => signal.sub(added.clone()),
-            None => signal,
-        };
-        if let Some(added) = added.clone() {
+        // What is there without body and room. It is left out of the simulation, not taken away again: before the gains are
+        // known, body and room may be smaller than its rounding.
+        if !plain.effects.is_empty() {
+            let added = plain.clean_signal(scene, &view, &Surfaces { body: None, room: None });
             measured = measured.sub(sampled(added));
         }
-        let alone = |surfaces: Surfaces| less(whole(surfaces));
+        let mut silent = plain.clone();
+        silent.effects.switch_off_additive();
+        let alone = |surfaces: Surfaces| silent.clean_signal(scene, &view, &surfaces);
         let of_body = sampled(alone(Surfaces { body, room: None }));
         let of_room = sampled(alone(Surfaces { body: None, room }));
 
