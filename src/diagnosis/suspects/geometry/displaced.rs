@@ -2,7 +2,8 @@
 //!
 //! Every change is judged by how well the powers of the body's speckle fit it, with the parts' amplitudes fitted anew each
 //! time, so that no reflectivity can be the cause. What remains of a real body's laws of reflection and visibility that the
-//! power model does not know shifts the body by up to 3.5 mm and 1.4 ms (measured on recordings without any such effect): a change must exceed these floors, frame after frame.
+//! power model does not know shifts the body by up to 4 mm and 1.4 ms (practice recordings without any such effect, which also
+//! helped to choose the lobes and these floors): a change must exceed these floors, frame after frame.
 
 use std::sync::Arc;
 
