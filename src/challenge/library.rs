@@ -35,9 +35,9 @@ pub struct Graded {
 }
 
 impl Graded {
-    /// `level` 0 is the weakest, 1 the strongest; below 0 it becomes weaker still.
+    /// `level` 0 is the weakest, 1 the strongest, also of what is above; below 0 it becomes weaker still.
     pub fn strength(&self, level: f64) -> f64 {
-        self.weakest * (self.strongest / self.weakest).powf(level)
+        self.weakest * (self.strongest / self.weakest).powf(level.min(1.0))
     }
 }
 
