@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::cube::Loaded;
 use super::evidence::{Evidence, hann};
 use super::prediction::Point;
+use super::support::Support;
 use crate::radar::Radar;
 
 /// One thing that was checked.
@@ -113,28 +114,27 @@ fn rail(evidence: &Evidence) -> Check {
     )
 }
 
-/// Static echoes have positive beat frequencies; with I and Q swapped they would have negative ones.
+/// Static echoes lie at the room's delays; with I and Q swapped their mirror images do. Nothing can be said of an
+/// unknown room: its far returns may fill the upper half of the spectrum.
 fn iq_order(evidence: &Evidence) -> Check {
-    let samples = evidence.cube.dims[4];
-    let (mut positive, mut negative) = (0.0, 0.0);
-    for channel in 0..evidence.cube.channels() {
-        let spectrum = spectrum(&evidence.still()[channel * samples..][..samples]);
-        // The lowest bins belong to leakage and offsets, which have no sign.
-        for (bin, value) in spectrum.iter().enumerate().skip(6).take(samples.saturating_sub(12)) {
-            if 2 * bin < samples { positive += value.norm_sqr() } else { negative += value.norm_sqr() }
-        }
+    let expected = "static echoes at the beat frequencies of the room's ranges";
+    if evidence.room.is_none() {
+        return Check::new("iq_order", expected, "cannot be told without the room's size", true);
     }
-    let ratio = 10.0 * (positive.max(1e-30) / negative.max(1e-30)).log10();
-    // Far returns fill the upper half of a long or unknown room: only a room that should be in the lower half tells.
-    let reaches = far_m(evidence).is_some_and(|far| far < 0.45 * evidence.radar.max_range_m());
-    let ok = ratio > -CLEARLY_DB || !reaches;
+    let support = Support::new(&evidence.radar, evidence.room.as_ref());
+    let outside = |chirp: &[Complex64]| -> f64 {
+        support.project(chirp).iter().zip(chirp).map(|(inside, value)| (value - inside).norm_sqr()).sum()
+    };
+    let samples = evidence.cube.dims[4];
+    let (mut as_is, mut swapped) = (0.0, 0.0);
+    for chirp in evidence.still().chunks_exact(samples) {
+        as_is += outside(chirp);
+        swapped += outside(&chirp.iter().map(Complex64::conj).collect::<Vec<_>>());
+    }
+    let db = 10.0 * (as_is.max(1e-30) / swapped.max(1e-30)).log10();
+    let ok = db < CLEARLY_DB;
     let hint = if ok { "" } else { ": I and Q are swapped, or the samples conjugated" };
-    Check::new(
-        "iq_order",
-        "static echoes at positive beat frequencies",
-        format!("{ratio:+.1} dB of the static energy on the positive side{hint}"),
-        ok,
-    )
+    Check::new("iq_order", expected, format!("{db:+.1} dB left outside them, against the conjugated samples{hint}"), ok)
 }
 
 fn far_m(evidence: &Evidence) -> Option<f64> {

@@ -26,11 +26,12 @@ const LEAST_POWER: f64 = 0.25;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
+    /// `wrapped`: beat frequencies above half the sample rate count as negative.
     Highpass {
         order: i32,
         from_rest: bool,
+        wrapped: bool,
     },
-    /// `wrapped`: beat frequencies above half the sample rate count as negative.
     Lowpass {
         wrapped: bool,
     },
@@ -57,8 +58,8 @@ impl Shape {
         };
         (0..samples)
             .map(|bin| match self {
-                Self::Highpass { order, .. } => {
-                    let ratio = Complex64::I * (hertz(bin, true) / value);
+                Self::Highpass { order, wrapped, .. } => {
+                    let ratio = Complex64::I * (hertz(bin, wrapped) / value);
                     (ratio / (one + ratio)).powi(order)
                 }
                 Self::Lowpass { wrapped } => one / (one + Complex64::I * (hertz(bin, wrapped) / value)),
@@ -79,13 +80,16 @@ impl Shape {
     }
 }
 
-const SHAPES: [Shape; 10] = [
-    Shape::Highpass { order: 1, from_rest: false },
-    Shape::Highpass { order: 2, from_rest: false },
-    Shape::Highpass { order: 3, from_rest: false },
-    Shape::Highpass { order: 1, from_rest: true },
-    Shape::Highpass { order: 2, from_rest: true },
-    Shape::Highpass { order: 3, from_rest: true },
+const SHAPES: [Shape; 13] = [
+    Shape::Highpass { order: 1, from_rest: false, wrapped: true },
+    Shape::Highpass { order: 2, from_rest: false, wrapped: true },
+    Shape::Highpass { order: 3, from_rest: false, wrapped: true },
+    Shape::Highpass { order: 1, from_rest: false, wrapped: false },
+    Shape::Highpass { order: 2, from_rest: false, wrapped: false },
+    Shape::Highpass { order: 3, from_rest: false, wrapped: false },
+    Shape::Highpass { order: 1, from_rest: true, wrapped: true },
+    Shape::Highpass { order: 2, from_rest: true, wrapped: true },
+    Shape::Highpass { order: 3, from_rest: true, wrapped: true },
     Shape::Lowpass { wrapped: true },
     Shape::Lowpass { wrapped: false },
     Shape::Delay { wrapped: true },
@@ -196,7 +200,7 @@ pub fn find(evidence: &Evidence, field: &Field, without: &[Vec<Complex64>]) -> O
 
 fn described(shape: Shape, value: f64, error: f64) -> (Vec<Estimate>, String) {
     match shape {
-        Shape::Highpass { order, from_rest } => (
+        Shape::Highpass { order, from_rest, .. } => (
             vec![
                 Estimate::normal("corner_hz", value, error),
                 Estimate { name: "order", values: vec![order.into()], ci90: vec![[f64::from(order), f64::from(order)]] },
@@ -270,7 +274,7 @@ impl Process {
             })
             .collect();
         match shape {
-            Some((Shape::Highpass { order, from_rest: true }, value)) => {
+            Some((Shape::Highpass { order, from_rest: true, .. }, value)) => {
                 let power: f64 = self.tones.iter().map(|(_, density)| density).sum();
                 columns.extend((0..order).map(|exponent| decay(value / rate, exponent, samples, power.sqrt())));
             }
@@ -323,7 +327,7 @@ fn decay(turns_per_sample: f64, power: i32, samples: usize, amplitude: f64) -> V
 fn space(field: &Field, shape: Shape, value: f64, rate: f64) -> Vec<Vec<Complex64>> {
     let inside = &field.support.inside;
     let samples = inside[0].len();
-    if let Shape::Highpass { order, from_rest: true } = shape {
+    if let Shape::Highpass { order, from_rest: true, .. } = shape {
         let transients = (0..order).map(|power| decay(value / rate, power, samples, 1.0));
         return inside.iter().cloned().chain(transients).collect();
     }
