@@ -7,6 +7,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 
+use super::codes::{self, Component};
 use super::cube::{Cube, Loaded, Split};
 use super::power::PowerModel;
 use super::prediction::BodyPrediction;
@@ -33,6 +34,8 @@ pub struct Evidence {
     /// Ids that were accepted, oldest first.
     pub accepted: Vec<&'static str>,
     pub extremes: [f64; 2],
+    /// Of the raw samples; none where they are no whole numbers.
+    pub codes: Option<Arc<Vec<Component>>>,
     noise: OnceLock<Vec<f64>>,
     still: OnceLock<Vec<Complex64>>,
     maps: OnceLock<Vec<f32>>,
@@ -42,6 +45,7 @@ pub struct Evidence {
 impl Evidence {
     pub fn new(loaded: Loaded, room: Option<Room>, body: Option<BodyPrediction>) -> Self {
         let Loaded { cube, radar, split, starts_s, extremes } = loaded;
+        let codes = codes::count(&cube, &split, extremes).map(Arc::new);
         Self {
             radar,
             room,
@@ -51,6 +55,7 @@ impl Evidence {
             body,
             accepted: vec![],
             extremes,
+            codes,
             noise: OnceLock::new(),
             still: OnceLock::new(),
             maps: OnceLock::new(),

@@ -1,5 +1,6 @@
 //! One file per family of effects: each looks at the evidence and says what it has found.
 
+pub mod codes;
 pub mod geometry;
 pub mod paths;
 pub mod receiver;
@@ -30,6 +31,8 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect { name: "noise", find: receiver::noise::find },
     Suspect { name: "droop", find: receiver::droop::find },
     Suspect { name: "slow time", find: slow::find },
+    Suspect { name: "one channel", find: slow::channels::find },
+    Suspect { name: "converter's codes", find: codes::find },
     Suspect { name: "chirp", find: waveform::find },
     Suspect { name: "vital signs", find: vital::find },
     Suspect { name: "untracked movers", find: untracked::find },

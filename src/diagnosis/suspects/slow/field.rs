@@ -52,7 +52,7 @@ pub struct Series {
 
 /// Four-term Blackman–Harris window of unit energy: the body is up to 50 dB above the noise, and its side lobes must
 /// not reach the static returns at other ranges.
-fn window(length: usize) -> Vec<f64> {
+pub(super) fn window(length: usize) -> Vec<f64> {
     let terms = [0.35875, -0.48829, 0.14128, -0.01168];
     let raw: Vec<f64> = (0..length)
         .map(|n| {

@@ -5,11 +5,13 @@
 //! functions of the chirp's place in its frame, and randomness.
 
 mod candidates;
+pub mod channels;
 pub mod drift;
 pub mod field;
 pub mod lines;
 pub mod random;
 pub mod settling;
+pub mod steady;
 #[cfg(test)]
 mod tests;
 mod undo;

@@ -137,3 +137,26 @@ fn random_chirps_are_phase_noise_or_jitter() {
     assert_eq!(found.id, Some("chirp_start_jitter"));
     within(&found, "jitter_s", 1.2e-8);
 }
+
+#[test]
+fn one_receiver_that_hops_is_told_from_all_that_drift() {
+    let hopping = |change: bool| {
+        let mut evidence = evidence(11, |_, _, _, _| Complex64::ONE);
+        evidence.cube.each_chirp(|[frame, channel, _], chirp| {
+            let factor = if change && channel == 2 && [0, 3, 4, 6, 10].contains(&frame) { 1.05 } else { 1.0 };
+            chirp.iter_mut().for_each(|value| *value *= factor);
+        });
+        evidence.changed()
+    };
+    assert!(super::channels::find(&hopping(false)).iter().all(|c| c.p_value > 5e-4));
+    let mut evidence_hopping = hopping(true);
+    let found = super::channels::find(&evidence_hopping);
+    assert!(found.len() == 1 && found[0].p_value < 1e-6 && found[0].gain > 10.0, "{found:?}");
+    assert_eq!(found[0].place.rx, Some(vec![2]));
+    let Correction::Samples(undo) = &found[0].correction else { panic!("no correction of samples") };
+    undo(&mut evidence_hopping.cube);
+    let again = super::channels::find(&evidence_hopping.changed());
+    assert!(again.iter().all(|c| c.p_value > 5e-4), "{again:?}");
+    let drifting = evidence(12, |_, frame, _, _| (1.0 + 0.01 * frame as f64).into());
+    assert!(super::channels::find(&drifting).iter().all(|c| c.p_value > 5e-4));
+}

@@ -1,0 +1,260 @@
+//! One receiver or transmitter whose gain changes from frame to frame while the others stay.
+//!
+//! The complex gain of the static returns, relative to that of the other channels, is estimated in every frame and in
+//! groups of ranges without movers. A gain is the same at all ranges: the nearer and the farther half of the static
+//! returns must each show it, and show the same.
+
+use std::f64::consts::LN_10;
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::steady::Steady;
+use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Rung};
+use crate::diagnosis::statistics;
+
+/// Fewest receivers or transmitters of which one can be told to be odd.
+const FEWEST: usize = 3;
+/// Bins between two groups, across which windowed noise is hardly correlated.
+const GAP: usize = 2;
+/// Correlation that the two halves of the ranges must have.
+const SAME: f64 = 0.8;
+/// Variance of a group's gain over that of independent bins: the window's noise bandwidth.
+const NEIGHBOURS: f64 = 2.0;
+/// Decibels of a natural logarithm of an amplitude.
+const DECIBEL: f64 = 20.0 / LN_10;
+
+/// Gains of one receiver or transmitter relative to the others.
+struct Relative {
+    members: Vec<usize>,
+    /// `[frame, group]` with inverse variances; zero where nothing can be said.
+    value: Vec<Complex64>,
+    weight: Vec<f64>,
+    groups: usize,
+}
+
+/// One gain per frame, from some groups.
+struct Series {
+    /// `[frame]`, about their mean.
+    value: Vec<Complex64>,
+    /// Inverse variance, by what the groups scatter.
+    weight: Vec<f64>,
+    /// Chance that they are equal.
+    p_value: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Axis {
+    Receiver(usize),
+    Transmitter(usize),
+}
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let [_, transmitters, receivers, ..] = evidence.cube.dims;
+    let mut units = vec![];
+    if receivers >= FEWEST {
+        units.extend((0..receivers).map(Axis::Receiver));
+    }
+    if transmitters >= FEWEST {
+        units.extend((0..transmitters).map(Axis::Transmitter));
+    }
+    if units.is_empty() {
+        return vec![];
+    }
+    let Some(steady) = Steady::new(evidence) else { return vec![] };
+    let tried = units.len() as f64;
+    let best = units
+        .iter()
+        .filter_map(|&unit| judged(evidence, &steady, unit))
+        .filter(|judged| judged.p_value < 0.01)
+        .max_by(|a, b| a.gain.total_cmp(&b.gain));
+    best.map(|judged| judged.candidate(evidence, tried)).into_iter().collect()
+}
+
+struct Judged {
+    unit: Axis,
+    members: Vec<usize>,
+    series: Series,
+    p_value: f64,
+    gain: f64,
+}
+
+fn judged(evidence: &Evidence, steady: &Steady, unit: Axis) -> Option<Judged> {
+    let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
+    let relative = Relative::new(steady, evidence.cube.dims[2], unit);
+    let all = relative.series(training, |_| true)?;
+    // The nearer and the farther half of what the groups know.
+    let known = |g: usize| training.iter().map(|&f| relative.weight[f * relative.groups + g]).sum::<f64>();
+    let total: f64 = (0..relative.groups).map(known).sum();
+    let mut sum = 0.0;
+    let near: Vec<bool> = (0..relative.groups)
+        .map(|g| {
+            sum += known(g);
+            sum - 0.5 * known(g) < 0.5 * total
+        })
+        .collect();
+    let halves = [relative.series(training, |g| near[g])?, relative.series(training, |g| !near[g])?];
+    if correlation(&halves, training) < SAME {
+        return None;
+    }
+    let p_value = halves[0].p_value.max(halves[1].p_value);
+    // Gains drawn from one law in every frame; its variance comes from the training frames.
+    let seen: Vec<usize> = training.iter().copied().filter(|&f| all.weight[f] > 0.0).collect();
+    let mean = |of: &dyn Fn(usize) -> f64| seen.iter().map(|&f| of(f)).sum::<f64>() / seen.len() as f64;
+    let variance = (mean(&|f| all.value[f].norm_sqr()) - mean(&|f| 1.0 / all.weight[f])).max(0.0);
+    let gain = held_out
+        .iter()
+        .map(|&f| {
+            let ratio = 1.0 + variance * all.weight[f];
+            all.value[f].norm_sqr() * all.weight[f] * (1.0 - 1.0 / ratio) - ratio.ln()
+        })
+        .sum();
+    Some(Judged { unit, members: relative.members, series: all, p_value, gain })
+}
+
+/// Of two halves' gains over some frames: one where both change alike.
+fn correlation(halves: &[Series; 2], frames: &[usize]) -> f64 {
+    let sums = frames.iter().filter(|&&f| halves.iter().all(|h| h.weight[f] > 0.0)).fold([0.0; 3], |sums, &f| {
+        let [a, b] = [halves[0].value[f], halves[1].value[f]];
+        [sums[0] + (a * b.conj()).re, sums[1] + a.norm_sqr(), sums[2] + b.norm_sqr()]
+    });
+    sums[0] / (sums[1] * sums[2]).sqrt().max(f64::MIN_POSITIVE)
+}
+
+impl Relative {
+    fn new(steady: &Steady, receivers: usize, unit: Axis) -> Self {
+        let belongs = |channel: usize| match unit {
+            Axis::Receiver(rx) => channel % receivers == rx,
+            Axis::Transmitter(tx) => channel / receivers == tx,
+        };
+        let (members, others): (Vec<usize>, Vec<usize>) = (0..steady.channels).partition(|&c| belongs(c));
+        let width = (steady.bins / 16).max(4 + GAP);
+        let groups = steady.bins / width;
+        let power = |bin: usize| (0..steady.channels).map(|c| steady.still[c * steady.bins + bin].norm_sqr()).sum::<f64>();
+        // What is lost in the noise teaches nothing.
+        let strong: Vec<bool> = (0..steady.bins).map(|bin| power(bin) > 3.0 * steady.channels as f64).collect();
+        let (mut value, mut weight) = (vec![], vec![]);
+        for frame in 0..steady.frames {
+            for group in 0..groups {
+                let bins: Vec<usize> =
+                    (group * width..(group + 1) * width - GAP).filter(|&bin| strong[bin] && steady.quiet(frame, bin)).collect();
+                let gain = |channels: &[usize]| {
+                    let (mut dot, mut own) = (Complex64::ZERO, 0.0);
+                    for &channel in channels {
+                        for &bin in &bins {
+                            let still = steady.still[channel * steady.bins + bin];
+                            dot += still.conj() * steady.deviation(frame, channel, bin);
+                            own += still.norm_sqr();
+                        }
+                    }
+                    (dot / own.max(f64::MIN_POSITIVE), own)
+                };
+                let ((mine, my_own), (theirs, their_own)) = (gain(&members), gain(&others));
+                let known = my_own > 0.0 && their_own > 0.0;
+                value.push(if known { mine - theirs } else { Complex64::ZERO });
+                weight.push(if known { 1.0 / (NEIGHBOURS * (1.0 / my_own + 1.0 / their_own)) } else { 0.0 });
+            }
+        }
+        Self { members, value, weight, groups }
+    }
+
+    /// None where too few frames or groups are known.
+    fn series(&self, training: &[usize], wanted: impl Fn(usize) -> bool) -> Option<Series> {
+        let cells = |frame: usize| {
+            (0..self.groups).filter(|&g| wanted(g)).map(move |g| frame * self.groups + g).filter(|&i| self.weight[i] > 0.0)
+        };
+        let frames = self.value.len() / self.groups;
+        let mut weight: Vec<f64> = (0..frames).map(|f| cells(f).map(|i| self.weight[i]).sum()).collect();
+        let mut value: Vec<Complex64> = (0..frames)
+            .map(|f| cells(f).map(|i| self.value[i] * self.weight[i]).sum::<Complex64>() / weight[f].max(f64::MIN_POSITIVE))
+            .collect();
+        let total: f64 = training.iter().map(|&f| weight[f]).sum();
+        let mean = training.iter().map(|&f| value[f] * weight[f]).sum::<Complex64>() / total.max(f64::MIN_POSITIVE);
+        let (mut between, mut within, mut above, mut below) = (0.0, 0.0, -1.0, 0.0);
+        for &frame in training.iter().filter(|&&f| weight[f] > 0.0) {
+            between += weight[frame] * (value[frame] - mean).norm_sqr();
+            above += 1.0;
+            for i in cells(frame) {
+                within += self.weight[i] * (self.value[i] - value[frame]).norm_sqr();
+                below += 1.0;
+            }
+            below -= 1.0;
+        }
+        if above < 4.0 || below < 4.0 {
+            return None;
+        }
+        // Ranges that scatter by more than the noise (the body's slow parts) make everything less sure.
+        let excess = (within / below).max(1.0);
+        let ratio = between / above / excess;
+        let law = FisherSnedecor::new(2.0 * above, 2.0 * below);
+        let p_value = if ratio > 0.0 { law.map_or(1.0, |law| law.sf(ratio)) } else { 1.0 };
+        value.iter_mut().for_each(|v| *v -= mean);
+        weight.iter_mut().for_each(|w| *w /= excess);
+        Some(Series { value, weight, p_value })
+    }
+}
+
+impl Judged {
+    fn candidate(&self, evidence: &Evidence, tried: f64) -> Candidate {
+        let [_, _, _, loops, samples] = evidence.cube.dims;
+        let known: Vec<usize> = (0..self.series.value.len()).filter(|&f| self.series.weight[f] > 0.0).collect();
+        let gains: Vec<Option<Complex64>> = (0..self.series.value.len())
+            .map(|f| (self.series.weight[f] > 0.0).then(|| Complex64::ONE + self.series.value[f]))
+            .map(|gain| gain.filter(|g| g.norm() > 0.05))
+            .collect();
+        let decibel: Vec<f64> = known.iter().map(|&f| DECIBEL * (1.0 + self.series.value[f]).norm().max(1e-3).ln()).collect();
+        let degrees: Vec<f64> = known.iter().map(|&f| (1.0 + self.series.value[f]).arg().to_degrees()).collect();
+        let span = |values: &[f64]| {
+            let [low, high] = values.iter().fold([f64::MAX, f64::MIN], |[l, h], &v| [l.min(v), h.max(v)]);
+            high - low
+        };
+        let error = known.iter().map(|&f| (0.5 / self.series.weight[f]).sqrt()).sum::<f64>() / known.len().max(1) as f64;
+        let turn = span(&degrees);
+        let phase = if turn > 6.0 * error.to_degrees() { format!(", and its phase by {turn:.1}°") } else { String::new() };
+        let (what, index, others) = match self.unit {
+            Axis::Receiver(rx) => ("receiver", rx, "receivers"),
+            Axis::Transmitter(tx) => ("transmitter", tx, "transmitters"),
+        };
+        let own: f64 = self.members.iter().flat_map(|&c| &evidence.still()[c * samples..][..samples]).map(|v| v.norm_sqr()).sum();
+        let square: f64 = known.iter().map(|&f| self.series.value[f].norm_sqr()).sum();
+        let times: Vec<f64> = known.iter().map(|&f| evidence.starts_s[f]).collect();
+        let members = self.members.clone();
+        Candidate {
+            id: None,
+            behaves_like: "slow-time gain of one channel",
+            estimates: vec![],
+            choice: None,
+            place: Place {
+                rx: matches!(self.unit, Axis::Receiver(_)).then(|| vec![index]),
+                tx: matches!(self.unit, Axis::Transmitter(_)).then(|| vec![index]),
+                ..Place::at("receiver")
+            },
+            p_value: statistics::corrected(self.p_value, tried).max(f64::MIN_POSITIVE),
+            gain: self.gain,
+            rung: Rung::F,
+            look_alikes: vec![],
+            statement: format!(
+                "The gain of {what} {index} changes from frame to frame, over {:.2} ± {:.2} dB{phase}, at all ranges alike, while \
+                 the other {others} stay.",
+                span(&decibel),
+                1.645 * DECIBEL * error * std::f64::consts::SQRT_2
+            ),
+            curve: Some(Curve {
+                title: format!("Static returns in {what} {index} relative to the other {others}"),
+                x_label: "time, s".into(),
+                y_label: "gain, dB".into(),
+                series: vec![("measured".into(), times, decibel)],
+            }),
+            energy: own * square * loops as f64,
+            correction: Correction::Samples(Arc::new(move |cube| {
+                cube.each_chirp(|[frame, channel, _], chirp| {
+                    if let Some(gain) = gains[frame].filter(|_| members.contains(&channel)) {
+                        chirp.iter_mut().for_each(|value| *value /= gain);
+                    }
+                });
+            })),
+        }
+    }
+}
