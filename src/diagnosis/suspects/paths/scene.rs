@@ -31,6 +31,8 @@ pub struct Scene<'a> {
     pub taken: Vec<bool>,
     /// Expected power in the other cells: noise, and what other imperfections smear along a range or a Doppler.
     pub base: Vec<f32>,
+    /// By range, how many times [`Evidence::noise`] the variance of noise in complex maps is that powers count as one.
+    pub shape: Vec<f64>,
 }
 
 impl<'a> Scene<'a> {
@@ -59,8 +61,14 @@ impl<'a> Scene<'a> {
                 (taken, base)
             })
             .unzip();
+        let (taken, mut base) = (taken.concat(), base.concat());
+        let levels = noise_levels(maps, &taken, &evidence.split.training, loops, samples, bins);
+        base.par_chunks_exact_mut(samples).for_each(|row| {
+            row.iter_mut().zip(&levels).for_each(|(base, level)| *base = base.max(*level as f32));
+        });
         let channels = evidence.cube.channels() as f64;
-        Some(Self { evidence, model, loops, samples, bins, channels, taken: taken.concat(), base: base.concat() })
+        let shape = shape(evidence);
+        Some(Self { evidence, model, loops, samples, bins, channels, taken, base, shape })
     }
 
     pub fn size(&self) -> usize {
@@ -144,6 +152,40 @@ impl<'a> Scene<'a> {
         let signed = if bin >= 0.5 * loops { bin - loops } else { bin };
         signed / self.model.cells.doppler_per_mps
     }
+}
+
+/// The noise's level in each range bin over that of the others, from the quieter of the free cells: where a filter that
+/// was undone ends abruptly, neighbouring bins do not tell.
+fn noise_levels(maps: &[f32], taken: &[bool], frames: &[usize], loops: usize, samples: usize, bins: usize) -> Vec<f64> {
+    const FEWEST_CELLS: usize = 48;
+    let quiet = |range: usize| {
+        let cells = frames.iter().flat_map(|frame| (0..loops).map(move |doppler| (frame * loops + doppler) * samples + range));
+        let mut powers: Vec<f64> = cells.filter(|&cell| !taken[cell]).map(|cell| f64::from(maps[cell])).collect();
+        let index = powers.len() * 35 / 100;
+        (powers.len() >= FEWEST_CELLS).then(|| *powers.select_nth_unstable_by(index, f64::total_cmp).1)
+    };
+    let quiet: Vec<Option<f64>> =
+        (0..samples).into_par_iter().map(|range| if range < bins { quiet(range) } else { None }).collect();
+    let usual = median(&mut quiet.iter().copied().flatten().collect::<Vec<_>>()).max(f64::MIN_POSITIVE);
+    quiet.iter().map(|level| level.map_or(1.0, |level| level / usual)).collect()
+}
+
+/// What [`Evidence::maps`] divides a range bin's powers by besides the noise's variance.
+fn shape(evidence: &Evidence) -> Vec<f64> {
+    let samples = evidence.cube.dims[4];
+    let count = evidence.cube.channels() as f64;
+    let mut power = vec![0.0; samples];
+    for (channel, noise) in evidence.noise().iter().enumerate() {
+        let map = evidence.range_doppler(0, channel);
+        let weight = 1.0 / (noise.max(f64::MIN_POSITIVE) * count);
+        for (cell, value) in map.iter().enumerate() {
+            power[cell % samples] += value.norm_sqr() * weight;
+        }
+    }
+    let mut flat = vec![0.0f64; samples];
+    let first = &evidence.maps()[..evidence.cube.dims[3] * samples];
+    first.iter().enumerate().for_each(|(cell, &value)| flat[cell % samples] += f64::from(value));
+    power.iter().zip(flat).map(|(power, flat)| if flat > 0.0 && *power > 0.0 { power / flat } else { 1.0 }).collect()
 }
 
 /// Range bins that the body has power in during some frame.
