@@ -40,7 +40,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let again = |id: &str| evidence.accepted.contains(&id);
     found.retain(|found| match found.id {
         Some(id) if again(id) => MANY.contains(&id) && found.gain > LEAST_GAIN_AGAIN,
-        Some(_) => true,
+        Some(id) => !MANY.contains(&id) || !MANY.into_iter().any(again) || found.gain > LEAST_GAIN_UNNAMED,
         None => !MANY.into_iter().any(again) || found.gain > LEAST_GAIN_AGAIN,
     });
     found
