@@ -72,7 +72,7 @@ fn matches(scene: &Scene, template: impl Fn(usize, usize) -> Vec<Complex64> + Sy
                 let measured = scene.evidence.range_doppler(frame, channel);
                 let map = template(frame, channel);
                 for cell in (0..taken.len()).filter(|&cell| !taken[cell]) {
-                    let weight = 1.0 / (noise.max(f64::MIN_POSITIVE) * f64::from(base[cell]));
+                    let weight = 1.0 / (noise.max(f64::MIN_POSITIVE) * scene.shape[cell % scene.samples] * f64::from(base[cell]));
                     sum.product += map[cell].conj() * measured[cell] * weight;
                     sum.energy += map[cell].norm_sqr() * weight;
                 }
@@ -266,7 +266,8 @@ fn shifted_matches(scene: &Scene, shifts: usize) -> Vec<Vec<Match>> {
                             continue;
                         }
                         let value = if shift % 2 == 0 { map[source] } else { between[source] };
-                        let weight = 1.0 / (noise.max(f64::MIN_POSITIVE) * f64::from(base[target]));
+                        let weight =
+                            1.0 / (noise.max(f64::MIN_POSITIVE) * scene.shape[target % samples] * f64::from(base[target]));
                         sums[shift - 1].product += value.conj() * map[target] * weight;
                         sums[shift - 1].energy += value.norm_sqr() * weight;
                     }

@@ -7,6 +7,7 @@ mod mover;
 mod pendulum;
 mod removal;
 mod scene;
+mod still_point;
 mod track;
 
 #[cfg(test)]
@@ -22,6 +23,8 @@ const AGREEING: f64 = 0.6;
 const LEAST_GAIN: f64 = 6.0;
 /// Of a track that follows no law of motion: remains of a strong path that was taken out look like that.
 const LEAST_GAIN_UNNAMED: f64 = 25.0;
+/// Of a second path: it must be no remains of the first.
+const LEAST_GAIN_AGAIN: f64 = 50.0;
 /// Kinds of answers that this family may give: every one is a chance to be wrong.
 const TRIED: f64 = 6.0;
 
@@ -30,10 +33,24 @@ const MANY: [&str; 3] = ["wall_ghost", "floor_bounce", "moving_reflector"];
 
 /// Mirror images of the body at the room's boundaries, and movers that are none.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let Some(scene) = Scene::new(evidence) else { return vec![] };
-    let ghosts = ghost::ghosts(&scene);
+    let mut found: Vec<Candidate> = still_point::find(evidence).into_iter().collect();
+    if let Some(scene) = Scene::new(evidence) {
+        found.extend(moving(&scene));
+    }
+    let again = |id: &str| evidence.accepted.contains(&id);
+    found.retain(|found| match found.id {
+        Some(id) if again(id) => MANY.contains(&id) && found.gain > LEAST_GAIN_AGAIN,
+        Some(id) => !MANY.contains(&id) || !MANY.into_iter().any(again) || found.gain > LEAST_GAIN_UNNAMED,
+        None => !MANY.into_iter().any(again) || found.gain > LEAST_GAIN_AGAIN,
+    });
+    found
+}
+
+/// Paths whose lengths change.
+fn moving(scene: &Scene) -> Vec<Candidate> {
+    let ghosts = ghost::ghosts(scene);
     let boundaries = ghosts.len().max(1) as f64;
-    let mover = track::strongest(&scene).and_then(|track| mover::Mover::new(&scene, track));
+    let mover = track::strongest(scene).and_then(|track| mover::Mover::new(scene, track));
     let mover_gain = mover.as_ref().map_or(0.0, |mover| mover.gain);
     let best = ghosts
         .iter()
@@ -41,14 +58,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         .max_by(|a, b| a.gain.total_cmp(&b.gain));
     let mut found = vec![];
     match (best, mover) {
-        (Some(ghost), _) if ghost.gain > mover_gain => found.push(image::candidate(&scene, ghost, &ghosts, TRIED * boundaries)),
+        (Some(ghost), _) if ghost.gain > mover_gain => found.push(image::candidate(scene, ghost, &ghosts, TRIED * boundaries)),
         (_, Some(mover)) if mover.gain > if mover.id.is_some() { LEAST_GAIN } else { LEAST_GAIN_UNNAMED } => {
-            found.push(mover.candidate(&scene, TRIED))
+            found.push(mover.candidate(scene, TRIED))
         }
         _ => {}
     }
-    let echoes = [echo::multibounce(&scene, TRIED), echo::object_radar_object(&scene, TRIED)];
+    let echoes = [echo::multibounce(scene, TRIED), echo::object_radar_object(scene, TRIED)];
     found.extend(echoes.into_iter().flatten());
-    found.retain(|found| found.id.is_none_or(|id| MANY.contains(&id) || !evidence.accepted.contains(&id)));
     found
 }

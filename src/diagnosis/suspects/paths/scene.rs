@@ -15,6 +15,8 @@ const DOPPLER_MARGIN: i64 = 2;
 const SIDELOBE_SAFETY: f64 = 10.0;
 /// Sidelobes below this share of the noise are nothing.
 const SIDELOBE_LEVEL: f64 = 0.3;
+/// Whose undoing leaves leakage of the body at fixed ranges.
+const FILTERS: [&str; 2] = ["if_highpass", "if_lowpass"];
 /// Σ |correlation|² of neighbouring cells of two Hann windows: so many cells are one independent value.
 pub const CELLS_PER_VALUE: f64 = 3.78;
 
@@ -31,6 +33,8 @@ pub struct Scene<'a> {
     pub taken: Vec<bool>,
     /// Expected power in the other cells: noise, and what other imperfections smear along a range or a Doppler.
     pub base: Vec<f32>,
+    /// By range, how many times [`Evidence::noise`] the variance of noise in complex maps is that powers count as one.
+    pub shape: Vec<f64>,
 }
 
 impl<'a> Scene<'a> {
@@ -59,8 +63,17 @@ impl<'a> Scene<'a> {
                 (taken, base)
             })
             .unzip();
+        let (taken, mut base) = (taken.concat(), base.concat());
+        let levels = noise_levels(maps, &taken, &evidence.split.training, loops, samples, bins);
+        base.par_chunks_exact_mut(samples).for_each(|row| {
+            row.iter_mut().zip(&levels).for_each(|(base, level)| *base = base.max(*level as f32));
+        });
+        if FILTERS.iter().any(|filter| evidence.accepted.contains(filter)) {
+            raise_for_leakage(&mut base, maps, &taken, &model, frames, loops, samples);
+        }
         let channels = evidence.cube.channels() as f64;
-        Some(Self { evidence, model, loops, samples, bins, channels, taken: taken.concat(), base: base.concat() })
+        let shape = shape(evidence);
+        Some(Self { evidence, model, loops, samples, bins, channels, taken, base, shape })
     }
 
     pub fn size(&self) -> usize {
@@ -144,6 +157,73 @@ impl<'a> Scene<'a> {
         let signed = if bin >= 0.5 * loops { bin - loops } else { bin };
         signed / self.model.cells.doppler_per_mps
     }
+}
+
+/// The noise's level in each range bin over that of the others, from the quieter of the free cells: where a filter that
+/// was undone ends abruptly, neighbouring bins do not tell.
+fn noise_levels(maps: &[f32], taken: &[bool], frames: &[usize], loops: usize, samples: usize, bins: usize) -> Vec<f64> {
+    const FEWEST_CELLS: usize = 48;
+    let quiet = |range: usize| {
+        let cells = frames.iter().flat_map(|frame| (0..loops).map(move |doppler| (frame * loops + doppler) * samples + range));
+        let mut powers: Vec<f64> = cells.filter(|&cell| !taken[cell]).map(|cell| f64::from(maps[cell])).collect();
+        let index = powers.len() * 35 / 100;
+        (powers.len() >= FEWEST_CELLS).then(|| *powers.select_nth_unstable_by(index, f64::total_cmp).1)
+    };
+    let quiet: Vec<Option<f64>> =
+        (0..samples).into_par_iter().map(|range| if range < bins { quiet(range) } else { None }).collect();
+    let usual = median(&mut quiet.iter().copied().flatten().collect::<Vec<_>>()).max(f64::MIN_POSITIVE);
+    quiet.iter().map(|level| level.map_or(1.0, |level| level / usual)).collect()
+}
+
+/// Raises the base at ranges that show a share of whatever the body returns at the same Doppler, in most of the cells
+/// where that is strong. An undone filter ends abruptly where it would amplify too much; there a window's sidelobes no
+/// longer cancel.
+fn raise_for_leakage(
+    base: &mut [f32],
+    maps: &[f32],
+    taken: &[bool],
+    model: &PowerModel,
+    frames: usize,
+    loops: usize,
+    samples: usize,
+) {
+    const STRONG: f64 = 300.0;
+    const FEWEST_CELLS: usize = 12;
+    let mut body = vec![0.0f64; frames * loops];
+    for (row, body) in body.iter_mut().enumerate() {
+        let support = &model.support(row / loops)[row % loops * samples..][..samples];
+        let powers = &maps[row * samples..][..samples];
+        *body = support.iter().zip(powers).filter(|(support, _)| **support).map(|(_, &power)| f64::from(power)).sum();
+    }
+    let share = |range: usize| {
+        let rows = (0..frames * loops).filter(|&row| body[row] > STRONG && !taken[row * samples + range]);
+        let mut shares: Vec<f64> = rows.map(|row| (f64::from(maps[row * samples + range]) - 1.5).max(0.0) / body[row]).collect();
+        // The upper quartile: what leaks is speckle, and weak rows show none of it.
+        let index = shares.len() * 3 / 4;
+        if shares.len() < FEWEST_CELLS { 0.0 } else { *shares.select_nth_unstable_by(index, f64::total_cmp).1 }
+    };
+    let shares: Vec<f64> = (0..samples).into_par_iter().map(share).collect();
+    base.par_chunks_exact_mut(samples).zip(&body).for_each(|(row, body)| {
+        row.iter_mut().zip(&shares).for_each(|(base, share)| *base = base.max((1.0 + 3.0 * share * body) as f32));
+    });
+}
+
+/// What [`Evidence::maps`] divides a range bin's powers by besides the noise's variance.
+fn shape(evidence: &Evidence) -> Vec<f64> {
+    let samples = evidence.cube.dims[4];
+    let count = evidence.cube.channels() as f64;
+    let mut power = vec![0.0; samples];
+    for (channel, noise) in evidence.noise().iter().enumerate() {
+        let map = evidence.range_doppler(0, channel);
+        let weight = 1.0 / (noise.max(f64::MIN_POSITIVE) * count);
+        for (cell, value) in map.iter().enumerate() {
+            power[cell % samples] += value.norm_sqr() * weight;
+        }
+    }
+    let mut flat = vec![0.0f64; samples];
+    let first = &evidence.maps()[..evidence.cube.dims[3] * samples];
+    first.iter().enumerate().for_each(|(cell, &value)| flat[cell % samples] += f64::from(value));
+    power.iter().zip(flat).map(|(power, flat)| if flat > 0.0 && *power > 0.0 { power / flat } else { 1.0 }).collect()
 }
 
 /// Range bins that the body has power in during some frame.

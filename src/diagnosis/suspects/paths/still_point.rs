@@ -1,0 +1,282 @@
+//! Something that stands still and stands out of the room's clutter (P1): in one range cell, from one direction, in every
+//! frame. What the clutter's own roughness may do is the null: its power in a cell is speckle about the mean of the
+//! ranges around it. Boundaries, edges and corners return more than their surroundings at known ranges, and are left out.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+
+use crate::diagnosis::evidence::{hann, transform};
+use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, Rung};
+use crate::radar::{Radar, SPEED_OF_LIGHT};
+use crate::room::{Boundary, Room};
+
+/// Ranges on either side that tell the clutter's mean, cells; those next to the peak belong to it.
+const AROUND: usize = 10;
+const PEAK: usize = 2;
+const FEWEST_AROUND: usize = 8;
+/// Neighbouring cells of a Hann window share their speckle.
+const CELLS_PER_RANGE: f64 = 2.0;
+/// Share of a cell's power that may differ from frame to frame: a body that pauses leaves more.
+const UNSTEADY: f64 = 0.15;
+/// Share of a cell's power that one direction must explain.
+const COHERENT: f64 = 0.8;
+/// Cells beside a known return of the room, and behind the nearest boundary, where clutter sets in.
+const BESIDE: f64 = 1.0;
+const ONSET: f64 = 4.0;
+const SINES: usize = 121;
+
+/// Mean chirps after a Hann window and a transform, `[channel][range]`.
+type Spectra = Vec<Vec<Complex64>>;
+
+struct Peak {
+    range_m: f64,
+    sine: Option<f64>,
+    /// Over the mean of the ranges around it.
+    ratio: f64,
+    around: Vec<usize>,
+    bin: usize,
+    p_value: f64,
+}
+
+pub fn find(evidence: &Evidence) -> Option<Candidate> {
+    let room = evidence.room.as_ref().filter(|room| !room.boundaries().is_empty())?;
+    let frames: Vec<Spectra> = (0..evidence.cube.dims[0]).map(|frame| spectra(&evidence.cube, &[frame])).collect();
+    let training = spectra(&evidence.cube, &evidence.split.training);
+    let steady = steady(&frames);
+    let (peak, tried) = strongest(evidence, room, &training, &steady)?;
+    let held_out = spectra(&evidence.cube, &evidence.split.held_out);
+    let ratio = beam(&evidence.radar, &held_out, peak.bin, peak.sine) / mean(&held_out, &peak.around);
+    let again = tail(ratio, peak.around.len());
+    let p_value = corrected(peak.p_value, tried * super::TRIED);
+    let gain = -(peak.p_value.max(again).max(1e-300) * tried).ln();
+    (gain > super::LEAST_GAIN && p_value < 1e-3).then(|| candidate(evidence, &peak, p_value, gain))
+}
+
+fn spectra(cube: &Cube, frames: &[usize]) -> Spectra {
+    let samples = cube.dims[4];
+    cube.still(frames).chunks_exact(samples).map(|mean| transform(mean, samples)).collect()
+}
+
+/// Whether a range returns the same in every frame.
+fn steady(frames: &[Spectra]) -> Vec<bool> {
+    let (channels, bins, count) = (frames[0].len(), frames[0][0].len(), frames.len() as f64);
+    (0..bins)
+        .map(|bin| {
+            let (mut power, mut spread) = (0.0, 0.0);
+            for channel in 0..channels {
+                let mean = frames.iter().map(|frame| frame[channel][bin]).sum::<Complex64>() / count;
+                power += mean.norm_sqr();
+                spread += frames.iter().map(|frame| (frame[channel][bin] - mean).norm_sqr()).sum::<f64>() / count;
+            }
+            spread < UNSTEADY * power
+        })
+        .collect()
+}
+
+/// The least likely cell under speckle, and how many were looked at.
+fn strongest(evidence: &Evidence, room: &Room, spectra: &Spectra, steady: &[bool]) -> Option<(Peak, f64)> {
+    let radar = &evidence.radar;
+    let cell_m = SPEED_OF_LIGHT * radar.sample_rate_hz / (2.0 * radar.slope_hz_per_s * radar.samples_per_chirp as f64);
+    let known = known_m(room);
+    let near_m = known.iter().copied().fold(f64::INFINITY, f64::min);
+    let far_m = known.iter().copied().fold(0.0, f64::max);
+    let bins = evidence.range_bins();
+    let inside = |bin: usize| (near_m..far_m).contains(&(bin as f64 * cell_m)) && bin + 1 < bins;
+    let directions: Vec<Option<f64>> =
+        if directed(radar) { (0..SINES).map(|i| Some(2.0 * i as f64 / (SINES - 1) as f64 - 1.0)).collect() } else { vec![None] };
+    let mut best: Option<Peak> = None;
+    let mut tried = 0.0;
+    for bin in (1..bins).filter(|&bin| inside(bin) && steady[bin]) {
+        let around: Vec<usize> =
+            (bin.saturating_sub(AROUND)..=bin + AROUND).filter(|&other| other.abs_diff(bin) > PEAK && inside(other)).collect();
+        if around.len() < FEWEST_AROUND {
+            continue;
+        }
+        tried += radar.rx_m.len() as f64;
+        let at = |bin: usize, sine: Option<f64>| beam(radar, spectra, bin, sine);
+        let Some(&sine) = directions.iter().max_by(|a, b| at(bin, **a).total_cmp(&at(bin, **b))) else { continue };
+        let [before, power, after] = [bin - 1, bin, bin + 1].map(|bin| at(bin, sine));
+        if power < before || power < after || power < COHERENT * mean(spectra, &[bin]) {
+            continue;
+        }
+        let range_m = (bin as f64 + hann_shift(before.sqrt(), power.sqrt(), after.sqrt())) * cell_m;
+        let beside = known.iter().any(|known| (known - range_m).abs() < BESIDE * cell_m);
+        if beside || range_m < near_m + ONSET * cell_m {
+            continue;
+        }
+        let ratio = power / mean(spectra, &around);
+        let p_value = tail(ratio, around.len());
+        if best.as_ref().is_none_or(|best| p_value < best.p_value) {
+            best = Some(Peak { range_m, sine, ratio, around, bin, p_value });
+        }
+    }
+    best.map(|best| (best, tried))
+}
+
+/// Probability that speckle exceeds so many times the mean of its neighbours (one draw over a mean of draws: F law).
+fn tail(ratio: f64, around: usize) -> f64 {
+    let count = around as f64 / CELLS_PER_RANGE;
+    (1.0 + ratio / count).powf(-count)
+}
+
+/// Mean power of a channel over some ranges.
+fn mean(spectra: &Spectra, bins: &[usize]) -> f64 {
+    let sum: f64 = spectra.iter().flat_map(|channel| bins.iter().map(|&bin| channel[bin].norm_sqr())).sum();
+    (sum / (spectra.len() * bins.len().max(1)) as f64).max(f64::MIN_POSITIVE)
+}
+
+fn directed(radar: &Radar) -> bool {
+    radar.rx_m.iter().any(|at| (at[0] - radar.rx_m[0][0]).abs() > 0.1 * radar.wavelength_m())
+}
+
+/// Power per channel that arrives from a direction (x over range); the receivers of each transmitter add coherently.
+fn beam(radar: &Radar, spectra: &Spectra, bin: usize, sine: Option<f64>) -> f64 {
+    let Some(sine) = sine else { return mean(spectra, &[bin]) };
+    let count = radar.rx_m.len();
+    let wave = std::f64::consts::TAU * (radar.carrier_hz() + 0.5 * radar.bandwidth_hz()) / SPEED_OF_LIGHT;
+    let power: f64 = spectra
+        .chunks_exact(count)
+        .map(|receivers| {
+            let parts = receivers.iter().zip(&radar.rx_m);
+            parts.map(|(values, at)| values[bin] * Complex64::cis(wave * at[0] * sine)).sum::<Complex64>().norm_sqr()
+        })
+        .sum();
+    power / (count * spectra.len()) as f64
+}
+
+/// Where a tone's peak lies beside a cell of a Hann window, from its amplitude and its neighbours'.
+fn hann_shift(before: f64, middle: f64, after: f64) -> f64 {
+    let side = if after >= before { 1.0 } else { -1.0 };
+    let neighbour = before.max(after);
+    side * ((2.0 * neighbour - middle) / (neighbour + middle).max(f64::MIN_POSITIVE)).clamp(-0.5, 0.5)
+}
+
+/// Ranges at which the bare room returns more than around them: feet of perpendiculars, edges and corners. What is
+/// behind the radar is not seen.
+fn known_m(room: &Room) -> Vec<f64> {
+    let axis = |boundaries: &[Boundary]| -> Vec<f64> {
+        std::iter::once(0.0).chain(boundaries.iter().filter_map(|&boundary| room.distance_m(boundary))).collect()
+    };
+    let across = axis(&[Boundary::Left, Boundary::Right]);
+    let along = axis(&[Boundary::Front]);
+    let up = axis(&[Boundary::Floor, Boundary::Ceiling]);
+    let mut known = vec![];
+    for x in &across {
+        for y in &along {
+            known.extend(up.iter().map(|z| (x * x + y * y + z * z).sqrt()).filter(|range| *range > 0.0));
+        }
+    }
+    known
+}
+
+fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candidate {
+    let radar = &evidence.radar;
+    let [frames, _, _, loops, samples] = evidence.cube.dims;
+    let cell_m = SPEED_OF_LIGHT * radar.sample_rate_hz / (2.0 * radar.slope_hz_per_s * samples as f64);
+    let rate = std::f64::consts::TAU * peak.range_m / cell_m / samples as f64;
+    let tone: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(rate * n as f64)).collect();
+    // Through the window, so that other ranges do not leak in.
+    let window: Vec<f64> = hann(samples).iter().map(|w| w * w).collect();
+    let amplitudes: Vec<Complex64> = (evidence.still().chunks_exact(samples))
+        .map(|mean| mean.iter().zip(&tone).zip(&window).map(|((value, tone), w)| value * tone.conj() * w).sum())
+        .collect();
+    let power: f64 = amplitudes.iter().map(Complex64::norm_sqr).sum();
+    let share = 1.0 / peak.ratio.sqrt();
+    let mut estimates = vec![];
+    let mut place = Place::at("scene");
+    place.range_m = Some([peak.range_m - 0.5 * cell_m, peak.range_m + 0.5 * cell_m]);
+    place.velocity_mps = Some([0.0, 0.0]);
+    let mut whereabouts = String::new();
+    if let Some(sine) = peak.sine {
+        let (at, range) = (radar.centre_m(), peak.range_m);
+        let error_m = 0.3 * cell_m;
+        let sine_error = 0.03 + 0.3 * share;
+        let (x, y) = (range * sine, range * (1.0 - sine * sine).max(0.0).sqrt());
+        // A line of receivers does not see the height; as far up or down as it is off, y is shorter.
+        let height = 1.0f64;
+        let bounds = |off: f64| (range * range * (1.0 - (sine.abs() + off).clamp(0.0, 1.0).powi(2))).max(0.0);
+        let lowest = (bounds(sine_error) - height * height).max(0.0).sqrt() - error_m;
+        estimates.push(Estimate {
+            name: "position_m",
+            values: vec![at[0] + x, at[1] + y, at[2]],
+            ci90: vec![
+                [at[0] + x - range * sine_error - error_m, at[0] + x + range * sine_error + error_m],
+                [at[1] + lowest, at[1] + bounds(-sine_error).sqrt() + error_m],
+                [at[2] - height, at[2] + height],
+            ],
+        });
+        place.position_m = Some([at[0] + x, at[1] + y, at[2]]);
+        let degrees = |sine: f64| sine.clamp(-1.0, 1.0).asin().to_degrees();
+        place.azimuth_deg = Some([degrees(sine - sine_error), degrees(sine + sine_error)]);
+        whereabouts = format!(" at {:.0}° azimuth (its height is not seen)", degrees(sine));
+    }
+    if let Some(level) = body_rms(evidence) {
+        let amplitude = (power / amplitudes.len() as f64).sqrt() / level;
+        // The clutter below it adds in any phase; the level of a body differs from frame to frame.
+        estimates.push(Estimate::normal("amplitude", amplitude, amplitude * share.hypot(0.2)));
+    }
+    Candidate {
+        id: Some("static_reflector"),
+        behaves_like: "path-like",
+        estimates,
+        choice: None,
+        place,
+        p_value,
+        gain,
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement: format!(
+            "Something stands still {:.2} m away{whereabouts}: all receivers see one direction, {:.0} dB above the clutter of \
+             the ranges around it, in every frame, and no boundary, edge or corner of the room is there.",
+            peak.range_m,
+            10.0 * peak.ratio.log10()
+        ),
+        curve: None,
+        energy: power * (frames * loops * samples) as f64,
+        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+            cube.each_chirp(|[_, channel, _], chirp| {
+                chirp.iter_mut().zip(&tone).for_each(|(value, tone)| *value -= amplitudes[channel] * tone);
+            });
+        })),
+    }
+}
+
+/// Root mean square of what moves, in a channel's samples, without the noise.
+fn body_rms(evidence: &Evidence) -> Option<f64> {
+    evidence.body.as_ref()?;
+    let samples = evidence.cube.dims[4];
+    let (mut sum, mut noise) = (0.0, 0.0);
+    for channel in 0..evidence.cube.channels() {
+        let still = &evidence.still()[channel * samples..][..samples];
+        for frame in 0..evidence.cube.dims[0] {
+            let chirps = evidence.cube.channel(frame, channel);
+            sum += chirps.iter().enumerate().map(|(i, value)| (value - still[i % samples]).norm_sqr()).sum::<f64>();
+            noise += evidence.noise()[channel] * chirps.len() as f64;
+        }
+    }
+    let power = (sum - noise) / evidence.cube.samples.len() as f64;
+    (power > 0.0).then(|| power.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speckle_hardly_stands_out_of_speckle_and_a_shift_is_read_back() {
+        assert!((tail(0.0, 16) - 1.0).abs() < 1e-12 && tail(50.0, 16) < 1e-6 && tail(5.0, 16) > 1e-3);
+        // A Hann window's main lobe a third of a cell beside the middle one.
+        let lobe = |x: f64| (std::f64::consts::PI * x).sin() / (std::f64::consts::PI * x * (1.0 - x * x));
+        let shift = hann_shift(lobe(-1.3).abs(), lobe(-0.3).abs(), lobe(0.7).abs());
+        assert!((shift - 0.3).abs() < 1e-9, "{shift}");
+    }
+
+    #[test]
+    fn feet_edges_and_corners_are_known() {
+        let known = known_m(&Room { front_m: Some(4.0), floor_m: Some(3.0), ..Room::default() });
+        assert_eq!(known.len(), 3);
+        assert!(known.iter().any(|range| (range - 5.0).abs() < 1e-12));
+    }
+}
