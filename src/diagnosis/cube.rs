@@ -41,6 +41,8 @@ pub struct Loaded {
 const FEWEST_FRAMES: usize = 4;
 /// Every so many-th frame is held out.
 const HELD_OUT_EVERY: usize = 4;
+/// At most one loop in so many is dropped by cutting into equal blocks.
+const MOST_DROPPED: usize = 20;
 /// Fewest loops in a block.
 const FEWEST_LOOPS: usize = 8;
 
@@ -163,12 +165,11 @@ fn analytic(values: &[f32], samples: usize) -> Vec<Complex64> {
 /// Few long frames as several short ones.
 fn in_blocks(cube: &Cube, radar: &Radar) -> Option<(Cube, Radar, usize)> {
     let [frames, tx, rx, loops, samples] = cube.dims;
-    let dropped = |blocks: usize| loops % blocks;
-    let most = (loops / FEWEST_LOOPS).min(10);
+    // Long blocks resolve velocities; a few loops more or less do not matter.
+    let most = loops / FEWEST_LOOPS;
     let blocks = (2..=most)
-        .rev()
-        .filter(|blocks| blocks * frames >= FEWEST_FRAMES)
-        .min_by_key(|&blocks| (dropped(blocks), 10 - blocks))?;
+        .find(|blocks| blocks * frames >= FEWEST_FRAMES && loops % blocks * MOST_DROPPED <= loops)
+        .or_else(|| (2..=most).find(|blocks| blocks * frames >= FEWEST_FRAMES))?;
     let short = loops / blocks;
     let mut samples_out = Vec::with_capacity(cube.samples.len());
     for frame in 0..frames {
@@ -199,8 +200,8 @@ mod tests {
         let samples = (0..dims.iter().product::<usize>()).map(|i| Complex64::from(i as f64)).collect();
         let cube = Cube::new(dims, samples);
         let (blocks, short, loops) = in_blocks(&cube, &radar).unwrap();
-        assert_eq!((short.frames, loops), (5, 17));
-        assert_eq!(blocks.channel(1, 2)[0], cube.channel(0, 2)[17 * 2]);
+        assert_eq!((short.frames, loops), (4, 21));
+        assert_eq!(blocks.channel(1, 2)[0], cube.channel(0, 2)[21 * 2]);
         radar.loops_per_frame = 20;
         assert!(in_blocks(&Cube::new(radar.dims(), vec![Complex64::ZERO; radar.dims().iter().product()]), &radar).is_none());
     }

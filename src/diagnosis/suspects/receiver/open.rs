@@ -18,8 +18,10 @@ use crate::diagnosis::{Cube, Evidence};
 const NEAR_M: f64 = 0.3;
 /// Depth of the valley behind it.
 const VALLEY_DB: f64 = 10.0;
-/// Power of a transient over the strongest sample between the edges.
+/// Power of a transient over the strongest sample between the edges; where a leakage was taken away, whose fit is poor at
+/// the edges, it must be more than that would leave.
 const WILD: f64 = 4.0;
+const WILD_BESIDE_LEAKAGE: f64 = 100.0;
 const ZERO_PADDING: usize = 4;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -28,8 +30,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let samples = evidence.cube.dims[4];
     let still: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
-    // The fit of a leakage is poor at the edges, and what it leaves there is no transient.
-    if !["ramp_edge_transient", "tx_leakage"].iter().any(|id| evidence.accepted.contains(id)) {
+    if !evidence.accepted.contains(&"ramp_edge_transient") {
         let edge: Vec<Candidate> = [false, true].into_iter().filter_map(|at_end| edge(evidence, &still, at_end)).collect();
         let edge: Vec<Candidate> = edge.into_iter().filter(|edge| edge.p_value < 1e-6).collect();
         if !edge.is_empty() {
@@ -73,8 +74,9 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
         .collect();
     let between = &power[samples / 8..samples - samples / 8];
     let (largest, mean) = (between.iter().fold(0.0f64, |a, &b| a.max(b)), between.iter().sum::<f64>() / between.len() as f64);
+    let wild = if evidence.accepted.contains(&"tx_leakage") { WILD_BESIDE_LEAKAGE } else { WILD };
     let at = |i: usize| if at_end { samples - 1 - i } else { i };
-    let count = (0..samples / 8).rev().find(|&i| power[at(i)] > WILD * largest)? + 1;
+    let count = (0..samples / 8).rev().find(|&i| power[at(i)] > wild * largest)? + 1;
     let wildest = (0..count).map(|i| power[at(i)]).fold(0.0, f64::max);
     let indices: Vec<usize> = if at_end { (samples - count..samples).collect() } else { (0..count).collect() };
     let term: Vec<Vec<Complex64>> = still
