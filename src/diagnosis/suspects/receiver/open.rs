@@ -18,10 +18,11 @@ use crate::diagnosis::{Cube, Evidence};
 const NEAR_M: f64 = 0.3;
 /// Depth of the valley behind it.
 const VALLEY_DB: f64 = 10.0;
-/// Power of a transient over the strongest sample between the edges; where a leakage was taken away, whose fit is poor at
-/// the edges, it must be more than that would leave.
+/// Power of a transient over the strongest sample between the edges.
 const WILD: f64 = 4.0;
-const WILD_BESIDE_LEAKAGE: f64 = 100.0;
+/// And over its neighbour's, where a leakage was taken away: the fit of that is poor at the edges, but what it leaves there
+/// rises slowly.
+const ABRUPT: f64 = 10.0;
 const ZERO_PADDING: usize = 4;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -74,9 +75,11 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
         .collect();
     let between = &power[samples / 8..samples - samples / 8];
     let (largest, mean) = (between.iter().fold(0.0f64, |a, &b| a.max(b)), between.iter().sum::<f64>() / between.len() as f64);
-    let wild = if evidence.accepted.contains(&"tx_leakage") { WILD_BESIDE_LEAKAGE } else { WILD };
     let at = |i: usize| if at_end { samples - 1 - i } else { i };
-    let count = (0..samples / 8).rev().find(|&i| power[at(i)] > wild * largest)? + 1;
+    let count = (0..samples / 8).rev().find(|&i| power[at(i)] > WILD * largest)? + 1;
+    if evidence.accepted.contains(&"tx_leakage") && power[at(count - 1)] < ABRUPT * power[at(count)] {
+        return None;
+    }
     let wildest = (0..count).map(|i| power[at(i)]).fold(0.0, f64::max);
     let indices: Vec<usize> = if at_end { (samples - count..samples).collect() } else { (0..count).collect() };
     let term: Vec<Vec<Complex64>> = still
