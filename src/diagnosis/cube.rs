@@ -41,8 +41,8 @@ pub struct Loaded {
 const FEWEST_FRAMES: usize = 4;
 /// Every so many-th frame is held out.
 const HELD_OUT_EVERY: usize = 4;
-/// One in so many loops may be lost when a frame is cut into blocks.
-const MOST_LOST_SHARE: usize = 25;
+/// At most one loop in so many is dropped by cutting into equal blocks.
+const MOST_DROPPED: usize = 20;
 /// Fewest loops in a block.
 const FEWEST_LOOPS: usize = 8;
 
@@ -165,12 +165,11 @@ fn analytic(values: &[f32], samples: usize) -> Vec<Complex64> {
 /// Few long frames as several short ones.
 fn in_blocks(cube: &Cube, radar: &Radar) -> Option<(Cube, Radar, usize)> {
     let [frames, tx, rx, loops, samples] = cube.dims;
-    let dropped = |blocks: usize| loops % blocks;
-    let most = (loops / FEWEST_LOOPS).min(10);
-    // Long blocks resolve velocities; so few of them, and few loops lost.
+    // Long blocks resolve velocities; a few loops more or less do not matter.
+    let most = loops / FEWEST_LOOPS;
     let blocks = (2..=most)
-        .filter(|blocks| blocks * frames >= FEWEST_FRAMES)
-        .min_by_key(|&blocks| (dropped(blocks) * MOST_LOST_SHARE / loops, blocks))?;
+        .find(|blocks| blocks * frames >= FEWEST_FRAMES && loops % blocks * MOST_DROPPED <= loops)
+        .or_else(|| (2..=most).find(|blocks| blocks * frames >= FEWEST_FRAMES))?;
     let short = loops / blocks;
     let mut samples_out = Vec::with_capacity(cube.samples.len());
     for frame in 0..frames {

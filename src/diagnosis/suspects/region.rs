@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use crate::diagnosis::Evidence;
 use crate::diagnosis::cube::Cube;
 
 /// Bins (not whole numbers, ends included) that may be negative: an interval around the zero frequency.
@@ -42,34 +43,71 @@ fn tones(length: usize, [low, high]: [f64; 2]) -> Vec<Vec<Complex64>> {
     basis
 }
 
-/// Subtracts from every frame what deviates from `still` (`[channel, sample]`) within the regions.
-pub fn remove(cube: &mut Cube, still: &[Complex64], regions: &[Region]) {
-    let [_, _, _, loops, samples] = cube.dims;
-    let channels = cube.channels();
-    for region in regions {
-        let (fast, slow) = (tones(samples, region.range), tones(loops, region.doppler));
-        let block = loops * samples;
-        cube.samples.par_chunks_exact_mut(block).enumerate().for_each(|(chunk, values)| {
-            let mean = &still[chunk % channels * samples..][..samples];
-            // `[loop][fast tone]`
-            let along: Vec<Vec<Complex64>> = values
-                .chunks_exact(samples)
-                .map(|chirp| {
-                    fast.iter().map(|tone| chirp.iter().zip(mean).zip(tone).map(|((v, m), t)| (v - m) * t.conj()).sum()).collect()
-                })
-                .collect();
-            for s in &slow {
-                let shares: Vec<Complex64> =
-                    (0..fast.len()).map(|i| along.iter().zip(s).map(|(a, s)| a[i] * s.conj()).sum()).collect();
-                for (chirp, s) in values.chunks_exact_mut(samples).zip(s) {
-                    for (tone, share) in fast.iter().zip(&shares) {
-                        let factor = share * s;
-                        chirp.iter_mut().zip(tone).for_each(|(v, t)| *v -= factor * t);
-                    }
-                }
-            }
-        });
+/// How many consecutive frames follow one another without a gap, as blocks of one long frame do.
+pub fn run(evidence: &Evidence) -> usize {
+    if evidence.split.block_loops.is_none() {
+        return 1;
     }
+    let loop_s = evidence.radar.loop_period_s();
+    let length_s = evidence.cube.dims[3] as f64 * loop_s;
+    let gap = |pair: &[f64]| pair[1] - pair[0] - length_s > 0.5 * loop_s;
+    let run = 1 + evidence.starts_s.windows(2).take_while(|pair| !gap(pair)).count();
+    if evidence.cube.dims[0].is_multiple_of(run) { run } else { 1 }
+}
+
+/// Consecutive frames of one channel as one, `[loop, sample]`, less what stands still over the training frames of this
+/// cube.
+pub fn joined(cube: &Cube, still: &[Complex64], frames: std::ops::Range<usize>, channel: usize) -> Vec<Complex64> {
+    let samples = cube.dims[4];
+    let mean = &still[channel * samples..][..samples];
+    frames
+        .flat_map(|frame| cube.channel(frame, channel).chunks_exact(samples))
+        .flat_map(|chirp| chirp.iter().zip(mean).map(|(value, mean)| value - mean))
+        .collect()
+}
+
+/// Subtracts from every run of frames what deviates, within the region, from what stands still over the training frames.
+/// That is the mean of the cube at hand: other things that stand still may have been taken away or may not.
+pub fn remove(cube: &mut Cube, training: &[usize], run: usize, region: Region) {
+    let [frames, _, _, loops, samples] = cube.dims;
+    let channels = cube.channels();
+    let still = cube.still(training);
+    let (fast, slow) = (tones(samples, region.range), tones(run * loops, region.doppler));
+    let parts: Vec<(usize, usize)> = (0..frames / run).flat_map(|part| (0..channels).map(move |c| (part, c))).collect();
+    let found: Vec<Vec<Complex64>> = parts
+        .par_iter()
+        .map(|&(part, channel)| {
+            let moving = joined(cube, &still, part * run..(part + 1) * run, channel);
+            within(&moving, samples, &fast, &slow)
+        })
+        .collect();
+    cube.each_chirp(|[frame, channel, index], chirp| {
+        if let Some(part) = found.get(frame / run * channels + channel) {
+            let start = (frame % run * loops + index) * samples;
+            chirp.iter_mut().zip(&part[start..start + samples]).for_each(|(value, moving)| *value -= moving);
+        }
+    });
+}
+
+/// Projection of `[loop, sample]` on tones of both axes.
+fn within(values: &[Complex64], samples: usize, fast: &[Vec<Complex64>], slow: &[Vec<Complex64>]) -> Vec<Complex64> {
+    // `[loop][fast tone]`
+    let along: Vec<Vec<Complex64>> = values
+        .chunks_exact(samples)
+        .map(|chirp| fast.iter().map(|tone| chirp.iter().zip(tone).map(|(v, t)| v * t.conj()).sum()).collect())
+        .collect();
+    let mut part = vec![Complex64::ZERO; values.len()];
+    for s in slow {
+        let mut line = vec![Complex64::ZERO; samples];
+        for (i, tone) in fast.iter().enumerate() {
+            let share: Complex64 = along.iter().zip(s).map(|(a, s)| a[i] * s.conj()).sum();
+            line.iter_mut().zip(tone).for_each(|(sum, t)| *sum += share * t);
+        }
+        for (chirp, s) in part.chunks_exact_mut(samples).zip(s) {
+            chirp.iter_mut().zip(&line).for_each(|(sum, value)| *sum += value * s);
+        }
+    }
+    part
 }
 
 #[cfg(test)]
@@ -89,13 +127,30 @@ mod tests {
         };
         let region = Region { range: [9.0, 12.0], doppler: [-4.0, -2.0] };
         let left = |range: f64, doppler: f64| {
-            let mut cube = Cube::new([1, 1, 1, loops, samples], tone(range, doppler));
-            remove(&mut cube, &vec![Complex64::ZERO; samples], &[region]);
+            let mut values = tone(range, doppler);
+            values.extend(vec![Complex64::ZERO; loops * samples]);
+            // The second frame alone is for training: nothing stands still.
+            let mut cube = Cube::new([2, 1, 1, loops, samples], values);
+            remove(&mut cube, &[1], 1, region);
             cube.samples.iter().map(|v| v.norm_sqr()).sum::<f64>() / (loops * samples) as f64
         };
         assert!(left(10.37, -2.81) < 1e-4, "{}", left(10.37, -2.81));
         // The basis holds tones between bins, whose side lobes reach far.
         assert!(left(30.0, -3.0) > 0.97, "{}", left(30.0, -3.0));
         assert!(left(10.0, 5.0) > 0.9, "{}", left(10.0, 5.0));
+    }
+
+    #[test]
+    fn what_stands_still_stays_whatever_was_known_of_it_before() {
+        let (loops, samples) = (8, 32);
+        let still = |i: usize| Complex64::cis(std::f64::consts::TAU * 4.3 * (i % samples) as f64 / samples as f64) * 1e3;
+        let slow =
+            |i: usize| Complex64::cis(std::f64::consts::TAU * 3.0 * (i / samples % (2 * loops)) as f64 / (2 * loops) as f64);
+        let values: Vec<Complex64> = (0..4 * loops * samples).map(|i| still(i) + still(i) * 0.01 * slow(i)).collect();
+        let mut cube = Cube::new([4, 1, 1, loops, samples], values);
+        // The same mean over training frames as over all, because whole periods fit.
+        remove(&mut cube, &[0, 1], 2, Region { range: [3.0, 6.0], doppler: [2.0, 4.0] });
+        let worst = cube.samples.iter().enumerate().map(|(i, v)| (v - still(i)).norm()).fold(0.0, f64::max);
+        assert!(worst < 0.5, "{worst} of a mover of 10 is left, or still returns of 1000 are gone");
     }
 }

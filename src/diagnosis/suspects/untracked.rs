@@ -1,24 +1,34 @@
 //! Movers of a recording in which nobody is tracked: power in the range-Doppler maps away from what stands still.
+//!
+//! Whether something moves is judged frame by frame. Where it is and how fast is then read from the longest stretch without
+//! a gap, because blocks of a long frame resolve velocities poorly; two people who pass one another at one range differ in
+//! nothing else.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use num_complex::Complex64;
+use rayon::prelude::*;
 
-use super::region::{Region, remove};
-use crate::diagnosis::evidence::Evidence;
+use super::region::{Region, joined, remove, run};
+use crate::diagnosis::evidence::{Evidence, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics;
 
 /// Doppler bins around zero where a Hann window leaves what stands still.
 const STILL_BINS: usize = 1;
-/// A mover's cells are those down to this share of its peak.
-const SHARE_OF_PEAK: f64 = 1e-2;
 /// Nearer ones belong to leakage, offsets and low-frequency noise.
 const NEAREST_BIN: usize = 3;
 /// Factor by which a mover's cell must exceed the median over velocities.
 const ABOVE_FLOOR: f64 = 4.0;
-/// Range bins on each side that a mover may fill.
-const REACH: usize = 8;
+/// Power over the noise of a mover beside one that was found already: what its removal leaves is less.
+const BESIDE_ANOTHER: f64 = 100.0;
+/// A mover's cells are those above this, over the noise.
+const FAINTEST: f64 = 6.3;
+/// A body's echoes and their first detours end here, m.
+const REACH_M: f64 = 1.2;
+/// Range bins between them that may be empty.
+const LARGEST_GAP: usize = 3;
 /// Directions that are tried, in sines of the azimuth.
 const DIRECTIONS: usize = 181;
 
@@ -60,34 +70,31 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
     let (doppler, range) = (peak / samples, peak % samples);
     let count = training.len() as f64 * channels;
     let p_value = statistics::corrected(statistics::mean_power_tail(mean[peak], count), cells as f64);
-    if p_value > 0.01 || held_out.is_empty() {
+    let another = evidence.accepted.contains(&"moving_reflector");
+    if p_value > 0.01 || held_out.is_empty() || another && mean[peak] < BESIDE_ANOTHER {
         return None;
     }
     let signed = |d: usize| if 2 * d >= loops { d as f64 - loops as f64 } else { d as f64 };
-    // Relative to the peak, because Doppler wraps around.
-    let offset = |d: usize| (signed(d) - signed(doppler) + 1.5 * loops as f64).rem_euclid(loops as f64) - 0.5 * loops as f64;
-    // What is much stronger than its surroundings; the cells that belong to it hang together.
-    let limit = (SHARE_OF_PEAK * mean[peak]).max(1.0 + 6.0 / count.sqrt());
-    let mut region: Vec<usize> = vec![peak];
-    let mut inside = vec![false; cells];
-    inside[peak] = true;
-    let mut next = 0;
-    while next < region.len() {
-        let (d, r) = (region[next] / samples, region[next] % samples);
-        next += 1;
-        let neighbours = [((d + 1) % loops, r), ((d + loops - 1) % loops, r), (d, r + 1), (d, r.wrapping_sub(1))];
-        for (d, r) in neighbours {
-            let near = r.abs_diff(range) <= REACH && offset(d).abs() <= (loops / 8 + 1) as f64;
-            if near && r < bins && moving(d) && !inside[d * samples + r] && mean[d * samples + r] > limit {
-                inside[d * samples + r] = true;
-                region.push(d * samples + r);
-            }
-        }
-    }
+    let run = run(evidence);
+    let stretch = Stretch::new(evidence, run);
+    let sign = signed(doppler).signum() as i64;
+    let top = stretch.peak([signed(doppler) as i64 * run as i64, range as i64], run as i64 + run as i64 / 2, sign);
+    let radar = &evidence.radar;
+    let (bin_m, bin_mps) = (radar.range_resolution_m(), radar.velocity_resolution_mps() / run as f64);
+    let region = stretch.around(top, sign, (REACH_M / bin_m).max(2.0) as i64, bins);
+    let span = |axis: usize| {
+        let values = region.iter().map(|cell| cell[axis]);
+        [values.clone().min().unwrap_or(top[axis]) as f64, values.max().unwrap_or(top[axis]) as f64]
+    };
+    let (dopplers, ranges) = (span(0), span(1));
+    let inside = |d: usize, r: usize| {
+        let scaled = signed(d) * run as f64;
+        (dopplers[0]..=dopplers[1]).contains(&scaled) && (ranges[0]..=ranges[1]).contains(&(r as f64))
+    };
     // Exponential laws with the training's mean power, against noise alone.
-    let gain: f64 = held_out
-        .iter()
-        .flat_map(|&f| region.iter().map(move |&cell| (f, cell)))
+    let gain: f64 = (0..cells)
+        .filter(|&cell| cell == peak || moving(cell / samples) && inside(cell / samples, cell % samples))
+        .flat_map(|cell| held_out.iter().map(move |&f| (f, cell)))
         .map(|(f, cell)| {
             let (power, expected) = (f64::from(maps[f * cells + cell]), mean[cell].max(1.0));
             channels * (power * (1.0 - 1.0 / expected) - expected.ln())
@@ -96,24 +103,20 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
     if gain < 3.0 {
         return None;
     }
-    let span = |values: Vec<f64>| values.iter().fold([f64::MAX, f64::MIN], |[l, h], &v| [l.min(v), h.max(v)]);
-    let ranges = span(region.iter().map(|c| (c % samples) as f64).collect());
-    let offsets = span(region.iter().map(|c| offset(c / samples)).collect());
-    let radar = &evidence.radar;
-    let (bin_m, bin_mps) = (radar.range_resolution_m(), radar.velocity_resolution_mps());
-    let centre = parabola(&mean, range, samples, doppler);
+    let centre = top[1] as f64 + stretch.summit(top, [0, 1]);
     let range_m = centre * bin_m;
-    let weight: f64 = region.iter().map(|&c| mean[c]).sum();
-    let velocity_mps = (signed(doppler) + region.iter().map(|&c| mean[c] * offset(c / samples)).sum::<f64>() / weight) * bin_mps;
-    let azimuth = azimuth_deg(evidence, doppler, range);
+    let velocity_mps = (top[0] as f64 + stretch.summit(top, [1, 0])) * bin_mps;
+    let azimuth = azimuth_deg(evidence, &stretch, top);
     let decibel = 10.0 * mean[peak].log10();
     let noise: f64 = evidence.noise().iter().sum();
-    let energy = region.iter().map(|&c| (mean[c] - 1.0).max(0.0)).sum::<f64>() * noise * evidence.cube.dims[0] as f64;
-    let still = evidence.still().to_vec();
+    let energy =
+        region.iter().map(|&cell| (stretch.at(cell) - 1.0).max(0.0)).sum::<f64>() * noise * (evidence.cube.dims[0] / run) as f64;
+    // Past zero Doppler it would be somebody else's.
     let cut = Region {
         range: [ranges[0] - 1.0, ranges[1] + 1.0],
-        doppler: [signed(doppler) + offsets[0] - 1.0, signed(doppler) + offsets[1] + 1.0],
+        doppler: if sign > 0 { [dopplers[0] - 1.0, dopplers[1] + 2.0] } else { [dopplers[0] - 2.0, dopplers[1] + 1.0] },
     };
+    let training = training.clone();
     let direction = azimuth.map_or(String::new(), |(a, _)| format!(", {a:+.0}° to the side"));
     let estimates = azimuth.map_or(vec![], |(a, deviation)| {
         let (s, c) = a.to_radians().sin_cos();
@@ -131,7 +134,7 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
         choice: None,
         place: Place {
             range_m: Some([(ranges[0] - 0.5).max(0.0) * bin_m, (ranges[1] + 0.5) * bin_m]),
-            velocity_mps: Some([velocity_mps + (offsets[0] - 0.5) * bin_mps, velocity_mps + (offsets[1] + 0.5) * bin_mps]),
+            velocity_mps: Some([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps]),
             azimuth_deg: azimuth.map(|(a, d)| [a - 2.0 * d, a + 2.0 * d]),
             ..Place::at("scene")
         },
@@ -145,42 +148,113 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
         ),
         curve: None,
         energy,
-        correction: Correction::Samples(Arc::new(move |cube| remove(cube, &still, &[cut]))),
+        correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, run, cut))),
     })
 }
 
-/// Top of the parabola through a peak's logarithms.
-fn parabola(mean: &[f64], range: usize, samples: usize, doppler: usize) -> f64 {
-    if range == 0 || range + 1 >= samples {
-        return range as f64;
+/// Runs of frames transformed as one, what stands still removed; cells are signed Doppler bins and range bins.
+struct Stretch {
+    loops: usize,
+    samples: usize,
+    /// `[run][channel]`, each `[doppler, range]`.
+    maps: Vec<Vec<Vec<Complex64>>>,
+    /// Mean over runs and channels, over the noise.
+    power: Vec<f64>,
+}
+
+type Cell = [i64; 2];
+
+impl Stretch {
+    fn new(evidence: &Evidence, run: usize) -> Self {
+        let [frames, _, _, loops, samples] = evidence.cube.dims;
+        let channels = evidence.cube.channels();
+        let maps: Vec<Vec<Vec<Complex64>>> = (0..frames / run)
+            .into_par_iter()
+            .filter(|part| run > 1 || evidence.split.training.contains(part))
+            .map(|part| {
+                let frames = part * run..(part + 1) * run;
+                let map = |c| transform(&joined(&evidence.cube, evidence.still(), frames.clone(), c), samples);
+                (0..channels).map(map).collect()
+            })
+            .collect();
+        let mut power = vec![0.0; run * loops * samples];
+        for part in &maps {
+            for (map, noise) in part.iter().zip(evidence.noise()) {
+                let weight = 1.0 / (noise.max(f64::MIN_POSITIVE) * (channels * maps.len()) as f64);
+                power.iter_mut().zip(map).for_each(|(sum, value)| *sum += weight * value.norm_sqr());
+            }
+        }
+        Self { loops: run * loops, samples, maps, power }
     }
-    let at = |r: usize| mean[doppler * samples + r].max(1e-9).ln();
-    let (left, middle, right) = (at(range - 1), at(range), at(range + 1));
-    let bend = left - 2.0 * middle + right;
-    range as f64 + if bend < 0.0 { (0.5 * (left - right) / bend).clamp(-0.5, 0.5) } else { 0.0 }
+
+    fn index(&self, [doppler, range]: Cell) -> usize {
+        doppler.rem_euclid(self.loops as i64) as usize * self.samples + range.rem_euclid(self.samples as i64) as usize
+    }
+
+    fn at(&self, cell: Cell) -> f64 {
+        self.power[self.index(cell)]
+    }
+
+    /// Whether a cell moves in a direction (+1 or −1).
+    fn moves(&self, doppler: i64, sign: i64) -> bool {
+        doppler * sign > STILL_BINS as i64 && 2 * doppler.abs() <= self.loops as i64
+    }
+
+    /// Strongest cell near another that moves the same way.
+    fn peak(&self, [doppler, range]: Cell, reach: i64, sign: i64) -> Cell {
+        (doppler - reach..=doppler + reach)
+            .filter(|&d| self.moves(d, sign))
+            .flat_map(|d| (range - 2..=range + 2).map(move |r| [d, r]))
+            .filter(|cell| cell[1] >= NEAREST_BIN as i64 && cell[1] < self.samples as i64)
+            .max_by(|&a, &b| self.at(a).total_cmp(&self.at(b)))
+            .unwrap_or([doppler, range])
+    }
+
+    /// Cells that hang together with the peak, nearly, and move the same way.
+    fn around(&self, top: Cell, sign: i64, reach: i64, bins: usize) -> Vec<Cell> {
+        let mut region = vec![top];
+        let mut known = HashSet::from([top]);
+        let gap = LARGEST_GAP as i64;
+        let mut next = 0;
+        while next < region.len() {
+            let [d, r] = region[next];
+            next += 1;
+            for cell in (-1..=1).flat_map(|i| (-gap..=gap).map(move |j| [d + i, r + j])) {
+                let near = (cell[1] - top[1]).abs() <= reach && cell[1] >= NEAREST_BIN as i64 && cell[1] < bins as i64;
+                if near && self.moves(cell[0], sign) && self.at(cell) > FAINTEST && known.insert(cell) {
+                    region.push(cell);
+                }
+            }
+        }
+        region
+    }
+
+    /// Top of the parabola through a peak's logarithms along an axis, in bins from it.
+    fn summit(&self, top: Cell, step: Cell) -> f64 {
+        let at = |k: i64| self.at([top[0] + k * step[0], top[1] + k * step[1]]).max(1e-9).ln();
+        let (left, middle, right) = (at(-1), at(0), at(1));
+        let bend = left - 2.0 * middle + right;
+        if bend < 0.0 { (0.5 * (left - right) / bend).clamp(-0.5, 0.5) } else { 0.0 }
+    }
 }
 
 /// Azimuth and the deviation of its error; none where the array has no width, or is not one line across.
-fn azimuth_deg(evidence: &Evidence, doppler: usize, range: usize) -> Option<(f64, f64)> {
-    let [_, _, receivers, loops, samples] = evidence.cube.dims;
+fn azimuth_deg(evidence: &Evidence, stretch: &Stretch, top: Cell) -> Option<(f64, f64)> {
+    let receivers = evidence.cube.dims[2];
     let radar = &evidence.radar;
     let channels = evidence.cube.channels();
     let wavelength = radar.wavelength_m();
-    let signed = if 2 * doppler >= loops { doppler as f64 - loops as f64 } else { doppler as f64 };
     // Distance across of each virtual antenna, and how far the mover has gone when its transmitter's turn comes.
     let across: Vec<f64> = (0..channels).map(|c| radar.tx_m[c / receivers][0] + radar.rx_m[c % receivers][0]).collect();
-    let turn = |c: usize| signed / loops as f64 * (c / receivers) as f64 / radar.tx_m.len() as f64;
+    let turn = |c: usize| top[0] as f64 / stretch.loops as f64 * (c / receivers) as f64 / radar.tx_m.len() as f64;
     let mean = across.iter().sum::<f64>() / channels as f64;
     let spread = (across.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / channels as f64).sqrt();
     if spread < 0.1 * wavelength {
         return None;
     }
-    let values: Vec<Vec<Complex64>> = evidence
-        .split
-        .training
-        .iter()
-        .map(|&frame| (0..channels).map(|c| evidence.range_doppler(frame, c)[doppler * samples + range]).collect())
-        .collect();
+    let cell = stretch.index(top);
+    let values: Vec<Vec<Complex64>> =
+        stretch.maps.iter().map(|channels| channels.iter().map(|map| map[cell]).collect()).collect();
     let power = |sine: f64| -> f64 {
         values
             .iter()
@@ -207,4 +281,67 @@ fn azimuth_deg(evidence: &Evidence, doppler: usize, range: usize) -> Option<(f64
     let azimuth = sine(best).asin();
     // An uncalibrated array errs by degrees.
     Some((azimuth.to_degrees(), (deviation / azimuth.cos()).to_degrees().max(2.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::diagnosis::cube::{Cube, Loaded, Split};
+    use crate::radar::Radar;
+
+    /// Four blocks of one long frame; movers as (range bin, Doppler bin of the long frame, sine of the azimuth, amplitude).
+    fn evidence(movers: &[(f64, f64, f64, f64)]) -> Evidence {
+        let (blocks, loops, samples) = (4, 16, 64);
+        let mut radar = Radar::small(blocks);
+        radar.loops_per_frame = loops;
+        radar.samples_per_chirp = samples;
+        radar.frame_period_s = loops as f64 * radar.loop_period_s();
+        let dims = radar.dims();
+        let wavelength = radar.wavelength_m();
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let mut values = vec![];
+        for (frame, tx, rx) in (0..blocks).flat_map(|f| (0..dims[1]).flat_map(move |t| (0..dims[2]).map(move |r| (f, t, r)))) {
+            let across = radar.tx_m[tx][0] + radar.rx_m[rx][0];
+            for (l, n) in (0..loops).flat_map(|l| (0..samples).map(move |n| (l, n))) {
+                let turn = tx as f64 / dims[1] as f64 + (frame * loops + l) as f64;
+                let mut value = Complex64::new(normal(), normal()) * 0.5f64.sqrt() + Complex64::from_polar(50.0, 0.4 * n as f64);
+                for &(range, doppler, sine, amplitude) in movers {
+                    let turns =
+                        range * n as f64 / samples as f64 + doppler * turn / (blocks * loops) as f64 - across * sine / wavelength;
+                    value += Complex64::from_polar(amplitude, std::f64::consts::TAU * turns);
+                }
+                values.push(value);
+            }
+        }
+        let starts_s = (0..blocks).map(|block| block as f64 * radar.frame_period_s).collect();
+        let split = Split { training: vec![0, 1, 3], held_out: vec![2], block_loops: Some(loops) };
+        let cube = Cube::new(dims, values);
+        Evidence::new(Loaded { cube, radar, split, starts_s, extremes: [-100.0, 100.0] }, None, None)
+    }
+
+    #[test]
+    fn two_who_pass_one_another_are_found_with_their_velocities_and_then_nobody() {
+        let mut evidence = evidence(&[(20.3, 8.4, -0.1, 5.0), (20.0, -9.0, 0.3, 4.0)]);
+        let bin_mps = evidence.radar.velocity_resolution_mps() / 4.0;
+        for doppler in [8.4, -9.0] {
+            let found = find(&evidence);
+            assert_eq!(found.len(), 1);
+            let [low, high] = found[0].place.velocity_mps.unwrap();
+            assert!(found[0].p_value < 1e-6 && found[0].gain > 10.0, "{found:?}");
+            assert!(low < doppler * bin_mps && doppler * bin_mps < high && low * high > 0.0, "{low} to {high} m/s");
+            evidence = evidence.with(&found[0]);
+        }
+        assert!(find(&evidence).is_empty(), "{:?}", find(&evidence));
+    }
+
+    #[test]
+    fn nobody_is_seen_in_a_still_room() {
+        let found = find(&evidence(&[]));
+        assert!(found.iter().all(|candidate| candidate.p_value > 5e-4), "{found:?}");
+    }
 }

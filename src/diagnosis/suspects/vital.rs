@@ -189,7 +189,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
         bins as f64,
     );
     let region = Region { range: [ends[0].saturating_sub(1) as f64, (ends[1] + 1) as f64], doppler: [-1.0, 1.0] };
-    let still = evidence.still().to_vec();
+    let training = training.clone();
     let energy: f64 = change.iter().map(|c| (c - 1.0).max(0.0)).sum::<f64>()
         * data.noise.iter().sum::<f64>()
         * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
@@ -220,7 +220,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
             series: vec![("measured".into(), times, displacement)],
         }),
         energy,
-        correction: Correction::Samples(Arc::new(move |cube| remove(cube, &still, &[region]))),
+        correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, 1, region))),
     })
 }
 

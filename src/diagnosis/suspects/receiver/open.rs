@@ -20,6 +20,9 @@ const NEAR_M: f64 = 0.3;
 const VALLEY_DB: f64 = 10.0;
 /// Power of a transient over the strongest sample between the edges.
 const WILD: f64 = 4.0;
+/// And over its neighbour's, where a leakage was taken away: the fit of that is poor at the edges, but what it leaves there
+/// rises slowly.
+const ABRUPT: f64 = 10.0;
 const ZERO_PADDING: usize = 4;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -28,8 +31,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let samples = evidence.cube.dims[4];
     let still: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
-    // The fit of a leakage is poor at the edges, and what it leaves there is no transient.
-    if !["ramp_edge_transient", "tx_leakage"].iter().any(|id| evidence.accepted.contains(id)) {
+    if !evidence.accepted.contains(&"ramp_edge_transient") {
         let edge: Vec<Candidate> = [false, true].into_iter().filter_map(|at_end| edge(evidence, &still, at_end)).collect();
         let edge: Vec<Candidate> = edge.into_iter().filter(|edge| edge.p_value < 1e-6).collect();
         if !edge.is_empty() {
@@ -75,6 +77,9 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
     let (largest, mean) = (between.iter().fold(0.0f64, |a, &b| a.max(b)), between.iter().sum::<f64>() / between.len() as f64);
     let at = |i: usize| if at_end { samples - 1 - i } else { i };
     let count = (0..samples / 8).rev().find(|&i| power[at(i)] > WILD * largest)? + 1;
+    if evidence.accepted.contains(&"tx_leakage") && power[at(count - 1)] < ABRUPT * power[at(count)] {
+        return None;
+    }
     let wildest = (0..count).map(|i| power[at(i)]).fold(0.0, f64::max);
     let indices: Vec<usize> = if at_end { (samples - count..samples).collect() } else { (0..count).collect() };
     let term: Vec<Vec<Complex64>> = still
