@@ -3,6 +3,12 @@
 //! Positions are good to millimetres only (errors of the mesh belong to the baseline), which is a whole wavelength of
 //! the round trip: the prediction is for delays, velocities, directions and powers, never for carrier phases.
 
+mod track;
+
+use rayon::prelude::*;
+
+pub use track::Track;
+
 use crate::body::{Interpolation, PosedBody, Sampling, SurfaceConfig};
 use crate::error::Result;
 use crate::person::{JOINT_NAMES, Person};
@@ -32,6 +38,8 @@ pub struct BodyPrediction {
     pub frames: Vec<Vec<Point>>,
     /// Radar time of the middle of every frame.
     pub middle_s: Vec<f64>,
+    /// How the points of every frame go on, `[frame]`; may be empty: then they go straight on.
+    pub tracks: Vec<Track>,
 }
 
 impl BodyPrediction {
@@ -40,31 +48,98 @@ impl BodyPrediction {
     /// # Errors
     /// A frame outside the motion, a body that cannot be posed.
     pub fn new(person: &Person, radar: &Radar, starts_s: &[f64]) -> Result<Self> {
-        // Straight lines between poses: a velocity within a frame is all that is needed.
+        // Smooth between poses: with straight lines, velocities are those of the middle between two poses, which at frames
+        // and poses in step is a constant error of the clock.
         let body = PosedBody::new(
             person,
             &SurfaceConfig { sampling: Sampling::Vertices, ..SurfaceConfig::default() },
-            Interpolation::Linear,
+            Interpolation::Cubic,
         )?;
         let (parts, of_vertex) = parts(person);
         let duration_s = radar.frame_duration_s();
-        let mut middle_s = vec![];
-        let mut frames = vec![];
-        for &start in starts_s {
-            let frame = body.frame(&[start, start + duration_s])?;
-            let seen = frame_visibility(&frame.vertices_m, &[], &[], radar.centre_m(), &[], DEFAULT_FLIP_EXPONENT).direct;
-            let points = (0..frame.position_m.len()).filter(|&vertex| seen[vertex]).map(|vertex| Point {
-                position_m: frame.position_m[vertex],
-                velocity_mps: frame.velocity_mps[vertex],
-                normal: frame.normal[vertex],
-                area_m2: frame.area_m2[vertex],
-                part: of_vertex.get(vertex).copied().unwrap_or(0),
-            });
-            frames.push(points.collect());
-            middle_s.push(frame.middle_s);
+        let period_s = period(starts_s).unwrap_or(duration_s);
+        let made: Vec<(Vec<Point>, f64, Track)> = starts_s
+            .par_iter()
+            .map(|&start| {
+                let frame = body.frame(&[start, start + duration_s])?;
+                let seen = frame_visibility(&frame.vertices_m, &[], &[], radar.centre_m(), &[], DEFAULT_FLIP_EXPONENT).direct;
+                let vertices: Vec<usize> = (0..frame.position_m.len()).filter(|&vertex| seen[vertex]).collect();
+                let point = |&vertex: &usize| Point {
+                    position_m: frame.position_m[vertex],
+                    velocity_mps: frame.velocity_mps[vertex],
+                    normal: frame.normal[vertex],
+                    area_m2: frame.area_m2[vertex],
+                    part: of_vertex.get(vertex).copied().unwrap_or(0),
+                };
+                let track = track(&body, &frame.position_m, &vertices, frame.middle_s, period_s)?;
+                Ok((vertices.iter().map(point).collect(), frame.middle_s, track))
+            })
+            .collect::<Result<_>>()?;
+        let mut prediction = Self { parts, frames: vec![], middle_s: vec![], tracks: vec![] };
+        for (points, middle_s, track) in made {
+            prediction.frames.push(points);
+            prediction.middle_s.push(middle_s);
+            prediction.tracks.push(track);
         }
-        Ok(Self { parts, frames, middle_s })
+        Ok(prediction)
     }
+
+    /// The points of a frame so much later in the motion, and whether that is known; beyond, they go straight on.
+    /// Visibility and orientation stay those of the frame.
+    pub fn later(&self, frame: usize, later_s: f64) -> (Vec<Point>, bool) {
+        let points = &self.frames[frame];
+        match self.tracks.get(frame).filter(|track| track.knows(later_s)) {
+            Some(track) => {
+                let steps = track.steps(later_s);
+                let moved = |(index, point): (usize, &Point)| {
+                    let (position, velocity) = steps(index);
+                    point.carried(position, velocity)
+                };
+                (points.iter().enumerate().map(moved).collect(), true)
+            }
+            None => {
+                (points.iter().map(|point| point.carried(point.velocity_mps.map(|v| later_s * v), [0.0; 3])).collect(), false)
+            }
+        }
+    }
+}
+
+impl Point {
+    fn carried(&self, step_m: [f64; 3], change_mps: [f64; 3]) -> Self {
+        Self {
+            position_m: std::array::from_fn(|axis| self.position_m[axis] + step_m[axis]),
+            velocity_mps: std::array::from_fn(|axis| self.velocity_mps[axis] + change_mps[axis]),
+            ..*self
+        }
+    }
+}
+
+/// Median step between frames; None for less than two.
+fn period(starts_s: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = starts_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    (!steps.is_empty()).then(|| super::statistics::median(&mut steps)).filter(|&period| period > 0.0)
+}
+
+/// Half a period to both sides, as far as the motion goes.
+fn track(body: &PosedBody, middle_m: &[[f64; 3]], vertices: &[usize], middle_s: f64, period_s: f64) -> Result<Track> {
+    let (first, last) = body.span_s();
+    let mut times_s = vec![];
+    let mut displacement_m = vec![];
+    for quarter in -2..=2 {
+        let later_s = 0.25 * f64::from(quarter) * period_s;
+        let time = middle_s + later_s;
+        if quarter == 0 {
+            displacement_m.push(vec![[0.0; 3]; vertices.len()]);
+        } else if time < first || time > last {
+            continue;
+        } else {
+            let there = body.frame(&[time])?.position_m;
+            let step = |&vertex: &usize| std::array::from_fn(|axis| (there[vertex][axis] - middle_m[vertex][axis]) as f32);
+            displacement_m.push(vertices.iter().map(step).collect());
+        }
+        times_s.push(later_s);
+    }
+    Ok(Track::new(times_s, displacement_m))
 }
 
 /// The parts' names, and the part of every vertex: the joint that moves it most.

@@ -21,29 +21,13 @@ pub enum Change {
 
 /// The body with changes of place and time.
 pub struct Moves {
-    /// Mean acceleration by frame and part.
-    acceleration: Vec<Vec<[f64; 3]>>,
     centre_m: [f64; 3],
 }
 
 impl Moves {
     /// `centre_m`: of the antennas.
-    pub fn new(body: &BodyPrediction, centre_m: [f64; 3]) -> Self {
-        let velocity: Vec<Vec<Option<[f64; 3]>>> =
-            body.frames.iter().map(|points| mean_velocities(points, body.parts.len())).collect();
-        let acceleration = (0..velocity.len())
-            .map(|frame| {
-                let (before, after) = (frame.saturating_sub(1), (frame + 1).min(velocity.len() - 1));
-                let time = body.middle_s[after] - body.middle_s[before];
-                (0..body.parts.len())
-                    .map(|part| match (velocity[before][part], velocity[after][part]) {
-                        (Some(a), Some(b)) if time > 0.0 => std::array::from_fn(|axis| (b[axis] - a[axis]) / time),
-                        _ => [0.0; 3],
-                    })
-                    .collect()
-            })
-            .collect();
-        Self { acceleration, centre_m }
+    pub fn new(centre_m: [f64; 3]) -> Self {
+        Self { centre_m }
     }
 
     /// How much later in its motion a frame shows the body.
@@ -61,7 +45,8 @@ impl Moves {
     pub fn points(&self, body: &BodyPrediction, frame: usize, change: Change) -> (Vec<Point>, bool) {
         let delay = self.delay_s(body, frame, change);
         if delay != 0.0 {
-            return self.later(body, frame, delay);
+            let (nearest, rest) = nearest(body, frame, delay);
+            return body.later(nearest, rest);
         }
         let moved = |point: &Point| {
             let sight: [f64; 3] = std::array::from_fn(|axis| point.position_m[axis] - self.centre_m[axis]);
@@ -77,31 +62,25 @@ impl Moves {
         (body.frames[frame].iter().map(moved).collect(), true)
     }
 
-    /// From the nearest frame in time, carried on with the parts' velocities and accelerations.
-    fn later(&self, body: &BodyPrediction, frame: usize, delay: f64) -> (Vec<Point>, bool) {
-        let time = body.middle_s[frame] + delay;
-        let apart = |frame: &usize| (body.middle_s[*frame] - time).abs();
-        let nearest = (0..body.frames.len()).min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(frame);
-        let rest = time - body.middle_s[nearest];
-        // A step of a whole frame is that frame, up to rounding.
-        let inside = rest.abs() <= 0.51 * frame_period_s(body);
-        let rest = rest.clamp(-frame_period_s(body), frame_period_s(body));
-        let points = body.frames[nearest].iter().map(|point| {
-            let acceleration = self.acceleration[nearest].get(point.part).copied().unwrap_or_default();
-            let step = |axis: usize| rest * (point.velocity_mps[axis] + 0.5 * rest * acceleration[axis]);
-            Point {
-                position_m: std::array::from_fn(|axis| point.position_m[axis] + step(axis)),
-                velocity_mps: std::array::from_fn(|axis| point.velocity_mps[axis] + rest * acceleration[axis]),
-                ..*point
-            }
-        });
-        (points.collect(), inside)
-    }
-
     /// The whole prediction after the change.
     pub fn apply(&self, body: &mut BodyPrediction, change: Change) {
-        body.frames = (0..body.frames.len()).map(|frame| self.points(body, frame, change).0).collect();
+        let frames = 0..body.frames.len();
+        let moved = frames.clone().map(|frame| self.points(body, frame, change).0).collect();
+        let track = |frame: usize| {
+            let (nearest, rest) = nearest(body, frame, self.delay_s(body, frame, change));
+            body.tracks.get(nearest).map(|track| track.from(rest))
+        };
+        body.tracks = frames.filter_map(track).collect();
+        body.frames = moved;
     }
+}
+
+/// The frame that shows the body nearest to so much later, and what remains of the time.
+fn nearest(body: &BodyPrediction, frame: usize, delay: f64) -> (usize, f64) {
+    let time = body.middle_s[frame] + delay;
+    let apart = |frame: &usize| (body.middle_s[*frame] - time).abs();
+    let nearest = (0..body.frames.len()).min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(frame);
+    (nearest, time - body.middle_s[nearest])
 }
 
 /// Median step between frames.
@@ -110,20 +89,10 @@ pub fn frame_period_s(body: &BodyPrediction) -> f64 {
     crate::diagnosis::statistics::median(&mut steps)
 }
 
-fn mean_velocities(points: &[Point], parts: usize) -> Vec<Option<[f64; 3]>> {
-    let mut sums = vec![([0.0; 3], 0usize); parts];
-    for point in points {
-        if let Some((sum, count)) = sums.get_mut(point.part) {
-            sum.iter_mut().zip(point.velocity_mps).for_each(|(sum, value)| *sum += value);
-            *count += 1;
-        }
-    }
-    sums.into_iter().map(|(sum, count)| (count > 0).then(|| sum.map(|value| value / count as f64))).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnosis::prediction::Track;
 
     /// One point that accelerates along boresight.
     fn falling() -> BodyPrediction {
@@ -135,19 +104,35 @@ mod tests {
             part: 0,
         };
         let middle_s: Vec<f64> = (0..8).map(|frame| frame as f64 * 0.1).collect();
-        BodyPrediction { parts: vec!["body".into()], frames: middle_s.iter().map(|&time| vec![point(time)]).collect(), middle_s }
+        let nodes = [-0.05, -0.025, 0.0, 0.025, 0.05];
+        let track = |time: f64| {
+            let step = |&node: &f64| vec![[0.0, (point(time + node).position_m[1] - point(time).position_m[1]) as f32, 0.0]];
+            Track::new(nodes.to_vec(), nodes.iter().map(step).collect())
+        };
+        BodyPrediction {
+            parts: vec!["body".into()],
+            frames: middle_s.iter().map(|&time| vec![point(time)]).collect(),
+            tracks: middle_s.iter().map(|&time| track(time)).collect(),
+            middle_s,
+        }
     }
 
     #[test]
     fn a_later_body_is_where_it_will_be() {
         let body = falling();
-        let moves = Moves::new(&body, [0.0; 3]);
+        let moves = Moves::new([0.0; 3]);
         for delay in [0.03, -0.04, 0.17] {
             let (points, inside) = moves.points(&body, 3, Change::Clock(delay));
             let time = 0.3 + delay;
-            assert!(inside && (points[0].position_m[1] - 2.0 - 0.5 * time * time).abs() < 1e-9);
-            assert!((points[0].velocity_mps[1] - time).abs() < 1e-9);
+            assert!(inside && (points[0].position_m[1] - 2.0 - 0.5 * time * time).abs() < 1e-7);
+            assert!((points[0].velocity_mps[1] - time).abs() < 1e-5);
         }
+        // A change in two steps is the change.
+        let (mut once, mut twice) = (body.clone(), body.clone());
+        moves.apply(&mut once, Change::Clock(0.07));
+        moves.apply(&mut twice, Change::Clock(0.04));
+        moves.apply(&mut twice, Change::Clock(0.03));
+        assert!((once.frames[3][0].position_m[1] - twice.frames[3][0].position_m[1]).abs() < 1e-6);
         let drop = Change::Drop { at: 4, count: 2 };
         assert_eq!(moves.points(&body, 3, drop).0, body.frames[3]);
         assert!((moves.points(&body, 4, drop).0[0].position_m[1] - body.frames[6][0].position_m[1]).abs() < 1e-9);

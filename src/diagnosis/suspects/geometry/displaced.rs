@@ -16,8 +16,8 @@ use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
 /// Errors of the prediction that are no finding: metres of range, seconds.
 const RANGE_FLOOR_M: f64 = 4e-3;
 const CLOCK_FLOOR_S: f64 = 2e-3;
-/// Standard deviation of a clock's offset from accelerations, in frame periods.
-const CLOCK_ROUGH: f64 = 0.08;
+/// Standard deviation of a clock's offset between the poses, in frame periods.
+const CLOCK_ROUGH: f64 = 0.02;
 /// Alternatives within so many nats are said to be indistinguishable.
 const ALIKE_NATS: f64 = 4.6;
 /// Ranges looked at first.
@@ -230,7 +230,7 @@ fn mean_range_m(trial: &Trial) -> f64 {
 
 fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, gain: f64) -> Candidate {
     let evidence = trial.evidence;
-    // Half of the floor is a standard deviation of what the power model does not know; between frames, the parts'
+    // Half of XX
     // accelerations are known roughly only, which pulls a clock's offset by several milliseconds.
     let rough = match fit.score.change {
         Change::Clock(_) => CLOCK_ROUGH * frame_period_s(trial.body),
@@ -291,7 +291,7 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
         Change::Drop { at, .. } => Some((at..evidence.cube.dims[0]).collect()),
         _ => None,
     };
-    let (moves, change) = (Moves::new(trial.body, evidence.radar.centre_m()), fit.score.change);
+    let (moves, change) = (Moves::new(evidence.radar.centre_m()), fit.score.change);
     Candidate {
         id: Some(fit.id),
         behaves_like: if stage == "timing" { "time offset" } else { "range offset" },

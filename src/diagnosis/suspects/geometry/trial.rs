@@ -52,7 +52,7 @@ impl<'a> Trial<'a> {
                 usable.map(|(&power, _)| heavy_tailed(power, 1.0)).sum()
             })
             .collect();
-        Self { evidence, model, body, moves: Moves::new(body, evidence.radar.centre_m()), empty }
+        Self { evidence, model, body, moves: Moves::new(evidence.radar.centre_m()), empty }
     }
 
     /// `among`: frames to look at; others stay zero and outside. `refit`: the weights, else those of the unchanged body
