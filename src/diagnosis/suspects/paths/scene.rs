@@ -176,7 +176,7 @@ fn noise_levels(maps: &[f32], taken: &[bool], frames: &[usize], loops: usize, sa
 }
 
 /// Raises the base at ranges that show a share of whatever the body returns at the same Doppler, in most of the cells
-/// where that is strong. An undone filter ends abruptly where it would amplify too much; there a window's sidelobes no
+/// where that is strongest. An undone filter ends abruptly where it would amplify too much; there a window's sidelobes no
 /// longer cancel.
 fn raise_for_leakage(
     base: &mut [f32],
@@ -187,7 +187,7 @@ fn raise_for_leakage(
     loops: usize,
     samples: usize,
 ) {
-    const STRONG: f64 = 300.0;
+    const STRONG: f64 = 0.03;
     const FEWEST_CELLS: usize = 12;
     let mut body = vec![0.0f64; frames * loops];
     for (row, body) in body.iter_mut().enumerate() {
@@ -195,10 +195,11 @@ fn raise_for_leakage(
         let powers = &maps[row * samples..][..samples];
         *body = support.iter().zip(powers).filter(|(support, _)| **support).map(|(_, &power)| f64::from(power)).sum();
     }
+    let strong = (STRONG * body.iter().copied().fold(0.0, f64::max)).max(100.0);
     let share = |range: usize| {
-        let rows = (0..frames * loops).filter(|&row| body[row] > STRONG && !taken[row * samples + range]);
+        let rows = (0..frames * loops).filter(|&row| body[row] > strong && !taken[row * samples + range]);
         let mut shares: Vec<f64> = rows.map(|row| (f64::from(maps[row * samples + range]) - 1.5).max(0.0) / body[row]).collect();
-        // The upper quartile: what leaks is speckle, and weak rows show none of it.
+        // The upper quartile, for what leaks is speckle.
         let index = shares.len() * 3 / 4;
         if shares.len() < FEWEST_CELLS { 0.0 } else { *shares.select_nth_unstable_by(index, f64::total_cmp).1 }
     };
