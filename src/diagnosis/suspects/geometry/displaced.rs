@@ -230,8 +230,8 @@ fn mean_range_m(trial: &Trial) -> f64 {
 
 fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, gain: f64) -> Candidate {
     let evidence = trial.evidence;
-    // Half of XX
-    // accelerations are known roughly only, which pulls a clock's offset by several milliseconds.
+    // Half of the floor is a standard deviation of what the power model does not know; between poses and frames, motion
+    // and visibility are known roughly only.
     let rough = match fit.score.change {
         Change::Clock(_) => CLOCK_ROUGH * frame_period_s(trial.body),
         Change::Drift(_) => {
