@@ -17,7 +17,7 @@ use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
 const RANGE_FLOOR_M: f64 = 4e-3;
 const CLOCK_FLOOR_S: f64 = 2e-3;
 /// Standard deviation of a clock's offset between the poses, in frame periods.
-const CLOCK_ROUGH: f64 = 0.02;
+const CLOCK_ROUGH: f64 = 0.08;
 /// Alternatives within so many nats are said to be indistinguishable.
 const ALIKE_NATS: f64 = 4.6;
 /// Ranges looked at first.
