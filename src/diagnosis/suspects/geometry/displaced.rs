@@ -17,7 +17,7 @@ use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
 const RANGE_FLOOR_M: f64 = 4e-3;
 const CLOCK_FLOOR_S: f64 = 2e-3;
 /// Standard deviation of a clock's offset between the poses, in frame periods.
-const CLOCK_ROUGH: f64 = 0.02;
+const CLOCK_ROUGH: f64 = 0.08;
 /// Alternatives within so many nats are said to be indistinguishable.
 const ALIKE_NATS: f64 = 4.6;
 /// Ranges looked at first.
@@ -230,8 +230,8 @@ fn mean_range_m(trial: &Trial) -> f64 {
 
 fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, gain: f64) -> Candidate {
     let evidence = trial.evidence;
-    // Half of XX
-    // accelerations are known roughly only, which pulls a clock's offset by several milliseconds.
+    // Half of the floor is a standard deviation of what the power model does not know; between poses and frames, motion
+    // and visibility are known roughly only.
     let rough = match fit.score.change {
         Change::Clock(_) => CLOCK_ROUGH * frame_period_s(trial.body),
         Change::Drift(_) => {

@@ -44,6 +44,12 @@ mod tests {
             println!("{path} {:.2} s", start.elapsed().as_secs_f64());
             for candidate in found {
                 println!("   {candidate:?} look-alikes {:?}", candidate.look_alikes);
+                // What was taken into account must leave nothing behind, whoever asks.
+                let mut next = evidence.with(&candidate);
+                next.accepted.clear();
+                for again in find(&next) {
+                    println!("      again {again:?}");
+                }
             }
         }
     }
