@@ -139,7 +139,7 @@ fn track(body: &PosedBody, middle_m: &[[f64; 3]], vertices: &[usize], middle_s: 
         }
         times_s.push(later_s);
     }
-    Ok(Track::new(times_s, displacement_m))
+    Ok(Track::new(middle_s, times_s, displacement_m))
 }
 
 /// The parts' names, and the part of every vertex: the joint that moves it most.

@@ -13,15 +13,15 @@ use super::misfit::Misfit;
 use super::suspects::{SUSPECTS, Suspect};
 
 impl DiagnosisConfig {
-    /// Of one suspect's p-value.
-    pub fn p_value(&self) -> f64 {
-        self.alarm / SUSPECTS.len().max(1) as f64
+    /// Limit of one suspect's p-value.
+    fn p_value(&self, suspect: usize) -> f64 {
+        self.alarm * SUSPECTS[suspect].share / SUSPECTS.iter().map(|suspect| suspect.share).sum::<f64>()
     }
 
     /// What has no name may be anything, so it must gain more.
-    fn passes(&self, candidate: &Candidate) -> bool {
+    fn passes(&self, suspect: usize, candidate: &Candidate) -> bool {
         let least = if candidate.id.is_some() { self.gain } else { self.nameless_gain };
-        candidate.p_value <= self.p_value() && candidate.gain >= least && candidate.gain.is_finite()
+        candidate.p_value <= self.p_value(suspect) && candidate.gain >= least && candidate.gain.is_finite()
     }
 }
 
@@ -67,12 +67,14 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         let evidence = current.as_ref().unwrap_or(&original);
         let found = suspicions(evidence);
         p_value.get_or_insert_with(|| {
-            let smallest = found.iter().map(|(_, candidate)| candidate.p_value).fold(1.0, f64::min);
-            super::statistics::corrected(smallest, SUSPECTS.len() as f64)
+            // The limit of the whole at which the strongest suspicion would just pass.
+            let shares: f64 = SUSPECTS.iter().map(|suspect| suspect.share).sum();
+            let weighted = |(suspect, candidate): &(usize, Candidate)| candidate.p_value * shares / SUSPECTS[*suspect].share;
+            found.iter().map(weighted).fold(1.0, f64::min)
         });
         let known = |candidate: &Candidate| accepted.iter().any(|effect| is_same(&effect.candidate, candidate));
         let passing: Vec<&(usize, Candidate)> =
-            found.iter().filter(|(_, candidate)| thresholds.passes(candidate) && !known(candidate)).collect();
+            found.iter().filter(|(suspect, candidate)| thresholds.passes(*suspect, candidate) && !known(candidate)).collect();
         if let Some(last) = accepted.last_mut() {
             settle_rivals(last, &pending, &passing, thresholds);
         }
@@ -163,7 +165,7 @@ fn verified(original: &Evidence, mut accepted: Vec<Accepted>, thresholds: &Diagn
         let same = |candidate: &&Candidate| {
             candidate.id == accepted[index].candidate.id
                 && candidate.choice == accepted[index].candidate.choice
-                && thresholds.passes(candidate)
+                && thresholds.passes(accepted[index].suspect, candidate)
         };
         match again.iter().filter(same).max_by(|a, b| a.gain.total_cmp(&b.gain)) {
             Some(candidate) => accepted[index].candidate = candidate.clone(),

@@ -8,6 +8,8 @@ const BEYOND: f64 = 0.15;
 /// Displacements of a frame's points at a few times about the frame's middle, with polynomials through them.
 #[derive(Clone, Debug)]
 pub struct Track {
+    /// Motion time of the middle of the frame in which the points were seen.
+    centre_s: f64,
     /// Of the known times, where the frame stands now.
     origin_s: f64,
     /// Ascending, from the middle of the frame the points were seen in.
@@ -17,8 +19,13 @@ pub struct Track {
 }
 
 impl Track {
-    pub fn new(times_s: Vec<f64>, displacement_m: Vec<Vec<[f32; 3]>>) -> Self {
-        Self { origin_s: 0.0, times_s, displacement_m: Arc::new(displacement_m) }
+    pub fn new(centre_s: f64, times_s: Vec<f64>, displacement_m: Vec<Vec<[f32; 3]>>) -> Self {
+        Self { centre_s, origin_s: 0.0, times_s, displacement_m: Arc::new(displacement_m) }
+    }
+
+    /// Motion time that was seen, and the one that is shown now.
+    pub fn seen_and_shown_s(&self) -> (f64, f64) {
+        (self.centre_s, self.centre_s + self.origin_s)
     }
 
     /// The same from another time on.
@@ -80,7 +87,7 @@ mod tests {
         let speed = |time: f64| 2.0 - 6.0 * time + 20.0 * time.powi(3);
         let times = vec![-0.5, -0.25, 0.0, 0.25, 0.5];
         let nodes = times.iter().map(|&time| vec![[0.0, place(time) as f32, 0.0]]).collect();
-        let track = Track::new(times, nodes);
+        let track = Track::new(0.0, times, nodes);
         for (origin, later) in [(0.0, 0.3), (0.2, -0.4), (-0.1, 0.0)] {
             let (position, velocity) = track.from(origin).steps(later)(0);
             assert!((position[1] - (place(origin + later) - place(origin))).abs() < 1e-6);

@@ -75,12 +75,17 @@ impl Moves {
     }
 }
 
-/// The frame that shows the body nearest to so much later, and what remains of the time.
+/// The frame in which the body was seen nearest to what is shown so much later, and what remains from what that frame
+/// shows now.
 fn nearest(body: &BodyPrediction, frame: usize, delay: f64) -> (usize, f64) {
-    let time = body.middle_s[frame] + delay;
-    let apart = |frame: &usize| (body.middle_s[*frame] - time).abs();
+    let times = |frame: usize| match body.tracks.get(frame) {
+        Some(track) => track.seen_and_shown_s(),
+        None => (body.middle_s[frame], body.middle_s[frame]),
+    };
+    let time = times(frame).1 + delay;
+    let apart = |frame: &usize| (times(*frame).0 - time).abs();
     let nearest = (0..body.frames.len()).min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(frame);
-    (nearest, time - body.middle_s[nearest])
+    (nearest, time - times(nearest).1)
 }
 
 /// Median step between frames.
@@ -107,7 +112,7 @@ mod tests {
         let nodes = [-0.05, -0.025, 0.0, 0.025, 0.05];
         let track = |time: f64| {
             let step = |&node: &f64| vec![[0.0, (point(time + node).position_m[1] - point(time).position_m[1]) as f32, 0.0]];
-            Track::new(nodes.to_vec(), nodes.iter().map(step).collect())
+            Track::new(time, nodes.to_vec(), nodes.iter().map(step).collect())
         };
         BodyPrediction {
             parts: vec!["body".into()],
