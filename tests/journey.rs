@@ -173,7 +173,7 @@ fn truncated_weights_are_refused_by_name() {
 
 /// A copy of the recording with leakage: a strong echo at rest in the first range bins, in codes.
 fn leaking(parent: &Path, level: f64) -> PathBuf {
-    let original = Recording::open(&recording()).unwrap();
+    let original = Recording::open(recording()).unwrap();
     let radar = &original.radar;
     let contents = RecordingContents {
         radar,

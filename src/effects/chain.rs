@@ -227,8 +227,7 @@ impl Effects {
         room: Option<&Room>,
         radar: &Radar,
         tx: usize,
-        dechirp: Dechirp,
-        form: SumForm,
+        (dechirp, form): (Dechirp, SumForm),
     ) -> Option<Complex<3>> {
         let (device, dtype) = (direct.device(), direct.re.dtype());
         let parts = self.enabled().filter_map(|effect| {

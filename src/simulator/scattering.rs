@@ -61,7 +61,7 @@ impl Simulator {
                 let (dechirp, form) = (self.config.dechirp, self.config.sum);
                 let direct = self.effects.direct_signal(points, radar, tx, dechirp, form);
                 let further = match group.visible.kind {
-                    Kind::Body => self.effects.further_paths(points, &direct, scene.room.as_ref(), radar, tx, dechirp, form),
+                    Kind::Body => self.effects.further_paths(points, &direct, scene.room.as_ref(), radar, tx, (dechirp, form)),
                     Kind::Room => None,
                 };
                 match further {

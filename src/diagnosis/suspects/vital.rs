@@ -125,9 +125,9 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let metres = evidence.radar.wavelength_m() / (4.0 * PI);
     let named = rhythm.as_ref().filter(|r| r.share > RHYTHMIC && r.p_value < 1e-3).and_then(|r| {
         let (rate, amplitude_m) = (r.frequency_hz, r.amplitude * metres);
-        if BREATHING_HZ[0] <= rate && rate <= BREATHING_HZ[1] && amplitude_m < LARGEST_BREATH_M {
+        if (BREATHING_HZ[0]..=BREATHING_HZ[1]).contains(&rate) && amplitude_m < LARGEST_BREATH_M {
             Some(("breathing", r))
-        } else if HEART_HZ[0] <= rate && rate <= HEART_HZ[1] && amplitude_m < LARGEST_HEARTBEAT_M {
+        } else if (HEART_HZ[0]..=HEART_HZ[1]).contains(&rate) && amplitude_m < LARGEST_HEARTBEAT_M {
             Some(("heartbeat", r))
         } else {
             None

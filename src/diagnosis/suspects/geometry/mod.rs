@@ -14,8 +14,8 @@ use crate::diagnosis::{Candidate, Evidence};
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(model) = evidence.power() else { return vec![] };
     let Some(body) = evidence.body.as_ref() else { return vec![] };
-    let mut found = displaced::find(&Trial::new(evidence, &model, body));
-    found.extend(channels::find(evidence, &model, body, Moves::new(evidence.radar.centre_m())));
+    let mut found = displaced::find(&Trial::new(evidence, model, body));
+    found.extend(channels::find(evidence, model, body, Moves::new(evidence.radar.centre_m())));
     found
 }
 

@@ -135,9 +135,8 @@ fn solve3(mut matrix: [[f64; 3]; 3], mut right: [f64; 3]) -> Option<[f64; 3]> {
         }
         for j in i + 1..3 {
             let factor = matrix[j][i] / pivot;
-            for k in i..3 {
-                matrix[j][k] -= factor * matrix[i][k];
-            }
+            let upper = matrix[i];
+            matrix[j].iter_mut().zip(upper).for_each(|(value, above)| *value -= factor * above);
             right[j] -= factor * right[i];
         }
     }

@@ -35,8 +35,8 @@ pub fn empty_cells(cube: &mut Cube, still: &[Complex64], frame: usize, cells: &[
         for (cell, amount) in cells.iter().zip(amounts) {
             let (doppler, range) = (cell / samples, cell % samples);
             let tone: Vec<Complex64> = (0..samples).map(|n| turn(range * n, samples) * fast[n]).collect();
-            for i in 0..loops {
-                let weight = amount * turn(doppler * i, loops) * slow[i];
+            for (i, window) in slow.iter().enumerate() {
+                let weight = amount * turn(doppler * i, loops) * window;
                 let chirp = &mut cube.samples[start + i * samples..][..samples];
                 chirp.iter_mut().zip(&tone).for_each(|(value, tone)| *value -= weight * tone);
             }

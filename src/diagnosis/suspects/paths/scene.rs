@@ -46,7 +46,7 @@ impl<'a> Scene<'a> {
         }
         let model = evidence.power()?;
         let (bins, size) = (evidence.range_bins(), loops * samples);
-        let visited = visited_ranges(&model, frames, loops, samples);
+        let visited = visited_ranges(model, frames, loops, samples);
         let clutter = still_power(evidence);
         let maps = evidence.maps();
         let (taken, base): (Vec<Vec<bool>>, Vec<Vec<f32>>) = (0..frames)
@@ -69,7 +69,7 @@ impl<'a> Scene<'a> {
             row.iter_mut().zip(&levels).for_each(|(base, level)| *base = base.max(*level as f32));
         });
         if FILTERS.iter().any(|filter| evidence.accepted.contains(filter)) {
-            raise_for_leakage(&mut base, maps, &taken, &model, frames, loops, samples);
+            raise_for_leakage(&mut base, maps, &taken, model, frames, loops, samples);
         }
         let channels = evidence.cube.channels() as f64;
         let shape = shape(evidence);

@@ -52,9 +52,10 @@ pub fn strongest(scene: &Scene) -> Option<Track> {
             let started = (own - begin).max(0.0);
             let (mut score, mut origin) = (started, None);
             if frame > 0 {
-                for near in range.saturating_sub(reach)..(range + reach + 1).min(bins) {
-                    let going = best[frame - 1][near] - 0.5 * near.abs_diff(range) as f64 + (own - go_on).max(0.0);
-                    if best[frame - 1][near] > 0.0 && going > score {
+                let last = (range + reach + 1).min(bins);
+                for (near, &before) in best[frame - 1].iter().enumerate().take(last).skip(range.saturating_sub(reach)) {
+                    let going = before - 0.5 * near.abs_diff(range) as f64 + (own - go_on).max(0.0);
+                    if before > 0.0 && going > score {
                         (score, origin) = (going, Some(near));
                     }
                 }

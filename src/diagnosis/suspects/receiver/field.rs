@@ -108,8 +108,8 @@ impl Field {
         let nothing = vec![vec![Complex64::ZERO; self.support.outside.len()]; self.channels()];
         let mut sum = 0.0;
         for &frame in &self.held_out {
-            for channel in 0..self.channels() {
-                sum += distance(&self.coordinates[frame][channel], &nothing[channel]) / self.variance[channel];
+            for ((own, nothing), variance) in self.coordinates[frame].iter().zip(&nothing).zip(&self.variance) {
+                sum += distance(own, nothing) / variance;
             }
         }
         sum

@@ -68,7 +68,7 @@ pub fn ranges_m(evidence: &Evidence) -> Option<[f64; 2]> {
 /// `contrast`: energy of a still chirp over the variance of the noise in a sample of it.
 pub fn support(evidence: &Evidence, contrast: f64) -> Option<Support> {
     let samples = evidence.cube.dims[4];
-    if evidence.is_real() || samples > MOST_SAMPLES || samples < 16 || evidence.radar.slope_hz_per_s <= 0.0 {
+    if evidence.is_real() || !(16..=MOST_SAMPLES).contains(&samples) || evidence.radar.slope_hz_per_s <= 0.0 {
         return None;
     }
     let [low_m, high_m] = ranges_m(evidence)?;

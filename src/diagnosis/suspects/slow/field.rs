@@ -240,8 +240,8 @@ fn of_frame(
     let noise = evidence.noise();
     // `[channel, loop, bin]`, in units of the noise's deviation, without what stands still.
     let mut spectra: Vec<Complex64> = Vec::with_capacity(channels * loops * samples);
-    for channel in 0..channels {
-        let scale = 1.0 / noise[channel].sqrt();
+    for (channel, variance) in noise.iter().enumerate() {
+        let scale = 1.0 / variance.sqrt();
         for chirp in evidence.cube.channel(frame, channel).chunks_exact(samples) {
             spectra.extend(chirp.iter().zip(taper).map(|(value, w)| value * (w * scale)));
         }

@@ -206,8 +206,8 @@ fn frame_spectra(field: &Field, series: &Series, frames: &[usize]) -> Vec<Vec<Co
         .par_iter()
         .map(|&frame| {
             let mut spectrum = vec![Complex64::ZERO; padded];
-            for index in 0..loops {
-                spectrum[index] = (series.value[frame * loops + index] * series.weight[frame]).into();
+            for (value, own) in spectrum.iter_mut().zip(&series.value[frame * loops..(frame + 1) * loops]) {
+                *value = (own * series.weight[frame]).into();
             }
             fft.process(&mut spectrum);
             for (bin, value) in spectrum.iter_mut().enumerate() {

@@ -80,10 +80,12 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let rivals: Vec<(Option<&'static str>, f64)> = found.iter().map(|c| (c.id, c.gain)).collect();
     for candidate in &mut found {
         for &(id, gain) in &rivals {
-            if let Some(id) = id {
-                if Some(id) != candidate.id && (gain - candidate.gain).abs() < UNDECIDED && !candidate.look_alikes.contains(&id) {
-                    candidate.look_alikes.push(id);
-                }
+            if let Some(id) = id
+                && Some(id) != candidate.id
+                && (gain - candidate.gain).abs() < UNDECIDED
+                && !candidate.look_alikes.contains(&id)
+            {
+                candidate.look_alikes.push(id);
             }
         }
     }

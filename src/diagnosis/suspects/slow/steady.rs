@@ -37,8 +37,8 @@ impl Steady {
         let fft = FftPlanner::new().plan_fft_forward(samples);
         let of_frame = |frame: usize| -> (Vec<Complex64>, Vec<f64>) {
             let (mut means, mut scatter) = (Vec::with_capacity(channels * bins), vec![0.0; bins]);
-            for channel in 0..channels {
-                let scale = 1.0 / noise[channel].sqrt();
+            for (channel, variance) in noise.iter().enumerate() {
+                let scale = 1.0 / variance.sqrt();
                 let mut spectra: Vec<Complex64> = evidence.cube.channel(frame, channel).to_vec();
                 for chirp in spectra.chunks_exact_mut(samples) {
                     chirp.iter_mut().zip(&taper).for_each(|(value, w)| *value *= w * scale);
