@@ -221,3 +221,34 @@ fn a_body_in_the_wrong_place_is_reported_not_fitted_away() {
     assert_eq!(found.verdict, Verdict::Undecided, "{:?}", found.audit);
     assert!(found.reason.contains("wrong place"), "{}", found.reason);
 }
+
+/// Nothing planted, with honest imperfections: millimetres of mesh error, unknown phase, different people and noise.
+#[test]
+fn nulls_stay_silent_and_their_p_values_are_not_too_small() {
+    let actions = ["walk_back_forth", "arm_swing", "lunge", "march_in_place"];
+    let mut small = 0;
+    let count = 12;
+    for case in 0..count {
+        let folder = tempfile::tempdir().unwrap();
+        let text = format!(
+            "seed = {}\nmesh_error_m = {}\n[person]\nsubject = \"s{}\"\naction = \"{}\"\n[surface]\nreturns = \"{}\"\nedge_m = 0.012",
+            100 + case,
+            0.0005 * f64::from(case % 5 + 1),
+            case % 6 + 1,
+            actions[case as usize % 4],
+            ["vertices", "random"][case as usize % 2],
+        );
+        let recording = Recording::open(recorded(folder.path(), &text)).unwrap();
+        let found = diagnose(&recording, &config(), &mut |_| {}).unwrap();
+        assert_eq!(
+            found.report.verdict,
+            Verdict::NoMismatch,
+            "null {case}: {:?} {:?}",
+            found.report.effects,
+            found.report.unexplained
+        );
+        small += usize::from(found.explanation.unwrap().p_value < 0.1);
+    }
+    // Six or more of twelve below 0.1 would happen once in two thousand times.
+    assert!(small <= 5, "{small} of {count} p-values below 0.1");
+}
