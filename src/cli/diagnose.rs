@@ -1,6 +1,9 @@
 //! `hybridsim diagnose`.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fmt::Write,
+    path::{Path, PathBuf},
+};
 
 use clap::Args;
 
@@ -62,7 +65,9 @@ fn simulate(
     tell: &mut dyn FnMut(&str),
 ) -> Result<Option<Simulated>> {
     let Some(explanation) = diagnosis.explanation.as_ref().filter(|_| config.diagnosis.epochs > 0) else { return Ok(None) };
-    let effects: Vec<_> = explanation.accepted.iter().filter_map(|effect| effect.candidate.setting()).collect();
+    let samples = diagnosis.original.cube.samples.iter();
+    let reference = samples.map(|value| value.re.abs().max(value.im.abs())).fold(0.0, f64::max);
+    let effects: Vec<_> = explanation.accepted.iter().filter_map(|effect| effect.candidate.setting(reference)).collect();
     let start = Start {
         simulator: &config.simulator,
         learning: &config.training,
@@ -83,12 +88,14 @@ fn write(out: &Path, diagnosis: &Diagnosis, html: &str) -> Result<()> {
 }
 
 fn tell_result(diagnosis: &Diagnosis, out: &Path) {
-    println!("{}", diagnosis::html::lead(&diagnosis.report));
+    let mut text = format!("{}\n", diagnosis::html::lead(&diagnosis.report));
     for effect in &diagnosis.report.effects {
-        println!("  {:<24} {:>4.0} %  {}", effect.id, 100.0 * effect.probability, effect.statement);
+        let _ = writeln!(text, "  {:<24} {:>4.0} %  {}", effect.id, 100.0 * effect.probability, effect.statement);
     }
     for unexplained in &diagnosis.report.unexplained {
-        println!("  {:<24}         {}", "(no name)", unexplained.statement);
+        let _ = writeln!(text, "  {:<24}         {}", "(no name)", unexplained.statement);
     }
-    println!("report: {}", out.join("report.html").display());
+    let _ = writeln!(text, "report: {}", out.join("report.html").display());
+    // Whoever reads may have closed the pipe: the report is written.
+    let _ = std::io::Write::write_all(&mut std::io::stdout(), text.as_bytes());
 }

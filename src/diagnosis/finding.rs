@@ -1,12 +1,13 @@
 //! What a suspect says: which effect, how large, where, how sure, and how to take it into account.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use super::cube::Cube;
 use super::prediction::BodyPrediction;
-use crate::effects::EffectSetting;
+use crate::effects::{self, EffectSetting};
 
 /// A parameter of an effect, or a list of them, with 90 % intervals.
 #[derive(Clone, Debug, PartialEq)]
@@ -117,10 +118,27 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// As the simulator takes it; `None` for what has no name.
-    pub fn setting(&self) -> Option<EffectSetting> {
-        let parameters = self.estimates.iter().map(|estimate| (estimate.name.to_string(), estimate.values.clone())).collect();
-        Some(EffectSetting { id: self.id?.into(), enabled: true, parameters, choice: self.choice.clone() })
+    /// As the simulator takes it; `None` for what has no name, and for what its operator cannot be told.
+    ///
+    /// `reference`: the recording's peak sample, to which levels are relative.
+    pub fn setting(&self, reference: f64) -> Option<EffectSetting> {
+        let info = effects::info(self.id?)?;
+        let choice = self.choice.clone().or(self.place.boundary.clone()).or(self.place.body_part.clone());
+        let mut setting = EffectSetting { id: info.id.into(), enabled: true, parameters: BTreeMap::new(), choice };
+        for estimate in &self.estimates {
+            let Some(parameter) = info.parameters.iter().find(|parameter| parameter.name == estimate.name) else { continue };
+            // Offsets are found in the recording's codes.
+            let unit = if parameter.unit == "of the reference" && info.id == "dc_offset" { reference } else { 1.0 };
+            let within = |value: &f64| {
+                let value = value / unit;
+                if parameter.is_relative() { value } else { value.clamp(parameter.least, parameter.most) }
+            };
+            setting.parameters.insert(estimate.name.into(), estimate.values.iter().map(within).collect());
+        }
+        if info.parameters.iter().any(|parameter| parameter.name == "reference") {
+            setting.parameters.insert("reference".into(), vec![reference]);
+        }
+        setting.check("effect").is_ok().then_some(setting)
     }
 }
 

@@ -68,7 +68,7 @@ pub fn lead(report: &Report) -> String {
         Verdict::Explained | Verdict::PartlyExplained => {
             let mut text = first(&report.effects[0].statement);
             if report.effects.len() > 1 {
-                let _ = write!(text, " {} more below.", count(report.effects.len() - 1, "effect"));
+                let _ = write!(text, " And {} more, below.", count(report.effects.len() - 1, "effect"));
             }
             if !report.unexplained.is_empty() {
                 let _ = write!(text, " Besides, {} without a name remains.", count(report.unexplained.len(), "mismatch"));
@@ -83,7 +83,7 @@ pub fn lead(report: &Report) -> String {
 
 fn count(number: usize, what: &str) -> String {
     let plural = if what.ends_with("ch") { "es" } else { "s" };
-    if number == 1 { format!("One {what}") } else { format!("{number} {what}{plural}") }
+    if number == 1 { format!("one {what}") } else { format!("{number} {what}{plural}") }
 }
 
 fn section(page: &mut String, number: usize, effect: &Effect, curve: Option<&str>) {

@@ -194,6 +194,14 @@ pub fn moving_energy(evidence: &super::Evidence) -> f64 {
     total - still * (cube.dims[0] * cube.dims[3]) as f64
 }
 
+/// With a capital in front and a stop behind.
+fn sentence(text: &str) -> String {
+    let mut letters = text.trim().chars();
+    let first: String = letters.next().map(|letter| letter.to_uppercase().collect()).unwrap_or_default();
+    let whole = first + letters.as_str();
+    if whole.ends_with(['.', '!', '?']) { whole } else { whole + "." }
+}
+
 fn decibels(ratio: f64) -> f64 {
     10.0 * ratio.max(1e-30).log10()
 }
@@ -235,7 +243,7 @@ impl Effect {
             id: id.into(),
             probability: accepted.probability * (1.0 - candidate.p_value),
             indistinguishable_from: accepted.rivals.iter().map(|&rival| rival.to_string()).collect(),
-            statement: candidate.statement.clone(),
+            statement: sentence(&candidate.statement),
             equation: info.map_or_else(String::new, |info| info.equation.into()),
             parameters,
             place,
@@ -290,7 +298,7 @@ impl Findings {
                     p_value: candidate.p_value,
                     behaves_like: candidate.behaves_like.into(),
                     fraction_of_energy_db: decibels(candidate.energy / moving_energy.max(f64::MIN_POSITIVE)),
-                    statement: candidate.statement.clone(),
+                    statement: sentence(&candidate.statement),
                     held_out_loglik_gain: candidate.gain,
                 }),
             }
