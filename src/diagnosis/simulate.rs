@@ -62,7 +62,7 @@ pub fn before_and_after(
         split: Split::Interleaved,
         ..start.learning.clone()
     };
-    let scratch = AtomicFolder::create(keep)?;
+    let scratch = AtomicFolder::replacing(keep)?;
     let mut train = |config: &SimulatorConfig, name: &str| -> Result<Simulator> {
         let folder = scratch.path().join(name);
         let trainer = Trainer {
