@@ -29,14 +29,22 @@ struct Share {
     repeated: f64,
 }
 
-fn share(component: &Component, bit: usize) -> Option<Share> {
+/// `noise`: standard deviation of a component's noise, which alone makes low bits fair.
+fn share(component: &Component, bit: usize, noise: f64) -> Option<Share> {
     let counts = &component.counts[0];
     let [ones, count] = counts.total(bit);
-    if count < 1000.0 || FAR_BELOW * f64::from(1u32 << bit) > component.deviation {
+    let value = f64::from(1u32 << bit);
+    if count < 1000.0 || FAR_BELOW * value > component.deviation || value > noise {
         return None;
     }
     let share = ones / count;
     let samples = counts.all.len();
+    // Without noise the same codes come again in every chirp, and their bits need not be fair.
+    let of_sample = |sample: usize| (counts.ones[bit * samples + sample], counts.all[sample]);
+    let repeats = (0..samples).map(of_sample).all(|(ones, all)| ones == 0 || ones == all);
+    if repeats && (0.001..0.999).contains(&share) {
+        return None;
+    }
     let blocks: Vec<[f64; 2]> = (0..samples / ALIKE)
         .map(|block| {
             let range = block * ALIKE..(block + 1) * ALIKE;
@@ -56,9 +64,10 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         return vec![];
     }
     let tried = (components.len() * BITS) as f64;
+    let noise = |component: &Component| (0.5 * evidence.noise()[component.channel]).sqrt();
     let mut found = vec![];
     for bit in 0..BITS {
-        let shares: Vec<Option<Share>> = components.iter().map(|component| share(component, bit)).collect();
+        let shares: Vec<Option<Share>> = components.iter().map(|component| share(component, bit, noise(component))).collect();
         for (component, own) in components.iter().zip(&shares) {
             let Some(own) = own else { continue };
             let bias = (own.share - 0.5).abs();
