@@ -2,11 +2,10 @@
 //! as that.
 
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 use serde::{Deserialize, Serialize};
 
 use super::cube::Loaded;
-use super::evidence::{Evidence, hann};
+use super::evidence::{Evidence, spectrum};
 use super::prediction::Point;
 use super::support::Support;
 use crate::radar::Radar;
@@ -322,12 +321,6 @@ fn numerics(evidence: &Evidence) -> Vec<Check> {
         ));
     }
     checks
-}
-
-fn spectrum(chirp: &[Complex64]) -> Vec<Complex64> {
-    let mut values: Vec<Complex64> = chirp.iter().zip(hann(chirp.len())).map(|(value, weight)| value * weight).collect();
-    FftPlanner::new().plan_fft_forward(values.len()).process(&mut values);
-    values
 }
 
 /// What could not be looked for, and why.

@@ -209,6 +209,27 @@ pub fn hann(length: usize) -> Vec<f64> {
     window.iter().map(|w| w / energy).collect()
 }
 
+/// Four-term Blackman–Harris window of unit energy: the body is up to 50 dB above the noise, and its side lobes must
+/// not reach the static returns at other ranges.
+pub fn blackman_harris(length: usize) -> Vec<f64> {
+    let terms = [0.35875, -0.48829, 0.14128, -0.01168];
+    let raw: Vec<f64> = (0..length)
+        .map(|n| {
+            let phase = std::f64::consts::TAU * (n as f64 + 0.5) / length as f64;
+            terms.iter().enumerate().map(|(i, a)| a * (i as f64 * phase).cos()).sum()
+        })
+        .collect();
+    let energy = raw.iter().map(|w: &f64| w * w).sum::<f64>().sqrt();
+    raw.iter().map(|w| w / energy).collect()
+}
+
+/// DFT of one chirp, with a Hann window of unit energy.
+pub fn spectrum(chirp: &[Complex64]) -> Vec<Complex64> {
+    let mut windowed: Vec<Complex64> = chirp.iter().zip(hann(chirp.len())).map(|(value, weight)| value * weight).collect();
+    FftPlanner::new().plan_fft_forward(chirp.len()).process(&mut windowed);
+    windowed
+}
+
 /// Range-Doppler transform of `[loop, sample]` with Hann windows of unit energy: `[doppler, range]` in FFT order.
 pub fn transform(signal: &[Complex64], samples: usize) -> Vec<Complex64> {
     let loops = signal.len() / samples;

@@ -7,10 +7,9 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 
 use super::support::{beat_hz, ranges_m};
-use crate::diagnosis::evidence::hann;
+use crate::diagnosis::evidence::spectrum;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
@@ -129,13 +128,6 @@ fn of_frame(evidence: &Evidence, frame: usize) -> Vec<Sums> {
             sums
         })
         .collect()
-}
-
-/// Of one chirp, with a Hann window of unit energy.
-pub fn spectrum(chirp: &[Complex64]) -> Vec<Complex64> {
-    let mut windowed: Vec<Complex64> = chirp.iter().zip(hann(chirp.len())).map(|(value, weight)| value * weight).collect();
-    FftPlanner::new().plan_fft_forward(chirp.len()).process(&mut windowed);
-    windowed
 }
 
 /// Beat frequencies, as bins, that hold neither room nor body.

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 
-use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::evidence::{Evidence, blackman_harris};
 
 /// Range cells whose gain is estimated together.
 #[derive(Clone, Debug)]
@@ -50,20 +50,6 @@ pub struct Series {
     pub loops: usize,
 }
 
-/// Four-term Blackman–Harris window of unit energy: the body is up to 50 dB above the noise, and its side lobes must
-/// not reach the static returns at other ranges.
-pub(super) fn window(length: usize) -> Vec<f64> {
-    let terms = [0.35875, -0.48829, 0.14128, -0.01168];
-    let raw: Vec<f64> = (0..length)
-        .map(|n| {
-            let phase = std::f64::consts::TAU * (n as f64 + 0.5) / length as f64;
-            terms.iter().enumerate().map(|(i, a)| a * (i as f64 * phase).cos()).sum()
-        })
-        .collect();
-    let energy = raw.iter().map(|w: &f64| w * w).sum::<f64>().sqrt();
-    raw.iter().map(|w| w / energy).collect()
-}
-
 /// Bins between two groups, across which windowed noise is hardly correlated.
 const GAP: usize = 2;
 /// Power over the noise that a cell without a mover may have; its law is narrower than this.
@@ -75,7 +61,7 @@ impl Field {
         let [frames, _, _, loops, samples] = evidence.cube.dims;
         let channels = evidence.cube.channels();
         let bins = evidence.range_bins();
-        let taper = window(samples);
+        let taper = blackman_harris(samples);
         let fft = FftPlanner::new().plan_fft_forward(samples);
         let noise = evidence.noise();
         if noise.iter().any(|v| !v.is_finite() || *v <= 0.0) {

@@ -4,8 +4,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use rustfft::FftPlanner;
 
-use super::field::window;
-use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::evidence::{Evidence, blackman_harris};
 
 /// Spectra in units of the noise's deviation of a frame's mean chirp.
 pub struct Steady {
@@ -33,7 +32,7 @@ impl Steady {
         if loops < 4 || bins < 16 || noise.iter().any(|v| !v.is_finite() || *v <= 0.0) {
             return None;
         }
-        let taper = window(samples);
+        let taper = blackman_harris(samples);
         let fft = FftPlanner::new().plan_fft_forward(samples);
         let of_frame = |frame: usize| -> (Vec<Complex64>, Vec<f64>) {
             let (mut means, mut scatter) = (Vec::with_capacity(channels * bins), vec![0.0; bins]);

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use rustfft::FftPlanner;
 
 use crate::diagnosis::cube::Cube;
-use crate::diagnosis::evidence::{Evidence, hann};
+use crate::diagnosis::evidence::{Evidence, blackman_harris, hann};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
 use crate::diagnosis::statistics;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
@@ -103,18 +103,6 @@ fn support(evidence: &Evidence, frame: usize) -> [Option<[usize; 2]>; 2] {
     // The body is there too, with its slow parts.
     let still = room.map(|[near, far]| body.map_or([near, far], |b| [near.min(b[0]), far.max(b[1])]));
     [still, body].map(|span| span.map(|[near, far]| bins(near, far)))
-}
-
-/// Blackman–Harris, unit energy.
-fn window(length: usize) -> Vec<f64> {
-    let raw: Vec<f64> = (0..length)
-        .map(|n| {
-            let x = TAU * (n as f64 + 0.5) / length as f64;
-            0.35875 - 0.48829 * x.cos() + 0.14128 * (2.0 * x).cos() - 0.01168 * (3.0 * x).cos()
-        })
-        .collect();
-    let energy = raw.iter().map(|w| w * w).sum::<f64>().sqrt();
-    raw.iter().map(|w| w / energy).collect()
 }
 
 pub fn find(evidence: &Evidence) -> Option<Candidate> {
@@ -218,7 +206,7 @@ fn of_frame(evidence: &Evidence, frame: usize, shifts: &[usize]) -> Vec<Sums> {
     if spans.iter().all(Option::is_none) {
         return sums;
     }
-    let (fast, slow) = (window(samples), hann(loops));
+    let (fast, slow) = (blackman_harris(samples), hann(loops));
     let mut planner = FftPlanner::new();
     let doppler_fft = planner.plan_fft_forward(loops);
     let padded = samples * PADDING;
