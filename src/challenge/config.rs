@@ -114,6 +114,9 @@ pub struct Scenes {
     pub snr_db: [f64; 2],
     /// Spread of the body's reflectivity.
     pub variation_db: [f64; 2],
+    /// Backscatter (γ) of the walls and of what stands before them. Real rooms return 0 to 20 dB more than a person who
+    /// walks in them.
+    pub clutter_db: [f64; 2],
     /// Longest edge of the pieces that the surface is cut into.
     pub edge_m: f64,
 }
@@ -133,6 +136,7 @@ impl Default for Scenes {
             mesh_error_m: [5.0e-4, 3.0e-3],
             snr_db: [30.0, 45.0],
             variation_db: [1.0, 4.0],
+            clutter_db: [-10.0, 5.0],
             edge_m: 1.0e-2,
         }
     }
@@ -187,6 +191,7 @@ impl ChallengeConfig {
             ("mesh_error_m", scenes.mesh_error_m, 0.0, 0.05),
             ("snr_db", scenes.snr_db, -20.0, 90.0),
             ("variation_db", scenes.variation_db, 0.0, 20.0),
+            ("clutter_db", scenes.clutter_db, -60.0, 20.0),
         ] {
             if !(bounds[0] >= low && bounds[1] <= high && bounds[0] <= bounds[1]) {
                 return Err(Error::setting(

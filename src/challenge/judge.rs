@@ -240,7 +240,7 @@ mod tests {
 
     fn truth(stratum: &str, effects: Value, d_prime: f64) -> Truth {
         let strength = json!({
-            "effect_to_noise_db": -20.0, "effect_to_moving_db": -30.0, "d_prime": d_prime, "d_prime_held_out": d_prime / 2.0,
+            "effect_to_noise_db": -20.0, "effect_to_moving_db": -30.0, "d_prime": d_prime, "d_prime_held_out": d_prime / 2.0, "d_prime_surviving": d_prime,
             "below_cover_db": 5.0, "gain_db": 0.0,
         });
         serde_json::from_value(json!({

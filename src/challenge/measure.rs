@@ -4,6 +4,7 @@ use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use super::rules::MASKED_DB;
+use super::surviving;
 use crate::data::IfFrame;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::statistics::exponential_scale;
@@ -20,6 +21,8 @@ pub struct Strength {
     pub d_prime: f64,
     /// The same for the held-out frames alone.
     pub d_prime_held_out: f64,
+    /// What is left of it when neither the body's phases nor the room's amplitudes are known (rung E).
+    pub d_prime_surviving: f64,
     /// Nine tenths of the effect's energy lie in range-Doppler cells whose return is stronger by at least this, dB.
     pub below_cover_db: f64,
     /// Of the recording with the effect over the one without, which the receiver scaled on its own.
@@ -53,9 +56,24 @@ fn samples(frame: &IfFrame) -> Vec<Complex64> {
     }
 }
 
+/// Samples of a recording.
+pub struct Frames {
+    /// Channels, loops, samples.
+    pub dims: [usize; 3],
+    /// `[frame][channel · loop · sample]`
+    pub values: Vec<Vec<Complex64>>,
+}
+
+impl Frames {
+    pub fn count(&self) -> usize {
+        self.values.len()
+    }
+}
+
 /// `clean` and `planted`: the same scene, noise included, without and with the effect, `[frame]`.
 pub fn strength(clean: &[IfFrame], planted: &[IfFrame]) -> Strength {
-    let [_, _, loops, fast] = clean[0].dims;
+    let [tx, rx, loops, fast] = clean[0].dims;
+    let dims = [tx * rx, loops, fast];
     let (clean, planted): (Vec<_>, Vec<_>) = (clean.iter().map(samples).collect(), planted.iter().map(samples).collect());
     let (mut cross, mut power) = (Complex64::ZERO, 0.0);
     for (x, y) in clean.iter().flatten().zip(planted.iter().flatten()) {
@@ -89,14 +107,15 @@ pub fn strength(clean: &[IfFrame], planted: &[IfFrame]) -> Strength {
     }
     let noise = exponential_scale(&mut noise_powers, 0.35).max(f64::MIN_POSITIVE);
     moving = (moving - noise * count).max(noise);
-    let channels = clean[0].len() / (loops * fast);
     let d_prime = |energy: f64| (2.0 * energy / noise).sqrt();
+    let (clean, effect) = (Frames { dims, values: clean }, Frames { dims, values: effect });
     Strength {
         effect_to_noise_db: decibels(total / (noise * count)),
         effect_to_moving_db: decibels(total / moving),
         d_prime: d_prime(total),
         d_prime_held_out: d_prime(kept),
-        below_cover_db: below_cover(&cells, noise * channels as f64),
+        d_prime_surviving: surviving::d_prime(&clean, &effect, noise, |_| true),
+        below_cover_db: below_cover(&cells, noise * (tx * rx) as f64),
         gain_db: decibels(gain.norm_sqr()),
     }
 }

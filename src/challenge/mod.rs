@@ -4,7 +4,7 @@
 //! The way of a case, in the order of the files:
 //! - [`config`], [`secret`]: what may be drawn, and by which random numbers
 //! - [`library`], [`rules`]: graded effects; look-alike sets and thresholds, fixed before any sealed run
-//! - [`plan`], [`measure`], [`seal`]: a case is drawn, recorded, its effect measured, and everything committed to
+//! - [`plan`], [`measure`], [`surviving`], [`seal`]: a case is drawn, recorded, its effect measured, and everything committed to
 //! - [`commitment`]: leaves, their Merkle root, and their verification
 //! - [`answer`]: one process per case, and what it answered
 //! - [`twins`]: the same scenes without their effects, for what a perfect diagnosis would be left with
@@ -24,6 +24,7 @@ pub mod rules;
 pub mod score;
 pub mod seal;
 pub mod secret;
+pub mod surviving;
 pub mod table;
 pub mod twins;
 

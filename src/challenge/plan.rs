@@ -147,7 +147,7 @@ fn scene(config: &ChallengeConfig, seed: u64, random: &mut ChaCha8Rng) -> (Recor
         edge_m: scenes.edge_m,
         ..SurfaceConfig::default()
     };
-    let walls = WallsConfig { clutter_gamma: 10f64.powf(between([-2.0, -1.3], random)), ..WallsConfig::default() };
+    let walls = WallsConfig { clutter_gamma: 10f64.powf(between(scenes.clutter_db, random) / 10.0), ..WallsConfig::default() };
     let mut scene = RecorderConfig {
         seed,
         mesh_error_m: between(scenes.mesh_error_m, random),

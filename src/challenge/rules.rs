@@ -2,9 +2,10 @@
 
 /// A name is confident from this probability on.
 pub const CONFIDENT: f64 = 0.8;
-/// An effect below this d′ (square root of twice its energy over the noise's variance) cannot be detected by anybody.
+/// An effect below this coherent d′ (square root of twice its energy over the noise's variance) cannot be detected by
+/// anybody; one whose surviving d′ (rung E) is below it can be all unknown phases and amplitudes.
 pub const UNDETECTABLE_D_PRIME: f64 = 2.0;
-/// From here on an effect is strong enough that missing it is a fault.
+/// From here on (rung E) an effect is strong enough that missing it is a fault.
 pub const OBVIOUS_D_PRIME: f64 = 8.0;
 /// A masked effect lies so far below the return that covers it, for nine tenths of its energy.
 pub const MASKED_DB: f64 = 20.0;

@@ -146,7 +146,13 @@ impl Case {
         !self.is(Stratum::Null)
     }
 
+    /// What survives unknown phases of the body and amplitudes of the room.
     fn d_prime(&self) -> f64 {
+        self.judgement.strength.map_or(0.0, |strength| strength.d_prime_surviving)
+    }
+
+    /// What an observer would see who knows everything but the effect.
+    fn coherent_d_prime(&self) -> f64 {
         self.judgement.strength.map_or(0.0, |strength| strength.d_prime)
     }
 
@@ -157,7 +163,7 @@ impl Case {
     }
 
     fn undetectable(&self) -> bool {
-        self.planted() && self.d_prime() < UNDETECTABLE_D_PRIME && self.judgement.truth.iter().all(|id| scalable(id))
+        self.planted() && self.coherent_d_prime() < UNDETECTABLE_D_PRIME && self.judgement.truth.iter().all(|id| scalable(id))
     }
 
     /// (before − after) / (before − oracle) on held-out data; none where there was nothing to remove.
@@ -207,7 +213,8 @@ fn points(cases: &[Case]) -> Vec<(f64, bool)> {
 fn rows(cases: &[Case], psychometric: Option<Logistic>) -> Vec<Row> {
     let all = |keep: &dyn Fn(&Case) -> bool| -> Vec<&Case> { cases.iter().filter(|case| keep(case)).collect() };
     let nulls = all(&|case| case.is(Stratum::Null));
-    let singles = all(&|case| case.graded_single() && !case.undetectable());
+    let graded = all(&|case| case.graded_single() && !case.undetectable());
+    let singles: Vec<&Case> = graded.iter().copied().filter(|case| case.d_prime() >= UNDETECTABLE_D_PRIME).collect();
     let detected: Vec<&Case> = singles.iter().copied().filter(|case| case.judgement.claims).collect();
     let pairs = all(&|case| case.is(Stratum::Pair) && case.d_prime() >= OBVIOUS_D_PRIME);
     let outside = all(&|case| case.is(Stratum::Outside) && case.d_prime() >= OBVIOUS_D_PRIME);
@@ -238,12 +245,24 @@ fn rows(cases: &[Case], psychometric: Option<Logistic>) -> Vec<Row> {
         };
         rows.push(share(name, within.map(|case| case.judgement.claims), aim));
     }
+    let hidden = graded.iter().filter(|case| case.d_prime() < UNDETECTABLE_D_PRIME);
+    rows.push(share(
+        format!("single effects detected, d′ below {UNDETECTABLE_D_PRIME}: unknown phases and amplitudes can be all of it"),
+        hidden.map(|case| case.judgement.claims),
+        Aim::None,
+    ));
+    let strong = graded.iter().filter(|case| case.coherent_d_prime() >= OBVIOUS_D_PRIME);
+    rows.push(share(
+        format!("single effects detected, coherent d′ ≥ {OBVIOUS_D_PRIME}: nothing but the effect is unknown"),
+        strong.map(|case| case.judgement.claims),
+        Aim::None,
+    ));
     if let Some(fit) = psychometric {
         for part in [0.5, 0.9] {
             let level = 10f64.powf(fit.level(part));
             rows.push(Row {
                 what: format!("d′ at which {:.0} % are detected (logistic fit)", 100.0 * part),
-                n: singles.len() + undetectable.len(),
+                n: cases.iter().filter(|case| case.graded_single()).count(),
                 estimate: level.is_finite().then_some(level),
                 interval: None,
                 aim: Aim::None,
@@ -307,9 +326,14 @@ fn rows(cases: &[Case], psychometric: Option<Logistic>) -> Vec<Row> {
             Aim::AtLeast(0.9),
         ),
         middle(
-            "removable held-out misfit recovered, median",
-            cases.iter().filter(|case| !case.is(Stratum::Outside)).filter_map(Case::recovered),
+            "removable held-out misfit recovered where an effect was named, median",
+            cases.iter().filter(|case| case.judgement.found.contains(&true)).filter_map(Case::recovered),
             Aim::AtLeast(0.9),
+        ),
+        middle(
+            "removable held-out misfit recovered, missed cases too, median",
+            cases.iter().filter(|case| !case.is(Stratum::Outside)).filter_map(Case::recovered),
+            Aim::None,
         ),
         share("concealed effects detected", concealed.iter().map(|case| case.judgement.claims), Aim::AtLeast(0.8)),
         share(
@@ -382,7 +406,7 @@ fn baseline_rows(cases: &[Case], nulls: &[&Case], singles: &[&Case], concealed: 
 
 /// What went wrong with a case, in a line; none if nothing did.
 fn failure(judgement: &Judgement) -> Option<String> {
-    let d_prime = judgement.strength.map_or(0.0, |strength| strength.d_prime);
+    let (d_prime, coherent) = judgement.strength.map_or((0.0, 0.0), |strength| (strength.d_prime_surviving, strength.d_prime));
     let reason = if let Some(reason) = &judgement.failure {
         format!("no usable report: {reason}")
     } else if judgement.stratum == Stratum::Null {
@@ -392,7 +416,7 @@ fn failure(judgement: &Judgement) -> Option<String> {
         format!("false alarm, named {:?}", judgement.named)
     } else if !judgement.overclaims.is_empty() {
         format!("confident wrong name {:?}", judgement.overclaims)
-    } else if judgement.stratum == Stratum::Undetectable || d_prime < UNDETECTABLE_D_PRIME {
+    } else if judgement.stratum == Stratum::Undetectable || coherent < UNDETECTABLE_D_PRIME {
         if !judgement.claims {
             return None;
         }
@@ -412,7 +436,7 @@ fn failure(judgement: &Judgement) -> Option<String> {
         return None;
     };
     Some(format!(
-        "`{}` ({}, tier {}, {}, d′ {d_prime:.1}): {reason}",
+        "`{}` ({}, tier {}, {}, d′ {d_prime:.1}, coherent {coherent:.1}): {reason}",
         judgement.case,
         judgement.stratum.name(),
         judgement.tier,
@@ -432,7 +456,7 @@ impl Score {
 
     pub fn markdown(&self) -> String {
         let mut text = format!(
-            "## Concealed data\n\n{} cases, committed to as `{}`; answers committed to as `{}` before the truths were opened.\n\n{}",
+            "## Concealed data\n\n{} cases, committed to as `{}`; answers committed to as `{}` before the truths were opened.\n\nd′ counts what survives unknown phases of the body and amplitudes of the room; the coherent d′ counts everything.\n\n{}",
             self.cases,
             self.challenge,
             self.answers,
@@ -450,7 +474,7 @@ impl Score {
     fn by_effect(&self) -> String {
         let mut counts: BTreeMap<&str, [usize; 3]> = BTreeMap::new();
         for judgement in &self.judgements {
-            let strong = judgement.strength.is_some_and(|strength| strength.d_prime >= OBVIOUS_D_PRIME);
+            let strong = judgement.strength.is_some_and(|strength| strength.d_prime_surviving >= OBVIOUS_D_PRIME);
             if let ([truth], true) = (&judgement.truth[..], strong) {
                 let count = counts.entry(truth).or_default();
                 count[0] += 1;

@@ -204,10 +204,10 @@ fn as_meant(plan: &mut Plan, strength: &Strength) -> bool {
             plan.weaken(strength.d_prime / WEAK_D_PRIME);
             false
         }
-        Stratum::Masked if !strength.masked() || strength.d_prime < OBVIOUS_D_PRIME => {
+        Stratum::Masked if !strength.masked() || strength.d_prime_surviving < OBVIOUS_D_PRIME => {
             // Some more than the measured shortfall, as far as a detectable effect remains.
             let missing_db = MASKED_DB + 3.0 - strength.below_cover_db;
-            let spare_db = 20.0 * (strength.d_prime / (1.5 * OBVIOUS_D_PRIME)).log10();
+            let spare_db = 20.0 * (strength.d_prime_surviving / (1.5 * OBVIOUS_D_PRIME)).log10();
             if missing_db > spare_db {
                 plan.redraw();
             }

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::effects::{Chain, Mover, Signal, Stage, Stages, codes, movers, shape_noise, twice_bounced, vibration};
+use super::effects::{Chain, EffectsConfig, Mover, Signal, Stage, Stages, codes, movers, shape_noise, twice_bounced, vibration};
 use super::paths::{Paths, body_scatter};
 use super::receiver::{Receiver, noise_for_snr, rail, random_phase};
 use super::scatter::{Scatter, widened};
@@ -164,6 +164,22 @@ impl Recorder {
         self.receiver.layout()
     }
 
+    /// The body's return in frame 0 as it were without effects: no effect of the scene changes the receiver's noise.
+    fn plain_body(&self) -> Result<Vec<Complex64>> {
+        let loops = self.world.radar.loops_per_frame;
+        if self.world.effects == EffectsConfig::default() {
+            let body = self.paths.body(0, &self.stages.wide, loops)?;
+            return Ok(body.cropped(self.stages.guard()).values);
+        }
+        let plain = World { effects: EffectsConfig::default(), ..self.world.clone() };
+        let stages = Stages::new(&plain);
+        let mut body = Signal::zero(0, &stages.wide, loops);
+        if let Some(scatter) = body_scatter(&plain, &stages, &stages.radar)? {
+            body.values = super::paths::body_values(&scatter, 0, loops)?;
+        }
+        Ok(body.cropped(stages.guard()).values)
+    }
+
     /// Scales the strongest sample to a part of full scale and finds the noise for the signal-to-noise ratio.
     fn settle(&mut self, bodies: &[Signal]) -> Result<()> {
         let (world, guard) = (self.world.clone(), self.stages.guard());
@@ -181,8 +197,7 @@ impl Recorder {
         let noise = if !config.noise {
             0.0
         } else if self.paths.scatter.is_some() {
-            let body = self.paths.body(0, &self.stages.wide, radar.loops_per_frame)?;
-            noise_for_snr(&body.cropped(guard).values, radar, config.snr_db)
+            noise_for_snr(&self.plain_body()?, radar, config.snr_db)
         } else {
             // Without a body the ratio is to what stands still.
             let still = self.paths.surroundings.still().chunks_exact(self.stages.wide.samples_per_chirp);

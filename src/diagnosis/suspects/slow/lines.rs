@@ -179,10 +179,13 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
     // What leaks from movers is no line: it raises the spectra of single frames at that frequency.
     let background = frames.iter().map(|&frame| leftover(field, series, frame, &line)).sum::<f64>() / frames.len() as f64;
     let background = background.max(1.0);
-    line.training_gain /= background;
+    // That background is itself known from a few frames only.
+    let freedom = (2 * frames.len()).saturating_sub(2 * harmonics + 1).max(1) as f64;
+    let unsure = |gain: f64| if gain > 0.0 { 0.5 * freedom * (2.0 * gain / freedom).ln_1p() } else { gain };
+    line.training_gain = unsure(line.training_gain / background);
     line.frequency_deviation_hz *= background.sqrt();
     line.amplitude_deviation *= background.sqrt();
-    line.held_out_gain = series.gain(field, held_out, |_, _, time| line.value(time)) / background;
+    line.held_out_gain = unsure(series.gain(field, held_out, |_, _, time| line.value(time)) / background);
     Some(line)
 }
 
