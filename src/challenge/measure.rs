@@ -9,8 +9,8 @@ use crate::data::IfFrame;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::statistics::exponential_scale;
 
-/// Of one case; energies are sums over all samples of |difference|², after the best common complex gain, because gain
-/// and phase of a recording are unknown to everybody.
+/// Of one case; energies are sums over all samples of |difference|², less what a common complex gain explains, because
+/// gain and phase of a recording are unknown to everybody.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Strength {
     /// Energy of the effect over the noise's, dB.
@@ -70,19 +70,17 @@ impl Frames {
     }
 }
 
-/// `clean` and `planted`: the same scene, noise included, without and with the effect, `[frame]`.
-pub fn strength(clean: &[IfFrame], planted: &[IfFrame]) -> Strength {
+/// `clean` and `planted`: the same scene, noise included, without and with the effect, `[frame]`. `gain`: of the second
+/// receiver over the first, which scale their samples on their own.
+pub fn strength(clean: &[IfFrame], planted: &[IfFrame], gain: f64) -> Strength {
     let [tx, rx, loops, fast] = clean[0].dims;
     let dims = [tx * rx, loops, fast];
     let (clean, planted): (Vec<_>, Vec<_>) = (clean.iter().map(samples).collect(), planted.iter().map(samples).collect());
-    let (mut cross, mut power) = (Complex64::ZERO, 0.0);
-    for (x, y) in clean.iter().flatten().zip(planted.iter().flatten()) {
-        cross += x.conj() * y;
-        power += x.norm_sqr();
-    }
-    let gain = if power > 0.0 && cross.norm() > 0.0 { cross / power } else { Complex64::ONE };
     let effect: Vec<Vec<Complex64>> =
         clean.iter().zip(&planted).map(|(x, y)| x.iter().zip(y).map(|(x, y)| y / gain - x).collect()).collect();
+    // What only turns or scales the whole recording is no effect: its gain and phase are unknown.
+    let common: Complex64 = clean.iter().flatten().zip(effect.iter().flatten()).map(|(x, e)| x.conj() * e).sum();
+    let power: f64 = clean.iter().flatten().map(Complex64::norm_sqr).sum();
 
     let (mut total, mut kept, mut moving, mut count) = (0.0, 0.0, 0.0, 0.0);
     let (mut noise_powers, mut cells) = (vec![], vec![]);
@@ -107,6 +105,8 @@ pub fn strength(clean: &[IfFrame], planted: &[IfFrame]) -> Strength {
     }
     let noise = exponential_scale(&mut noise_powers, 0.35).max(f64::MIN_POSITIVE);
     moving = (moving - noise * count).max(noise);
+    let shared = (common.norm_sqr() / (power - noise * count).max(noise) / total.max(f64::MIN_POSITIVE)).min(1.0);
+    (total, kept) = (total * (1.0 - shared), kept * (1.0 - shared));
     let d_prime = |energy: f64| (2.0 * energy / noise).sqrt();
     let (clean, effect) = (Frames { dims, values: clean }, Frames { dims, values: effect });
     Strength {
@@ -116,7 +116,7 @@ pub fn strength(clean: &[IfFrame], planted: &[IfFrame]) -> Strength {
         d_prime_held_out: d_prime(kept),
         d_prime_surviving: surviving::d_prime(&clean, &effect, noise, |_| true),
         below_cover_db: below_cover(&cells, noise * (tx * rx) as f64),
-        gain_db: decibels(gain.norm_sqr()),
+        gain_db: decibels(gain * gain),
     }
 }
 
@@ -186,15 +186,15 @@ mod tests {
     fn a_known_tone_has_its_energy_whatever_the_gain() {
         let clean = frames(1.0, |_, _| Complex64::ZERO, Complex64::ONE);
         let tone = |slow: usize, fast: usize| Complex64::cis(-1.1 * slow as f64 + 2.2 * fast as f64) * 0.5;
-        let planted = frames(1.0, tone, Complex64::new(0.3, -0.8));
-        let found = strength(&clean, &planted);
+        let planted = frames(1.0, tone, 0.4.into());
+        let found = strength(&clean, &planted, 0.4);
         // 4096 samples, energy 0.25 each, noise of variance 2.
         let wanted = (2.0 * 4096.0 * 0.25 / 2.0f64).sqrt();
         assert!((found.d_prime / wanted - 1.0).abs() < 0.05, "{} against {wanted}", found.d_prime);
         assert!((found.d_prime_held_out / wanted - 0.5).abs() < 0.05);
         assert!((found.effect_to_moving_db - 20.0 * (0.5f64 / 100.0).log10()).abs() < 0.5, "{}", found.effect_to_moving_db);
         assert!(!found.masked());
-        assert!((found.gain_db - 10.0 * 0.73f64.log10()).abs() < 0.05);
+        assert!((found.gain_db - 20.0 * 0.4f64.log10()).abs() < 0.05);
     }
 
     #[test]
@@ -202,9 +202,11 @@ mod tests {
         let clean = frames(1.0, |_, _| Complex64::ZERO, Complex64::ONE);
         // The same cell as the mover, but from frame to frame alike only in one half of the chirps.
         let under = |slow: usize, fast: usize| Complex64::cis(0.95 * slow as f64 + 0.72 * fast as f64) * 2.0;
-        let found = strength(&clean, &frames(1.0, under, Complex64::ONE));
+        let found = strength(&clean, &frames(1.0, under, Complex64::ONE), 1.0);
         assert!(found.masked(), "{} dB", found.below_cover_db);
-        let nothing = strength(&clean, &clean);
+        let nothing = strength(&clean, &clean, 1.0);
         assert!(nothing.d_prime < 1e-3 && nothing.effect_to_noise_db < -60.0);
+        let turned = strength(&clean, &frames(1.0, |_, _| Complex64::ZERO, Complex64::cis(0.7)), 1.0);
+        assert!(turned.d_prime < 1.0, "{}", turned.d_prime);
     }
 }

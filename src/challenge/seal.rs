@@ -181,15 +181,15 @@ fn record(config: &ChallengeConfig, plan: &mut Plan) -> Result<Recorded> {
     // What the converter does is not seen in samples that it never touched.
     scene.receiver.adc = plan.effects.iter().any(|(graded, _)| matches!(graded.id, "adc_saturation" | "lsb_stuck"));
     let world = scene.world(Path::new("."))?;
-    let clean = frames_of(&world)?;
+    let (clean, clean_gain) = frames_of(&world)?;
     if plan.stratum == Stratum::Null {
         return Ok(Recorded { world, frames: clean, settings: scene, strength: None });
     }
     let mut attempts = 1;
     loop {
         let settings = RecorderConfig { effects: plan.planted(config), ..scene.clone() };
-        let frames = frames_of(&settings.world(Path::new("."))?)?;
-        let strength = strength(&clean, &frames);
+        let (frames, gain) = frames_of(&settings.world(Path::new("."))?)?;
+        let strength = strength(&clean, &frames, gain / clean_gain);
         if attempts == MOST_ATTEMPTS || as_meant(plan, &strength) {
             return Ok(Recorded { world, frames, settings, strength: Some(strength) });
         }
@@ -218,8 +218,10 @@ fn as_meant(plan: &mut Plan, strength: &Strength) -> bool {
     }
 }
 
-fn frames_of(world: &World) -> Result<Vec<IfFrame>> {
-    Recorder::new(world)?.frames().collect()
+/// All frames, and the receiver's gain.
+fn frames_of(world: &World) -> Result<(Vec<IfFrame>, f64)> {
+    let recorder = Recorder::new(world)?;
+    Ok((recorder.frames().collect::<Result<_>>()?, recorder.gain()))
 }
 
 /// The recording without a truth and without labels.
@@ -232,7 +234,7 @@ pub fn record_twin(settings: &str, case: &Path) -> Result<()> {
     let settings: RecorderConfig =
         toml::from_str(settings).map_err(|error| Error::Parse { path: case.into(), message: error.to_string() })?;
     let world = RecorderConfig { effects: EffectsConfig::default(), ..settings }.world(Path::new("."))?;
-    write_frames(&world, &frames_of(&world)?, case)
+    write_frames(&world, &frames_of(&world)?.0, case)
 }
 
 fn write_frames(world: &World, frames: &[IfFrame], case: &Path) -> Result<()> {

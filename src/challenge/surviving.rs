@@ -4,7 +4,7 @@
 //! Nuisances, each with the size that the recording itself has:
 //! - whatever stands still may return any amplitude at any range in every channel;
 //! - what moves is, in every frame, known only up to mixing: its return in a range-Doppler cell may be any combination of
-//!   the returns in and beside the cell, with weights of unit variance. What channels differ by is not mixed away;
+//!   the returns that reach the cell, with weights of unit variance. What channels differ by is not mixed away;
 //! - the power that moves in and around a cell is known, as it follows from where the surface is: a change of it counts
 //!   as much as one exponentially distributed power can show.
 
@@ -16,6 +16,8 @@ use crate::diagnosis::evidence::{hann, transform};
 
 /// A neighbourhood whose mean power is below this many times the noise's holds no return.
 const RETURN_OVER_NOISE: f64 = 4.0;
+/// A return reaches two cells to either side: half the main lobe of a Hann window.
+const REACH: std::ops::Range<usize> = 0..5;
 /// Cells per independent power: the noise bandwidth of two Hann windows, in bins.
 const CELLS_PER_POWER: f64 = 1.5 * 1.5;
 
@@ -23,13 +25,15 @@ const CELLS_PER_POWER: f64 = 1.5 * 1.5;
 /// `noise`: variance of a complex sample's noise.
 pub fn d_prime(clean: &Frames, effect: &Frames, noise: f64, frames: impl Fn(usize) -> bool) -> f64 {
     let (still, still_effect) = (clean.mean_chirp(), effect.mean_chirp());
-    let mut squared = 0.0;
-    let mut kept = 0.0;
+    let (mut squared, mut kept, mut ratios) = (0.0, 0.0, vec![]);
     for frame in (0..clean.count()).filter(|&frame| frames(frame)) {
         let (x, e) = (clean.maps_without(frame, &still), effect.maps_without(frame, &still_effect));
-        squared += moving(&x, &e, clean.dims, noise);
+        squared += moving(&x, &e, clean.dims, noise, &mut ratios);
         kept += 1.0;
     }
+    // One gain for all of them is unknown.
+    let mean = ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
+    squared += ratios.iter().map(|ratio| (ratio - mean).powi(2)).sum::<f64>() / CELLS_PER_POWER;
     squared += standing(&still, &still_effect, clean, noise) * kept / clean.count() as f64;
     squared.max(0.0).sqrt()
 }
@@ -43,8 +47,8 @@ fn standing(still: &[Vec<Complex64>], effect: &[Vec<Complex64>], clean: &Frames,
         let (x, e) = (transform_chirp(x), transform_chirp(e));
         let bins = x.len();
         for (bin, e) in e.iter().enumerate() {
-            let free: f64 = [bins - 1, 0, 1].iter().map(|step| x[(bin + step) % bins].norm_sqr()).sum();
-            squared += 2.0 * e.norm_sqr() / (floor + (free - 3.0 * floor).max(0.0));
+            let free: f64 = REACH.map(|step| x[(bin + bins + step - 2) % bins].norm_sqr()).sum();
+            squared += 2.0 * e.norm_sqr() / (floor + (free - REACH.len() as f64 * floor).max(0.0));
         }
     }
     squared
@@ -56,16 +60,16 @@ fn transform_chirp(chirp: &[Complex64]) -> Vec<Complex64> {
     spectrum
 }
 
-/// Of one frame's maps, `[channel][doppler · range]`.
-fn moving(x: &[Vec<Complex64>], e: &[Vec<Complex64>], dims: [usize; 3], floor: f64) -> f64 {
+/// Of one frame's maps, `[channel][doppler · range]`; `ratios` takes the logarithms of the powers' changes.
+fn moving(x: &[Vec<Complex64>], e: &[Vec<Complex64>], dims: [usize; 3], floor: f64, ratios: &mut Vec<f64>) -> f64 {
     let [channels, loops, samples] = dims;
     let mut squared = 0.0;
     for doppler in 0..loops {
         for range in 0..samples {
             let cell = doppler * samples + range;
-            let around: Vec<usize> = [loops - 1, 0, 1]
-                .iter()
-                .flat_map(|d| [samples - 1, 0, 1].map(|r| (doppler + d) % loops * samples + (range + r) % samples))
+            let around: Vec<usize> = REACH
+                .flat_map(|d| REACH.map(move |r| [d, r]))
+                .map(|[d, r]| (doppler + loops + d - 2) % loops * samples + (range + samples + r - 2) % samples)
                 .collect();
             let power = |of: &dyn Fn(usize, usize) -> Complex64| -> f64 {
                 around.iter().map(|&at| (0..channels).map(|k| of(k, at).norm_sqr()).sum::<f64>()).sum()
@@ -82,7 +86,7 @@ fn moving(x: &[Vec<Complex64>], e: &[Vec<Complex64>], dims: [usize; 3], floor: f
             let whitened = covariance.cholesky().map(|factor| factor.solve(&here));
             squared += whitened.map_or(0.0, |whitened| 2.0 * here.dotc(&whitened).re);
             let after = power(&|k, at| x[k][at] + e[k][at]);
-            squared += ((after + background) / (before + background)).ln().powi(2) / CELLS_PER_POWER;
+            ratios.push(((after + background) / (before + background)).ln());
         }
     }
     squared

@@ -91,6 +91,11 @@ impl Recorder {
         self.peak
     }
 
+    /// Codes per unit of the transmitted wave: each world's strongest sample is scaled to the same part of full scale.
+    pub fn gain(&self) -> f64 {
+        self.receiver.gain.norm()
+    }
+
     /// The IF before noise and converter, `[tx, rx, loop, sample]`, in units of the transmitted wave.
     pub fn field(&self, frame: usize) -> Result<Vec<Complex64>> {
         let body = self.paths.body(frame, &self.stages.wide, self.world.radar.loops_per_frame)?;

@@ -3,6 +3,11 @@
 //! Bits far below the signal's deviation are set half of the time, whatever the signal is (Widrow's theorem of
 //! quantisation). A bit that all channels share out unevenly belongs to the format of the codes and is no finding.
 
+use std::sync::Arc;
+
+use num_complex::Complex64;
+
+use crate::diagnosis::Cube;
 use crate::diagnosis::codes::{BITS, Component};
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
@@ -102,6 +107,8 @@ fn candidate(evidence: &Evidence, component: &Component, bit: usize, share: f64,
     let [frames, _, receivers, loops, samples] = evidence.cube.dims;
     let rx = component.channel % receivers;
     let value = f64::from(1u32 << bit);
+    let stuck = component.channel;
+    let offset = (share - 0.5) * value * if component.imaginary { Complex64::I } else { Complex64::ONE };
     let what = match share {
         s if s > 0.999 => "is always 1".to_string(),
         s if s < 0.001 => "is always 0".to_string(),
@@ -129,7 +136,14 @@ fn candidate(evidence: &Evidence, component: &Component, bit: usize, share: f64,
         ),
         curve: None,
         energy: (share - 0.5).abs() * value * value * (frames * loops * samples) as f64,
-        correction: Correction::None,
+        // What the bit was is lost but for its mean: without it, the offset of a stuck bit is no offset of the receiver.
+        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+            cube.each_chirp(|[_, channel, _], chirp| {
+                if channel == stuck {
+                    chirp.iter_mut().for_each(|value| *value -= offset);
+                }
+            });
+        })),
     }
 }
 

@@ -28,6 +28,8 @@ const CLOCK_GRID: [f64; 13] = [-3.0, -2.0, -1.0, -0.6, -0.3, -0.15, 0.0, 0.15, 0
 const DRIFT_GRID: [f64; 7] = [-0.1, -0.03, -0.01, 0.0, 0.01, 0.03, 0.1];
 /// Most frames lost at once that are looked for.
 const MOST_LOST: usize = 4;
+/// Standard deviation of a displacement across the line of sight, which ranges do not show.
+const UNSEEN_M: f64 = 0.2;
 /// Kinds of change that can be told apart, and places of a step, for the correction of the p-value.
 const KINDS: f64 = 3.0;
 const STEPS: f64 = 80.0;
@@ -259,7 +261,7 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
             ),
         ),
         Change::Offset(_) => (
-            vec![Estimate::list("offset_m", &[0.0, fit.value, 0.0], &[0.05, deviation, 0.05])],
+            vec![Estimate::list("offset_m", &[0.0, fit.value, 0.0], &[UNSEEN_M, deviation, UNSEEN_M])],
             "scene",
             Rung::D,
             format!("The body stands {:.1} mm farther along boresight than stated.", 1e3 * fit.value),

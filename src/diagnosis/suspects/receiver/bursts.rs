@@ -84,7 +84,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         (false, false) => ("impulsive_noise", vec!["interference"]),
     };
     let count = places.len() as f64;
-    let estimates = if id == "interference" { vec![Estimate::normal("bursts", count, 0.03 * count + 0.3)] } else { vec![] };
+    let estimates = if id == "interference" { vec![Estimate::normal("bursts", count, 0.1 * count + 0.6)] } else { vec![] };
     let statement = if id == "interference" {
         format!(
             "{count} chirps hold a burst of {lengths:.0} samples that all receivers see at once and that neither the chirp before \

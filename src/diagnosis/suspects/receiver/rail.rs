@@ -1,16 +1,21 @@
 //! The converter's rail: components pile up at one value (card R4).
 
-use num_complex::Complex64;
+use std::sync::Arc;
 
-use crate::diagnosis::Evidence;
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::declip::Declip;
+use super::image::empty_bins;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::{Cube, Evidence};
 
 /// Fewest components at the rail.
 const FEWEST: usize = 8;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    // Clipping cannot be undone: it is looked for once, in the samples as they were recorded.
+    // It is looked for once, in the samples as they were recorded.
     if !evidence.accepted.is_empty() || evidence.is_real() {
         return vec![];
     }
@@ -48,16 +53,44 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let excess = at as f64 * (at as f64 / expected).ln() - (at as f64 - expected);
     let held_share = held_at as f64 / at as f64;
     let share = at as f64 / (2 * evidence.cube.samples.len()) as f64;
-    // How far the signal would have gone: from its root mean square and the share beyond, as for a Gaussian.
-    let rms =
-        (evidence.cube.samples.iter().map(Complex64::norm_sqr).sum::<f64>() / (2 * evidence.cube.samples.len()) as f64).sqrt();
-    let level = (rms * (2.0 * (2.0 * evidence.cube.samples.len() as f64).ln()).sqrt() / largest).max(1.0);
+    // How far the signal would have gone: from what the empty beat frequencies say of it, or else as for a Gaussian.
+    let declip = Declip::new(&empty_bins(evidence), largest, tolerance).map(Arc::new);
+    let (level, ci90) = match &declip {
+        Some(declip) => {
+            let strongest = |chirp: &[Complex64]| chirp.iter().flat_map(parts).map(f64::abs).fold(0.0, f64::max);
+            let level = evidence
+                .cube
+                .samples
+                .par_chunks_exact(samples)
+                .filter(|chirp| strongest(chirp) >= largest - tolerance)
+                .map(|chirp| {
+                    let mut whole = chirp.to_vec();
+                    declip.restore(&mut whole);
+                    strongest(&whole)
+                })
+                .reduce(|| largest, f64::max)
+                / largest;
+            // The strongest of many restored values is one of the worse restored ones, and the noise is restored with it.
+            let beyond = level - 1.0;
+            (level, [1.0 + 0.5 * beyond, 1.0 + 1.25 * beyond + 0.05])
+        }
+        None => {
+            let power = evidence.cube.samples.iter().map(Complex64::norm_sqr).sum::<f64>();
+            let rms = (power / (2 * evidence.cube.samples.len()) as f64).sqrt();
+            let level = (rms * (2.0 * (2.0 * evidence.cube.samples.len() as f64).ln()).sqrt() / largest).max(1.0);
+            (level, [0.6 * level, 1.8 * level])
+        }
+    };
+    let correction = match declip {
+        Some(declip) => Correction::Samples(Arc::new(move |cube: &mut Cube| cube.each_chirp(|_, chirp| declip.restore(chirp)))),
+        None => Correction::None,
+    };
     let frames: Vec<usize> = (0..hit_frames.len()).filter(|&frame| hit_frames[frame] > 0).collect();
     let everywhere = frames.len() == hit_frames.len();
     candidates.push(Candidate {
         id: Some("adc_saturation"),
         behaves_like: "amplitude",
-        estimates: vec![Estimate { name: "level", values: vec![level], ci90: vec![[0.6 * level, 1.8 * level]] }],
+        estimates: vec![Estimate { name: "level", values: vec![level], ci90: vec![ci90] }],
         choice: None,
         place: Place { frames: (!everywhere).then_some(frames), ..Place::at("receiver") },
         p_value: corrected((-excess).exp(), 2.0),
@@ -71,7 +104,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         ),
         curve: None,
         energy: at as f64 * (0.1 * largest).powi(2),
-        correction: Correction::None,
+        correction,
     });
     candidates
 }

@@ -319,6 +319,8 @@ fn candidate(
             let curvature = (2.0 * fitted.likelihood - at(turns + step) - at(turns - step)) / (0.002f64 * 0.002);
             let error = if curvature > 0.0 { curvature.recip().sqrt() } else { 0.05 };
             place.range_m = Some([range, range]);
+            // One level stands for channels that differ.
+            let level_deviation = 0.2 + 0.3 * spread_db / (channels as f64).sqrt();
             let statement = format!(
                 "a return {range:.3} m away, nearer than anything in the room, that never changes: the transmitters leak into \
                  the receivers over the board, {level_db:.1} dB to the signal's peak sample, {spread_db:.1} dB apart between \
@@ -326,7 +328,10 @@ fn candidate(
             );
             (
                 "tx_leakage",
-                vec![Estimate::normal("range_m", range, error.max(5e-4)), Estimate::normal("level_db", level_db, 0.2)],
+                vec![
+                    Estimate::normal("range_m", range, error.max(5e-4)),
+                    Estimate::normal("level_db", level_db, level_deviation),
+                ],
                 statement,
             )
         }
