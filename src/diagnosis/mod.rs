@@ -9,6 +9,7 @@ pub mod audit;
 pub mod codes;
 pub mod config;
 pub mod cube;
+pub mod denoised;
 pub mod evidence;
 pub mod finding;
 pub mod html;

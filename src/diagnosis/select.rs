@@ -78,8 +78,10 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         if let Some(last) = accepted.last_mut() {
             settle_rivals(last, &pending, &passing, thresholds);
         }
-        let Some((suspect, best)) = passing.iter().max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).map(|best| (&best.0, &best.1))
-        else {
+        // What happened last in the signal's chain is undone first; else the strongest.
+        let order = |(suspect, candidate): &&&(usize, Candidate)| (SUSPECTS[*suspect].last_in_chain, candidate.gain);
+        let strongest = passing.iter().max_by(|a, b| order(a).partial_cmp(&order(b)).expect("gains are finite"));
+        let Some((suspect, best)) = strongest.map(|best| (&best.0, &best.1)) else {
             break;
         };
         if accepted.len() == thresholds.most {
@@ -159,6 +161,9 @@ fn verified(original: &Evidence, mut accepted: Vec<Accepted>, thresholds: &Diagn
     let mut index = accepted.len();
     while index > 0 {
         index -= 1;
+        if SUSPECTS[accepted[index].suspect].last_in_chain {
+            continue;
+        }
         let others = accepted.iter().enumerate().filter(|&(other, _)| other != index);
         let evidence = others.fold(original.clone(), |evidence, (_, effect)| evidence.with(&effect.candidate));
         let again = (SUSPECTS[accepted[index].suspect].find)(&evidence);

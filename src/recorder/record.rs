@@ -15,7 +15,7 @@ use crate::radar::Radar;
 /// Frames that are in memory together.
 const MOST_AT_ONCE: usize = 16;
 /// Frames from which the converter's scale is estimated.
-const PREVIEWS: usize = 6;
+const PREVIEWS: usize = 32;
 
 /// Records one world, frame by frame. Equal worlds give equal samples, on any number of threads.
 pub struct Recorder {

@@ -1,6 +1,5 @@
-//! Echoes of the measured signal itself, in cells where nothing else can be: a delayed copy of the body's return (T9),
-//! and the product of two returns, object to radar to object (R6). At high signal-to-noise the measurement is the best
-//! prediction of the signal, phases included.
+//! Echoes of the measured body itself, in cells where nothing else can be: a delayed copy of its return (T9). At high
+//! signal-to-noise the measurement is the best prediction of the signal, phases included.
 
 use std::sync::Arc;
 
@@ -21,26 +20,24 @@ const LEAST_HALF_CELLS: usize = 4;
 const STRONGEST_COPY: f64 = 0.7;
 /// And not as weak as what sidelobes share with the main lobe.
 const WEAKEST_COPY: f64 = 0.01;
-/// Log-likelihood within which two explanations are not told apart.
-const CLOSE: f64 = 4.6;
 
 /// What one complex factor of a template gains.
-struct Fit {
-    factor: Complex64,
-    training: f64,
-    held_out: f64,
+pub struct Fit {
+    pub factor: Complex64,
+    pub training: f64,
+    pub held_out: f64,
     /// Standard deviation of the factor's real and imaginary part.
-    deviation: f64,
+    pub deviation: f64,
 }
 
 /// Sums of conj(template) · measured and |template|², over the noise, of one frame.
 #[derive(Clone, Copy, Default)]
-struct Match {
+pub struct Match {
     product: Complex64,
     energy: f64,
 }
 
-fn fit(scene: &Scene, matches: &[Match]) -> Fit {
+pub fn fit(scene: &Scene, matches: &[Match]) -> Fit {
     let split = &scene.evidence.split;
     let sum = |frames: &[usize]| {
         frames.iter().fold(Match::default(), |sum, &frame| Match {
@@ -61,7 +58,7 @@ fn fit(scene: &Scene, matches: &[Match]) -> Fit {
 }
 
 /// Per frame, templates `[doppler, range]` of every channel against what is measured, in free cells.
-fn matches(scene: &Scene, template: impl Fn(usize, usize) -> Vec<Complex64> + Sync) -> Vec<Match> {
+pub fn matches(scene: &Scene, template: impl Fn(usize, usize) -> Vec<Complex64> + Sync) -> Vec<Match> {
     let noise = scene.evidence.noise();
     (0..scene.frames())
         .into_par_iter()
@@ -80,80 +77,6 @@ fn matches(scene: &Scene, template: impl Fn(usize, usize) -> Vec<Complex64> + Sy
             sum
         })
         .collect()
-}
-
-/// The sum of all channels of a chirp of the moving and still signal: what arrives at the board.
-fn board(cube: &Cube, frame: usize) -> Vec<Complex64> {
-    let mut sum = vec![Complex64::ZERO; cube.dims[3] * cube.dims[4]];
-    let weight = 1.0 / cube.channels() as f64;
-    for channel in 0..cube.channels() {
-        sum.iter_mut().zip(cube.channel(frame, channel)).for_each(|(sum, value)| *sum += value * weight);
-    }
-    sum
-}
-
-/// R6: both beams multiplied. Told from the second harmonic, which doubles the phase of every receiver.
-pub fn object_radar_object(scene: &Scene, tried: f64) -> Option<Candidate> {
-    let cube = &scene.evidence.cube;
-    if scene.evidence.is_real() {
-        return None;
-    }
-    let samples = scene.samples;
-    let boards: Vec<Vec<Complex64>> = (0..scene.frames()).map(|frame| board(cube, frame)).collect();
-    let bounced = matches(scene, |frame, channel| {
-        let product: Vec<_> = cube.channel(frame, channel).iter().zip(&boards[frame]).map(|(a, b)| a * b).collect();
-        transform(&product, samples)
-    });
-    let found = fit(scene, &bounced);
-    let p_value = corrected((-(found.training + found.held_out).max(0.0)).exp(), tried);
-    if found.held_out < super::LEAST_GAIN || p_value > 1e-3 {
-        return None;
-    }
-    let squared = matches(scene, |frame, channel| {
-        let square: Vec<_> = cube.channel(frame, channel).iter().map(|value| value * value).collect();
-        transform(&square, samples)
-    });
-    let harmonic = fit(scene, &squared).held_out;
-    if harmonic > found.held_out + CLOSE {
-        return None;
-    }
-    let peak = cube.samples.iter().map(|value| value.norm()).fold(0.0, f64::max);
-    let value = found.factor.norm() * peak;
-    let factor = found.factor;
-    let energy: f64 = (0..scene.frames())
-        .flat_map(|frame| (0..cube.channels()).map(move |channel| (frame, channel)))
-        .map(|(frame, channel)| {
-            let pairs = cube.channel(frame, channel).iter().zip(&boards[frame]);
-            pairs.map(|(a, b)| (factor * a * b).norm_sqr()).sum::<f64>()
-        })
-        .sum();
-    Some(Candidate {
-        id: Some("object_radar_object"),
-        behaves_like: "path-like",
-        estimates: vec![Estimate::normal("coefficient", value, peak * found.deviation.max(0.05 * found.factor.norm()))],
-        choice: None,
-        place: Place::at("propagation"),
-        p_value,
-        gain: found.held_out,
-        rung: Rung::F,
-        look_alikes: if (harmonic - found.held_out).abs() < CLOSE { vec!["second_harmonic"] } else { vec![] },
-        statement: format!(
-            "Returns go out a second time: at the sum of two ranges and two velocities lies {:.0} dB (of the peak sample) of \
-             their product, with the array phase of one arrival, not twice that phase.",
-            20.0 * value.max(1e-12).log10()
-        ),
-        curve: None,
-        energy,
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-            for frame in 0..cube.dims[0] {
-                let board = board(cube, frame);
-                let (channels, size) = (cube.channels(), board.len());
-                for chirps in cube.samples[frame * channels * size..(frame + 1) * channels * size].chunks_exact_mut(size) {
-                    chirps.iter_mut().zip(&board).for_each(|(value, board)| *value -= factor * *value * board);
-                }
-            }
-        })),
-    })
 }
 
 /// T9: the body once more, a fixed way later.

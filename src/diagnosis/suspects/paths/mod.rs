@@ -5,6 +5,7 @@ mod ghost;
 mod image;
 mod mover;
 mod pendulum;
+mod product;
 mod removal;
 mod scene;
 mod still_point;
@@ -64,7 +65,7 @@ fn moving(scene: &Scene) -> Vec<Candidate> {
         }
         _ => {}
     }
-    let echoes = [echo::multibounce(scene, TRIED), echo::object_radar_object(scene, TRIED)];
+    let echoes = [echo::multibounce(scene, TRIED), product::find(scene, TRIED)];
     found.extend(echoes.into_iter().flatten());
     found
 }

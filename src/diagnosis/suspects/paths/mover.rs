@@ -14,6 +14,8 @@ use crate::diagnosis::{Candidate, Correction, Estimate, Place, Rung};
 const CELL_ERROR: f64 = 0.12;
 /// A sighting so much weaker than the others is noise or a sidelobe on the way.
 const CHANCE_SHARE: f64 = 0.03;
+/// A thing that swings farther is no fan, curtain or pendulum: it has no name.
+const WIDEST_SWING_M: f64 = 0.5;
 /// A swing leaves less than this share of the velocities' variance.
 const SWING_LEAVES: f64 = 0.15;
 
@@ -216,7 +218,8 @@ fn fit(scene: &Scene, sightings: &[Sighting]) -> Option<Pendulum> {
     let times: Vec<f64> = sightings.iter().map(|s| middle_s(scene, s.frame)).collect();
     let cells = &scene.model.cells;
     let errors = [CELL_ERROR / cells.bins_per_m, CELL_ERROR / cells.doppler_per_mps];
-    Pendulum::fit(sightings, &times, errors, scene.loops as f64 / cells.doppler_per_mps).filter(|fit| fit.left < SWING_LEAVES)
+    Pendulum::fit(sightings, &times, errors, scene.loops as f64 / cells.doppler_per_mps)
+        .filter(|fit| fit.left < SWING_LEAVES && fit.swing_m() < WIDEST_SWING_M)
 }
 
 /// What a frame should show: the swing, or the way between the neighbouring sightings, blurred by what it may be off.

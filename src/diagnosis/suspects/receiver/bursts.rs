@@ -31,7 +31,7 @@ struct Burst {
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [frames, _, rx, loops, samples] = evidence.cube.dims;
-    if loops < 8 || evidence.accepted.iter().any(|id| ["interference", "impulsive_noise"].contains(id)) {
+    if loops < 8 || evidence.accepted.iter().any(|id| ["interference", "impulsive_noise", "adc_saturation"].contains(id)) {
         return vec![];
     }
     let channels = evidence.cube.channels();

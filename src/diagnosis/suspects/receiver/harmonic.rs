@@ -9,7 +9,8 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::image::empty_bins;
-use crate::diagnosis::evidence::{hann, spectrum, transform};
+use crate::diagnosis::denoised;
+use crate::diagnosis::evidence::{spectrum, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
@@ -126,17 +127,12 @@ fn tested(evidence: &Evidence, cubic: bool) -> Option<Candidate> {
 fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool], cubic: bool, peak: f64) -> Sums {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let scale = if cubic { 1.0 / (peak * peak) } else { 1.0 / peak };
-    let (slow, fast) = (hann(loops), hann(samples));
     let mut sums = Sums::default();
     for channel in 0..evidence.cube.channels() {
         let noise = evidence.noise()[channel].max(1e-300);
         let signal = evidence.cube.channel(frame, channel);
-        // |s + n|² (s + n) holds 2 |s|² n, which is the noise that is looked at: its mean is taken away.
-        // Weighted as the transform weights the noise; windows of unit energy make this a mean.
-        let mean_power: f64 =
-            signal.iter().enumerate().map(|(i, value)| value.norm_sqr() * (slow[i / samples] * fast[i % samples]).powi(2)).sum();
-        let own = if cubic { 2.0 * mean_power } else { 0.0 };
-        let mut template: Vec<Complex64> = signal.iter().map(|value| (power_of(*value, cubic) - value * own) * scale).collect();
+        let clean = denoised::channel(evidence, frame, channel);
+        let mut template: Vec<Complex64> = clean.iter().map(|value| power_of(*value, cubic) * scale).collect();
         let mut mean = vec![Complex64::ZERO; samples];
         let mut still = vec![Complex64::ZERO; samples];
         for (template, chirp) in template.chunks_exact(samples).zip(signal.chunks_exact(samples)) {

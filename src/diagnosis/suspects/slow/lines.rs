@@ -29,6 +29,8 @@ const HARMONICS: usize = 4;
 const HARMONIC_GAIN: f64 = 10.0;
 /// Aliases that explain only so much less (nats) cannot be told apart.
 const ALIAS_GAIN: f64 = 4.6;
+/// A background above this many times the noise is more than noise.
+const LOUD: f64 = 1.5;
 /// Points per resolution cell of a frame's own spectrum.
 const PADDING: usize = 16;
 
@@ -179,9 +181,11 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
     // What leaks from movers is no line: it raises the spectra of single frames at that frequency.
     let background = frames.iter().map(|&frame| leftover(field, series, frame, &line)).sum::<f64>() / frames.len() as f64;
     let background = background.max(1.0);
-    // That background is itself known from a few frames only.
+    // A background of more than noise is itself known from a few frames only.
     let freedom = (2 * frames.len()).saturating_sub(2 * harmonics + 1).max(1) as f64;
-    let unsure = |gain: f64| if gain > 0.0 { 0.5 * freedom * (2.0 * gain / freedom).ln_1p() } else { gain };
+    let unsure = |gain: f64| {
+        if gain > 0.0 && background > LOUD { 0.5 * freedom * (2.0 * gain / freedom).ln_1p() } else { gain }
+    };
     line.training_gain = unsure(line.training_gain / background);
     line.frequency_deviation_hz *= background.sqrt();
     line.amplitude_deviation *= background.sqrt();

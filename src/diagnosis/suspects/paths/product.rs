@@ -1,0 +1,202 @@
+//! Products of the signal with itself: two returns one after the other, object to radar to object (R6), and the second
+//! harmonic of a receiver (R5), which doubles the phase of every receiver where the second trip has that of one arrival.
+//! Both lie at the sum of two ranges and two velocities; the measurement without its noise is the best template of either.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::echo::{Fit, fit, matches};
+use super::scene::Scene;
+use crate::diagnosis::denoised;
+use crate::diagnosis::evidence::transform;
+use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Rung};
+
+/// Log-likelihood within which two explanations are not told apart.
+const CLOSE: f64 = 4.6;
+/// What was measured holds the products already: so often they are taken out of their own template.
+const ROUNDS: usize = 3;
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// What arrives at the board is that of one channel, or the mean of all.
+    Bounce(Option<usize>),
+    Harmonic,
+}
+
+const KINDS: [Kind; 3] = [Kind::Bounce(None), Kind::Bounce(Some(0)), Kind::Harmonic];
+
+impl Kind {
+    fn id(self) -> &'static str {
+        match self {
+            Self::Bounce(_) => "object_radar_object",
+            Self::Harmonic => "second_harmonic",
+        }
+    }
+
+    /// `[channel][loop · sample]`
+    fn product<T: AsRef<[Complex64]>>(self, channels: &[T]) -> Vec<Vec<Complex64>> {
+        let channels = channels.iter().map(AsRef::as_ref);
+        match self {
+            Self::Harmonic => channels.map(|channel| channel.iter().map(|value| value * value).collect()).collect(),
+            Self::Bounce(place) => {
+                let all: Vec<&[Complex64]> = channels.clone().collect();
+                let board = place.map_or_else(|| mean(&all), |place| all[place].to_vec());
+                channels.map(|channel| channel.iter().zip(&board).map(|(a, b)| a * b).collect()).collect()
+            }
+        }
+    }
+}
+
+fn mean(channels: &[&[Complex64]]) -> Vec<Complex64> {
+    let mut sum = vec![Complex64::ZERO; channels[0].len()];
+    let weight = 1.0 / channels.len() as f64;
+    for channel in channels {
+        sum.iter_mut().zip(*channel).for_each(|(sum, value)| *sum += value * weight);
+    }
+    sum
+}
+
+pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
+    if scene.evidence.is_real() {
+        return None;
+    }
+    let clean: Vec<Vec<Vec<Complex64>>> = (0..scene.frames()).map(|frame| denoised::frame(scene.evidence, frame)).collect();
+    let known = |kind: Kind| scene.evidence.accepted.contains(&kind.id());
+    let mut fits: Vec<(Kind, Fit, f64)> = KINDS
+        .into_iter()
+        .filter(|kind| !known(*kind))
+        .map(|kind| {
+            let (found, energy) = fitted(scene, &clean, kind);
+            (kind, found, energy)
+        })
+        .collect();
+    fits.sort_by(|a, b| b.1.held_out.total_cmp(&a.1.held_out));
+    let (kind, found, energy) = fits.first()?;
+    let p_value = corrected((-(found.training + found.held_out).max(0.0)).exp(), tried);
+    if found.held_out < super::LEAST_GAIN || p_value > 1e-3 {
+        return None;
+    }
+    let peak = scene.evidence.cube.samples.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    let (value, deviation) = (found.factor.norm() * peak, peak * found.deviation.max(0.05 * found.factor.norm()));
+    let level_db = 20.0 * value.max(1e-12).log10();
+    let (estimate, stage, statement) = match kind {
+        Kind::Bounce(_) => (
+            Estimate::normal("coefficient", value, deviation),
+            "propagation",
+            format!(
+                "Returns go out a second time: at the sum of two ranges and two velocities lies {level_db:.0} dB (of the peak \
+                 sample) of their product, with the array phase of one arrival, not twice that phase."
+            ),
+        ),
+        Kind::Harmonic => (
+            Estimate::normal("level_db", level_db, 8.7 * deviation / value.max(1e-12)),
+            "receiver",
+            format!(
+                "everything has a second harmonic, at twice its beat frequency and velocity and with twice the phase of every \
+                 receiver: {level_db:.1} dB at the strongest sample"
+            ),
+        ),
+    };
+    let (kind, factor) = (*kind, found.factor);
+    Some(Candidate {
+        id: Some(kind.id()),
+        behaves_like: if kind == Kind::Harmonic { "non-linear" } else { "path-like" },
+        estimates: vec![estimate],
+        choice: None,
+        place: Place::at(stage),
+        p_value,
+        gain: found.held_out,
+        rung: Rung::F,
+        look_alikes: fits
+            .iter()
+            .skip(1)
+            .filter(|other| found.held_out - other.1.held_out < CLOSE)
+            .map(|other| other.0.id())
+            .collect(),
+        statement,
+        curve: None,
+        energy: *energy,
+        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| remove(cube, kind, factor))),
+    })
+}
+
+/// The factor of the product, and the energy that it stands for.
+fn fitted(scene: &Scene, clean: &[Vec<Vec<Complex64>>], kind: Kind) -> (Fit, f64) {
+    let mut products: Vec<Vec<Vec<Complex64>>> = clean.par_iter().map(|frame| kind.product(frame)).collect();
+    let samples = scene.samples;
+    let judge = |products: &[Vec<Vec<Complex64>>]| {
+        // As in the measured maps, what stands still in all frames is left out.
+        let still: Vec<Vec<Complex64>> = (0..products[0].len()).map(|channel| mean_chirp(products, channel, samples)).collect();
+        let moving = |frame: usize, channel: usize| -> Vec<Complex64> {
+            products[frame][channel].iter().enumerate().map(|(i, value)| value - still[channel][i % samples]).collect()
+        };
+        fit(scene, &matches(scene, |frame, channel| transform(&moving(frame, channel), samples)))
+    };
+    let mut found = judge(&products);
+    for _ in 1..ROUNDS {
+        if found.training < super::LEAST_GAIN {
+            break;
+        }
+        let factor = found.factor;
+        let without = |(frame, product): (&Vec<Vec<Complex64>>, &Vec<Vec<Complex64>>)| {
+            let linear: Vec<Vec<Complex64>> =
+                frame.iter().zip(product).map(|(s, p)| s.iter().zip(p).map(|(s, p)| s - factor * p).collect()).collect();
+            kind.product(&linear)
+        };
+        let refined: Vec<Vec<Vec<Complex64>>> = clean.par_iter().zip(&products).map(without).collect();
+        let again = judge(&refined);
+        if again.training <= found.training {
+            break;
+        }
+        (products, found) = (refined, again);
+    }
+    let energy = products.iter().flatten().flatten().map(|value| (found.factor * value).norm_sqr()).sum();
+    (found, energy)
+}
+
+/// Over all frames and loops.
+fn mean_chirp(frames: &[Vec<Vec<Complex64>>], channel: usize, samples: usize) -> Vec<Complex64> {
+    let mut mean = vec![Complex64::ZERO; samples];
+    let chirps = frames.iter().flat_map(|frame| frame[channel].chunks_exact(samples));
+    let weight = 1.0 / chirps.clone().count() as f64;
+    chirps.for_each(|chirp| mean.iter_mut().zip(chirp).for_each(|(mean, value)| *mean += value * weight));
+    mean
+}
+
+/// Undoes it in two steps, which are enough for what is small.
+fn remove(cube: &mut Cube, kind: Kind, factor: Complex64) {
+    let (channels, size) = (cube.channels(), cube.dims[3] * cube.dims[4]);
+    cube.samples.par_chunks_exact_mut(channels * size).for_each(|frame| {
+        let found: Vec<Vec<Complex64>> = frame.chunks_exact(size).map(<[Complex64]>::to_vec).collect();
+        let without = |product: Vec<Vec<Complex64>>| -> Vec<Vec<Complex64>> {
+            found.iter().zip(product).map(|(s, p)| s.iter().zip(p).map(|(s, p)| s - factor * p).collect()).collect()
+        };
+        let linear = without(kind.product(&without(kind.product(&found))));
+        frame.copy_from_slice(&linear.concat());
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_added_is_removed_and_the_two_kinds_differ() {
+        let tone = |rate: f64, rx: f64| (0..64).map(move |n| Complex64::cis(rate * f64::from(n) + rx)).collect::<Vec<_>>();
+        let signal: Vec<Vec<Complex64>> = [0.0, 1.0].map(|rx| tone(0.5, rx)).to_vec();
+        assert_ne!(Kind::Bounce(Some(0)).product(&signal)[1], Kind::Harmonic.product(&signal)[1]);
+        for kind in KINDS {
+            let factor = Complex64::new(0.02, 0.01);
+            let product = kind.product(&signal);
+            let with: Vec<Complex64> =
+                signal.iter().flatten().zip(product.iter().flatten()).map(|(s, p)| s + factor * p).collect();
+            let mut cube = Cube::new([1, 1, 2, 2, 32], with);
+            remove(&mut cube, kind, factor);
+            let worst = cube.samples.iter().zip(signal.iter().flatten()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            assert!(worst < 1e-3, "{worst}");
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! One frame of one channel that is not like the others: samples that slipped, a frame that was written over.
+//!
+//! What stands still is alike in all frames. Movers leave remains in it, which all channels of a frame share in power; so
+//! the odd one must stand out both from its channel's other frames and from its frame's other channels. A frame is all
+//! there is of it, so its even chirps propose and its odd chirps judge.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use crate::diagnosis::Cube;
+use crate::diagnosis::evidence::{Evidence, spectrum};
+use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
+use crate::diagnosis::statistics::corrected;
+
+/// Fewest frames and channels among which one can be odd.
+const FEWEST_FRAMES: usize = 6;
+const FEWEST_CHANNELS: usize = 2;
+/// How many times the strongest other deviation an odd one is at least.
+const STANDS_OUT: f64 = 4.0;
+/// Independent numbers that a deviation's energy is taken to consist of at most: remains of movers are few.
+const FEW_NUMBERS: f64 = 20.0;
+pub const BEHAVES_LIKE: &str = "single frame";
+
+/// Mean chirps of the even and of the odd loops less the channel's mean over the other frames.
+struct Deviation {
+    halves: [Vec<Complex64>; 2],
+    /// Σ |spectrum|² of both halves' mean over the noise's expectation, and the number of bins.
+    energy: f64,
+}
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let [frames, _, receivers, loops, samples] = evidence.cube.dims;
+    let channels = evidence.cube.channels();
+    if frames < FEWEST_FRAMES || channels < FEWEST_CHANNELS || loops < 4 || evidence.accepted.contains(&BEHAVES_LIKE) {
+        return vec![];
+    }
+    let means: Vec<[Vec<Complex64>; 2]> = (0..frames * channels)
+        .into_par_iter()
+        .map(|at| halves(evidence.cube.channel(at / channels, at % channels), samples))
+        .collect();
+    let deviations: Vec<Deviation> = (0..frames * channels)
+        .into_par_iter()
+        .map(|at| {
+            let (frame, channel) = (at / channels, at % channels);
+            let others = (frames - 1) as f64;
+            let mut rest = vec![Complex64::ZERO; samples];
+            for other in (0..frames).filter(|&other| other != frame) {
+                for half in &means[other * channels + channel] {
+                    rest.iter_mut().zip(half).for_each(|(sum, value)| *sum += value / (2.0 * others));
+                }
+            }
+            let halves = [0, 1].map(|half| means[at][half].iter().zip(&rest).map(|(a, b)| a - b).collect::<Vec<_>>());
+            let mean: Vec<Complex64> = halves[0].iter().zip(&halves[1]).map(|(a, b)| (a + b) / 2.0).collect();
+            let noise = evidence.noise()[channel].max(1e-300) / loops as f64;
+            let energy = spectrum(&mean).iter().map(|value| value.norm_sqr()).sum::<f64>() / noise / samples as f64;
+            Deviation { halves, energy }
+        })
+        .collect();
+    let Some(odd) = (0..deviations.len()).max_by(|&a, &b| deviations[a].energy.total_cmp(&deviations[b].energy)) else {
+        return vec![];
+    };
+    let (frame, channel) = (odd / channels, odd % channels);
+    let next = (0..deviations.len()).filter(|&at| at != odd).map(|at| deviations[at].energy).fold(1.0, f64::max);
+    let ratio = deviations[odd].energy / next;
+    if ratio < STANDS_OUT {
+        return vec![];
+    }
+    // A ratio of mean powers of so many numbers each, at the worst.
+    let p_value = corrected((-0.5 * FEW_NUMBERS * (ratio.ln() - (1.0 - 1.0 / ratio))).exp(), deviations.len() as f64);
+    // What the even chirps deviate by predicts the odd ones.
+    let [even, uneven] = &deviations[odd].halves;
+    let noise = next * evidence.noise()[channel].max(1e-300) / (0.5 * loops as f64);
+    let gain = uneven.iter().zip(even).map(|(a, b)| a.norm_sqr() - (a - b).norm_sqr()).sum::<f64>() / noise;
+    let change: Vec<Complex64> = even.iter().zip(uneven).map(|(a, b)| (a + b) / 2.0).collect();
+    let energy = change.iter().map(|value| value.norm_sqr()).sum::<f64>() * loops as f64;
+    let size = loops * samples;
+    vec![Candidate {
+        id: None,
+        behaves_like: BEHAVES_LIKE,
+        estimates: vec![],
+        choice: None,
+        place: Place {
+            frames: Some(vec![frame]),
+            rx: Some(vec![channel % receivers]),
+            tx: (channels > receivers).then(|| vec![channel / receivers]),
+            ..Place::at("receiver")
+        },
+        p_value,
+        gain,
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement: format!(
+            "In frame {frame} receiver {} sees the room otherwise than in all other frames, by {:.0} times the power of the next \
+             deviation, and no other receiver does: that frame of that receiver was corrupted or shifted.",
+            channel % receivers,
+            ratio
+        ),
+        curve: None,
+        energy,
+        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+            let start = odd * size;
+            for chirp in cube.samples[start..start + size].chunks_exact_mut(change.len()) {
+                chirp.iter_mut().zip(&change).for_each(|(value, change)| *value -= change);
+            }
+        })),
+    }]
+}
+
+/// Mean chirps of the even and of the odd loops.
+fn halves(channel: &[Complex64], samples: usize) -> [Vec<Complex64>; 2] {
+    let mut sums = [vec![Complex64::ZERO; samples], vec![Complex64::ZERO; samples]];
+    let mut counts = [0.0; 2];
+    for (index, chirp) in channel.chunks_exact(samples).enumerate() {
+        sums[index % 2].iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value);
+        counts[index % 2] += 1.0;
+    }
+    for (sum, count) in sums.iter_mut().zip(counts) {
+        sum.iter_mut().for_each(|value| *value /= count);
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::diagnosis::cube::{Loaded, Split};
+    use crate::radar::Radar;
+
+    /// Two static returns and a slow mover in noise.
+    fn evidence(slip: usize) -> Evidence {
+        let mut radar = Radar::small(8);
+        (radar.loops_per_frame, radar.samples_per_chirp) = (16, 64);
+        let dims = radar.dims();
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let [_, _, receivers, loops, samples] = dims;
+        let samples_all: Vec<Complex64> = (0..dims.iter().product::<usize>())
+            .map(|i| {
+                let (n, slow, rx, frame) =
+                    (i % samples, i / samples % loops, i / samples / loops % receivers, i / samples / loops / receivers);
+                let n = if (frame, rx) == (3, 1) { n + slip } else { n } as f64;
+                let mover = Complex64::cis(0.6 * n + 0.03 * slow as f64 + 1.9 * frame as f64) * 4.0;
+                Complex64::cis(0.9 * n + 0.4 * rx as f64) * 30.0 + mover + Complex64::new(normal(), normal())
+            })
+            .collect();
+        let starts_s = (0..dims[0]).map(|frame| frame as f64 * radar.frame_period_s).collect();
+        let loaded = Loaded {
+            cube: Cube::new(dims, samples_all),
+            split: Split { training: vec![0, 1, 3, 4, 5, 7], held_out: vec![2, 6], block_loops: None },
+            starts_s,
+            extremes: [-100.0, 100.0],
+            radar,
+        };
+        Evidence::new(loaded, None, None)
+    }
+
+    #[test]
+    fn a_slipped_frame_is_found_where_it_is_and_nothing_is_nothing() {
+        let found = find(&evidence(3));
+        let place = &found[0].place;
+        assert_eq!((place.frames.as_deref(), place.rx.as_deref()), (Some(&[3][..]), Some(&[1][..])));
+        assert!(found[0].p_value < 1e-6 && found[0].gain > 15.0, "{} {}", found[0].p_value, found[0].gain);
+        assert!(find(&evidence(3).with(&found[0])).is_empty());
+        assert!(find(&evidence(0)).is_empty());
+    }
+}
