@@ -12,6 +12,7 @@ use crate::{
     data::{IfFrame, IfLayout, Recording, RecordingContents, write_recording},
     error::Result,
     heatmap::{HeatmapConfig, synthetic},
+    lpips::tests::random_network,
     metrics::MetricsConfig,
     person::Person,
     radar::Radar,
@@ -91,6 +92,37 @@ fn a_second_take_agrees_where_the_person_is_and_not_in_the_noise() {
         assert_eq!((scores.psnr_db.mean, scores.mean_absolute_error_db.mean), (100.0, 0.0));
         assert!((scores.ssim.mean - 1.0).abs() < 1e-12 && scores.lpips.is_none());
     }
+}
+
+#[test]
+fn a_network_sees_every_region_and_refuses_maps_that_are_too_small_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let lpips = random_network(Network::Squeeze);
+    let with = |measured: &Recording, other: &Recording| {
+        compare(measured, other, &HeatmapConfig::default(), &MetricsConfig::default(), Some(&lpips))
+    };
+    let vertices = vec![vec![[0.0, 3.0, 0.0], [0.1, 3.0, 0.0], [0.0, 3.0, 0.1]]; 2];
+    let person = Person::Meshes { vertices, faces: vec![[0, 1, 2]], pose_times_s: vec![0.0, 1.0] };
+    let radar = radar(2);
+    let [measured, again, empty] =
+        [("measured", 30.0, 1), ("again", 30.0, 2), ("empty", 0.0, 3)].map(|(name, amplitude, seed)| {
+            write(&folder.path().join(name), &radar, &samples(&radar, amplitude, seed), &[], Some(&person))
+        });
+    let distances = |other: &Recording| {
+        let found = with(&measured, other).unwrap();
+        assert_eq!(found.lpips, Some(Network::Squeeze));
+        [found.global, found.moving, found.person].map(|scores| scores.unwrap().lpips.unwrap().mean)
+    };
+    assert_eq!(distances(&measured), [0.0; 3]);
+    let (near, far) = (distances(&again), distances(&empty));
+    assert!(near.iter().zip(&far).all(|(near, far)| 0.0 < *near && near < far), "{near:?}, {far:?}");
+    // the person's is that of a box, not of the whole map
+    assert_ne!(far[1], far[2]);
+
+    let radar = Radar { loops_per_frame: 16, ..radar };
+    let small = write(&folder.path().join("small"), &radar, &samples(&radar, 1.0, 1), &[], None);
+    let text = with(&small, &small).unwrap_err().to_string();
+    assert!(text.contains("maps of 16 × 100 cells, expected at least 32 × 32"), "{text}");
 }
 
 #[test]

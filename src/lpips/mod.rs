@@ -125,4 +125,4 @@ fn head_distance(features: Tensor<4>, head: &Tensor<4>) -> f64 {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -5,7 +5,7 @@ use std::{fs, io::Write, path::Path};
 use burn::tensor::Device;
 
 use super::*;
-use crate::support::{numbers, shared};
+use crate::support::{fixture_images, numbers, shared, splitmix64};
 
 /// Name, shape, values.
 type Tensors = Vec<(String, Vec<usize>, Vec<f32>)>;
@@ -77,6 +77,15 @@ fn heads(network: Network) -> Tensors {
 
 fn open(network: Network, weights: &Path, heads: &Path) -> Result<Lpips> {
     Lpips::open(&LpipsConfig { network, weights: weights.into(), heads: heads.into() }, &Device::flex())
+}
+
+/// A network of random weights, for tests elsewhere.
+pub fn random_network(network: Network) -> Lpips {
+    let folder = tempfile::tempdir().unwrap();
+    let (weights, head) = (folder.path().join("weights.safetensors"), folder.path().join("heads.safetensors"));
+    write_safetensors(&weights, &backbone(network));
+    write_safetensors(&head, &heads(network));
+    open(network, &weights, &head).unwrap()
 }
 
 #[test]
@@ -171,32 +180,11 @@ fn files_of_another_network_are_refused_with_the_tensor_and_the_network_they_fit
     assert!(text.contains("absent.safetensors: cannot be read"), "{text}");
 }
 
-/// splitmix64's uniform numbers, as the fixture draws its weights.
-fn uniform(seed: u64, count: usize) -> Vec<f64> {
-    let number = |index: u64| {
-        let mut z = index.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(seed);
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 * 2f64.powi(-53)
-    };
-    (1..=count as u64).map(number).collect()
-}
-
 #[test]
 fn distances_at_every_depth_are_those_of_the_lpips_package() {
     let Some(folder) = shared("fixtures/metrics") else { return };
     let fixture: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("fixture.json")).unwrap()).unwrap();
-    let (rows, columns) = (128, 256);
-    assert_eq!((fixture["H"].as_u64(), fixture["W"].as_u64()), (Some(rows), Some(columns)));
-    let (rows, columns) = (rows as usize, columns as usize);
-    let (texture, error) = (uniform(1, rows * columns), uniform(2, rows * columns));
-    let pixel = |index: usize| {
-        let (y, x) = ((index / columns) as f64, (index % columns) as f64);
-        let blob = |row: f64, height: f64, width: f64| (-((y - row).powi(2) / height + (x - 60.0).powi(2) / width)).exp();
-        (0.15 * texture[index] + 0.8 * blob(64.0, 20.0, 90.0) + 0.5 * blob(80.0, 200.0, 60.0)).clamp(0.0, 1.0)
-    };
-    let a: Vec<f64> = (0..rows * columns).map(pixel).collect();
-    let b: Vec<f64> = a.iter().zip(&error).map(|(a, u)| (a + 0.2 * (2.0 * u - 1.0)).clamp(0.0, 1.0)).collect();
+    let ([a, b], dims) = fixture_images();
     let scratch = tempfile::tempdir().unwrap();
     let (weights, head) = (scratch.path().join("weights.safetensors"), scratch.path().join("heads.safetensors"));
     let mut wrong = Vec::new();
@@ -207,17 +195,17 @@ fn distances_at_every_depth_are_those_of_the_lpips_package() {
             let shape: Vec<usize> = serde_json::from_value(entry[1].clone()).unwrap();
             let inputs: usize = shape[1..].iter().product();
             let size = if shape.len() > 1 { (6.0 / inputs as f64).sqrt() } else { 0.05 };
-            let values = uniform(1000 + index as u64, shape.iter().product());
+            let values = splitmix64(1000 + index as u64, shape.iter().product());
             let values = values.into_iter().map(|u| ((2.0 * u - 1.0) * size) as f32).collect();
             (entry[0].as_str().unwrap().to_string(), shape, values)
         };
         write_safetensors(&weights, &wanted["tensors"].as_array().unwrap().iter().enumerate().map(tensor).collect());
         let mut trained = heads(network);
         for (depth, (_, shape, values)) in trained.iter_mut().enumerate() {
-            *values = uniform(2000 + depth as u64, shape[1]).into_iter().map(|u| (u / shape[1] as f64) as f32).collect();
+            *values = splitmix64(2000 + depth as u64, shape[1]).into_iter().map(|u| (u / shape[1] as f64) as f32).collect();
         }
         write_safetensors(&head, &trained);
-        let found = open(network, &weights, &head).unwrap().by_depth(&a, &b, [rows, columns]);
+        let found = open(network, &weights, &head).unwrap().by_depth(&a, &b, dims);
         let by_depth: Vec<f64> = serde_json::from_value(wanted["per_layer"].clone()).unwrap();
         assert_eq!(found.len(), by_depth.len());
         let total = (found.iter().sum::<f64>(), wanted["distance"].as_f64().unwrap());
