@@ -71,7 +71,7 @@ fn help_names_every_verb_and_where_to_start() {
     for word in ["check", "record", "train", "infer", "evaluate", "--set", "--device", "configs/quickstart.toml"] {
         assert!(out(&output).contains(word), "{word} is missing in:\n{}", out(&output));
     }
-    for verb in ["check", "record", "train", "infer", "evaluate"] {
+    for verb in ["check", "record", "train", "infer", "evaluate", "compare"] {
         let output = hybridsim(&[verb, "--help"], &root());
         assert!(out(&output).lines().count() > 10, "{verb} --help teaches nothing:\n{}", out(&output));
     }
@@ -121,6 +121,51 @@ fn a_run_leaves_pictures_numbers_and_a_model_that_infers_at_once() {
         "{}",
         out(&output)
     );
+}
+
+#[test]
+fn two_folders_of_recordings_are_compared_by_name_with_an_interval_over_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorded = recording().display().to_string();
+    let output = hybridsim(&["compare", &recorded, &recorded, "-q", "--set", "metrics.span_db=60"], folder.path());
+    assert!(output.status.success(), "{}", err(&output));
+    assert!(out(&output).contains("60 dB below") && out(&output).contains("PSNR 100.00"), "{}", out(&output));
+    assert!(out(&output).contains("LPIPS           not available") && !out(&output).contains("together"), "{}", out(&output));
+
+    // a site, and a method's simulations of it, the second in a folder of results as `infer` leaves it
+    for (from, to) in [("measured", ["a", "b", "c"]), ("simulated", ["a", "b/recording", ""])] {
+        for name in to.into_iter().filter(|name| !name.is_empty()) {
+            let target = folder.path().join(from).join(name);
+            std::fs::create_dir_all(&target).unwrap();
+            for entry in std::fs::read_dir(recording()).unwrap() {
+                let path = entry.unwrap().path();
+                std::fs::copy(&path, target.join(path.file_name().unwrap())).unwrap();
+            }
+        }
+    }
+    let output = hybridsim(&["compare", "measured", "simulated", "-q", "--out", "found"], folder.path());
+    assert!(output.status.success(), "{}", err(&output));
+    assert!(out(&output).contains("2 sequences") && err(&output).contains("1 of 3 measured recordings"), "{}", out(&output));
+    let found: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("found/metrics.json")).unwrap()).unwrap();
+    assert_eq!(found["recordings"]["b"]["global"]["psnr_db"]["interval"], serde_json::Value::Null);
+    assert_eq!(found["over_sequences"]["global"]["psnr_db"]["interval"], 0.0);
+    assert!(folder.path().join("found/config.toml").is_file());
+    assert_refused(&hybridsim(&["compare", "measured", "simulated", "--out", "found"], folder.path()), 2, &["exists already"]);
+    assert_refused(&hybridsim(&["compare", "measured", "found"], folder.path()), 2, &["found: holds no recording"]);
+    assert_refused(&hybridsim(&["compare", "simulated", "measured"], folder.path()), 2, &["c: no measured recording"]);
+}
+
+#[test]
+fn a_network_without_its_files_is_no_network() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorded = recording().display().to_string();
+    let compare = ["compare", &recorded, &recorded, "--out", "found", "--lpips", "squeeze"];
+    assert_refused(&hybridsim(&compare, folder.path()), 2, &["--lpips-weights", "--lpips-heads"]);
+    std::fs::write(folder.path().join("wrong.pth"), "no weights").unwrap();
+    let files = ["--lpips-weights", "wrong.pth", "--lpips-heads", "heads.npz"];
+    assert_refused(&hybridsim(&[&compare[..], &files].concat(), folder.path()), 2, &["wrong.pth: cannot be read as torch"]);
+    assert!(!folder.path().join("found").exists());
 }
 
 #[test]

@@ -6,3 +6,5 @@ mod heatmaps;
 mod learned;
 mod metrics;
 mod paths;
+#[path = "../support/mod.rs"]
+mod support;

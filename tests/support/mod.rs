@@ -47,6 +47,32 @@ pub fn numbers(seed: u64, count: usize, low: f64, high: f64) -> Vec<f64> {
     (0..count).map(|_| low + (high - low) * next()).collect()
 }
 
+/// splitmix64's uniform numbers in 0 .. 1, for what other programs draw too.
+pub fn splitmix64(seed: u64, count: usize) -> Vec<f64> {
+    let number = |index: u64| {
+        let mut z = index.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(seed);
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 * 2f64.powi(-53)
+    };
+    (1..=count as u64).map(number).collect()
+}
+
+/// Two images in 0 … 1 and their `[row, column]`: texture with two blobs, and the same with noise. scikit-image and the
+/// `lpips` package have scored them.
+pub fn fixture_images() -> ([Vec<f64>; 2], [usize; 2]) {
+    let [rows, columns] = [128, 256];
+    let (texture, error) = (splitmix64(1, rows * columns), splitmix64(2, rows * columns));
+    let pixel = |index: usize| {
+        let (y, x) = ((index / columns) as f64, (index % columns) as f64);
+        let blob = |row: f64, height: f64, width: f64| (-((y - row).powi(2) / height + (x - 60.0).powi(2) / width)).exp();
+        (0.15 * texture[index] + 0.8 * blob(64.0, 20.0, 90.0) + 0.5 * blob(80.0, 200.0, 60.0)).clamp(0.0, 1.0)
+    };
+    let a: Vec<f64> = (0..rows * columns).map(pixel).collect();
+    let b = a.iter().zip(&error).map(|(a, u)| (a + 0.2 * (2.0 * u - 1.0)).clamp(0.0, 1.0)).collect();
+    ([a, b], [rows, columns])
+}
+
 /// Unit vectors in all directions, `[point, xyz]` row by row, the same in every run.
 pub fn directions(seed: u64, count: usize) -> Vec<f64> {
     let draws = numbers(seed, 2 * count, 0.0, 1.0);
