@@ -5,7 +5,6 @@ use rand::RngExt;
 use serde::Serialize;
 
 use crate::{
-    complex::Complex,
     data::Recording,
     error::Result,
     heatmap::{Analysis, HeatmapConfig, Map, Samples, StaticRemoval, remove_static},
@@ -40,14 +39,8 @@ impl<'a> Simulation<'a> {
             true => self.simulator.with_noise(&self.scene.radar, clean, step_rng(self.seed, frame, 0x51A1).random()),
             false => clean,
         };
-        Ok(to_host(signal))
+        Ok(signal.to_host())
     }
-}
-
-/// A signal's values on the host, in the order of its axes.
-fn to_host(signal: Complex<4>) -> Vec<Complex32> {
-    let part = |tensor: burn::tensor::Tensor<4>| tensor.into_data().convert::<f32>().try_into_vec::<f32>().expect("converted");
-    part(signal.re).into_iter().zip(part(signal.im)).map(|(re, im)| Complex32::new(re, im)).collect()
 }
 
 /// The measured samples of a frame, `[tx, rx, loop, sample]`.

@@ -29,6 +29,8 @@ pub mod simulator;
 pub mod training;
 pub mod evaluation;
 pub mod pictures;
+// how others simulate the same recordings
+pub mod baselines;
 // why a recording and the simulator disagree
 pub mod diagnosis;
 pub mod config;

@@ -3,6 +3,7 @@
 //! Results go to standard output, progress and warnings to standard error. Exit status: 0 done, 1 failed,
 //! 2 wrong usage, configuration or input.
 
+mod baseline;
 mod challenge;
 mod check;
 mod device;
@@ -13,6 +14,7 @@ mod infer;
 mod progress;
 mod record;
 mod report;
+mod simulated;
 mod train;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -70,6 +72,12 @@ enum Command {
     /// Takes a checkpoint and a motion (BVH or AMASS-layout npz, or one of the embedded actions) and writes a
     /// recording folder with the simulated IF samples, and heatmaps as PNG.
     Infer(infer::Arguments),
+    /// Simulate a recording's motion as others do, to compare with
+    ///
+    /// mmgpe: every visible vertex reflects with fixed lobes. rf-genesis: rays through a pixel grid, one return for each
+    /// hit; rf-genesis-released: the same with the errors of its released code. two-bounce: a checkpoint's direct path,
+    /// with mirrors in place of its indirect path. Writes a recording folder as infer does, and baseline.json.
+    Baseline(baseline::Arguments),
     /// Compare simulated with measured heatmaps
     ///
     /// PSNR, SSIM and dB error over all cells, with what is static removed, and on the cells that the person
@@ -109,6 +117,7 @@ pub fn main() -> ExitCode {
         Command::Record(arguments) => record::run(arguments, &cli.common),
         Command::Train(arguments) => train::run(arguments, &cli.common),
         Command::Infer(arguments) => infer::run(arguments, &cli.common),
+        Command::Baseline(arguments) => baseline::run(arguments, &cli.common),
         Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
         Command::Diagnose(arguments) => diagnose::run(arguments, &cli.common),
         Command::Challenge(arguments) => challenge::run(arguments, &cli.common),
