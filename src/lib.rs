@@ -23,6 +23,7 @@ pub mod if_signal;
 pub mod heatmap;
 pub mod loss;
 pub mod metrics;
+pub mod lpips;
 pub mod effects;
 pub mod simulator;
 // 4: what is done with it

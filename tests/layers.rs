@@ -18,6 +18,7 @@ const FLOORS: [&[&str]; 22] = [
     &["if_signal"],
     &["heatmap"],
     &["loss", "metrics"],
+    &["lpips"],
     &["effects"],
     &["simulator"],
     &["training"],

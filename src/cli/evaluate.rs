@@ -4,11 +4,18 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Common, Out, device, effects::WithoutEffects, progress::Progress, report};
+use super::{
+    Common, Out, device,
+    effects::WithoutEffects,
+    progress::Progress,
+    report,
+    scores::{self, LpipsArguments},
+};
 use crate::{
     data::atomic,
     error::{Error, Result},
     evaluation::{self, Simulation},
+    lpips::Lpips,
     metrics::MetricsConfig,
     training::{LoadedRecording, checkpoint},
 };
@@ -27,6 +34,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     without: WithoutEffects,
     #[command(flatten)]
+    lpips: LpipsArguments,
+    #[command(flatten)]
     out: Out,
 }
 
@@ -42,7 +51,9 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let device = device(&common.device)?;
     let (mut simulator, state) = checkpoint::open(&arguments.checkpoint, &device)?;
     arguments.without.switch_off(&mut simulator)?;
-    let mut results = serde_json::Map::new();
+    let lpips = arguments.lpips.config().map(|config| Lpips::open(&config, &device)).transpose()?;
+    let metrics = MetricsConfig::default();
+    let mut evaluations = Vec::new();
     for folder in &arguments.recordings {
         let recording = LoadedRecording::open(folder, &state.simulator, false)?;
         report::same_radar(folder, &recording.scene.radar, &state.site.radar)?;
@@ -59,20 +70,24 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         let simulation = Simulation::new(&simulator, &recording.scene, state.seed, true);
         let progress = Progress::new("evaluating", frames.len(), common.quiet);
         let mut done = 0;
+        let mut observe = |_, _, _| {
+            done += 1;
+            progress.set(done);
+        };
         let evaluation =
-            evaluation::evaluate(&recording, &simulation, &frames, &state.heatmap, &MetricsConfig::default(), &mut |_, _, _| {
-                done += 1;
-                progress.set(done);
-            })?;
+            evaluation::evaluate(&recording, &simulation, &frames, &state.heatmap, &metrics, lpips.as_ref(), &mut observe)?;
         progress.finish();
         println!("{}", folder.display());
-        print!("{}", report::table(&evaluation));
-        results.insert(folder.display().to_string(), serde_json::to_value(&evaluation).expect("plain data"));
+        print!("{}", scores::of_frames(&evaluation));
+        evaluations.push((folder.display().to_string(), evaluation));
+    }
+    if let (true, Some(summary)) = (evaluations.len() > 1, scores::summary(&evaluations)) {
+        println!("together");
+        print!("{}", scores::of_sequences(&summary));
     }
     if let Some(out) = &arguments.out.out {
         std::fs::create_dir_all(out).map_err(|error| Error::write(out, error))?;
-        let text = serde_json::to_string_pretty(&results).expect("plain data");
-        atomic::write_text(out.join("metrics.json"), &text)?;
+        atomic::write_text(out.join("metrics.json"), &scores::json(&evaluations))?;
     }
     Ok(())
 }

@@ -6,6 +6,7 @@
 mod baseline;
 mod challenge;
 mod check;
+mod compare;
 mod device;
 mod diagnose;
 mod effects;
@@ -14,6 +15,7 @@ mod infer;
 mod progress;
 mod record;
 mod report;
+mod scores;
 mod simulated;
 mod train;
 
@@ -81,8 +83,14 @@ enum Command {
     /// Compare simulated with measured heatmaps
     ///
     /// PSNR, SSIM and dB error over all cells, with what is static removed, and on the cells that the person
-    /// occupies, as mean and standard deviation over frames; --out writes them with their 95 % intervals as JSON.
+    /// occupies, as mean and standard deviation over frames; of several recordings also the mean's 95 % interval.
+    /// With --lpips also LPIPS. --out writes all of it as JSON.
     Evaluate(evaluate::Arguments),
+    /// Compare two recordings, or two folders of them
+    ///
+    /// The same scores as `evaluate`, for simulations by whatever method that were written as recording folders. Of a
+    /// truth that was recorded twice it gives the ceiling: no simulator can agree better than two noises do.
+    Compare(compare::Arguments),
     /// Find out why a recording and the simulator disagree
     ///
     /// Says what physics was left out, where, how large and how sure, what it cannot tell apart, and how much better
@@ -119,6 +127,7 @@ pub fn main() -> ExitCode {
         Command::Infer(arguments) => infer::run(arguments, &cli.common),
         Command::Baseline(arguments) => baseline::run(arguments, &cli.common),
         Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
+        Command::Compare(arguments) => compare::run(arguments, &cli.common),
         Command::Diagnose(arguments) => diagnose::run(arguments, &cli.common),
         Command::Challenge(arguments) => challenge::run(arguments, &cli.common),
     });

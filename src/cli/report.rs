@@ -9,11 +9,12 @@ use burn::tensor::Device;
 use num_complex::Complex32;
 use serde_json::json;
 
+use super::scores;
 use crate::{
     config::Config,
     data::atomic,
     error::{Error, Result},
-    evaluation::{self, Evaluation, FrameMaps, ScoreSummary, Simulation, measured_frame},
+    evaluation::{self, Evaluation, FrameMaps, Simulation, measured_frame},
     heatmap::{Analysis, Gate, HeatmapConfig, Map, Samples, Scan, StaticRemoval, remove_static},
     metrics::{DbWindow, MetricsConfig},
     pictures::{self, Chart, Series},
@@ -59,27 +60,6 @@ pub(super) fn same_radar(folder: &Path, found: &Radar, trained: &Radar) -> Resul
 /// The number of frames and the rail may differ.
 pub(super) fn is_same_radar(a: &Radar, b: &Radar) -> bool {
     (Radar { frames: b.frames, full_scale_codes: b.full_scale_codes, ..a.clone() }) == *b
-}
-
-/// The scores as lines of text.
-pub(super) fn table(evaluation: &Evaluation) -> String {
-    let mut text = format!(
-        "  {} frames, decibels from {:.0} dB below the strongest cell, mean ± standard deviation over frames\n",
-        evaluation.frames, evaluation.span_db
-    );
-    let rows =
-        [("all cells", &evaluation.global), ("static removed", &evaluation.moving), ("person's cells", &evaluation.person)];
-    for (name, scores) in rows {
-        match scores {
-            Some(ScoreSummary { psnr_db, ssim, mean_absolute_error_db }) => {
-                writeln!(text, "  {name:<15} PSNR {psnr_db:.2} dB   SSIM {ssim:.3}   mean error {mean_absolute_error_db:.2} dB")
-            }
-            None => writeln!(text, "  {name:<15} not available"),
-        }
-        .expect("text grows");
-    }
-    text.push_str("  LPIPS           not available: it needs backbone weights\n");
-    text
 }
 
 /// Draws heatmaps of recordings of one radar.
@@ -188,12 +168,19 @@ impl RunReport<'_> {
             let metrics = MetricsConfig::default();
             let middle = frames[frames.len() / 2];
             let mut drawn = Ok(());
-            let evaluation =
-                evaluation::evaluate(recording, &simulation, &frames, &training.heatmap, &metrics, &mut |frame, all, moving| {
+            let evaluation = evaluation::evaluate(
+                recording,
+                &simulation,
+                &frames,
+                &training.heatmap,
+                &metrics,
+                None,
+                &mut |frame, all, moving| {
                     if index == 0 && frame == middle {
                         drawn = self.draw_held_out(frame, &all, &moving);
                     }
-                })?;
+                },
+            )?;
             drawn?;
             if index == 0 {
                 self.draw_over_time(recording, &simulation)?;
@@ -205,7 +192,7 @@ impl RunReport<'_> {
         self.write_report(&evaluations, !split.validation.is_empty())?;
         for (folder, evaluation) in &evaluations {
             println!("{}", folder.display());
-            print!("{}", table(evaluation));
+            print!("{}", scores::of_frames(evaluation));
         }
         println!("report: {}", self.folder.join("report.md").display());
         Ok(())
@@ -305,7 +292,8 @@ impl RunReport<'_> {
         );
         for (folder, evaluation) in evaluations {
             let which = if held_out { "held-out" } else { "training" };
-            writeln!(text, "`{}`, {which} frames:\n\n```\n{}```\n", folder.display(), table(evaluation)).expect("text grows");
+            writeln!(text, "`{}`, {which} frames:\n\n```\n{}```\n", folder.display(), scores::of_frames(evaluation))
+                .expect("text grows");
         }
         text.push_str("![loss](loss.png)\n![range-Doppler](range_doppler.png)\n");
         text.push_str("![range-Doppler, static removed](range_doppler_moving.png)\n![time-Doppler](time_doppler.png)\n\n");

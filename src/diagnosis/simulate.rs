@@ -114,19 +114,20 @@ impl Held {
         let (mut squares, mut cells) = (0.0, 0.0f64);
         let mut sums: Option<(Map, Map)> = None;
         let heatmap = HeatmapConfig::default();
-        let found = evaluate(recording, &simulation, held_out, &heatmap, &MetricsConfig::default(), &mut |_, all, moving| {
-            let pairs = all.measured.values.iter().zip(&all.simulated.values);
-            squares += pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-            cells += all.measured.values.len() as f64;
-            match &mut sums {
-                None => sums = Some((moving.measured, moving.simulated)),
-                Some((measured, simulated)) => {
-                    for (sum, map) in [(measured, &moving.measured), (simulated, &moving.simulated)] {
-                        sum.values.iter_mut().zip(&map.values).for_each(|(sum, value)| *sum = sum.max(*value));
+        let found =
+            evaluate(recording, &simulation, held_out, &heatmap, &MetricsConfig::default(), None, &mut |_, all, moving| {
+                let pairs = all.measured.values.iter().zip(&all.simulated.values);
+                squares += pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+                cells += all.measured.values.len() as f64;
+                match &mut sums {
+                    None => sums = Some((moving.measured, moving.simulated)),
+                    Some((measured, simulated)) => {
+                        for (sum, map) in [(measured, &moving.measured), (simulated, &moving.simulated)] {
+                            sum.values.iter_mut().zip(&map.values).for_each(|(sum, value)| *sum = sum.max(*value));
+                        }
                     }
                 }
-            }
-        })?;
+            })?;
         let global = found.global.as_ref();
         let person = found.person.as_ref();
         let (measured, simulated) = sums.expect("at least one frame is held out");

@@ -1,17 +1,22 @@
-//! How alike two heatmaps are: PSNR and SSIM as images, mean absolute error in decibels.
+//! How alike two heatmaps are: PSNR and SSIM as images, mean absolute error in decibels. (LPIPS: [`crate::lpips`].)
 //!
 //! Images are decibels mapped from a stated [`DbWindow`] to 0 … 1. Because most cells of a map hold no person, the same
 //! numbers are reported globally (as in the paper), on static-removed maps, and on the cells that the person occupies.
 
+mod region;
 mod spread;
 mod ssim;
 
+pub use region::{bounding_box, crop, person_cells};
 pub use spread::Spread;
 pub use ssim::{ssim, ssim_map};
 
 use serde::{Deserialize, Serialize};
 
-use crate::heatmap::Map;
+use crate::{
+    error::{Error, Result},
+    heatmap::Map,
+};
 
 /// The decibels that are black and white in an image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,6 +55,16 @@ pub struct MetricsConfig {
 impl Default for MetricsConfig {
     fn default() -> Self {
         Self { span_db: 80.0, person_db: 20.0 }
+    }
+}
+
+impl MetricsConfig {
+    pub fn check(&self) -> Result<()> {
+        let settings = [("span_db", self.span_db), ("person_db", self.person_db)];
+        match settings.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
+            Some((key, value)) => Err(Error::setting(format!("metrics.{key}"), value, "a positive number of decibels")),
+            None => Ok(()),
+        }
     }
 }
 
@@ -98,13 +113,6 @@ fn psnr_of(mean_squared: f64) -> f64 {
     -10.0 * mean_squared.max(1e-10).log10()
 }
 
-/// The cells that hold a person: those of `person_db`, a map of the person alone (or a static-removed one), within
-/// `down_db` of its strongest cell.
-pub fn person_cells(person_db: &Map, down_db: f64) -> Vec<bool> {
-    let level = person_db.max() - down_db;
-    person_db.values.iter().map(|&db| db >= level).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,14 +158,5 @@ mod tests {
         let left: Vec<bool> = right.iter().map(|cell| !cell).collect();
         assert!(scores(&map(ramp()), &wrong, &window, Some(&left)).unwrap().mean_absolute_error_db > 1.0);
         assert_eq!(scores(&map(ramp()), &wrong, &window, Some(&[false; 320])), None);
-    }
-
-    #[test]
-    fn the_persons_cells_are_those_near_the_strongest() {
-        let mut values = vec![-90.0; 320];
-        (values[5], values[6], values[7]) = (-20.0, -35.0, -41.0);
-        let cells = person_cells(&map(values), 20.0);
-        assert_eq!(cells.iter().filter(|cell| **cell).count(), 2);
-        assert!(cells[5] && cells[6]);
     }
 }

@@ -1,0 +1,71 @@
+//! A trained simulator's frames, held against a recording's.
+
+use num_complex::Complex32;
+use rand::RngExt;
+
+use super::{
+    Evaluation,
+    frames::{FrameMaps, Pair, measured_frame, score},
+};
+use crate::{
+    error::Result,
+    heatmap::HeatmapConfig,
+    lpips::Lpips,
+    metrics::MetricsConfig,
+    simulator::{Mode, Scene, Simulator, Surfaces},
+    training::{LoadedRecording, step_rng},
+};
+
+/// Simulates frames as at inference, one at a time.
+pub struct Simulation<'a> {
+    simulator: &'a Simulator,
+    scene: &'a Scene,
+    surfaces: Surfaces,
+    seed: u64,
+    noise: bool,
+}
+
+impl<'a> Simulation<'a> {
+    /// `noise` off gives the clean signal.
+    pub fn new(simulator: &'a Simulator, scene: &'a Scene, seed: u64, noise: bool) -> Self {
+        Self { simulator, scene, surfaces: simulator.surfaces(&simulator.constants(scene), Mode::Inference), seed, noise }
+    }
+
+    /// `[tx, rx, loop, sample]`, in the units of the recordings it was trained on.
+    ///
+    /// # Errors
+    /// A frame outside the motion.
+    pub fn frame(&self, frame: usize) -> Result<Vec<Complex32>> {
+        let view = self.scene.view(frame)?;
+        let clean = self.simulator.clean_signal(self.scene, &view, &self.surfaces);
+        let signal = match self.noise {
+            true => self.simulator.with_noise(&self.scene.radar, clean, step_rng(self.seed, frame, 0x51A1).random()),
+            false => clean,
+        };
+        Ok(signal.to_host())
+    }
+}
+
+/// Compares a recording's frames with simulated ones, one by one.
+///
+/// `observe` sees the maps of every frame: all cells, then static-removed ones.
+///
+/// # Errors
+/// A frame that cannot be read or lies outside the motion; maps too small for `lpips`.
+pub fn evaluate(
+    recording: &LoadedRecording,
+    simulation: &Simulation<'_>,
+    frames: &[usize],
+    heatmap: &HeatmapConfig,
+    metrics: &MetricsConfig,
+    lpips: Option<&Lpips>,
+    observe: &mut dyn FnMut(usize, FrameMaps, FrameMaps),
+) -> Result<Evaluation> {
+    let pair = Pair {
+        radar: &recording.scene.radar,
+        tracked: recording.recording.person().is_some(),
+        measured: &|frame| measured_frame(&recording.recording, frame),
+        simulated: &|frame| simulation.frame(frame),
+    };
+    score(&pair, frames, heatmap, metrics, lpips, observe)
+}
