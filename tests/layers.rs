@@ -4,13 +4,14 @@
 use std::path::{Path, PathBuf};
 
 /// The journey; modules on one floor do not import each other.
-const FLOORS: [&[&str]; 21] = [
+const FLOORS: [&[&str]; 22] = [
     &["error", "complex"],
     &["radar", "room"],
     &["person"],
     &["data"],
     &["import"],
     &["recorder"],
+    &["site"],
     &["body"],
     &["features"],
     &["scatterers"],

@@ -13,6 +13,7 @@ mod infer;
 mod progress;
 mod record;
 mod report;
+mod site;
 mod train;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -59,6 +60,11 @@ enum Command {
     /// Writes a recording folder (recording.toml, if.npy, body.npz, motion.npz, truth.json) from the [record] section
     /// of a config. Use it when you have no radar at hand.
     Record(record::Arguments),
+    /// Record a site: several subjects and actions in one room, by one board
+    ///
+    /// Writes DIR/site.toml (resolved) and a recording folder per sequence. Killed runs go on where they stopped;
+    /// --shard divides the work between processes. All settings are checked before the first sequence is recorded.
+    Site(site::Arguments),
     /// Fit the simulator to recordings
     ///
     /// Reads recording folders (or makes one first from [record]), trains, and leaves a run folder: config.toml
@@ -107,6 +113,7 @@ pub fn main() -> ExitCode {
     let result = refuse_idle_settings(&cli).and_then(|()| match &cli.command {
         Command::Check(arguments) => check::run(arguments, &cli.common),
         Command::Record(arguments) => record::run(arguments, &cli.common),
+        Command::Site(arguments) => site::run(arguments, &cli.common),
         Command::Train(arguments) => train::run(arguments, &cli.common),
         Command::Infer(arguments) => infer::run(arguments, &cli.common),
         Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
