@@ -14,6 +14,8 @@ pub mod data;
 pub mod import;
 // the independent world that makes recordings: shares settings, errors and files with the simulator, never physics
 pub mod recorder;
+// many recordings of one room and one board
+pub mod site;
 // 3: the simulator
 pub mod body;
 pub mod features;

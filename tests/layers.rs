@@ -11,6 +11,7 @@ const FLOORS: [&[&str]; 22] = [
     &["data"],
     &["import"],
     &["recorder"],
+    &["site"],
     &["body"],
     &["features"],
     &["scatterers"],

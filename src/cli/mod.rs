@@ -17,6 +17,7 @@ mod record;
 mod report;
 mod scores;
 mod simulated;
+mod site;
 mod train;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -63,6 +64,11 @@ enum Command {
     /// Writes a recording folder (recording.toml, if.npy, body.npz, motion.npz, truth.json) from the [record] section
     /// of a config. Use it when you have no radar at hand.
     Record(record::Arguments),
+    /// Record a site: several subjects and actions in one room, by one board
+    ///
+    /// Writes DIR/site.toml (resolved) and a recording folder per sequence. Killed runs go on where they stopped;
+    /// --shard divides the work between processes. All settings are checked before the first sequence is recorded.
+    Site(site::Arguments),
     /// Fit the simulator to recordings
     ///
     /// Reads recording folders (or makes one first from [record]), trains, and leaves a run folder: config.toml
@@ -123,6 +129,7 @@ pub fn main() -> ExitCode {
     let result = refuse_idle_settings(&cli).and_then(|()| match &cli.command {
         Command::Check(arguments) => check::run(arguments, &cli.common),
         Command::Record(arguments) => record::run(arguments, &cli.common),
+        Command::Site(arguments) => site::run(arguments, &cli.common),
         Command::Train(arguments) => train::run(arguments, &cli.common),
         Command::Infer(arguments) => infer::run(arguments, &cli.common),
         Command::Baseline(arguments) => baseline::run(arguments, &cli.common),
