@@ -33,6 +33,8 @@ pub mod evaluation;
 pub mod pictures;
 // why a recording and the simulator disagree
 pub mod diagnosis;
+// what somebody does in a recording
+pub mod recognition;
 pub mod config;
 // the proof on concealed data
 pub mod challenge;

@@ -11,6 +11,7 @@ mod effects;
 mod evaluate;
 mod infer;
 mod progress;
+mod recognize;
 mod record;
 mod report;
 mod site;
@@ -81,6 +82,11 @@ enum Command {
     /// PSNR, SSIM and dB error over all cells, with what is static removed, and on the cells that the person
     /// occupies, as mean and standard deviation over frames; --out writes them with their 95 % intervals as JSON.
     Evaluate(evaluate::Arguments),
+    /// Train a classifier of activities on some recordings, test it on others
+    ///
+    /// The label `action` is the class. Give simulated recordings to --train and measured ones to --test to see what
+    /// simulation is worth; measured ones of other people to both for the ceiling.
+    Recognize(recognize::Arguments),
     /// Find out why a recording and the simulator disagree
     ///
     /// Says what physics was left out, where, how large and how sure, what it cannot tell apart, and how much better
@@ -113,6 +119,7 @@ pub fn main() -> ExitCode {
     let result = refuse_idle_settings(&cli).and_then(|()| match &cli.command {
         Command::Check(arguments) => check::run(arguments, &cli.common),
         Command::Record(arguments) => record::run(arguments, &cli.common),
+        Command::Recognize(arguments) => recognize::run(arguments, &cli.common),
         Command::Site(arguments) => site::run(arguments, &cli.common),
         Command::Train(arguments) => train::run(arguments, &cli.common),
         Command::Infer(arguments) => infer::run(arguments, &cli.common),
