@@ -36,6 +36,8 @@ pub mod pictures;
 pub mod baselines;
 // why a recording and the simulator disagree
 pub mod diagnosis;
+// what somebody does in a recording
+pub mod recognition;
 pub mod config;
 // the proof on concealed data
 pub mod challenge;

@@ -13,6 +13,7 @@ mod effects;
 mod evaluate;
 mod infer;
 mod progress;
+mod recognize;
 mod record;
 mod report;
 mod scores;
@@ -97,6 +98,11 @@ enum Command {
     /// The same scores as `evaluate`, for simulations by whatever method that were written as recording folders. Of a
     /// truth that was recorded twice it gives the ceiling: no simulator can agree better than two noises do.
     Compare(compare::Arguments),
+    /// Train a classifier of activities on some recordings, test it on others
+    ///
+    /// The label `action` is the class. Give simulated recordings to --train and measured ones to --test to see what
+    /// simulation is worth; measured ones of other people to both for the ceiling.
+    Recognize(recognize::Arguments),
     /// Find out why a recording and the simulator disagree
     ///
     /// Says what physics was left out, where, how large and how sure, what it cannot tell apart, and how much better
@@ -129,6 +135,7 @@ pub fn main() -> ExitCode {
     let result = refuse_idle_settings(&cli).and_then(|()| match &cli.command {
         Command::Check(arguments) => check::run(arguments, &cli.common),
         Command::Record(arguments) => record::run(arguments, &cli.common),
+        Command::Recognize(arguments) => recognize::run(arguments, &cli.common),
         Command::Site(arguments) => site::run(arguments, &cli.common),
         Command::Train(arguments) => train::run(arguments, &cli.common),
         Command::Infer(arguments) => infer::run(arguments, &cli.common),
