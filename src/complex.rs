@@ -1,6 +1,7 @@
 //! Complex numbers as a pair of real tensors, with the few operations that radar needs.
 
 use burn::tensor::{Device, Tensor};
+use num_complex::Complex32;
 
 /// A complex tensor. Gradients flow through both parts.
 #[derive(Clone, Debug)]
@@ -108,6 +109,12 @@ impl<const D: usize> Complex<D> {
     pub fn cat(parts: Vec<Self>, dim: usize) -> Self {
         let (re, im) = parts.into_iter().map(|part| (part.re, part.im)).unzip();
         Self { re: Tensor::cat(re, dim), im: Tensor::cat(im, dim) }
+    }
+
+    /// The values on the host, in the order of the axes.
+    pub fn to_host(self) -> Vec<Complex32> {
+        let part = |tensor: Tensor<D>| tensor.into_data().convert::<f32>().try_into_vec::<f32>().expect("converted");
+        part(self.re).into_iter().zip(part(self.im)).map(|(re, im)| Complex32::new(re, im)).collect()
     }
 
     pub fn detach(self) -> Self {

@@ -39,9 +39,9 @@ impl Config {
     pub fn read(path: &Path, sets: &[String]) -> Result<Self> {
         let mut config: Self = settings::read_settings(path, sets)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        for recording in &mut config.data.recordings {
-            if recording.is_relative() {
-                *recording = folder.join(&*recording);
+        for path in config.data.recordings.iter_mut().chain(&mut config.training.start_from) {
+            if path.is_relative() {
+                *path = folder.join(&*path);
             }
         }
         config.training.check()?;

@@ -14,6 +14,8 @@ pub mod data;
 pub mod import;
 // the independent world that makes recordings: shares settings, errors and files with the simulator, never physics
 pub mod recorder;
+// many recordings of one room and one board
+pub mod site;
 // 3: the simulator
 pub mod body;
 pub mod features;
@@ -30,8 +32,12 @@ pub mod simulator;
 pub mod training;
 pub mod evaluation;
 pub mod pictures;
+// how others simulate the same recordings
+pub mod baselines;
 // why a recording and the simulator disagree
 pub mod diagnosis;
+// what somebody does in a recording
+pub mod recognition;
 pub mod config;
 // the proof on concealed data
 pub mod challenge;

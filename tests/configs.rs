@@ -4,6 +4,7 @@ use std::path::Path;
 
 use hybridsim::challenge::ChallengeConfig;
 use hybridsim::config::Config;
+use hybridsim::site::{SiteConfig, sequences};
 
 #[test]
 fn all_configs_parse_and_resolve_to_themselves() {
@@ -16,8 +17,14 @@ fn all_configs_parse_and_resolve_to_themselves() {
         }
         let again = tempfile::tempdir().unwrap();
         let resolved = again.path().join("config.toml");
-        // A challenge is no experiment and has settings of its own.
-        if path.file_name().unwrap().to_str().unwrap().starts_with("challenge") {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        // A challenge and a site are no experiments and have settings of their own.
+        if name.starts_with("site") {
+            let config = SiteConfig::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+            std::fs::write(&resolved, config.to_toml()).unwrap();
+            assert_eq!(SiteConfig::read(&resolved, &[]).unwrap(), config, "{}", path.display());
+            sequences(&config, &folder).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        } else if name.starts_with("challenge") {
             let config = ChallengeConfig::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
             std::fs::write(&resolved, config.to_toml()).unwrap();
             assert_eq!(ChallengeConfig::read(&resolved, &[]).unwrap(), config, "{}", path.display());
@@ -27,7 +34,6 @@ fn all_configs_parse_and_resolve_to_themselves() {
             assert_eq!(Config::read(&resolved, &[]).unwrap(), config, "{}", path.display());
         }
         let listed = std::fs::read_to_string(folder.join("README.md")).unwrap();
-        let name = path.file_name().unwrap().to_str().unwrap();
         assert!(listed.contains(&format!("`{name}`")), "configs/README.md does not list {name}");
         count += 1;
     }

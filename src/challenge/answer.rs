@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use super::commitment::{Commitment, canonical, hash_file, joint_root, read_json, sha256};
 use super::report::Report;
-use super::seal::Shard;
+use crate::data::Shard;
 use crate::data::atomic::{AtomicFolder, write_text};
 use crate::error::{Error, Result};
 

@@ -21,7 +21,7 @@ use super::plan::{Plan, plans};
 use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
 use super::secret::Secret;
 use crate::data::atomic::write_text;
-use crate::data::{IfFrame, IfLayout, RecordingContents, read_toml, write_recording};
+use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, read_toml, write_recording};
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
 use crate::recorder::{EffectsConfig, Recorder, RecorderConfig, Returns, World};
@@ -33,21 +33,6 @@ const TIME_OF_FILES: u64 = 1_767_225_600;
 const MOST_ATTEMPTS: usize = 4;
 /// An undetectable effect is brought to this d′.
 const WEAK_D_PRIME: f64 = 1.0;
-
-/// Which part of the cases is dealt with: number (from 1) and count.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    pub number: usize,
-    pub of: usize,
-}
-
-impl Shard {
-    pub const ALL: Self = Self { number: 1, of: 1 };
-
-    pub fn holds(&self, index: usize) -> bool {
-        index % self.of == self.number - 1
-    }
-}
 
 /// Seals a challenge into `out`; one that was interrupted goes on. `progress` hears how many cases are done.
 ///
@@ -221,7 +206,7 @@ fn as_meant(plan: &mut Plan, strength: &Strength) -> bool {
 /// All frames, and the receiver's gain.
 fn frames_of(world: &World) -> Result<(Vec<IfFrame>, f64)> {
     let recorder = Recorder::new(world)?;
-    Ok((recorder.frames().collect::<Result<_>>()?, recorder.gain()))
+    Ok((recorder.frames().collect::<Result<_>>()?, recorder.level().gain))
 }
 
 /// The recording without a truth and without labels.
@@ -308,14 +293,5 @@ mod tests {
         assert_eq!((found[0]["name"].as_str(), found[0]["gain_db"].as_f64()), (Some("iq_imbalance"), Some(0.5)));
         assert_eq!((&found[1]["name"], found[1]["kind"].as_str()), (&Value::Null, Some("lo_pulling")));
         assert!(effects(&EffectsConfig::default()).is_empty());
-    }
-
-    #[test]
-    fn shards_hold_every_case_once() {
-        for index in 0..20 {
-            let holders = (1..=3).filter(|&number| Shard { number, of: 3 }.holds(index)).count();
-            assert_eq!(holders, 1);
-        }
-        assert!((0..9).all(|index| Shard::ALL.holds(index)));
     }
 }

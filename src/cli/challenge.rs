@@ -10,10 +10,9 @@ use crate::{
     challenge::{
         ChallengeConfig,
         answer::{self, RunConfig},
-        score,
-        seal::{self, Shard},
-        twins,
+        score, seal, twins,
     },
+    data::Shard,
     error::{Error, Result},
 };
 
@@ -46,7 +45,7 @@ struct Seal {
     #[arg(long, value_name = "TEXT")]
     seed: Option<String>,
     /// Only part i of n, such as 2/8
-    #[arg(long, value_name = "I/N", value_parser = shard)]
+    #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
 }
 
@@ -92,7 +91,7 @@ struct Score {
 #[derive(Args)]
 struct How {
     /// Only part i of n, such as 2/8
-    #[arg(long, value_name = "I/N", value_parser = shard)]
+    #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// Stop after so many cases
     #[arg(long, value_name = "N")]
@@ -112,13 +111,6 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         Step::Twins(arguments) => twins(arguments, common),
         Step::Score(arguments) => score(arguments, common),
     }
-}
-
-fn shard(text: &str) -> std::result::Result<Shard, String> {
-    let (number, of) = text.split_once('/').ok_or("write i/n, such as 2/8")?;
-    let parse = |part: &str| part.parse::<usize>().map_err(|_| format!("{part} is no whole number"));
-    let shard = Shard { number: parse(number)?, of: parse(of)? };
-    if (1..=shard.of).contains(&shard.number) { Ok(shard) } else { Err("i must be between 1 and n".into()) }
 }
 
 fn seal(arguments: &Seal, common: &Common) -> Result<()> {

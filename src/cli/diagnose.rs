@@ -64,10 +64,10 @@ fn simulate(
     diagnosis: &mut Diagnosis,
     tell: &mut dyn FnMut(&str),
 ) -> Result<Option<Simulated>> {
-    let Some(explanation) = diagnosis.explanation.as_ref().filter(|_| config.diagnosis.epochs > 0) else { return Ok(None) };
-    let samples = diagnosis.original.cube.samples.iter();
-    let reference = samples.map(|value| value.re.abs().max(value.im.abs())).fold(0.0, f64::max);
-    let effects: Vec<_> = explanation.accepted.iter().filter_map(|effect| effect.candidate.setting(reference)).collect();
+    if diagnosis.explanation.is_none() || config.diagnosis.epochs == 0 {
+        return Ok(None);
+    }
+    let effects = diagnosis.effects();
     let start = Start {
         simulator: &config.simulator,
         learning: &config.training,

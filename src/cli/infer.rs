@@ -3,20 +3,24 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use num_complex::Complex32;
 
-use super::{Common, Out, device, effects::WithoutEffects, progress::Progress, report};
+use super::{
+    Common, Out, device,
+    effects::WithoutEffects,
+    report,
+    simulated::{self, Sequence},
+};
 use crate::{
-    data::{IfFrame, IfLayout, RecordingContents, atomic::AtomicFolder, read_body, settings::read_settings, write_recording},
+    data::{atomic::AtomicFolder, read_body, settings::read_settings},
     error::{Error, Result},
-    evaluation::{Simulation, measured_frame},
+    evaluation::Simulation,
     import::{self, BvhConfig},
     person::{
         BodyModel, Person, Placement,
         actions::{self, Action, StyleConfig},
         procedural::{self, PersonConfig},
     },
-    radar::{Radar, Sampling},
+    radar::Radar,
     simulator::Scene,
     training::{
         LoadedRecording,
@@ -108,37 +112,21 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         }
     };
 
-    let simulation = Simulation::new(&simulator, scene, state.seed, !arguments.clean);
-    let progress = Progress::new("simulating", radar.frames, common.quiet);
-    let mut simulated: Vec<Complex32> = Vec::new();
-    let contents = RecordingContents {
+    // A recording's labels stay true of what is simulated from its motion.
+    let labels = match (&measured, arguments.action) {
+        (Some(recording), _) => recording.recording.labels.clone(),
+        (None, Some(action)) => [("action".to_string(), action.name().to_string())].into(),
+        (None, None) => Default::default(),
+    };
+    let sequence = Sequence {
         radar: &radar,
         room: room.as_ref(),
         person: person.as_ref(),
-        body_file: None,
-        labels: arguments.action.map(|action| ("action".to_string(), action.name().to_string())).into_iter().collect(),
-        layout: if radar.sampling == Sampling::Real { IfLayout::Real } else { IfLayout::Complex },
-        truth: None,
+        labels,
+        measured: measured.as_ref().map(|loaded| &loaded.recording),
     };
-    let [_, tx, rx, loops, samples] = radar.dims();
-    write_recording(folder.path().join("recording"), &contents, &mut |frame| {
-        let signal = simulation.frame(frame)?;
-        simulated.extend_from_slice(&signal);
-        progress.set(frame + 1);
-        let im = (radar.sampling == Sampling::Complex).then(|| signal.iter().map(|value| value.im).collect());
-        Ok(IfFrame::new([tx, rx, loops, samples], signal.iter().map(|value| value.re).collect(), im))
-    })?;
-    progress.finish();
-
-    let mut pictures = report::Pictures::new(&radar, &state.heatmap);
-    match &measured {
-        Some(recording) => {
-            let samples =
-                (0..radar.frames).map(|frame| measured_frame(&recording.recording, frame)).collect::<Result<Vec<_>>>()?.concat();
-            pictures.compare(folder.path(), &samples, &simulated)?;
-        }
-        None => pictures.show(folder.path(), &simulated)?,
-    }
+    let simulation = Simulation::new(&simulator, scene, state.seed, !arguments.clean);
+    simulated::write(folder.path(), &sequence, &state.heatmap, common.quiet, &mut |frame| simulation.frame(frame))?;
     folder.finish()?;
     println!("simulated {} frames: {}", radar.frames, out.display());
     println!("  recording/   IF samples as a recording folder");

@@ -3,6 +3,7 @@
 //! Results go to standard output, progress and warnings to standard error. Exit status: 0 done, 1 failed,
 //! 2 wrong usage, configuration or input.
 
+mod baseline;
 mod challenge;
 mod check;
 mod compare;
@@ -12,9 +13,12 @@ mod effects;
 mod evaluate;
 mod infer;
 mod progress;
+mod recognize;
 mod record;
 mod report;
 mod scores;
+mod simulated;
+mod site;
 mod train;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -61,6 +65,11 @@ enum Command {
     /// Writes a recording folder (recording.toml, if.npy, body.npz, motion.npz, truth.json) from the [record] section
     /// of a config. Use it when you have no radar at hand.
     Record(record::Arguments),
+    /// Record a site: several subjects and actions in one room, by one board
+    ///
+    /// Writes DIR/site.toml (resolved) and a recording folder per sequence. Killed runs go on where they stopped;
+    /// --shard divides the work between processes. All settings are checked before the first sequence is recorded.
+    Site(site::Arguments),
     /// Fit the simulator to recordings
     ///
     /// Reads recording folders (or makes one first from [record]), trains, and leaves a run folder: config.toml
@@ -72,6 +81,12 @@ enum Command {
     /// Takes a checkpoint and a motion (BVH or AMASS-layout npz, or one of the embedded actions) and writes a
     /// recording folder with the simulated IF samples, and heatmaps as PNG.
     Infer(infer::Arguments),
+    /// Simulate a recording's motion as others do, to compare with
+    ///
+    /// mmgpe: every visible vertex reflects with fixed lobes. rf-genesis: rays through a pixel grid, one return for each
+    /// hit; rf-genesis-released: the same with the errors of its released code. two-bounce: a checkpoint's direct path,
+    /// with mirrors in place of its indirect path. Writes a recording folder as infer does, and baseline.json.
+    Baseline(baseline::Arguments),
     /// Compare simulated with measured heatmaps
     ///
     /// PSNR, SSIM and dB error over all cells, with what is static removed, and on the cells that the person
@@ -83,6 +98,11 @@ enum Command {
     /// The same scores as `evaluate`, for simulations by whatever method that were written as recording folders. Of a
     /// truth that was recorded twice it gives the ceiling: no simulator can agree better than two noises do.
     Compare(compare::Arguments),
+    /// Train a classifier of activities on some recordings, test it on others
+    ///
+    /// The label `action` is the class. Give simulated recordings to --train and measured ones to --test to see what
+    /// simulation is worth; measured ones of other people to both for the ceiling.
+    Recognize(recognize::Arguments),
     /// Find out why a recording and the simulator disagree
     ///
     /// Says what physics was left out, where, how large and how sure, what it cannot tell apart, and how much better
@@ -115,8 +135,11 @@ pub fn main() -> ExitCode {
     let result = refuse_idle_settings(&cli).and_then(|()| match &cli.command {
         Command::Check(arguments) => check::run(arguments, &cli.common),
         Command::Record(arguments) => record::run(arguments, &cli.common),
+        Command::Recognize(arguments) => recognize::run(arguments, &cli.common),
+        Command::Site(arguments) => site::run(arguments, &cli.common),
         Command::Train(arguments) => train::run(arguments, &cli.common),
         Command::Infer(arguments) => infer::run(arguments, &cli.common),
+        Command::Baseline(arguments) => baseline::run(arguments, &cli.common),
         Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
         Command::Compare(arguments) => compare::run(arguments, &cli.common),
         Command::Diagnose(arguments) => diagnose::run(arguments, &cli.common),

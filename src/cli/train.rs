@@ -14,7 +14,7 @@ use crate::{
     config::Config,
     data::atomic,
     error::{Error, Result},
-    training::{Trainer, load_recordings, site},
+    training::{Trainer, load_recordings, site_from},
 };
 
 #[derive(Args)]
@@ -63,6 +63,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         config.data.recordings = vec![recorded];
     }
     absolute(&mut config.data.recordings)?;
+    absolute(config.training.start_from.as_mut_slice())?;
     let config_toml = config.to_toml();
     std::fs::create_dir_all(&run_folder).map_err(|error| Error::write(&run_folder, error))?;
     atomic::write_text(run_folder.join("config.toml"), &config_toml)?;
@@ -75,7 +76,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         simulator_config: &config.simulator,
         seed: config.seed,
         recordings: &recordings,
-        site: site(&recordings, &config.simulator),
+        site: site_from(&recordings, &config.simulator, config.training.start_from.as_deref())?,
         config_toml: &config_toml,
         folder: &run_folder,
         device: device.clone(),

@@ -9,11 +9,13 @@ pub mod bodies;
 pub mod motions;
 pub mod recording;
 pub mod settings;
+mod shard;
 
 pub use bodies::{read_body, write_body};
 pub use motions::{read_motion, write_motion};
 pub use recording::{IfFrame, IfLayout, Recording, RecordingContents, write_recording};
 pub use settings::{read_settings, read_toml};
+pub use shard::Shard;
 
 #[cfg(test)]
 pub(crate) mod test_support;

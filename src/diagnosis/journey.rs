@@ -11,6 +11,7 @@ use super::report::{
 };
 use super::select::{Explanation, explain};
 use crate::data::Recording;
+use crate::effects::EffectSetting;
 use crate::error::{Error, Result};
 use crate::person::Person;
 use crate::radar::Radar;
@@ -28,6 +29,16 @@ pub struct Diagnosis {
     pub original: Evidence,
     /// Absent when nothing could be decided.
     pub explanation: Option<Explanation>,
+}
+
+impl Diagnosis {
+    /// What was found, as settings of the simulator in its own units.
+    pub fn effects(&self) -> Vec<EffectSetting> {
+        let samples = self.original.cube.samples.iter();
+        let reference = samples.map(|value| value.re.abs().max(value.im.abs())).fold(0.0, f64::max);
+        let accepted = self.explanation.iter().flat_map(|explanation| &explanation.accepted);
+        accepted.filter_map(|effect| effect.candidate.setting(reference)).collect()
+    }
 }
 
 /// Looks at a recording; `progress` hears what happens, in plain words.

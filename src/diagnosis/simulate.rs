@@ -60,6 +60,8 @@ pub fn before_and_after(
         epochs: start.epochs,
         validation_fraction: held_out.len() as f64 / frames as f64,
         split: Split::Interleaved,
+        frames: None,
+        start_from: None,
         ..start.learning.clone()
     };
     let scratch = AtomicFolder::replacing(keep)?;

@@ -22,7 +22,7 @@ mod chain;
 mod context;
 mod effect;
 mod info;
-mod mirror;
+pub mod mirror;
 mod points;
 mod setting;
 mod tones;

@@ -8,7 +8,6 @@ use super::{
     frames::{FrameMaps, Pair, measured_frame, score},
 };
 use crate::{
-    complex::Complex,
     error::Result,
     heatmap::HeatmapConfig,
     lpips::Lpips,
@@ -43,14 +42,8 @@ impl<'a> Simulation<'a> {
             true => self.simulator.with_noise(&self.scene.radar, clean, step_rng(self.seed, frame, 0x51A1).random()),
             false => clean,
         };
-        Ok(to_host(signal))
+        Ok(signal.to_host())
     }
-}
-
-/// A signal's values on the host, in the order of its axes.
-fn to_host(signal: Complex<4>) -> Vec<Complex32> {
-    let part = |tensor: burn::tensor::Tensor<4>| tensor.into_data().convert::<f32>().try_into_vec::<f32>().expect("converted");
-    part(signal.re).into_iter().zip(part(signal.im)).map(|(re, im)| Complex32::new(re, im)).collect()
 }
 
 /// Compares a recording's frames with simulated ones, one by one.

@@ -4,9 +4,11 @@
 //! whatever happens, no half picture is left.
 
 mod chart;
+mod confusion;
 mod heatmap;
 
 pub use chart::{Chart, Series};
+pub use confusion::confusion;
 pub use heatmap::{comparison, heatmap};
 
 use std::{io, io::Write, path::Path, sync::Once};

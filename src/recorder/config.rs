@@ -109,6 +109,9 @@ impl Default for ActorConfig {
 #[serde(deny_unknown_fields, default)]
 pub struct RecorderConfig {
     pub seed: u64,
+    /// Of the receiver's noise and the oscillator's alone, so that one truth can be recorded twice; absent: `seed`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_seed: Option<u64>,
     /// Overrides the radar's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frames: Option<usize>,
@@ -135,6 +138,7 @@ impl Default for RecorderConfig {
     fn default() -> Self {
         Self {
             seed: 0,
+            noise_seed: None,
             frames: None,
             interpolation: Interpolation::default(),
             mesh_error_m: 0.0,
@@ -182,6 +186,7 @@ impl RecorderConfig {
             receiver: self.receiver,
             effects: self.effects.clone(),
             seed: self.seed,
+            noise_seed: self.noise_seed,
         };
         world.check()?;
         Ok(world)

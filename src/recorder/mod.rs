@@ -47,7 +47,7 @@ pub(crate) mod test_support;
 pub use config::{ActorConfig, RadarChoice, RecorderConfig};
 pub use effects::EffectsConfig;
 pub use material::Material;
-pub use receiver::ReceiverConfig;
+pub use receiver::{Level, ReceiverConfig};
 pub use record::{Recorder, record};
 pub use surface::{Returns, SurfaceConfig};
 pub use timeline::Interpolation;

@@ -24,11 +24,26 @@ pub struct ReceiverConfig {
     pub adc: bool,
     /// Of the ADC's full scale that the strongest samples reach.
     pub peak_fraction: f64,
+    /// A board whose gain and noise are settled already; `snr_db` and `peak_fraction` then say nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub level: Option<Level>,
+}
+
+/// Gain and noise of a board, for recordings that share it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Level {
+    /// What levels relative to the peak sample are relative to, in units of the transmitted wave.
+    pub peak: f64,
+    /// Codes per unit of the transmitted wave.
+    pub gain: f64,
+    /// Standard deviation per component.
+    pub noise_codes: f64,
 }
 
 impl Default for ReceiverConfig {
     fn default() -> Self {
-        Self { noise: true, snr_db: 40.0, unknown_phase: true, adc: true, peak_fraction: 0.27 }
+        Self { noise: true, snr_db: 40.0, unknown_phase: true, adc: true, peak_fraction: 0.27, level: None }
     }
 }
 
@@ -42,6 +57,15 @@ impl ReceiverConfig {
         if !(self.peak_fraction > 0.0 && self.peak_fraction <= 4.0) {
             return Err(Error::setting(format!("{key}.peak_fraction"), self.peak_fraction, "above 0 and at most 4")
                 .with_hint("a fraction above 1 saturates the converter"));
+        }
+        if let Some(level) = &self.level {
+            for (name, value, least) in
+                [("peak", level.peak, 0.0), ("gain", level.gain, f64::MIN_POSITIVE), ("noise_codes", level.noise_codes, 0.0)]
+            {
+                if !(value.is_finite() && value >= least) {
+                    return Err(Error::setting(format!("{key}.level.{name}"), value, "a finite number that is not negative"));
+                }
+            }
         }
         if !self.snr_db.is_finite() {
             return Err(Error::setting(format!("{key}.snr_db"), self.snr_db, "a finite number of decibels"));

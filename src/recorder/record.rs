@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::effects::{Chain, EffectsConfig, Mover, Signal, Stage, Stages, codes, movers, shape_noise, twice_bounced, vibration};
 use super::paths::{Paths, body_scatter};
-use super::receiver::{Receiver, noise_for_snr, rail, random_phase};
+use super::receiver::{Level, Receiver, noise_for_snr, rail, random_phase};
 use super::scatter::{Scatter, widened};
 use super::world::{Draw, World};
 use crate::data::{IfFrame, IfLayout};
@@ -91,9 +91,9 @@ impl Recorder {
         self.peak
     }
 
-    /// Codes per unit of the transmitted wave: each world's strongest sample is scaled to the same part of full scale.
-    pub fn gain(&self) -> f64 {
-        self.receiver.gain.norm()
+    /// The board's gain and noise, for other recordings with the same.
+    pub fn level(&self) -> Level {
+        Level { peak: self.peak, gain: self.receiver.gain.re, noise_codes: self.receiver.noise_codes }
     }
 
     /// The IF before noise and converter, `[tx, rx, loop, sample]`, in units of the transmitted wave.
@@ -172,7 +172,7 @@ impl Recorder {
     /// The body's return in frame 0 as it were without effects: no effect of the scene changes the receiver's noise.
     fn plain_body(&self) -> Result<Vec<Complex64>> {
         let loops = self.world.radar.loops_per_frame;
-        if self.world.effects == EffectsConfig::default() {
+        if self.world.effects.is_off() {
             let body = self.paths.body(0, &self.stages.wide, loops)?;
             return Ok(body.cropped(self.stages.guard()).values);
         }
@@ -189,6 +189,14 @@ impl Recorder {
     fn settle(&mut self, bodies: &[Signal]) -> Result<()> {
         let (world, guard) = (self.world.clone(), self.stages.guard());
         let (radar, config) = (&world.radar, &world.receiver);
+        if let Some(level) = config.level {
+            self.peak = level.peak;
+            self.chain = self.stages.chain(&world, level.peak);
+            self.receiver.gain = level.gain.into();
+            self.receiver.noise_codes = level.noise_codes;
+            self.receiver.clips = config.adc || world.effects.adc_saturation.is_some();
+            return Ok(());
+        }
         let mut peak: f64 = 0.0;
         for body in bodies {
             peak = peak.max(self.all_paths(body.clone())?.cropped(guard).peak());

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::effects::EffectsConfig;
+use super::effects::{self, EffectsConfig};
 use super::material::Material;
 use super::receiver::ReceiverConfig;
 use super::surface::SurfaceConfig;
@@ -82,6 +82,8 @@ pub struct World {
     pub receiver: ReceiverConfig,
     pub effects: EffectsConfig,
     pub seed: u64,
+    /// Of the receiver's noise and the oscillator's alone; absent: `seed`.
+    pub noise_seed: Option<u64>,
 }
 
 impl Default for World {
@@ -100,6 +102,7 @@ impl Default for World {
             receiver: ReceiverConfig::default(),
             effects: EffectsConfig::default(),
             seed: 0,
+            noise_seed: None,
         }
     }
 }
@@ -153,7 +156,12 @@ impl World {
             Draw::Noise { frame } => 1000 + frame as u64,
             Draw::Effect { id, frame } => ((1 + id) << 40) + frame as u64,
         };
-        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        let again = match draw {
+            Draw::Noise { .. } => true,
+            Draw::Effect { id, .. } => effects::is_noise(id),
+            _ => false,
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(if again { self.noise_seed.unwrap_or(self.seed) } else { self.seed });
         rng.set_stream(stream);
         rng
     }

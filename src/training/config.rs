@@ -1,5 +1,7 @@
 //! Settings of the training loop.
 
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 
 use super::Split;
@@ -23,6 +25,13 @@ pub struct TrainingConfig {
     /// Held out of training.
     pub validation_fraction: f64,
     pub split: Split,
+    /// Train on this many frames only, evenly spaced over those that are not held out; all by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frames: Option<usize>,
+    /// A checkpoint whose weights training starts from, such as that of another room; the optimiser starts anew. A
+    /// relative path starts from the config's folder.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start_from: Option<PathBuf>,
     /// Stop after this many epochs without a better validation loss; zero never stops early.
     pub patience_epochs: usize,
     /// Whether the simulator's effects learn too.
@@ -41,6 +50,8 @@ impl Default for TrainingConfig {
             gradient_clip: 1.0,
             validation_fraction: 0.2,
             split: Split::Last,
+            frames: None,
+            start_from: None,
             patience_epochs: 0,
             learn_effects: true,
             heatmap: HeatmapConfig::default(),
@@ -54,6 +65,9 @@ impl TrainingConfig {
         let at_least_one = [("epochs", self.epochs), ("frames_per_step", self.frames_per_step)];
         if let Some((key, _)) = at_least_one.into_iter().find(|(_, value)| *value == 0) {
             return Err(Error::setting(format!("training.{key}"), 0, "at least 1"));
+        }
+        if self.frames == Some(0) {
+            return Err(Error::setting("training.frames", 0, "at least 1").with_hint("leave the key out to train on all"));
         }
         let positive = [
             ("learning_rate", self.learning_rate),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use burn::tensor::{Device, Tensor, TensorData};
 
-use super::checkpoint::Site;
+use super::checkpoint::{Site, read_state};
 use crate::{
     complex::Complex,
     data::{IfFrame, Recording},
@@ -71,7 +71,19 @@ impl LoadedRecording {
 }
 
 /// What a simulator trained on these recordings must remember of them: the first radar, room and placement, and the
-/// box around all of their bodies.
+/// box around all of their bodies; or the box of the checkpoint that training starts from, whose planes fill it.
+///
+/// # Errors
+/// A checkpoint that cannot be read.
+pub fn site_from(recordings: &[LoadedRecording], config: &SimulatorConfig, start_from: Option<&Path>) -> Result<Site> {
+    let found = site(recordings, config);
+    Ok(match start_from {
+        Some(checkpoint) => Site { body_extent: read_state(checkpoint)?.site.body_extent, ..found },
+        None => found,
+    })
+}
+
+/// What a simulator trained from the beginning on these recordings must remember of them, as [`site_from`] has it.
 pub fn site(recordings: &[LoadedRecording], config: &SimulatorConfig) -> Site {
     let first = &recordings[0];
     let bodies = recordings.iter().filter_map(|recording| recording.scene.body.as_ref());

@@ -61,6 +61,15 @@ impl FrameSplit {
         Self { training, validation }
     }
 
+    /// The same split with at most so many training frames, evenly spaced over all of them.
+    pub fn with_most(mut self, frames: Option<usize>) -> Self {
+        let all = self.training.len();
+        if let Some(most) = frames.filter(|&most| most < all) {
+            self.training = (0..most).map(|part| self.training[(2 * part + 1) * all / (2 * most)]).collect();
+        }
+        self
+    }
+
     /// The order in which an epoch visits the training frames: a function of seed and epoch alone, so that a
     /// resumed run continues as if it had never stopped.
     pub fn epoch_order(&self, seed: u64, epoch: usize) -> Vec<FrameId> {
@@ -109,6 +118,17 @@ mod tests {
     fn a_single_frame_is_trained_on_not_held_out() {
         let split = FrameSplit::new(&[1], 0.2, Split::Last, 1);
         assert_eq!((split.training.len(), split.validation.len()), (1, 0));
+    }
+
+    #[test]
+    fn few_frames_are_spread_over_all_recordings() {
+        let split = FrameSplit::new(&[10, 10], 0.2, Split::Last, 1);
+        let few = split.clone().with_most(Some(4));
+        let found: Vec<_> = few.training.iter().map(|id| (id.recording, id.frame)).collect();
+        assert_eq!(found, [(0, 2), (0, 6), (1, 2), (1, 6)]);
+        assert_eq!(few.validation, split.validation);
+        assert_eq!(split.clone().with_most(Some(99)), split);
+        assert_eq!(split.clone().with_most(None), split);
     }
 
     #[test]

@@ -61,13 +61,15 @@ pub struct Trainer<'a> {
 }
 
 impl Trainer<'_> {
-    /// Trains from the beginning, or from `resume` (a checkpoint folder of the same configuration).
+    /// Trains from the beginning, from the weights of `start_from`, or from `resume` (a checkpoint folder of the same
+    /// configuration).
     ///
     /// A resumed run visits the same frames with the same noise as one that was never stopped.
     pub fn run(&self, resume: Option<&Path>, emit: &mut dyn FnMut(Event)) -> Result<Outcome> {
         self.config.check()?;
         let counts: Vec<usize> = self.recordings.iter().map(|recording| recording.scene.radar.frames).collect();
-        let split = FrameSplit::new(&counts, self.config.validation_fraction, self.config.split, self.seed);
+        let split =
+            FrameSplit::new(&counts, self.config.validation_fraction, self.config.split, self.seed).with_most(self.config.frames);
         let steps_per_epoch = split.training.len().div_ceil(self.config.frames_per_step);
         let steps = self.config.epochs * steps_per_epoch;
         let device = self.device.clone().autodiff();
@@ -78,8 +80,8 @@ impl Trainer<'_> {
             .with_grad_clipping(GradientClipping::Norm(self.config.gradient_clip as f32));
         let mut progress =
             Progress { epochs_done: 0, steps_done: 0, best_epoch: 0, best_validation: f64::INFINITY, history: Vec::new() };
-        match resume {
-            Some(folder) => {
+        match (resume, &self.config.start_from) {
+            (Some(folder), _) => {
                 let state = checkpoint::read_state(folder)?;
                 if state.simulator != *self.simulator_config || state.seed != self.seed || state.site != self.site {
                     return Err(Error::Usage {
@@ -91,7 +93,20 @@ impl Trainer<'_> {
                 optimizer = checkpoint::load_optimizer(folder, optimizer)?;
                 progress = state.progress;
             }
-            None => {
+            (None, Some(folder)) => {
+                let state = checkpoint::read_state(folder)?;
+                if state.simulator != *self.simulator_config || state.site.body_extent != self.site.body_extent {
+                    return Err(Error::Usage {
+                        message: format!("{}: a checkpoint of another simulator", folder.display()),
+                        hint: Some(
+                            "training.start_from needs the [simulator] settings that the checkpoint was trained with".into(),
+                        ),
+                    });
+                }
+                // The receiver that set the levels is the same one.
+                simulator = checkpoint::load_weights(folder, simulator)?;
+            }
+            (None, None) => {
                 simulator = calibrate::fit_levels(simulator, self.recordings, &prepared, &split.training, &self.config.heatmap)?;
                 simulator = checkpoint::with_stable_ids(simulator);
             }

@@ -49,6 +49,11 @@ streams! {
     OUTSIDE = 100
 }
 
+/// Whether the draws of an effect are noise, which is another one in each recording of the same truth.
+pub fn is_noise(id: u64) -> bool {
+    [PHASE_NOISE, CHIRP_START_JITTER, IMPULSIVE_NOISE, CORRELATED_NOISE].contains(&id)
+}
+
 /// The table `[effects]`: a sub-table per effect id, off where absent.
 macro_rules! effects {
     ($($field:ident: $kind:ident),*; $($list:ident: $item:ident),*) => {

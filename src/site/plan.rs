@@ -1,0 +1,136 @@
+//! From a site's settings to the settings of each of its sequences.
+
+use std::path::Path;
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use sha2::{Digest, Sha256};
+
+use super::config::SiteConfig;
+use crate::error::{Error, Result};
+use crate::person::Placement;
+use crate::person::actions::{self, Action, StyleConfig};
+use crate::recorder::{Recorder, RecorderConfig, World, body::MovingBody};
+use crate::room::Boundary;
+
+/// How far soles may be below the floor: a procedural foot rolls over its ball.
+const SOLE_M: f64 = 0.06;
+/// Least horizontal distance between the radar and the body.
+const NEAREST_M: f64 = 0.3;
+/// Poses per second at which a motion is held against the room.
+const CHECKED_HZ: f64 = 15.0;
+
+/// One recording of a site.
+#[derive(Clone, Debug)]
+pub struct Sequence {
+    /// `<subject>_<action>_<repetition>`, the folder's name.
+    pub name: String,
+    pub subject: String,
+    pub action: Action,
+    /// From 1.
+    pub repetition: usize,
+    pub recorder: RecorderConfig,
+}
+
+/// All sequences of a site in a fixed order, subject by subject. Equal settings give equal sequences.
+///
+/// Everything that can be refused is refused here: settings, a person who leaves the room, a radar that cannot be.
+/// `settings_folder`: what relative paths start from. Gain and noise are settled on the first sequence and hold for all.
+///
+/// # Errors
+/// Settings that cannot be a site, a body that comes nearer to a boundary than `margin_m`, what the recorder refuses.
+pub fn sequences(config: &SiteConfig, settings_folder: &Path) -> Result<Vec<Sequence>> {
+    config.check()?;
+    let mut all = Vec::new();
+    for subject in &config.subjects {
+        for &action in &config.actions {
+            all.extend((1..=config.repetitions).map(|repetition| sequence(config, subject, action, repetition)));
+        }
+    }
+    all.par_iter().try_for_each(|sequence| {
+        let world = sequence.recorder.world(settings_folder)?;
+        stays_inside(&world, config.margin_m, &sequence.name)
+    })?;
+    if config.record.receiver.level.is_none() {
+        let level = Recorder::new(&all[0].recorder.world(settings_folder)?)?.level();
+        all.iter_mut().for_each(|sequence| sequence.recorder.receiver.level = Some(level));
+    }
+    Ok(all)
+}
+
+fn sequence(config: &SiteConfig, subject: &str, action: Action, repetition: usize) -> Sequence {
+    let name = format!("{subject}_{}_{repetition}", action.name());
+    let seed = |purpose: &str| derived_seed(config.seed, &format!("{name}/{purpose}"));
+    let mut random = ChaCha8Rng::seed_from_u64(seed("style"));
+    let mut draw = |[low, high]: [f64; 2]| low + (high - low) * random.random::<f64>();
+    let ranges = &config.style;
+    let mut recorder = config.record.clone();
+    // What belongs to the room, the board and the subject's surface is the same in all sequences.
+    recorder.seed = config.seed;
+    recorder.noise_seed = Some(seed("noise"));
+    let person = &mut recorder.person;
+    (person.subject, person.action) = (subject.into(), action);
+    person.style = StyleConfig {
+        tempo: draw(ranges.tempo),
+        amplitude: draw(ranges.amplitude),
+        path_scale: draw(ranges.path_scale),
+        variation: draw(ranges.variation),
+        seed: seed("motion"),
+    };
+    person.distance_m = draw(ranges.distance_m);
+    let upright = actions::placement(recorder.room.floor_m.unwrap_or(1.0), person.distance_m);
+    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), draw(ranges.turn_deg).to_radians());
+    let rotation = turn.into_inner() * Matrix3::from_fn(|row, column| upright.radar_from_motion[row][column]);
+    let [_, ahead, up] = upright.origin_m;
+    person.placement = Some(Placement {
+        radar_from_motion: std::array::from_fn(|row| std::array::from_fn(|column| rotation[(row, column)])),
+        origin_m: [draw(ranges.sideways_m), ahead, up],
+        start_s: -draw(ranges.begun_s),
+    });
+    Sequence { name, subject: subject.into(), action, repetition, recorder }
+}
+
+/// Settings of the same truth with independent noise.
+pub(super) fn again(config: &SiteConfig, sequence: &Sequence) -> RecorderConfig {
+    let noise_seed = Some(derived_seed(config.seed, &format!("{}/noise again", sequence.name)));
+    RecorderConfig { noise_seed, ..sequence.recorder.clone() }
+}
+
+/// 48 bits of a hash, so that TOML holds them and people can read them.
+fn derived_seed(seed: u64, purpose: &str) -> u64 {
+    let digest = Sha256::digest(format!("{seed}/{purpose}"));
+    digest.iter().take(6).fold(0, |sum, &byte| (sum << 8) | u64::from(byte))
+}
+
+/// Refuses a body that is not wholly in the room at all times.
+fn stays_inside(world: &World, margin_m: f64, name: &str) -> Result<()> {
+    let Some(person) = &world.person else { return Ok(()) };
+    let body = MovingBody::new(person, world.interpolation)?;
+    let times = person.pose_times_s();
+    let rate_hz = (times.len() - 1) as f64 / (times[times.len() - 1] - times[0]);
+    let stride = ((rate_hz / CHECKED_HZ).floor() as usize).max(1);
+    for (pose, time_s) in times.iter().enumerate().filter(|(pose, time)| pose % stride == 0 && **time >= 0.0) {
+        for vertex in body.pose(pose) {
+            let outside = |boundary: &Boundary| {
+                let (axis, sign) = boundary.axis();
+                let margin = if *boundary == Boundary::Floor { -SOLE_M } else { margin_m };
+                world.room.distance_m(*boundary).is_some_and(|distance| sign * vertex[axis] > distance - margin)
+            };
+            let place = || format!("at [{:.2}, {:.2}, {:.2}] m after {time_s:.2} s", vertex[0], vertex[1], vertex[2]);
+            if let Some(boundary) = Boundary::ALL.iter().find(|boundary| outside(boundary)) {
+                let distance = world.room.distance_m(*boundary).unwrap_or_default();
+                let expected = format!("everybody within the room, whose {} boundary is {distance} m away", boundary.name());
+                return Err(Error::setting(format!("style of {name}"), format!("a person {}", place()), expected)
+                    .with_hint("narrow style.path_scale, style.distance_m or style.sideways_m, or give a larger room"));
+            }
+            if vertex[0].hypot(vertex[1]) < NEAREST_M {
+                let expected = format!("nobody nearer to the radar than {NEAREST_M} m");
+                return Err(Error::setting(format!("style of {name}"), format!("a person {}", place()), expected)
+                    .with_hint("raise style.distance_m or lower style.path_scale"));
+            }
+        }
+    }
+    Ok(())
+}
