@@ -90,8 +90,9 @@ mod tests {
     #[test]
     fn a_cut_tone_is_whole_again() {
         let samples = 64;
+        let turn = |cells: f64| Complex64::cis(std::f64::consts::TAU * cells / 64.0);
         let tones: Vec<Complex64> = (0..samples)
-            .map(|n| Complex64::cis(0.41 * n as f64) * 100.0 + Complex64::cis(1.07 * n as f64 + 1.0) * 70.0)
+            .map(|n| turn(4.0 * n as f64) * 100.0 + turn(11.0 * n as f64 + 10.0) * 70.0)
             .collect();
         let rail = 120.0;
         let cut = |part: f64| part.clamp(-rail, rail);
