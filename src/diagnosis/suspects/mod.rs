@@ -1,6 +1,7 @@
 //! One file per family of effects: each looks at the evidence and says what it has found.
 
 pub mod codes;
+pub mod fluctuation;
 pub mod geometry;
 pub mod paths;
 pub mod receiver;
@@ -37,6 +38,7 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect { name: "one channel", share: 1.0, find: slow::channels::find },
     Suspect { name: "converter's codes", share: 1.0, find: codes::find },
     Suspect { name: "chirp", share: 1.0, find: waveform::find },
+    Suspect { name: "static returns behind the body", share: 1.0, find: fluctuation::find },
     Suspect { name: "vital signs", share: 1.0, find: vital::find },
     Suspect { name: "untracked movers", share: 1.0, find: untracked::find },
     Suspect { name: "extra paths", share: 1.0, find: paths::find },
