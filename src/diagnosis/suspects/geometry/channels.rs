@@ -51,14 +51,6 @@ impl Sums {
     fn own(&self, rx: usize) -> f64 {
         self.products[rx * self.receivers() + rx].re
     }
-
-    /// As if every receiver had been divided by a factor.
-    fn divided(&self, factors: &[Complex64]) -> Self {
-        let count = factors.len();
-        let products = self.products.iter().enumerate();
-        let products = products.map(|(i, value)| value / (factors[i / count] * factors[i % count].conj())).collect();
-        Self { products, ..*self }
-    }
 }
 
 /// A mean over frames and the standard error of it.
@@ -84,8 +76,9 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
         && let Some(coupling) = coupling::find(evidence, &training, &held_out)
     {
         // Receivers that differ in any other way remain different without it.
-        let rest: Vec<Sums> = training.iter().map(|sums| sums.divided(&coupling.amplitudes)).collect();
-        if judge(&evidence.radar, &rest).own > UNEVEN {
+        let undone = |sums: &Sums| coupling::uncoupled(&evidence.radar, sums, coupling.strength);
+        let rest: Option<Vec<Sums>> = training.iter().map(undone).collect();
+        if rest.is_some_and(|rest| judge(&evidence.radar, &rest).own > UNEVEN) {
             return vec![coupling.candidate];
         }
     }

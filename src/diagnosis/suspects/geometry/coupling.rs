@@ -23,10 +23,10 @@ const STRONGEST: f64 = 0.5;
 /// Parts of a complex number, and of the family's two looks at the receivers.
 const TRIED: f64 = 4.0;
 
-/// A coupling that was found, and the receivers' amplitudes that it causes at the body's mean direction.
+/// A coupling that was found, and its strength.
 pub struct Found {
     pub candidate: Candidate,
-    pub amplitudes: Vec<Complex64>,
+    pub strength: Complex64,
 }
 
 /// Strength with the standard errors of its parts, from leaving out one frame after the other.
@@ -52,7 +52,7 @@ pub fn find(evidence: &Evidence, training: &[Sums], held_out: &[Sums]) -> Option
     let gain = likelihood_gain(training, held_out, &amplitudes);
     let deviation = (re * re * all.re.powi(2) + im * im * all.im.powi(2)).sqrt() / all.norm();
     let deviation = deviation.hypot(0.5 * FLOOR);
-    (gain > 0.0).then(|| Found { candidate: candidate(evidence, all, deviation, p_value, gain), amplitudes })
+    (gain > 0.0).then(|| Found { candidate: candidate(evidence, all, deviation, p_value, gain), strength: all })
 }
 
 fn mean_sine<'a>(frames: impl Iterator<Item = &'a Sums>) -> f64 {
@@ -85,31 +85,47 @@ fn contrast(radar: &Radar, values: &[Complex64]) -> Vec<Complex64> {
     values.iter().zip(&places).map(|(v, x)| v - mean - slope * x).collect()
 }
 
-/// Least squares of the receivers' logarithmic gains; none where the array cannot tell.
+/// What the receivers would have heard alone, for directions near the mean one. None where that cannot be told.
+pub fn uncoupled(radar: &Radar, sums: &Sums, strength: Complex64) -> Option<Sums> {
+    let wave = TAU / radar.wavelength_m();
+    let count = radar.rx_m.len();
+    let coupled = DMatrix::from_fn(count, count, |row, column| match row.abs_diff(column) {
+        0 => Complex64::ONE,
+        1 => strength * Complex64::cis(-wave * (radar.rx_m[column][0] - radar.rx_m[row][0]) * sums.sine),
+        _ => Complex64::ZERO,
+    });
+    let inverse = coupled.try_inverse()?;
+    let products = &inverse * DMatrix::from_row_slice(count, count, &sums.products) * inverse.adjoint();
+    Some(Sums { products: products.transpose().as_slice().to_vec(), ..*sums })
+}
+
+/// The coupling that, undone, leaves receivers as alike as can be; none where the array cannot tell.
 fn strength<'a>(radar: &Radar, frames: impl Iterator<Item = &'a Sums> + Clone) -> Option<Complex64> {
+    const ROUNDS: usize = 4;
+    let mut total = Complex64::ZERO;
+    for _ in 0..ROUNDS {
+        // Neighbours do not hear quite the same of a wide body, so that one step falls short.
+        let undone: Vec<Sums> = frames.clone().map(|sums| uncoupled(radar, sums, total)).collect::<Option<_>>()?;
+        total += step(radar, undone.iter())?;
+        if !total.is_finite() || total.norm() > 2.0 * STRONGEST {
+            return None;
+        }
+    }
+    Some(total)
+}
+
+/// Least squares of the receivers' logarithmic gains.
+fn step<'a>(radar: &Radar, frames: impl Iterator<Item = &'a Sums> + Clone) -> Option<Complex64> {
     let count = radar.rx_m.len();
     let mut products = vec![Complex64::ZERO; count * count];
     for sums in frames.clone() {
         products.iter_mut().zip(&sums.products).for_each(|(sum, product)| *sum += product);
     }
     let gains = log_gains(&products, count)?;
-    let heard = neighbours(radar, mean_sine(frames));
-    let lever = contrast(radar, &heard);
+    let lever = contrast(radar, &neighbours(radar, mean_sine(frames)));
     let energy: f64 = lever.iter().map(|value| value.norm_sqr()).sum();
-    if energy < LEAST_CONTRAST {
-        return None;
-    }
-    let mut strength = Complex64::ZERO;
-    // ln(1 + c n) is c n but for small terms, which the last round's c gives.
-    for _ in 0..4 {
-        let linear: Vec<Complex64> =
-            gains.iter().zip(&heard).map(|(gain, n)| gain - (1.0 + strength * n).ln() + strength * n).collect();
-        strength = contrast(radar, &linear).iter().zip(&lever).map(|(gain, n)| gain * n.conj()).sum::<Complex64>() / energy;
-        if !strength.is_finite() || strength.norm() > 2.0 * STRONGEST {
-            return None;
-        }
-    }
-    Some(strength)
+    let data: Complex64 = contrast(radar, &gains).iter().zip(&lever).map(|(gain, n)| gain * n.conj()).sum();
+    (energy >= LEAST_CONTRAST).then(|| data / energy)
 }
 
 /// Logarithms of the receivers' amplitudes: from their powers, and phases that agree best with all products.
@@ -152,8 +168,9 @@ fn candidate(evidence: &Evidence, strength: Complex64, deviation: f64, p_value: 
         // Of three receivers only the middle one is odd.
         look_alikes: if receivers < 4 { vec!["channel_mismatch"] } else { vec![] },
         statement: format!(
-            "Each receiver also hears its neighbours, {level_db:.1} dB below them and {:.0}° ahead: the inner receivers, which have two \
+            "Each receiver also hears its neighbours, {:.1} dB below them and {:.0}° ahead: the inner receivers, which have two \
              neighbours, differ from the outer ones, which have one, in the way that every direction of the body predicts.",
+            -level_db,
             strength.arg().to_degrees()
         ),
         curve: None,
