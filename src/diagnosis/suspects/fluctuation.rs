@@ -27,8 +27,9 @@ const SPACING: usize = 3;
 const QUIET: f64 = 1.3;
 /// Share of the change that has the static return's own pattern across the channels.
 const SAME_PATTERN: f64 = 0.4;
-/// Share of the change that the body's silhouette must explain to be called its shadow.
-const EXPLAINED: f64 = 0.8;
+/// Share of the change that the body's silhouette must explain to be called its shadow; the rest is what the edges of the
+/// body do to the clutter around.
+const EXPLAINED: f64 = 0.6;
 /// Fewest training frames.
 const FEWEST: usize = 6;
 /// Fewest other returns to compare with.
@@ -300,7 +301,7 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, named: bool, p_va
     let why = if named {
         "when the body's silhouette covers it: the body casts a shadow on the room."
     } else {
-        "but not as the body's silhouette covers it: something stirs there, or passes in front of it."
+        "and the body's silhouette alone does not explain it: something stirs there, or passes in front of it."
     };
     Candidate {
         id: named.then_some(ID),
