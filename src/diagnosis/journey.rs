@@ -97,7 +97,8 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     report.reason = findings.reason;
     report.effects = findings.effects;
     report.unexplained = findings.unexplained;
-    report.not_detectable = never_detectable();
+    report.not_detectable = never_detectable(original.body.is_some());
+    report.not_detectable.retain(|limit| report.effects.iter().all(|effect| effect.id != limit.id));
     report.probability_nothing_missing = match report.verdict {
         Verdict::NoMismatch => 1.0 - 0.5 * (1.0 - probability_of_nothing(explanation.p_value)),
         _ => probability_of_nothing(explanation.p_value),

@@ -315,13 +315,37 @@ impl Findings {
     }
 }
 
-/// Effects that no recording of this kind can show, whatever their size.
-pub fn never_detectable() -> Vec<NotDetectable> {
-    vec![NotDetectable {
-        id: "part_reflectivity".into(),
-        at_most_db: None,
-        reason:
-            "a wrong reflectivity is only another amplitude, and amplitudes are free: no recording can show it without a prior"
-                .into(),
-    }]
+/// What no recording of this kind can show, whatever its size: ids and why.
+const NEVER: [(&[&str], &str); 5] = [
+    (
+        &["part_reflectivity"],
+        "a wrong reflectivity is only another amplitude, and amplitudes are free: no recording can show it without a prior",
+    ),
+    (
+        &["start_frequency_error", "adc_start_error", "if_delay"],
+        "all three only turn every return by a phase in proportion to its delay, and phases of returns are free: millimetres of the \
+         mesh and of the room do the same; they would show only if known ranges were good to a fiftieth of a millimetre",
+    ),
+    (
+        &["antenna_pattern"],
+        "a factor that depends on direction alone is part of the amplitudes of whatever stands in that direction, and those are \
+         free; the same body would have to be seen from the same side in several directions",
+    ),
+    (
+        &["antenna_position", "tdm_phase"],
+        "within the body's few degrees of direction and its velocities they are phases of channels, which are reported as such \
+         (channel_mismatch); a target over ±40° of direction would tell them apart",
+    ),
+    (
+        &["breathing", "heartbeat"],
+        "of a body whose motion is known to millimetres: the mesh's own error moves by as much, and as slowly; they are \
+         looked for only where nobody was tracked",
+    ),
+];
+
+/// Effects that no recording of this kind can show; `body`: somebody was tracked.
+pub fn never_detectable(body: bool) -> Vec<NotDetectable> {
+    let applies = |id: &&&str| body || !matches!(**id, "breathing" | "heartbeat");
+    let entry = |id: &&str, reason: &str| NotDetectable { id: (*id).into(), at_most_db: None, reason: reason.into() };
+    NEVER.iter().flat_map(|(ids, reason)| ids.iter().filter(applies).map(|id| entry(id, reason))).collect()
 }

@@ -1,6 +1,7 @@
 //! One file per family of effects: each looks at the evidence and says what it has found.
 
 pub mod codes;
+pub mod fluctuation;
 pub mod geometry;
 pub mod paths;
 pub mod receiver;
@@ -44,4 +45,5 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect { name: "untracked movers", share: 1.0, find: untracked::find, last_in_chain: false },
     Suspect { name: "extra paths", share: 1.0, find: paths::find, last_in_chain: false },
     Suspect { name: "geometry", share: 8.0, find: geometry::find, last_in_chain: false },
+    Suspect { name: "static returns behind the body", share: 1.0, find: fluctuation::find, last_in_chain: false },
 ];

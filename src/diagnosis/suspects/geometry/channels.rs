@@ -12,25 +12,45 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::change::{Change, Moves};
+use super::coupling;
 use crate::diagnosis::power::{PowerModel, part_templates};
 use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, Rung, statistics};
+use crate::radar::Radar;
 
 /// Expected power over the noise from which on a cell is used.
 const LEAST_POWER: f32 = 10.0;
 /// What the power model's errors do to a phase and to a power between neighbouring receivers (half a wavelength).
 const PHASE_FLOOR_RAD: f64 = 1.5 * PI / 180.0;
 const GAIN_FLOOR_DB: f64 = 0.2;
+/// Chance below which receivers are not alike.
+const UNEVEN: f64 = 0.05;
 /// Cells that one independent draw is spread over by two Hann windows.
 const CELLS_PER_DRAW: f64 = 2.25;
 
-/// Sums over the cells of a frame, by receiver: cross power with the first receiver after the predicted steering, own
-/// power, and the first receiver's.
+/// Sums over the cells of a frame after the predicted steering: products of every two receivers.
 #[derive(Clone, Debug)]
-struct Sums {
-    cross: Vec<Complex64>,
-    own: Vec<f64>,
-    cells: f64,
-    range_m: f64,
+pub struct Sums {
+    /// `[rx, rx]`, the second one conjugated.
+    pub products: Vec<Complex64>,
+    pub cells: f64,
+    pub range_m: f64,
+    /// Mean x of the cells' directions (unit vectors).
+    pub sine: f64,
+}
+
+impl Sums {
+    pub fn receivers(&self) -> usize {
+        self.products.len().isqrt()
+    }
+
+    /// With the first receiver.
+    fn cross(&self, rx: usize) -> Complex64 {
+        self.products[rx * self.receivers()]
+    }
+
+    fn own(&self, rx: usize) -> f64 {
+        self.products[rx * self.receivers() + rx].re
+    }
 }
 
 /// A mean over frames and the standard error of it.
@@ -52,12 +72,61 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     if training.len() < 6 || held_out.is_empty() {
         return vec![];
     }
+    if !evidence.accepted.contains(&"mutual_coupling")
+        && let Some(coupling) = coupling::find(evidence, &training, &held_out)
+    {
+        // Receivers that differ in any other way remain different without it.
+        let undone = |sums: &Sums| coupling::uncoupled(&evidence.radar, sums, coupling.strength);
+        let rest: Option<Vec<Sums>> = training.iter().map(undone).collect();
+        if rest.is_some_and(|rest| judge(&evidence.radar, &rest).own > UNEVEN) {
+            return vec![coupling.candidate];
+        }
+    }
+    let Judgement { phases, gains, direction, own, bearing, aside } = judge(&evidence.radar, &training);
+    let (places, wave) = (places(&evidence.radar), TAU / evidence.radar.wavelength_m());
+    if own < UNEVEN {
+        let amplitudes: Vec<Complex64> = std::iter::once(Complex64::ONE)
+            .chain(
+                phases.iter().zip(&gains).map(|(phase, gain)| Complex64::from_polar(10f64.powf(gain.value / 20.0), phase.value)),
+            )
+            .collect();
+        let gain = likelihood_gain(&training, &held_out, &amplitudes);
+        return (gain > 0.0).then(|| mismatch(evidence, &phases, &gains, amplitudes, own, gain)).into_iter().collect();
+    }
+    if aside < 0.05 {
+        let amplitudes: Vec<Complex64> = places.iter().map(|x| Complex64::cis(-direction * wave * x)).collect();
+        let gain = likelihood_gain(&training, &held_out, &amplitudes);
+        let range_m = training.iter().map(|sums| sums.range_m).sum::<f64>() / training.len() as f64;
+        return (gain > 0.0).then(|| displaced(evidence, bearing, range_m, moves, aside, gain)).into_iter().collect();
+    }
+    vec![]
+}
+
+/// Places of the receivers along x, from the first one.
+fn places(radar: &Radar) -> Vec<f64> {
+    radar.rx_m.iter().map(|rx| rx[0] - radar.rx_m[0][0]).collect()
+}
+
+/// How the receivers differ from the first one.
+struct Judgement {
+    phases: Vec<Mean>,
+    gains: Vec<Mean>,
+    /// The part of the phases that is a direction, as a sine.
+    direction: f64,
+    /// Chance that the rest, and the powers, are the body's.
+    own: f64,
+    bearing: Mean,
+    /// Chance that the direction is the body's.
+    aside: f64,
+}
+
+fn judge(radar: &Radar, training: &[Sums]) -> Judgement {
+    let receivers = radar.rx_m.len();
     let freedom = training.len() as f64 - 1.0;
-    let phases: Vec<Mean> = (1..receivers).map(|rx| phase(&training, rx)).collect();
-    let gains: Vec<Mean> = (1..receivers).map(|rx| gain_db(&training, rx)).collect();
+    let phases: Vec<Mean> = (1..receivers).map(|rx| phase(training, rx)).collect();
+    let gains: Vec<Mean> = (1..receivers).map(|rx| gain_db(training, rx)).collect();
     // The part that is a direction: least squares through the receivers' places, of every frame on its own.
-    let places: Vec<f64> = evidence.radar.rx_m.iter().map(|rx| rx[0] - evidence.radar.rx_m[0][0]).collect();
-    let wave = TAU / evidence.radar.wavelength_m();
+    let (places, wave) = (places(radar), TAU / radar.wavelength_m());
     let spread: f64 = places.iter().map(|x| x * x).sum();
     let sine = |phases: &[f64]| -phases.iter().zip(&places[1..]).map(|(phase, x)| phase * x).sum::<f64>() / (spread * wave);
     let values: Vec<f64> = phases.iter().map(|phase| phase.value).collect();
@@ -81,23 +150,11 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     };
     let floor = PHASE_FLOOR_RAD / PI;
     let aside = if spread > 0.0 { statistics::corrected(p(bearing.value, floor, bearing.deviation), tried) } else { 1.0 };
-    if own < 0.05 {
-        let amplitudes: Vec<Complex64> = std::iter::once(Complex64::ONE)
-            .chain(values.iter().zip(&gains).map(|(&phase, gain)| Complex64::from_polar(10f64.powf(gain.value / 20.0), phase)))
-            .collect();
-        let gain = likelihood_gain(&training, &held_out, &amplitudes);
-        return (gain > 0.0).then(|| mismatch(evidence, &phases, &gains, amplitudes, own, gain)).into_iter().collect();
-    }
-    if aside < 0.05 {
-        let amplitudes: Vec<Complex64> = places.iter().map(|x| Complex64::cis(-direction * wave * x)).collect();
-        let gain = likelihood_gain(&training, &held_out, &amplitudes);
-        let range_m = training.iter().map(|sums| sums.range_m).sum::<f64>() / training.len() as f64;
-        return (gain > 0.0).then(|| displaced(evidence, bearing, range_m, moves, aside, gain)).into_iter().collect();
-    }
-    vec![]
+    Judgement { phases, gains, direction, own, bearing, aside }
 }
 
-fn tail(t: f64, freedom: f64) -> f64 {
+/// Two-sided, of Student's law.
+pub fn tail(t: f64, freedom: f64) -> f64 {
     if t <= 0.0 { 1.0 } else { StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| 2.0 * law.sf(t)) }
 }
 
@@ -127,7 +184,9 @@ fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: u
         std::array::from_fn(|axis| mean(&|position| (position[axis] - centre[axis]) / range(position)));
     let range_m = points.iter().map(|point| range(point.position_m)).sum::<f64>() / points.len().max(1) as f64;
     let noise = evidence.noise();
-    let mut result = Sums { cross: vec![Complex64::ZERO; receivers], own: vec![0.0; receivers], cells: 0.0, range_m };
+    let sine = direction[0].iter().map(|&x| f64::from(x)).sum::<f64>() / cells.len() as f64;
+    let mut result = Sums { products: vec![Complex64::ZERO; receivers * receivers], cells: 0.0, range_m, sine };
+    let mut steered = vec![Complex64::ZERO; receivers];
     for tx in 0..transmitters {
         let maps: Vec<_> = (0..receivers).map(|rx| evidence.range_doppler(frame, tx * receivers + rx)).collect();
         for (index, &cell) in cells.iter().enumerate() {
@@ -137,9 +196,10 @@ fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: u
                 let phase: f64 = (0..3)
                     .map(|axis| (radar.rx_m[rx][axis] - radar.rx_m[0][axis]) * f64::from(direction[axis][index]) * wave)
                     .sum();
-                let value = maps[rx][cell];
-                result.cross[rx] += value * maps[0][cell].conj() * Complex64::cis(phase) * weight;
-                result.own[rx] += value.norm_sqr() * weight;
+                steered[rx] = maps[rx][cell] * Complex64::cis(phase);
+            }
+            for (i, product) in result.products.iter_mut().enumerate() {
+                *product += steered[i / receivers] * steered[i % receivers].conj() * weight;
             }
         }
     }
@@ -148,8 +208,8 @@ fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: u
 
 /// Phase of a receiver against the first, radians.
 fn phase(frames: &[Sums], rx: usize) -> Mean {
-    let total: Complex64 = frames.iter().map(|sums| sums.cross[rx]).sum();
-    let turned = |sums: &Sums| (sums.cross[rx] * total.conj() / total.norm().max(f64::MIN_POSITIVE)).im;
+    let total: Complex64 = frames.iter().map(|sums| sums.cross(rx)).sum();
+    let turned = |sums: &Sums| (sums.cross(rx) * total.conj() / total.norm().max(f64::MIN_POSITIVE)).im;
     let scatter: f64 = frames.iter().map(|sums| turned(sums).powi(2)).sum();
     let count = frames.len() as f64;
     Mean { value: total.arg(), deviation: (scatter * count / (count - 1.0)).sqrt() / total.norm().max(f64::MIN_POSITIVE) }
@@ -157,9 +217,9 @@ fn phase(frames: &[Sums], rx: usize) -> Mean {
 
 /// Power of a receiver against the first, decibels.
 fn gain_db(frames: &[Sums], rx: usize) -> Mean {
-    let (own, first): (f64, f64) = frames.iter().fold((0.0, 0.0), |(own, first), sums| (own + sums.own[rx], first + sums.own[0]));
+    let (own, first): (f64, f64) = frames.iter().fold((0.0, 0.0), |(own, first), sums| (own + sums.own(rx), first + sums.own(0)));
     let ratio = (own / first.max(f64::MIN_POSITIVE)).max(f64::MIN_POSITIVE);
-    let scatter: f64 = frames.iter().map(|sums| (sums.own[rx] - ratio * sums.own[0]).powi(2)).sum();
+    let scatter: f64 = frames.iter().map(|sums| (sums.own(rx) - ratio * sums.own(0)).powi(2)).sum();
     let count = frames.len() as f64;
     let db = 10.0 / std::f64::consts::LN_10;
     Mean { value: db * ratio.ln(), deviation: db * (scatter * count / (count - 1.0)).sqrt() / own.max(f64::MIN_POSITIVE) }
@@ -167,14 +227,14 @@ fn gain_db(frames: &[Sums], rx: usize) -> Mean {
 
 /// Of held-out frames, pair by pair with the first receiver: circular Gaussian fields with equal powers and a real
 /// correlation, against the same with the amplitudes put in.
-fn likelihood_gain(training: &[Sums], held_out: &[Sums], amplitudes: &[Complex64]) -> f64 {
+pub fn likelihood_gain(training: &[Sums], held_out: &[Sums], amplitudes: &[Complex64]) -> f64 {
     let mut gain = 0.0;
     for (rx, amplitude) in amplitudes.iter().enumerate().skip(1) {
         let undone = |sums: &[Sums], amplitude: Complex64| {
             let cells: f64 = sums.iter().map(|sums| sums.cells).sum::<f64>().max(1.0);
-            let first = sums.iter().map(|sums| sums.own[0]).sum::<f64>() / cells;
-            let own = sums.iter().map(|sums| sums.own[rx]).sum::<f64>() / (cells * amplitude.norm_sqr());
-            let cross = sums.iter().map(|sums| sums.cross[rx]).sum::<Complex64>() / (amplitude * cells);
+            let first = sums.iter().map(|sums| sums.own(0)).sum::<f64>() / cells;
+            let own = sums.iter().map(|sums| sums.own(rx)).sum::<f64>() / (cells * amplitude.norm_sqr());
+            let cross = sums.iter().map(|sums| sums.cross(rx)).sum::<Complex64>() / (amplitude * cells);
             (cells, 0.5 * (first + own), cross.re)
         };
         let log_likelihood = |amplitude: Complex64| {

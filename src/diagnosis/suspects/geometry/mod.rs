@@ -2,6 +2,7 @@
 
 mod change;
 mod channels;
+mod coupling;
 mod displaced;
 mod trial;
 

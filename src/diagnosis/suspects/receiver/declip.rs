@@ -91,9 +91,8 @@ mod tests {
     fn a_cut_tone_is_whole_again() {
         let samples = 64;
         let turn = |cells: f64| Complex64::cis(std::f64::consts::TAU * cells / 64.0);
-        let tones: Vec<Complex64> = (0..samples)
-            .map(|n| turn(4.0 * n as f64) * 100.0 + turn(11.0 * n as f64 + 10.0) * 70.0)
-            .collect();
+        let tones: Vec<Complex64> =
+            (0..samples).map(|n| turn(4.0 * n as f64) * 100.0 + turn(11.0 * n as f64 + 10.0) * 70.0).collect();
         let rail = 120.0;
         let cut = |part: f64| part.clamp(-rail, rail);
         let mut chirp: Vec<Complex64> = tones.iter().map(|value| Complex64::new(cut(value.re), cut(value.im))).collect();

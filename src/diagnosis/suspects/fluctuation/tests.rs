@@ -1,0 +1,98 @@
+use std::f64::consts::TAU;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::diagnosis::cube::{Cube, Loaded, Split};
+use crate::diagnosis::prediction::{BodyPrediction, Point};
+use crate::radar::{Radar, SPEED_OF_LIGHT};
+use crate::room::Room;
+
+const FRAMES: usize = 16;
+const FRONT_M: f64 = 5.0;
+
+/// A body that steps into the line of sight and out again.
+fn covers(frame: usize) -> bool {
+    frame % 5 < 2
+}
+
+/// Three static returns, the last of them the front wall behind the body; `change`: factor of return and frame.
+fn evidence(seed: u64, change: impl Fn(usize, usize) -> Complex64) -> Evidence {
+    let mut radar = Radar::small(FRAMES);
+    (radar.loops_per_frame, radar.samples_per_chirp) = (16, 128);
+    let dims = radar.dims();
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let ranges = [1.2, 4.2, FRONT_M];
+    let block = dims[3] * dims[4];
+    let samples = (0..dims.iter().product::<usize>())
+        .map(|i| {
+            let (frame, channel, n) = (i / (dims[1] * dims[2] * block), i / block % (dims[1] * dims[2]), i % dims[4]);
+            let returns = ranges.iter().enumerate().map(|(index, range)| {
+                let cycles = 2.0 * range / SPEED_OF_LIGHT * radar.slope_hz_per_s / radar.sample_rate_hz;
+                Complex64::cis(TAU * cycles * n as f64 + (index * 3 + channel * (index + 1)) as f64) * change(index, frame)
+            });
+            returns.sum::<Complex64>() + Complex64::new(normal(), normal())
+        })
+        .collect();
+    let (held_out, training) = (0..FRAMES).partition(|frame| frame % 4 == 2);
+    let starts_s: Vec<f64> = (0..FRAMES).map(|frame| radar.chirp_time_s(frame, 0, 0)).collect();
+    let points = |frame: usize| {
+        let side_m = if covers(frame) { 0.0 } else { 0.7 };
+        let at = |i: usize, j: usize| Point {
+            position_m: [side_m + 0.02 * i as f64 - 0.2, 2.6, 0.02 * j as f64 - 0.5],
+            velocity_mps: [0.0; 3],
+            normal: [0.0, -1.0, 0.0],
+            area_m2: 4e-4,
+            part: 0,
+        };
+        (0..20).flat_map(|i| (0..30).map(move |j| (i, j))).map(|(i, j)| at(i, j)).collect()
+    };
+    let body = BodyPrediction {
+        parts: vec!["body".into()],
+        frames: (0..FRAMES).map(points).collect(),
+        middle_s: starts_s.clone(),
+        tracks: vec![],
+    };
+    let room = Room { front_m: Some(FRONT_M), floor_m: Some(1.2), ..Room::default() };
+    let loaded = Loaded {
+        cube: Cube::new(dims, samples),
+        radar,
+        split: Split { training, held_out, block_loops: None },
+        starts_s,
+        extremes: [-100.0, 100.0],
+    };
+    Evidence::new(loaded, Some(room), Some(body))
+}
+
+#[test]
+fn a_shadow_is_named_and_a_curtain_is_not() {
+    let shadow = evidence(1, |index, frame| Complex64::from(if index == 2 && covers(frame) { 0.5 } else { 1.0 }));
+    let found = find(&shadow);
+    assert!(found.len() == 1 && found[0].id == Some(ID) && found[0].p_value < 1e-6 && found[0].gain > 15.0, "{found:?}");
+    let [near, far] = found[0].place.range_m.unwrap();
+    assert!(near < FRONT_M && far > FRONT_M);
+    // What was taken out is gone, though nothing forbids to find it again.
+    let mut next = shadow.with(&found[0]);
+    next.accepted.clear();
+    assert!(find(&next).iter().all(|again| again.gain < 0.05 * found[0].gain), "{:?}", find(&next));
+
+    let curtain =
+        evidence(2, |index, frame| Complex64::cis(if index == 2 { 0.6 * (TAU * frame as f64 / 7.3).sin() } else { 0.0 }));
+    let found = find(&curtain);
+    assert!(found.len() == 1 && found[0].id.is_none() && found[0].gain > 15.0, "{found:?}");
+}
+
+#[test]
+fn noise_and_what_all_returns_do_is_nothing() {
+    for seed in 3..9 {
+        assert!(find(&evidence(seed, |_, _| Complex64::ONE)).is_empty());
+        let drift = evidence(seed, |index, frame| {
+            let turn = 0.01 * frame as f64 * (1.0 + [1.2, 4.2, FRONT_M][index]);
+            Complex64::from_polar(1.0 + 0.02 * frame as f64, turn)
+        });
+        assert!(find(&drift).is_empty(), "{:?}", find(&drift));
+    }
+}
