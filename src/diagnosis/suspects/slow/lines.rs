@@ -181,10 +181,12 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
     // What leaks from movers is no line: it raises the spectra of single frames at that frequency.
     let background = frames.iter().map(|&frame| leftover(field, series, frame, &line)).sum::<f64>() / frames.len() as f64;
     let background = background.max(1.0);
-    // A background of more than noise is itself known from a few frames only.
+    // What is slower than a frame is seen in how few frames differ, and a background of more than noise is known from
+    // few frames only.
+    let slow = frequency * loop_s * (loops as f64) < 1.0;
     let freedom = (2 * frames.len()).saturating_sub(2 * harmonics + 1).max(1) as f64;
     let unsure = |gain: f64| {
-        if gain > 0.0 && background > LOUD { 0.5 * freedom * (2.0 * gain / freedom).ln_1p() } else { gain }
+        if gain > 0.0 && (slow || background > LOUD) { 0.5 * freedom * (2.0 * gain / freedom).ln_1p() } else { gain }
     };
     line.training_gain = unsure(line.training_gain / background);
     line.frequency_deviation_hz *= background.sqrt();
