@@ -11,9 +11,10 @@ use hybridsim::challenge::answer::{self, Answers, RunConfig};
 use hybridsim::challenge::commitment::{Commitment, Sealed, read_json};
 use hybridsim::challenge::config::Stratum;
 use hybridsim::challenge::judge::Truth;
-use hybridsim::challenge::seal::{Shard, seal};
+use hybridsim::challenge::seal::seal;
 use hybridsim::challenge::{ChallengeConfig, score::score, twins};
 use hybridsim::data::Recording;
+use hybridsim::data::Shard;
 use serde_json::{Value, json};
 
 fn config(cases: usize) -> ChallengeConfig {
