@@ -41,6 +41,8 @@ pub mod recognition;
 pub mod config;
 // the proof on concealed data
 pub mod challenge;
+// the paper's tables, from nothing
+pub mod experiments;
 pub mod cli;
 
 pub use error::{Error, Result};

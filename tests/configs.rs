@@ -4,6 +4,7 @@ use std::path::Path;
 
 use hybridsim::challenge::ChallengeConfig;
 use hybridsim::config::Config;
+use hybridsim::experiments::ReproduceConfig;
 use hybridsim::site::{SiteConfig, sequences};
 
 #[test]
@@ -18,12 +19,18 @@ fn all_configs_parse_and_resolve_to_themselves() {
         let again = tempfile::tempdir().unwrap();
         let resolved = again.path().join("config.toml");
         let name = path.file_name().unwrap().to_str().unwrap();
-        // A challenge and a site are no experiments and have settings of their own.
+        // A challenge, a site and a reproduction are no experiments and have settings of their own.
         if name.starts_with("site") {
             let config = SiteConfig::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
             std::fs::write(&resolved, config.to_toml()).unwrap();
             assert_eq!(SiteConfig::read(&resolved, &[]).unwrap(), config, "{}", path.display());
             sequences(&config, &folder).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        } else if name.starts_with("reproduce") {
+            // Its site is a path, which the resolved form has from here.
+            let config = ReproduceConfig::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+            assert!(config.site.is_file() && config.second_room.as_ref().is_none_or(|room| room.is_file()));
+            std::fs::write(&resolved, config.to_toml()).unwrap();
+            assert_eq!(ReproduceConfig::read(&resolved, &[]).unwrap(), config, "{}", path.display());
         } else if name.starts_with("challenge") {
             let config = ChallengeConfig::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
             std::fs::write(&resolved, config.to_toml()).unwrap();

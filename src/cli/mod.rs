@@ -16,6 +16,7 @@ mod progress;
 mod recognize;
 mod record;
 mod report;
+mod reproduce;
 mod scores;
 mod simulated;
 mod site;
@@ -113,6 +114,12 @@ enum Command {
     /// `seal` records cases by a secret and commits to their truths; `run` has each diagnosed by a process of its own
     /// that cannot see them; `score` opens them and holds the reports against them.
     Challenge(challenge::Arguments),
+    /// Make the paper's experiments again, from nothing to tables
+    ///
+    /// Records a site, trains the simulator and its ablations, simulates by every method what was measured, scores it and
+    /// trains classifiers on it. Stages are kept under the hash of all that they depend on: a run that was killed, or
+    /// whose config has changed, does only what is missing. Leaves results.md, results.json and adaptation.png.
+    Reproduce(reproduce::Arguments),
 }
 
 /// Where results go.
@@ -144,6 +151,7 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(arguments, &cli.common),
         Command::Diagnose(arguments) => diagnose::run(arguments, &cli.common),
         Command::Challenge(arguments) => challenge::run(arguments, &cli.common),
+        Command::Reproduce(arguments) => reproduce::run(arguments, &cli.common),
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -2,9 +2,9 @@
 
 use std::{io::IsTerminal, time::Duration};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::training::Event;
+use crate::{experiments::Event as StageEvent, training::Event};
 
 /// Shows how far a task is, with the time that remains.
 pub struct Progress {
@@ -97,6 +97,71 @@ impl TrainingProgress {
     pub fn finish(self) {
         if let Some(progress) = self.progress {
             progress.finish();
+        }
+    }
+}
+
+/// Shows the stages of a reproduction: one bar over all of them and one within the stage.
+pub struct StageProgress {
+    stages: ProgressBar,
+    within: ProgressBar,
+    quiet: bool,
+    terminal: bool,
+    known: usize,
+}
+
+impl StageProgress {
+    pub fn new(stages: usize, quiet: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let bars = MultiProgress::with_draw_target(if quiet || !terminal {
+            ProgressDrawTarget::hidden()
+        } else {
+            ProgressDrawTarget::stderr()
+        });
+        let bar = |length: u64, template: &str| {
+            let style = ProgressStyle::with_template(template).expect("a constant template").progress_chars("=> ");
+            let bar = bars.add(ProgressBar::new(length).with_style(style));
+            bar.enable_steady_tick(Duration::from_millis(500));
+            bar
+        };
+        if !quiet && !terminal {
+            eprintln!("reproducing: {stages} stages");
+        }
+        Self {
+            stages: bar(stages as u64, "stages [{bar:30}] {pos}/{len}  {elapsed} elapsed, {eta} left"),
+            within: bar(0, "       [{bar:30}] {pos}/{len}  {msg}"),
+            quiet,
+            terminal,
+            known: 0,
+        }
+    }
+
+    pub fn show(&mut self, event: &StageEvent) {
+        match event {
+            StageEvent::Stage { index, name, known, .. } => {
+                self.stages.set_position(*index as u64);
+                self.within.set_position(0);
+                self.within.set_length(0);
+                self.within.set_message(name.to_string());
+                self.known += usize::from(*known);
+            }
+            StageEvent::Step { done, of } => {
+                self.within.set_length(*of as u64);
+                self.within.set_position(*done as u64);
+            }
+            StageEvent::Done { name, seconds } if !self.quiet => {
+                let text = format!("{seconds:8.1} s  {name}");
+                if self.terminal { self.stages.println(text) } else { eprintln!("{text}") }
+            }
+            StageEvent::Done { .. } => {}
+        }
+    }
+
+    pub fn finish(self) {
+        self.within.finish_and_clear();
+        self.stages.finish_and_clear();
+        if !self.quiet && self.known > 0 {
+            eprintln!("{} stages had been done before", self.known);
         }
     }
 }

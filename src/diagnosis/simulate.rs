@@ -61,6 +61,7 @@ pub fn before_and_after(
         validation_fraction: held_out.len() as f64 / frames as f64,
         split: Split::Interleaved,
         frames: None,
+        repeats: 1,
         start_from: None,
         ..start.learning.clone()
     };

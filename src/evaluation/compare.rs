@@ -52,6 +52,19 @@ pub fn compare(
     metrics: &MetricsConfig,
     lpips: Option<&Lpips>,
 ) -> Result<Evaluation> {
+    let frames: Vec<usize> = (0..measured.frames()).collect();
+    compare_frames(measured, simulated, &frames, heatmap, metrics, lpips)
+}
+
+/// The same for some frames of both, such as those that training held out.
+pub fn compare_frames(
+    measured: &Recording,
+    simulated: &Recording,
+    frames: &[usize],
+    heatmap: &HeatmapConfig,
+    metrics: &MetricsConfig,
+    lpips: Option<&Lpips>,
+) -> Result<Evaluation> {
     refuse_different(measured, simulated)?;
     let pair = Pair {
         radar: &measured.radar,
@@ -59,8 +72,7 @@ pub fn compare(
         measured: &|frame| measured_frame(measured, frame),
         simulated: &|frame| measured_frame(simulated, frame),
     };
-    let frames: Vec<usize> = (0..measured.frames()).collect();
-    score(&pair, &frames, heatmap, metrics, lpips, &mut |_, _, _| {})
+    score(&pair, frames, heatmap, metrics, lpips, &mut |_, _, _| {})
 }
 
 /// Whether two recordings can show the same: the same radar and number of frames, and no label that contradicts. How the

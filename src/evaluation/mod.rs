@@ -9,12 +9,12 @@ mod frames;
 mod sequences;
 mod simulation;
 
-pub use compare::{ComparisonConfig, compare, refuse_different};
+pub use compare::{ComparisonConfig, compare, compare_frames, refuse_different};
 pub use frames::{FrameMaps, measured_frame};
 pub use sequences::{SequenceSummary, over_sequences};
 pub use simulation::{Simulation, evaluate};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     lpips::Network,
@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// Mean scores: over the frames of one recording, or over recordings.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ScoreSummary {
     pub psnr_db: Spread,
     pub ssim: Spread,
@@ -34,7 +34,7 @@ pub struct ScoreSummary {
 /// What an evaluation of one recording found. Images map `span_db` below the recording's strongest cell to 0 … 1.
 ///
 /// A recording's frames resemble each other, so these spreads have no interval: that takes several recordings.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Evaluation {
     pub frames: usize,
     pub span_db: f64,

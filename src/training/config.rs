@@ -28,6 +28,9 @@ pub struct TrainingConfig {
     /// Train on this many frames only, evenly spaced over those that are not held out; all by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frames: Option<usize>,
+    /// Times that an epoch visits every frame; with few frames, one visit is too little between two validations.
+    #[serde(skip_serializing_if = "is_one")]
+    pub repeats: usize,
     /// A checkpoint whose weights training starts from, such as that of another room; the optimiser starts anew. A
     /// relative path starts from the config's folder.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -38,6 +41,10 @@ pub struct TrainingConfig {
     pub learn_effects: bool,
     pub heatmap: HeatmapConfig,
     pub loss: LossConfig,
+}
+
+fn is_one(count: &usize) -> bool {
+    *count == 1
 }
 
 impl Default for TrainingConfig {
@@ -51,6 +58,7 @@ impl Default for TrainingConfig {
             validation_fraction: 0.2,
             split: Split::Last,
             frames: None,
+            repeats: 1,
             start_from: None,
             patience_epochs: 0,
             learn_effects: true,
@@ -62,7 +70,7 @@ impl Default for TrainingConfig {
 
 impl TrainingConfig {
     pub fn check(&self) -> Result<()> {
-        let at_least_one = [("epochs", self.epochs), ("frames_per_step", self.frames_per_step)];
+        let at_least_one = [("epochs", self.epochs), ("frames_per_step", self.frames_per_step), ("repeats", self.repeats)];
         if let Some((key, _)) = at_least_one.into_iter().find(|(_, value)| *value == 0) {
             return Err(Error::setting(format!("training.{key}"), 0, "at least 1"));
         }

@@ -70,6 +70,13 @@ impl FrameSplit {
         self
     }
 
+    /// The same split whose epochs visit every training frame so many times.
+    pub fn repeated(mut self, times: usize) -> Self {
+        self.training = self.training.repeat(times);
+        self.training.sort_unstable();
+        self
+    }
+
     /// The order in which an epoch visits the training frames: a function of seed and epoch alone, so that a
     /// resumed run continues as if it had never stopped.
     pub fn epoch_order(&self, seed: u64, epoch: usize) -> Vec<FrameId> {
@@ -129,6 +136,9 @@ mod tests {
         assert_eq!(few.validation, split.validation);
         assert_eq!(split.clone().with_most(Some(99)), split);
         assert_eq!(split.clone().with_most(None), split);
+        let often = few.repeated(3);
+        assert_eq!(often.epoch_order(1, 0).len(), 12);
+        assert_eq!(often.training.iter().filter(|id| (id.recording, id.frame) == (1, 6)).count(), 3);
     }
 
     #[test]

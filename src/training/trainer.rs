@@ -68,8 +68,11 @@ impl Trainer<'_> {
     pub fn run(&self, resume: Option<&Path>, emit: &mut dyn FnMut(Event)) -> Result<Outcome> {
         self.config.check()?;
         let counts: Vec<usize> = self.recordings.iter().map(|recording| recording.scene.radar.frames).collect();
-        let split =
-            FrameSplit::new(&counts, self.config.validation_fraction, self.config.split, self.seed).with_most(self.config.frames);
+        let split = FrameSplit::new(&counts, self.config.validation_fraction, self.config.split, self.seed);
+        if let Some(frames) = self.config.frames.filter(|&frames| frames > split.training.len()) {
+            return Err(Error::setting("training.frames", frames, format!("at most {}, all there are", split.training.len())));
+        }
+        let split = split.with_most(self.config.frames).repeated(self.config.repeats);
         let steps_per_epoch = split.training.len().div_ceil(self.config.frames_per_step);
         let steps = self.config.epochs * steps_per_epoch;
         let device = self.device.clone().autodiff();

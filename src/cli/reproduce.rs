@@ -1,0 +1,79 @@
+//! `hybridsim reproduce`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::{Common, Out, device, progress::StageProgress, scores::LpipsArguments};
+use crate::{
+    data::atomic,
+    error::{Error, Result},
+    experiments::{self, Plan, ReproduceConfig, Store, report, results, stage::read_record, stage::stage_folder},
+};
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// What to reproduce, such as configs/reproduce_smoke.toml
+    config: PathBuf,
+    /// List the stages, with what is done already, and do nothing
+    #[arg(long)]
+    plan: bool,
+    #[command(flatten)]
+    lpips: LpipsArguments,
+    #[command(flatten)]
+    out: Out,
+}
+
+pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
+    let mut config = ReproduceConfig::read(&arguments.config, &common.set)?;
+    if let Some(lpips) = arguments.lpips.config() {
+        config.comparison.lpips = Some(lpips);
+    }
+    let out = match &arguments.out.out {
+        Some(out) => out.clone(),
+        None => Path::new("runs").join(arguments.config.file_stem().unwrap_or("reproduce".as_ref())),
+    };
+    std::fs::create_dir_all(&out).map_err(|error| Error::write(&out, error))?;
+    // Stages name each other's files.
+    let out = out.canonicalize().map_err(|error| Error::read(&out, error))?;
+    let plan = experiments::plan(&config, &out)?;
+    if arguments.plan {
+        list(&plan, &out);
+        return Ok(());
+    }
+    let device = device(&common.device)?;
+    let store = Store::open(&out, format!("{device:?}"))?;
+    atomic::write_text(out.join("config.toml"), &config.to_toml())?;
+    let mut progress = StageProgress::new(plan.stages.len(), common.quiet);
+    let records = experiments::run(&plan, &store, &device, &mut |event| progress.show(&event))?;
+    progress.finish();
+    let results = results::collect(&plan, &store, &records)?;
+    report::write(&out, &config, &results, &command(arguments, common))?;
+    println!("results: {}", out.join("results.md").display());
+    Ok(())
+}
+
+/// What was typed, as far as it decides the numbers.
+fn command(arguments: &Arguments, common: &Common) -> String {
+    let sets: String = common.set.iter().map(|set| format!(" --set '{set}'")).collect();
+    format!("hybridsim reproduce {}{sets}", arguments.config.display())
+}
+
+fn list(plan: &Plan, out: &Path) {
+    let mut text = String::new();
+    let (mut done, mut seconds) = (0, 0.0);
+    for stage in &plan.stages {
+        let state = match read_record(&stage_folder(out, &stage.key)) {
+            Some(record) => {
+                done += 1;
+                seconds += record.seconds;
+                format!("{:9.1} s", record.seconds)
+            }
+            None => "       to do".into(),
+        };
+        text += &format!("{state}  {}\n", stage.key.folder());
+    }
+    text += &format!("{done} of {} stages are done, in {seconds:.0} s\n", plan.stages.len());
+    // Whoever reads may have closed the pipe.
+    let _ = std::io::Write::write_all(&mut std::io::stdout(), text.as_bytes());
+}

@@ -1,0 +1,252 @@
+//! What a reproduction is told: which site, who is trained on and who is unseen, which simulators, and how long.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::variants::Variant;
+use crate::body::{Sampling, SurfaceConfig};
+use crate::data::read_settings;
+use crate::diagnosis::DiagnosisConfig;
+use crate::error::{Error, Result};
+use crate::evaluation::ComparisonConfig;
+use crate::recognition::RecognitionConfig;
+use crate::simulator::SimulatorConfig;
+use crate::training::{Split, TrainingConfig};
+
+/// Simulators by others, and the mirror ray tracer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BaselineName {
+    RfGenesis,
+    RfGenesisReleased,
+    Mmgpe,
+    TwoBounce,
+}
+
+impl BaselineName {
+    pub const ALL: [Self; 4] = [Self::RfGenesis, Self::RfGenesisReleased, Self::Mmgpe, Self::TwoBounce];
+
+    /// As in settings, folders and `hybridsim baseline`.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::RfGenesis => "rf-genesis",
+            Self::RfGenesisReleased => "rf-genesis-released",
+            Self::Mmgpe => "mmgpe",
+            Self::TwoBounce => "two-bounce",
+        }
+    }
+
+    /// As in tables.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::RfGenesis => "RF-Genesis-like",
+            Self::RfGenesisReleased => "RF-Genesis-like, as released",
+            Self::Mmgpe => "mmGPE-like",
+            Self::TwoBounce => "two-bounce mirror tracer",
+        }
+    }
+}
+
+/// On whose motions the classifier is trained; it is always tested on measured recordings of the unseen subject.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Protocol {
+    /// The unseen subject's own motions, simulated: the paper's.
+    SameMotions,
+    /// Everybody else's motions, simulated: the classifier has never met the motions that it is tested on.
+    OtherSubjects,
+}
+
+impl Protocol {
+    pub const ALL: [Self; 2] = [Self::SameMotions, Self::OtherSubjects];
+
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::SameMotions => "same_motions",
+            Self::OtherSubjects => "other_subjects",
+        }
+    }
+}
+
+/// Who is trained on and who is not.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SubjectSplit {
+    /// The simulator learns from all of this subject's recordings but their last frames.
+    pub training: String,
+    /// No simulator and no classifier learns from this subject's measured recordings.
+    pub unseen: String,
+}
+
+impl Default for SubjectSplit {
+    fn default() -> Self {
+        Self { training: "s1".into(), unseen: "s4".into() }
+    }
+}
+
+/// How a trained simulator is brought to a second room.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct AdaptationConfig {
+    /// Numbers of frames of the second room that are learned from, one run each; zero is the simulator as it was.
+    pub frames: Vec<usize>,
+    /// Of the optimiser in every run, whatever the number of frames.
+    pub steps: usize,
+}
+
+impl Default for AdaptationConfig {
+    fn default() -> Self {
+        Self { frames: vec![0, 1, 4, 16, 64], steps: 1000 }
+    }
+}
+
+/// `hybridsim reproduce CONFIG`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReproduceConfig {
+    #[serde(default)]
+    pub seed: u64,
+    /// A site's config file, or a folder of recordings with the labels `subject` and `action`; relative to this file.
+    pub site: PathBuf,
+    /// The same for another room.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second_room: Option<PathBuf>,
+    #[serde(default)]
+    pub split: SubjectSplit,
+    #[serde(default = "all_variants")]
+    pub variants: Vec<Variant>,
+    #[serde(default = "all_baselines")]
+    pub baselines: Vec<BaselineName>,
+    #[serde(default = "all_protocols")]
+    pub protocols: Vec<Protocol>,
+    /// The action of the training subject whose recording the detective looks at.
+    #[serde(default = "diagnosed")]
+    pub diagnosed_action: String,
+    #[serde(default)]
+    pub simulator: SimulatorConfig,
+    #[serde(default)]
+    pub training: TrainingConfig,
+    /// The surface of the variant `dense_surface`.
+    #[serde(default = "dense")]
+    pub dense_surface: SurfaceConfig,
+    #[serde(default)]
+    pub recognition: RecognitionConfig,
+    #[serde(default)]
+    pub diagnosis: DiagnosisConfig,
+    #[serde(default)]
+    pub adaptation: AdaptationConfig,
+    #[serde(default)]
+    pub comparison: ComparisonConfig,
+}
+
+fn all_variants() -> Vec<Variant> {
+    Variant::ALL.to_vec()
+}
+
+fn all_baselines() -> Vec<BaselineName> {
+    BaselineName::ALL.to_vec()
+}
+
+fn all_protocols() -> Vec<Protocol> {
+    Protocol::ALL.to_vec()
+}
+
+fn dense() -> SurfaceConfig {
+    SurfaceConfig { sampling: Sampling::Facets, ..Default::default() }
+}
+
+fn diagnosed() -> String {
+    "walk_back_forth_armswing".into()
+}
+
+impl ReproduceConfig {
+    pub fn read(path: &Path, sets: &[String]) -> Result<Self> {
+        let mut config: Self = read_settings(path, sets)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for site in std::iter::once(&mut config.site).chain(&mut config.second_room) {
+            if site.is_relative() {
+                *site = folder.join(&*site);
+            }
+        }
+        config.check()?;
+        Ok(config)
+    }
+
+    /// Refuses what cannot be reproduced, before anything is recorded.
+    pub fn check(&self) -> Result<()> {
+        self.simulator.check()?;
+        self.training.check()?;
+        self.diagnosis.check()?;
+        self.recognition.check()?;
+        for &variant in &self.variants {
+            variant.settings(&self.simulator, &self.dense_surface).check()?;
+        }
+        if !self.variants.contains(&Variant::Ours) {
+            return Err(Error::setting("variants", format!("{:?}", self.variants), "a list with `ours`")
+                .with_hint("the others are compared with it, and some start from it"));
+        }
+        if self.split.training == self.split.unseen {
+            return Err(Error::setting("split.unseen", &self.split.unseen, "another subject than split.training"));
+        }
+        if self.training.split != Split::Last || self.training.validation_fraction == 0.0 {
+            return Err(Error::setting(
+                "training.split",
+                format!("{:?} with a fraction of {}", self.training.split, self.training.validation_fraction).to_lowercase(),
+                "last, with a validation_fraction above zero",
+            )
+            .with_hint("the tables' unseen frames are the last ones of the training subject's recordings"));
+        }
+        let training = &self.training;
+        for (key, set) in [
+            ("frames", training.frames.is_some()),
+            ("repeats", training.repeats != 1),
+            ("start_from", training.start_from.is_some()),
+        ] {
+            if set {
+                return Err(Error::setting(format!("training.{key}"), "given", "nothing: [adaptation] sets it"));
+            }
+        }
+        let adaptation = &self.adaptation;
+        if self.second_room.is_some() && (adaptation.steps == 0 || adaptation.frames.is_empty()) {
+            return Err(Error::setting("adaptation", "empty", "frames and steps, for [second_room]"));
+        }
+        Ok(())
+    }
+
+    pub fn to_toml(&self) -> String {
+        toml::to_string_pretty(self).expect("settings are plain data")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(change: impl FnOnce(&mut ReproduceConfig)) -> String {
+        let mut config: ReproduceConfig = toml::from_str("site = \"site.toml\"").unwrap();
+        config.check().unwrap();
+        change(&mut config);
+        config.check().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_cannot_be_reproduced_is_refused_by_name() {
+        assert!(refused(|config| config.split.unseen = "s1".into()).contains("`split.unseen`"));
+        assert!(refused(|config| config.variants = vec![Variant::Coupled]).contains("`variants`"));
+        assert!(refused(|config| config.training.split = Split::Random).contains("`training.split`"));
+        assert!(refused(|config| config.training.frames = Some(3)).contains("`training.frames`"));
+        let error = refused(|config| {
+            config.second_room = Some("room2.toml".into());
+            config.adaptation.frames.clear();
+        });
+        assert!(error.contains("`adaptation`"));
+        assert!(refused(|config| config.simulator.surface.sampling = Sampling::Facets).contains("coupled"));
+    }
+
+    #[test]
+    fn the_resolved_settings_are_read_again_as_they_are() {
+        let config: ReproduceConfig = toml::from_str("site = \"site.toml\"\nvariants = [\"ours\", \"coupled\"]").unwrap();
+        assert_eq!(toml::from_str::<ReproduceConfig>(&config.to_toml()).unwrap(), config);
+    }
+}

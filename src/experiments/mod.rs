@@ -1,0 +1,26 @@
+//! The paper's experiments, from nothing to tables: a site is recorded, simulators are trained, every method simulates what
+//! was measured, and what comes out is scored and learned from. Recording folders are all that methods exchange.
+//!
+//! - [`config`]: what is asked for
+//! - [`takes`], [`variants`]: who does what in which recording; ours and its ablations
+//! - [`task`], [`plan`]: every stage with what it depends on, before any of them runs
+//! - [`stage`], [`run`], [`work`]: each is done once, under the hash of all that it depends on
+//! - [`results`], [`paper`], [`tables`], [`report`]: numbers, the paper's, and both side by side
+
+pub mod config;
+pub mod paper;
+pub mod plan;
+pub mod report;
+pub mod results;
+pub mod run;
+pub mod stage;
+pub mod tables;
+pub mod takes;
+pub mod task;
+pub mod variants;
+pub mod work;
+
+pub use config::ReproduceConfig;
+pub use plan::{Plan, plan};
+pub use run::{Event, run};
+pub use stage::Store;

@@ -1,0 +1,470 @@
+//! All stages of a reproduction and what they depend on, known before the first one runs.
+//!
+//! Measured recordings come first, then trainings, then every method's simulation of every recording (one recording after
+//! the other, so that its geometry is worked out once for all methods) with its scores, then recognition.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::config::{BaselineName, Protocol, ReproduceConfig, SubjectSplit};
+use super::stage::{Key, read_record, stage_folder};
+use super::takes::{Take, check_split, takes_in};
+use super::task::Task;
+use super::variants::Variant;
+use crate::error::{Error, Result};
+use crate::site::{self, SiteConfig};
+use crate::training::TrainingConfig;
+
+/// Who simulates; or, for comparison, measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    Baseline(BaselineName),
+    Variant(Variant),
+    /// The same truth recorded again with other noise: no simulator can do better.
+    Again,
+    /// Ours brought to the second room by so many of its frames; with zero, as it was.
+    Adapted(usize),
+    /// Trained from the beginning on so many frames of the second room, as many steps long.
+    FromScratch(usize),
+}
+
+impl Method {
+    /// As in folders.
+    pub fn id(self) -> String {
+        match self {
+            Self::Baseline(name) => name.id().into(),
+            Self::Variant(variant) => variant.id().into(),
+            Self::Again => "again".into(),
+            Self::Adapted(frames) => format!("adapted_{frames}"),
+            Self::FromScratch(frames) => format!("from_scratch_{frames}"),
+        }
+    }
+
+    /// As in tables.
+    pub fn title(self) -> String {
+        match self {
+            Self::Baseline(name) => name.title().into(),
+            Self::Variant(variant) => variant.title().into(),
+            Self::Again => "measured again (ceiling)".into(),
+            Self::Adapted(frames) => format!("HybridSim, adapted to {frames} frames"),
+            Self::FromScratch(frames) => format!("HybridSim, trained on {frames} frames only"),
+        }
+    }
+}
+
+/// One stage.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    pub key: Key,
+    pub settings: Value,
+    /// Stages that must be done before.
+    pub parents: Vec<usize>,
+    pub task: Task,
+}
+
+/// The stages whose results belong to one method.
+#[derive(Clone, Debug, Default)]
+pub struct MethodStages {
+    pub train: Option<usize>,
+    pub simulate: Vec<usize>,
+    /// Scores on the training subject's held-out frames, one stage for each recording.
+    pub intra: Vec<usize>,
+    /// Scores on the unseen subject.
+    pub cross: Vec<usize>,
+    /// The names of `cross`' actions.
+    pub cross_actions: Vec<String>,
+    pub recognition: BTreeMap<Protocol, usize>,
+}
+
+/// What is to be done, in an order in which it can be.
+#[derive(Clone, Debug, Default)]
+pub struct Plan {
+    pub stages: Vec<Stage>,
+    /// In the order of the tables.
+    pub methods: Vec<(Method, MethodStages)>,
+    pub diagnosis: Option<usize>,
+}
+
+/// Where measured recordings are.
+struct Place {
+    /// The stage that records them; none where the user did.
+    stage: Option<usize>,
+    /// Stands for recordings that the user made.
+    key: Key,
+    recordings: PathBuf,
+    again: Again,
+    takes: Vec<Take>,
+}
+
+/// The same truth recorded a second time, for some subjects.
+#[derive(Clone, Debug, Default)]
+struct Again {
+    folder: PathBuf,
+    subjects: Vec<String>,
+}
+
+impl Place {
+    fn of_subject<'a>(&'a self, subject: &'a str) -> impl Iterator<Item = &'a Take> + 'a {
+        self.takes.iter().filter(move |take| take.subject == subject)
+    }
+}
+
+struct Planner<'a> {
+    config: &'a ReproduceConfig,
+    root: &'a Path,
+    plan: Plan,
+}
+
+/// Plans a reproduction whose results go below `root`, an absolute path.
+///
+/// # Errors
+/// Sites that cannot be read or split as asked for.
+pub fn plan(config: &ReproduceConfig, root: &Path) -> Result<Plan> {
+    let mut planner = Planner { config, root, plan: Plan::default() };
+    let first = planner.place("site", &config.site)?;
+    let second = config.second_room.as_deref().map(|site| planner.place("second_room", site)).transpose()?;
+    planner.all(&first, second.as_ref())?;
+    Ok(planner.plan)
+}
+
+/// A training stage and the checkpoint that it leaves.
+#[derive(Clone)]
+struct Trained {
+    stage: usize,
+    checkpoint: PathBuf,
+}
+
+impl Planner<'_> {
+    fn all(&mut self, first: &Place, second: Option<&Place>) -> Result<()> {
+        let SubjectSplit { training, unseen } = &self.config.split;
+        check_split(&first.takes, training, unseen)?;
+        if let Some(second) = second
+            && second.of_subject(training).next().is_none()
+        {
+            return Err(Error::setting("second_room", second.recordings.display(), format!("recordings of {training}")));
+        }
+        let trained = self.trainings(first)?;
+        let adapted = second.map(|second| self.adaptations(second, &trained[&Variant::Ours]));
+        self.methods(first, &trained);
+        if let (Some(second), Some(adapted)) = (second, adapted) {
+            self.second_room(second, &adapted);
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, name: String, mut parents: Vec<usize>, place: Option<&Place>, task: Task) -> usize {
+        parents.extend(place.and_then(|place| place.stage));
+        let settings = serde_json::to_value(&task).expect("plain data");
+        let mut keys: Vec<&Key> = parents.iter().map(|&parent| &self.plan.stages[parent].key).collect();
+        keys.extend(place.filter(|place| place.stage.is_none()).map(|place| &place.key));
+        let key = Key::new(name, &settings, &keys);
+        if let Some(known) = self.plan.stages.iter().position(|stage| stage.key == key) {
+            return known;
+        }
+        self.plan.stages.push(Stage { key, settings, parents, task });
+        self.plan.stages.len() - 1
+    }
+
+    fn folder(&self, stage: usize) -> PathBuf {
+        stage_folder(self.root, &self.plan.stages[stage].key)
+    }
+
+    /// A site that is recorded, or a folder of recordings.
+    fn place(&mut self, name: &str, path: &Path) -> Result<Place> {
+        if path.is_dir() {
+            let recordings = path.canonicalize().map_err(|error| Error::read(path, error))?;
+            let takes = takes_in(&recordings)?;
+            let key = Key::new(name, &(&recordings, &takes), &[]);
+            return Ok(Place { stage: None, key, recordings, again: Again::default(), takes });
+        }
+        let config = SiteConfig::read(path, &[])?;
+        if config.unseen.contains(&self.config.split.training) {
+            let expected = format!("a subject that {} does not list as unseen", path.display());
+            return Err(Error::setting("split.training", &self.config.split.training, expected));
+        }
+        let settings_folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        let again = config.again.clone();
+        let task = Task::Site { config: Box::new(config.clone()), settings_folder: settings_folder.clone() };
+        let stage = self.add(name.into(), vec![], None, task);
+        let folder = self.folder(stage);
+        // Posing everybody, as the plan of a site does, is not needed again once they are recorded.
+        let takes = match read_record(&folder) {
+            Some(_) => takes_in(&folder.join("recordings"))?,
+            None => site::sequences(&config, &settings_folder)?
+                .into_iter()
+                .map(|sequence| Take { name: sequence.name, subject: sequence.subject, action: sequence.action.name().into() })
+                .collect(),
+        };
+        let key = self.plan.stages[stage].key.clone();
+        Ok(Place {
+            stage: Some(stage),
+            key,
+            recordings: folder.join("recordings"),
+            again: Again { folder: folder.join("again"), subjects: again },
+            takes,
+        })
+    }
+
+    fn trainings(&mut self, place: &Place) -> Result<BTreeMap<Variant, Trained>> {
+        let config = self.config;
+        let (recordings, names) = training_takes(config, place);
+        let mut trained: BTreeMap<Variant, Trained> = BTreeMap::new();
+        for &variant in &config.variants {
+            let simulator = Box::new(variant.settings(&config.simulator, &config.dense_surface));
+            let mut parents = vec![];
+            let mut effects = None;
+            if variant == Variant::WithEffects {
+                let stage = self.diagnosis(place)?;
+                effects = Some(self.folder(stage).join("effects.json"));
+                parents.push(stage);
+            }
+            let task = Task::Train {
+                recordings: recordings.clone(),
+                names: names.clone(),
+                simulator,
+                training: Box::new(config.training.clone()),
+                seed: config.seed,
+                effects,
+                start_from: None,
+            };
+            let stage = self.add(format!("train/{}", variant.trained_as().id()), parents, Some(place), task);
+            trained.insert(variant, Trained { stage, checkpoint: self.folder(stage).join("last") });
+        }
+        Ok(trained)
+    }
+
+    fn diagnosis(&mut self, place: &Place) -> Result<usize> {
+        let config = self.config;
+        let of_subject = |take: &&Take| take.action == config.diagnosed_action;
+        let take = place.of_subject(&config.split.training).find(of_subject).ok_or_else(|| {
+            Error::setting("diagnosed_action", &config.diagnosed_action, format!("an action of {}", config.split.training))
+        })?;
+        let task = Task::Diagnose {
+            recording: place.recordings.join(&take.name),
+            name: take.name.clone(),
+            diagnosis: config.diagnosis.clone(),
+        };
+        let stage = self.add(format!("diagnose/{}", take.name), vec![], Some(place), task);
+        self.plan.diagnosis = Some(stage);
+        Ok(stage)
+    }
+
+    /// Simulation, scores and recognition of every method, on the first site.
+    fn methods(&mut self, place: &Place, trained: &BTreeMap<Variant, Trained>) {
+        let config = self.config;
+        let SubjectSplit { training, unseen } = &config.split;
+        let baselines = config.baselines.iter().map(|&name| Method::Baseline(name));
+        let mut methods: Vec<(Method, MethodStages)> = baselines
+            .chain(config.variants.iter().map(|&variant| Method::Variant(variant)))
+            .map(|method| (method, MethodStages::default()))
+            .collect();
+        let mut again = MethodStages::default();
+        // Everybody is needed where the classifier learns from others.
+        let everybody = config.protocols.contains(&Protocol::OtherSubjects);
+        let needed = |take: &&Take| everybody || take.subject == *training || take.subject == *unseen;
+        for take in place.takes.iter().filter(needed) {
+            for (method, stages) in &mut methods {
+                let ours = &trained[&Variant::Ours];
+                let simulate = match *method {
+                    Method::Variant(variant) => {
+                        stages.train = Some(trained[&variant].stage);
+                        self.simulate(*method, place, take, &trained[&variant])
+                    }
+                    Method::Baseline(name) => self.baseline(name, place, take, ours),
+                    _ => unreachable!("the first site has baselines and variants"),
+                };
+                stages.simulate.push(simulate);
+                let simulated = self.folder(simulate).join("recording");
+                self.scores(stages, *method, place, take, simulate, simulated);
+            }
+            if place.again.subjects.contains(&take.subject) {
+                self.scores_again(&mut again, place, take, place.again.folder.join(&take.name));
+            }
+        }
+        for (method, stages) in &mut methods {
+            let simulated: Vec<(usize, &Take)> = stages.simulate.iter().copied().zip(place.takes.iter().filter(needed)).collect();
+            for &protocol in &config.protocols {
+                let learned: Vec<usize> = simulated
+                    .iter()
+                    .filter(|(_, take)| (take.subject == *unseen) == (protocol == Protocol::SameMotions))
+                    .map(|&(stage, _)| stage)
+                    .collect();
+                let folders = learned.iter().map(|&stage| self.folder(stage).join("recording")).collect();
+                let stage = self.recognition(method.id(), protocol, place, learned, folders);
+                stages.recognition.insert(protocol, stage);
+            }
+        }
+        // Trained on what was measured: how well it could go.
+        for &protocol in &config.protocols {
+            let folders: Option<Vec<PathBuf>> = match protocol {
+                Protocol::SameMotions => {
+                    let recorded = place.again.subjects.contains(unseen);
+                    recorded.then(|| place.of_subject(unseen).map(|take| place.again.folder.join(&take.name)).collect())
+                }
+                Protocol::OtherSubjects => {
+                    let others = place.takes.iter().filter(|take| take.subject != *unseen);
+                    Some(others.map(|take| place.recordings.join(&take.name)).collect())
+                }
+            };
+            if let Some(folders) = folders {
+                let stage = self.recognition("again".into(), protocol, place, vec![], folders);
+                again.recognition.insert(protocol, stage);
+            }
+        }
+        self.plan.methods.extend(methods);
+        self.plan.methods.push((Method::Again, again));
+    }
+
+    fn simulate(&mut self, method: Method, place: &Place, take: &Take, trained: &Trained) -> usize {
+        let task = Task::Simulate {
+            checkpoint: trained.checkpoint.clone(),
+            recording: place.recordings.join(&take.name),
+            name: take.name.clone(),
+            graph_at_inference: method == Method::Variant(Variant::GcnAtInference),
+            seed: self.config.seed,
+        };
+        self.add(format!("simulate/{}/{}", method.id(), take.name), vec![trained.stage], Some(place), task)
+    }
+
+    /// A baseline's simulation of a recording: with our direct path, or at the level that the training recordings have.
+    fn baseline(&mut self, method: BaselineName, place: &Place, take: &Take, ours: &Trained) -> usize {
+        let (parent, gain, checkpoint) = match method {
+            BaselineName::TwoBounce => (ours.stage, None, Some(ours.checkpoint.clone())),
+            _ => {
+                let (recordings, names) = training_takes(self.config, place);
+                let task = Task::Calibrate { method, recordings, names };
+                let stage = self.add(format!("calibrate/{}", method.id()), vec![], Some(place), task);
+                (stage, Some(self.folder(stage).join("gain.json")), None)
+            }
+        };
+        let (recording, name, seed) = (place.recordings.join(&take.name), take.name.clone(), self.config.seed);
+        let task = Task::Baseline { method, recording, name, gain, checkpoint, seed };
+        self.add(format!("simulate/{}/{}", method.id(), take.name), vec![parent], Some(place), task)
+    }
+
+    /// Scores of a simulated recording, where its subject is one that is scored.
+    fn scores(
+        &mut self,
+        stages: &mut MethodStages,
+        method: Method,
+        place: &Place,
+        take: &Take,
+        parent: usize,
+        simulated: PathBuf,
+    ) {
+        let held_out = take.subject == self.config.split.training;
+        if !held_out && take.subject != self.config.split.unseen {
+            return;
+        }
+        let task = self.compare(place, take, simulated, held_out);
+        let stage = self.add(format!("compare/{}/{}", method.id(), take.name), vec![parent], Some(place), task);
+        stages.note(stage, take, held_out);
+    }
+
+    fn scores_again(&mut self, stages: &mut MethodStages, place: &Place, take: &Take, again: PathBuf) {
+        let held_out = take.subject == self.config.split.training;
+        if held_out || take.subject == self.config.split.unseen {
+            let task = self.compare(place, take, again, held_out);
+            let stage = self.add(format!("compare/again/{}", take.name), vec![], Some(place), task);
+            stages.note(stage, take, held_out);
+        }
+    }
+
+    fn compare(&self, place: &Place, take: &Take, simulated: PathBuf, held_out: bool) -> Task {
+        Task::Compare {
+            measured: place.recordings.join(&take.name),
+            simulated,
+            name: take.name.clone(),
+            held_out_fraction: held_out.then_some(self.config.training.validation_fraction),
+            comparison: Box::new(self.config.comparison.clone()),
+        }
+    }
+
+    fn recognition(&mut self, id: String, protocol: Protocol, place: &Place, parents: Vec<usize>, train: Vec<PathBuf>) -> usize {
+        let test: Vec<&Take> = place.of_subject(&self.config.split.unseen).collect();
+        let task = Task::Recognise {
+            train,
+            test: test.iter().map(|take| place.recordings.join(&take.name)).collect(),
+            names: test.iter().map(|take| take.name.clone()).collect(),
+            recognition: Box::new(self.config.recognition.clone()),
+        };
+        self.add(format!("recognise/{}/{id}", protocol.id()), parents, Some(place), task)
+    }
+
+    /// Trainings in the second room.
+    fn adaptations(&mut self, place: &Place, ours: &Trained) -> Vec<(Method, Trained)> {
+        let config = self.config;
+        let (recordings, names) = training_takes(config, place);
+        let mut trained = vec![];
+        for &frames in &config.adaptation.frames {
+            if frames == 0 {
+                trained.push((Method::Adapted(0), ours.clone()));
+                continue;
+            }
+            for method in [Method::Adapted(frames), Method::FromScratch(frames)] {
+                let adapted = matches!(method, Method::Adapted(_));
+                let task = Task::Train {
+                    recordings: recordings.clone(),
+                    names: names.clone(),
+                    simulator: Box::new(config.simulator.clone()),
+                    training: Box::new(TrainingConfig {
+                        frames: Some(frames),
+                        epochs: 1,
+                        repeats: (config.adaptation.steps * config.training.frames_per_step).div_ceil(frames),
+                        patience_epochs: 0,
+                        ..config.training.clone()
+                    }),
+                    seed: config.seed,
+                    effects: None,
+                    start_from: adapted.then(|| ours.checkpoint.clone()),
+                };
+                let parents = if adapted { vec![ours.stage] } else { vec![] };
+                let stage = self.add(format!("train/{}", method.id()), parents, Some(place), task);
+                trained.push((method, Trained { stage, checkpoint: self.folder(stage).join("last") }));
+            }
+        }
+        trained
+    }
+
+    /// Scores of the adapted simulators on the second room's held-out frames.
+    fn second_room(&mut self, place: &Place, trained: &[(Method, Trained)]) {
+        let mut methods: Vec<(Method, MethodStages)> = trained
+            .iter()
+            .map(|(method, trained)| (*method, MethodStages { train: Some(trained.stage), ..Default::default() }))
+            .collect();
+        for take in place.of_subject(&self.config.split.training) {
+            for ((method, stages), (_, trained)) in methods.iter_mut().zip(trained) {
+                let simulate = self.simulate(*method, place, take, trained);
+                stages.simulate.push(simulate);
+                let simulated = self.folder(simulate).join("recording");
+                self.scores(stages, *method, place, take, simulate, simulated);
+            }
+        }
+        self.plan.methods.extend(methods);
+    }
+}
+
+impl MethodStages {
+    fn note(&mut self, stage: usize, take: &Take, held_out: bool) {
+        if held_out {
+            self.intra.push(stage);
+        } else {
+            self.cross.push(stage);
+            self.cross_actions.push(take.action.clone());
+        }
+    }
+}
+
+/// Folders and names of the recordings that simulators learn from.
+fn training_takes(config: &ReproduceConfig, place: &Place) -> (Vec<PathBuf>, Vec<String>) {
+    let takes = place.of_subject(&config.split.training);
+    takes.map(|take| (place.recordings.join(&take.name), take.name.clone())).unzip()
+}
+
+#[cfg(test)]
+#[path = "plan_tests.rs"]
+mod tests;

@@ -1,0 +1,286 @@
+//! The results as Markdown, in the paper's layout with its numbers beside ours. Numbers only: what they mean is for people
+//! to write.
+
+use std::fmt::Write;
+
+use super::config::{BaselineName, Protocol};
+use super::paper::{self, Paper};
+use super::plan::Method;
+use super::results::{MethodResults, Recognised, Results, Share};
+use super::variants::Variant;
+use crate::evaluation::{ScoreSummary, SequenceSummary};
+use crate::metrics::Spread;
+
+/// A table that grows row by row.
+struct Table {
+    text: String,
+}
+
+impl Table {
+    fn new(title: &str, note: &str, columns: &[&str]) -> Self {
+        let mut text = format!("### {title}\n\n");
+        if !note.is_empty() {
+            text += &format!("{note}\n\n");
+        }
+        text += &format!("| {} |\n|{}\n", columns.join(" | "), "---|".repeat(columns.len()));
+        Self { text }
+    }
+
+    fn row(&mut self, cells: &[String]) {
+        writeln!(self.text, "| {} |", cells.join(" | ")).expect("text grows");
+    }
+
+    fn end(self) -> String {
+        self.text + "\n"
+    }
+}
+
+/// A number with its interval, and the paper's in brackets.
+fn number(found: Option<Spread>, places: usize, paper: Option<f64>) -> String {
+    let ours = match found {
+        None => "–".into(),
+        Some(Spread { mean, interval: Some(interval), .. }) => format!("{mean:.places$} ± {interval:.places$}"),
+        Some(Spread { mean, .. }) => format!("{mean:.places$}"),
+    };
+    with_paper(ours, paper.map(|value| format!("{value:.places$}")))
+}
+
+fn with_paper(ours: String, paper: Option<String>) -> String {
+    match paper {
+        Some(paper) => format!("{ours} ({paper})"),
+        None => ours,
+    }
+}
+
+type Region = fn(&SequenceSummary) -> Option<&ScoreSummary>;
+
+const GLOBAL: Region = |summary| summary.global.as_ref();
+const MOVING: Region = |summary| summary.moving.as_ref();
+const PERSON: Region = |summary| summary.person.as_ref();
+
+/// PSNR, SSIM and LPIPS of a region.
+fn scores(summary: Option<&SequenceSummary>, region: Region, paper: Paper) -> [String; 3] {
+    let found = summary.and_then(region);
+    let lpips = match (found, found.and_then(|found| found.lpips)) {
+        (Some(_), None) => with_paper("not available".into(), paper.lpips.map(|value| format!("{value:.3}"))),
+        (_, lpips) => number(lpips, 3, paper.lpips),
+    };
+    [number(found.map(|found| found.psnr_db), 2, paper.psnr_db), number(found.map(|found| found.ssim), 3, paper.ssim), lpips]
+}
+
+/// Accuracy in per cent, and macro F1.
+fn recognised(found: Option<&Recognised>, paper: Paper) -> [String; 2] {
+    let share = |share: Share, factor: f64, places: usize| {
+        let [low, high] = share.interval_sequences.map(|limit| factor * limit);
+        format!("{:.places$} [{low:.places$}, {high:.places$}]", factor * share.value)
+    };
+    let accuracy = found.map_or("–".into(), |found| share(found.accuracy, 100.0, 1));
+    let f1 = found.map_or("–".into(), |found| share(found.macro_f1, 1.0, 3));
+    [
+        with_paper(accuracy, paper.accuracy.map(|value| format!("{value:.1}"))),
+        with_paper(f1, paper.f1.map(|value| format!("{value:.3}"))),
+    ]
+}
+
+fn cells(first: String, rest: impl IntoIterator<Item = String>) -> Vec<String> {
+    std::iter::once(first).chain(rest).collect()
+}
+
+/// All tables that the results have rows for.
+pub fn tables(results: &Results) -> String {
+    let mut text = String::new();
+    text += &main_table(results);
+    text += &regions(results);
+    text += &recognition(results);
+    let variants = |list: &[Variant]| list.iter().map(|&variant| Method::Variant(variant)).collect::<Vec<_>>();
+    text += &ablation(results, "Coupled Gaussian patches (paper, table 3)", "", &variants(&[Variant::Coupled, Variant::Ours]));
+    let mut indirect = vec![Method::Baseline(BaselineName::TwoBounce)];
+    indirect.extend(variants(&[Variant::WithoutIndirect, Variant::Ours]));
+    text += &ablation(results, "Indirect path (paper, section 4.6)", "", &indirect);
+    text +=
+        &ablation(results, "Noise (paper, table 4)", "", &variants(&[Variant::WithoutNoise, Variant::FixedNoise, Variant::Ours]));
+    text += &ablation(
+        results,
+        "Graph convolution (paper, table 5)",
+        "",
+        &variants(&[Variant::GcnAtInference, Variant::WithoutGcn, Variant::Ours]),
+    );
+    text += &arm_swing(results);
+    text += &ablation(results, "Surface: vertices or all of it", "", &variants(&[Variant::DenseSurface, Variant::Ours]));
+    let found = match &results.effects {
+        Some(effects) if effects.is_empty() => "The detective found nothing that was left out.".into(),
+        Some(effects) => format!("Found in one training recording: {}.", effects.join(", ")),
+        None => String::new(),
+    };
+    text += &ablation(
+        results,
+        "With the effects that the detective found",
+        &found,
+        &variants(&[Variant::WithEffects, Variant::Ours]),
+    );
+    text += &second_room(results);
+    text += &speed(results);
+    text
+}
+
+fn of(results: &Results, method: Method) -> Option<&MethodResults> {
+    results.methods.iter().find(|found| found.method == method)
+}
+
+/// Baselines, ours, and the ceiling.
+fn compared(results: &Results) -> impl Iterator<Item = &MethodResults> {
+    results
+        .methods
+        .iter()
+        .filter(|found| matches!(found.method, Method::Baseline(_) | Method::Variant(Variant::Ours) | Method::Again))
+}
+
+const UNITS: &str = "PSNR in dB; mean ± half the 95 % interval over recordings (paper)";
+
+fn main_table(results: &Results) -> String {
+    let columns = ["method", "PSNR, unseen frames", "SSIM", "LPIPS", "PSNR, unseen human", "SSIM", "LPIPS"];
+    let mut table = Table::new("Range-Doppler maps (paper, table 1)", UNITS, &columns);
+    for found in compared(results) {
+        let intra = scores(found.intra.as_ref(), GLOBAL, paper::intra(found.method));
+        let cross = scores(found.cross.as_ref(), GLOBAL, paper::cross(found.method));
+        table.row(&cells(found.method.title(), intra.into_iter().chain(cross)));
+    }
+    table.end()
+}
+
+/// Where the person is, which the paper does not report.
+fn regions(results: &Results) -> String {
+    let columns = ["method", "PSNR, unseen frames", "SSIM", "LPIPS", "PSNR, unseen human", "SSIM", "LPIPS"];
+    let mut text = String::new();
+    for (title, region) in [("The same, static removed", MOVING), ("The same, on the person's cells", PERSON)] {
+        let mut table = Table::new(title, "", &columns);
+        for found in compared(results) {
+            let intra = scores(found.intra.as_ref(), region, Paper::default());
+            let cross = scores(found.cross.as_ref(), region, Paper::default());
+            table.row(&cells(found.method.title(), intra.into_iter().chain(cross)));
+        }
+        text += &table.end();
+    }
+    text
+}
+
+fn recognition(results: &Results) -> String {
+    let columns = ["learned from", "accuracy, %", "macro F1", "accuracy, %", "macro F1"];
+    let note = "Tested on measured recordings of the unseen subject, with 95 % intervals over recordings (paper). First two columns: the classifier \
+                learned from simulations of the unseen subject's own motions, as in the paper; last two: of the other subjects' \
+                motions.";
+    let mut table = Table::new("Recognition (paper, table 2)", note, &columns);
+    for found in compared(results) {
+        let same = recognised(found.recognition.get(&Protocol::SameMotions), paper::cross(found.method));
+        let others = recognised(found.recognition.get(&Protocol::OtherSubjects), Paper::default());
+        table.row(&cells(found.method.title(), same.into_iter().chain(others)));
+    }
+    table.end()
+}
+
+/// Scores and recognition of a few methods on the unseen subject.
+fn ablation(results: &Results, title: &str, note: &str, methods: &[Method]) -> String {
+    let found: Vec<&MethodResults> = methods.iter().filter_map(|&method| of(results, method)).collect();
+    if found.len() < 2 {
+        return String::new();
+    }
+    let columns = [
+        "unseen human",
+        "PSNR",
+        "SSIM",
+        "LPIPS",
+        "PSNR, static removed",
+        "PSNR, person's cells",
+        "accuracy, %",
+        "macro F1",
+        "accuracy, other subjects, %",
+        "s a frame",
+    ];
+    let mut table = Table::new(title, note, &columns);
+    for found in found {
+        let paper = paper::cross(found.method);
+        let cross = found.cross.as_ref();
+        let [moving, _, _] = scores(cross, MOVING, Paper::default());
+        let [person, _, _] = scores(cross, PERSON, Paper::default());
+        let [others, _] = recognised(found.recognition.get(&Protocol::OtherSubjects), Paper::default());
+        let seconds = found.speed.map_or("–".into(), |speed| format!("{:.3}", speed.signal_s / speed.frames as f64));
+        let seconds = with_paper(seconds, paper.seconds_per_frame.map(String::from));
+        let row = scores(cross, GLOBAL, paper)
+            .into_iter()
+            .chain([moving, person])
+            .chain(recognised(found.recognition.get(&Protocol::SameMotions), paper))
+            .chain([others, seconds]);
+        table.row(&cells(found.method.title(), row));
+    }
+    table.end()
+}
+
+fn arm_swing(results: &Results) -> String {
+    let methods = [Variant::GcnAtInference, Variant::Ours].map(Method::Variant);
+    let found: Vec<&MethodResults> = methods.iter().filter_map(|&method| of(results, method)).collect();
+    if found.len() < 2 || found.iter().all(|found| found.arm_swing.is_none()) {
+        return String::new();
+    }
+    let title = "Graph convolution on walking with arm swing, static removed (paper, table 6)";
+    let mut table = Table::new(title, "", &["unseen human", "PSNR", "SSIM", "LPIPS"]);
+    for found in found {
+        table.row(&cells(found.method.title(), scores(found.arm_swing.as_ref(), MOVING, paper::arm_swing(found.method))));
+    }
+    table.end()
+}
+
+fn second_room(results: &Results) -> String {
+    let of_room = |found: &&MethodResults| matches!(found.method, Method::Adapted(_) | Method::FromScratch(_));
+    if !results.methods.iter().any(|found| of_room(&found)) {
+        return String::new();
+    }
+    let note = format!(
+        "Held-out frames of the training subject in another room; every training takes the same number of steps. The paper \
+         trains on eight actions in its second room and tests on four others: {}. `adaptation.png` is this table as curves.",
+        paper::SECOND_ROOM
+    );
+    let columns = ["", "PSNR", "SSIM", "LPIPS", "PSNR, static removed", "PSNR, person's cells"];
+    let mut table = Table::new("Second room (paper, section 4.7)", &note, &columns);
+    for found in results.methods.iter().filter(of_room) {
+        let [moving, _, _] = scores(found.intra.as_ref(), MOVING, Paper::default());
+        let [person, _, _] = scores(found.intra.as_ref(), PERSON, Paper::default());
+        let row = scores(found.intra.as_ref(), GLOBAL, Paper::default()).into_iter().chain([moving, person]);
+        table.row(&cells(found.method.title(), row));
+    }
+    table.end()
+}
+
+fn speed(results: &Results) -> String {
+    let note = "Wall clock. Poses and visibility are worked out once for every geometry and shared by the methods of a \
+                recording: whoever comes first pays.";
+    let columns = ["method", "training, s", "poses and visibility, s a frame", "paths, sum and noise, s a frame", "command"];
+    let mut table = Table::new("Times and commands", note, &columns);
+    for found in &results.methods {
+        let a_frame = |seconds: f64, frames: usize| format!("{:.4}", seconds / frames as f64);
+        let (geometry, signal) = found.speed.map_or(("–".into(), "–".into()), |speed| {
+            (a_frame(speed.geometry_s, speed.frames), a_frame(speed.signal_s, speed.frames))
+        });
+        let training = found
+            .training
+            .as_ref()
+            .map_or("–".into(), |training| format!("{}{:.0}", if training.resumed { "over " } else { "" }, training.seconds));
+        let command = match (&found.training, found.method) {
+            (_, Method::Baseline(name)) => format!("`hybridsim baseline {} RECORDING`", name.id()),
+            (Some(training), _) => format!("`hybridsim train OUT/{}/config.toml`", training.folder),
+            (None, _) => "–".into(),
+        };
+        table.row(&[found.method.title(), training, geometry, signal, command]);
+    }
+    let mut text = table.end();
+    text += "| stages | s |\n|---|---|\n";
+    for (kind, seconds) in &results.seconds {
+        writeln!(text, "| {kind} | {seconds:.0} |").expect("text grows");
+    }
+    let all: f64 = results.seconds.values().sum();
+    writeln!(text, "| all | {all:.0} |").expect("text grows");
+    text
+}
+
+#[cfg(test)]
+#[path = "tables_tests.rs"]
+mod tests;

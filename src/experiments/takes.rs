@@ -1,0 +1,92 @@
+//! The recordings of a site, by who does what in them.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::data::Recording;
+use crate::error::{Error, Result};
+
+/// One recording of a site.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct Take {
+    pub name: String,
+    pub subject: String,
+    pub action: String,
+}
+
+/// The recordings in a folder's folders, in the order of their names.
+///
+/// # Errors
+/// A folder without any; a recording that cannot be read or lacks one of the labels.
+pub fn takes_in(folder: &Path) -> Result<Vec<Take>> {
+    let entries = std::fs::read_dir(folder).map_err(|error| Error::read(folder, error))?;
+    let mut found: Vec<PathBuf> =
+        entries.flatten().map(|entry| entry.path()).filter(|path| path.join("recording.toml").is_file()).collect();
+    found.sort();
+    if found.is_empty() {
+        return Err(Error::Usage {
+            message: format!("{}: holds no recordings", folder.display()),
+            hint: Some("name a folder whose folders are recordings, or the config of a site".into()),
+        });
+    }
+    found.iter().map(|path| take(path)).collect()
+}
+
+fn take(folder: &Path) -> Result<Take> {
+    let recording = Recording::open(folder)?;
+    let label = |name: &str| {
+        recording.labels.get(name).cloned().ok_or_else(|| {
+            Error::field(folder.join("recording.toml"), format!("labels.{name}"), "missing", format!("the {name}"))
+        })
+    };
+    let name = folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    Ok(Take { name, subject: label("subject")?, action: label("action")? })
+}
+
+/// Whether a site can be split as asked for.
+///
+/// # Errors
+/// A subject that nobody recorded; an action of the unseen subject that the training subject does not show.
+pub fn check_split(takes: &[Take], training: &str, unseen: &str) -> Result<()> {
+    let subjects: BTreeSet<&str> = takes.iter().map(|take| take.subject.as_str()).collect();
+    let names = subjects.iter().copied().collect::<Vec<_>>().join(", ");
+    for (key, subject) in [("split.training", training), ("split.unseen", unseen)] {
+        if !subjects.contains(subject) {
+            return Err(Error::setting(key, subject, format!("one of the site's subjects: {names}")));
+        }
+    }
+    let actions = |subject: &str| -> BTreeSet<&str> {
+        takes.iter().filter(|take| take.subject == subject).map(|take| take.action.as_str()).collect()
+    };
+    if let Some(strange) = actions(unseen).difference(&actions(training)).next() {
+        return Err(Error::setting(
+            "split.unseen",
+            format!("{unseen}, who does `{strange}`"),
+            format!("only what {training} does"),
+        ));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_split_needs_both_subjects_and_their_actions() {
+        let take = |subject: &str, action: &str| Take { name: String::new(), subject: subject.into(), action: action.into() };
+        let takes = [take("s1", "lunge"), take("s2", "lunge"), take("s3", "arm_swing")];
+        assert!(check_split(&takes, "s1", "s2").is_ok());
+        let error = check_split(&takes, "s1", "s9").unwrap_err().to_string();
+        assert!(error.contains("`split.unseen` is s9") && error.contains("s1, s2, s3"), "{error}");
+        assert!(check_split(&takes, "s1", "s3").unwrap_err().to_string().contains("arm_swing"));
+    }
+
+    #[test]
+    fn a_folder_without_recordings_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(takes_in(folder.path()).unwrap_err().to_string().contains("holds no recordings"));
+    }
+}

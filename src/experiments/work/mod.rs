@@ -1,0 +1,12 @@
+//! What the stages do. Each fills its folder with files that later stages and the tables read.
+
+pub mod baseline;
+mod bench;
+mod measure;
+pub mod simulate;
+mod sources;
+pub mod train;
+
+pub use bench::Bench;
+pub use measure::{Speed, compare, read_json, recognise};
+pub use sources::{diagnose, site};
