@@ -31,8 +31,9 @@ impl Convolution {
 
 /// A layer that can be run.
 pub(super) enum Stage {
-    Convolution(Convolution),
-    Fire { squeeze: Convolution, expand: [Convolution; 2] },
+    Convolution(Box<Convolution>),
+    /// Squeeze, then both expansions.
+    Fire(Box<[Convolution; 3]>),
     MaxPool(MaxPoolOptions<2>),
     Tap,
 }
@@ -58,8 +59,8 @@ pub(super) fn stages(network: Network, file: &WeightFile, device: &Device) -> Re
         }
     };
     let stage = |layer: Layer| match layer {
-        Layer::Convolution { stride, padding, .. } => Stage::Convolution(convolution(stride, padding)),
-        Layer::Fire { .. } => Stage::Fire { squeeze: convolution(1, 0), expand: [convolution(1, 0), convolution(1, 1)] },
+        Layer::Convolution { stride, padding, .. } => Stage::Convolution(Box::new(convolution(stride, padding))),
+        Layer::Fire { .. } => Stage::Fire(Box::new([convolution(1, 0), convolution(1, 0), convolution(1, 1)])),
         Layer::MaxPool { kernel, ceil } => {
             Stage::MaxPool(MaxPoolOptions::new([kernel; 2]).with_stride([2, 2]).with_ceil_mode(ceil))
         }
@@ -75,9 +76,10 @@ pub(super) fn features(stages: &[Stage], images: Tensor<4>) -> Vec<Tensor<4>> {
     for stage in stages {
         at = match stage {
             Stage::Convolution(convolution) => convolution.forward(at),
-            Stage::Fire { squeeze, expand } => {
+            Stage::Fire(convolutions) => {
+                let [squeeze, pixels, neighbours] = &**convolutions;
                 let squeezed = squeeze.forward(at);
-                Tensor::cat(expand.iter().map(|convolution| convolution.forward(squeezed.clone())).collect(), 1)
+                Tensor::cat(vec![pixels.forward(squeezed.clone()), neighbours.forward(squeezed)], 1)
             }
             Stage::MaxPool(options) => max_pool2d(at, options.clone()),
             Stage::Tap => {
