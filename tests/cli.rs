@@ -114,6 +114,11 @@ fn a_run_leaves_pictures_numbers_and_a_model_that_infers_at_once() {
     assert!(folder.path().join("made/range_doppler.png").is_file());
 
     let recorded = recording().display().to_string();
+    let arguments =
+        ["baseline", "two-bounce", &recorded, "--checkpoint", "run/best", "-q", "--device", "flex", "--out", "mirrors"];
+    let output = hybridsim(&arguments, folder.path());
+    assert!(output.status.success(), "{}", err(&output));
+    assert!(folder.path().join("mirrors/recording/if.npy").is_file());
     let output = hybridsim(&["evaluate", "--checkpoint", "run/best", &recorded, "-q"], folder.path());
     assert!(output.status.success(), "{}", err(&output));
     assert!(
@@ -166,6 +171,30 @@ fn a_network_without_its_files_is_no_network() {
     let files = ["--lpips-weights", "wrong.pth", "--lpips-heads", "heads.npz"];
     assert_refused(&hybridsim(&[&compare[..], &files].concat(), folder.path()), 2, &["wrong.pth: cannot be read as torch"]);
     assert!(!folder.path().join("found").exists());
+}
+
+#[test]
+fn baselines_write_recordings_with_the_labels_of_what_they_imitate() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorded = recording().display().to_string();
+    for method in ["mmgpe", "rf-genesis", "rf-genesis-released"] {
+        let arguments = ["baseline", method, &recorded, "-q", "--device", "flex", "--calibrate", &recorded, "--out", method];
+        let output = hybridsim(&arguments, folder.path());
+        assert!(output.status.success(), "{method}: {}", err(&output));
+        let made = folder.path().join(method);
+        assert!(made.join("recording/if.npy").is_file() && made.join("range_doppler.png").is_file());
+        let settings = std::fs::read_to_string(made.join("recording/recording.toml")).unwrap();
+        assert!(settings.contains("walk_back_forth"), "the action is missing in:\n{settings}");
+        let about = std::fs::read_to_string(made.join("baseline.json")).unwrap();
+        let about: serde_json::Value = serde_json::from_str(&about).unwrap();
+        assert_eq!(about["method"], method);
+        assert!(about["gain"].as_f64().unwrap() > 0.0 && about["seconds_per_frame"].as_f64().unwrap() > 0.0);
+        assert_eq!(about["noise_rate"], 0.025);
+    }
+    let refused = |arguments: &[&str]| hybridsim(&[&["baseline"], arguments].concat(), folder.path());
+    assert_refused(&refused(&["two-bounce", &recorded]), 2, &["--checkpoint belongs to two-bounce", "hint: "]);
+    assert_refused(&refused(&["mmgpe", &recorded, "--set", "diffus=1"]), 2, &["unknown key `diffus`", "`diffuse`"]);
+    assert_refused(&refused(&["mmgpe", &recorded, "--gain", "-1"]), 2, &["--gain"]);
 }
 
 #[test]
