@@ -1,6 +1,8 @@
 //! The settings of `hybridsim record`, and the world they describe.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Deserializer, Serialize, de};
 
@@ -13,7 +15,7 @@ use super::world::{Reflector, WallsConfig, World};
 use crate::data::{read_body, read_motion};
 use crate::error::{Error, Result};
 use crate::person::actions::{self, Action, StyleConfig};
-use crate::person::{Motion, Person, Placement, procedural};
+use crate::person::{BodyModel, Motion, Person, Placement, procedural};
 use crate::radar::Radar;
 use crate::room::Room;
 
@@ -208,7 +210,7 @@ impl ActorConfig {
         let (first_s, last_s) = clock.motion_span_s(radar);
         let model = match &self.body {
             Some(path) => read_body(folder.join(path))?,
-            None => procedural::person(&procedural::subject(&self.subject)?)?,
+            None => embedded(&self.subject)?,
         };
         let placement = self.placement.clone().unwrap_or_else(|| {
             // Without a floor the radar is on a table.
@@ -226,6 +228,19 @@ impl ActorConfig {
         };
         Ok(Person::Skinned { model, motion, placement })
     }
+}
+
+/// An embedded subject, generated once per process: a site asks for the same few again and again.
+fn embedded(subject: &str) -> Result<BodyModel> {
+    static MADE: Mutex<BTreeMap<String, BodyModel>> = Mutex::new(BTreeMap::new());
+    let config = procedural::subject(subject)?;
+    let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(model) = made.get(subject) {
+        return Ok(model.clone());
+    }
+    let model = procedural::person(&config)?;
+    made.insert(subject.into(), model.clone());
+    Ok(model)
 }
 
 #[cfg(test)]
