@@ -42,7 +42,9 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         return Ok(());
     }
     let device = device(&common.device)?;
-    let store = Store::open(&out, format!("{device:?}"))?;
+    // As Burn prints it, without the wrapping type.
+    let name = format!("{device:?}").trim_start_matches("Device<").trim_end_matches('>').to_lowercase();
+    let store = Store::open(&out, name)?;
     atomic::write_text(out.join("config.toml"), &config.to_toml())?;
     let mut progress = StageProgress::new(plan.stages.len(), common.quiet);
     let records = experiments::run(&plan, &store, &device, &mut |event| progress.show(&event))?;

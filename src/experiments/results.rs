@@ -83,7 +83,7 @@ pub fn collect(plan: &Plan, store: &Store, records: &[Record]) -> Result<Results
                 recognition: stages
                     .recognition
                     .iter()
-                    .map(|(&protocol, &stage)| Ok((protocol, read_json(&folder(stage).join("classifier/recognition.json"))?)))
+                    .map(|(&protocol, &stage)| Ok((protocol, read_json(folder(stage).join("classifier/recognition.json"))?)))
                     .collect::<Result<_>>()?,
                 training: stages.train.map(|stage| Training {
                     folder: format!("stages/{}", plan.stages[stage].key.folder()),
@@ -95,7 +95,7 @@ pub fn collect(plan: &Plan, store: &Store, records: &[Record]) -> Result<Results
         })
         .collect::<Result<_>>()?;
     let effects = plan.diagnosis.map(|stage| {
-        let found: Vec<serde_json::Value> = read_json(&folder(stage).join("effects.json"))?;
+        let found: Vec<serde_json::Value> = read_json(folder(stage).join("effects.json"))?;
         Ok::<_, Error>(found.iter().filter_map(|effect| Some(effect["id"].as_str()?.to_string())).collect())
     });
     let mut seconds = BTreeMap::new();

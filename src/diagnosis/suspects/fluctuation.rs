@@ -116,7 +116,7 @@ impl Returns {
         }
         let (mut spectra, mut variance, mut unrest) = (vec![], vec![], vec![0.0; bins]);
         for frame in 0..frames {
-            for channel in 0..channels {
+            for (channel, noise) in noise.iter().enumerate() {
                 let mut chirps: Vec<Complex64> =
                     evidence.cube.channel(frame, channel).iter().enumerate().map(|(i, v)| v * fast[i % samples]).collect();
                 fft.process(&mut chirps);
@@ -124,10 +124,10 @@ impl Returns {
                     let at = |index: usize| chirps[index * samples + bin];
                     let mean: Complex64 = (0..loops).map(|index| at(index) * (slow[index] / sum)).sum();
                     let own = (0..loops).map(|index| (at(index) - mean).norm_sqr()).sum::<f64>() / (loops as f64 - 1.0);
-                    unrest[bin] += own / noise[channel];
+                    unrest[bin] += own / noise;
                     spectra.push(mean);
                     // Bursts and noise of any colour are in what one frame shows itself.
-                    variance.push(own.max(noise[channel]) * share);
+                    variance.push(own.max(*noise) * share);
                 }
             }
         }

@@ -1,3 +1,5 @@
+use std::slice::from_ref;
+
 use super::*;
 use crate::data::{IfFrame, IfLayout, RecordingContents, write_recording};
 use crate::heatmap::synthetic;
@@ -58,12 +60,12 @@ fn two_motions_are_told_apart_in_recordings_of_others_and_the_result_is_written(
     for action in ["walk", "swing"] {
         recorded(&test, action, Some(action), &radar(), 9);
     }
-    let result = attempt(&[training.clone()], &[test.clone()]).unwrap();
+    let result = attempt(from_ref(&training), from_ref(&test)).unwrap();
     assert_eq!(result.actions, ["swing", "walk"]);
     assert_eq!((result.training.windows, result.test.windows, result.test.sequences), (16, 4, 2));
     assert!(result.accuracy.value > 0.7, "{result:?}");
     assert!(result.notes.is_empty(), "{:?}", result.notes);
-    let again = attempt(&[training.clone()], &[test]).unwrap();
+    let again = attempt(from_ref(&training), &[test]).unwrap();
     assert_eq!((&again.confusion, again.training_loss), (&result.confusion, result.training_loss));
     let out = folder.path().join("result");
     super::super::write(&result, &config(), &out).unwrap();
