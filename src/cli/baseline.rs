@@ -48,7 +48,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "COUNT", default_value_t = 4, requires = "calibrate")]
     calibration_frames: usize,
     /// The gain, as an earlier baseline.json has it
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     gain: Option<f64>,
     /// Of the noise
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -91,7 +91,9 @@ fn pairs(measured: &Path, simulated: &Path) -> Result<Vec<Pair>> {
     }
     let list = |folder: &Path| -> Result<Vec<String>> {
         let entries = std::fs::read_dir(folder).map_err(|source| Error::read(folder, source))?;
-        let folders = entries.filter_map(|entry| entry.ok()).filter(|entry| is_recording(&recording_in(entry.path())));
+        let folders = entries
+            .filter_map(|entry| entry.ok())
+            .filter(|entry| entry.path().is_dir() && is_recording(&recording_in(entry.path())));
         let mut names: Vec<String> = folders.filter_map(|entry| entry.file_name().into_string().ok()).collect();
         names.sort();
         Ok(names)

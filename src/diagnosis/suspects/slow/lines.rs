@@ -21,6 +21,8 @@ pub struct Line {
     pub tried: f64,
     pub frequency_deviation_hz: f64,
     pub amplitude_deviation: f64,
+    /// Degrees of freedom of the background that the gains are in units of; none where it is the noise's, which is known.
+    pub freedom: Option<f64>,
 }
 
 /// Harmonics that may be needed to describe what is periodic.
@@ -33,6 +35,11 @@ const ALIAS_GAIN: f64 = 4.6;
 const LOUD: f64 = 1.5;
 /// Points per resolution cell of a frame's own spectrum.
 const PADDING: usize = 16;
+
+/// A gain over a background of so many degrees of freedom, as Student's law has it.
+pub fn unsure(gain: f64, freedom: f64) -> f64 {
+    if gain > 0.0 { 0.5 * freedom * (2.0 * gain / freedom).ln_1p() } else { gain }
+}
 
 impl Line {
     pub fn value(&self, time_s: f64) -> f64 {
@@ -177,6 +184,7 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
             0.5 / duration_s
         },
         amplitude_deviation: (2.0 / total).sqrt(),
+        freedom: None,
     };
     // What leaks from movers is no line: it raises the spectra of single frames at that frequency.
     let background = frames.iter().map(|&frame| leftover(field, series, frame, &line)).sum::<f64>() / frames.len() as f64;
@@ -184,14 +192,13 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
     // What is slower than a frame is seen in how few frames differ, and a background of more than noise is known from
     // few frames only.
     let slow = frequency * loop_s * (loops as f64) < 1.0;
-    let freedom = (2 * frames.len()).saturating_sub(2 * harmonics + 1).max(1) as f64;
-    let unsure = |gain: f64| {
-        if gain > 0.0 && (slow || background > LOUD) { 0.5 * freedom * (2.0 * gain / freedom).ln_1p() } else { gain }
-    };
-    line.training_gain = unsure(line.training_gain / background);
+    if slow || background > LOUD {
+        line.freedom = Some((2 * frames.len()).saturating_sub(2 * harmonics + 1).max(1) as f64);
+    }
+    line.training_gain /= background;
     line.frequency_deviation_hz *= background.sqrt();
     line.amplitude_deviation *= background.sqrt();
-    line.held_out_gain = unsure(series.gain(field, held_out, |_, _, time| line.value(time)) / background);
+    line.held_out_gain = series.gain(field, held_out, |_, _, time| line.value(time)) / background;
     Some(line)
 }
 

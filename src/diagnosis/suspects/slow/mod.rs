@@ -39,13 +39,20 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     // Of a few parameters, and those that are free in every chirp.
     let (mut found, mut free) = (vec![], vec![]);
+    // Lines on a background that is hardly known: their statements, its degrees of freedom, their p-values.
+    let mut unsure: Vec<(String, f64, f64)> = vec![];
     for part in [Part::Gain, Part::Phase, Part::Delay] {
         let series = field.series(part, |_| true);
         // A radian at the farthest group.
         let farthest_s = field.groups.iter().map(|g| g.delay_s).fold(0.0, f64::max);
         let largest = if part == Part::Delay { 1.0 / farthest_s } else { 1.0 };
         if let Some(line) = lines::strongest(&field, &series, training, held_out, largest) {
-            found.push(candidates::of_line(evidence, &field, part, &line));
+            let candidate = candidates::of_line(evidence, &field, part, &line);
+            if let Some(freedom) = line.freedom {
+                let p_value = (-lines::unsure(line.training_gain, freedom)).exp();
+                unsure.push((candidate.statement.clone(), freedom, statistics::corrected(p_value, line.tried * LOOKS)));
+            }
+            found.push(candidate);
         }
         if let Some(drift) = drift::best(&field, &series, training, held_out) {
             found.push(candidates::of_drift(evidence, &field, part, &drift));
@@ -88,6 +95,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             {
                 candidate.look_alikes.push(id);
             }
+        }
+    }
+    // Only now: what a line explains best is no better explained by something else because the line is unsure.
+    for candidate in &mut found {
+        if let Some((_, freedom, p_value)) = unsure.iter().find(|(statement, ..)| *statement == candidate.statement) {
+            candidate.gain = lines::unsure(candidate.gain, *freedom);
+            candidate.p_value = *p_value;
         }
     }
     found
