@@ -3,8 +3,8 @@
 //!
 //! - [`config`]: what is asked for
 //! - [`takes`], [`variants`]: who does what in which recording; ours and its ablations
-//! - [`task`], [`plan`]: every stage with what it depends on, before any of them runs
-//! - [`stage`], [`run`], [`work`]: each is done once, under the hash of all that it depends on
+//! - [`task`], [`mod@plan`]: every stage with what it depends on, before any of them runs
+//! - [`stage`], [`mod@run`], [`work`]: each is done once, under the hash of all that it depends on
 //! - [`results`], [`paper`], [`tables`], [`report`]: numbers, the paper's, and both side by side
 
 pub mod config;
