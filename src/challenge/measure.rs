@@ -114,7 +114,7 @@ pub fn strength(clean: &[IfFrame], planted: &[IfFrame], gain: f64) -> Strength {
         effect_to_moving_db: decibels(total / moving),
         d_prime: d_prime(total),
         d_prime_held_out: d_prime(kept),
-        d_prime_surviving: surviving::d_prime(&clean, &effect, noise, |_| true),
+        d_prime_surviving: surviving::d_prime(&clean, &effect, noise),
         below_cover_db: below_cover(&cells, noise * (tx * rx) as f64),
         gain_db: decibels(gain * gain),
     }

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::measure::Frames;
-use crate::diagnosis::evidence::{hann, transform};
+use crate::diagnosis::evidence::{spectrum, transform};
 
 /// A neighbourhood whose mean power is below this many times the noise's holds no return.
 const RETURN_OVER_NOISE: f64 = 4.0;
@@ -23,18 +23,16 @@ const CELLS_PER_POWER: f64 = 1.5 * 1.5;
 
 /// d′ of an effect, the difference that it makes to a recording (`clean`, noise included).
 /// `noise`: variance of a complex sample's noise.
-pub fn d_prime(clean: &Frames, effect: &Frames, noise: f64, frames: impl Fn(usize) -> bool) -> f64 {
+pub fn d_prime(clean: &Frames, effect: &Frames, noise: f64) -> f64 {
     let (still, still_effect) = (clean.mean_chirp(), effect.mean_chirp());
-    let (mut squared, mut kept, mut ratios) = (0.0, 0.0, vec![]);
-    for frame in (0..clean.count()).filter(|&frame| frames(frame)) {
+    let (mut squared, mut ratios) = (standing(&still, &still_effect, clean, noise), vec![]);
+    for frame in 0..clean.count() {
         let (x, e) = (clean.maps_without(frame, &still), effect.maps_without(frame, &still_effect));
         squared += moving(&x, &e, clean.dims, noise, &mut ratios);
-        kept += 1.0;
     }
     // One gain for all of them is unknown.
     let mean = ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
     squared += ratios.iter().map(|ratio| (ratio - mean).powi(2)).sum::<f64>() / CELLS_PER_POWER;
-    squared += standing(&still, &still_effect, clean, noise) * kept / clean.count() as f64;
     squared.max(0.0).sqrt()
 }
 
@@ -44,7 +42,7 @@ fn standing(still: &[Vec<Complex64>], effect: &[Vec<Complex64>], clean: &Frames,
     let floor = noise / chirps;
     let mut squared = 0.0;
     for (x, e) in still.iter().zip(effect) {
-        let (x, e) = (transform_chirp(x), transform_chirp(e));
+        let (x, e) = (spectrum(x), spectrum(e));
         let bins = x.len();
         for (bin, e) in e.iter().enumerate() {
             let free: f64 = REACH.map(|step| x[(bin + bins + step - 2) % bins].norm_sqr()).sum();
@@ -52,12 +50,6 @@ fn standing(still: &[Vec<Complex64>], effect: &[Vec<Complex64>], clean: &Frames,
         }
     }
     squared
-}
-
-fn transform_chirp(chirp: &[Complex64]) -> Vec<Complex64> {
-    let mut spectrum: Vec<Complex64> = chirp.iter().zip(hann(chirp.len())).map(|(value, w)| value * w).collect();
-    rustfft::FftPlanner::new().plan_fft_forward(chirp.len()).process(&mut spectrum);
-    spectrum
 }
 
 /// Of one frame's maps, `[channel][doppler · range]`; `ratios` takes the logarithms of the powers' changes.
@@ -159,7 +151,7 @@ mod tests {
         let effect = frames(4, |_, _, slow, fast| tone(-5.0, 20.0, slow, fast) * 0.3);
         // 4096 samples of energy 0.09, noise of variance 2
         let wanted = (2.0 * 4096.0 * 0.09 / 2.0f64).sqrt();
-        let found = d_prime(&clean, &effect, 2.0, |_| true);
+        let found = d_prime(&clean, &effect, 2.0);
         assert!((found / wanted - 1.0).abs() < 0.1, "{found} against {wanted}");
     }
 
@@ -172,11 +164,11 @@ mod tests {
         let wall = frames(4, |_, _, slow, fast| tone(0.0, 20.0, slow, fast) * 6.0);
         let coherent = |effect: &Frames| (effect.values.iter().flatten().map(Complex64::norm_sqr).sum::<f64>()).sqrt();
         for effect in [&turned, &wall] {
-            let found = d_prime(&clean, effect, 2.0, |_| true);
+            let found = d_prime(&clean, effect, 2.0);
             assert!(coherent(effect) > 200.0 && found < 8.0, "{} and {found}", coherent(effect));
         }
         // and a difference between the channels is not hidden
         let one = frames(4, |frame, channel, slow, fast| body(frame, slow, fast) * if channel == 0 { 0.1 } else { -0.1 });
-        assert!(d_prime(&clean, &one, 2.0, |_| true) > 30.0);
+        assert!(d_prime(&clean, &one, 2.0) > 30.0);
     }
 }

@@ -3,9 +3,9 @@
 
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
+use rustfft::FftDirection;
 
-use super::evidence::Evidence;
+use super::evidence::{Evidence, fft_2d};
 
 /// Power over the noise's mean from which on a cell holds signal.
 const SIGNAL: f64 = 12.0;
@@ -19,24 +19,13 @@ pub fn channel(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Complex
     // Without a window, so that the transform can be taken back; a cell's noise is the sum over the samples.
     let count = (loops * samples) as f64;
     let least = SIGNAL * evidence.noise()[channel] * count;
-    let mut planner = FftPlanner::new();
-    transform(&mut moving, loops, samples, &*planner.plan_fft_forward(samples), &*planner.plan_fft_forward(loops));
+    fft_2d(&mut moving, samples, FftDirection::Forward);
     moving.iter_mut().filter(|value| value.norm_sqr() < least).for_each(|value| *value = Complex64::ZERO);
-    transform(&mut moving, loops, samples, &*planner.plan_fft_inverse(samples), &*planner.plan_fft_inverse(loops));
+    fft_2d(&mut moving, samples, FftDirection::Inverse);
     moving.iter().enumerate().map(|(i, value)| value / count + still[i % samples]).collect()
 }
 
 /// All channels of a frame, `[tx · rx][loop · sample]`.
 pub fn frame(evidence: &Evidence, frame: usize) -> Vec<Vec<Complex64>> {
     (0..evidence.cube.channels()).into_par_iter().map(|index| channel(evidence, frame, index)).collect()
-}
-
-fn transform(map: &mut [Complex64], loops: usize, samples: usize, fast: &dyn rustfft::Fft<f64>, slow: &dyn rustfft::Fft<f64>) {
-    fast.process(map);
-    let mut column = vec![Complex64::ZERO; loops];
-    for range in 0..samples {
-        column.iter_mut().enumerate().for_each(|(row, value)| *value = map[row * samples + range]);
-        slow.process(&mut column);
-        column.iter().enumerate().for_each(|(row, value)| map[row * samples + range] = *value);
-    }
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::{Fft, FftPlanner};
+use rustfft::{FftDirection, FftPlanner};
 
 use super::codes::{self, Component};
 use super::cube::{Cube, Loaded, Split};
@@ -236,9 +236,16 @@ pub fn transform(signal: &[Complex64], samples: usize) -> Vec<Complex64> {
     let (slow, fast) = (hann(loops), hann(samples));
     let mut map: Vec<Complex64> =
         signal.iter().enumerate().map(|(i, value)| value * (slow[i / samples] * fast[i % samples])).collect();
+    fft_2d(&mut map, samples, FftDirection::Forward);
+    map
+}
+
+/// Both DFTs of `[loop, sample]` in place, not scaled: there and back multiplies by the number of samples.
+pub fn fft_2d(map: &mut [Complex64], samples: usize, direction: FftDirection) {
+    let loops = map.len() / samples;
     let mut planner = FftPlanner::new();
-    planner.plan_fft_forward(samples).process(&mut map);
-    let doppler: Arc<dyn Fft<f64>> = planner.plan_fft_forward(loops);
+    planner.plan_fft(samples, direction).process(map);
+    let doppler = planner.plan_fft(loops, direction);
     let mut column = vec![Complex64::ZERO; loops];
     for range in 0..samples {
         for (i, value) in column.iter_mut().enumerate() {
@@ -249,5 +256,4 @@ pub fn transform(signal: &[Complex64], samples: usize) -> Vec<Complex64> {
             map[i * samples + range] = *value;
         }
     }
-    map
 }

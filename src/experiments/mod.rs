@@ -4,7 +4,7 @@
 //! - [`config`]: what is asked for
 //! - [`takes`], [`variants`]: who does what in which recording; ours and its ablations
 //! - [`task`], [`mod@plan`]: every stage with what it depends on, before any of them runs
-//! - [`stage`], [`mod@run`], [`work`]: each is done once, under the hash of all that it depends on
+//! - [`stage`], [`mod@run`], [`steps`]: each is done once, under the hash of all that it depends on
 //! - [`results`], [`paper`], [`tables`], [`report`]: numbers, the paper's, and both side by side
 
 pub mod config;
@@ -14,11 +14,11 @@ pub mod report;
 pub mod results;
 pub mod run;
 pub mod stage;
+pub mod steps;
 pub mod tables;
 pub mod takes;
 pub mod task;
 pub mod variants;
-pub mod work;
 
 pub use config::ReproduceConfig;
 pub use plan::{Plan, plan};

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::config::Protocol;
 use super::plan::{Method, MethodStages, Plan};
 use super::stage::{Record, Store};
-use super::work::{Speed, read_json};
+use super::steps::{Speed, read_json};
 use crate::error::{Error, Result};
 use crate::evaluation::{Evaluation, SequenceSummary, over_sequences};
 

@@ -6,8 +6,8 @@ use burn::tensor::Device;
 
 use super::plan::{Plan, Stage};
 use super::stage::{Record, Store};
+use super::steps::{Bench, baseline, compare, diagnose, recognise, simulate, site, train};
 use super::task::Task;
-use super::work::{Bench, baseline, compare, diagnose, recognise, simulate, site, train};
 use crate::error::Result;
 
 /// What happens in a reproduction, for whoever shows it.

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use super::*;
 use crate::experiments::results::Training;
-use crate::experiments::work::Speed;
+use crate::experiments::steps::Speed;
 
 fn summary(psnr_db: f64, lpips: Option<f64>) -> SequenceSummary {
     let spread = |mean: f64| Spread { mean, deviation: 1.0, interval: Some(0.5), count: 8 };

@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn a_stuck_bit_is_told_and_a_coarse_converter_is_not() {
         let found = find(&evidence(|rx, code| if rx == 1 { code | 8 } else { code }));
-        assert!(found.len() == 1 && found[0].p_value < 1e-6 && found[0].gain > 10.0, "{found:?}");
+        assert!(found.len() == 1 && found[0].p_value < 1e-6 && found[0].gain > 20.0, "{found:?}");
         assert_eq!(found[0].place.rx, Some(vec![1]));
         assert!(found[0].statement.starts_with("Bit 3 "), "{}", found[0].statement);
         assert!(find(&evidence(|_, code| code)).is_empty());

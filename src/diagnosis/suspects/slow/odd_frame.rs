@@ -26,7 +26,7 @@ pub const BEHAVES_LIKE: &str = "single frame";
 /// Mean chirps of the even and of the odd loops less the channel's mean over the other frames.
 struct Deviation {
     halves: [Vec<Complex64>; 2],
-    /// Σ |spectrum|² of both halves' mean over the noise's expectation, and the number of bins.
+    /// Mean |spectrum|² of both halves' mean over the noise's expectation.
     energy: f64,
 }
 
