@@ -10,6 +10,7 @@ use super::config::DiagnosisConfig;
 use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
+use super::suspects::receiver::harmonic;
 use super::suspects::{SUSPECTS, Suspect};
 
 impl DiagnosisConfig {
@@ -24,6 +25,14 @@ impl DiagnosisConfig {
         candidate.p_value <= self.p_value(suspect) && candidate.gain >= least && candidate.gain.is_finite()
     }
 }
+
+/// What has no name is modelled roughly, and these are modelled most roughly of all: what they leave, up to this share of
+/// their gain, takes any shape.
+const ROUGH: [&str; 2] = ["additive fast-time", harmonic::QUADRATIC];
+const ROUGHLY: f64 = 0.1;
+
+/// What is named even where products of the signal with itself lie everywhere.
+const WHATEVER_THE_SIGNAL: [&str; 2] = ["iq_imbalance", "adc_saturation"];
 
 /// Two instances of an effect closer than this are one.
 const NEAR_M: f64 = 0.3;
@@ -72,9 +81,15 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
             let weighted = |(suspect, candidate): &(usize, Candidate)| candidate.p_value * shares / SUSPECTS[*suspect].share;
             found.iter().map(weighted).fold(1.0, f64::min)
         });
-        let known = |candidate: &Candidate| accepted.iter().any(|effect| is_same(&effect.candidate, candidate));
-        let passing: Vec<&(usize, Candidate)> =
-            found.iter().filter(|(suspect, candidate)| thresholds.passes(*suspect, candidate) && !known(candidate)).collect();
+        let known = |candidate: &Candidate| {
+            accepted.iter().any(|effect| is_same(&effect.candidate, candidate) || is_left_by(&effect.candidate, candidate))
+        };
+        let mixed = harmonic::is_mixed(evidence);
+        let passing: Vec<&(usize, Candidate)> = found
+            .iter()
+            .filter(|(suspect, candidate)| thresholds.passes(*suspect, candidate) && !known(candidate))
+            .filter(|(_, candidate)| !mixed || candidate.id.is_none_or(|id| WHATEVER_THE_SIGNAL.contains(&id)))
+            .collect();
         if let Some(last) = accepted.last_mut() {
             settle_rivals(last, &pending, &passing, thresholds);
         }
@@ -125,6 +140,11 @@ fn is_same(accepted: &Candidate, candidate: &Candidate) -> bool {
         })
 }
 
+/// Whether a candidate may be no more than what a rough correction left.
+fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
+    accepted.id.is_none() && ROUGH.contains(&accepted.behaves_like) && candidate.gain < ROUGHLY * accepted.gain
+}
+
 /// What every suspect has to say.
 fn suspicions(evidence: &Evidence) -> Vec<(usize, Candidate)> {
     // The shared products first, so that suspects do not wait for one another.
@@ -152,8 +172,8 @@ fn settle_rivals(last: &mut Accepted, pending: &[Candidate], passing: &[&(usize,
     last.probability = 1.0 / weight;
 }
 
-/// Asks everyone accepted to stand again with all others taken into account; the fallen go, the weakest first, and the
-/// rest keep the parameters of this last fit.
+/// Asks everyone accepted to stand again with all others taken into account; the rest keep the parameters of this last
+/// fit. Whoever falls only because somebody later is there competes with that one: the one that gains more alone stays.
 fn verified(original: &Evidence, mut accepted: Vec<Accepted>, thresholds: &DiagnosisConfig) -> Vec<Accepted> {
     if accepted.len() < 2 {
         return accepted;
@@ -164,22 +184,47 @@ fn verified(original: &Evidence, mut accepted: Vec<Accepted>, thresholds: &Diagn
         if SUSPECTS[accepted[index].suspect].last_in_chain {
             continue;
         }
-        let others = accepted.iter().enumerate().filter(|&(other, _)| other != index);
-        let evidence = others.fold(original.clone(), |evidence, (_, effect)| evidence.with(&effect.candidate));
-        let again = (SUSPECTS[accepted[index].suspect].find)(&evidence);
-        let same = |candidate: &&Candidate| {
-            candidate.id == accepted[index].candidate.id
-                && candidate.choice == accepted[index].candidate.choice
-                && thresholds.passes(accepted[index].suspect, candidate)
-        };
-        match again.iter().filter(same).max_by(|a, b| a.gain.total_cmp(&b.gain)) {
-            Some(candidate) => accepted[index].candidate = candidate.clone(),
+        if let Some(candidate) = again(original, &accepted, index, &[], thresholds) {
+            accepted[index].candidate = candidate;
+            continue;
+        }
+        // The latest first: what came last is the most likely to be a remainder.
+        let rival = (index + 1..accepted.len()).rev().find_map(|other| {
+            let alone = again(original, &accepted, index, &[other], thresholds)?;
+            let other_alone = again(original, &accepted, other, &[index], thresholds).map_or(0.0, |other| other.gain);
+            (alone.gain > other_alone).then_some((other, alone))
+        });
+        match rival {
+            Some((other, alone)) => {
+                accepted[index].candidate = alone;
+                accepted.remove(other);
+            }
             None => {
                 accepted.remove(index);
             }
         }
     }
     accepted
+}
+
+/// What one of the accepted says once more when all others but some are taken into account.
+fn again(
+    original: &Evidence,
+    accepted: &[Accepted],
+    index: usize,
+    without: &[usize],
+    thresholds: &DiagnosisConfig,
+) -> Option<Candidate> {
+    let effect = &accepted[index];
+    let others = accepted.iter().enumerate().filter(|(other, _)| *other != index && !without.contains(other));
+    let evidence = others.fold(original.clone(), |evidence, (_, effect)| evidence.with(&effect.candidate));
+    let same = |candidate: &Candidate| {
+        candidate.id == effect.candidate.id
+            && candidate.choice == effect.candidate.choice
+            && thresholds.passes(effect.suspect, candidate)
+    };
+    let found = (SUSPECTS[effect.suspect].find)(&evidence).into_iter().filter(same);
+    found.max_by(|a, b| a.gain.total_cmp(&b.gain))
 }
 
 impl Evidence {

@@ -19,6 +19,10 @@ const FAR_BELOW: f64 = 8.0;
 const LEAST_BIAS: f64 = 0.05;
 /// How much of that the same bit may deviate elsewhere.
 const ELSEWHERE: f64 = 0.3;
+/// And the same of a bit that never changes, though it is not far below the signal.
+const ELSEWHERE_STUCK: f64 = 0.6;
+/// Deviation of the codes in units of such a bit's value: a signal that large crosses it.
+const CROSSED: f64 = 0.5;
 /// Samples that lie so close to one another that their codes may be alike.
 const ALIKE: usize = 4;
 pub const BEHAVES_LIKE: &str = "quantisation";
@@ -32,6 +36,8 @@ struct Share {
     count: f64,
     /// How many codes stand for one independent one: static returns repeat from chirp to chirp.
     repeated: f64,
+    /// Whether it must be fair, being far below the signal and the noise.
+    fair: bool,
 }
 
 /// `noise`: standard deviation of a component's noise, which alone makes low bits fair.
@@ -39,15 +45,16 @@ fn share(component: &Component, bit: usize, noise: f64) -> Option<Share> {
     let counts = &component.counts[0];
     let [ones, count] = counts.total(bit);
     let value = f64::from(1u32 << bit);
-    if count < 1000.0 || FAR_BELOW * value > component.deviation || value > noise {
+    if count < 1000.0 || CROSSED * value > component.deviation {
         return None;
     }
+    let fair = FAR_BELOW * value <= component.deviation && value <= noise;
     let share = ones / count;
     let samples = counts.all.len();
     // Without noise the same codes come again in every chirp, and their bits need not be fair.
     let of_sample = |sample: usize| (counts.ones[bit * samples + sample], counts.all[sample]);
     let repeats = (0..samples).map(of_sample).all(|(ones, all)| ones == 0 || ones == all);
-    if repeats && (0.001..0.999).contains(&share) {
+    if fair && repeats && (0.001..0.999).contains(&share) {
         return None;
     }
     let blocks: Vec<[f64; 2]> = (0..samples / ALIKE)
@@ -58,9 +65,9 @@ fn share(component: &Component, bit: usize, noise: f64) -> Option<Share> {
         })
         .filter(|block| block[1] > 0.0)
         .collect();
-    let fair = (share * (1.0 - share)).max(1e-3);
-    let scatter: f64 = blocks.iter().map(|[ones, all]| (ones - share * all).powi(2) / (fair * all)).sum();
-    Some(Share { share, count, repeated: (scatter / blocks.len().max(1) as f64).max(1.0) })
+    let variance = (share * (1.0 - share)).max(1e-3);
+    let scatter: f64 = blocks.iter().map(|[ones, all]| (ones - share * all).powi(2) / (variance * all)).sum();
+    Some(Share { share, count, repeated: (scatter / blocks.len().max(1) as f64).max(1.0), fair })
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -83,7 +90,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
                     .filter(|(other, _)| other.channel != component.channel)
                     .filter_map(|(_, s)| s.as_ref())
             };
-            if bias < LEAST_BIAS || others().next().is_none() || others().any(|s| (s.share - 0.5).abs() > ELSEWHERE * bias) {
+            // A bit that is not far below the signal tells only by never changing at all.
+            let elsewhere = match (own.fair, own.share) {
+                (true, _) => ELSEWHERE,
+                (false, 0.0 | 1.0) => ELSEWHERE_STUCK,
+                _ => continue,
+            };
+            if bias < LEAST_BIAS || others().next().is_none() || others().any(|s| (s.share - 0.5).abs() > elsewhere * bias) {
                 continue;
             }
             // A stuck bit does not tell how far codes repeat; the other channels do.

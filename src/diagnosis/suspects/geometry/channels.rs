@@ -62,7 +62,9 @@ struct Mean {
 
 pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, moves: Moves) -> Vec<Candidate> {
     let receivers = evidence.radar.rx_m.len();
-    if receivers < 2 || evidence.accepted.contains(&"channel_mismatch") {
+    // One channel whose gain hopped was brought to its own mean, which need not be that of the others.
+    let hopped = evidence.accepted.contains(&crate::diagnosis::suspects::slow::channels::BEHAVES_LIKE);
+    if receivers < 2 || hopped || evidence.accepted.contains(&"channel_mismatch") {
         return vec![];
     }
     let sums: Vec<Option<Sums>> =

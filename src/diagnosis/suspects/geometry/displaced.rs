@@ -34,6 +34,9 @@ const UNSEEN_M: f64 = 0.2;
 const KINDS: f64 = 3.0;
 const STEPS: f64 = 80.0;
 
+/// Largest relative error that a ramp's slope can have.
+const MOST_SLOPE: f64 = 0.02;
+
 /// An alternative, fitted.
 struct Fitted {
     id: &'static str,
@@ -80,7 +83,7 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
     }
     fitted.extend(clock);
     fitted.extend(lost_frames(trial, &null));
-    fitted.retain(|fit| !evidence.accepted.contains(&fit.id));
+    fitted.retain(|fit| !evidence.accepted.contains(&fit.id) && (fit.id != "slope_error" || fit.value.abs() <= MOST_SLOPE));
 
     // A pose has four parameters of which one is fitted: it must be better by what the others could gain.
     let gain = |fit: &Fitted| {

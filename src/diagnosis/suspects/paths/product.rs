@@ -12,6 +12,7 @@ use super::scene::Scene;
 use crate::diagnosis::denoised;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::suspects::receiver::harmonic;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Rung};
 
 /// Log-likelihood within which two explanations are not told apart.
@@ -60,7 +61,9 @@ fn mean(channels: &[&[Complex64]]) -> Vec<Complex64> {
 }
 
 pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
-    if scene.evidence.is_real() {
+    // Where the receiver bends everything, or products of other kinds are there too, these two are not the cause.
+    let bent = ["adc_saturation", harmonic::QUADRATIC].iter().any(|id| scene.evidence.accepted.contains(id));
+    if scene.evidence.is_real() || bent || harmonic::is_mixed(scene.evidence) {
         return None;
     }
     let clean: Vec<Vec<Vec<Complex64>>> = (0..scene.frames()).map(|frame| denoised::frame(scene.evidence, frame)).collect();

@@ -23,20 +23,82 @@ struct Sums {
     cells: usize,
 }
 
+/// A product of the signal with itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Product {
+    /// s²
+    Square,
+    /// |s|²
+    Magnitude,
+    /// |s|² s
+    Cube,
+}
+
+impl Product {
+    fn of(self, value: Complex64) -> Complex64 {
+        match self {
+            Self::Square => value * value,
+            Self::Magnitude => value.norm_sqr().into(),
+            Self::Cube => value * value.norm_sqr(),
+        }
+    }
+
+    /// For factors that are shares of the peak sample.
+    fn scale(self, peak: f64) -> f64 {
+        if self == Self::Cube { 1.0 / (peak * peak) } else { 1.0 / peak }
+    }
+}
+
+/// How much of a product is in the recording.
+#[derive(Clone, Copy)]
+struct Law {
+    product: Product,
+    kappa: Complex64,
+    /// Of κ, complex.
+    scatter: f64,
+    p_value: f64,
+    /// Of held-out frames.
+    gain: f64,
+    peak: f64,
+}
+
+/// A magnitude squared at least this large beside a square makes it no harmonic.
+const BESIDE: f64 = 0.3;
+/// Chance below which it is there.
+const SURELY: f64 = 1e-6;
+
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.is_real() || evidence.accepted.contains(&"adc_saturation") {
         return vec![];
     }
-    let square = (!evidence.accepted.contains(&"second_harmonic")).then(|| tested(evidence, false));
-    let cube = (!evidence.accepted.contains(&"compression")).then(|| tested(evidence, true));
-    square.into_iter().chain(cube).flatten().collect()
+    if let Some(laws) = mixed(evidence) {
+        return if evidence.accepted.contains(&QUADRATIC) { vec![] } else { vec![nameless(evidence, laws)] };
+    }
+    let known = |id: &str| evidence.accepted.contains(&id);
+    let square = (!known("second_harmonic") && !known(QUADRATIC)).then(|| tested(evidence, Product::Square));
+    let cube = (!known("compression")).then(|| tested(evidence, Product::Cube));
+    square.into_iter().chain(cube).flatten().map(|law| candidate(evidence, law)).collect()
 }
 
-fn power_of(value: Complex64, cubic: bool) -> Complex64 {
-    if cubic { value * value.norm_sqr() } else { value * value }
+pub const QUADRATIC: &str = "quadratic in the signal";
+
+/// Square and magnitude squared, if the latter is there and nearly as large: no mere second harmonic and no second trip.
+/// An oscillator that the signal pulls does it, or mixers whose I and Q are bent each on its own.
+fn mixed(evidence: &Evidence) -> Option<Vec<Law>> {
+    let magnitude = tested(evidence, Product::Magnitude).filter(|law| law.p_value < SURELY)?;
+    let square = tested(evidence, Product::Square).filter(|law| law.p_value < SURELY);
+    let beside = square.is_none_or(|square| magnitude.kappa.norm() > BESIDE * square.kappa.norm());
+    beside.then(|| square.into_iter().chain([magnitude]).collect())
 }
 
-fn tested(evidence: &Evidence, cubic: bool) -> Option<Candidate> {
+/// Whether products of the signal with its own conjugate are there: then nothing that stands still, and no tone, can be
+/// told from such a product.
+pub fn is_mixed(evidence: &Evidence) -> bool {
+    !evidence.is_real() && mixed(evidence).is_some()
+}
+
+/// None where it is not to be expected, or held-out frames are worse with it.
+fn tested(evidence: &Evidence, product: Product) -> Option<Law> {
     let empty = empty_bins(evidence);
     if !empty.contains(&true) {
         return None;
@@ -46,7 +108,7 @@ fn tested(evidence: &Evidence, cubic: bool) -> Option<Candidate> {
     if peak <= 0.0 {
         return None;
     }
-    let sums: Vec<Sums> = (0..frames).into_par_iter().map(|frame| of_frame(evidence, frame, &empty, cubic, peak)).collect();
+    let sums: Vec<Sums> = (0..frames).into_par_iter().map(|frame| of_frame(evidence, frame, &empty, product, peak)).collect();
     let over = |frames: &[usize]| {
         frames.iter().fold(Sums::default(), |a, &frame| Sums {
             cross: a.cross + sums[frame].cross,
@@ -70,14 +132,17 @@ fn tested(evidence: &Evidence, cubic: bool) -> Option<Candidate> {
     let held_out = over(&evidence.split.held_out);
     let gain = (2.0 * (kappa.conj() * held_out.cross).re - kappa.norm_sqr() * held_out.template) / widening;
     // A receiver that expands instead of compressing, or turns phases more than amplitudes, is none.
-    if gain <= 0.0 || (cubic && kappa.re > 0.0) {
-        return None;
-    }
+    let possible = gain > 0.0 && !(product == Product::Cube && kappa.re > 0.0);
+    possible.then_some(Law { product, kappa, scatter, p_value, gain, peak })
+}
+
+fn candidate(evidence: &Evidence, law: Law) -> Candidate {
+    let Law { product, kappa, scatter, .. } = law;
     let level = kappa.norm();
     let level_db = 20.0 * level.log10();
-    let id = if cubic { "compression" } else { "second_harmonic" };
-    let (estimate, statement) = if cubic {
+    let (id, estimate, statement) = if product == Product::Cube {
         (
+            "compression",
             Estimate::normal("level", -kappa.re, 0.71 * scatter),
             format!(
                 "strong samples come out too small: the receiver compresses, the strongest sample by {:.2} %; its third-order \
@@ -87,6 +152,7 @@ fn tested(evidence: &Evidence, cubic: bool) -> Option<Candidate> {
         )
     } else {
         (
+            "second_harmonic",
             Estimate::normal("level_db", level_db, 8.7 * 0.71 * scatter / level),
             format!(
                 "everything has a second harmonic, at twice its beat frequency and velocity: {level_db:.1} dB at the strongest \
@@ -94,13 +160,35 @@ fn tested(evidence: &Evidence, cubic: bool) -> Option<Candidate> {
             ),
         )
     };
-    let energy = evidence.cube.samples.iter().map(|value| power_of(*value, cubic).norm_sqr()).sum::<f64>()
-        * (level / if cubic { peak * peak } else { peak }).powi(2);
-    let factor = if cubic { kappa / (peak * peak) } else { kappa / peak };
-    Some(Candidate {
-        id: Some(id),
-        behaves_like: "non-linear",
-        estimates: vec![estimate],
+    Candidate { id: Some(id), estimates: vec![estimate], ..nonlinear(evidence, "non-linear", vec![law], statement) }
+}
+
+fn nameless(evidence: &Evidence, laws: Vec<Law>) -> Candidate {
+    let level = |product: Product| {
+        let law = laws.iter().find(|law| law.product == product);
+        law.map_or("not seen".into(), |law| format!("{:.1} dB at the strongest sample", 20.0 * law.kappa.norm().log10()))
+    };
+    let statement = format!(
+        "products of the signal with itself lie where neither the room nor the body can be, at differences of beat frequencies \
+         and velocities ({}) and at sums ({}): more than a second harmonic; something that the whole signal drives, such as \
+         an oscillator that it pulls",
+        level(Product::Magnitude),
+        level(Product::Square)
+    );
+    nonlinear(evidence, QUADRATIC, laws, statement)
+}
+
+/// Without a name.
+fn nonlinear(evidence: &Evidence, behaves_like: &'static str, laws: Vec<Law>, statement: String) -> Candidate {
+    let (p_value, gain) = (laws.iter().map(|law| law.p_value).fold(1.0, f64::min), laws.iter().map(|law| law.gain).sum());
+    let distortion = move |value: Complex64| -> Complex64 {
+        laws.iter().map(|law| law.kappa * law.product.scale(law.peak) * law.product.of(value)).sum()
+    };
+    let energy = evidence.cube.samples.iter().map(|value| distortion(*value).norm_sqr()).sum();
+    Candidate {
+        id: None,
+        behaves_like,
+        estimates: vec![],
         choice: None,
         place: Place::at("receiver"),
         p_value,
@@ -115,24 +203,24 @@ fn tested(evidence: &Evidence, cubic: bool) -> Option<Candidate> {
                 chirp.iter_mut().for_each(|value| {
                     let found = *value;
                     // The distortion of the undistorted signal: two steps are enough for what is small.
-                    let first = found - factor * power_of(found, cubic);
-                    *value = found - factor * power_of(first, cubic);
+                    let first = found - distortion(found);
+                    *value = found - distortion(first);
                 });
             });
         })),
-    })
+    }
 }
 
 /// Templates are scaled by the peak sample, so that κ is a share of it.
-fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool], cubic: bool, peak: f64) -> Sums {
+fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool], product: Product, peak: f64) -> Sums {
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let scale = if cubic { 1.0 / (peak * peak) } else { 1.0 / peak };
+    let scale = product.scale(peak);
     let mut sums = Sums::default();
     for channel in 0..evidence.cube.channels() {
         let noise = evidence.noise()[channel].max(1e-300);
         let signal = evidence.cube.channel(frame, channel);
         let clean = denoised::channel(evidence, frame, channel);
-        let mut template: Vec<Complex64> = clean.iter().map(|value| power_of(*value, cubic) * scale).collect();
+        let mut template: Vec<Complex64> = clean.iter().map(|value| product.of(*value) * scale).collect();
         let mut mean = vec![Complex64::ZERO; samples];
         let mut still = vec![Complex64::ZERO; samples];
         for (template, chirp) in template.chunks_exact(samples).zip(signal.chunks_exact(samples)) {

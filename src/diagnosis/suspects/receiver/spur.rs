@@ -8,9 +8,15 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::image::empty_bins;
+use crate::diagnosis::evidence::transform;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 use crate::diagnosis::{Cube, Evidence};
+
+/// Share of the power around a tone that it may leave: a mover's Doppler changes, and it leaves more.
+const LEFT_OVER: f64 = 0.2;
+/// Cells around the tone to each side, in both axes.
+const AROUND: i64 = 4;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [frames, _, _, loops, samples] = evidence.cube.dims;
@@ -43,6 +49,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let start = (doppler as f64 / loops as f64, range as f64 / samples as f64);
     let (slow, fast) = refined(evidence, start);
     let amplitudes = amplitudes_of(&evidence.cube, slow, fast);
+    if left_over(evidence, (slow, fast), &amplitudes) > LEFT_OVER {
+        return vec![];
+    }
     let noise = evidence.noise();
     let count = (loops * samples) as f64;
     let gain: f64 = evidence
@@ -97,6 +106,40 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     })
     .into_iter()
     .collect()
+}
+
+/// Power around the tone over the noise in held-out frames once it is taken away, over that before.
+fn left_over(evidence: &Evidence, (slow, fast): (f64, f64), amplitudes: &[Complex64]) -> f64 {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let channels = evidence.cube.channels();
+    let near = |turns: f64, length: usize| -> Vec<usize> {
+        let middle = (turns * length as f64).round() as i64;
+        (-AROUND..=AROUND).map(|step| (middle + step).rem_euclid(length as i64) as usize).collect()
+    };
+    let (dopplers, ranges) = (near(slow, loops), near(fast, samples));
+    let excess = |signal: &[Complex64], noise: f64| -> f64 {
+        let map = transform(signal, samples);
+        let cells = dopplers.iter().flat_map(|doppler| ranges.iter().map(move |range| doppler * samples + range));
+        cells.map(|cell| map[cell].norm_sqr() - noise).sum()
+    };
+    let parts: Vec<(usize, usize)> =
+        evidence.split.held_out.iter().flat_map(|&frame| (0..channels).map(move |channel| (frame, channel))).collect();
+    let (before, after) = parts
+        .into_par_iter()
+        .map(|(frame, channel)| {
+            let (noise, still) = (evidence.noise()[channel], &evidence.still()[channel * samples..][..samples]);
+            let own = evidence.cube.channel(frame, channel);
+            let mut signal: Vec<Complex64> = own.iter().enumerate().map(|(i, value)| value - still[i % samples]).collect();
+            let before = excess(&signal, noise) / noise.max(1e-300);
+            let amplitude = amplitudes[frame * channels + channel];
+            for (i, value) in signal.iter_mut().enumerate() {
+                let turns = slow * (i / samples) as f64 + fast * (i % samples) as f64;
+                *value -= amplitude * Complex64::cis(TAU * turns.fract());
+            }
+            (before, excess(&signal, noise) / noise.max(1e-300))
+        })
+        .reduce(|| (0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+    after / before.max(1e-300)
 }
 
 /// Least squares of the tone in every frame and channel, `[frame][channel]`, once what stands still is away.

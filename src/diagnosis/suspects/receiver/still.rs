@@ -52,10 +52,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let without = residual(&elements, &fitted, &field, &images);
     // A field far stronger than any filter's traces needs no second thought.
     let plain = explained >= 0.98 * free_gain && fitted.likelihood > 1e5;
-    let filter = if plain { None } else { response::find(evidence, &field, &without) };
+    // A converter at its rail bends everything; what remains of it has no shape of its own, least of all a filter's.
+    let bent = evidence.accepted.contains(&"adc_saturation");
+    let filter = if plain || bent { None } else { response::find(evidence, &field, &without) };
     // A filter has one unknown where a field has many: by the information criterion's price for each.
     if let Some(found) = &filter
         && found.likelihood > 12.0
+        && found.likelihood >= ENOUGH * (free - 0.5 * field.freedom())
         && (!named || found.likelihood - found.additive > penalty(&field) * (2.0 - spent))
     {
         return vec![found.candidate.clone()];
@@ -63,8 +66,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if explained >= ENOUGH * free_gain {
         return (0..elements.len()).filter_map(|index| candidate(evidence, &field, &images, &elements, &fitted, index)).collect();
     }
-    // A converter at its rail bends everything; what remains of it has no shape of its own.
-    if free_gain < 20.0 || evidence.accepted.contains(&"adc_saturation") {
+    if free_gain < 20.0 || bent {
         return vec![];
     }
     unexplained(evidence, &field, p_free, free_gain).into_iter().collect()

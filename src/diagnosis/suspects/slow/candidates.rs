@@ -224,8 +224,7 @@ pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -
 pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> Candidate {
     let transmitters = evidence.radar.tx_m.len() as f64;
     let free = &settling.free;
-    // A decay is named where it is most of what a free function of the chirp explains.
-    let named = settling.held_out_gain > 0.8 * free.held_out_gain && settling.amplitude.re.abs() > settling.amplitude.im.abs();
+    let named = settling.is_named();
     let shape = settling.clone();
     let last_level = settling.constant;
     let deviation: Arc<dyn Fn(usize) -> Complex64 + Send + Sync> = if named {

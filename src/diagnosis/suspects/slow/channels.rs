@@ -23,6 +23,7 @@ const GAP: usize = 2;
 const SAME: f64 = 0.8;
 /// Variance of a group's gain over that of independent bins: the window's noise bandwidth.
 const NEIGHBOURS: f64 = 2.0;
+pub const BEHAVES_LIKE: &str = "slow-time gain of one channel";
 /// Decibels of a natural logarithm of an amplitude.
 const DECIBEL: f64 = 20.0 / LN_10;
 
@@ -223,7 +224,7 @@ impl Judged {
         let members = self.members.clone();
         Candidate {
             id: None,
-            behaves_like: "slow-time gain of one channel",
+            behaves_like: BEHAVES_LIKE,
             estimates: vec![],
             choice: None,
             place: Place {

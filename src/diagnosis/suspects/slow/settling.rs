@@ -30,7 +30,22 @@ pub struct Free {
     pub held_out_gain: f64,
 }
 
+/// Share of what a free function of the loop gains that a decay must reach.
+const ENOUGH: f64 = 0.8;
+/// And share that it may leave where what it leaves is beyond doubt: a strong pattern shows its shape.
+const LEFT_OVER: f64 = 0.01;
+/// Beyond doubt, nats.
+const PLAIN: f64 = 50.0;
+
 impl Settling {
+    /// Whether this is a decay, and not the best decay for something else: a line that is locked to the frames, say.
+    pub fn is_named(&self) -> bool {
+        let rest = self.free.held_out_gain - self.held_out_gain;
+        self.held_out_gain > ENOUGH * self.free.held_out_gain
+            && (rest < PLAIN || rest < LEFT_OVER * self.free.held_out_gain)
+            && self.amplitude.re.abs() > self.amplitude.im.abs()
+    }
+
     /// Relative to the settled state.
     pub fn value(&self, index: usize) -> Complex64 {
         self.amplitude * (-(index as f64) / self.loops).exp()
