@@ -11,7 +11,7 @@ use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
 use super::suspects::receiver::harmonic;
-use super::suspects::{SUSPECTS, Suspect};
+use super::suspects::{SUSPECTS, Suspect, excess};
 
 impl DiagnosisConfig {
     /// Limit of one suspect's p-value.
@@ -93,8 +93,11 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         if let Some(last) = accepted.last_mut() {
             settle_rivals(last, &pending, &passing, thresholds);
         }
-        // What happened last in the signal's chain is undone first; else the strongest.
-        let order = |(suspect, candidate): &&&(usize, Candidate)| (SUSPECTS[*suspect].last_in_chain, candidate.gain);
+        // What happened last in the signal's chain is undone first; else the strongest; what has no shape at all last.
+        let order = |(suspect, candidate): &&&(usize, Candidate)| {
+            let suspect = &SUSPECTS[*suspect];
+            (suspect.last_in_chain, !suspect.last_resort, candidate.gain)
+        };
         let strongest = passing.iter().max_by(|a, b| order(a).partial_cmp(&order(b)).expect("gains are finite"));
         let Some((suspect, best)) = strongest.map(|best| (&best.0, &best.1)) else {
             break;
@@ -142,7 +145,8 @@ fn is_same(accepted: &Candidate, candidate: &Candidate) -> bool {
 
 /// Whether a candidate may be no more than what a rough correction left.
 fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
-    accepted.id.is_none() && ROUGH.contains(&accepted.behaves_like) && candidate.gain < ROUGHLY * accepted.gain
+    let rough = accepted.id.is_none() && ROUGH.contains(&accepted.behaves_like);
+    (rough || candidate.behaves_like == excess::BEHAVES_LIKE) && candidate.gain < ROUGHLY * accepted.gain
 }
 
 /// What every suspect has to say.

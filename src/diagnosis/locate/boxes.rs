@@ -5,7 +5,7 @@ use super::residual::Residual;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::finding::Place;
 use crate::diagnosis::power::Cells;
-use crate::diagnosis::statistics::mean_power_tail;
+use crate::diagnosis::statistics::{corrected, mean_power_tail};
 
 /// Share of false boxes among those that are returned.
 const FALSE_SHARE: f64 = 0.05;
@@ -34,6 +34,41 @@ pub fn regions(evidence: &Evidence, residual: &Residual) -> Vec<Region> {
     }
     let cells = Cells::new(&evidence.radar);
     kept.iter().map(|found| region(evidence, residual, &cells, found)).collect()
+}
+
+/// The most unlikely box of all, judged on the training frames and tried on the held-out ones.
+pub struct Strongest {
+    pub region: Region,
+    /// Of the training frames, corrected for all boxes.
+    pub p_value: f64,
+    /// Log-likelihood that held-out frames gain when the training frames' excess is expected there.
+    pub gain: f64,
+}
+
+pub fn strongest(evidence: &Evidence, residual: &Residual) -> Option<Strongest> {
+    let boxes = all(residual);
+    let tried = boxes.len() as f64;
+    let found = boxes.into_iter().max_by(|a, b| b.p_value.total_cmp(&a.p_value).then(rank(a).total_cmp(&rank(b))))?;
+    let sums = |frames: &[usize]| {
+        let inside = frames.iter().filter(|frame| (found.low[0]..found.high[0]).contains(frame));
+        let cells = inside.flat_map(|frame| {
+            (found.low[1]..found.high[1]).flat_map(move |doppler| {
+                (found.low[2]..found.high[2]).map(move |range| (frame * residual.dims[1] + doppler) * residual.dims[2] + range)
+            })
+        });
+        cells.fold((0.0, 0.0), |(sum, count), cell| {
+            let weight = f64::from(residual.count[cell]);
+            (sum + weight * f64::from(residual.ratio[cell]), count + weight)
+        })
+    };
+    let ((sum, count), (held_sum, held_count)) = (sums(&evidence.split.training), sums(&evidence.split.held_out));
+    if sum <= count || count <= 0.05 || held_count <= 0.0 {
+        return None;
+    }
+    let mean = sum / count;
+    let gain = held_sum * (1.0 - 1.0 / mean) - held_count * mean.ln();
+    let p_value = corrected(mean_power_tail(mean, count.max(0.1)), tried);
+    Some(Strongest { region: region(evidence, residual, &Cells::new(&evidence.radar), &found), p_value, gain })
 }
 
 /// How far above chance, also where p-values underflow.

@@ -11,6 +11,7 @@ mod parts;
 mod profile;
 mod residual;
 
+pub use boxes::{Strongest, strongest};
 pub use parts::{Seen, by_part, by_wall};
 pub use profile::{Profile, profiles};
 pub use residual::Residual;

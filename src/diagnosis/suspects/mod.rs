@@ -1,6 +1,7 @@
 //! One file per family of effects: each looks at the evidence and says what it has found.
 
 pub mod codes;
+pub mod excess;
 pub mod fluctuation;
 pub mod geometry;
 pub mod paths;
@@ -23,27 +24,36 @@ pub struct Suspect {
     pub find: fn(&Evidence) -> Vec<Candidate>,
     /// Looks at the codes as the converter gave them: what is corrected comes after it and takes nothing back.
     pub last_in_chain: bool,
+    /// Is heard only where nobody else has anything to say.
+    pub last_resort: bool,
+}
+
+impl Suspect {
+    const fn new(name: &'static str, find: fn(&Evidence) -> Vec<Candidate>) -> Self {
+        Self { name, share: 1.0, find, last_in_chain: false, last_resort: false }
+    }
 }
 
 /// All of them. Each answers on its own, within its family; the selection chooses between families.
 pub const SUSPECTS: &[Suspect] = &[
-    Suspect { name: "still field", share: 1.0, find: receiver::still::find, last_in_chain: false },
-    Suspect { name: "still field, room unknown", share: 1.0, find: receiver::open::find, last_in_chain: false },
-    Suspect { name: "quadrature image", share: 1.0, find: receiver::image::find, last_in_chain: false },
-    Suspect { name: "non-linear receiver", share: 1.0, find: receiver::harmonic::find, last_in_chain: false },
-    Suspect { name: "converter's rail", share: 1.0, find: receiver::rail::find, last_in_chain: true },
-    Suspect { name: "spur", share: 1.0, find: receiver::spur::find, last_in_chain: false },
-    Suspect { name: "bursts", share: 1.0, find: receiver::bursts::find, last_in_chain: false },
-    Suspect { name: "noise", share: 1.0, find: receiver::noise::find, last_in_chain: false },
-    Suspect { name: "droop", share: 1.0, find: receiver::droop::find, last_in_chain: false },
-    Suspect { name: "slow time", share: 1.0, find: slow::find, last_in_chain: false },
-    Suspect { name: "one channel", share: 1.0, find: slow::channels::find, last_in_chain: false },
-    Suspect { name: "single frame", share: 1.0, find: slow::odd_frame::find, last_in_chain: false },
-    Suspect { name: "converter's codes", share: 1.0, find: codes::find, last_in_chain: true },
-    Suspect { name: "chirp", share: 1.0, find: waveform::find, last_in_chain: false },
-    Suspect { name: "vital signs", share: 1.0, find: vital::find, last_in_chain: false },
-    Suspect { name: "untracked movers", share: 1.0, find: untracked::find, last_in_chain: false },
-    Suspect { name: "extra paths", share: 1.0, find: paths::find, last_in_chain: false },
-    Suspect { name: "geometry", share: 8.0, find: geometry::find, last_in_chain: false },
-    Suspect { name: "static returns behind the body", share: 1.0, find: fluctuation::find, last_in_chain: false },
+    Suspect::new("still field", receiver::still::find),
+    Suspect::new("still field, room unknown", receiver::open::find),
+    Suspect::new("quadrature image", receiver::image::find),
+    Suspect::new("non-linear receiver", receiver::harmonic::find),
+    Suspect { last_in_chain: true, ..Suspect::new("converter's rail", receiver::rail::find) },
+    Suspect::new("spur", receiver::spur::find),
+    Suspect::new("bursts", receiver::bursts::find),
+    Suspect::new("noise", receiver::noise::find),
+    Suspect::new("droop", receiver::droop::find),
+    Suspect::new("slow time", slow::find),
+    Suspect::new("one channel", slow::channels::find),
+    Suspect::new("single frame", slow::odd_frame::find),
+    Suspect { last_in_chain: true, ..Suspect::new("converter's codes", codes::find) },
+    Suspect::new("chirp", waveform::find),
+    Suspect::new("vital signs", vital::find),
+    Suspect::new("untracked movers", untracked::find),
+    Suspect::new("extra paths", paths::find),
+    Suspect { share: 8.0, ..Suspect::new("geometry", geometry::find) },
+    Suspect::new("static returns behind the body", fluctuation::find),
+    Suspect { last_resort: true, ..Suspect::new("excess power", excess::find) },
 ];

@@ -9,13 +9,16 @@ mod trial;
 use change::Moves;
 use trial::Trial;
 
+use crate::diagnosis::suspects::paths::OVER_THE_BODY;
 use crate::diagnosis::{Candidate, Evidence};
 
 /// At most one candidate for a change of the body's place or time, and one for what differs between receivers.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(model) = evidence.power() else { return vec![] };
     let Some(body) = evidence.body.as_ref() else { return vec![] };
-    let mut found = displaced::find(&Trial::new(evidence, model, body));
+    // Beside a stranger that outshines the body, the body's place and time cannot be told.
+    let outshone = evidence.accepted.contains(&OVER_THE_BODY);
+    let mut found = if outshone { vec![] } else { displaced::find(&Trial::new(evidence, model, body)) };
     found.extend(channels::find(evidence, model, body, Moves::new(evidence.radar.centre_m())));
     found
 }

@@ -29,6 +29,8 @@ const LEAST_GAIN_AGAIN: f64 = 50.0;
 /// Kinds of answers that this family may give: every one is a chance to be wrong.
 const TRIED: f64 = 6.0;
 
+pub const OVER_THE_BODY: &str = "path-like, over the body";
+
 /// Effects of which there may be several.
 const MANY: [&str; 3] = ["wall_ghost", "floor_bounce", "moving_reflector"];
 
@@ -36,7 +38,12 @@ const MANY: [&str; 3] = ["wall_ghost", "floor_bounce", "moving_reflector"];
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let mut found: Vec<Candidate> = still_point::find(evidence).into_iter().collect();
     if let Some(scene) = Scene::new(evidence) {
-        found.extend(moving(&scene));
+        let moving = moving(&scene);
+        let elsewhere = moving.iter().any(|found| found.gain > LEAST_GAIN);
+        found.extend(moving);
+        if !elsewhere {
+            found.extend(over_the_body(&scene.over_the_body()));
+        }
     }
     let again = |id: &str| evidence.accepted.contains(&id);
     found.retain(|found| match found.id {
@@ -45,6 +52,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         None => !MANY.into_iter().any(again) || found.gain > LEAST_GAIN_AGAIN,
     });
     found
+}
+
+/// Something far stronger than the body, where the body is.
+fn over_the_body(scene: &Scene) -> Option<Candidate> {
+    let mover = mover::Mover::new(scene, track::strongest(scene)?)?;
+    let found = mover.candidate(scene, TRIED);
+    (mover.gain > LEAST_GAIN_UNNAMED).then(|| Candidate { behaves_like: OVER_THE_BODY, ..found })
 }
 
 /// Paths whose lengths change.

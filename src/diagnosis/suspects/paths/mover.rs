@@ -51,6 +51,8 @@ impl Mover {
             .sum();
         let id = if pendulum.is_some() { Some("moving_reflector") } else { named(scene, &track.sightings) };
         let id = id.map(|id| if outside(scene, &track.sightings) { "range_alias" } else { id });
+        // Where the body is, what moves with it has the same law: only a swing to one side of it is told.
+        let id = id.filter(|_| !scene.over_body || (pendulum.is_some() && aside(scene, &track.sightings)));
         Some(Self { track, pendulum, id, gain, power })
     }
 
@@ -122,11 +124,17 @@ impl Mover {
             None => " Its range and its Doppler do not belong together: no single reflector moves so.",
             _ => "",
         };
+        let instead = if scene.over_body {
+            "far stronger than the body can be at that range and velocity"
+        } else {
+            "neither the body nor its mirror images can be there"
+        };
         let statement = format!(
-            "Something {:.2} m away{whereabouts} {motion}, {:.0} dB above the noise; neither the body nor its mirror images can be there.{alias}",
+            "Something {:.2} m away{whereabouts} {motion}, {:.0} dB above the noise; {instead}.{alias}",
             mean_m,
             10.0 * self.power.log10()
         );
+        let nothing = vec![false; scene.size()];
         let cells: Vec<(usize, Vec<usize>)> = (0..scene.frames())
             .filter_map(|frame| {
                 let seen = sightings.iter().find(|s| s.frame == frame);
@@ -137,7 +145,8 @@ impl Mover {
                 };
                 let power = seen.map_or(self.power, |s| s.power);
                 let expected = scene.model.template([(at.0, at.1, power)].into_iter());
-                Some((frame, patch(&expected, scene.map(frame), scene.model.support(frame), scene.samples, 0.05)))
+                let kept = if scene.over_body { &nothing } else { scene.model.support(frame) };
+                Some((frame, patch(&expected, scene.map(frame), kept, scene.samples, 0.05)))
             })
             .collect();
         let still = scene.evidence.still().to_vec();
@@ -161,6 +170,22 @@ impl Mover {
             })),
         }
     }
+}
+
+/// Whether most sightings come from a direction that the body does not fill.
+fn aside(scene: &Scene, sightings: &[Sighting]) -> bool {
+    const APART: f64 = 0.25;
+    let Some(body) = &scene.evidence.body else { return false };
+    let centre = scene.evidence.radar.centre_m();
+    let apart = |sighting: &&Sighting| {
+        let sines = body.frames[sighting.frame].iter().map(|point| {
+            let way: [f64; 3] = std::array::from_fn(|axis| point.position_m[axis] - centre[axis]);
+            way[0] / way.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6)
+        });
+        let [low, high] = bounds(sines);
+        sighting.sine.is_some_and(|sine| sine < low - APART || sine > high + APART)
+    };
+    3 * sightings.iter().filter(apart).count() > 2 * sightings.len()
 }
 
 /// Whether the room is too small for what was seen: farther than its farthest corner.

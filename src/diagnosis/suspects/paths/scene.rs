@@ -15,6 +15,8 @@ const DOPPLER_MARGIN: i64 = 2;
 const SIDELOBE_SAFETY: f64 = 10.0;
 /// Sidelobes below this share of the noise are nothing.
 const SIDELOBE_LEVEL: f64 = 0.3;
+/// The body's expected power is trusted to this factor.
+const BODY_FACTOR: f64 = 10.0;
 /// Whose undoing leaves leakage of the body at fixed ranges.
 const FILTERS: [&str; 2] = ["if_highpass", "if_lowpass"];
 /// Σ |correlation|² of neighbouring cells of two Hann windows: so many cells are one independent value.
@@ -33,6 +35,8 @@ pub struct Scene<'a> {
     pub taken: Vec<bool>,
     /// Expected power in the other cells: noise, and what other imperfections smear along a range or a Doppler.
     pub base: Vec<f32>,
+    /// Whether cells of the body are free too, for what is far stronger than the body.
+    pub over_body: bool,
     /// By range, how many times [`Evidence::noise`] the variance of noise in complex maps is that powers count as one.
     pub shape: Vec<f64>,
 }
@@ -73,7 +77,33 @@ impl<'a> Scene<'a> {
         }
         let channels = evidence.cube.channels() as f64;
         let shape = shape(evidence);
-        Some(Self { evidence, model, loops, samples, bins, channels, taken, base, shape })
+        Some(Self { evidence, model, loops, samples, bins, channels, taken, base, over_body: false, shape })
+    }
+
+    /// The same with the body's cells free, where its expected power is trusted to a factor only.
+    pub fn over_the_body(mut self) -> Self {
+        let (frames, size) = (self.frames(), self.size());
+        let (loops, samples, bins) = (self.loops, self.samples, self.bins);
+        let visited = visited_ranges(self.model, frames, loops, samples);
+        let model = self.model;
+        let frames = self.taken.par_chunks_exact_mut(size).zip(self.base.par_chunks_exact_mut(size)).enumerate();
+        frames.for_each(|(frame, (taken, base))| {
+            let expected = model.expected(frame);
+            let lobes = lobes(expected, model.support(frame), loops, samples);
+            for (cell, taken) in taken.iter_mut().enumerate() {
+                let (doppler, range) = (cell / samples, cell % samples);
+                let still = doppler.min(loops - doppler) as i64 <= STILL_BINS;
+                *taken = range >= bins || doppler == 0 || (still && visited[range]);
+                let near = (-DOPPLER_MARGIN..=DOPPLER_MARGIN).flat_map(|slow| {
+                    let row = (doppler as i64 + slow).rem_euclid(loops as i64) as usize * samples;
+                    (range.saturating_sub(1)..(range + 2).min(samples)).map(move |range| row + range)
+                });
+                let loudest = near.map(|near| f64::from(expected[near]) - 1.0).fold(0.0, f64::max);
+                base[cell] = base[cell].max((1.0 + BODY_FACTOR * (loudest + lobes[cell])) as f32);
+            }
+        });
+        self.over_body = true;
+        self
     }
 
     pub fn size(&self) -> usize {
@@ -263,12 +293,22 @@ fn hann_envelope(cells: f64) -> f64 {
 /// The support, wider along Doppler, and where sidelobes of the measured power reach.
 fn sidelobes(map: &[f32], support: &[bool], loops: usize, samples: usize) -> Vec<bool> {
     let mut taken = support.to_vec();
-    let mut lobes = vec![0.0f64; map.len()];
     for cell in (0..map.len()).filter(|&cell| support[cell]) {
         let (doppler, range) = (cell / samples, cell % samples);
         for step in -DOPPLER_MARGIN..=DOPPLER_MARGIN {
             taken[(doppler as i64 + step).rem_euclid(loops as i64) as usize * samples + range] = true;
         }
+    }
+    let lobes = lobes(map, support, loops, samples);
+    taken.iter_mut().zip(lobes).for_each(|(taken, lobe)| *taken |= lobe * SIDELOBE_SAFETY > SIDELOBE_LEVEL);
+    taken
+}
+
+/// Upper bounds of the powers that the windows' sidelobes carry from a map's cells within the support.
+fn lobes(map: &[f32], support: &[bool], loops: usize, samples: usize) -> Vec<f64> {
+    let mut lobes = vec![0.0f64; map.len()];
+    for cell in (0..map.len()).filter(|&cell| support[cell]) {
+        let (doppler, range) = (cell / samples, cell % samples);
         let power = f64::from(map[cell]);
         if power * SIDELOBE_SAFETY * hann_envelope(3.0) < SIDELOBE_LEVEL {
             continue;
@@ -291,8 +331,7 @@ fn sidelobes(map: &[f32], support: &[bool], loops: usize, samples: usize) -> Vec
             }
         }
     }
-    taken.iter_mut().zip(lobes).for_each(|(taken, lobe)| *taken |= lobe * SIDELOBE_SAFETY > SIDELOBE_LEVEL);
-    taken
+    lobes
 }
 
 /// Noise, raised where a whole range or a whole Doppler is louder than noise, or clutter has sidebands: imperfections of

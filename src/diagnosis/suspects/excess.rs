@@ -1,0 +1,41 @@
+//! What nobody else explains: a box of range, Doppler and frames with more power than body, room and noise have.
+
+use crate::diagnosis::Evidence;
+use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
+use crate::diagnosis::locate::{Residual, strongest};
+
+pub const BEHAVES_LIKE: &str = "excess power";
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    if evidence.accepted.contains(&BEHAVES_LIKE) {
+        return vec![];
+    }
+    let Some(found) = Residual::new(evidence).and_then(|residual| strongest(evidence, &residual)) else { return vec![] };
+    let place = &found.region.place;
+    let along = |what: &str, unit: &str, bounds: Option<[f64; 2]>| {
+        bounds.map(|[low, high]| format!("{what} {low:.1} to {high:.1} {unit}"))
+    };
+    let frames = place.frames.as_ref().map(|frames| format!("in frames {} to {}", frames[0], frames[frames.len() - 1]));
+    let words: Vec<String> =
+        [along("at", "m", place.range_m), along("at", "m/s", place.velocity_mps), frames].into_iter().flatten().collect();
+    let place_words = if words.is_empty() { "everywhere".to_string() } else { words.join(", ") };
+    let noise = evidence.noise().iter().sum::<f64>() / evidence.noise().len().max(1) as f64;
+    vec![Candidate {
+        id: None,
+        behaves_like: BEHAVES_LIKE,
+        estimates: vec![],
+        choice: None,
+        place: Place { stage: "propagation".into(), ..place.clone() },
+        p_value: found.p_value,
+        gain: found.gain,
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement: format!(
+            "there is {:.1} dB more power than body, room and noise can have, {place_words}; no effect of the library explains it",
+            found.region.excess_db
+        ),
+        curve: None,
+        energy: found.region.energy * noise,
+        correction: Correction::None,
+    }]
+}
