@@ -27,7 +27,7 @@ impl DiagnosisConfig {
 }
 
 /// What has no name is modelled roughly, and these are modelled most roughly of all: what they leave, up to this share of
-/// their gain, takes any shape.
+/// their gain, takes any shape; and they come after whatever gains more than it.
 const ROUGH: [&str; 2] = ["additive fast-time", harmonic::QUADRATIC];
 const ROUGHLY: f64 = 0.1;
 
@@ -96,7 +96,8 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         // What happened last in the signal's chain is undone first; else the strongest; what has no shape at all last.
         let order = |(suspect, candidate): &&&(usize, Candidate)| {
             let suspect = &SUSPECTS[*suspect];
-            (suspect.last_in_chain, !suspect.last_resort, candidate.gain)
+            let worth = if is_rough(candidate) { ROUGHLY * candidate.gain } else { candidate.gain };
+            (suspect.last_in_chain, !suspect.last_resort, worth)
         };
         let strongest = passing.iter().max_by(|a, b| order(a).partial_cmp(&order(b)).expect("gains are finite"));
         let Some((suspect, best)) = strongest.map(|best| (&best.0, &best.1)) else {
@@ -143,10 +144,13 @@ fn is_same(accepted: &Candidate, candidate: &Candidate) -> bool {
         })
 }
 
+fn is_rough(candidate: &Candidate) -> bool {
+    candidate.id.is_none() && ROUGH.contains(&candidate.behaves_like)
+}
+
 /// Whether a candidate may be no more than what a rough correction left.
 fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
-    let rough = accepted.id.is_none() && ROUGH.contains(&accepted.behaves_like);
-    (rough || candidate.behaves_like == excess::BEHAVES_LIKE) && candidate.gain < ROUGHLY * accepted.gain
+    (is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE) && candidate.gain < ROUGHLY * accepted.gain
 }
 
 /// What every suspect has to say.

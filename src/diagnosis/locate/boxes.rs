@@ -48,7 +48,10 @@ pub struct Strongest {
 pub fn strongest(evidence: &Evidence, residual: &Residual) -> Option<Strongest> {
     let boxes = all(residual);
     let tried = boxes.len() as f64;
-    let found = boxes.into_iter().max_by(|a, b| b.p_value.total_cmp(&a.p_value).then(rank(a).total_cmp(&rank(b))))?;
+    let holds = |frames: &[usize], found: &Box3| frames.iter().any(|frame| (found.low[0]..found.high[0]).contains(frame));
+    let split = &evidence.split;
+    let shared = boxes.into_iter().filter(|found| holds(&split.training, found) && holds(&split.held_out, found));
+    let found = shared.max_by(|a, b| b.p_value.total_cmp(&a.p_value).then(rank(a).total_cmp(&rank(b))))?;
     let sums = |frames: &[usize]| {
         let inside = frames.iter().filter(|frame| (found.low[0]..found.high[0]).contains(frame));
         let cells = inside.flat_map(|frame| {

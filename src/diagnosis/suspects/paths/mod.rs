@@ -26,6 +26,8 @@ const LEAST_GAIN: f64 = 6.0;
 const LEAST_GAIN_UNNAMED: f64 = 25.0;
 /// Of a second path: it must be no remains of the first.
 const LEAST_GAIN_AGAIN: f64 = 50.0;
+/// Share of a track's or an image's gain from which on a product of the signal with itself explains as much.
+const NEARLY: f64 = 0.5;
 /// Kinds of answers that this family may give: every one is a chance to be wrong.
 const TRIED: f64 = 6.0;
 
@@ -79,7 +81,11 @@ fn moving(scene: &Scene) -> Vec<Candidate> {
         }
         _ => {}
     }
-    let echoes = [echo::multibounce(scene, TRIED), product::find(scene, TRIED)];
-    found.extend(echoes.into_iter().flatten());
+    let product = product::find(scene, TRIED);
+    // One number that explains as much as a track or an image does comes first; the others are asked again without it.
+    if let Some(product) = &product {
+        found.retain(|found| product.gain < NEARLY * found.gain);
+    }
+    found.extend(echo::multibounce(scene, TRIED).into_iter().chain(product));
     found
 }

@@ -64,6 +64,8 @@ struct Law {
 
 /// A magnitude squared at least this large beside a square makes it no harmonic.
 const BESIDE: f64 = 0.3;
+/// Least gain on held-out frames for it, nats.
+const LEAST_GAIN: f64 = 20.0;
 /// Chance below which it is there.
 const SURELY: f64 = 1e-6;
 
@@ -85,7 +87,11 @@ pub const QUADRATIC: &str = "quadratic in the signal";
 /// Square and magnitude squared, if the latter is there and nearly as large: no mere second harmonic and no second trip.
 /// An oscillator that the signal pulls does it, or mixers whose I and Q are bent each on its own.
 fn mixed(evidence: &Evidence) -> Option<Vec<Law>> {
-    let magnitude = tested(evidence, Product::Magnitude).filter(|law| law.p_value < SURELY)?;
+    let magnitude = tested(evidence, Product::Magnitude).filter(|law| law.p_value < SURELY && law.gain > LEAST_GAIN)?;
+    // A receiver that compresses leaves a little of it too.
+    if tested(evidence, Product::Cube).is_some_and(|cube| cube.gain > magnitude.gain) {
+        return None;
+    }
     let square = tested(evidence, Product::Square).filter(|law| law.p_value < SURELY);
     let beside = square.is_none_or(|square| magnitude.kappa.norm() > BESIDE * square.kappa.norm());
     beside.then(|| square.into_iter().chain([magnitude]).collect())

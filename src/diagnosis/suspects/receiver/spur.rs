@@ -10,11 +10,15 @@ use rayon::prelude::*;
 use super::image::empty_bins;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::locate::Residual;
+use crate::diagnosis::power::Cells;
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 use crate::diagnosis::{Cube, Evidence};
 
 /// Share of the power around a tone that it may leave: a mover's Doppler changes, and it leaves more.
 const LEFT_OVER: f64 = 0.2;
+/// Range bins that a mover must have passed during the recording.
+const LEAVES_BINS: f64 = 6.0;
 /// Cells around the tone to each side, in both axes.
 const AROUND: i64 = 4;
 
@@ -23,18 +27,18 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.accepted.iter().filter(|id| **id == "spur").count() > 2 {
         return vec![];
     }
-    let empty = empty_bins(evidence);
-    let maps = evidence.maps();
     let training = &evidence.split.training;
     let channels = evidence.cube.channels();
-    let at = |frame: usize, doppler: usize, range: usize| f64::from(maps[(frame * loops + doppler) * samples + range]);
-    let cells: Vec<(usize, usize)> =
-        (1..loops).flat_map(|doppler| (0..samples).map(move |range| (doppler, range))).filter(|cell| empty[cell.1]).collect();
+    let line = Line::new(evidence);
+    let cells: Vec<(usize, usize)> = (1..loops)
+        .flat_map(|doppler| (0..samples).map(move |range| (doppler, range)))
+        .filter(|&(doppler, range)| line.is_told(doppler, range))
+        .collect();
     // The median over the frames: a mover crosses a cell, a line stays.
     let best = cells
         .par_iter()
         .map(|&(doppler, range)| {
-            let mut powers: Vec<f64> = training.iter().map(|&frame| at(frame, doppler, range)).collect();
+            let mut powers: Vec<f64> = training.iter().map(|&frame| line.power(frame, doppler, range)).collect();
             (median(&mut powers), doppler, range)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0));
@@ -85,7 +89,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         look_alikes: vec![],
         statement: format!(
             "a continuous tone at {:.4} MHz (or {:.4} MHz, as sampled), {level_db:.1} dB to the peak sample, runs through all frames \
-             where neither the room nor the body can be; its phase advances by {:.3} turns per chirp",
+             where nothing of the room or the body can stay; its phase advances by {:.3} turns per chirp",
             frequency_hz * 1e-6,
             wrapped * rate * 1e-6,
             slow
@@ -106,6 +110,42 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     })
     .into_iter()
     .collect()
+}
+
+/// Where a line of a fixed range and Doppler frequency cannot be anything that moves, and the powers there.
+struct Line<'a> {
+    evidence: &'a Evidence,
+    /// Beat frequencies without room and body.
+    empty: Vec<bool>,
+    /// Over what room and body have elsewhere.
+    residual: Option<Residual>,
+    /// Doppler bins from which on a mover leaves its range bins during the recording.
+    fast: f64,
+}
+
+impl<'a> Line<'a> {
+    fn new(evidence: &'a Evidence) -> Self {
+        let cells = Cells::new(&evidence.radar);
+        let duration_s = evidence.starts_s.last().map_or(0.0, |last| last - evidence.starts_s[0]);
+        let fast = LEAVES_BINS / (cells.bins_per_m * duration_s.max(1e-9)) * cells.doppler_per_mps;
+        let residual = evidence.power().and_then(|_| Residual::new(evidence));
+        Self { evidence, empty: empty_bins(evidence), residual, fast }
+    }
+
+    fn is_told(&self, doppler: usize, range: usize) -> bool {
+        let loops = self.evidence.cube.dims[3];
+        let leaves = doppler.min(loops - doppler) as f64 > self.fast;
+        self.empty[range] || (leaves && self.residual.as_ref().is_some_and(|residual| range < residual.bins))
+    }
+
+    fn power(&self, frame: usize, doppler: usize, range: usize) -> f64 {
+        let [_, _, _, loops, samples] = self.evidence.cube.dims;
+        let at = (frame * loops + doppler) * samples + range;
+        match &self.residual {
+            Some(residual) if !self.empty[range] => f64::from(residual.ratio[at]),
+            _ => f64::from(self.evidence.maps()[at]),
+        }
+    }
 }
 
 /// Power around the tone over the noise in held-out frames once it is taken away, over that before.
