@@ -21,13 +21,15 @@ pub struct DiagnosisConfig {
     pub most: usize,
     /// Epochs for which the simulator is trained, without and with the effects; zero: it is not.
     pub epochs: usize,
+    /// Whether to say how strong what was not found can be at most; it takes several times as long as finding.
+    pub limits: bool,
     /// Of the simulator's training.
     pub seed: u64,
 }
 
 impl Default for DiagnosisConfig {
     fn default() -> Self {
-        Self { alarm: 0.01, gain: 6.0, nameless_gain: 15.0, tie: 4.6, most: 10, epochs: 8, seed: 1 }
+        Self { alarm: 0.01, gain: 6.0, nameless_gain: 15.0, tie: 4.6, most: 10, epochs: 8, limits: true, seed: 1 }
     }
 }
 

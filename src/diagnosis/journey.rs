@@ -4,10 +4,12 @@ use super::audit;
 use super::config::DiagnosisConfig;
 use super::cube::Loaded;
 use super::evidence::Evidence;
+use super::limits::limits;
 use super::misfit::Misfit;
 use super::prediction::BodyPrediction;
 use super::report::{
-    FORMAT, Findings, Fit, HeldOut, Location, Report, Verdict, moving_energy, never_detectable, probability_of_nothing,
+    Effect, FORMAT, Findings, Fit, HeldOut, Location, NotDetectable, Report, Verdict, moving_energy, never_detectable,
+    probability_of_nothing,
 };
 use super::select::{Explanation, explain};
 use crate::data::Recording;
@@ -98,6 +100,12 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     report.effects = findings.effects;
     report.unexplained = findings.unexplained;
     report.not_detectable = never_detectable(original.body.is_some());
+    if config.limits {
+        progress("putting in what was not found, to see how strong it can be");
+        let taken: Vec<&str> = report.effects.iter().flat_map(Effect::names).collect();
+        let limits = limits(&explanation.evidence, &taken, moving_energy(&original), config);
+        report.not_detectable.extend(limits.into_iter().map(NotDetectable::at_most));
+    }
     report.not_detectable.retain(|limit| report.effects.iter().all(|effect| effect.id != limit.id));
     report.probability_nothing_missing = match report.verdict {
         Verdict::NoMismatch => 1.0 - 0.5 * (1.0 - probability_of_nothing(explanation.p_value)),

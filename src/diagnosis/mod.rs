@@ -14,6 +14,7 @@ pub mod evidence;
 pub mod finding;
 pub mod html;
 pub mod journey;
+pub mod limits;
 pub mod misfit;
 pub mod locate;
 pub mod power;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::audit::Check;
 use super::cube::Split;
 use super::finding::{Place, Rung};
+use super::limits::Limit;
 use super::locate;
 use super::misfit::Misfit;
 use super::select::{Accepted, Explanation};
@@ -217,7 +218,21 @@ pub fn probability_of_nothing(p_value: f64) -> f64 {
     bound / (1.0 + bound)
 }
 
+impl NotDetectable {
+    /// What this recording would have shown, had it been stronger.
+    pub fn at_most(limit: Limit) -> Self {
+        let reason = "it was not found, and was found when it was put into this recording as strongly as that, in dB relative to \
+                      the energy of what moves";
+        Self { id: limit.id.into(), at_most_db: Some(limit.at_most_db), reason: reason.into() }
+    }
+}
+
 impl Effect {
+    /// Its id, and those that it cannot be told from.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(self.id.as_str()).chain(self.indistinguishable_from.iter().map(String::as_str))
+    }
+
     fn of(accepted: &Accepted, id: &str) -> Self {
         let candidate = &accepted.candidate;
         let info = effects::info(id);

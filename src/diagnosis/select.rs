@@ -20,7 +20,7 @@ impl DiagnosisConfig {
     }
 
     /// What has no name may be anything, so it must gain more.
-    fn passes(&self, suspect: usize, candidate: &Candidate) -> bool {
+    pub(super) fn passes(&self, suspect: usize, candidate: &Candidate) -> bool {
         let least = if candidate.id.is_some() { self.gain } else { self.nameless_gain };
         candidate.p_value <= self.p_value(suspect) && candidate.gain >= least && candidate.gain.is_finite()
     }
