@@ -10,7 +10,7 @@ use hybridsim::diagnosis::{DiagnosisConfig, diagnose};
 use hybridsim::recorder::{self, RecorderConfig};
 
 fn config() -> DiagnosisConfig {
-    DiagnosisConfig { epochs: 0, ..DiagnosisConfig::default() }
+    DiagnosisConfig { epochs: 0, limits: false, ..DiagnosisConfig::default() }
 }
 
 fn report(folder: &Path) -> Report {
@@ -251,4 +251,32 @@ fn nulls_stay_silent_and_their_p_values_are_not_too_small() {
     }
     // Six or more of twelve below 0.1 would happen once in two thousand times.
     assert!(small <= 5, "{small} of {count} p-values below 0.1");
+}
+
+#[test]
+fn what_was_not_found_has_a_limit_that_a_louder_one_exceeds() {
+    let folder = tempfile::tempdir().unwrap();
+    let limits = DiagnosisConfig { limits: true, ..config() };
+    let asked = |name: &str, effects: &str| {
+        let folder = folder.path().join(name);
+        std::fs::create_dir(&folder).unwrap();
+        let recording = Recording::open(recorded(&folder, &format!("seed = 6\n{effects}"))).unwrap();
+        diagnose(&recording, &limits, &mut |_| {}).unwrap()
+    };
+    let limit = |report: &Report, id: &str| {
+        report.not_detectable.iter().find(|limit| limit.id == id && limit.at_most_db.is_some()).map(|l| l.at_most_db.unwrap())
+    };
+    let clean = asked("clean", "");
+    assert_eq!(clean.report.verdict, Verdict::NoMismatch);
+    let at_most_db = limit(&clean.report, "dc_offset").unwrap();
+    assert!(limit(&clean.report, "iq_imbalance").is_some());
+    // The recorder's own offset, whose energy is told by its mean square.
+    let with = asked("offset", "effects.dc_offset = { i = 0.05, q = 0.0 }");
+    assert_eq!(ids(&with.report), ["dc_offset"]);
+    assert!(limit(&with.report, "dc_offset").is_none());
+    let offset = |part: &str| with.report.effects[0].parameters[part].value.as_array().unwrap()[0].as_f64().unwrap();
+    let energy = (offset("i").powi(2) + offset("q").powi(2)) * with.original.cube.samples.len() as f64;
+    let moving = hybridsim::diagnosis::report::moving_energy(&clean.original);
+    let found_db = 10.0 * (energy / moving).log10();
+    assert!(found_db > at_most_db, "an offset of {found_db:.1} dB is found, and the limit is {at_most_db:.1} dB");
 }

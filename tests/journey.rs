@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use burn::tensor::Device;
 use hybridsim::{
     config::Config,
     data::{IfFrame, IfLayout, Recording, RecordingContents, write_recording},
@@ -39,6 +40,16 @@ struct Run {
 }
 
 fn train(config: &Config, recordings: &[LoadedRecording], resume: Option<&Path>, stop_after: Option<usize>) -> Run {
+    train_on(&[Device::flex()], config, recordings, resume, stop_after)
+}
+
+fn train_on(
+    devices: &[Device],
+    config: &Config,
+    recordings: &[LoadedRecording],
+    resume: Option<&Path>,
+    stop_after: Option<usize>,
+) -> Run {
     let folder = tempfile::tempdir().unwrap();
     let trainer = Trainer {
         config: &config.training,
@@ -48,7 +59,8 @@ fn train(config: &Config, recordings: &[LoadedRecording], resume: Option<&Path>,
         site: site(recordings, &config.simulator),
         config_toml: &config.to_toml(),
         folder: folder.path(),
-        device: burn::tensor::Device::flex(),
+        device: devices[0].clone(),
+        also: &devices[1..],
     };
     let mut losses = Vec::new();
     let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
@@ -106,6 +118,22 @@ fn equal_seeds_give_equal_weights_and_others_do_not() {
     assert_eq!(weights(&first), weights(&second));
     config.seed += 1;
     assert_ne!(first.losses, train(&config, &recordings, None, None).losses);
+}
+
+#[test]
+fn devices_that_share_the_frames_learn_what_one_learns() {
+    let mut config = config();
+    config.training.epochs = 2;
+    config.training.frames_per_step = 4;
+    let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
+    let alone = train(&config, &recordings, None, None);
+    #[allow(deprecated)]
+    let devices = [Device::flex(), Device::flex(), Device::ndarray()];
+    let shared = train_on(&devices, &config, &recordings, None, None);
+    shared.result.as_ref().unwrap();
+    for (alone, shared) in alone.losses.iter().zip(&shared.losses) {
+        assert!((alone - shared).abs() < 1e-5 * alone, "{alone} dB² alone, {shared} dB² shared");
+    }
 }
 
 #[test]

@@ -29,6 +29,7 @@ fn training_on_a_planted_recording_lowers_its_loss() {
         config_toml: &config.to_toml(),
         folder: folder.path(),
         device: burn::tensor::Device::flex(),
+        also: &[],
     };
     let mut losses = Vec::new();
     trainer

@@ -33,6 +33,11 @@ pub fn device(name: &str) -> Result<Device> {
     }
 }
 
+/// Devices of names between commas: the first holds what is trained, the others share its frames.
+pub fn devices(names: &str) -> Result<Vec<Device>> {
+    names.split(',').map(|name| device(name.trim())).collect()
+}
+
 fn fastest() -> Device {
     #[cfg(feature = "cuda")]
     if let Some(device) = cuda(0) {
@@ -112,6 +117,8 @@ mod tests {
 
     #[test]
     fn an_unknown_device_is_refused_with_what_there_is() {
+        assert_eq!(devices("flex, cpu").unwrap().len(), 2);
+        assert!(devices("flex,").is_err());
         let error = device("abacus").unwrap_err().to_string();
         assert!(error.starts_with("no device `abacus` here, available: flex, ndarray"), "{error}");
     }

@@ -28,7 +28,7 @@ use clap::{Args, Parser, Subcommand};
 
 use crate::error::{Error, Result};
 
-pub use device::{available, device};
+pub use device::{available, device, devices};
 
 /// Simulate mmWave radar recordings of moving people, and learn the physics from recordings.
 #[derive(Parser)]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Common, Out, device, progress::StageProgress, scores::LpipsArguments};
+use super::{Common, Out, devices, progress::StageProgress, scores::LpipsArguments};
 use crate::{
     data::atomic,
     error::{Error, Result},
@@ -41,13 +41,13 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         list(&plan, &out);
         return Ok(());
     }
-    let device = device(&common.device)?;
+    let devices = devices(&common.device)?;
     // As Burn prints it, without the wrapping type.
-    let name = format!("{device:?}").trim_start_matches("Device<").trim_end_matches('>').to_lowercase();
+    let name = format!("{:?}", devices[0]).trim_start_matches("Device<").trim_end_matches('>').to_lowercase();
     let store = Store::open(&out, name)?;
     atomic::write_text(out.join("config.toml"), &config.to_toml())?;
     let mut progress = StageProgress::new(plan.stages.len(), common.quiet);
-    let records = experiments::run(&plan, &store, &device, &mut |event| progress.show(&event))?;
+    let records = experiments::run(&plan, &store, &devices, &mut |event| progress.show(&event))?;
     progress.finish();
     let results = results::collect(&plan, &store, &records)?;
     report::write(&out, &config, &results, &command(arguments, common))?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{
-    Common, Out, device,
+    Common, Out, devices,
     progress::TrainingProgress,
     record,
     report::{self, RunReport},
@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         });
     }
     let mut config = Config::read(&config_path, &common.set)?;
-    let device = device(&common.device)?;
+    let devices = devices(&common.device)?;
     if resume.is_none() && run_folder.join("last").is_dir() {
         return Err(Error::Usage {
             message: format!("{}: already holds a run", run_folder.display()),
@@ -79,7 +79,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         site: site_from(&recordings, &config.simulator, config.training.start_from.as_deref())?,
         config_toml: &config_toml,
         folder: &run_folder,
-        device: device.clone(),
+        device: devices[0].clone(),
+        also: &devices[1..],
     };
     let mut progress = TrainingProgress::new(common.quiet);
     let outcome = trainer.run(resume.as_deref(), &mut |event| progress.show(&event))?;
@@ -90,7 +91,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         config: &config,
         recordings: &recordings,
         progress: &outcome.progress,
-        device: &device,
+        device: &devices[0],
         seconds: started.elapsed().as_secs_f64(),
     };
     report.write()

@@ -77,6 +77,7 @@ pub fn before_and_after(
             config_toml: "",
             folder: &folder,
             device: start.device.clone(),
+            also: &[],
         };
         let outcome = trainer.run(None, &mut |event| {
             if let Event::Epoch(metrics) = event {

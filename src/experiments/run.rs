@@ -25,8 +25,8 @@ pub enum Event<'a> {
 ///
 /// # Errors
 /// Whatever a stage refuses; what was done before stays done.
-pub fn run(plan: &Plan, store: &Store, device: &Device, tell: &mut dyn FnMut(Event)) -> Result<Vec<Record>> {
-    let mut bench = Bench::new(device.clone());
+pub fn run(plan: &Plan, store: &Store, devices: &[Device], tell: &mut dyn FnMut(Event)) -> Result<Vec<Record>> {
+    let mut bench = Bench::new(devices);
     let of = plan.stages.len();
     let mut records = Vec::with_capacity(of);
     for (index, stage) in plan.stages.iter().enumerate() {

@@ -47,7 +47,7 @@ fn a_reproduction_is_done_once_and_what_is_lost_is_made_again_as_it_was() {
     let store = Store::open(&out, "flex").unwrap();
     let once = || {
         let mut worked = vec![];
-        let records = run(&plan, &store, &Device::flex(), &mut |event| {
+        let records = run(&plan, &store, &[Device::flex()], &mut |event| {
             if let Event::Done { name, .. } = event {
                 worked.push(name.to_string());
             }

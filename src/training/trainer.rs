@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use burn::{
     grad_clipping::GradientClipping,
     module::Module,
-    optim::{AdamConfig, GradientsParams, ModuleOptimizer},
+    optim::{AdamConfig, GradientsAccumulator, GradientsParams, ModuleOptimizer},
     tensor::{Device, Tensor},
 };
 use rand::RngExt;
@@ -57,8 +57,14 @@ pub struct Trainer<'a> {
     pub config_toml: &'a str,
     /// Where `best` and `last` are kept.
     pub folder: &'a Path,
+    /// Where the weights and the optimiser are.
     pub device: Device,
+    /// Devices that share the frames of every step with it. The gradient is the same but for rounding.
+    pub also: &'a [Device],
 }
+
+/// A frame of a step, and the seed of its noise.
+type Draw = (FrameId, u64);
 
 impl Trainer<'_> {
     /// Trains from the beginning, from the weights of `start_from`, or from `resume` (a checkpoint folder of the same
@@ -78,7 +84,7 @@ impl Trainer<'_> {
         let device = self.device.clone().autodiff();
 
         let mut simulator = checkpoint::with_stable_ids(self.simulator_config.init(self.site.body_extent, self.seed, &device));
-        let prepared = self.prepare(&simulator, &split)?;
+        let prepared = self.prepare(&simulator, &split, &self.device)?;
         let mut optimizer = ModuleOptimizer::from(AdamConfig::new().with_epsilon(1e-8).build())
             .with_grad_clipping(GradientClipping::Norm(self.config.gradient_clip as f32));
         let mut progress =
@@ -118,6 +124,11 @@ impl Trainer<'_> {
             simulator.effects = simulator.effects.no_grad();
         }
 
+        let further: Vec<Vec<Prepared>> = self
+            .also
+            .iter()
+            .map(|device| self.prepare(&simulator.clone().fork(&device.clone().autodiff()), &split, device))
+            .collect::<Result<_>>()?;
         emit(Event::Started {
             steps,
             first_step: progress.steps_done,
@@ -135,8 +146,8 @@ impl Trainer<'_> {
             let mut learning_rate = self.config.learning_rate;
             for batch in order.chunks(self.config.frames_per_step) {
                 learning_rate = self.config.learning_rate_at(progress.steps_done, steps);
-                let (stepped, loss) =
-                    self.step(simulator, &mut optimizer, &prepared, batch, progress.steps_done, learning_rate)?;
+                let all: Vec<&[Prepared]> = std::iter::once(&prepared).chain(&further).map(Vec::as_slice).collect();
+                let (stepped, loss) = self.step(simulator, &mut optimizer, &all, batch, progress.steps_done, learning_rate)?;
                 simulator = stepped;
                 sum += loss * batch.len() as f64;
                 progress.steps_done += 1;
@@ -189,49 +200,101 @@ impl Trainer<'_> {
     }
 
     /// One step of the optimiser on a few frames; its loss, dB².
+    ///
+    /// `prepared`: for every device.
     fn step(
         &self,
         simulator: Simulator,
         optimizer: &mut ModuleOptimizer,
-        prepared: &[Prepared],
+        prepared: &[&[Prepared]],
         batch: &[FrameId],
         step: usize,
         learning_rate: f64,
     ) -> Result<(Simulator, f64)> {
         let mut rng = step_rng(self.seed, step, 0x57E9);
         let mode = Mode::Training { seed: rng.random() };
-        let loss = self.batch_loss(&simulator, prepared, batch, mode, &mut rng)?;
-        let value: f64 = loss.clone().into_scalar::<f32>().into();
+        let draws = draws(batch, &mut rng);
+        // Frames of one recording stay together as far as they can: its surfaces are decoded once for all of them.
+        let shares: Vec<&[Draw]> = draws.chunks(draws.len().div_ceil(prepared.len())).collect();
+        let parts: Vec<(GradientsParams, f64)> = match shares.as_slice() {
+            [all] => vec![self.gradients(&simulator, prepared[0], all, draws.len(), mode, &self.device)?],
+            _ => self.shared_gradients(&simulator, prepared, &shares, draws.len(), mode)?,
+        };
+        let value: f64 = parts.iter().map(|(_, loss)| loss).sum();
         if !value.is_finite() {
-            return Err(self.first_broken_stage(&simulator, prepared, batch, mode, step)?);
+            return Err(self.first_broken_stage(&simulator, prepared[0], batch, mode, step)?);
         }
-        let mut gradients = loss.backward();
-        let gradients = GradientsParams::from_module(&mut gradients, &simulator);
-        let simulator = optimizer.step(learning_rate, simulator, gradients);
+        let mut sum = GradientsAccumulator::new();
+        parts.into_iter().for_each(|(gradients, _)| sum.accumulate(&simulator, gradients));
+        let simulator = optimizer.step(learning_rate, simulator, sum.grads());
         match checkpoint::first_non_finite(&simulator) {
             Some(name) => Err(Error::NonFinite { stage: format!("the gradient of `{name}`"), step }),
             None => Ok((simulator, value)),
         }
     }
 
-    fn batch_loss(
+    /// Every device on a thread of its own, with a copy of the weights; gradients come back to the first.
+    fn shared_gradients(
+        &self,
+        simulator: &Simulator,
+        prepared: &[&[Prepared]],
+        shares: &[&[Draw]],
+        of: usize,
+        mode: Mode,
+    ) -> Result<Vec<(GradientsParams, f64)>> {
+        let devices = std::iter::once(&self.device).chain(self.also);
+        std::thread::scope(|scope| {
+            let threads: Vec<_> = devices
+                .zip(prepared)
+                .zip(shares)
+                .map(|((device, prepared), share)| {
+                    let copy = simulator.clone().fork(&device.clone().autodiff());
+                    scope.spawn(move || -> Result<(GradientsParams, f64)> {
+                        let (gradients, loss) = self.gradients(&copy, prepared, share, of, mode, device)?;
+                        Ok((gradients.to_device(&self.device, &copy), loss))
+                    })
+                })
+                .collect();
+            threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+        })
+    }
+
+    /// Of the part that some frames have in the mean loss of `of` frames; and that part.
+    fn gradients(
         &self,
         simulator: &Simulator,
         prepared: &[Prepared],
-        frames: &[FrameId],
+        frames: &[Draw],
+        of: usize,
         mode: Mode,
-        rng: &mut ChaCha8Rng,
+        device: &Device,
+    ) -> Result<(GradientsParams, f64)> {
+        let loss = self.summed_loss(simulator, prepared, frames, mode, device)? / of as f64;
+        let value: f64 = loss.clone().into_scalar::<f32>().into();
+        let mut gradients = loss.backward();
+        Ok((GradientsParams::from_module(&mut gradients, simulator), value))
+    }
+
+    /// Sum over frames, dB².
+    fn summed_loss(
+        &self,
+        simulator: &Simulator,
+        prepared: &[Prepared],
+        frames: &[Draw],
+        mode: Mode,
+        device: &Device,
     ) -> Result<Tensor<1>> {
         let mut sum: Option<Tensor<1>> = None;
-        for (index, frames) in by_recording(frames) {
+        for frames in frames.chunk_by(|a, b| a.0.recording == b.0.recording) {
+            let index = frames[0].0.recording;
             let recording = &self.recordings[index];
             let Prepared { loss, constants } = &prepared[index];
             let surfaces = simulator.surfaces(constants, mode);
-            for frame in frames {
-                let view = recording.scene.view(frame)?;
+            for (FrameId { frame, .. }, seed) in frames {
+                let view = recording.scene.view(*frame)?;
                 let clean = simulator.clean_signal(&recording.scene, &view, &surfaces);
-                let signal = simulator.with_noise(&recording.scene.radar, clean, rng.random());
-                let measured = loss.maps_db(one_frame(recording.target(frame, &self.device)?));
+                let signal = simulator.with_noise(&recording.scene.radar, clean, *seed);
+                let measured = loss.maps_db(one_frame(recording.target(*frame, device)?));
                 let value = loss.loss(one_frame(signal), measured);
                 sum = Some(match sum {
                     Some(sum) => sum + value,
@@ -239,25 +302,20 @@ impl Trainer<'_> {
                 });
             }
         }
-        Ok(sum.expect("a batch has frames") / frames.len() as f64)
+        Ok(sum.expect("a batch has frames"))
     }
 
     /// Loss and constants of every recording; the loss's floors refer to the recording's first training frame.
-    fn prepare(&self, simulator: &Simulator, split: &FrameSplit) -> Result<Vec<Prepared>> {
+    fn prepare(&self, simulator: &Simulator, split: &FrameSplit, device: &Device) -> Result<Vec<Prepared>> {
         let mut prepared = Vec::new();
         for (index, recording) in self.recordings.iter().enumerate() {
             let radar = &recording.scene.radar;
             let frame = split.training.iter().find(|id| id.recording == index).map_or(0, |id| id.frame);
-            let transform = RangeDoppler::new(
-                radar.loops_per_frame,
-                radar.samples_per_chirp,
-                radar.sampling,
-                &self.config.heatmap,
-                &self.device,
-            );
-            let peak = transform.peak_amplitude(recording.target(frame, &self.device)?);
+            let transform =
+                RangeDoppler::new(radar.loops_per_frame, radar.samples_per_chirp, radar.sampling, &self.config.heatmap, device);
+            let peak = transform.peak_amplitude(recording.target(frame, device)?);
             prepared.push(Prepared {
-                loss: DbLoss::new(radar, &self.config.heatmap, &self.config.loss, peak, &self.device)?,
+                loss: DbLoss::new(radar, &self.config.heatmap, &self.config.loss, peak, device)?,
                 constants: simulator.constants(&recording.scene),
             });
         }
@@ -274,7 +332,8 @@ impl Trainer<'_> {
         let mut sum = 0.0;
         for frame in frames {
             // One frame at a time bounds the memory.
-            let loss = self.batch_loss(&simulator, prepared, std::slice::from_ref(frame), Mode::Inference, &mut rng)?;
+            let draw = (*frame, rng.random());
+            let loss = self.summed_loss(&simulator, prepared, &[draw], Mode::Inference, &self.device)?;
             sum += f64::from(loss.into_scalar::<f32>());
         }
         Ok(Some(sum / frames.len() as f64))
@@ -312,6 +371,13 @@ impl Trainer<'_> {
 fn one_frame(signal: Complex<4>) -> Complex<5> {
     let [tx, rx, loops, samples] = signal.dims();
     signal.reshape([1, tx, rx, loops, samples])
+}
+
+/// Frames grouped by recording, each with a seed.
+fn draws(batch: &[FrameId], rng: &mut ChaCha8Rng) -> Vec<Draw> {
+    let grouped = by_recording(batch).into_iter();
+    let frames = grouped.flat_map(|(recording, frames)| frames.into_iter().map(move |frame| FrameId { recording, frame }));
+    frames.map(|frame| (frame, rng.random())).collect()
 }
 
 /// Frames of a batch, grouped by recording, each group in the batch's order.

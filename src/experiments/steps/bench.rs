@@ -25,14 +25,19 @@ fn geometry(config: &SimulatorConfig) -> Geometry {
 /// whom in a frame is the same for most simulators, and dearer than the simulation itself.
 pub struct Bench {
     pub device: Device,
+    /// Devices that share the frames of a training.
+    pub also: Vec<Device>,
     training: Option<(Vec<PathBuf>, Geometry, Rc<Vec<LoadedRecording>>)>,
     simulated: (PathBuf, HashMap<Geometry, Rc<LoadedRecording>>),
     lpips: Option<(LpipsConfig, Rc<Lpips>)>,
 }
 
 impl Bench {
-    pub fn new(device: Device) -> Self {
-        Self { device, training: None, simulated: Default::default(), lpips: None }
+    /// # Panics
+    /// Without any device.
+    pub fn new(devices: &[Device]) -> Self {
+        let (device, also) = (devices[0].clone(), devices[1..].to_vec());
+        Self { device, also, training: None, simulated: Default::default(), lpips: None }
     }
 
     /// Recordings to learn from, together.

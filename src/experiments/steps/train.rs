@@ -36,6 +36,7 @@ pub fn train(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut
     let config_toml = config.to_toml();
     atomic::write_text(folder.join("config.toml"), &config_toml)?;
     let recordings = bench.training(task.recordings, &config.simulator)?;
+    let also = bench.also.clone();
     let trainer = Trainer {
         config: &config.training,
         simulator_config: &config.simulator,
@@ -45,6 +46,7 @@ pub fn train(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut
         config_toml: &config_toml,
         folder,
         device: bench.device.clone(),
+        also: &also,
     };
     let last = folder.join("last");
     atomic::recover(&last)?;
