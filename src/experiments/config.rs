@@ -132,7 +132,7 @@ pub struct ReproduceConfig {
     pub dense_surface: SurfaceConfig,
     #[serde(default)]
     pub recognition: RecognitionConfig,
-    #[serde(default)]
+    #[serde(default = "effects_only")]
     pub diagnosis: DiagnosisConfig,
     #[serde(default)]
     pub adaptation: AdaptationConfig,
@@ -158,6 +158,11 @@ fn dense() -> SurfaceConfig {
 
 fn diagnosed() -> String {
     "walk_back_forth_armswing".into()
+}
+
+/// Limits on what was not found take longer than finding, and no table needs them.
+fn effects_only() -> DiagnosisConfig {
+    DiagnosisConfig { limits: false, ..DiagnosisConfig::default() }
 }
 
 impl ReproduceConfig {
