@@ -205,7 +205,7 @@ impl Recorder {
         self.chain = self.stages.chain(&world, peak);
         let mut strongest: f64 = 0.0;
         for body in bodies {
-            strongest = strongest.max(self.received(body.clone())?.peak());
+            strongest = strongest.max(self.received(body.clone())?.largest_component());
         }
         let noise = if !config.noise {
             0.0

@@ -77,8 +77,13 @@ impl Signal {
         Self { samples, values, ..self }
     }
 
-    /// Largest magnitude of a component.
+    /// Largest magnitude of a sample.
     pub fn peak(&self) -> f64 {
+        self.values.iter().map(Complex64::norm_sqr).fold(0.0, f64::max).sqrt()
+    }
+
+    /// Largest magnitude of a component, which is what a converter's rail bounds.
+    pub fn largest_component(&self) -> f64 {
         self.values.iter().map(|value| value.re.abs().max(value.im.abs())).fold(0.0, f64::max)
     }
 

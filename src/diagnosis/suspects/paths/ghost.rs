@@ -18,6 +18,8 @@ pub struct Ghost {
     /// Of all frames, for the p-value; of the held-out ones.
     pub gain_all: f64,
     pub gain: f64,
+    /// The same of cells that move: what stands still and fades is no image of somebody who walks.
+    pub gain_moving: f64,
     /// Held-out frames that gain on their own, of those that could.
     pub agreeing: f64,
     pub coefficient: f64,
@@ -56,7 +58,9 @@ fn ghost(scene: &Scene, boundary: Boundary, distance_m: f64) -> Option<Ghost> {
     let held_out: Vec<f64> = split.held_out.iter().map(|&frame| scene.gain(frame, &templates[frame], weight)).collect();
     let seen: Vec<f64> = held_out.iter().copied().filter(|gain| gain.abs() > 1e-3).collect();
     let gain = held_out.iter().sum::<f64>();
+    let moving = split.held_out.iter().map(|&frame| scene.gain(frame, &scene.moving(&templates[frame]), weight)).sum();
     Some(Ghost {
+        gain_moving: moving,
         boundary,
         templates,
         weight,

@@ -69,10 +69,12 @@ fn moving(scene: &Scene) -> Vec<Candidate> {
     let boundaries = ghosts.len().max(1) as f64;
     let mover = track::strongest(scene).and_then(|track| mover::Mover::new(scene, track));
     let mover_gain = mover.as_ref().map_or(0.0, |mover| mover.gain);
-    let best = ghosts
-        .iter()
-        .filter(|ghost| ghost.gain > LEAST_GAIN && ghost.agreeing >= AGREEING)
-        .max_by(|a, b| a.gain.total_cmp(&b.gain));
+    let seen = |ghost: &&ghost::Ghost| ghost.gain > LEAST_GAIN && ghost.agreeing >= AGREEING;
+    let (images, fading): (Vec<_>, Vec<_>) = ghosts.iter().filter(seen).partition(|ghost| ghost.gain_moving > LEAST_GAIN);
+    let best = images.into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
+    // What an image explains best, but only where nothing moves, is neither an image nor something that moves.
+    let fades = fading.iter().map(|ghost| ghost.gain).fold(0.0, f64::max);
+    let mover = mover.filter(|mover| mover.gain > fades);
     let mut found = vec![];
     match (best, mover) {
         (Some(ghost), _) if ghost.gain > mover_gain => found.push(image::candidate(scene, ghost, &ghosts, TRIED * boundaries)),

@@ -137,6 +137,17 @@ impl<'a> Scene<'a> {
         Template { cells, power }
     }
 
+    /// The part of a template whose Doppler is not that of what stands still.
+    pub fn moving(&self, template: &Template) -> Template {
+        let moves = |cell: u32| {
+            let doppler = cell as usize / self.samples;
+            doppler.min(self.loops - doppler) as i64 > STILL_BINS
+        };
+        let kept = template.cells.iter().zip(&template.power).filter(|(cell, _)| moves(**cell));
+        let (cells, power) = kept.map(|(&cell, &power)| (cell, power)).unzip();
+        Template { cells, power }
+    }
+
     /// Log-likelihood that a frame gains when `weight` times a template is expected besides the base, nats.
     pub fn gain(&self, frame: usize, template: &Template, weight: f64) -> f64 {
         let (map, base) = (self.map(frame), self.base(frame));

@@ -73,7 +73,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let level_db = 20.0 * (strength / (peak - strength).max(1e-300)).log10();
     let rate = evidence.radar.sample_rate_hz;
     let wrapped = if fast > 0.5 { fast - 1.0 } else { fast };
-    let frequency_hz = fast * rate;
+    // The frequency nearest to zero that samples so.
+    let frequency_hz = wrapped * rate;
     Some(Candidate {
         id: Some("spur"),
         behaves_like: "tone",
@@ -91,7 +92,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             "a continuous tone at {:.4} MHz (or {:.4} MHz, as sampled), {level_db:.1} dB to the peak sample, runs through all frames \
              where nothing of the room or the body can stay; its phase advances by {:.3} turns per chirp",
             frequency_hz * 1e-6,
-            wrapped * rate * 1e-6,
+            (wrapped - wrapped.signum()) * rate * 1e-6,
             slow
         ),
         curve: None,

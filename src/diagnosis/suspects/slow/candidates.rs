@@ -234,13 +234,15 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
     };
     let square: f64 = (0..field.loops).map(|i| deviation(i).norm_sqr()).sum::<f64>() * field.frames as f64;
     let energy = square * evidence.still().iter().map(|v| v.norm_sqr()).sum::<f64>();
-    let depth = -settling.amplitude.re;
+    // The deviation is from the mean over the frame, the depth from where the gain settles.
+    let settled = 1.0 + settling.constant.re;
+    let depth = -settling.amplitude.re / settled;
     let chirps = settling.loops * transmitters;
     let (id, estimates, statement) = if named {
         (
             Some("chirp_settling"),
             vec![
-                Estimate::normal("depth", depth, settling.amplitude_deviation),
+                Estimate::normal("depth", depth, settling.amplitude_deviation / settled),
                 Estimate::normal("chirps", chirps, settling.loops_deviation * transmitters),
             ],
             format!(
