@@ -112,9 +112,8 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         _ => probability_of_nothing(explanation.p_value),
     };
     let held_out: f64 = original.split.held_out.len() as f64 * original.cube.dims[1..].iter().product::<usize>() as f64;
-    let gained: f64 = explanation.accepted.iter().map(|effect| effect.candidate.gain).sum();
-    // Undoing a filter changes the scale of the samples; the gains are those of the recording as it is.
-    let loglik_per_sample = explanation.before.loglik_per_sample + gained / held_out.max(1.0);
+    let gained: f64 = explanation.accepted.iter().map(|effect| effect.gained(held_out.max(1.0))).sum();
+    let loglik_per_sample = explanation.before.loglik_per_sample + gained;
     report.fit = Fit { before: explanation.before, after: Misfit { loglik_per_sample, ..explanation.after } };
     Ok(Diagnosis { report, radar, original, explanation: Some(explanation) })
 }

@@ -51,6 +51,18 @@ pub struct Accepted {
     pub after: Misfit,
 }
 
+impl Accepted {
+    /// Log-likelihood per sample that all cells of the held-out frames gain, of `samples`. Where samples are changed, by
+    /// undoing a filter or emptying cells, likelihoods before and after are not of the same data: then it is what the
+    /// suspect's own test gains, which is less.
+    pub fn gained(&self, samples: f64) -> f64 {
+        match self.candidate.correction {
+            Correction::Body(_) => self.after.loglik_per_sample - self.before.loglik_per_sample,
+            _ => self.candidate.gain / samples,
+        }
+    }
+}
+
 /// What the rounds left behind.
 pub struct Explanation {
     pub accepted: Vec<Accepted>,
