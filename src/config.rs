@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -10,7 +11,7 @@ use crate::{
     error::{Error, Result},
     recorder::RecorderConfig,
     simulator::SimulatorConfig,
-    training::TrainingConfig,
+    training::{LoadedRecording, Trainer, TrainingConfig, site_from},
 };
 
 /// What a config file may hold. Every section has defaults but one of `data` and `record` must say what to learn from.
@@ -35,6 +36,29 @@ pub struct DataConfig {
 }
 
 impl Config {
+    /// What trains as this config says; `config_toml` is its resolved text.
+    ///
+    /// # Errors
+    /// A checkpoint to start from that cannot be read.
+    pub fn trainer<'a>(
+        &'a self,
+        recordings: &'a [LoadedRecording],
+        config_toml: &'a str,
+        folder: &'a Path,
+        devices: &'a [Device],
+    ) -> Result<Trainer<'a>> {
+        Ok(Trainer {
+            config: &self.training,
+            simulator_config: &self.simulator,
+            seed: self.seed,
+            recordings,
+            site: site_from(recordings, &self.simulator, self.training.start_from.as_deref())?,
+            config_toml,
+            folder,
+            devices,
+        })
+    }
+
     /// Reads a config file with its `extends` parents, changed by `--set key=value`.
     pub fn read(path: &Path, sets: &[String]) -> Result<Self> {
         let mut config: Self = settings::read_settings(path, sets)?;

@@ -9,7 +9,7 @@ use hybridsim::{
     effects::EffectSetting,
     error::{Error, Result},
     recorder,
-    training::{Event, LoadedRecording, Trainer, checkpoint, load_recordings, site},
+    training::{Event, LoadedRecording, checkpoint, load_recordings},
 };
 
 /// `configs/test.toml`, with its recording made once for all tests of this file.
@@ -51,17 +51,8 @@ fn train_on(
     stop_after: Option<usize>,
 ) -> Run {
     let folder = tempfile::tempdir().unwrap();
-    let trainer = Trainer {
-        config: &config.training,
-        simulator_config: &config.simulator,
-        seed: config.seed,
-        recordings,
-        site: site(recordings, &config.simulator),
-        config_toml: &config.to_toml(),
-        folder: folder.path(),
-        device: devices[0].clone(),
-        also: &devices[1..],
-    };
+    let config_toml = config.to_toml();
+    let trainer = config.trainer(recordings, &config_toml, folder.path(), devices).unwrap();
     let mut losses = Vec::new();
     let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
         trainer.run(resume, &mut |event| {

@@ -8,7 +8,7 @@ use hybridsim::{
     config::Config,
     data::{Recording, read_body},
     import::{self, BvhConfig},
-    training::{Event, Trainer, load_recordings, site},
+    training::{Event, load_recordings},
 };
 
 #[test]
@@ -20,17 +20,8 @@ fn training_on_a_planted_recording_lowers_its_loss() {
     config.data.recordings = vec![shared.join("recordings/planted/p1")];
     let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let trainer = Trainer {
-        config: &config.training,
-        simulator_config: &config.simulator,
-        seed: config.seed,
-        recordings: &recordings,
-        site: site(&recordings, &config.simulator),
-        config_toml: &config.to_toml(),
-        folder: folder.path(),
-        device: burn::tensor::Device::flex(),
-        also: &[],
-    };
+    let (config_toml, devices) = (config.to_toml(), [burn::tensor::Device::flex()]);
+    let trainer = config.trainer(&recordings, &config_toml, folder.path(), &devices).unwrap();
     let mut losses = Vec::new();
     trainer
         .run(None, &mut |event| {

@@ -14,7 +14,7 @@ use crate::{
     config::Config,
     data::atomic,
     error::{Error, Result},
-    training::{Trainer, load_recordings, site_from},
+    training::load_recordings,
 };
 
 #[derive(Args)]
@@ -71,17 +71,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let started = std::time::Instant::now();
     let recordings = load_recordings(&config.data.recordings, &config.simulator)?;
     recordings.iter().for_each(report::tell_notes);
-    let trainer = Trainer {
-        config: &config.training,
-        simulator_config: &config.simulator,
-        seed: config.seed,
-        recordings: &recordings,
-        site: site_from(&recordings, &config.simulator, config.training.start_from.as_deref())?,
-        config_toml: &config_toml,
-        folder: &run_folder,
-        device: devices[0].clone(),
-        also: &devices[1..],
-    };
+    let trainer = config.trainer(&recordings, &config_toml, &run_folder, &devices)?;
     let mut progress = TrainingProgress::new(common.quiet);
     let outcome = trainer.run(resume.as_deref(), &mut |event| progress.show(&event))?;
     progress.finish();

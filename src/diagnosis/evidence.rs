@@ -11,6 +11,7 @@ use super::codes::{self, Component};
 use super::cube::{Cube, Loaded, Split};
 use super::power::PowerModel;
 use super::prediction::BodyPrediction;
+use super::products::Products;
 use super::statistics;
 use crate::radar::{Radar, Sampling};
 use crate::room::Room;
@@ -40,6 +41,7 @@ pub struct Evidence {
     still: OnceLock<Vec<Complex64>>,
     maps: OnceLock<Vec<f32>>,
     power: OnceLock<Option<Arc<PowerModel>>>,
+    products: OnceLock<Products>,
 }
 
 impl Evidence {
@@ -60,12 +62,20 @@ impl Evidence {
             still: OnceLock::new(),
             maps: OnceLock::new(),
             power: OnceLock::new(),
+            products: OnceLock::new(),
         }
     }
 
     /// The same after samples or prediction changed: nothing computed is kept.
     pub fn changed(self) -> Self {
-        Self { noise: OnceLock::new(), still: OnceLock::new(), maps: OnceLock::new(), power: OnceLock::new(), ..self }
+        Self {
+            noise: OnceLock::new(),
+            still: OnceLock::new(),
+            maps: OnceLock::new(),
+            power: OnceLock::new(),
+            products: OnceLock::new(),
+            ..self
+        }
     }
 
     pub fn is_real(&self) -> bool {
@@ -125,6 +135,11 @@ impl Evidence {
     /// The power model of the body, where there is one.
     pub fn power(&self) -> Option<&PowerModel> {
         self.power.get_or_init(|| PowerModel::new(self).map(Arc::new)).as_deref()
+    }
+
+    /// Products of the signal with itself where neither room nor body can be.
+    pub fn products(&self) -> &Products {
+        self.products.get_or_init(|| Products::new(self))
     }
 
     /// One frame and channel after the transforms with Hann windows of unit energy (white noise keeps its variance),

@@ -36,8 +36,7 @@ pub struct Diagnosis {
 impl Diagnosis {
     /// What was found, as settings of the simulator in its own units.
     pub fn effects(&self) -> Vec<EffectSetting> {
-        let samples = self.original.cube.samples.iter();
-        let reference = samples.map(|value| value.norm_sqr()).fold(0.0, f64::max).sqrt();
+        let reference = self.original.cube.peak();
         let accepted = self.explanation.iter().flat_map(|explanation| &explanation.accepted);
         accepted.filter_map(|effect| effect.candidate.setting(reference)).collect()
     }

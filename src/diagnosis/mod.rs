@@ -19,6 +19,7 @@ pub mod misfit;
 pub mod locate;
 pub mod power;
 pub mod prediction;
+pub mod products;
 pub mod report;
 pub mod select;
 pub mod simulate;

@@ -96,7 +96,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         let known = |candidate: &Candidate| {
             accepted.iter().any(|effect| is_same(&effect.candidate, candidate) || is_left_by(&effect.candidate, candidate))
         };
-        let mixed = harmonic::is_mixed(evidence);
+        let mixed = evidence.products().mixed().is_some();
         let passing: Vec<&(usize, Candidate)> = found
             .iter()
             .filter(|(suspect, candidate)| thresholds.passes(*suspect, candidate) && !known(candidate))

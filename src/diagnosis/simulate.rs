@@ -76,8 +76,7 @@ pub fn before_and_after(
             site: site(&recordings, config),
             config_toml: "",
             folder: &folder,
-            device: start.device.clone(),
-            also: &[],
+            devices: std::slice::from_ref(start.device),
         };
         let outcome = trainer.run(None, &mut |event| {
             if let Event::Epoch(metrics) = event {

@@ -57,10 +57,9 @@ pub struct Trainer<'a> {
     pub config_toml: &'a str,
     /// Where `best` and `last` are kept.
     pub folder: &'a Path,
-    /// Where the weights and the optimiser are.
-    pub device: Device,
-    /// Devices that share the frames of every step with it. The gradient is the same but for rounding.
-    pub also: &'a [Device],
+    /// The first has the weights and the optimiser; all share the frames of every step. The gradient is the same but for
+    /// rounding.
+    pub devices: &'a [Device],
 }
 
 /// A frame of a step, and the seed of its noise.
@@ -81,10 +80,10 @@ impl Trainer<'_> {
         let split = split.with_most(self.config.frames).repeated(self.config.repeats);
         let steps_per_epoch = split.training.len().div_ceil(self.config.frames_per_step);
         let steps = self.config.epochs * steps_per_epoch;
-        let device = self.device.clone().autodiff();
+        let device = self.device().clone().autodiff();
 
         let mut simulator = checkpoint::with_stable_ids(self.simulator_config.init(self.site.body_extent, self.seed, &device));
-        let prepared = self.prepare(&simulator, &split, &self.device)?;
+        let prepared = self.prepare(&simulator, &split, self.device())?;
         let mut optimizer = ModuleOptimizer::from(AdamConfig::new().with_epsilon(1e-8).build())
             .with_grad_clipping(GradientClipping::Norm(self.config.gradient_clip as f32));
         let mut progress =
@@ -124,8 +123,7 @@ impl Trainer<'_> {
             simulator.effects = simulator.effects.no_grad();
         }
 
-        let further: Vec<Vec<Prepared>> = self
-            .also
+        let further: Vec<Vec<Prepared>> = self.devices[1..]
             .iter()
             .map(|device| self.prepare(&simulator.clone().fork(&device.clone().autodiff()), &split, device))
             .collect::<Result<_>>()?;
@@ -176,6 +174,12 @@ impl Trainer<'_> {
         Ok(Outcome { simulator, progress })
     }
 
+    /// # Panics
+    /// Without any.
+    fn device(&self) -> &Device {
+        &self.devices[0]
+    }
+
     fn save(
         &self,
         name: &str,
@@ -217,7 +221,7 @@ impl Trainer<'_> {
         // Frames of one recording stay together as far as they can: its surfaces are decoded once for all of them.
         let shares: Vec<&[Draw]> = draws.chunks(draws.len().div_ceil(prepared.len())).collect();
         let parts: Vec<(GradientsParams, f64)> = match shares.as_slice() {
-            [all] => vec![self.gradients(&simulator, prepared[0], all, draws.len(), mode, &self.device)?],
+            [all] => vec![self.gradients(&simulator, prepared[0], all, draws.len(), mode, self.device())?],
             _ => self.shared_gradients(&simulator, prepared, &shares, draws.len(), mode)?,
         };
         let value: f64 = parts.iter().map(|(_, loss)| loss).sum();
@@ -242,16 +246,17 @@ impl Trainer<'_> {
         of: usize,
         mode: Mode,
     ) -> Result<Vec<(GradientsParams, f64)>> {
-        let devices = std::iter::once(&self.device).chain(self.also);
         std::thread::scope(|scope| {
-            let threads: Vec<_> = devices
+            let threads: Vec<_> = self
+                .devices
+                .iter()
                 .zip(prepared)
                 .zip(shares)
                 .map(|((device, prepared), share)| {
                     let copy = simulator.clone().fork(&device.clone().autodiff());
                     scope.spawn(move || -> Result<(GradientsParams, f64)> {
                         let (gradients, loss) = self.gradients(&copy, prepared, share, of, mode, device)?;
-                        Ok((gradients.to_device(&self.device, &copy), loss))
+                        Ok((gradients.to_device(self.device(), &copy), loss))
                     })
                 })
                 .collect();
@@ -333,7 +338,7 @@ impl Trainer<'_> {
         for frame in frames {
             // One frame at a time bounds the memory.
             let draw = (*frame, rng.random());
-            let loss = self.summed_loss(&simulator, prepared, &[draw], Mode::Inference, &self.device)?;
+            let loss = self.summed_loss(&simulator, prepared, &[draw], Mode::Inference, self.device())?;
             sum += f64::from(loss.into_scalar::<f32>());
         }
         Ok(Some(sum / frames.len() as f64))
@@ -354,7 +359,7 @@ impl Trainer<'_> {
         for (index, frames) in by_recording(batch) {
             let recording = &self.recordings[index];
             for frame in frames {
-                if !is_finite(recording.target(frame, &self.device)?.re) {
+                if !is_finite(recording.target(frame, self.device())?.re) {
                     return Ok(Error::NonFinite { stage: format!("frame {frame} of the recording"), step });
                 }
                 let scene = &recording.scene;

@@ -14,7 +14,7 @@ mod residual;
 pub use boxes::{Strongest, strongest};
 pub use parts::{Seen, by_part, by_wall};
 pub use profile::{Profile, profiles};
-pub use residual::Residual;
+pub use residual::{BODY_FACTOR, CELLS_PER_VALUE, Residual};
 
 use super::Evidence;
 use super::finding::Place;

@@ -63,4 +63,4 @@ impl Residual {
 }
 
 /// The body's expected power is trusted to this factor.
-const BODY_FACTOR: f32 = 10.0;
+pub const BODY_FACTOR: f32 = 10.0;

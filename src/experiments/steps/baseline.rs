@@ -36,7 +36,7 @@ pub fn calibrate(
     let mut calibration = Calibration::default();
     for (index, path) in recordings.iter().enumerate() {
         let recording = Recording::open(path)?;
-        calibration.add(&recording, &*open(method, &recording, None, &bench.device)?, CALIBRATION_FRAMES)?;
+        calibration.add(&recording, &*open(method, &recording, None, bench.device())?, CALIBRATION_FRAMES)?;
         step(index + 1, recordings.len());
     }
     write_json(&folder.join("gain.json"), &Gain { gain: calibration.gain()? })
@@ -54,7 +54,7 @@ pub struct Task<'a> {
 
 pub fn simulate(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut(usize, usize)) -> Result<()> {
     let recording = Recording::open(task.recording)?;
-    let baseline = open(task.method, &recording, task.checkpoint, &bench.device)?;
+    let baseline = open(task.method, &recording, task.checkpoint, bench.device())?;
     let gain = task.gain.map(read_json::<Gain>).transpose()?.map_or(1.0, |found| found.gain);
     let rendering = Rendering { baseline: &*baseline, gain, noise: Some(seed_of(task.seed, task.name)) };
     write_frames(folder, &recording, &|_| Ok(()), &mut |frame| rendering.frame(frame), step)

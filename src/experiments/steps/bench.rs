@@ -24,20 +24,22 @@ fn geometry(config: &SimulatorConfig) -> Geometry {
 /// Keeps the recordings of the last training, and the last simulated recording under every geometry asked for: who sees
 /// whom in a frame is the same for most simulators, and dearer than the simulation itself.
 pub struct Bench {
-    pub device: Device,
-    /// Devices that share the frames of a training.
-    pub also: Vec<Device>,
+    /// All share the frames of a training; the first does the rest.
+    pub devices: Vec<Device>,
     training: Option<(Vec<PathBuf>, Geometry, Rc<Vec<LoadedRecording>>)>,
     simulated: (PathBuf, HashMap<Geometry, Rc<LoadedRecording>>),
     lpips: Option<(LpipsConfig, Rc<Lpips>)>,
 }
 
 impl Bench {
-    /// # Panics
-    /// Without any device.
     pub fn new(devices: &[Device]) -> Self {
-        let (device, also) = (devices[0].clone(), devices[1..].to_vec());
-        Self { device, also, training: None, simulated: Default::default(), lpips: None }
+        Self { devices: devices.to_vec(), training: None, simulated: Default::default(), lpips: None }
+    }
+
+    /// # Panics
+    /// Without any.
+    pub fn device(&self) -> &Device {
+        &self.devices[0]
     }
 
     /// Recordings to learn from, together.
@@ -60,7 +62,7 @@ impl Bench {
     pub fn lpips(&mut self, config: &ComparisonConfig) -> Result<Option<Rc<Lpips>>> {
         let Some(wanted) = &config.lpips else { return Ok(None) };
         if self.lpips.as_ref().is_none_or(|(known, _)| known != wanted) {
-            self.lpips = Some((wanted.clone(), Rc::new(Lpips::open(wanted, &self.device)?)));
+            self.lpips = Some((wanted.clone(), Rc::new(Lpips::open(wanted, self.device())?)));
         }
         Ok(self.lpips.as_ref().map(|(_, lpips)| lpips.clone()))
     }

@@ -60,7 +60,7 @@ pub fn recognise(
     bench: &Bench,
     step: &mut dyn FnMut(usize, usize),
 ) -> Result<()> {
-    let found = recognition::run(config, train, test, &bench.device, &mut |stage| match stage {
+    let found = recognition::run(config, train, test, bench.device(), &mut |stage| match stage {
         Stage::Reading { done, of } | Stage::Training { done, of, .. } => step(done, of),
     })?;
     let result = folder.join("classifier");

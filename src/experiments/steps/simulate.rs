@@ -24,7 +24,7 @@ pub struct Task<'a> {
 }
 
 pub fn simulate(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut(usize, usize)) -> Result<()> {
-    let (simulator, config) = open(task.checkpoint, task.graph_at_inference, &bench.device)?;
+    let (simulator, config) = open(task.checkpoint, task.graph_at_inference, bench.device())?;
     let loaded = bench.simulated(task.recording, &config)?;
     let simulation = Simulation::new(&simulator, &loaded.scene, seed_of(task.seed, task.name), true);
     // Where everything is and who is seen; kept for the next method.

@@ -8,7 +8,7 @@ use crate::data::atomic;
 use crate::effects::EffectSetting;
 use crate::error::Result;
 use crate::simulator::SimulatorConfig;
-use crate::training::{Event, Trainer, TrainingConfig, site_from};
+use crate::training::{Event, TrainingConfig};
 
 pub struct Task<'a> {
     pub recordings: &'a [PathBuf],
@@ -36,18 +36,7 @@ pub fn train(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut
     let config_toml = config.to_toml();
     atomic::write_text(folder.join("config.toml"), &config_toml)?;
     let recordings = bench.training(task.recordings, &config.simulator)?;
-    let also = bench.also.clone();
-    let trainer = Trainer {
-        config: &config.training,
-        simulator_config: &config.simulator,
-        seed: config.seed,
-        recordings: &recordings,
-        site: site_from(&recordings, &config.simulator, config.training.start_from.as_deref())?,
-        config_toml: &config_toml,
-        folder,
-        device: bench.device.clone(),
-        also: &also,
-    };
+    let trainer = config.trainer(&recordings, &config_toml, folder, &bench.devices)?;
     let last = folder.join("last");
     atomic::recover(&last)?;
     let mut steps = 0;

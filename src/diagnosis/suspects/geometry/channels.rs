@@ -14,6 +14,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::change::{Change, Moves};
 use super::coupling;
 use crate::diagnosis::power::{PowerModel, part_templates};
+use crate::diagnosis::suspects::slow;
 use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, Rung, statistics};
 use crate::radar::Radar;
 
@@ -63,7 +64,7 @@ struct Mean {
 pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, moves: Moves) -> Vec<Candidate> {
     let receivers = evidence.radar.rx_m.len();
     // One channel whose gain hopped was brought to its own mean, which need not be that of the others.
-    let hopped = evidence.accepted.contains(&crate::diagnosis::suspects::slow::channels::BEHAVES_LIKE);
+    let hopped = evidence.accepted.contains(&slow::channels::BEHAVES_LIKE);
     if receivers < 2 || hopped || evidence.accepted.contains(&"channel_mismatch") {
         return vec![];
     }

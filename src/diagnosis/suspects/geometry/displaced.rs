@@ -12,6 +12,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::change::{Change, Moves, frame_period_s};
 use super::trial::{Score, Trial};
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
+use crate::effects::slope_error;
 
 /// Errors of the prediction that are no finding: metres of range, seconds.
 const RANGE_FLOOR_M: f64 = 4e-3;
@@ -33,9 +34,6 @@ const UNSEEN_M: f64 = 0.2;
 /// Kinds of change that can be told apart, and places of a step, for the correction of the p-value.
 const KINDS: f64 = 3.0;
 const STEPS: f64 = 80.0;
-
-/// Largest relative error that a ramp's slope can have.
-const MOST_SLOPE: f64 = 0.02;
 
 /// An alternative, fitted.
 struct Fitted {
@@ -83,7 +81,9 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
     }
     fitted.extend(clock);
     fitted.extend(lost_frames(trial, &null));
-    fitted.retain(|fit| !evidence.accepted.contains(&fit.id) && (fit.id != "slope_error" || fit.value.abs() <= MOST_SLOPE));
+    // A ramp's slope is wrong by no more than the library allows it.
+    let most_slope = slope_error::INFO.parameters[0].most;
+    fitted.retain(|fit| !evidence.accepted.contains(&fit.id) && (fit.id != "slope_error" || fit.value.abs() <= most_slope));
 
     // A pose has four parameters of which one is fitted: it must be better by what the others could gain.
     let gain = |fit: &Fitted| {

@@ -6,8 +6,9 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::scene::{CELLS_PER_VALUE, Scene};
+use super::scene::Scene;
 use crate::diagnosis::evidence::transform;
+use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Rung};
 use crate::radar::SPEED_OF_LIGHT;

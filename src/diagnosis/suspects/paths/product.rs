@@ -63,7 +63,7 @@ fn mean(channels: &[&[Complex64]]) -> Vec<Complex64> {
 pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
     // Where the receiver bends everything, or products of other kinds are there too, these two are not the cause.
     let bent = ["adc_saturation", harmonic::QUADRATIC].iter().any(|id| scene.evidence.accepted.contains(id));
-    if scene.evidence.is_real() || bent || harmonic::is_mixed(scene.evidence) {
+    if scene.evidence.is_real() || bent || scene.evidence.products().mixed().is_some() {
         return None;
     }
     let clean: Vec<Vec<Vec<Complex64>>> = (0..scene.frames()).map(|frame| denoised::frame(scene.evidence, frame)).collect();
@@ -82,7 +82,7 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
     if found.held_out < super::LEAST_GAIN || p_value > 1e-3 {
         return None;
     }
-    let peak = scene.evidence.cube.samples.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    let peak = scene.evidence.cube.peak();
     let (value, deviation) = (found.factor.norm() * peak, peak * found.deviation.max(0.05 * found.factor.norm()));
     let level_db = 20.0 * value.max(1e-12).log10();
     let (estimate, stage, statement) = match kind {

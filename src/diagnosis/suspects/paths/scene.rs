@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::diagnosis::Evidence;
 use crate::diagnosis::evidence::transform;
+use crate::diagnosis::locate::{BODY_FACTOR, CELLS_PER_VALUE};
 use crate::diagnosis::power::{PowerModel, Template};
 use crate::diagnosis::statistics::median;
 
@@ -15,12 +16,8 @@ const DOPPLER_MARGIN: i64 = 2;
 const SIDELOBE_SAFETY: f64 = 10.0;
 /// Sidelobes below this share of the noise are nothing.
 const SIDELOBE_LEVEL: f64 = 0.3;
-/// The body's expected power is trusted to this factor.
-const BODY_FACTOR: f64 = 10.0;
 /// Whose undoing leaves leakage of the body at fixed ranges.
 const FILTERS: [&str; 2] = ["if_highpass", "if_lowpass"];
-/// Σ |correlation|² of neighbouring cells of two Hann windows: so many cells are one independent value.
-pub const CELLS_PER_VALUE: f64 = 3.78;
 
 /// Powers over the noise, and what is expected of them without any further path, `[frame, doppler, range]`.
 pub struct Scene<'a> {
@@ -99,7 +96,7 @@ impl<'a> Scene<'a> {
                     (range.saturating_sub(1)..(range + 2).min(samples)).map(move |range| row + range)
                 });
                 let loudest = near.map(|near| f64::from(expected[near]) - 1.0).fold(0.0, f64::max);
-                base[cell] = base[cell].max((1.0 + BODY_FACTOR * (loudest + lobes[cell])) as f32);
+                base[cell] = base[cell].max((1.0 + f64::from(BODY_FACTOR) * (loudest + lobes[cell])) as f32);
             }
         });
         self.over_body = true;

@@ -4,7 +4,8 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::scene::{CELLS_PER_VALUE, Scene};
+use super::scene::Scene;
+use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::statistics::{chi2_tail, mean_power_tail};
 use crate::radar::SPEED_OF_LIGHT;
 

@@ -69,7 +69,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         })
         .sum();
     let strength = (amplitudes.iter().map(Complex64::norm_sqr).sum::<f64>() / amplitudes.len() as f64).sqrt();
-    let peak = evidence.cube.samples.iter().map(Complex64::norm_sqr).fold(0.0, f64::max).sqrt();
+    let peak = evidence.cube.peak();
     let level_db = 20.0 * (strength / (peak - strength).max(1e-300)).log10();
     let rate = evidence.radar.sample_rate_hz;
     let wrapped = if fast > 0.5 { fast - 1.0 } else { fast };
@@ -98,14 +98,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         curve: None,
         energy: strength * strength * (frames * channels) as f64 * count,
         correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-            let samples = cube.dims[4];
             let channels = cube.channels();
             let amplitudes = amplitudes_of(cube, slow, fast);
             cube.each_chirp(|[frame, channel, chirp], values| {
                 let amplitude = amplitudes[frame * channels + channel];
-                for (n, value) in values.iter_mut().enumerate().take(samples) {
-                    *value -= amplitude * Complex64::cis(TAU * (slow * chirp as f64 + fast * n as f64));
-                }
+                values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(slow, fast, chirp, n));
             });
         })),
     })
@@ -158,29 +155,30 @@ fn left_over(evidence: &Evidence, (slow, fast): (f64, f64), amplitudes: &[Comple
         (-AROUND..=AROUND).map(|step| (middle + step).rem_euclid(length as i64) as usize).collect()
     };
     let (dopplers, ranges) = (near(slow, loops), near(fast, samples));
-    let excess = |signal: &[Complex64], noise: f64| -> f64 {
-        let map = transform(signal, samples);
-        let cells = dopplers.iter().flat_map(|doppler| ranges.iter().map(move |range| doppler * samples + range));
-        cells.map(|cell| map[cell].norm_sqr() - noise).sum()
-    };
+    let cells: Vec<usize> =
+        dopplers.iter().flat_map(|doppler| ranges.iter().map(move |range| doppler * samples + range)).collect();
+    let tone: Vec<Complex64> = (0..loops * samples).map(|i| tone(slow, fast, i / samples, i % samples)).collect();
+    let tone = transform(&tone, samples);
     let parts: Vec<(usize, usize)> =
         evidence.split.held_out.iter().flat_map(|&frame| (0..channels).map(move |channel| (frame, channel))).collect();
     let (before, after) = parts
         .into_par_iter()
         .map(|(frame, channel)| {
-            let (noise, still) = (evidence.noise()[channel], &evidence.still()[channel * samples..][..samples]);
-            let own = evidence.cube.channel(frame, channel);
-            let mut signal: Vec<Complex64> = own.iter().enumerate().map(|(i, value)| value - still[i % samples]).collect();
-            let before = excess(&signal, noise) / noise.max(1e-300);
-            let amplitude = amplitudes[frame * channels + channel];
-            for (i, value) in signal.iter_mut().enumerate() {
-                let turns = slow * (i / samples) as f64 + fast * (i % samples) as f64;
-                *value -= amplitude * Complex64::cis(TAU * turns.fract());
-            }
-            (before, excess(&signal, noise) / noise.max(1e-300))
+            let map = evidence.range_doppler(frame, channel);
+            let (amplitude, noise) = (amplitudes[frame * channels + channel], evidence.noise()[channel]);
+            let excess = |share: f64| -> f64 {
+                let powers = cells.iter().map(|&cell| (map[cell] - share * amplitude * tone[cell]).norm_sqr() - noise);
+                powers.sum::<f64>() / noise.max(1e-300)
+            };
+            (excess(0.0), excess(1.0))
         })
         .reduce(|| (0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
     after / before.max(1e-300)
+}
+
+/// Of amplitude 1, at a sample of a chirp of a frame.
+fn tone(slow: f64, fast: f64, chirp: usize, sample: usize) -> Complex64 {
+    Complex64::cis(TAU * (slow * chirp as f64 + fast * sample as f64))
 }
 
 /// Least squares of the tone in every frame and channel, `[frame][channel]`, once what stands still is away.

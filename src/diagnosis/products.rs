@@ -1,0 +1,198 @@
+//! Products of the signal with itself, as non-linear receivers make them, measured where neither room nor body can be.
+//!
+//! The denoised signal's square, squared magnitude and cube are transformed like the signal itself; in empty cells one
+//! complex number must relate a product to what was measured, everywhere.
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::denoised;
+use super::evidence::{Evidence, spectrum, transform};
+use super::statistics::{chi2_tail, corrected};
+use super::suspects::receiver::image::empty_bins;
+
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    cross: Complex64,
+    template: f64,
+    found: f64,
+    cells: usize,
+}
+
+/// A product of the signal with itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Product {
+    /// s²
+    Square,
+    /// |s|²
+    Magnitude,
+    /// |s|² s
+    Cube,
+}
+
+impl Product {
+    pub fn of(self, value: Complex64) -> Complex64 {
+        match self {
+            Self::Square => value * value,
+            Self::Magnitude => value.norm_sqr().into(),
+            Self::Cube => value * value.norm_sqr(),
+        }
+    }
+
+    /// For factors that are shares of the peak sample.
+    pub fn scale(self, peak: f64) -> f64 {
+        if self == Self::Cube { 1.0 / (peak * peak) } else { 1.0 / peak }
+    }
+}
+
+/// How much of a product is in the recording.
+#[derive(Clone, Copy)]
+pub struct Law {
+    pub product: Product,
+    pub kappa: Complex64,
+    /// Of κ, complex.
+    pub scatter: f64,
+    pub p_value: f64,
+    /// Of held-out frames.
+    pub gain: f64,
+    pub peak: f64,
+}
+
+/// A magnitude squared at least this large beside a square makes it no harmonic.
+const BESIDE: f64 = 0.3;
+/// Least gain on held-out frames for it, nats.
+const LEAST_GAIN: f64 = 20.0;
+/// Chance below which it is there.
+const SURELY: f64 = 1e-6;
+
+const PRODUCTS: [Product; 3] = [Product::Square, Product::Magnitude, Product::Cube];
+
+/// What was found of each.
+#[derive(Clone, Default)]
+pub struct Products {
+    pub square: Option<Law>,
+    pub magnitude: Option<Law>,
+    pub cube: Option<Law>,
+}
+
+impl Products {
+    /// Nothing of a real recording, or where no cells are empty.
+    pub fn new(evidence: &Evidence) -> Self {
+        let empty = empty_bins(evidence);
+        let peak = evidence.cube.peak();
+        if evidence.is_real() || !empty.contains(&true) || peak <= 0.0 {
+            return Self::default();
+        }
+        let frames = 0..evidence.cube.dims[0];
+        let sums: Vec<[Sums; 3]> = frames.into_par_iter().map(|frame| of_frame(evidence, frame, &empty, peak)).collect();
+        let [square, magnitude, cube] = std::array::from_fn(|index| {
+            let of_product: Vec<Sums> = sums.iter().map(|sums| sums[index]).collect();
+            judged(evidence, PRODUCTS[index], &of_product, peak)
+        });
+        Self { square, magnitude, cube }
+    }
+
+    /// Square and magnitude squared, if the latter is there and nearly as large: no mere second harmonic and no second
+    /// trip. An oscillator that the signal pulls does it, or mixers whose I and Q are bent each on its own. Then nothing
+    /// that stands still, and no tone, can be told from such a product.
+    pub fn mixed(&self) -> Option<Vec<Law>> {
+        let magnitude = self.magnitude.filter(|law| law.p_value < SURELY && law.gain > LEAST_GAIN)?;
+        // A receiver that compresses leaves a little of it too.
+        if self.cube.is_some_and(|cube| cube.gain > magnitude.gain) {
+            return None;
+        }
+        let square = self.square.filter(|law| law.p_value < SURELY);
+        let beside = square.is_none_or(|square| magnitude.kappa.norm() > BESIDE * square.kappa.norm());
+        beside.then(|| square.into_iter().chain([magnitude]).collect())
+    }
+}
+
+/// None where it is not to be expected, or held-out frames are worse with it. `sums`: by frame.
+fn judged(evidence: &Evidence, product: Product, sums: &[Sums], peak: f64) -> Option<Law> {
+    let over = |frames: &[usize]| {
+        frames.iter().fold(Sums::default(), |a, &frame| Sums {
+            cross: a.cross + sums[frame].cross,
+            template: a.template + sums[frame].template,
+            found: a.found + sums[frame].found,
+            cells: a.cells + sums[frame].cells,
+        })
+    };
+    let training = over(&evidence.split.training);
+    if training.template <= 0.0 {
+        return None;
+    }
+    let kappa = training.cross / training.template;
+    let rest = (training.found - kappa.norm_sqr() * training.template) / training.cells.max(1) as f64;
+    // Windowed neighbours share their noise; other things in the cells count as more of it.
+    let widening = 2.25 * rest.max(1.0);
+    let variance = widening / training.template;
+    // Frames must agree on it as well as the noise lets expect.
+    let scatter = jackknife(sums, &evidence.split.training).max(variance.sqrt());
+    let p_value = corrected(chi2_tail(2.0 * kappa.norm_sqr() / (scatter * scatter), 2.0), 2.0);
+    let held_out = over(&evidence.split.held_out);
+    let gain = (2.0 * (kappa.conj() * held_out.cross).re - kappa.norm_sqr() * held_out.template) / widening;
+    // A receiver that expands instead of compressing, or turns phases more than amplitudes, is none.
+    let possible = gain > 0.0 && !(product == Product::Cube && kappa.re > 0.0);
+    possible.then_some(Law { product, kappa, scatter, p_value, gain, peak })
+}
+
+/// Templates are scaled by the peak sample, so that κ is a share of it.
+fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool], peak: f64) -> [Sums; 3] {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let mut sums = [Sums::default(); 3];
+    for channel in 0..evidence.cube.channels() {
+        let noise = evidence.noise()[channel].max(1e-300);
+        let clean = denoised::channel(evidence, frame, channel);
+        let [found, still] = moving_and_still(evidence.cube.channel(frame, channel).to_vec(), samples);
+        for (product, sums) in PRODUCTS.into_iter().zip(&mut sums) {
+            let scale = product.scale(peak);
+            let template = clean.iter().map(|value| product.of(*value) * scale).collect();
+            let [expected, mean] = moving_and_still(template, samples);
+            for range in (0..samples).filter(|&range| empty[range]) {
+                for doppler in 1..loops {
+                    sums.count(found[doppler * samples + range], expected[doppler * samples + range], noise);
+                }
+                // An offset or a leakage is near zero; what stands still elsewhere counts.
+                if range > 8 && range + 8 < samples {
+                    sums.count(still[range], mean[range], noise / loops as f64);
+                }
+            }
+        }
+    }
+    sums
+}
+
+/// The map of what changes within a frame, `[doppler, range]`, and the spectrum of what does not, `[range]`.
+fn moving_and_still(mut signal: Vec<Complex64>, samples: usize) -> [Vec<Complex64>; 2] {
+    let loops = signal.len() / samples;
+    let mut still = vec![Complex64::ZERO; samples];
+    for chirp in signal.chunks_exact(samples) {
+        still.iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value / loops as f64);
+    }
+    for chirp in signal.chunks_exact_mut(samples) {
+        chirp.iter_mut().zip(&still).for_each(|(value, still)| *value -= still);
+    }
+    [transform(&signal, samples), spectrum(&still)]
+}
+
+impl Sums {
+    fn count(&mut self, found: Complex64, expected: Complex64, noise: f64) {
+        // Strangers far above what could be predicted are left out by a bound on their say.
+        let bounded = found * (6.0 * (noise + 0.01 * expected.norm_sqr()).sqrt() / found.norm().max(1e-300)).min(1.0);
+        self.cross += expected.conj() * bounded / noise;
+        self.template += expected.norm_sqr() / noise;
+        self.found += bounded.norm_sqr() / noise;
+        self.cells += 1;
+    }
+}
+
+fn jackknife(sums: &[Sums], training: &[usize]) -> f64 {
+    let all = training.iter().fold((Complex64::ZERO, 0.0), |a, &f| (a.0 + sums[f].cross, a.1 + sums[f].template));
+    let count = training.len() as f64;
+    let spread: f64 = training
+        .iter()
+        .filter(|&&f| all.1 > sums[f].template)
+        .map(|&f| ((all.0 - sums[f].cross) / (all.1 - sums[f].template) - all.0 / all.1).norm_sqr())
+        .sum();
+    (spread * (count - 1.0) / count).sqrt()
+}
