@@ -110,10 +110,7 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         Verdict::NoMismatch => 1.0 - 0.5 * (1.0 - probability_of_nothing(explanation.p_value)),
         _ => probability_of_nothing(explanation.p_value),
     };
-    let held_out: f64 = original.split.held_out.len() as f64 * original.cube.dims[1..].iter().product::<usize>() as f64;
-    let gained: f64 = explanation.accepted.iter().map(|effect| effect.gained(held_out.max(1.0))).sum();
-    let loglik_per_sample = explanation.before.loglik_per_sample + gained;
-    report.fit = Fit { before: explanation.before, after: Misfit { loglik_per_sample, ..explanation.after } };
+    report.fit = Fit { before: explanation.before, after: explanation.after };
     Ok(Diagnosis { report, radar, original, explanation: Some(explanation) })
 }
 

@@ -1,4 +1,4 @@
-//! How well the baseline explains frames that it was not fitted on.
+//! How well frames are explained that nothing was fitted on.
 
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::evidence::{Evidence, transform};
 use super::support::Support;
 
-/// Of the held-out frames.
+/// Of the held-out frames, in the samples as they were recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Misfit {
     /// Of the Gaussian and exponential laws of the cells, nats.
@@ -20,50 +20,172 @@ pub struct Misfit {
 
 /// Below the noise nothing is compared: logarithms of small numbers would decide.
 const FLOOR: f64 = 0.1;
+/// Training frames that say how strong is on average what was taken out.
+const MOST_TRAINING: usize = 16;
+
+/// Sums over cells.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    likelihood: f64,
+    squares: f64,
+    cells: usize,
+    peak: f64,
+}
+
+impl Sums {
+    fn and(self, other: Self) -> Self {
+        Self {
+            likelihood: self.likelihood + other.likelihood,
+            squares: self.squares + other.squares,
+            cells: self.cells + other.cells,
+            peak: self.peak.max(other.peak),
+        }
+    }
+}
 
 impl Misfit {
     /// The static part is what of the training mean can come from the room; the moving part of a cell is expected to
     /// have the power that the same cell's neighbourhood predicts from body and noise.
     pub fn of(evidence: &Evidence) -> Self {
-        let [_, _, _, loops, samples] = evidence.cube.dims;
-        let support = Support::new(&evidence.radar, evidence.room.as_ref());
-        let channels = evidence.cube.channels();
-        let still: Vec<Vec<Complex64>> =
-            (0..channels).map(|channel| support.project(&evidence.still()[channel * samples..][..samples])).collect();
-        let noise = evidence.noise();
-        let bins = evidence.range_bins();
-        // Per frame: the sum of the log-likelihood, of the squared dB differences, cells, the span.
-        let sums = evidence.split.held_out.par_iter().map(|&frame| {
-            let expected_moving = evidence.expected(frame);
-            let (mut likelihood, mut squares, mut peak) = (0.0, 0.0, 1.0f64);
-            for channel in 0..channels {
-                let measured = transform(evidence.cube.channel(frame, channel), samples);
-                let repeated = still[channel].repeat(loops);
-                let predicted = transform(&repeated, samples);
-                let variance = noise[channel].max(f64::MIN_POSITIVE);
-                for doppler in 0..loops {
-                    for range in 0..bins {
-                        let cell = doppler * samples + range;
-                        let spread = f64::from(expected_moving[cell]).max(1.0);
+        Self::after(evidence, evidence)
+    }
+
+    /// The same with effects taken into account, as likelihood of the same samples as before: `explained` has them undone
+    /// or foreseen. Undoing follows each frame's own samples, so what it took out of a held-out frame is no prediction of
+    /// it. It counts as a random signal instead, whose power in a cell is foretold by what was taken out of the other
+    /// channels, or on average of the training frames. Each law, and that nothing was taken out, weighs the same at
+    /// first; every frame and channel says which of them holds (Bayes).
+    pub fn after(recording: &Evidence, explained: &Evidence) -> Self {
+        let [_, _, _, loops, samples] = recording.cube.dims;
+        let support = Support::new(&recording.radar, recording.room.as_ref());
+        let channels = recording.cube.channels();
+        let removed = Removed::new(recording, explained);
+        let still: Vec<Vec<Complex64>> = (0..channels)
+            .map(|channel| {
+                let of = channel * samples..(channel + 1) * samples;
+                let room = support.project(&explained.still()[of.clone()]);
+                room.iter().zip(&removed.still[of]).map(|(room, removed)| room + removed).collect()
+            })
+            .collect();
+        let noise: Vec<f64> =
+            recording.noise().iter().zip(explained.noise()).map(|(a, b)| a.min(*b).max(f64::MIN_POSITIVE)).collect();
+        let bins = recording.range_bins();
+        let of_frame = |&frame: &usize| {
+            let expected_moving = explained.expected(frame);
+            let here = removed.powers(frame, &noise);
+            let of_channel = |channel: usize| {
+                let measured = transform(recording.cube.channel(frame, channel), samples);
+                let predicted = transform(&still[channel].repeat(loops), samples);
+                let variance = noise[channel];
+                let inside = || (0..loops).flat_map(|doppler| (0..bins).map(move |range| doppler * samples + range));
+                let laws = removed.laws(&here, channel);
+                let spread = |cell: usize, law: &Option<Vec<f32>>| {
+                    f64::from(expected_moving[cell]).max(1.0) + law.as_ref().map_or(0.0, |law| f64::from(law[cell]))
+                };
+                let likelihood = |law: &Option<Vec<f32>>| -> f64 {
+                    let of_cell = |cell: usize| {
+                        let spread = spread(cell, law);
                         let residual = (measured[cell] - predicted[cell]).norm_sqr() / variance;
-                        likelihood -= residual / spread + (std::f64::consts::PI * variance * spread).ln();
-                        let seen = measured[cell].norm_sqr() / variance;
-                        let wanted = predicted[cell].norm_sqr() / variance + spread;
-                        squares += (10.0 * (seen.max(FLOOR) / wanted.max(FLOOR)).log10()).powi(2);
-                        peak = peak.max(seen);
-                    }
+                        -residual / spread - (std::f64::consts::PI * variance * spread).ln()
+                    };
+                    inside().map(of_cell).sum()
+                };
+                let each: Vec<f64> = laws.iter().map(likelihood).collect();
+                let most = each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                let weights: Vec<f64> = each.iter().map(|value| (value - most).exp()).collect();
+                let total: f64 = weights.iter().sum();
+                let mut sums = Sums {
+                    likelihood: most + (total / laws.len() as f64).ln(),
+                    cells: loops * bins,
+                    peak: 1.0,
+                    ..Sums::default()
+                };
+                for cell in inside() {
+                    let spread: f64 = laws.iter().zip(&weights).map(|(law, weight)| weight / total * spread(cell, law)).sum();
+                    let seen = measured[cell].norm_sqr() / variance;
+                    let wanted = predicted[cell].norm_sqr() / variance + spread;
+                    sums.squares += (10.0 * (seen.max(FLOOR) / wanted.max(FLOOR)).log10()).powi(2);
+                    sums.peak = sums.peak.max(seen);
                 }
-            }
-            (likelihood, squares, (channels * loops * bins) as f64, peak)
-        });
-        let (likelihood, squares, cells, peak) =
-            sums.reduce(|| (0.0, 0.0, 0.0, 1.0), |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2, a.3.max(b.3)));
-        let cells = cells.max(1.0);
-        let (db_mse, span) = (squares / cells, 10.0 * peak.log10());
+                sums
+            };
+            (0..channels).map(of_channel).fold(Sums::default(), Sums::and)
+        };
+        let sums = recording.split.held_out.par_iter().map(of_frame).reduce(Sums::default, Sums::and);
+        let cells = sums.cells.max(1) as f64;
+        let (db_mse, span) = (sums.squares / cells, 10.0 * sums.peak.max(1.0).log10());
         Self {
-            loglik_per_sample: likelihood / cells,
+            loglik_per_sample: sums.likelihood / cells,
             db_mse,
             psnr_db: 10.0 * (span * span / db_mse.max(f64::MIN_POSITIVE)).log10(),
         }
+    }
+}
+
+/// What the effects took out of the samples.
+struct Removed<'a> {
+    recording: &'a Evidence,
+    explained: &'a Evidence,
+    /// Mean over the training frames, `[channel · sample]`.
+    still: Vec<Complex64>,
+    /// Mean power of the rest over the training frames and over the noise, `[channel][doppler · range]`; none: nothing was
+    /// taken out.
+    usual: Option<Vec<Vec<f32>>>,
+}
+
+impl<'a> Removed<'a> {
+    fn new(recording: &'a Evidence, explained: &'a Evidence) -> Self {
+        let still = recording.still().iter().zip(explained.still()).map(|(before, after)| before - after).collect();
+        let mut removed = Self { recording, explained, still, usual: None };
+        if std::ptr::eq(recording, explained) || recording.cube.samples == explained.cube.samples {
+            return removed;
+        }
+        let training = &recording.split.training;
+        let frames: Vec<usize> = training.iter().copied().step_by(training.len().div_ceil(MOST_TRAINING).max(1)).collect();
+        let size = recording.cube.dims[3] * recording.cube.dims[4];
+        let of_channel = |channel: usize| {
+            let mut mean = vec![0.0f32; size];
+            let noise = recording.noise()[channel].min(explained.noise()[channel]).max(f64::MIN_POSITIVE);
+            for &frame in &frames {
+                let map = removed.map(frame, channel);
+                mean.iter_mut().zip(map).for_each(|(sum, value)| *sum += (value.norm_sqr() / noise) as f32);
+            }
+            mean.iter_mut().for_each(|sum| *sum /= frames.len().max(1) as f32);
+            mean
+        };
+        removed.usual = Some((0..recording.cube.channels()).into_par_iter().map(of_channel).collect());
+        removed
+    }
+
+    /// Range-Doppler map of what was taken out of a frame beyond the mean.
+    fn map(&self, frame: usize, channel: usize) -> Vec<Complex64> {
+        let samples = self.recording.cube.dims[4];
+        let still = self.still[channel * samples..][..samples].iter().cycle();
+        let (before, after) = (self.recording.cube.channel(frame, channel), self.explained.cube.channel(frame, channel));
+        let moving: Vec<Complex64> =
+            before.iter().zip(after).zip(still).map(|((before, after), still)| before - after - still).collect();
+        transform(&moving, samples)
+    }
+
+    /// Power over the noise in a frame, `[channel][doppler · range]`; empty: nothing was taken out.
+    fn powers(&self, frame: usize, noise: &[f64]) -> Vec<Vec<f32>> {
+        let power = |(channel, noise): (usize, &f64)| -> Vec<f32> {
+            self.map(frame, channel).iter().map(|value| (value.norm_sqr() / noise) as f32).collect()
+        };
+        if self.usual.is_some() { noise.iter().enumerate().map(power).collect() } else { vec![] }
+    }
+
+    /// What may be expected of the removed power in a channel; none: nothing.
+    fn laws(&self, here: &[Vec<f32>], channel: usize) -> Vec<Option<Vec<f32>>> {
+        let mut laws = vec![None];
+        if let Some(usual) = &self.usual {
+            laws.push(Some(usual[channel].clone()));
+            let others: Vec<&Vec<f32>> = (0..here.len()).filter(|&other| other != channel).map(|other| &here[other]).collect();
+            if !others.is_empty() {
+                let mean = |cell: usize| others.iter().map(|map| map[cell]).sum::<f32>() / others.len() as f32;
+                laws.push(Some((0..here[channel].len()).map(mean).collect()));
+            }
+        }
+        laws
     }
 }

@@ -114,6 +114,14 @@ impl PowerModel {
         self.cells.loops * self.cells.samples
     }
 
+    /// Weight of a part's power at a cosine of the angle between its normal and the way to the radar, both lobes together.
+    pub fn reflectivity(&self, part: usize, cosine: f64) -> f64 {
+        let of = |(lobe, &exponent): (usize, &i32)| {
+            self.weights.get(part * LOBES.len() + lobe).copied().unwrap_or(0.0) * cosine.max(0.0).powi(exponent)
+        };
+        LOBES.iter().enumerate().map(of).sum()
+    }
+
     /// Expected power of some parts alone (such as a limb), `[doppler, range]`.
     pub fn of_parts(&self, frame: usize, parts: impl Fn(usize) -> bool) -> Vec<f32> {
         let mut map = vec![0.0; self.size()];

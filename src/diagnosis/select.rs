@@ -11,7 +11,7 @@ use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
 use super::suspects::receiver::harmonic;
-use super::suspects::{SUSPECTS, Suspect, excess};
+use super::suspects::{SUSPECTS, Suspect, excess, paths};
 
 impl DiagnosisConfig {
     /// Limit of one suspect's p-value.
@@ -49,18 +49,6 @@ pub struct Accepted {
     /// Of the held-out frames, without and with it.
     pub before: Misfit,
     pub after: Misfit,
-}
-
-impl Accepted {
-    /// Log-likelihood per sample that all cells of the held-out frames gain, of `samples`. Where samples are changed, by
-    /// undoing a filter or emptying cells, likelihoods before and after are not of the same data: then it is what the
-    /// suspect's own test gains, which is less.
-    pub fn gained(&self, samples: f64) -> f64 {
-        match self.candidate.correction {
-            Correction::Body(_) => self.after.loglik_per_sample - self.before.loglik_per_sample,
-            _ => self.candidate.gain / samples,
-        }
-    }
 }
 
 /// What the rounds left behind.
@@ -121,7 +109,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         progress(&best.statement);
         pending = passing.iter().map(|(_, other)| other.clone()).filter(|other| !std::ptr::eq(other, best)).collect();
         let next = evidence.with(best);
-        let after = Misfit::of(&next);
+        let after = Misfit::after(&original, &next);
         accepted.push(Accepted {
             suspect: *suspect,
             candidate: best.clone(),
@@ -134,15 +122,18 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         current = Some(next);
     }
     let accepted = verified(&original, accepted, thresholds);
-    let evidence = accepted.iter().fold(original, |evidence, effect| evidence.with(&effect.candidate));
-    let after = Misfit::of(&evidence);
+    let evidence = accepted.iter().fold(original.clone(), |evidence, effect| evidence.with(&effect.candidate));
+    let mut after = Misfit::after(&original, &evidence);
+    // What changes neither samples nor prediction, such as a law of the noise, gains what its own test says.
+    let held_out = original.split.held_out.len() * original.cube.channels() * original.cube.dims[3] * original.range_bins();
+    let unseen = accepted.iter().filter(|effect| matches!(effect.candidate.correction, Correction::None));
+    after.loglik_per_sample += unseen.map(|effect| effect.candidate.gain).sum::<f64>() / held_out.max(1) as f64;
     Explanation { accepted, evidence, p_value: p_value.unwrap_or(1.0), before, after }
 }
 
 /// Whether a candidate is what was accepted already and could not be removed in full: a second instance of an effect must
 /// lie at another place.
 fn is_same(accepted: &Candidate, candidate: &Candidate) -> bool {
-    let apart = |a: Option<[f64; 2]>, b: Option<[f64; 2]>| matches!((a, b), (Some(a), Some(b)) if a[1] < b[0] || b[1] < a[0]);
     let (old, new) = (&accepted.place, &candidate.place);
     accepted.id == candidate.id
         && accepted.behaves_like == candidate.behaves_like
@@ -160,9 +151,17 @@ fn is_rough(candidate: &Candidate) -> bool {
     candidate.id.is_none() && ROUGH.contains(&candidate.behaves_like)
 }
 
-/// Whether a candidate may be no more than what a rough correction left.
+/// Whether a candidate may be no more than what a rough correction left, or what a moving path left around its range.
 fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
-    (is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE) && candidate.gain < ROUGHLY * accepted.gain
+    let is_path = |candidate: &Candidate| {
+        candidate.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_none_or(|id| paths::MANY.contains(&id))
+    };
+    let beside = is_path(accepted) && is_path(candidate) && !apart(accepted.place.range_m, candidate.place.range_m);
+    (is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside) && candidate.gain < ROUGHLY * accepted.gain
+}
+
+fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> bool {
+    matches!((a, b), (Some(a), Some(b)) if a[1] < b[0] || b[1] < a[0])
 }
 
 /// What every suspect has to say.

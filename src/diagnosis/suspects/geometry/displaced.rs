@@ -34,6 +34,8 @@ const UNSEEN_M: f64 = 0.2;
 /// Kinds of change that can be told apart, and places of a step, for the correction of the p-value.
 const KINDS: f64 = 3.0;
 const STEPS: f64 = 80.0;
+/// How overconfident the likelihood of a step is: cells are not independent, and the power model is rough.
+const STEP_INFLATION: f64 = 3.0;
 
 /// An alternative, fitted.
 struct Fitted {
@@ -160,7 +162,8 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
     let frames: Vec<usize> = (0..trial.evidence.cube.dims[0]).collect();
     let training = &trial.evidence.split.training;
     let mut best: Option<(f64, Change)> = None;
-    for count in 1..=MOST_LOST.min(frames.len() / 4) {
+    let most_lost = MOST_LOST.min(frames.len() / 4);
+    for count in 1..=most_lost {
         // All frames later by so many: what follows the step, whenever it is.
         let later = trial.score(Change::Drop { at: 0, count }, training, false);
         for at in 2..frames.len().saturating_sub(count + 1) {
@@ -173,54 +176,39 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
     }
     let (_, change) = best?;
     let Change::Drop { at, count } = change else { return None };
-    // The weights were those of the unchanged body: with their own, neighbouring places may be better.
+    // The weights were those of the unchanged body: with their own, other places and counts may be better.
     let interesting = null.gain_over(&trial.score(change, training, true), training) < 0.0;
-    let reach = if interesting { 4 } else { 0 };
-    let near = (at.saturating_sub(reach).max(1)..=at + reach).map(|at| Change::Drop { at, count });
+    let (reach, counts) = if interesting { (4, 1..=most_lost) } else { (0, count..=count) };
+    let near = counts.flat_map(|count| (at.saturating_sub(reach).max(1)..=at + reach).map(move |at| Change::Drop { at, count }));
     let change = near
+        .filter(|change| matches!(change, Change::Drop { at, .. } if *at < frames.len()))
         .map(|change| (trial.score(change, training, true).gain_over(null, training), change))
         .max_by(|a, b| a.0.total_cmp(&b.0))?
         .1;
+    let Change::Drop { count, .. } = change else { return None };
     let score = trial.score(change, &frames, true);
-    // A step is all or nothing: its scatter is that of the frames' gains.
-    let gains: Vec<f64> = training
-        .iter()
-        .filter(|&&frame| score.inside[frame])
-        .map(|&frame| score.by_frame[frame] - null.by_frame[frame])
-        .collect();
-    let mean = gains.iter().sum::<f64>() / gains.len().max(1) as f64;
-    let scatter: f64 = gains.iter().map(|gain| (gain - mean).powi(2)).sum();
-    let inflation = (scatter / gains.iter().map(|gain| gain.abs()).sum::<f64>().max(1e-9)).max(1.0);
-    Some(Fitted { id: "frame_drop", value: count as f64, deviation: 0.0, floor: 0.0, inflation, score })
+    Some(Fitted { id: "frame_drop", value: count as f64, deviation: 0.0, floor: 0.0, inflation: STEP_INFLATION, score })
 }
 
-/// Under the null: a value beyond its floor by so many deviations; for a step, gains whose sum exceeds their scatter.
+/// Under the null: a value beyond its floor by so many deviations; for a step, so much gained.
 fn p_value(fit: &Fitted, null: &Score, training: &[usize]) -> f64 {
     let gains: Vec<f64> = training
         .iter()
         .filter(|&&frame| fit.score.inside[frame] && null.inside[frame])
         .map(|&frame| fit.score.by_frame[frame] - null.by_frame[frame])
         .collect();
-    let sign = match fit.score.change {
-        // Only frames after the step can say anything.
-        Change::Drop { .. } => {
-            let changed: Vec<f64> = gains.into_iter().filter(|gain| *gain != 0.0).collect();
-            let count = changed.len() as f64;
-            let mean = changed.iter().sum::<f64>() / count.max(1.0);
-            let variance = changed.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-            (mean / (variance / count.max(1.0)).sqrt().max(1e-12), count - 1.0, STEPS)
-        }
-        _ => {
-            let excess = (fit.value.abs() - fit.floor).max(0.0);
-            (excess / fit.deviation.max(1e-12), gains.len() as f64 - 1.0, KINDS)
-        }
-    };
-    let (t, freedom, tried) = sign;
+    if let Change::Drop { .. } = fit.score.change {
+        // A ratio of likelihoods exceeds e^x by chance with probability e^-x at most (Ville).
+        let gain = gains.iter().sum::<f64>() / fit.inflation;
+        return crate::diagnosis::statistics::corrected((-gain).exp().min(1.0), STEPS);
+    }
+    let excess = (fit.value.abs() - fit.floor).max(0.0);
+    let (t, freedom) = (excess / fit.deviation.max(1e-12), gains.len() as f64 - 1.0);
     if freedom < 3.0 || !t.is_finite() {
         return 1.0;
     }
     let tail = StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| 2.0 * law.sf(t.max(0.0)));
-    crate::diagnosis::statistics::corrected(tail.min(1.0), tried)
+    crate::diagnosis::statistics::corrected(tail.min(1.0), KINDS)
 }
 
 fn mean_range_m(trial: &Trial) -> f64 {

@@ -82,7 +82,8 @@ impl<'a> Trial<'a> {
                 .zip(&reach.measured)
                 .map(|(&expected, &power)| heavy_tailed(power, expected) - heavy_tailed(power, 1.0));
             score.by_frame[frame] = self.empty[frame] + change.sum::<f64>();
-            score.inside[frame] = inside;
+            // A step is so long that a body carried straight on shows it all the same, and shows none where there is none.
+            score.inside[frame] = inside || matches!(score.change, Change::Drop { .. });
         }
         score
     }

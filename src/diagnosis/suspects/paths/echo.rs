@@ -64,7 +64,7 @@ pub fn matches(scene: &Scene, template: impl Fn(usize, usize) -> Vec<Complex64> 
     (0..scene.frames())
         .into_par_iter()
         .map(|frame| {
-            let (taken, base) = (scene.taken(frame), scene.base(frame));
+            let (taken, base) = (scene.reached(frame), scene.base(frame));
             let mut sum = Match::default();
             for (channel, noise) in noise.iter().enumerate() {
                 let measured = scene.evidence.range_doppler(frame, channel);
@@ -176,7 +176,7 @@ fn shifted_matches(scene: &Scene, shifts: usize) -> Vec<Vec<Match>> {
         .into_par_iter()
         .map(|frame| {
             let mut sums = vec![Match::default(); shifts];
-            let (taken, base, support) = (scene.taken(frame), scene.base(frame), scene.model.support(frame));
+            let (taken, base, support) = (scene.reached(frame), scene.base(frame), scene.model.support(frame));
             let sources: Vec<usize> = (0..support.len()).filter(|&cell| support[cell] && scene.map(frame)[cell] > 4.0).collect();
             for (channel, noise) in noise.iter().enumerate() {
                 let map = scene.evidence.range_doppler(frame, channel);

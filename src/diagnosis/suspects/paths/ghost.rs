@@ -25,6 +25,9 @@ pub struct Ghost {
     pub coefficient: f64,
 }
 
+/// Rough skin returns as much to every side as at this cosine.
+const ROUGH: f64 = 0.1;
+
 /// One ghost per boundary of the room.
 pub fn ghosts(scene: &Scene) -> Vec<Ghost> {
     let Some(room) = &scene.evidence.room else { return vec![] };
@@ -79,37 +82,52 @@ fn templates(scene: &Scene, boundary: Boundary, distance_m: f64, twice: bool) ->
         .par_iter()
         .map(|points| {
             let returns = points.iter().map(|point| {
-                let (range_m, velocity, power) = mirrored_return(radar, point, boundary, distance_m, twice);
-                (range_m, velocity, power * scene.model.weights.get(point.part).copied().unwrap_or(0.0))
+                let image = mirrored_return(radar, point, boundary, distance_m, twice);
+                (image.range_m, image.velocity_mps, image.spread * scene.model.reflectivity(point.part, image.cosine))
             });
             scene.model.template(returns)
         })
         .collect()
 }
 
-/// Range (half the length of the path), its rate, and power of one point before the part's weight.
-pub fn mirrored_return(radar: &Radar, point: &Point, boundary: Boundary, distance_m: f64, twice: bool) -> (f64, f64, f64) {
+/// One point of the body, seen by way of a mirror.
+pub struct Mirrored {
+    /// Half the length of the path.
+    pub range_m: f64,
+    pub velocity_mps: f64,
+    /// Of its area over the ranges' fourth power.
+    pub spread: f64,
+    /// Between its normal and the middle of the two ways.
+    pub cosine: f64,
+}
+
+pub fn mirrored_return(radar: &Radar, point: &Point, boundary: Boundary, distance_m: f64, twice: bool) -> Mirrored {
     let (axis, sign) = boundary.axis();
     let mut image = *point;
     image.position_m[axis] = 2.0 * sign * distance_m - point.position_m[axis];
     image.velocity_mps[axis] *= -1.0;
-    image.normal[axis] *= -1.0;
     let (near_m, near_mps) = range_and_velocity(radar, point.position_m, point.velocity_mps);
     let (far_m, far_mps) = range_and_velocity(radar, image.position_m, image.velocity_mps);
-    let (near, far) = (facing(radar, point), facing(radar, &image));
     let (near_m, far_m) = (near_m.max(0.1), far_m.max(0.1));
-    if twice {
-        (far_m, far_mps, point.area_m2 * far * far / far_m.powi(4))
+    let near = way(radar, point.position_m);
+    // From the point itself the mirrored way leaves towards the radar's image.
+    let mut far = way(radar, image.position_m);
+    far[axis] *= -1.0;
+    let half: [f64; 3] = if twice { far } else { std::array::from_fn(|i| near[i] + far[i]) };
+    let length = half.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
+    let cosine = (half.iter().zip(point.normal).map(|(a, b)| a * b).sum::<f64>() / length).max(ROUGH);
+    let (range_m, velocity_mps, ranges) = if twice {
+        (far_m, far_mps, far_m.powi(4))
     } else {
-        (0.5 * (near_m + far_m), 0.5 * (near_mps + far_mps), point.area_m2 * near * far / (near_m * far_m).powi(2))
-    }
+        (0.5 * (near_m + far_m), 0.5 * (near_mps + far_mps), (near_m * far_m).powi(2))
+    };
+    Mirrored { range_m, velocity_mps, spread: point.area_m2 / ranges, cosine }
 }
 
-/// Cosine between a point's normal and the way to the radar; rough skin returns a little to every side.
-fn facing(radar: &Radar, point: &Point) -> f64 {
-    const ROUGH: f64 = 0.1;
+/// Unit vector to the radar.
+fn way(radar: &Radar, from_m: [f64; 3]) -> [f64; 3] {
     let centre = radar.centre_m();
-    let way: [f64; 3] = std::array::from_fn(|axis| centre[axis] - point.position_m[axis]);
+    let way: [f64; 3] = std::array::from_fn(|axis| centre[axis] - from_m[axis]);
     let length = way.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
-    (way.iter().zip(point.normal).map(|(a, b)| a * b).sum::<f64>() / length).max(ROUGH)
+    way.map(|x| x / length)
 }

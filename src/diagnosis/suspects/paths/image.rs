@@ -21,9 +21,9 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
     if let (Some(body), Some(room)) = (&evidence.body, &evidence.room) {
         let distance = room.distance_m(ghost.boundary).unwrap_or(0.0);
         for point in body.frames.iter().flatten() {
-            let (range, velocity, _) = mirrored_return(&evidence.radar, point, ghost.boundary, distance, false);
-            (low, high) = (low.min(range), high.max(range));
-            (slow, fast) = (slow.min(velocity), fast.max(velocity));
+            let image = mirrored_return(&evidence.radar, point, ghost.boundary, distance, false);
+            (low, high) = (low.min(image.range_m), high.max(image.range_m));
+            (slow, fast) = (slow.min(image.velocity_mps), fast.max(image.velocity_mps));
         }
     }
     let name = ghost.boundary.name();

@@ -9,6 +9,7 @@ mod product;
 mod removal;
 mod scene;
 mod still_point;
+mod swing;
 mod track;
 
 #[cfg(test)]
@@ -22,6 +23,8 @@ use scene::Scene;
 const AGREEING: f64 = 0.6;
 /// Least gain on held-out frames that is worth a name, nats.
 const LEAST_GAIN: f64 = 6.0;
+/// Of a track that follows the law of a thing that moves: faint products of two paths come near it.
+const LEAST_GAIN_TRACK: f64 = 12.0;
 /// Of a track that follows no law of motion: remains of a strong path that was taken out look like that.
 const LEAST_GAIN_UNNAMED: f64 = 25.0;
 /// Of a second path: it must be no remains of the first.
@@ -31,10 +34,12 @@ const NEARLY: f64 = 0.5;
 /// Kinds of answers that this family may give: every one is a chance to be wrong.
 const TRIED: f64 = 6.0;
 
+/// How behaviours of paths begin.
+pub const PATH_LIKE: &str = "path-like";
 pub const OVER_THE_BODY: &str = "path-like, over the body";
 
 /// Effects of which there may be several.
-const MANY: [&str; 3] = ["wall_ghost", "floor_bounce", "moving_reflector"];
+pub const MANY: [&str; 3] = ["wall_ghost", "floor_bounce", "moving_reflector"];
 
 /// Mirror images of the body at the room's boundaries, and movers that are none.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -44,7 +49,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         let elsewhere = moving.iter().any(|found| found.gain > LEAST_GAIN);
         found.extend(moving);
         if !elsewhere {
-            found.extend(over_the_body(&scene.over_the_body()));
+            let swing = swing::strongest(&scene);
+            let over = scene.over_the_body();
+            let swing = swing.map(|mover| mover.candidate(&over, TRIED)).filter(|found| found.gain > LEAST_GAIN);
+            let track = over_the_body(&over);
+            found.extend(swing.into_iter().chain(track).max_by(|a, b| a.gain.total_cmp(&b.gain)));
         }
     }
     let again = |id: &str| evidence.accepted.contains(&id);
@@ -78,7 +87,7 @@ fn moving(scene: &Scene) -> Vec<Candidate> {
     let mut found = vec![];
     match (best, mover) {
         (Some(ghost), _) if ghost.gain > mover_gain => found.push(image::candidate(scene, ghost, &ghosts, TRIED * boundaries)),
-        (_, Some(mover)) if mover.gain > if mover.id.is_some() { LEAST_GAIN } else { LEAST_GAIN_UNNAMED } => {
+        (_, Some(mover)) if mover.gain > if mover.id.is_some() { LEAST_GAIN_TRACK } else { LEAST_GAIN_UNNAMED } => {
             found.push(mover.candidate(scene, TRIED))
         }
         _ => {}

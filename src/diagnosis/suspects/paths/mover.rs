@@ -28,6 +28,8 @@ pub struct Mover {
     /// Held-out frames, nats.
     pub gain: f64,
     pub power: f64,
+    /// Why it is not the body.
+    pub unlike: &'static str,
 }
 
 impl Mover {
@@ -53,7 +55,12 @@ impl Mover {
         let id = id.map(|id| if outside(scene, &track.sightings) { "range_alias" } else { id });
         // Where the body is, what moves with it has the same law: only a swing to one side of it is told.
         let id = id.filter(|_| !scene.over_body || (pendulum.is_some() && aside(scene, &track.sightings)));
-        Some(Self { track, pendulum, id, gain, power })
+        let unlike = if scene.over_body {
+            "far stronger than the body can be at that range and velocity"
+        } else {
+            "neither the body nor its mirror images can be there"
+        };
+        Some(Self { track, pendulum, id, gain, power, unlike })
     }
 
     pub fn candidate(&self, scene: &Scene, tried: f64) -> Candidate {
@@ -124,15 +131,11 @@ impl Mover {
             None => " Its range and its Doppler do not belong together: no single reflector moves so.",
             _ => "",
         };
-        let instead = if scene.over_body {
-            "far stronger than the body can be at that range and velocity"
-        } else {
-            "neither the body nor its mirror images can be there"
-        };
         let statement = format!(
-            "Something {:.2} m away{whereabouts} {motion}, {:.0} dB above the noise; {instead}.{alias}",
+            "Something {:.2} m away{whereabouts} {motion}, {:.0} dB above the noise; {}.{alias}",
             mean_m,
-            10.0 * self.power.log10()
+            10.0 * self.power.log10(),
+            self.unlike
         );
         let nothing = vec![false; scene.size()];
         let cells: Vec<(usize, Vec<usize>)> = (0..scene.frames())
@@ -159,7 +162,7 @@ impl Mover {
             p_value: corrected(self.track.p_value, tried),
             gain: self.gain,
             rung: Rung::F,
-            look_alikes: if self.id == Some("range_alias") { vec!["moving_reflector"] } else { vec![] },
+            look_alikes: self.look_alikes(scene),
             statement,
             curve: None,
             energy: energy(scene, sightings.iter().map(|s| s.power).sum()),
@@ -168,6 +171,17 @@ impl Mover {
                     empty_cells(cube, &still, *frame, cells);
                 }
             })),
+        }
+    }
+}
+
+impl Mover {
+    /// With quadrature, what is folded at the end of the unambiguous range looks as if it were there.
+    fn look_alikes(&self, scene: &Scene) -> Vec<&'static str> {
+        match self.id {
+            Some("range_alias") => vec!["moving_reflector"],
+            Some("moving_reflector") if !scene.evidence.is_real() => vec!["range_alias"],
+            _ => vec![],
         }
     }
 }

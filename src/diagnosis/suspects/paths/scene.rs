@@ -28,10 +28,12 @@ pub struct Scene<'a> {
     pub bins: usize,
     /// Channels that a power is the mean of.
     pub channels: f64,
-    /// Cells where the body, its sidelobes, or remains of the room can be.
-    pub taken: Vec<bool>,
+    /// Cells where the body or remains of the room can be.
+    taken: Vec<bool>,
+    /// These, and where the body's sidelobes reach: they move in step with it.
+    reached: Vec<bool>,
     /// Expected power in the other cells: noise, and what other imperfections smear along a range or a Doppler.
-    pub base: Vec<f32>,
+    base: Vec<f32>,
     /// Whether cells of the body are free too, for what is far stronger than the body.
     pub over_body: bool,
     /// By range, how many times [`Evidence::noise`] the variance of noise in complex maps is that powers count as one.
@@ -50,31 +52,44 @@ impl<'a> Scene<'a> {
         let visited = visited_ranges(model, frames, loops, samples);
         let clutter = still_power(evidence);
         let maps = evidence.maps();
-        let (taken, base): (Vec<Vec<bool>>, Vec<Vec<f32>>) = (0..frames)
+        let made: Vec<(Vec<bool>, Vec<bool>, Vec<f32>)> = (0..frames)
             .into_par_iter()
             .map(|frame| {
                 let map = &maps[frame * size..(frame + 1) * size];
-                let mut taken = sidelobes(map, model.support(frame), loops, samples);
-                for (cell, taken) in taken.iter_mut().enumerate() {
-                    let doppler = (cell / samples).min(loops - cell / samples) as i64;
-                    let range = cell % samples;
-                    *taken |= range >= bins || (doppler <= STILL_BINS && visited[range]) || doppler == 0;
+                let support = grown(model.support(frame), loops, samples);
+                let lobes = lobes(map, model.support(frame), loops, samples);
+                let never = |cell: usize| {
+                    let (doppler, range) = (cell / samples, cell % samples);
+                    let still = doppler.min(loops - doppler) as i64;
+                    range >= bins || (still <= STILL_BINS && visited[range]) || still == 0
+                };
+                let taken: Vec<bool> = (0..size).map(|cell| support[cell] || never(cell)).collect();
+                // What other imperfections smear is told where no sidelobes are.
+                let near = |cell: usize| lobes[cell] * SIDELOBE_SAFETY > SIDELOBE_LEVEL;
+                let reached: Vec<bool> = (0..size).map(|cell| taken[cell] || near(cell)).collect();
+                let mut base = floor(map, &reached, &clutter, loops, samples);
+                for cell in (0..size).filter(|&cell| near(cell)) {
+                    base[cell] = base[cell].max((1.0 + SIDELOBE_SAFETY * lobes[cell]) as f32);
                 }
-                let base = floor(map, &taken, &clutter, loops, samples);
-                (taken, base)
+                (taken, reached, base)
             })
-            .unzip();
-        let (taken, mut base) = (taken.concat(), base.concat());
-        let levels = noise_levels(maps, &taken, &evidence.split.training, loops, samples, bins);
+            .collect();
+        let (mut taken, mut reached, mut base) = (vec![], vec![], vec![]);
+        for (taken_here, reached_here, base_here) in made {
+            taken.extend(taken_here);
+            reached.extend(reached_here);
+            base.extend(base_here);
+        }
+        let levels = noise_levels(maps, &reached, &evidence.split.training, loops, samples, bins);
         base.par_chunks_exact_mut(samples).for_each(|row| {
             row.iter_mut().zip(&levels).for_each(|(base, level)| *base = base.max(*level as f32));
         });
         if FILTERS.iter().any(|filter| evidence.accepted.contains(filter)) {
-            raise_for_leakage(&mut base, maps, &taken, model, frames, loops, samples);
+            raise_for_leakage(&mut base, maps, &reached, model, frames, loops, samples);
         }
         let channels = evidence.cube.channels() as f64;
         let shape = shape(evidence);
-        Some(Self { evidence, model, loops, samples, bins, channels, taken, base, over_body: false, shape })
+        Some(Self { evidence, model, loops, samples, bins, channels, taken, reached, base, over_body: false, shape })
     }
 
     /// The same with the body's cells free, where its expected power is trusted to a factor only.
@@ -117,6 +132,10 @@ impl<'a> Scene<'a> {
 
     pub fn taken(&self, frame: usize) -> &[bool] {
         &self.taken[frame * self.size()..(frame + 1) * self.size()]
+    }
+
+    pub fn reached(&self, frame: usize) -> &[bool] {
+        &self.reached[frame * self.size()..(frame + 1) * self.size()]
     }
 
     pub fn base(&self, frame: usize) -> &[f32] {
@@ -164,24 +183,27 @@ impl<'a> Scene<'a> {
     }
 
     /// The weight (≥ 0) of templates `[frame]` that some frames' powers make most likely, over a grid of tenths of a
-    /// decade around the ratio of energies.
+    /// decade below the ratio of energies: the base is more than what is there.
     pub fn weight(&self, frames: &[usize], templates: &[Template]) -> f64 {
         let (mut above, mut below) = (0.0, 0.0);
         for &frame in frames {
             for (&cell, &power) in templates[frame].cells.iter().zip(&templates[frame].power) {
-                above += f64::from(self.map(frame)[cell as usize] - self.base(frame)[cell as usize]);
+                above += f64::from((self.map(frame)[cell as usize] - self.base(frame)[cell as usize]).max(0.0));
                 below += f64::from(power);
             }
         }
         if above <= 0.0 || below <= 0.0 {
             return 0.0;
         }
-        let best = (-10..=8)
-            .into_par_iter()
-            .map(|step| above / below * 10f64.powf(f64::from(step) / 10.0))
-            .map(|weight| (weight, self.gains(frames, templates, weight)))
-            .reduce(|| (0.0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
-        best.0
+        let best = |steps: &mut dyn Iterator<Item = i32>| {
+            let tried: Vec<i32> = steps.collect();
+            let gain = |step: i32| self.gains(frames, templates, above / below * 10f64.powf(f64::from(step) / 10.0));
+            let gains: Vec<(i32, f64)> = tried.into_par_iter().map(|step| (step, gain(step))).collect();
+            gains.into_iter().filter(|(_, gain)| *gain > 0.0).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(step, _)| step)
+        };
+        let Some(coarse) = best(&mut (-10..=3).map(|step| 3 * step)) else { return 0.0 };
+        let fine = best(&mut (coarse - 2..=coarse + 2)).unwrap_or(coarse);
+        above / below * 10f64.powf(f64::from(fine) / 10.0)
     }
 
     /// Ranges in metres of a box of bins.
@@ -266,7 +288,7 @@ fn shape(evidence: &Evidence) -> Vec<f64> {
 }
 
 /// Range bins that the body has power in during some frame.
-fn visited_ranges(model: &PowerModel, frames: usize, loops: usize, samples: usize) -> Vec<bool> {
+pub fn visited_ranges(model: &PowerModel, frames: usize, loops: usize, samples: usize) -> Vec<bool> {
     let mut visited = vec![false; samples];
     for frame in 0..frames {
         for doppler in 0..loops {
@@ -298,18 +320,15 @@ fn hann_envelope(cells: f64) -> f64 {
     (1.0 / (std::f64::consts::PI * x * (x * x - 1.0))).powi(2).min(1.0)
 }
 
-/// The support, wider along Doppler, and where sidelobes of the measured power reach.
-fn sidelobes(map: &[f32], support: &[bool], loops: usize, samples: usize) -> Vec<bool> {
-    let mut taken = support.to_vec();
-    for cell in (0..map.len()).filter(|&cell| support[cell]) {
-        let (doppler, range) = (cell / samples, cell % samples);
+/// The support, wider along Doppler.
+fn grown(support: &[bool], loops: usize, samples: usize) -> Vec<bool> {
+    let mut grown = support.to_vec();
+    for cell in (0..support.len()).filter(|&cell| support[cell]) {
         for step in -DOPPLER_MARGIN..=DOPPLER_MARGIN {
-            taken[(doppler as i64 + step).rem_euclid(loops as i64) as usize * samples + range] = true;
+            grown[((cell / samples) as i64 + step).rem_euclid(loops as i64) as usize * samples + cell % samples] = true;
         }
     }
-    let lobes = lobes(map, support, loops, samples);
-    taken.iter_mut().zip(lobes).for_each(|(taken, lobe)| *taken |= lobe * SIDELOBE_SAFETY > SIDELOBE_LEVEL);
-    taken
+    grown
 }
 
 /// Upper bounds of the powers that the windows' sidelobes carry from a map's cells within the support.

@@ -109,7 +109,7 @@ fn surprise(scene: &Scene, frame: usize) -> Surprise {
 }
 
 /// Centre of gravity of the power around a peak, and where it arrives from.
-fn sighting(scene: &Scene, frame: usize, cell: usize) -> Sighting {
+pub fn sighting(scene: &Scene, frame: usize, cell: usize) -> Sighting {
     let map = scene.map(frame);
     // The peak may lie beside the most unlikely cell.
     let neighbours = |cell: usize| -> Vec<(i64, i64, usize)> {

@@ -36,6 +36,8 @@ const ENOUGH: f64 = 0.8;
 const LEFT_OVER: f64 = 0.01;
 /// Beyond doubt, nats.
 const PLAIN: f64 = 50.0;
+/// What is over within a chirp is no decay that was seen: the first chirp may lack what each leaves to the next.
+const FEWEST_LOOPS: f64 = 0.5;
 
 impl Settling {
     /// Whether this is a decay, and not the best decay for something else: a line that is locked to the frames, say.
@@ -44,6 +46,7 @@ impl Settling {
         self.held_out_gain > ENOUGH * self.free.held_out_gain
             && (rest < PLAIN || rest < LEFT_OVER * self.free.held_out_gain)
             && self.amplitude.re.abs() > self.amplitude.im.abs()
+            && self.loops > FEWEST_LOOPS
     }
 
     /// Relative to the settled state.

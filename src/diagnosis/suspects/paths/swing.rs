@@ -1,0 +1,248 @@
+//! A thing that swings among the body's returns: frame by frame it drowns in them, but its frames together follow one law.
+//! Every swing is tried against what the body is expected to be (a bank of templates), then the best one is fitted.
+
+use rayon::prelude::*;
+
+use super::mover::{Mover, middle_s};
+use super::pendulum::Pendulum;
+use super::scene::{Scene, visited_ranges};
+use super::track::{Sighting, Track, sighting};
+use crate::diagnosis::locate::CELLS_PER_VALUE;
+
+/// Doppler bins on either side of zero that hold remains of what stands still.
+const STILL_BINS: i64 = 2;
+/// Powers over the noise at the peak that are tried.
+const LEVELS: [f32; 8] = [4.0, 10.0, 25.0, 63.0, 160.0, 400.0, 1000.0, 4000.0];
+/// Rates are tried up to this.
+const FASTEST_HZ: f64 = 4.0;
+/// Swings that are tried: the smallest, the ratio to the next, how many.
+const SWINGS: (f64, f64, usize) = (0.02, 1.5, 8);
+const PHASES: usize = 16;
+/// Training frames that the bank is laid over.
+const MOST_FRAMES: usize = 48;
+/// Degrees of freedom of the heavy tail of powers about their mean.
+const TAIL: f32 = 8.0;
+/// Power over what else is expected from which on a frame shows the swing itself.
+const PLAIN: f32 = 4.0;
+/// Steps by which the fit closes in.
+const STEPS: usize = 24;
+
+/// Expected powers without a swing, `[frame][doppler · samples + range]`; infinite where nothing can be seen.
+struct Ground<'a> {
+    scene: &'a Scene<'a>,
+    expected: Vec<Vec<f32>>,
+}
+
+/// mean, sine, cosine (metres), rate (Hz).
+type Law = [f64; 4];
+
+/// None where nothing gains.
+pub fn strongest(scene: &Scene) -> Option<Mover> {
+    let ground = Ground::new(scene);
+    let training: Vec<usize> = scene.evidence.split.training.iter().copied().take(MOST_FRAMES).collect();
+    let (first, last) = (*training.first()?, *training.last()?);
+    let length_s = middle_s(scene, last) - middle_s(scene, first);
+    if length_s <= 0.0 {
+        return None;
+    }
+    let table = ground.table(&training);
+    let visited = visited_ranges(scene.model, scene.frames(), scene.loops, scene.samples);
+    let ranges: Vec<usize> = (0..scene.bins).filter(|&range| visited[range]).collect();
+    let step_hz = 0.1 / length_s;
+    let rates: Vec<f64> = (4..(FASTEST_HZ / step_hz) as usize).map(|step| step as f64 * step_hz).collect();
+    let times: Vec<f64> = training.iter().map(|&frame| middle_s(scene, frame)).collect();
+    let bank = |&rate_hz: &f64| -> Option<(f32, Law)> {
+        let omega = std::f64::consts::TAU * rate_hz;
+        let mut best: Option<(f32, Law)> = None;
+        for swing_m in (0..SWINGS.2).map(|step| SWINGS.0 * SWINGS.1.powi(step as i32)) {
+            if omega * swing_m * scene.model.cells.doppler_per_mps < (STILL_BINS + 1) as f64 {
+                continue;
+            }
+            for phase in 0..PHASES {
+                let (sine, cosine) = (std::f64::consts::TAU * phase as f64 / PHASES as f64).sin_cos();
+                let law = [0.0, swing_m * sine, swing_m * cosine, rate_hz];
+                let places: Vec<(i64, i64)> = times
+                    .iter()
+                    .map(|&time| {
+                        let (range_m, velocity) = at(law, time);
+                        let (doppler, range) = scene.model.cells.place(range_m, velocity);
+                        (doppler.round() as i64, range.round() as i64)
+                    })
+                    .collect();
+                for &range in &ranges {
+                    let gain = table.gain(&places, range as i64);
+                    if best.is_none_or(|best| gain > best.0) {
+                        best = Some((gain, [scene.range_m(range as f64), law[1], law[2], rate_hz]));
+                    }
+                }
+            }
+        }
+        best
+    };
+    let (_, law) = rates.par_iter().filter_map(bank).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (law, power) = ground.fitted(law, length_s, &training);
+    let gain = |frames: &[usize]| ground.gain(law, power, frames) / CELLS_PER_VALUE;
+    let held_out = gain(&scene.evidence.split.held_out);
+    let tried = (rates.len() * SWINGS.2 * PHASES * ranges.len() * LEVELS.len()) as f64;
+    let p_value = (tried.ln() - gain(&training)).min(0.0).exp();
+    let sightings: Vec<Sighting> = (0..scene.frames()).filter_map(|frame| ground.sighting(law, frame)).collect();
+    let swing = law[1].hypot(law[2]);
+    let pendulum = Pendulum {
+        mean_m: law[0],
+        sine_m: law[1],
+        cosine_m: law[2],
+        rate_hz: law[3],
+        left: 0.0,
+        deviations: [0.2 * scene.range_m(1.0), 0.1 * swing, 0.05 / length_s],
+    };
+    (!sightings.is_empty()).then_some(Mover {
+        track: Track { sightings, p_value },
+        pendulum: Some(pendulum),
+        id: Some("moving_reflector"),
+        gain: held_out,
+        power: f64::from(power),
+        unlike: "its frames follow one swing, which the body's returns around it do not",
+    })
+}
+
+/// Range and velocity.
+fn at([mean_m, sine_m, cosine_m, rate_hz]: Law, time_s: f64) -> (f64, f64) {
+    let omega = std::f64::consts::TAU * rate_hz;
+    let (sine, cosine) = (omega * time_s).sin_cos();
+    (mean_m + sine_m * sine + cosine_m * cosine, omega * (sine_m * cosine - cosine_m * sine))
+}
+
+/// Log-likelihoods gained by a swing's power in a place, `[frame][doppler · bins + range]` for each level.
+struct Table {
+    frames: Vec<Vec<[f32; LEVELS.len()]>>,
+    loops: i64,
+    bins: i64,
+}
+
+impl Table {
+    /// Of the level that explains most.
+    fn gain(&self, places: &[(i64, i64)], range: i64) -> f32 {
+        let mut sums = [0.0f32; LEVELS.len()];
+        for (cells, &(doppler, step)) in self.frames.iter().zip(places) {
+            let range = range + step;
+            if (0..self.bins).contains(&range) {
+                let cell = &cells[(doppler.rem_euclid(self.loops) * self.bins + range) as usize];
+                sums.iter_mut().zip(cell).for_each(|(sum, gain)| *sum += gain);
+            }
+        }
+        sums.into_iter().fold(f32::NEG_INFINITY, f32::max)
+    }
+}
+
+impl<'a> Ground<'a> {
+    fn new(scene: &'a Scene<'a>) -> Self {
+        let (loops, samples, bins) = (scene.loops, scene.samples, scene.bins);
+        let of_frame = |frame: usize| -> Vec<f32> {
+            let (body, support, base) = (scene.model.expected(frame), scene.model.support(frame), scene.base(frame));
+            let loudest = |doppler: usize, range: usize| {
+                let rows = [doppler, (doppler + 1) % loops, (doppler + loops - 1) % loops];
+                let ranges = range.saturating_sub(1)..(range + 2).min(samples);
+                rows.into_iter().flat_map(|row| ranges.clone().map(move |range| body[row * samples + range])).fold(1.0, f32::max)
+            };
+            (0..loops * samples)
+                .map(|cell| {
+                    let (doppler, range) = (cell / samples, cell % samples);
+                    if range >= bins || doppler.min(loops - doppler) as i64 <= STILL_BINS {
+                        f32::INFINITY
+                    } else if support[cell] {
+                        loudest(doppler, range)
+                    } else {
+                        base[cell].max(loudest(doppler, range))
+                    }
+                })
+                .collect()
+        };
+        Self { scene, expected: (0..scene.frames()).into_par_iter().map(of_frame).collect() }
+    }
+
+    /// Of one cell.
+    fn cell(&self, frame: usize, cell: usize, more: f32) -> f32 {
+        let expected = self.expected[frame][cell];
+        if expected.is_infinite() {
+            return 0.0;
+        }
+        let power = self.scene.map(frame)[cell];
+        let law = |expected: f32| -expected.ln() - (TAIL + 1.0) * (power / (TAIL * expected)).ln_1p();
+        law(expected + more) - law(expected)
+    }
+
+    fn table(&self, frames: &[usize]) -> Table {
+        /// Share of the peak beside it, for a place that is known to half a cell.
+        const BESIDE: f32 = 0.3;
+        let (loops, samples, bins) = (self.scene.loops, self.scene.samples, self.scene.bins);
+        let of_frame = |&frame: &usize| {
+            let mut cells = vec![[0.0; LEVELS.len()]; loops * bins];
+            for (place, gains) in cells.iter_mut().enumerate() {
+                let (doppler, range) = (place / bins, place % bins);
+                for (level, gain) in LEVELS.into_iter().zip(gains) {
+                    for (row, slow) in [(doppler, 1.0), ((doppler + 1) % loops, BESIDE), ((doppler + loops - 1) % loops, BESIDE)]
+                    {
+                        for near in range.saturating_sub(1)..(range + 2).min(bins) {
+                            let fast = if near == range { 1.0 } else { BESIDE };
+                            *gain += self.cell(frame, row * samples + near, level * slow * fast);
+                        }
+                    }
+                }
+            }
+            cells
+        };
+        Table { frames: frames.par_iter().map(of_frame).collect(), loops: loops as i64, bins: bins as i64 }
+    }
+
+    fn gain(&self, law: Law, power: f32, frames: &[usize]) -> f64 {
+        let of_frame = |&frame: &usize| -> f64 {
+            let (range_m, velocity) = at(law, middle_s(self.scene, frame));
+            let template = self.scene.model.template([(range_m, velocity, 1.0)].into_iter());
+            let shown = template.iter().enumerate().filter(|(_, share)| **share > 0.01);
+            shown.map(|(cell, share)| f64::from(self.cell(frame, cell, power * share))).sum()
+        };
+        frames.par_iter().map(of_frame).sum()
+    }
+
+    /// The best law and power near a first guess: one after another is moved as long as that helps, then by less.
+    fn fitted(&self, law: Law, length_s: f64, frames: &[usize]) -> (Law, f32) {
+        let cell_m = self.scene.range_m(1.0);
+        let swing = law[1].hypot(law[2]);
+        let mut width = [0.5 * cell_m, 0.25 * swing, 0.25 * swing, 0.05 / length_s, 0.5];
+        let gain = |now: [f64; 5]| self.gain([now[0], now[1], now[2], now[3]], now[4].exp() as f32, frames);
+        let start = |level: f32| [law[0], law[1], law[2], law[3], f64::from(level).ln()];
+        let mut now = LEVELS.into_iter().map(start).max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(start(LEVELS[0]));
+        let mut best = gain(now);
+        for _ in 0..STEPS {
+            let mut moved = false;
+            for axis in 0..now.len() {
+                for sign in [-1.0, 1.0] {
+                    let mut other = now;
+                    other[axis] += sign * width[axis];
+                    let found = gain(other);
+                    if found > best {
+                        (now, best, moved) = (other, found, true);
+                    }
+                }
+            }
+            if !moved {
+                width.iter_mut().for_each(|width| *width *= 0.6);
+            }
+        }
+        ([now[0], now[1], now[2], now[3]], now[4].exp() as f32)
+    }
+
+    /// Where a frame shows the swing itself, plainly more than all else.
+    fn sighting(&self, law: Law, frame: usize) -> Option<Sighting> {
+        let (range_m, velocity) = at(law, middle_s(self.scene, frame));
+        let (doppler, range) = self.scene.model.cells.place(range_m, velocity);
+        let range = range.round();
+        if !(0.0..self.scene.bins as f64).contains(&range) {
+            return None;
+        }
+        let row = (doppler.round() as i64).rem_euclid(self.scene.loops as i64) as usize;
+        let cell = row * self.scene.samples + range as usize;
+        let plain = self.scene.map(frame)[cell] > PLAIN * self.expected[frame][cell];
+        plain.then(|| Sighting { range_m, velocity_mps: velocity, ..sighting(self.scene, frame, cell) })
+    }
+}
