@@ -76,6 +76,8 @@ pub struct Judgement {
     pub parameters: Vec<Covered>,
     /// Nothing detectable is there, and the stated limit is not below the truth.
     pub limit_holds: Option<bool>,
+    /// Nothing is claimed, and the report says of everything that is there that no such recording can show it.
+    pub said_hidden: bool,
 }
 
 fn word(effect: &Value) -> String {
@@ -107,12 +109,16 @@ pub fn judge(case: &str, truth: &Truth, report: &std::result::Result<Report, Str
         left_unnamed: None,
         parameters: vec![],
         limit_holds: None,
+        said_hidden: false,
     };
     let Ok(report) = report else { return judgement };
     let ids: Vec<&str> = truth.ids().into_iter().flatten().collect();
     judgement.verdict = report.verdict.clone();
     judgement.claims = report.claims();
     judgement.named = report.effects.iter().map(|effect| effect.id.clone()).collect();
+    let hidden = |id: &&str| report.not_detectable.iter().any(|limit| limit.id == **id && limit.at_most_db.is_none());
+    judgement.said_hidden =
+        !judgement.claims && !ids.is_empty() && ids.len() == truth.ids().len() && ids.iter().all(|id| hidden(&id));
     for (found, id) in judgement.found.iter_mut().zip(truth.ids()) {
         *found = id.is_some_and(|id| report.effects.iter().any(|reported| stands_for(reported, id)));
     }
@@ -254,7 +260,11 @@ mod tests {
         let verdict = if effects == json!([]) && unexplained == json!([]) { "no_mismatch" } else { "explained" };
         Ok(report(json!({
             "verdict": verdict, "effects": effects, "unexplained": unexplained,
-            "not_detectable": [{"id": "breathing", "at_most_db": -25.0}, {"id": "spur", "at_most_db": -40.0}],
+            "not_detectable": [
+                {"id": "breathing", "at_most_db": -25.0},
+                {"id": "spur", "at_most_db": -40.0},
+                {"id": "part_reflectivity", "at_most_db": null},
+            ],
             "fit": {"before": {}, "after": {}},
         })))
     }
@@ -326,6 +336,8 @@ mod tests {
         assert_eq!(judge("a", &weak("breathing"), &silent).limit_holds, Some(true));
         assert_eq!(judge("a", &weak("spur"), &silent).limit_holds, Some(false));
         assert_eq!(judge("a", &weak("slope_error"), &silent).limit_holds, None);
+        assert!(!judge("a", &weak("spur"), &silent).said_hidden && !judge("a", &weak("slope_error"), &silent).said_hidden);
+        assert!(judge("a", &weak("part_reflectivity"), &silent).said_hidden);
         let failed = judge("a", &weak("spur"), &Err("no answer".into()));
         assert_eq!((failed.failure.as_deref(), failed.claims), (Some("no answer"), false));
     }

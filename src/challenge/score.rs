@@ -337,6 +337,11 @@ fn rows(cases: &[Case], psychometric: Option<Logistic>) -> Vec<Row> {
         ),
         share("concealed effects detected", concealed.iter().map(|case| case.judgement.claims), Aim::AtLeast(0.8)),
         share(
+            "concealed effects detected, or said to be such that no recording of this kind can show them",
+            concealed.iter().map(|case| case.judgement.claims || case.judgement.said_hidden),
+            Aim::None,
+        ),
+        share(
             "concealed effects of the library, detected and named, look-alikes allowed",
             concealed_library.iter().map(|case| case.judgement.found.iter().all(|&found| found)),
             Aim::None,

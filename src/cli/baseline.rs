@@ -114,10 +114,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     });
     atomic::write_text(folder.path().join("baseline.json"), &format!("{about:#}\n"))?;
     folder.finish()?;
-    println!("simulated {frames} frames, {seconds_per_frame:.3} s each: {}", out.display());
-    println!("  recording/     IF samples as a recording folder");
-    println!("  baseline.json  settings, gain, time");
-    println!("  *.png          heatmaps");
+    say!("simulated {frames} frames, {seconds_per_frame:.3} s each: {}", out.display());
+    say!("  recording/     IF samples as a recording folder");
+    say!("  baseline.json  settings, gain, time");
+    say!("  *.png          heatmaps");
     Ok(())
 }
 

@@ -121,8 +121,8 @@ fn seal(arguments: &Seal, common: &Common) -> Result<()> {
     let sealed = seal::seal(&config, arguments.seed.as_deref(), &arguments.out, shard, &|done| progress.set(done));
     progress.finish();
     let commitment = sealed?;
-    println!("sealed {} cases in {}", commitment.cases, arguments.out.display());
-    println!("publish before anybody diagnoses: root {}", commitment.root);
+    say!("sealed {} cases in {}", commitment.cases, arguments.out.display());
+    say!("publish before anybody diagnoses: root {}", commitment.root);
     Ok(())
 }
 
@@ -149,11 +149,11 @@ fn answer(arguments: &Run, common: &Common) -> Result<()> {
     let answers = answer::run(&arguments.challenge, &arguments.out, &config, &mut |done| progress.set(done));
     progress.finish();
     let answers = answers?;
-    println!("{} reports, {} failures in {}", answers.reports.len(), answers.failures.len(), arguments.out.display());
+    say!("{} reports, {} failures in {}", answers.reports.len(), answers.failures.len(), arguments.out.display());
     if answers.complete {
-        println!("publish before the truths are opened: {}", answers.sha256);
+        say!("publish before the truths are opened: {}", answers.sha256);
     } else {
-        println!("not complete yet: the same command goes on");
+        say!("not complete yet: the same command goes on");
     }
     Ok(())
 }
@@ -163,7 +163,7 @@ fn twins(arguments: &Twins, common: &Common) -> Result<()> {
     let progress = Progress::new("twins", answer::waiting(&arguments.challenge, &arguments.out, &config)?, common.quiet);
     let done = twins::run(&arguments.challenge, &arguments.answers, &arguments.out, &config, &mut |done| progress.set(done));
     progress.finish();
-    println!("{} twins diagnosed in {}", done?, arguments.out.display());
+    say!("{} twins diagnosed in {}", done?, arguments.out.display());
     Ok(())
 }
 
@@ -175,7 +175,7 @@ fn score(arguments: &Score, common: &Common) -> Result<()> {
     let scored = scored?;
     let out = arguments.out.clone().unwrap_or_else(|| arguments.answers.join("score"));
     scored.write(&out)?;
-    println!("{}", scored.markdown());
-    println!("results: {}", out.join("results.md").display());
+    say!("{}", scored.markdown());
+    say!("results: {}", out.join("results.md").display());
     Ok(())
 }

@@ -28,7 +28,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let path = &arguments.path;
     if path.join("checkpoint.toml").is_file() {
         let state = checkpoint::read_state(path)?;
-        println!(
+        say!(
             "checkpoint of hybridsim {}, {} epochs, best in epoch {}",
             state.version,
             state.progress.epochs_done,
@@ -50,10 +50,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     if let Some(record) = &config.record {
         let world = record.world(path.parent().unwrap_or(Path::new("")))?;
-        println!("a recording to be made:");
+        say!("a recording to be made:");
         show_radar(&world.radar, Some(&world.room));
     }
-    println!("resolved configuration:\n\n{}", config.to_toml());
+    say!("resolved configuration:\n\n{}", config.to_toml());
     Ok(())
 }
 
@@ -64,7 +64,7 @@ fn draw(recording: &Recording, out: &Path) -> Result<()> {
     let samples = (0..frames).map(|frame| evaluation::measured_frame(recording, frame)).collect::<Result<Vec<_>>>()?.concat();
     report::Pictures::new(&recording.radar, &HeatmapConfig::default()).show(folder.path(), &samples)?;
     folder.finish()?;
-    println!("  heatmaps           {}", out.display());
+    say!("  heatmaps           {}", out.display());
     Ok(())
 }
 
@@ -73,12 +73,12 @@ const MOST_DRAWN: usize = 600;
 
 fn show_recording(folder: &Path) -> Result<Recording> {
     let recording = Recording::open(folder)?;
-    println!("recording: {}", folder.display());
+    say!("recording: {}", folder.display());
     show_radar(&recording.radar, recording.room.as_ref());
     match recording.person() {
         Some(person) => {
             let times = person.pose_times_s();
-            println!(
+            say!(
                 "  person             {} faces, {} poses from {:.2} s to {:.2} s",
                 person.faces().len(),
                 times.len(),
@@ -86,7 +86,7 @@ fn show_recording(folder: &Path) -> Result<Recording> {
                 times[times.len() - 1]
             );
         }
-        None => println!("  person             none: only what needs no tracked body will work"),
+        None => say!("  person             none: only what needs no tracked body will work"),
     }
     for note in &recording.notes {
         eprintln!("note: {note}");
@@ -95,23 +95,19 @@ fn show_recording(folder: &Path) -> Result<Recording> {
     for frame in 0..recording.radar.frames {
         recording.frame(frame)?;
     }
-    println!("  samples            all {} frames can be read", recording.radar.frames);
+    say!("  samples            all {} frames can be read", recording.radar.frames);
     Ok(recording)
 }
 
 fn show_radar(radar: &Radar, room: Option<&Room>) {
     let [frames, tx, rx, loops, samples] = radar.dims();
-    println!("  frames x tx x rx x loops x samples   {frames} x {tx} x {rx} x {loops} x {samples}");
-    println!("  carrier            {:.3} GHz, wavelength {:.3} mm", radar.carrier_hz() / 1e9, radar.wavelength_m() * 1e3);
-    println!("  bandwidth          {:.3} GHz", radar.bandwidth_hz() / 1e9);
-    println!("  range              {:.3} m resolution, up to {:.2} m", radar.range_resolution_m(), radar.max_range_m());
-    println!(
-        "  velocity           {:.3} m/s resolution, up to {:.2} m/s",
-        radar.velocity_resolution_mps(),
-        radar.max_velocity_mps()
-    );
+    say!("  frames x tx x rx x loops x samples   {frames} x {tx} x {rx} x {loops} x {samples}");
+    say!("  carrier            {:.3} GHz, wavelength {:.3} mm", radar.carrier_hz() / 1e9, radar.wavelength_m() * 1e3);
+    say!("  bandwidth          {:.3} GHz", radar.bandwidth_hz() / 1e9);
+    say!("  range              {:.3} m resolution, up to {:.2} m", radar.range_resolution_m(), radar.max_range_m());
+    say!("  velocity           {:.3} m/s resolution, up to {:.2} m/s", radar.velocity_resolution_mps(), radar.max_velocity_mps());
     match room {
-        Some(room) => println!(
+        Some(room) => say!(
             "  room               {}",
             room.boundaries()
                 .into_iter()
@@ -119,11 +115,11 @@ fn show_radar(radar: &Radar, room: Option<&Room>) {
                 .collect::<Vec<_>>()
                 .join(", ")
         ),
-        None => println!("  room               none: only what needs no walls will work"),
+        None => say!("  room               none: only what needs no walls will work"),
     }
     for check in radar::checks(radar, room.and_then(Room::farthest_wall_m), None) {
         match check.passed {
-            Some(true) => println!("  ok       {} ({})", check.rule, check.found),
+            Some(true) => say!("  ok       {} ({})", check.rule, check.found),
             Some(false) => eprintln!("warning: {} does not hold ({}): {}", check.rule, check.found, check.reason),
             None => {}
         }

@@ -57,11 +57,11 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     progress.finish();
     for (name, found) in &evaluations {
-        println!("{name}");
+        say!("{name}");
         print!("{}", scores::of_frames(found));
     }
     if let (true, Some(summary)) = (evaluations.len() > 1, scores::summary(&evaluations)) {
-        println!("together");
+        say!("together");
         print!("{}", scores::of_sequences(&summary));
     }
     if let Some(out) = out {

@@ -96,6 +96,5 @@ fn tell_result(diagnosis: &Diagnosis, out: &Path) {
         let _ = writeln!(text, "  {:<24}         {}", "(no name)", unexplained.statement);
     }
     let _ = writeln!(text, "report: {}", out.join("report.html").display());
-    // Whoever reads may have closed the pipe: the report is written.
-    let _ = std::io::Write::write_all(&mut std::io::stdout(), text.as_bytes());
+    super::tell(&text);
 }

@@ -77,12 +77,12 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         let evaluation =
             evaluation::evaluate(&recording, &simulation, &frames, &state.heatmap, &metrics, lpips.as_ref(), &mut observe)?;
         progress.finish();
-        println!("{}", folder.display());
+        say!("{}", folder.display());
         print!("{}", scores::of_frames(&evaluation));
         evaluations.push((folder.display().to_string(), evaluation));
     }
     if let (true, Some(summary)) = (evaluations.len() > 1, scores::summary(&evaluations)) {
-        println!("together");
+        say!("together");
         print!("{}", scores::of_sequences(&summary));
     }
     if let Some(out) = &arguments.out.out {

@@ -128,9 +128,9 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let simulation = Simulation::new(&simulator, scene, state.seed, !arguments.clean);
     simulated::write(folder.path(), &sequence, &state.heatmap, common.quiet, &mut |frame| simulation.frame(frame))?;
     folder.finish()?;
-    println!("simulated {} frames: {}", radar.frames, out.display());
-    println!("  recording/   IF samples as a recording folder");
-    println!("  *.png        heatmaps");
+    say!("simulated {} frames: {}", radar.frames, out.display());
+    say!("  recording/   IF samples as a recording folder");
+    say!("  *.png        heatmaps");
     Ok(())
 }
 

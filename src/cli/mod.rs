@@ -3,6 +3,11 @@
 //! Results go to standard output, progress and warnings to standard error. Exit status: 0 done, 1 failed,
 //! 2 wrong usage, configuration or input.
 
+/// A line on standard output.
+macro_rules! say {
+    ($($text:tt)*) => { $crate::cli::tell(&format!("{}\n", format_args!($($text)*))) };
+}
+
 mod baseline;
 mod challenge;
 mod check;
@@ -29,6 +34,11 @@ use clap::{Args, Parser, Subcommand};
 use crate::error::{Error, Result};
 
 pub use device::{available, device, devices};
+
+/// Text on standard output. Whoever reads may have closed the pipe: what was made is made.
+fn tell(text: &str) {
+    let _ = std::io::Write::write_all(&mut std::io::stdout(), text.as_bytes());
+}
 
 /// Simulate mmWave radar recordings of moving people, and learn the physics from recordings.
 #[derive(Parser)]

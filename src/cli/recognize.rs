@@ -55,6 +55,6 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let result = result?;
     recognition::write(&result, &config, &arguments.out)?;
     print!("{}", recognition::text(&result));
-    println!("\nresult: {}", arguments.out.display());
+    say!("\nresult: {}", arguments.out.display());
     Ok(())
 }

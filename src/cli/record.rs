@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         }
         None => recorded(record, &arguments.config, common.quiet)?,
     };
-    println!("recording: {}", folder.display());
+    say!("recording: {}", folder.display());
     Ok(())
 }
 

@@ -191,10 +191,10 @@ impl RunReport<'_> {
         self.write_numbers(&evaluations)?;
         self.write_report(&evaluations, !split.validation.is_empty())?;
         for (folder, evaluation) in &evaluations {
-            println!("{}", folder.display());
+            say!("{}", folder.display());
             print!("{}", scores::of_frames(evaluation));
         }
-        println!("report: {}", self.folder.join("report.md").display());
+        say!("report: {}", self.folder.join("report.md").display());
         Ok(())
     }
 

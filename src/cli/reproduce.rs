@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     progress.finish();
     let results = results::collect(&plan, &store, &records)?;
     report::write(&out, &config, &results, &command(arguments, common))?;
-    println!("results: {}", out.join("results.md").display());
+    say!("results: {}", out.join("results.md").display());
     Ok(())
 }
 
@@ -76,6 +76,5 @@ fn list(plan: &Plan, out: &Path) {
         text += &format!("{state}  {}\n", stage.key.folder());
     }
     text += &format!("{done} of {} stages are done, in {seconds:.0} s\n", plan.stages.len());
-    // Whoever reads may have closed the pipe.
-    let _ = std::io::Write::write_all(&mut std::io::stdout(), text.as_bytes());
+    super::tell(&text);
 }

@@ -37,7 +37,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         progress.finish();
     }
     let made = made?;
-    println!("site: {}", arguments.out.display());
-    println!("{} of {} sequences: {} recorded, {} kept", made.sequences, made.of, made.recorded, made.kept);
+    say!("site: {}", arguments.out.display());
+    say!("{} of {} sequences: {} recorded, {} kept", made.sequences, made.of, made.recorded, made.kept);
     Ok(())
 }

@@ -78,19 +78,21 @@ impl Cube {
 
     /// Mean over all chirps of some frames, `[tx · rx, sample]`.
     pub fn still(&self, frames: &[usize]) -> Vec<Complex64> {
-        let (channels, samples) = (self.channels(), self.dims[4]);
-        let mut mean = vec![Complex64::ZERO; channels * samples];
-        for &frame in frames {
-            for channel in 0..channels {
-                for chirp in self.channel(frame, channel).chunks_exact(samples) {
-                    mean[channel * samples..][..samples].iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value);
-                }
-            }
-        }
-        let count = (frames.len() * self.dims[3]).max(1) as f64;
-        mean.iter_mut().for_each(|value| *value /= count);
-        mean
+        let samples = self.dims[4];
+        let chirps = |channel: usize| frames.iter().flat_map(move |&frame| self.channel(frame, channel).chunks_exact(samples));
+        (0..self.channels()).flat_map(|channel| mean_chirp(chirps(channel), samples)).collect()
     }
+}
+
+/// Mean of some chirps; zero of none.
+pub fn mean_chirp<'a>(chirps: impl Iterator<Item = &'a [Complex64]>, samples: usize) -> Vec<Complex64> {
+    let (mut mean, mut count) = (vec![Complex64::ZERO; samples], 0.0f64);
+    for chirp in chirps {
+        mean.iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value);
+        count += 1.0;
+    }
+    mean.iter_mut().for_each(|value| *value /= count.max(1.0));
+    mean
 }
 
 impl Loaded {

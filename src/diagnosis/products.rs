@@ -6,6 +6,7 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::cube::mean_chirp;
 use super::denoised;
 use super::evidence::{Evidence, spectrum, transform};
 use super::statistics::{chi2_tail, corrected};
@@ -164,11 +165,7 @@ fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool], peak: f64) -> [Su
 
 /// The map of what changes within a frame, `[doppler, range]`, and the spectrum of what does not, `[range]`.
 fn moving_and_still(mut signal: Vec<Complex64>, samples: usize) -> [Vec<Complex64>; 2] {
-    let loops = signal.len() / samples;
-    let mut still = vec![Complex64::ZERO; samples];
-    for chirp in signal.chunks_exact(samples) {
-        still.iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value / loops as f64);
-    }
+    let still = mean_chirp(signal.chunks_exact(samples), samples);
     for chirp in signal.chunks_exact_mut(samples) {
         chirp.iter_mut().zip(&still).for_each(|(value, still)| *value -= still);
     }

@@ -174,9 +174,18 @@ fn suspicions(evidence: &Evidence) -> Vec<(usize, Candidate)> {
     SUSPECTS.par_iter().enumerate().flat_map_iter(ask).collect()
 }
 
+/// How likely a look-alike is beforehand, against the one that it looks like.
+fn prior(id: &str) -> f64 {
+    match id {
+        // It must lie beyond the unambiguous range, and be stronger by the fourth power of that to be seen at all.
+        "range_alias" => 0.1,
+        _ => 1.0,
+    }
+}
+
 /// Rivals of the effect accepted last: they passed beside it and have nothing left to say now that it is in place.
 fn settle_rivals(last: &mut Accepted, pending: &[Candidate], passing: &[&(usize, Candidate)], thresholds: &DiagnosisConfig) {
-    let mut weight = 1.0 + last.candidate.look_alikes.len() as f64;
+    let mut weight = 1.0 + last.candidate.look_alikes.iter().map(|id| prior(id)).sum::<f64>();
     for rival in pending {
         let Some(id) = rival.id else { continue };
         let silent = !passing.iter().any(|(_, candidate)| candidate.id == Some(id));

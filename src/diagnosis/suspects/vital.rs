@@ -12,6 +12,7 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 use super::region::{Region, remove};
+use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::evidence::{Evidence, hann};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
 use crate::diagnosis::statistics;
@@ -61,10 +62,7 @@ fn frames(evidence: &Evidence) -> Frames {
         .map(|frame| {
             (0..channels)
                 .flat_map(|channel| {
-                    let mut sum = vec![Complex64::ZERO; samples];
-                    for chirp in evidence.cube.channel(frame, channel).chunks_exact(samples) {
-                        sum.iter_mut().zip(chirp).for_each(|(s, v)| *s += v / loops as f64);
-                    }
+                    let mut sum = mean_chirp(evidence.cube.channel(frame, channel).chunks_exact(samples), samples);
                     sum.iter_mut().zip(&window).for_each(|(s, w)| *s *= w);
                     fft.process(&mut sum);
                     sum.truncate(bins);

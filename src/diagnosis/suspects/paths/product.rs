@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::echo::{Fit, fit, matches};
 use super::scene::Scene;
+use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::denoised;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::statistics::corrected;
@@ -132,7 +133,9 @@ fn fitted(scene: &Scene, clean: &[Vec<Vec<Complex64>>], kind: Kind) -> (Fit, f64
     let samples = scene.samples;
     let judge = |products: &[Vec<Vec<Complex64>>]| {
         // As in the measured maps, what stands still in all frames is left out.
-        let still: Vec<Vec<Complex64>> = (0..products[0].len()).map(|channel| mean_chirp(products, channel, samples)).collect();
+        let still: Vec<Vec<Complex64>> = (0..products[0].len())
+            .map(|channel| mean_chirp(products.iter().flat_map(|frame| frame[channel].chunks_exact(samples)), samples))
+            .collect();
         let moving = |frame: usize, channel: usize| -> Vec<Complex64> {
             products[frame][channel].iter().enumerate().map(|(i, value)| value - still[channel][i % samples]).collect()
         };
@@ -158,15 +161,6 @@ fn fitted(scene: &Scene, clean: &[Vec<Vec<Complex64>>], kind: Kind) -> (Fit, f64
     }
     let energy = products.iter().flatten().flatten().map(|value| (found.factor * value).norm_sqr()).sum();
     (found, energy)
-}
-
-/// Over all frames and loops.
-fn mean_chirp(frames: &[Vec<Vec<Complex64>>], channel: usize, samples: usize) -> Vec<Complex64> {
-    let mut mean = vec![Complex64::ZERO; samples];
-    let chirps = frames.iter().flat_map(|frame| frame[channel].chunks_exact(samples));
-    let weight = 1.0 / chirps.clone().count() as f64;
-    chirps.for_each(|chirp| mean.iter_mut().zip(chirp).for_each(|(mean, value)| *mean += value * weight));
-    mean
 }
 
 /// Undoes it in two steps, which are enough for what is small.

@@ -34,59 +34,70 @@ const UNDECIDED: f64 = 4.6;
 /// p-value below which a candidate is passed on.
 const PASSED_ON: f64 = 0.01;
 
+/// A candidate of this family.
+struct Found {
+    candidate: Candidate,
+    /// Of a line on a background that is hardly known: its degrees of freedom, and the p-value that this leaves.
+    unsure: Option<(f64, f64)>,
+}
+
+impl From<Candidate> for Found {
+    fn from(candidate: Candidate) -> Self {
+        Self { candidate, unsure: None }
+    }
+}
+
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(field) = Field::new(evidence) else { return vec![] };
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     // Of a few parameters, and those that are free in every chirp.
-    let (mut found, mut free) = (vec![], vec![]);
-    // Lines on a background that is hardly known: their statements, its degrees of freedom, their p-values.
-    let mut unsure: Vec<(String, f64, f64)> = vec![];
+    let (mut found, mut free): (Vec<Found>, Vec<Found>) = (vec![], vec![]);
     for part in [Part::Gain, Part::Phase, Part::Delay] {
         let series = field.series(part, |_| true);
         // A radian at the farthest group.
         let farthest_s = field.groups.iter().map(|g| g.delay_s).fold(0.0, f64::max);
         let largest = if part == Part::Delay { 1.0 / farthest_s } else { 1.0 };
         if let Some(line) = lines::strongest(&field, &series, training, held_out, largest) {
+            let p_value = |freedom| (-lines::unsure(line.training_gain, freedom)).exp();
+            let unsure = |freedom| (freedom, statistics::corrected(p_value(freedom), line.tried * LOOKS));
             let candidate = candidates::of_line(evidence, &field, part, &line);
-            if let Some(freedom) = line.freedom {
-                let p_value = (-lines::unsure(line.training_gain, freedom)).exp();
-                unsure.push((candidate.statement.clone(), freedom, statistics::corrected(p_value, line.tried * LOOKS)));
-            }
-            found.push(candidate);
+            found.push(Found { candidate, unsure: line.freedom.map(unsure) });
         }
         if let Some(drift) = drift::best(&field, &series, training, held_out) {
-            found.push(candidates::of_drift(evidence, &field, part, &drift));
+            found.push(candidates::of_drift(evidence, &field, part, &drift).into());
         }
         if let Some(random) = random::best(&field, part, training, held_out) {
-            free.push(candidates::of_random(evidence, &field, part, &random));
+            free.push(candidates::of_random(evidence, &field, part, &random).into());
         }
     }
     if let Some(settling) = settling::best(&field, training, held_out) {
         let candidate = candidates::of_settling(evidence, &field, &settling);
-        if candidate.id.is_some() { found.push(candidate) } else { free.push(candidate) }
+        if candidate.id.is_some() { found.push(candidate.into()) } else { free.push(candidate.into()) }
     }
-    for candidates in [&mut found, &mut free] {
-        for candidate in candidates.iter_mut() {
+    for list in [&mut found, &mut free] {
+        for Found { candidate, .. } in list.iter_mut() {
             candidate.p_value = statistics::corrected(candidate.p_value, LOOKS);
         }
-        candidates
-            .retain(|c| c.p_value < PASSED_ON && c.gain > LEAST_GAIN && c.id.is_none_or(|id| !evidence.accepted.contains(&id)));
+        list.retain(|Found { candidate: c, .. }| {
+            c.p_value < PASSED_ON && c.gain > LEAST_GAIN && c.id.is_none_or(|id| !evidence.accepted.contains(&id))
+        });
     }
     // One cause shows in several looks. A law of few parameters wins where it explains nearly as much as what is free in
     // every chirp, and a name where it explains nearly as much as what has none.
-    let most = |of: &[Candidate]| of.iter().map(|c| c.gain).fold(0.0, f64::max);
+    let most = |of: &[Found]| of.iter().map(|found| found.candidate.gain).fold(0.0, f64::max);
     if found.is_empty() || most(&found) < NEARLY * most(&free) {
         found.append(&mut free);
     }
     // Of another kind it wins only where the recording cannot tell.
-    let names: Vec<(&str, f64)> = found.iter().filter(|c| c.id.is_some()).map(|c| (c.behaves_like, c.gain)).collect();
+    let named = found.iter().map(|found| &found.candidate).filter(|candidate| candidate.id.is_some());
+    let names: Vec<(&str, f64)> = named.map(|candidate| (candidate.behaves_like, candidate.gain)).collect();
     let taken = |c: &Candidate| {
         names.iter().any(|(like, gain)| (*like == c.behaves_like && *gain > NEARLY * c.gain) || *gain > c.gain - UNDECIDED)
     };
-    found.retain(|c| c.id.is_some() || !taken(c));
-    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let rivals: Vec<(Option<&'static str>, f64)> = found.iter().map(|c| (c.id, c.gain)).collect();
-    for candidate in &mut found {
+    found.retain(|Found { candidate, .. }| candidate.id.is_some() || !taken(candidate));
+    found.sort_by(|a, b| b.candidate.gain.total_cmp(&a.candidate.gain));
+    let rivals: Vec<(Option<&'static str>, f64)> = found.iter().map(|found| (found.candidate.id, found.candidate.gain)).collect();
+    for Found { candidate, .. } in &mut found {
         for &(id, gain) in &rivals {
             if let Some(id) = id
                 && Some(id) != candidate.id
@@ -98,11 +109,12 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         }
     }
     // Only now: what a line explains best is no better explained by something else because the line is unsure.
-    for candidate in &mut found {
-        if let Some((_, freedom, p_value)) = unsure.iter().find(|(statement, ..)| *statement == candidate.statement) {
-            candidate.gain = lines::unsure(candidate.gain, *freedom);
-            candidate.p_value = *p_value;
+    let judged = |Found { mut candidate, unsure }| {
+        if let Some((freedom, p_value)) = unsure {
+            candidate.gain = lines::unsure(candidate.gain, freedom);
+            candidate.p_value = p_value;
         }
-    }
-    found
+        candidate
+    };
+    found.into_iter().map(judged).collect()
 }
