@@ -78,12 +78,12 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
             evaluation::evaluate(&recording, &simulation, &frames, &state.heatmap, &metrics, lpips.as_ref(), &mut observe)?;
         progress.finish();
         say!("{}", folder.display());
-        print!("{}", scores::of_frames(&evaluation));
+        super::tell(&scores::of_frames(&evaluation));
         evaluations.push((folder.display().to_string(), evaluation));
     }
     if let (true, Some(summary)) = (evaluations.len() > 1, scores::summary(&evaluations)) {
         say!("together");
-        print!("{}", scores::of_sequences(&summary));
+        super::tell(&scores::of_sequences(&summary));
     }
     if let Some(out) = &arguments.out.out {
         std::fs::create_dir_all(out).map_err(|error| Error::write(out, error))?;

@@ -37,7 +37,12 @@ pub use device::{available, device, devices};
 
 /// Text on standard output. Whoever reads may have closed the pipe: what was made is made.
 fn tell(text: &str) {
-    let _ = std::io::Write::write_all(&mut std::io::stdout(), text.as_bytes());
+    if let Err(error) = std::io::Write::write_all(&mut std::io::stdout(), text.as_bytes())
+        && error.kind() != std::io::ErrorKind::BrokenPipe
+    {
+        eprintln!("error: standard output: {error}");
+        std::process::exit(1);
+    }
 }
 
 /// Simulate mmWave radar recordings of moving people, and learn the physics from recordings.

@@ -54,7 +54,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let result = result?;
     recognition::write(&result, &config, &arguments.out)?;
-    print!("{}", recognition::text(&result));
+    super::tell(&recognition::text(&result));
     say!("\nresult: {}", arguments.out.display());
     Ok(())
 }

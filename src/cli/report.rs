@@ -192,7 +192,7 @@ impl RunReport<'_> {
         self.write_report(&evaluations, !split.validation.is_empty())?;
         for (folder, evaluation) in &evaluations {
             say!("{}", folder.display());
-            print!("{}", scores::of_frames(evaluation));
+            super::tell(&scores::of_frames(evaluation));
         }
         say!("report: {}", self.folder.join("report.md").display());
         Ok(())

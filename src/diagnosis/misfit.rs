@@ -52,58 +52,48 @@ impl Misfit {
 
     /// The same with effects taken into account, as likelihood of the same samples as before: `explained` has them undone
     /// or foreseen. Undoing follows each frame's own samples, so what it took out of a held-out frame is no prediction of
-    /// it. It counts as a random signal instead, whose power in a cell is foretold by what was taken out of the other
-    /// channels, or on average of the training frames. Each law, and that nothing was taken out, weighs the same at
-    /// first; every frame and channel says which of them holds (Bayes).
+    /// it. It counts as a random signal instead, whose power in a cell is foretold by what was taken out of the channels
+    /// before it in the same frame, or on average of the training frames. These laws, that nothing was taken out, and that
+    /// nothing is explained weigh the same at first; every frame and channel says which of them holds (Bayes).
     pub fn after(recording: &Evidence, explained: &Evidence) -> Self {
         let [_, _, _, loops, samples] = recording.cube.dims;
-        let support = Support::new(&recording.radar, recording.room.as_ref());
         let channels = recording.cube.channels();
         let removed = Removed::new(recording, explained);
-        let still: Vec<Vec<Complex64>> = (0..channels)
-            .map(|channel| {
-                let of = channel * samples..(channel + 1) * samples;
-                let room = support.project(&explained.still()[of.clone()]);
-                room.iter().zip(&removed.still[of]).map(|(room, removed)| room + removed).collect()
-            })
-            .collect();
-        let noise: Vec<f64> =
-            recording.noise().iter().zip(explained.noise()).map(|(a, b)| a.min(*b).max(f64::MIN_POSITIVE)).collect();
+        let support = Support::new(&recording.radar, recording.room.as_ref());
+        let nothing = vec![Complex64::ZERO; removed.still.len()];
+        let before = Baseline::new(recording, &support, &nothing, recording.noise());
+        let noise: Vec<f64> = recording.noise().iter().zip(explained.noise()).map(|(a, b)| a.min(*b)).collect();
+        let after = removed.is_any().then(|| Baseline::new(explained, &support, &removed.still, &noise));
+        let after = after.as_ref().or((!std::ptr::eq(recording, explained)).then_some(&before));
         let bins = recording.range_bins();
+        let cells: Vec<usize> = (0..loops).flat_map(|doppler| (0..bins).map(move |range| doppler * samples + range)).collect();
         let of_frame = |&frame: &usize| {
-            let expected_moving = explained.expected(frame);
             let here = removed.powers(frame, &noise);
+            let expected = [recording.expected(frame), explained.expected(frame)];
             let of_channel = |channel: usize| {
                 let measured = transform(recording.cube.channel(frame, channel), samples);
-                let predicted = transform(&still[channel].repeat(loops), samples);
-                let variance = noise[channel];
-                let inside = || (0..loops).flat_map(|doppler| (0..bins).map(move |range| doppler * samples + range));
-                let laws = removed.laws(&here, channel);
-                let spread = |cell: usize, law: &Option<Vec<f32>>| {
-                    f64::from(expected_moving[cell]).max(1.0) + law.as_ref().map_or(0.0, |law| f64::from(law[cell]))
-                };
-                let likelihood = |law: &Option<Vec<f32>>| -> f64 {
-                    let of_cell = |cell: usize| {
-                        let spread = spread(cell, law);
-                        let residual = (measured[cell] - predicted[cell]).norm_sqr() / variance;
-                        -residual / spread - (std::f64::consts::PI * variance * spread).ln()
-                    };
-                    inside().map(of_cell).sum()
-                };
+                let more = removed.laws(&here, channel);
+                let mut laws = vec![before.law(channel, &expected[0], None)];
+                if let Some(after) = after {
+                    laws.push(after.law(channel, &expected[1], None));
+                    laws.extend(more.iter().map(|more| after.law(channel, &expected[1], Some(more))));
+                }
+                let likelihood = |law: &Law| -> f64 { cells.iter().map(|&cell| law.log_density(cell, measured[cell])).sum() };
                 let each: Vec<f64> = laws.iter().map(likelihood).collect();
                 let most = each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
                 let weights: Vec<f64> = each.iter().map(|value| (value - most).exp()).collect();
                 let total: f64 = weights.iter().sum();
                 let mut sums = Sums {
                     likelihood: most + (total / laws.len() as f64).ln(),
-                    cells: loops * bins,
+                    cells: cells.len(),
                     peak: 1.0,
                     ..Sums::default()
                 };
-                for cell in inside() {
-                    let spread: f64 = laws.iter().zip(&weights).map(|(law, weight)| weight / total * spread(cell, law)).sum();
-                    let seen = measured[cell].norm_sqr() / variance;
-                    let wanted = predicted[cell].norm_sqr() / variance + spread;
+                let unit = before.variance[channel];
+                for &cell in &cells {
+                    let wanted: f64 =
+                        laws.iter().zip(&weights).map(|(law, weight)| weight / total * law.power(cell)).sum::<f64>();
+                    let (seen, wanted) = (measured[cell].norm_sqr() / unit, wanted / unit);
                     sums.squares += (10.0 * (seen.max(FLOOR) / wanted.max(FLOOR)).log10()).powi(2);
                     sums.peak = sums.peak.max(seen);
                 }
@@ -119,6 +109,58 @@ impl Misfit {
             db_mse,
             psnr_db: 10.0 * (span * span / db_mse.max(f64::MIN_POSITIVE)).log10(),
         }
+    }
+}
+
+/// What stands still, and the noise.
+struct Baseline {
+    /// `[channel][doppler · range]`
+    still: Vec<Vec<Complex64>>,
+    /// By channel.
+    variance: Vec<f64>,
+}
+
+impl Baseline {
+    /// `more`: stands still besides what can come from the room, `[channel · sample]`.
+    fn new(evidence: &Evidence, support: &Support, more: &[Complex64], noise: &[f64]) -> Self {
+        let [_, _, _, loops, samples] = evidence.cube.dims;
+        let of_channel = |channel: usize| {
+            let of = channel * samples..(channel + 1) * samples;
+            let room = support.project(&evidence.still()[of.clone()]);
+            let chirp: Vec<Complex64> = room.iter().zip(&more[of]).map(|(room, more)| room + more).collect();
+            transform(&chirp.repeat(loops), samples)
+        };
+        let variance = noise.iter().map(|noise| noise.max(f64::MIN_POSITIVE)).collect();
+        Self { still: (0..evidence.cube.channels()).into_par_iter().map(of_channel).collect(), variance }
+    }
+
+    fn law<'a>(&'a self, channel: usize, moving: &'a [f32], more: Option<&'a Vec<f32>>) -> Law<'a> {
+        Law { still: &self.still[channel], variance: self.variance[channel], moving, more }
+    }
+}
+
+/// The law of a channel's cells: a circular Gaussian about what stands still.
+struct Law<'a> {
+    still: &'a [Complex64],
+    variance: f64,
+    /// Of what moves and of noise, over the noise.
+    moving: &'a [f32],
+    more: Option<&'a Vec<f32>>,
+}
+
+impl Law<'_> {
+    fn spread(&self, cell: usize) -> f64 {
+        self.variance * (f64::from(self.moving[cell]).max(1.0) + self.more.map_or(0.0, |more| f64::from(more[cell])))
+    }
+
+    fn log_density(&self, cell: usize, measured: Complex64) -> f64 {
+        let spread = self.spread(cell);
+        -(measured - self.still[cell]).norm_sqr() / spread - (std::f64::consts::PI * spread).ln()
+    }
+
+    /// Expected.
+    fn power(&self, cell: usize) -> f64 {
+        self.still[cell].norm_sqr() + self.spread(cell)
     }
 }
 
@@ -175,16 +217,18 @@ impl<'a> Removed<'a> {
         if self.usual.is_some() { noise.iter().enumerate().map(power).collect() } else { vec![] }
     }
 
-    /// What may be expected of the removed power in a channel; none: nothing.
-    fn laws(&self, here: &[Vec<f32>], channel: usize) -> Vec<Option<Vec<f32>>> {
-        let mut laws = vec![None];
-        if let Some(usual) = &self.usual {
-            laws.push(Some(usual[channel].clone()));
-            let others: Vec<&Vec<f32>> = (0..here.len()).filter(|&other| other != channel).map(|other| &here[other]).collect();
-            if !others.is_empty() {
-                let mean = |cell: usize| others.iter().map(|map| map[cell]).sum::<f32>() / others.len() as f32;
-                laws.push(Some((0..here[channel].len()).map(mean).collect()));
-            }
+    fn is_any(&self) -> bool {
+        self.usual.is_some()
+    }
+
+    /// What may be expected of the removed power in a channel.
+    fn laws(&self, here: &[Vec<f32>], channel: usize) -> Vec<Vec<f32>> {
+        let Some(usual) = &self.usual else { return vec![] };
+        let mut laws = vec![usual[channel].clone()];
+        let earlier = &here[..channel];
+        if !earlier.is_empty() {
+            let mean = |cell: usize| earlier.iter().map(|map| map[cell]).sum::<f32>() / earlier.len() as f32;
+            laws.push((0..here[channel].len()).map(mean).collect());
         }
         laws
     }

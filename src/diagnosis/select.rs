@@ -121,6 +121,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         misfit = after;
         current = Some(next);
     }
+    drop(current);
     let accepted = verified(&original, accepted, thresholds);
     let evidence = accepted.iter().fold(original.clone(), |evidence, effect| evidence.with(&effect.candidate));
     let mut after = Misfit::after(&original, &evidence);
@@ -156,7 +157,12 @@ fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let is_path = |candidate: &Candidate| {
         candidate.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_none_or(|id| paths::MANY.contains(&id))
     };
-    let beside = is_path(accepted) && is_path(candidate) && !apart(accepted.place.range_m, candidate.place.range_m);
+    // An image of the body is all over the place: what else is there is something else.
+    let beside = is_path(accepted)
+        && is_path(candidate)
+        && accepted.place.boundary.is_none()
+        && !apart(accepted.place.range_m, candidate.place.range_m)
+        && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
     (is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside) && candidate.gain < ROUGHLY * accepted.gain
 }
 
@@ -174,10 +180,11 @@ fn suspicions(evidence: &Evidence) -> Vec<(usize, Candidate)> {
     SUSPECTS.par_iter().enumerate().flat_map_iter(ask).collect()
 }
 
-/// How likely a look-alike is beforehand, against the one that it looks like.
+/// How likely a look-alike is beforehand, against the effect that was accepted.
 fn prior(id: &str) -> f64 {
     match id {
-        // It must lie beyond the unambiguous range, and be stronger by the fourth power of that to be seen at all.
+        // It must lie beyond the unambiguous range, and be stronger by the fourth power of that to be seen at all. Where it
+        // is accepted itself, it was seen beyond the room.
         "range_alias" => 0.1,
         _ => 1.0,
     }

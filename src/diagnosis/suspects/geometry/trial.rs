@@ -29,6 +29,8 @@ pub struct Score {
     pub by_frame: Vec<f64>,
     /// Frames that the change can still predict.
     pub inside: Vec<bool>,
+    /// Frames for which nothing was carried on beyond what is known of the motion.
+    pub known: Vec<bool>,
 }
 
 impl Score {
@@ -74,7 +76,7 @@ impl<'a> Trial<'a> {
             improve(&training, &mut weights, STEPS);
         }
         let frames = self.evidence.cube.dims[0];
-        let mut score = Score { change, by_frame: vec![0.0; frames], inside: vec![false; frames] };
+        let mut score = Score { change, by_frame: vec![0.0; frames], inside: vec![false; frames], known: vec![false; frames] };
         for (frame, reach, inside) in made {
             let expected = reach.expected(&weights);
             let change = expected
@@ -82,6 +84,7 @@ impl<'a> Trial<'a> {
                 .zip(&reach.measured)
                 .map(|(&expected, &power)| heavy_tailed(power, expected) - heavy_tailed(power, 1.0));
             score.by_frame[frame] = self.empty[frame] + change.sum::<f64>();
+            score.known[frame] = inside;
             // A step is so long that a body carried straight on shows it all the same, and shows none where there is none.
             score.inside[frame] = inside || matches!(score.change, Change::Drop { .. });
         }

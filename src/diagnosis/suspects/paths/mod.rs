@@ -49,11 +49,10 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         let elsewhere = moving.iter().any(|found| found.gain > LEAST_GAIN);
         found.extend(moving);
         if !elsewhere {
-            let swing = swing::strongest(&scene);
+            let swing = swing::strongest(&scene).filter(|swing| swing.gain > LEAST_GAIN);
             let over = scene.over_the_body();
-            let swing = swing.map(|mover| mover.candidate(&over, TRIED)).filter(|found| found.gain > LEAST_GAIN);
-            let track = over_the_body(&over);
-            found.extend(swing.into_iter().chain(track).max_by(|a, b| a.gain.total_cmp(&b.gain)));
+            // What single frames show needs no law.
+            found.extend(over_the_body(&over).or_else(|| swing.map(|swing| over_the_body_named(&swing, &over))));
         }
     }
     let again = |id: &str| evidence.accepted.contains(&id);
@@ -70,6 +69,12 @@ fn over_the_body(scene: &Scene) -> Option<Candidate> {
     let mover = mover::Mover::new(scene, track::strongest(scene)?)?;
     let found = mover.candidate(scene, TRIED);
     (mover.gain > LEAST_GAIN_UNNAMED).then(|| Candidate { behaves_like: OVER_THE_BODY, ..found })
+}
+
+/// A swing; without a name it is what has no law either.
+fn over_the_body_named(swing: &mover::Mover, scene: &Scene) -> Candidate {
+    let found = swing.candidate(scene, TRIED);
+    if found.id.is_some() { found } else { Candidate { behaves_like: OVER_THE_BODY, ..found } }
 }
 
 /// Paths whose lengths change.

@@ -15,13 +15,14 @@ const CELL_ERROR: f64 = 0.12;
 /// A sighting so much weaker than the others is noise or a sidelobe on the way.
 const CHANCE_SHARE: f64 = 0.03;
 /// A thing that swings farther is no fan, curtain or pendulum: it has no name.
-const WIDEST_SWING_M: f64 = 0.5;
+pub const WIDEST_SWING_M: f64 = 0.5;
 /// A swing leaves less than this share of the velocities' variance.
 const SWING_LEAVES: f64 = 0.15;
 
 /// A track that is judged: how far it predicts frames that it was not fitted to.
 pub struct Mover {
     pub track: Track,
+    /// Fitted to all frames that show it.
     pub pendulum: Option<Pendulum>,
     /// What the track behaves like; none: its ranges and its Doppler do not belong together.
     pub id: Option<&'static str>,
@@ -60,12 +61,13 @@ impl Mover {
         } else {
             "neither the body nor its mirror images can be there"
         };
+        let pendulum = pendulum.and_then(|_| fit(scene, &track.sightings)).or(pendulum);
         Some(Self { track, pendulum, id, gain, power, unlike })
     }
 
     pub fn candidate(&self, scene: &Scene, tried: f64) -> Candidate {
         let sightings = &self.track.sightings;
-        let whole = self.pendulum.and_then(|_| fit(scene, sightings)).or(self.pendulum);
+        let whole = self.pendulum;
         let ranges = bounds(sightings.iter().map(|s| s.range_m));
         let velocities = bounds(sightings.iter().map(|s| s.velocity_mps));
         let cell_m = scene.range_m(1.0);

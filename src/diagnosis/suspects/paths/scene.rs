@@ -34,6 +34,8 @@ pub struct Scene<'a> {
     reached: Vec<bool>,
     /// Expected power in the other cells: noise, and what other imperfections smear along a range or a Doppler.
     base: Vec<f32>,
+    /// The same without the sidelobes of what was measured where the body is.
+    floor: Vec<f32>,
     /// Whether cells of the body are free too, for what is far stronger than the body.
     pub over_body: bool,
     /// By range, how many times [`Evidence::noise`] the variance of noise in complex maps is that powers count as one.
@@ -52,7 +54,7 @@ impl<'a> Scene<'a> {
         let visited = visited_ranges(model, frames, loops, samples);
         let clutter = still_power(evidence);
         let maps = evidence.maps();
-        let made: Vec<(Vec<bool>, Vec<bool>, Vec<f32>)> = (0..frames)
+        let made: Vec<(Vec<bool>, Vec<bool>, Vec<f32>, Vec<f32>)> = (0..frames)
             .into_par_iter()
             .map(|frame| {
                 let map = &maps[frame * size..(frame + 1) * size];
@@ -67,18 +69,18 @@ impl<'a> Scene<'a> {
                 // What other imperfections smear is told where no sidelobes are.
                 let near = |cell: usize| lobes[cell] * SIDELOBE_SAFETY > SIDELOBE_LEVEL;
                 let reached: Vec<bool> = (0..size).map(|cell| taken[cell] || near(cell)).collect();
-                let mut base = floor(map, &reached, &clutter, loops, samples);
-                for cell in (0..size).filter(|&cell| near(cell)) {
-                    base[cell] = base[cell].max((1.0 + SIDELOBE_SAFETY * lobes[cell]) as f32);
-                }
-                (taken, reached, base)
+                let floor = floor(map, &reached, &clutter, loops, samples);
+                let lobes: Vec<f32> =
+                    (0..size).map(|cell| if near(cell) { (1.0 + SIDELOBE_SAFETY * lobes[cell]) as f32 } else { 1.0 }).collect();
+                (taken, reached, floor, lobes)
             })
             .collect();
-        let (mut taken, mut reached, mut base) = (vec![], vec![], vec![]);
-        for (taken_here, reached_here, base_here) in made {
+        let (mut taken, mut reached, mut base, mut lobes) = (vec![], vec![], vec![], vec![]);
+        for (taken_here, reached_here, floor_here, lobes_here) in made {
             taken.extend(taken_here);
             reached.extend(reached_here);
-            base.extend(base_here);
+            base.extend(floor_here);
+            lobes.extend(lobes_here);
         }
         let levels = noise_levels(maps, &reached, &evidence.split.training, loops, samples, bins);
         base.par_chunks_exact_mut(samples).for_each(|row| {
@@ -87,13 +89,17 @@ impl<'a> Scene<'a> {
         if FILTERS.iter().any(|filter| evidence.accepted.contains(filter)) {
             raise_for_leakage(&mut base, maps, &reached, model, frames, loops, samples);
         }
+        let floor = base.clone();
+        base.par_iter_mut().zip(&lobes).for_each(|(base, lobe)| *base = base.max(*lobe));
         let channels = evidence.cube.channels() as f64;
         let shape = shape(evidence);
-        Some(Self { evidence, model, loops, samples, bins, channels, taken, reached, base, over_body: false, shape })
+        Some(Self { evidence, model, loops, samples, bins, channels, taken, reached, base, floor, over_body: false, shape })
     }
 
     /// The same with the body's cells free, where its expected power is trusted to a factor only.
     pub fn over_the_body(mut self) -> Self {
+        // Something strong among the body's cells has sidelobes, too: only those of the expected body count.
+        self.base = std::mem::take(&mut self.floor);
         let (frames, size) = (self.frames(), self.size());
         let (loops, samples, bins) = (self.loops, self.samples, self.bins);
         let visited = visited_ranges(self.model, frames, loops, samples);

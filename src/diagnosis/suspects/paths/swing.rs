@@ -3,11 +3,13 @@
 
 use rayon::prelude::*;
 
-use super::mover::{Mover, middle_s};
+use super::mover::{Mover, WIDEST_SWING_M, middle_s};
 use super::pendulum::Pendulum;
 use super::scene::{Scene, visited_ranges};
 use super::track::{Sighting, Track, sighting};
+use crate::diagnosis::Point;
 use crate::diagnosis::locate::CELLS_PER_VALUE;
+use crate::diagnosis::power::range_and_velocity;
 
 /// Doppler bins on either side of zero that hold remains of what stands still.
 const STILL_BINS: i64 = 2;
@@ -18,8 +20,10 @@ const FASTEST_HZ: f64 = 4.0;
 /// Swings that are tried: the smallest, the ratio to the next, how many.
 const SWINGS: (f64, f64, usize) = (0.02, 1.5, 8);
 const PHASES: usize = 16;
-/// Training frames that the bank is laid over.
+/// Training frames that the bank is laid over, and how long they may last: rates are as fine as that is long.
 const MOST_FRAMES: usize = 48;
+const LONGEST_S: f64 = 10.0;
+const FEWEST_FRAMES: usize = 8;
 /// Degrees of freedom of the heavy tail of powers about their mean.
 const TAIL: f32 = 8.0;
 /// Power over what else is expected from which on a frame shows the swing itself.
@@ -36,13 +40,15 @@ struct Ground<'a> {
 /// mean, sine, cosine (metres), rate (Hz).
 type Law = [f64; 4];
 
-/// None where nothing gains.
+/// None where nothing gains, or no frame shows what the law says.
 pub fn strongest(scene: &Scene) -> Option<Mover> {
     let ground = Ground::new(scene);
-    let training: Vec<usize> = scene.evidence.split.training.iter().copied().take(MOST_FRAMES).collect();
-    let (first, last) = (*training.first()?, *training.last()?);
-    let length_s = middle_s(scene, last) - middle_s(scene, first);
-    if length_s <= 0.0 {
+    let every = &scene.evidence.split.training;
+    let start_s = middle_s(scene, *every.first()?);
+    let in_span = |frame: &usize| middle_s(scene, *frame) - start_s < LONGEST_S;
+    let training: Vec<usize> = every.iter().copied().filter(in_span).take(MOST_FRAMES).collect();
+    let length_s = middle_s(scene, *training.last()?) - start_s;
+    if length_s <= 0.0 || training.len() < FEWEST_FRAMES {
         return None;
     }
     let table = ground.table(&training);
@@ -80,13 +86,27 @@ pub fn strongest(scene: &Scene) -> Option<Mover> {
         best
     };
     let (_, law) = rates.par_iter().filter_map(bank).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let (law, power) = ground.fitted(law, length_s, &training);
+    let (mut law, mut power) = ground.fitted(law, &LEVELS, length_s, &training);
+    // A long recording tells the rate better than a part of it, which must not be off by a turn at once.
+    let mut count = training.len();
+    while count < every.len() {
+        count = (2 * count).min(every.len());
+        let longer = &every[..count];
+        (law, power) = ground.fitted(law, &[power], middle_s(scene, longer[count - 1]) - start_s, longer);
+    }
+    let swing = law[1].hypot(law[2]);
+    if swing > WIDEST_SWING_M {
+        return None;
+    }
     let gain = |frames: &[usize]| ground.gain(law, power, frames) / CELLS_PER_VALUE;
     let held_out = gain(&scene.evidence.split.held_out);
     let tried = (rates.len() * SWINGS.2 * PHASES * ranges.len() * LEVELS.len()) as f64;
-    let p_value = (tried.ln() - gain(&training)).min(0.0).exp();
+    let p_value = (tried.ln() - gain(every)).min(0.0).exp();
+    if held_out <= 0.0 {
+        return None;
+    }
     let sightings: Vec<Sighting> = (0..scene.frames()).filter_map(|frame| ground.sighting(law, frame)).collect();
-    let swing = law[1].hypot(law[2]);
+    let length_s = middle_s(scene, *every.last()?) - start_s;
     let pendulum = Pendulum {
         mean_m: law[0],
         sine_m: law[1],
@@ -98,7 +118,7 @@ pub fn strongest(scene: &Scene) -> Option<Mover> {
     (!sightings.is_empty()).then_some(Mover {
         track: Track { sightings, p_value },
         pendulum: Some(pendulum),
-        id: Some("moving_reflector"),
+        id: (!ground.moves_with_the_body(law)).then_some("moving_reflector"),
         gain: held_out,
         power: f64::from(power),
         unlike: "its frames follow one swing, which the body's returns around it do not",
@@ -205,13 +225,13 @@ impl<'a> Ground<'a> {
     }
 
     /// The best law and power near a first guess: one after another is moved as long as that helps, then by less.
-    fn fitted(&self, law: Law, length_s: f64, frames: &[usize]) -> (Law, f32) {
+    fn fitted(&self, law: Law, powers: &[f32], length_s: f64, frames: &[usize]) -> (Law, f32) {
         let cell_m = self.scene.range_m(1.0);
         let swing = law[1].hypot(law[2]);
         let mut width = [0.5 * cell_m, 0.25 * swing, 0.25 * swing, 0.05 / length_s, 0.5];
         let gain = |now: [f64; 5]| self.gain([now[0], now[1], now[2], now[3]], now[4].exp() as f32, frames);
         let start = |level: f32| [law[0], law[1], law[2], law[3], f64::from(level).ln()];
-        let mut now = LEVELS.into_iter().map(start).max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(start(LEVELS[0]));
+        let mut now = powers.iter().map(|&power| start(power)).max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(start(1.0));
         let mut best = gain(now);
         for _ in 0..STEPS {
             let mut moved = false;
@@ -230,6 +250,29 @@ impl<'a> Ground<'a> {
             }
         }
         ([now[0], now[1], now[2], now[3]], now[4].exp() as f32)
+    }
+
+    /// Whether some point of the body is at the swing's range and velocity in most frames in which it moves: then it may
+    /// be a limb whose returns are stronger than expected.
+    fn moves_with_the_body(&self, law: Law) -> bool {
+        let Some(body) = &self.scene.evidence.body else { return false };
+        let cells = &self.scene.model.cells;
+        let (mut with, mut seen) = (0, 0);
+        for frame in 0..self.scene.frames() {
+            let (range_m, velocity) = at(law, middle_s(self.scene, frame));
+            let (doppler, range) = cells.place(range_m, velocity);
+            if doppler.abs() <= STILL_BINS as f64 {
+                continue;
+            }
+            seen += 1;
+            let near = |point: &Point| {
+                let (range_m, velocity) = range_and_velocity(&self.scene.evidence.radar, point.position_m, point.velocity_mps);
+                let place = cells.place(range_m, velocity);
+                (place.0 - doppler).abs() < 1.0 && (place.1 - range).abs() < 1.0
+            };
+            with += usize::from(body.frames[frame].iter().any(near));
+        }
+        2 * with > seen
     }
 
     /// Where a frame shows the swing itself, plainly more than all else.

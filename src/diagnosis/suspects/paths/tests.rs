@@ -142,15 +142,15 @@ fn a_swinging_stranger_is_found_and_removed() {
 }
 
 #[test]
-fn what_was_taken_out_of_a_recording_counts_as_foretold_by_its_other_channels() {
+fn what_was_taken_out_of_a_channel_counts_as_foretold_by_those_before_it() {
     let (with, without) = (evidence(0.0, 1.0), evidence(0.0, 0.0));
     let found = believed(&with);
     let explained = corrected(with.clone(), &found[0]);
     let [before, after, best] = [Misfit::of(&with), Misfit::after(&with, &explained), Misfit::of(&without)];
     let [before, after, best] = [before, after, best].map(|misfit| misfit.loglik_per_sample);
     let recovered = (after - before) / (best - before);
-    // Amplitudes that nobody foretold cost a little; to know them would be to have looked.
-    assert!((0.8..1.0).contains(&recovered), "{before} {after} {best}");
+    // Nobody foretells the first of the two channels; the second costs a little, for its amplitudes are not known.
+    assert!((0.4..0.95).contains(&recovered), "{before} {after} {best}");
 }
 
 #[test]
@@ -164,4 +164,11 @@ fn a_swing_among_the_bodys_returns_is_found_by_its_law() {
     let alone = evidence(0.0, 0.0);
     let nothing = swing::strongest(&Scene::new(&alone).unwrap());
     assert!(nothing.is_none_or(|found| found.track.p_value > 0.01 || found.gain < 6.0));
+}
+
+#[test]
+fn something_far_stronger_than_the_body_is_seen_where_the_body_is() {
+    // It swings where the body walks, 20 dB above all of it.
+    let found = believed(&made(0.0, 60.0, 2.2));
+    assert!(found.iter().any(|found| found.behaves_like.starts_with(super::PATH_LIKE) && found.gain > 100.0), "{found:?}");
 }
