@@ -117,8 +117,7 @@ pub fn judge(case: &str, truth: &Truth, report: &std::result::Result<Report, Str
     judgement.claims = report.claims();
     judgement.named = report.effects.iter().map(|effect| effect.id.clone()).collect();
     let hidden = |id: &&str| report.not_detectable.iter().any(|limit| limit.id == **id && limit.at_most_db.is_none());
-    judgement.said_hidden =
-        !judgement.claims && !ids.is_empty() && ids.len() == truth.ids().len() && ids.iter().all(|id| hidden(&id));
+    judgement.said_hidden = !judgement.claims && !ids.is_empty() && ids.len() == truth.ids().len() && ids.iter().all(hidden);
     for (found, id) in judgement.found.iter_mut().zip(truth.ids()) {
         *found = id.is_some_and(|id| report.effects.iter().any(|reported| stands_for(reported, id)));
     }

@@ -42,6 +42,14 @@ pub struct Scene<'a> {
     pub shape: Vec<f64>,
 }
 
+/// The cells of one frame, `[doppler, range]`, as the scene puts them together.
+struct Frame {
+    taken: Vec<bool>,
+    reached: Vec<bool>,
+    floor: Vec<f32>,
+    lobes: Vec<f32>,
+}
+
 impl<'a> Scene<'a> {
     /// None without a body, or with too few cells to be of use.
     pub fn new(evidence: &'a Evidence) -> Option<Self> {
@@ -54,7 +62,7 @@ impl<'a> Scene<'a> {
         let visited = visited_ranges(model, frames, loops, samples);
         let clutter = still_power(evidence);
         let maps = evidence.maps();
-        let made: Vec<(Vec<bool>, Vec<bool>, Vec<f32>, Vec<f32>)> = (0..frames)
+        let made: Vec<Frame> = (0..frames)
             .into_par_iter()
             .map(|frame| {
                 let map = &maps[frame * size..(frame + 1) * size];
@@ -72,15 +80,15 @@ impl<'a> Scene<'a> {
                 let floor = floor(map, &reached, &clutter, loops, samples);
                 let lobes: Vec<f32> =
                     (0..size).map(|cell| if near(cell) { (1.0 + SIDELOBE_SAFETY * lobes[cell]) as f32 } else { 1.0 }).collect();
-                (taken, reached, floor, lobes)
+                Frame { taken, reached, floor, lobes }
             })
             .collect();
         let (mut taken, mut reached, mut base, mut lobes) = (vec![], vec![], vec![], vec![]);
-        for (taken_here, reached_here, floor_here, lobes_here) in made {
-            taken.extend(taken_here);
-            reached.extend(reached_here);
-            base.extend(floor_here);
-            lobes.extend(lobes_here);
+        for frame in made {
+            taken.extend(frame.taken);
+            reached.extend(frame.reached);
+            base.extend(frame.floor);
+            lobes.extend(frame.lobes);
         }
         let levels = noise_levels(maps, &reached, &evidence.split.training, loops, samples, bins);
         base.par_chunks_exact_mut(samples).for_each(|row| {
