@@ -58,21 +58,22 @@ impl Misfit {
     pub fn after(recording: &Evidence, explained: &Evidence) -> Self {
         let [_, _, _, loops, samples] = recording.cube.dims;
         let channels = recording.cube.channels();
-        let removed = Removed::new(recording, explained);
+        let quieter = recording.noise().iter().zip(explained.noise()).map(|(a, b)| a.min(*b));
+        let removed = Removed::new(recording, explained, quieter.collect());
         let support = Support::new(&recording.radar, recording.room.as_ref());
-        let nothing = vec![Complex64::ZERO; removed.still.len()];
+        let nothing = vec![Complex64::ZERO; channels * samples];
         let before = Baseline::new(recording, &support, &nothing, recording.noise());
-        let noise: Vec<f64> = recording.noise().iter().zip(explained.noise()).map(|(a, b)| a.min(*b)).collect();
-        let after = removed.is_any().then(|| Baseline::new(explained, &support, &removed.still, &noise));
+        let after = removed.as_ref().map(|removed| Baseline::new(explained, &support, &removed.still, &removed.noise));
         let after = after.as_ref().or((!std::ptr::eq(recording, explained)).then_some(&before));
         let bins = recording.range_bins();
         let cells: Vec<usize> = (0..loops).flat_map(|doppler| (0..bins).map(move |range| doppler * samples + range)).collect();
         let of_frame = |&frame: &usize| {
-            let here = removed.powers(frame, &noise);
+            let here: Option<Vec<Vec<f32>>> = removed.as_ref().map(|removed| removed.powers(frame));
             let expected = [recording.expected(frame), explained.expected(frame)];
             let of_channel = |channel: usize| {
                 let measured = transform(recording.cube.channel(frame, channel), samples);
-                let more = removed.laws(&here, channel);
+                let more = removed.iter().zip(&here).flat_map(|(removed, here)| removed.laws(here, channel));
+                let more: Vec<Vec<f32>> = more.collect();
                 let mut laws = vec![before.law(channel, &expected[0], None)];
                 if let Some(after) = after {
                     laws.push(after.law(channel, &expected[1], None));
@@ -168,63 +169,55 @@ impl Law<'_> {
 struct Removed<'a> {
     recording: &'a Evidence,
     explained: &'a Evidence,
+    /// Variance by channel, of which powers are multiples.
+    noise: Vec<f64>,
     /// Mean over the training frames, `[channel · sample]`.
     still: Vec<Complex64>,
-    /// Mean power of the rest over the training frames and over the noise, `[channel][doppler · range]`; none: nothing was
-    /// taken out.
-    usual: Option<Vec<Vec<f32>>>,
+    /// Mean power of the rest over the training frames, `[channel][doppler · range]`.
+    usual: Vec<Vec<f32>>,
 }
 
 impl<'a> Removed<'a> {
-    fn new(recording: &'a Evidence, explained: &'a Evidence) -> Self {
-        let still = recording.still().iter().zip(explained.still()).map(|(before, after)| before - after).collect();
-        let mut removed = Self { recording, explained, still, usual: None };
+    /// None where nothing was taken out.
+    fn new(recording: &'a Evidence, explained: &'a Evidence, noise: Vec<f64>) -> Option<Self> {
         if std::ptr::eq(recording, explained) || recording.cube.samples == explained.cube.samples {
-            return removed;
+            return None;
         }
+        let noise = noise.into_iter().map(|noise| noise.max(f64::MIN_POSITIVE)).collect();
+        let still = recording.still().iter().zip(explained.still()).map(|(before, after)| before - after).collect();
+        let mut removed = Self { recording, explained, noise, still, usual: vec![] };
         let training = &recording.split.training;
         let frames: Vec<usize> = training.iter().copied().step_by(training.len().div_ceil(MOST_TRAINING).max(1)).collect();
-        let size = recording.cube.dims[3] * recording.cube.dims[4];
         let of_channel = |channel: usize| {
-            let mut mean = vec![0.0f32; size];
-            let noise = recording.noise()[channel].min(explained.noise()[channel]).max(f64::MIN_POSITIVE);
+            let mut mean = vec![0.0f32; recording.cube.dims[3] * recording.cube.dims[4]];
             for &frame in &frames {
-                let map = removed.map(frame, channel);
-                mean.iter_mut().zip(map).for_each(|(sum, value)| *sum += (value.norm_sqr() / noise) as f32);
+                mean.iter_mut().zip(removed.power(frame, channel)).for_each(|(sum, power)| *sum += power);
             }
             mean.iter_mut().for_each(|sum| *sum /= frames.len().max(1) as f32);
             mean
         };
-        removed.usual = Some((0..recording.cube.channels()).into_par_iter().map(of_channel).collect());
-        removed
+        removed.usual = (0..recording.cube.channels()).into_par_iter().map(of_channel).collect();
+        Some(removed)
     }
 
-    /// Range-Doppler map of what was taken out of a frame beyond the mean.
-    fn map(&self, frame: usize, channel: usize) -> Vec<Complex64> {
+    /// Range-Doppler map of the power of what was taken out of a frame beyond the mean.
+    fn power(&self, frame: usize, channel: usize) -> Vec<f32> {
         let samples = self.recording.cube.dims[4];
         let still = self.still[channel * samples..][..samples].iter().cycle();
         let (before, after) = (self.recording.cube.channel(frame, channel), self.explained.cube.channel(frame, channel));
         let moving: Vec<Complex64> =
             before.iter().zip(after).zip(still).map(|((before, after), still)| before - after - still).collect();
-        transform(&moving, samples)
+        transform(&moving, samples).iter().map(|value| (value.norm_sqr() / self.noise[channel]) as f32).collect()
     }
 
-    /// Power over the noise in a frame, `[channel][doppler · range]`; empty: nothing was taken out.
-    fn powers(&self, frame: usize, noise: &[f64]) -> Vec<Vec<f32>> {
-        let power = |(channel, noise): (usize, &f64)| -> Vec<f32> {
-            self.map(frame, channel).iter().map(|value| (value.norm_sqr() / noise) as f32).collect()
-        };
-        if self.usual.is_some() { noise.iter().enumerate().map(power).collect() } else { vec![] }
-    }
-
-    fn is_any(&self) -> bool {
-        self.usual.is_some()
+    /// Of all channels of a frame.
+    fn powers(&self, frame: usize) -> Vec<Vec<f32>> {
+        (0..self.recording.cube.channels()).map(|channel| self.power(frame, channel)).collect()
     }
 
     /// What may be expected of the removed power in a channel.
     fn laws(&self, here: &[Vec<f32>], channel: usize) -> Vec<Vec<f32>> {
-        let Some(usual) = &self.usual else { return vec![] };
-        let mut laws = vec![usual[channel].clone()];
+        let mut laws = vec![self.usual[channel].clone()];
         let earlier = &here[..channel];
         if !earlier.is_empty() {
             let mean = |cell: usize| earlier.iter().map(|map| map[cell]).sum::<f32>() / earlier.len() as f32;

@@ -129,7 +129,7 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
     });
     Some(Candidate {
         id: Some("moving_reflector"),
-        behaves_like: "path-like",
+        behaves_like: super::paths::PATH_LIKE,
         estimates,
         choice: None,
         place: Place {

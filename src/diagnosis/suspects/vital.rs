@@ -193,7 +193,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
         * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
     Some(Candidate {
         id: named.map(|n| n.0),
-        behaves_like: "path-like",
+        behaves_like: super::paths::PATH_LIKE,
         estimates: named.map_or(vec![], |(_, r)| {
             vec![
                 Estimate::normal("rate_hz", r.frequency_hz, r.frequency_deviation_hz),

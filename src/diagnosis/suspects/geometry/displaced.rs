@@ -167,7 +167,7 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
     let frames: Vec<usize> = (0..trial.evidence.cube.dims[0]).collect();
     let training = &trial.evidence.split.training;
     let mut best: Option<(f64, Change)> = None;
-    let most_lost = MOST_LOST.min(frames.len() / 4);
+    let most_lost = most_lost(frames.len());
     for count in 1..=most_lost {
         // All frames later by so many: what follows the step, whenever it is.
         let later = trial.score(Change::Drop { at: 0, count }, training, false);
@@ -197,16 +197,12 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
 
 /// Under the null: a value beyond its floor by so many deviations; for a step, so much gained.
 fn p_value(fit: &Fitted, null: &Score, training: &[usize]) -> f64 {
-    let gains: Vec<f64> = training
-        .iter()
-        .filter(|&&frame| fit.score.inside[frame] && null.inside[frame])
-        .map(|&frame| fit.score.by_frame[frame] - null.by_frame[frame])
-        .collect();
     if let Change::Drop { .. } = fit.score.change {
-        return step_p_value(gains.iter().sum(), fit.score.inside.len());
+        return step_p_value(fit.score.gain_over(null, training), fit.score.inside.len());
     }
     let excess = (fit.value.abs() - fit.floor).max(0.0);
-    let (t, freedom) = (excess / fit.deviation.max(1e-12), gains.len() as f64 - 1.0);
+    let judged = training.iter().filter(|&&frame| fit.score.inside[frame] && null.inside[frame]).count();
+    let (t, freedom) = (excess / fit.deviation.max(1e-12), judged as f64 - 1.0);
     if freedom < 3.0 || !t.is_finite() {
         return 1.0;
     }
@@ -214,11 +210,16 @@ fn p_value(fit: &Fitted, null: &Score, training: &[usize]) -> f64 {
     crate::diagnosis::statistics::corrected(tail.min(1.0), KINDS)
 }
 
+/// Most frames lost at once that are looked for among so many.
+fn most_lost(frames: usize) -> usize {
+    MOST_LOST.min(frames / 4)
+}
+
 /// A rule of thumb: a ratio of likelihoods of fixed laws would exceed e^x by chance with probability e^-x at most, and the
 /// weights that are fitted here are the same in number with and without the step. On 150 recordings without anything
 /// missing (two sealed sets that had been opened) the largest gain was 1.2 nats; from 30 on this is below 0.01.
 fn step_p_value(gain: f64, frames: usize) -> f64 {
-    let tried = (MOST_LOST.min(frames / 4) * frames).max(1) as f64;
+    let tried = (most_lost(frames) * frames).max(1) as f64;
     crate::diagnosis::statistics::corrected((-gain / STEP_INFLATION).exp().min(1.0), tried)
 }
 

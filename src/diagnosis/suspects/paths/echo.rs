@@ -140,7 +140,7 @@ pub fn multibounce(scene: &Scene, tried: f64) -> Option<Candidate> {
     let step_m = scene.range_m(0.125);
     Some(Candidate {
         id: Some("body_multibounce"),
-        behaves_like: "path-like",
+        behaves_like: super::PATH_LIKE,
         estimates: vec![Estimate::normal("extra_m", extra_m, 0.4 * step_m)],
         choice: None,
         place,

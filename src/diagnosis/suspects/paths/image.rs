@@ -67,7 +67,7 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
         .sum();
     Candidate {
         id: Some(if floor { "floor_bounce" } else { "wall_ghost" }),
-        behaves_like: "path-like",
+        behaves_like: super::PATH_LIKE,
         estimates: vec![coefficient],
         choice: Some(name.into()),
         place,

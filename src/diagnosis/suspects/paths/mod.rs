@@ -52,7 +52,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             let swing = swing::strongest(&scene).filter(|swing| swing.gain > LEAST_GAIN);
             let over = scene.over_the_body();
             // What single frames show needs no law.
-            found.extend(over_the_body(&over).or_else(|| swing.map(|swing| over_the_body_named(&swing, &over))));
+            found.extend(over_the_body(&over).or_else(|| swing.map(|swing| swinging(&swing, &over))));
         }
     }
     let again = |id: &str| evidence.accepted.contains(&id);
@@ -72,7 +72,7 @@ fn over_the_body(scene: &Scene) -> Option<Candidate> {
 }
 
 /// A swing; without a name it is what has no law either.
-fn over_the_body_named(swing: &mover::Mover, scene: &Scene) -> Candidate {
+fn swinging(swing: &mover::Mover, scene: &Scene) -> Candidate {
     let found = swing.candidate(scene, TRIED);
     if found.id.is_some() { found } else { Candidate { behaves_like: OVER_THE_BODY, ..found } }
 }

@@ -157,7 +157,7 @@ impl Mover {
         let still = scene.evidence.still().to_vec();
         Candidate {
             id: self.id,
-            behaves_like: "path-like",
+            behaves_like: super::PATH_LIKE,
             estimates: if self.id == Some("moving_reflector") { estimates } else { vec![] },
             choice: None,
             place,
@@ -175,9 +175,6 @@ impl Mover {
             })),
         }
     }
-}
-
-impl Mover {
     /// With quadrature, what is folded at the end of the unambiguous range looks as if it were there.
     fn look_alikes(&self, scene: &Scene) -> Vec<&'static str> {
         match self.id {

@@ -18,6 +18,16 @@ pub struct Pendulum {
     pub deviations: [f64; 3],
 }
 
+/// Mean, sine, cosine (metres), rate (Hz).
+pub type Law = [f64; 4];
+
+/// Range and velocity.
+pub fn at([mean_m, sine_m, cosine_m, rate_hz]: Law, time_s: f64) -> (f64, f64) {
+    let omega = std::f64::consts::TAU * rate_hz;
+    let (sine, cosine) = (omega * time_s).sin_cos();
+    (mean_m + sine_m * sine + cosine_m * cosine, omega * (sine_m * cosine - cosine_m * sine))
+}
+
 impl Pendulum {
     pub fn swing_m(&self) -> f64 {
         self.sine_m.hypot(self.cosine_m)
@@ -25,9 +35,7 @@ impl Pendulum {
 
     /// Range and velocity.
     pub fn at(&self, time_s: f64) -> (f64, f64) {
-        let rate = std::f64::consts::TAU * self.rate_hz;
-        let (sine, cosine) = (rate * time_s).sin_cos();
-        (self.mean_m + self.sine_m * sine + self.cosine_m * cosine, rate * (self.sine_m * cosine - self.cosine_m * sine))
+        at([self.mean_m, self.sine_m, self.cosine_m, self.rate_hz], time_s)
     }
 
     /// Least squares on ranges and velocities with their errors; velocities wrap around `span_mps` (twice the greatest

@@ -9,7 +9,7 @@ use crate::diagnosis::power::{PowerModel, Template};
 use crate::diagnosis::statistics::median;
 
 /// Doppler bins around zero in which what stands still leaves remains wherever the body was in some frame.
-const STILL_BINS: i64 = 2;
+pub const STILL_BINS: i64 = 2;
 /// Cells by which the body's support grows along Doppler: accelerations within a frame.
 const DOPPLER_MARGIN: i64 = 2;
 /// Accelerations raise sidelobes above the window's own.
@@ -28,7 +28,11 @@ pub struct Scene<'a> {
     pub bins: usize,
     /// Channels that a power is the mean of.
     pub channels: f64,
-    /// Cells where the body or remains of the room can be.
+    /// Range bins that the body has power in during some frame.
+    pub visited: Vec<bool>,
+    /// Cells of a map where in every frame remains of the room can be, or nothing is received.
+    never: Vec<bool>,
+    /// These, and where the body can be.
     taken: Vec<bool>,
     /// These, and where the body's sidelobes reach: they move in step with it.
     reached: Vec<bool>,
@@ -62,18 +66,19 @@ impl<'a> Scene<'a> {
         let visited = visited_ranges(model, frames, loops, samples);
         let clutter = still_power(evidence);
         let maps = evidence.maps();
+        let is_never = |cell: usize| {
+            let (doppler, range) = (cell / samples, cell % samples);
+            let still = doppler.min(loops - doppler) as i64;
+            range >= bins || (still <= STILL_BINS && visited[range]) || still == 0
+        };
+        let never: Vec<bool> = (0..size).map(is_never).collect();
         let made: Vec<Frame> = (0..frames)
             .into_par_iter()
             .map(|frame| {
                 let map = &maps[frame * size..(frame + 1) * size];
                 let support = grown(model.support(frame), loops, samples);
                 let lobes = lobes(map, model.support(frame), loops, samples);
-                let never = |cell: usize| {
-                    let (doppler, range) = (cell / samples, cell % samples);
-                    let still = doppler.min(loops - doppler) as i64;
-                    range >= bins || (still <= STILL_BINS && visited[range]) || still == 0
-                };
-                let taken: Vec<bool> = (0..size).map(|cell| support[cell] || never(cell)).collect();
+                let taken: Vec<bool> = support.iter().zip(&never).map(|(support, never)| *support || *never).collect();
                 // What other imperfections smear is told where no sidelobes are.
                 let near = |cell: usize| lobes[cell] * SIDELOBE_SAFETY > SIDELOBE_LEVEL;
                 let reached: Vec<bool> = (0..size).map(|cell| taken[cell] || near(cell)).collect();
@@ -101,31 +106,43 @@ impl<'a> Scene<'a> {
         base.par_iter_mut().zip(&lobes).for_each(|(base, lobe)| *base = base.max(*lobe));
         let channels = evidence.cube.channels() as f64;
         let shape = shape(evidence);
-        Some(Self { evidence, model, loops, samples, bins, channels, taken, reached, base, floor, over_body: false, shape })
+        Some(Self {
+            evidence,
+            model,
+            loops,
+            samples,
+            bins,
+            channels,
+            visited,
+            never,
+            taken,
+            reached,
+            base,
+            floor,
+            over_body: false,
+            shape,
+        })
     }
 
     /// The same with the body's cells free, where its expected power is trusted to a factor only.
     pub fn over_the_body(mut self) -> Self {
         // Something strong among the body's cells has sidelobes, too: only those of the expected body count.
         self.base = std::mem::take(&mut self.floor);
-        let (frames, size) = (self.frames(), self.size());
-        let (loops, samples, bins) = (self.loops, self.samples, self.bins);
-        let visited = visited_ranges(self.model, frames, loops, samples);
-        let model = self.model;
+        let (size, loops, samples) = (self.size(), self.loops, self.samples);
+        let (model, never) = (self.model, &self.never);
         let frames = self.taken.par_chunks_exact_mut(size).zip(self.base.par_chunks_exact_mut(size)).enumerate();
         frames.for_each(|(frame, (taken, base))| {
             let expected = model.expected(frame);
             let lobes = lobes(expected, model.support(frame), loops, samples);
-            for (cell, taken) in taken.iter_mut().enumerate() {
+            taken.copy_from_slice(never);
+            for (cell, base) in base.iter_mut().enumerate() {
                 let (doppler, range) = (cell / samples, cell % samples);
-                let still = doppler.min(loops - doppler) as i64 <= STILL_BINS;
-                *taken = range >= bins || doppler == 0 || (still && visited[range]);
                 let near = (-DOPPLER_MARGIN..=DOPPLER_MARGIN).flat_map(|slow| {
                     let row = (doppler as i64 + slow).rem_euclid(loops as i64) as usize * samples;
                     (range.saturating_sub(1)..(range + 2).min(samples)).map(move |range| row + range)
                 });
                 let loudest = near.map(|near| f64::from(expected[near]) - 1.0).fold(0.0, f64::max);
-                base[cell] = base[cell].max((1.0 + f64::from(BODY_FACTOR) * (loudest + lobes[cell])) as f32);
+                *base = base.max((1.0 + f64::from(BODY_FACTOR) * (loudest + lobes[cell])) as f32);
             }
         });
         self.over_body = true;
@@ -302,7 +319,7 @@ fn shape(evidence: &Evidence) -> Vec<f64> {
 }
 
 /// Range bins that the body has power in during some frame.
-pub fn visited_ranges(model: &PowerModel, frames: usize, loops: usize, samples: usize) -> Vec<bool> {
+fn visited_ranges(model: &PowerModel, frames: usize, loops: usize, samples: usize) -> Vec<bool> {
     let mut visited = vec![false; samples];
     for frame in 0..frames {
         for doppler in 0..loops {

@@ -219,7 +219,7 @@ fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candi
     }
     Candidate {
         id: Some("static_reflector"),
-        behaves_like: "path-like",
+        behaves_like: super::PATH_LIKE,
         estimates,
         choice: None,
         place,

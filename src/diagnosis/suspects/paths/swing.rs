@@ -4,15 +4,13 @@
 use rayon::prelude::*;
 
 use super::mover::{Mover, WIDEST_SWING_M, middle_s};
-use super::pendulum::Pendulum;
-use super::scene::{Scene, visited_ranges};
+use super::pendulum::{Law, Pendulum, at};
+use super::scene::{STILL_BINS, Scene};
 use super::track::{Sighting, Track, sighting};
 use crate::diagnosis::Point;
 use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::power::range_and_velocity;
 
-/// Doppler bins on either side of zero that hold remains of what stands still.
-const STILL_BINS: i64 = 2;
 /// Powers over the noise at the peak that are tried.
 const LEVELS: [f32; 8] = [4.0, 10.0, 25.0, 63.0, 160.0, 400.0, 1000.0, 4000.0];
 /// Rates are tried up to this.
@@ -37,9 +35,6 @@ struct Ground<'a> {
     expected: Vec<Vec<f32>>,
 }
 
-/// mean, sine, cosine (metres), rate (Hz).
-type Law = [f64; 4];
-
 /// None where nothing gains, or no frame shows what the law says.
 pub fn strongest(scene: &Scene) -> Option<Mover> {
     let ground = Ground::new(scene);
@@ -52,8 +47,7 @@ pub fn strongest(scene: &Scene) -> Option<Mover> {
         return None;
     }
     let table = ground.table(&training);
-    let visited = visited_ranges(scene.model, scene.frames(), scene.loops, scene.samples);
-    let ranges: Vec<usize> = (0..scene.bins).filter(|&range| visited[range]).collect();
+    let ranges: Vec<usize> = (0..scene.bins).filter(|&range| scene.visited[range]).collect();
     let step_hz = 0.1 / length_s;
     let rates: Vec<f64> = (4..(FASTEST_HZ / step_hz) as usize).map(|step| step as f64 * step_hz).collect();
     let times: Vec<f64> = training.iter().map(|&frame| middle_s(scene, frame)).collect();
@@ -123,13 +117,6 @@ pub fn strongest(scene: &Scene) -> Option<Mover> {
         power: f64::from(power),
         unlike: "its frames follow one swing, which the body's returns around it do not",
     })
-}
-
-/// Range and velocity.
-fn at([mean_m, sine_m, cosine_m, rate_hz]: Law, time_s: f64) -> (f64, f64) {
-    let omega = std::f64::consts::TAU * rate_hz;
-    let (sine, cosine) = (omega * time_s).sin_cos();
-    (mean_m + sine_m * sine + cosine_m * cosine, omega * (sine_m * cosine - cosine_m * sine))
 }
 
 /// Log-likelihoods gained by a swing's power in a place, `[frame][doppler · bins + range]` for each level.
