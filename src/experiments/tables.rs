@@ -97,8 +97,8 @@ pub fn tables(results: &Results) -> String {
     let mut indirect = vec![Method::Baseline(BaselineName::TwoBounce)];
     indirect.extend(variants(&[Variant::WithoutIndirect, Variant::Ours]));
     text += &ablation(results, "Indirect path (paper, section 4.6)", "", &indirect);
-    text +=
-        &ablation(results, "Noise (paper, table 4)", "", &variants(&[Variant::WithoutNoise, Variant::FixedNoise, Variant::Ours]));
+    let noises = [Variant::WithoutNoise, Variant::FixedNoise, Variant::ThermalNoise, Variant::Ours];
+    text += &ablation(results, "Noise (paper, table 4)", "", &variants(&noises));
     text += &ablation(
         results,
         "Graph convolution (paper, table 5)",

@@ -22,6 +22,8 @@ pub enum Variant {
     WithoutNoise,
     /// The paper's fixed rate of 0.025 (paper, table 4 and supplement 11).
     FixedNoise,
+    /// What receivers have: one level whatever the signal, learned.
+    ThermalNoise,
     /// The surface as it is, in place of the mesh's vertices.
     DenseSurface,
     /// Ours, with what the detective found in one training recording.
@@ -29,7 +31,7 @@ pub enum Variant {
 }
 
 impl Variant {
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Ours,
         Self::Coupled,
         Self::WithoutIndirect,
@@ -37,6 +39,7 @@ impl Variant {
         Self::GcnAtInference,
         Self::WithoutNoise,
         Self::FixedNoise,
+        Self::ThermalNoise,
         Self::DenseSurface,
         Self::WithEffects,
     ];
@@ -51,6 +54,7 @@ impl Variant {
             Self::GcnAtInference => "gcn_at_inference",
             Self::WithoutNoise => "without_noise",
             Self::FixedNoise => "fixed_noise",
+            Self::ThermalNoise => "thermal_noise",
             Self::DenseSurface => "dense_surface",
             Self::WithEffects => "with_effects",
         }
@@ -66,6 +70,7 @@ impl Variant {
             Self::GcnAtInference => "HybridSim, GCN at inference",
             Self::WithoutNoise => "HybridSim without noise",
             Self::FixedNoise => "HybridSim, fixed noise",
+            Self::ThermalNoise => "HybridSim, thermal noise",
             Self::DenseSurface => "HybridSim, dense surface",
             Self::WithEffects => "HybridSim with found effects",
         }
@@ -87,6 +92,10 @@ impl Variant {
             Self::FixedNoise => {
                 settings.noise.law = NoiseLaw::Fixed;
                 settings.noise.rate = 0.025;
+            }
+            Self::ThermalNoise => {
+                settings.noise.law = NoiseLaw::Constant;
+                settings.noise.level = 0.0;
             }
             Self::DenseSurface => settings.surface = dense.clone(),
             Self::Ours | Self::GcnAtInference | Self::WithEffects => {}

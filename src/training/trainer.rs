@@ -111,8 +111,10 @@ impl Trainer<'_> {
                         ),
                     });
                 }
-                // The receiver that set the levels is the same one.
+                // Another room's gain is another one, and with it the noise over the amplitude.
                 simulator = checkpoint::load_weights(folder, simulator)?;
+                simulator = calibrate::fit_levels(simulator, self.recordings, &prepared, &split.training, &self.config.heatmap)?;
+                simulator = checkpoint::with_stable_ids(simulator);
             }
             (None, None) => {
                 simulator = calibrate::fit_levels(simulator, self.recordings, &prepared, &split.training, &self.config.heatmap)?;

@@ -1,10 +1,11 @@
-//! A static return behind the body that changes from frame to frame while all others stay: the body's shadow falls on it
+//! A static return that swings at one frequency ([`hum`]), or one behind the body that changes from frame to frame while all others stay: the body's shadow falls on it
 //! (card T7), or it stirs itself.
 //!
 //! What all static returns do together (gain, phase, a phase in proportion to the delay) is somebody else's affair and is
 //! taken from the other returns, frame by frame. Only the strong ranges beyond the body's reach are looked at, where
 //! nothing moves within a frame; a change must keep the pattern that the return has across the receivers.
 
+mod hum;
 mod silhouette;
 
 use std::f64::consts::LN_10;
@@ -59,7 +60,7 @@ struct Returns {
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    judged(evidence).into_iter().collect()
+    judged(evidence).into_iter().chain(hum::find(evidence)).collect()
 }
 
 fn judged(evidence: &Evidence) -> Option<Candidate> {

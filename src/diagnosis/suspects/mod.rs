@@ -54,6 +54,6 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect::new("untracked movers", untracked::find),
     Suspect::new("extra paths", paths::find),
     Suspect { share: 8.0, ..Suspect::new("geometry", geometry::find) },
-    Suspect::new("static returns behind the body", fluctuation::find),
+    Suspect::new("changing static returns", fluctuation::find),
     Suspect { last_resort: true, ..Suspect::new("excess power", excess::find) },
 ];

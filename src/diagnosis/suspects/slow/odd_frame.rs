@@ -1,8 +1,8 @@
 //! One frame of one channel that is not like the others: samples that slipped, a frame that was written over.
 //!
-//! What stands still is alike in all frames. Movers leave remains in it, which all channels of a frame share in power; so
-//! the odd one must stand out both from its channel's other frames and from its frame's other channels. A frame is all
-//! there is of it, so its even chirps propose and its odd chirps judge.
+//! What stands still is alike in all frames. Movers leave remains in it, which all channels of a frame share in power,
+//! range by range; so the odd one stands out from its frame's other channels, by more than any other does. A frame is
+//! all there is of it, so its even chirps propose and its odd chirps judge.
 
 use std::sync::Arc;
 
@@ -12,22 +12,23 @@ use rayon::prelude::*;
 use crate::diagnosis::Cube;
 use crate::diagnosis::evidence::{Evidence, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
-use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::statistics::{corrected, median};
 
 /// Fewest frames and channels among which one can be odd.
 const FEWEST_FRAMES: usize = 6;
 const FEWEST_CHANNELS: usize = 2;
-/// How many times the strongest other deviation an odd one is at least.
-const STANDS_OUT: f64 = 4.0;
-/// Independent numbers that a deviation's energy is taken to consist of at most: remains of movers are few.
-const FEW_NUMBERS: f64 = 20.0;
+/// Deviations of the scores' law that the odd one's is out at least, and how many times the next one's.
+const STANDS_OUT: f64 = 10.0;
+const FROM_THE_NEXT: f64 = 2.0;
+/// Median absolute deviation to standard deviation of a normal law.
+const TO_DEVIATION: f64 = 1.4826;
 pub const BEHAVES_LIKE: &str = "single frame";
 
 /// Mean chirps of the even and of the odd loops less the channel's mean over the other frames.
 struct Deviation {
     halves: [Vec<Complex64>; 2],
-    /// Mean |spectrum|² of both halves' mean over the noise's expectation.
-    energy: f64,
+    /// |spectrum|² of both halves' mean over the noise's expectation, by range.
+    power: Vec<f64>,
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -40,38 +41,40 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         .into_par_iter()
         .map(|at| halves(evidence.cube.channel(at / channels, at % channels), samples))
         .collect();
-    let deviations: Vec<Deviation> = (0..frames * channels)
-        .into_par_iter()
-        .map(|at| {
+    let deviations = |without: Option<usize>| -> Vec<Deviation> {
+        let of = |at: usize| {
             let (frame, channel) = (at / channels, at % channels);
-            let others = (frames - 1) as f64;
+            let others: Vec<usize> = (0..frames).filter(|&other| other != frame && Some(other) != without).collect();
             let mut rest = vec![Complex64::ZERO; samples];
-            for other in (0..frames).filter(|&other| other != frame) {
-                for half in &means[other * channels + channel] {
-                    rest.iter_mut().zip(half).for_each(|(sum, value)| *sum += value / (2.0 * others));
-                }
+            for half in others.iter().flat_map(|other| &means[other * channels + channel]) {
+                rest.iter_mut().zip(half).for_each(|(sum, value)| *sum += value / (2 * others.len()) as f64);
             }
             let halves = [0, 1].map(|half| means[at][half].iter().zip(&rest).map(|(a, b)| a - b).collect::<Vec<_>>());
             let mean: Vec<Complex64> = halves[0].iter().zip(&halves[1]).map(|(a, b)| (a + b) / 2.0).collect();
             let noise = evidence.noise()[channel].max(1e-300) / loops as f64;
-            let energy = spectrum(&mean).iter().map(|value| value.norm_sqr()).sum::<f64>() / noise / samples as f64;
-            Deviation { halves, energy }
-        })
-        .collect();
-    let Some(odd) = (0..deviations.len()).max_by(|&a, &b| deviations[a].energy.total_cmp(&deviations[b].energy)) else {
-        return vec![];
+            Deviation { power: spectrum(&mean).iter().map(|value| value.norm_sqr() / noise).collect(), halves }
+        };
+        (0..frames * channels).into_par_iter().map(of).collect()
     };
+    let largest = |scores: &[f64]| (0..scores.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b]));
+    // The odd one is in all others' means, too: it is judged against what they are without it.
+    let Some(odd) = largest(&scores(&deviations(None), channels)) else { return vec![] };
     let (frame, channel) = (odd / channels, odd % channels);
-    let next = (0..deviations.len()).filter(|&at| at != odd).map(|at| deviations[at].energy).fold(1.0, f64::max);
-    let ratio = deviations[odd].energy / next;
-    if ratio < STANDS_OUT {
+    let deviations = deviations(Some(frame));
+    let scores = scores(&deviations, channels);
+    let next = (0..scores.len()).filter(|&at| at != odd).map(|at| scores[at]).fold(0.0, f64::max);
+    if scores[odd] < STANDS_OUT.max(FROM_THE_NEXT * next) {
         return vec![];
     }
-    // A ratio of mean powers of so many numbers each, at the worst.
-    let p_value = corrected((-0.5 * FEW_NUMBERS * (ratio.ln() - (1.0 - 1.0 / ratio))).exp(), deviations.len() as f64);
+    // Scores of remains of movers have a longer tail than a normal law's.
+    let p_value = corrected((-scores[odd]).exp(), scores.len() as f64);
+    let total = |at: usize| deviations[at].power.iter().sum::<f64>();
+    let usual = (0..deviations.len()).filter(|&at| at != odd).map(total).sum::<f64>() / (deviations.len() - 1) as f64;
+    let ratio = total(odd) / usual.max(f64::MIN_POSITIVE);
     // What the even chirps deviate by predicts the odd ones.
     let [even, uneven] = &deviations[odd].halves;
-    let noise = next * evidence.noise()[channel].max(1e-300) / (0.5 * loops as f64);
+    let floor = (usual / samples as f64).max(1.0);
+    let noise = floor * evidence.noise()[channel].max(1e-300) / (0.5 * loops as f64);
     let gain = uneven.iter().zip(even).map(|(a, b)| a.norm_sqr() - (a - b).norm_sqr()).sum::<f64>() / noise;
     let change: Vec<Complex64> = even.iter().zip(uneven).map(|(a, b)| (a + b) / 2.0).collect();
     let energy = change.iter().map(|value| value.norm_sqr()).sum::<f64>() * loops as f64;
@@ -92,8 +95,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         rung: Rung::F,
         look_alikes: vec![],
         statement: format!(
-            "In frame {frame} receiver {} sees the room otherwise than in all other frames, by {:.0} times the power of the next \
-             deviation, and no other receiver does: that frame of that receiver was corrupted or shifted.",
+            "In frame {frame} receiver {} sees the room otherwise than in all other frames, with {:.1} times the power of \
+             the usual deviation, and no other receiver does at those ranges: that frame of that receiver was corrupted or shifted.",
             channel % receivers,
             ratio
         ),
@@ -106,6 +109,26 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             }
         })),
     }]
+}
+
+/// How far every deviation is out of its frame's other channels', over the ranges, in deviations from the median:
+/// `[frame, channel]`.
+fn scores(deviations: &[Deviation], channels: usize) -> Vec<f64> {
+    let others = (channels - 1) as f64;
+    let raw = |at: usize| -> f64 {
+        let frame = at / channels * channels..(at / channels + 1) * channels;
+        let out = |(range, own): (usize, &f64)| {
+            let all: f64 = deviations[frame.clone()].iter().map(|deviation| deviation.power[range]).sum();
+            // The likelihood ratio of one power against so many others of one law, which is never below the noise's.
+            (own / (all - own).max(others)).ln_1p()
+        };
+        deviations[at].power.iter().enumerate().map(out).sum()
+    };
+    let scores: Vec<f64> = (0..deviations.len()).map(raw).collect();
+    let middle = median(&mut scores.clone());
+    let mut apart: Vec<f64> = scores.iter().map(|score| (score - middle).abs()).collect();
+    let spread = TO_DEVIATION * median(&mut apart);
+    scores.iter().map(|score| (score - middle) / spread.max(f64::MIN_POSITIVE)).collect()
 }
 
 /// Mean chirps of the even and of the odd loops.

@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use super::UNDECIDED;
 use super::field::{Field, Part};
 use crate::diagnosis::statistics;
 
@@ -17,6 +18,8 @@ pub struct Settling {
     pub p_value: f64,
     pub training_gain: f64,
     pub held_out_gain: f64,
+    /// What a hum of the mains gains in training, where its periods fit into the frames': it is then alike in all of them.
+    pub hum_gain: f64,
     /// What a free function of the loop gains on held-out frames.
     pub free: Free,
 }
@@ -36,17 +39,22 @@ const ENOUGH: f64 = 0.8;
 const LEFT_OVER: f64 = 0.01;
 /// Beyond doubt, nats.
 const PLAIN: f64 = 50.0;
+/// Frequencies at which supplies and lamps hum.
+const MAINS_HZ: [f64; 8] = [50.0, 60.0, 100.0, 120.0, 200.0, 240.0, 300.0, 360.0];
+/// Turns that a hum may drift over the recording and still look alike in all frames.
+const LOCKED_TURNS: f64 = 0.25;
 /// What is over within a chirp is no decay that was seen: the first chirp may lack what each leaves to the next.
 const FEWEST_LOOPS: f64 = 0.5;
 
 impl Settling {
-    /// Whether this is a decay, and not the best decay for something else: a line that is locked to the frames, say.
+    /// Whether this is a decay, and not the best decay for something else: a hum that is locked to the frames, say.
     pub fn is_named(&self) -> bool {
         let rest = self.free.held_out_gain - self.held_out_gain;
         self.held_out_gain > ENOUGH * self.free.held_out_gain
             && (rest < PLAIN || rest < LEFT_OVER * self.free.held_out_gain)
             && self.amplitude.re.abs() > self.amplitude.im.abs()
             && self.loops > FEWEST_LOOPS
+            && self.training_gain > self.hum_gain + UNDECIDED
     }
 
     /// Relative to the settled state.
@@ -120,7 +128,32 @@ pub fn best(field: &Field, training: &[usize], held_out: &[usize]) -> Option<Set
         constant,
         p_value,
         training_gain,
+        hum_gain: 0.5 * weight * locked(field).map(|hertz| explained(field, &free.values, hertz)).fold(0.0, f64::max),
         held_out_gain: held_gain(&|index| amplitude * (-(index as f64) / length).exp() + constant),
         free,
     })
+}
+
+/// Frequencies of the mains that all frames see alike.
+fn locked(field: &Field) -> impl Iterator<Item = f64> {
+    let starts: Vec<f64> = field.times_s.iter().step_by(field.loops).copied().collect();
+    let period = starts.get(1).map_or(0.0, |second| second - starts[0]);
+    let drift = move |hertz: f64| (hertz * period - (hertz * period).round()).abs() * starts.len() as f64;
+    MAINS_HZ.into_iter().filter(move |&hertz| period > 0.0 && drift(hertz) < LOCKED_TURNS)
+}
+
+/// Energy that a sinusoid takes out of values by loop whose mean is zero.
+fn explained(field: &Field, values: &[Complex64], hertz: f64) -> f64 {
+    let wave = |shift: f64| -> Vec<f64> {
+        let wave = |time: &f64| (std::f64::consts::TAU * hertz * (time - field.times_s[0]) + shift).cos();
+        let wave: Vec<f64> = field.times_s[..values.len()].iter().map(wave).collect();
+        let mean = wave.iter().sum::<f64>() / wave.len() as f64;
+        wave.into_iter().map(|value| value - mean).collect()
+    };
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (cosine, mut sine) = (wave(0.0), wave(-std::f64::consts::FRAC_PI_2));
+    let shared = dot(&sine, &cosine) / dot(&cosine, &cosine);
+    sine.iter_mut().zip(&cosine).for_each(|(sine, cosine)| *sine -= shared * cosine);
+    let along = |wave: &[f64]| values.iter().zip(wave).map(|(v, w)| v * w).sum::<Complex64>().norm_sqr() / dot(wave, wave);
+    along(&cosine) + along(&sine)
 }

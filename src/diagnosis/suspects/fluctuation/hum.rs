@@ -1,0 +1,346 @@
+//! A static return that swings at one frequency while the others stay: a lamp, a motor, a screen.
+//!
+//! Its two sidebands are alike and go on from frame to frame. What moves there has other phases in every frame, so the
+//! frames' own scatter is what a line must stand out of.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+use rustfft::FftPlanner;
+
+use crate::diagnosis::evidence::{Evidence, blackman_harris};
+use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
+use crate::diagnosis::statistics::corrected;
+
+/// Slower swings belong to people, faster ones to electronics.
+const LOWEST_HZ: f64 = 20.0;
+const HIGHEST_HZ: f64 = 500.0;
+/// Frequencies per resolution cell of the recording.
+const FINE: f64 = 4.0;
+/// Frequencies per resolution cell of a frame at which its amplitude is worked out.
+const COARSE: f64 = 8.0;
+/// Share of one sideband's power that the other has at least.
+const ALIKE: f64 = 0.3;
+/// Bins to either side that a return reaches under the taper.
+const REACH: usize = 3;
+const FEWEST_FRAMES: usize = 5;
+const REFINEMENTS: usize = 16;
+pub const BEHAVES_LIKE: &str = "a static return that hums";
+
+/// Chirps without what stands still, by range, and when they were.
+struct Chirps<'a> {
+    evidence: &'a Evidence,
+    bins: usize,
+    /// `[frame][loop · channel · bin]`
+    spectra: Vec<Vec<Complex64>>,
+    /// Of the loops relative to their frame's middle.
+    loops_s: Vec<f64>,
+    /// Of the frames' middles.
+    middles_s: Vec<f64>,
+}
+
+/// Amplitudes of both sidebands in every frame, `[sideband][frame · channel · bin]`.
+type Sidebands = [Vec<Complex64>; 2];
+
+#[derive(Clone, Copy)]
+struct Line {
+    frequency_hz: f64,
+    bin: usize,
+    /// Power of the training frames' mean over what their scatter makes of it.
+    ratio: f64,
+}
+
+pub fn find(evidence: &Evidence) -> Option<Candidate> {
+    let training = &evidence.split.training;
+    if training.len() < FEWEST_FRAMES || evidence.split.held_out.is_empty() || evidence.accepted.contains(&BEHAVES_LIKE) {
+        return None;
+    }
+    let chirps = Chirps::new(evidence)?;
+    let duration_s = chirps.middles_s[training[training.len() - 1]] - chirps.middles_s[training[0]];
+    let frame_s = chirps.loops_s.len() as f64 * evidence.radar.loop_period_s();
+    let highest_hz = HIGHEST_HZ.min(0.4 / evidence.radar.loop_period_s());
+    if duration_s * LOWEST_HZ < FEWEST_FRAMES as f64 || highest_hz <= LOWEST_HZ {
+        return None;
+    }
+    let coarse = 1.0 / (COARSE * frame_s);
+    let fine = 1.0 / (FINE * duration_s);
+    let cells = ((highest_hz - LOWEST_HZ) / coarse).ceil() as usize;
+    let strongest = |cell: usize| {
+        let start = LOWEST_HZ + cell as f64 * coarse;
+        let sidebands = chirps.sidebands(start + 0.5 * coarse);
+        let count = (coarse / fine).ceil() as usize;
+        (0..count).filter_map(|i| chirps.strongest(&sidebands, start + i as f64 * fine)).max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+    };
+    let line = (0..cells).into_par_iter().filter_map(strongest).max_by(|a, b| a.ratio.total_cmp(&b.ratio))?;
+    let line = chirps.refined(line, 0.5 * fine);
+    // As if all channels were one: what moves is alike in all of them.
+    let freedom = training.len() as f64 - 1.0;
+    let tried = (highest_hz - LOWEST_HZ) * duration_s * (chirps.bins / 2) as f64;
+    let p_value = corrected((1.0 + line.ratio / freedom).powf(-freedom), tried);
+    let gain = chirps.gain(&line);
+    (p_value < 0.01 && gain > 0.0).then(|| candidate(&chirps, &line, p_value, gain))
+}
+
+impl<'a> Chirps<'a> {
+    fn new(evidence: &'a Evidence) -> Option<Self> {
+        let [frames, _, _, loops, samples] = evidence.cube.dims;
+        let (channels, bins) = (evidence.cube.channels(), evidence.range_bins());
+        if loops < 8 || bins < 16 {
+            return None;
+        }
+        let taper = blackman_harris(samples);
+        let fft = FftPlanner::new().plan_fft_forward(samples);
+        let transformed = |values: &mut Vec<Complex64>| {
+            values.iter_mut().enumerate().for_each(|(i, value)| *value *= taper[i % samples]);
+            fft.process(values);
+        };
+        let mut still = evidence.still().to_vec();
+        transformed(&mut still);
+        let spectra = (0..frames).into_par_iter().map(|frame| {
+            let mut spectra = vec![Complex64::ZERO; loops * channels * bins];
+            for channel in 0..channels {
+                let mut chirps = evidence.cube.channel(frame, channel).to_vec();
+                transformed(&mut chirps);
+                for (index, chirp) in chirps.chunks_exact(samples).enumerate() {
+                    for bin in 0..bins {
+                        spectra[(index * channels + channel) * bins + bin] = chirp[bin] - still[channel * samples + bin];
+                    }
+                }
+            }
+            spectra
+        });
+        let loop_s = evidence.radar.loop_period_s();
+        let middle = 0.5 * (loops - 1) as f64;
+        Some(Self {
+            evidence,
+            bins,
+            spectra: spectra.collect(),
+            loops_s: (0..loops).map(|index| (index as f64 - middle) * loop_s).collect(),
+            middles_s: evidence.starts_s.iter().map(|start| start + middle * loop_s).collect(),
+        })
+    }
+
+    /// At plus and minus a frequency, with the phases of the frames' middles.
+    fn sidebands(&self, frequency_hz: f64) -> Sidebands {
+        [1.0, -1.0].map(|sign| {
+            let turns: Vec<Complex64> =
+                self.loops_s.iter().map(|time| Complex64::cis(-sign * TAU * frequency_hz * time)).collect();
+            let of_frame = |spectra: &Vec<Complex64>| {
+                let size = spectra.len() / turns.len();
+                let mut sum = vec![Complex64::ZERO; size];
+                for (chirp, turn) in spectra.chunks_exact(size).zip(&turns) {
+                    sum.iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value * turn);
+                }
+                sum.iter_mut().for_each(|value| *value /= turns.len() as f64);
+                sum
+            };
+            self.spectra.iter().flat_map(of_frame).collect()
+        })
+    }
+
+    /// Back to the recording's beginning, by frame.
+    fn turns(&self, frequency_hz: f64, sideband: usize) -> Vec<Complex64> {
+        let sign = [-1.0, 1.0][sideband];
+        self.middles_s.iter().map(|time| Complex64::cis(sign * TAU * frequency_hz * time)).collect()
+    }
+
+    /// The range at which a frequency stands out most.
+    fn strongest(&self, sidebands: &Sidebands, frequency_hz: f64) -> Option<Line> {
+        let training = &self.evidence.split.training;
+        let (channels, bins, count) = (self.evidence.cube.channels(), self.bins, training.len() as f64);
+        let mut scatter = vec![0.0; bins];
+        let power = [0, 1].map(|sideband| {
+            let turns = self.turns(frequency_hz, sideband);
+            let mut power = vec![0.0; bins];
+            for channel in 0..channels {
+                for bin in 0..bins {
+                    let (mut sum, mut squares) = (Complex64::ZERO, 0.0);
+                    for &frame in training {
+                        let value = sidebands[sideband][(frame * channels + channel) * bins + bin];
+                        sum += value * turns[frame];
+                        squares += value.norm_sqr();
+                    }
+                    let of_mean = sum.norm_sqr() / count;
+                    power[bin] += of_mean;
+                    scatter[bin] += (squares - of_mean).max(0.0);
+                }
+            }
+            power
+        });
+        let ratio = |bin: usize| {
+            let [upper, lower] = [power[0][bin], power[1][bin]];
+            let alike = upper.min(lower) >= ALIKE * upper.max(lower) && scatter[bin] > 0.0;
+            if alike { (upper + lower) / (scatter[bin] / (count - 1.0)) } else { 0.0 }
+        };
+        let bin = (0..bins).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
+        (ratio(bin) > 0.0).then(|| Line { frequency_hz, bin, ratio: ratio(bin) })
+    }
+
+    /// A line beside its true frequency has a scatter of its own.
+    fn refined(&self, mut line: Line, mut step_hz: f64) -> Line {
+        let sidebands = self.sidebands(line.frequency_hz);
+        let mut tries = 0;
+        while tries < REFINEMENTS {
+            let beside = [-step_hz, step_hz].map(|step| self.strongest(&sidebands, line.frequency_hz + step));
+            match beside.into_iter().flatten().find(|beside| beside.ratio > line.ratio) {
+                Some(better) => line = better,
+                None => step_hz *= 0.5,
+            }
+            tries += 1;
+        }
+        line
+    }
+
+    /// What the training frames' mean gains on the held-out ones, nats; all channels as one.
+    fn gain(&self, line: &Line) -> f64 {
+        let (training, held_out) = (&self.evidence.split.training, &self.evidence.split.held_out);
+        let channels = self.evidence.cube.channels();
+        let sidebands = self.sidebands(line.frequency_hz);
+        let (mut gained, mut scatter) = (0.0, 0.0);
+        for (sideband, values) in sidebands.iter().enumerate() {
+            let turns = self.turns(line.frequency_hz, sideband);
+            for channel in 0..channels {
+                let value = |frame: usize| values[(frame * channels + channel) * self.bins + line.bin] * turns[frame];
+                let mean = training.iter().map(|&frame| value(frame)).sum::<Complex64>() / training.len() as f64;
+                scatter += training.iter().map(|&frame| (value(frame) - mean).norm_sqr()).sum::<f64>();
+                gained += held_out.iter().map(|&frame| value(frame).norm_sqr() - (value(frame) - mean).norm_sqr()).sum::<f64>();
+            }
+        }
+        sidebands.len() as f64 * gained * (training.len() - 1) as f64 / scatter.max(f64::MIN_POSITIVE)
+    }
+
+    /// What swings at plus and minus a frequency within a few bins of a range, `[sideband][channel · sample]`.
+    fn waves(&self, line: &Line) -> [Vec<Complex64>; 2] {
+        let evidence = self.evidence;
+        let [_, _, _, loops, samples] = evidence.cube.dims;
+        let channels = evidence.cube.channels();
+        let mut planner = FftPlanner::new();
+        let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
+        [0, 1].map(|sideband| {
+            let mut wave = vec![Complex64::ZERO; channels * samples];
+            let turns = self.turns(line.frequency_hz, sideband);
+            let sign = [-1.0, 1.0][sideband];
+            for &frame in &evidence.split.training {
+                for channel in 0..channels {
+                    let still = &evidence.still()[channel * samples..][..samples];
+                    let wave = &mut wave[channel * samples..][..samples];
+                    for (chirp, time) in evidence.cube.channel(frame, channel).chunks_exact(samples).zip(&self.loops_s) {
+                        let turn = turns[frame] * Complex64::cis(sign * TAU * line.frequency_hz * time);
+                        wave.iter_mut().zip(chirp).zip(still).for_each(|((sum, value), still)| *sum += (value - still) * turn);
+                    }
+                }
+            }
+            forward.process(&mut wave);
+            let count = (evidence.split.training.len() * loops * samples) as f64;
+            for (i, value) in wave.iter_mut().enumerate() {
+                let far = (i % samples).abs_diff(line.bin);
+                *value *= if far.min(samples - far) <= REACH { 1.0 / count } else { 0.0 };
+            }
+            inverse.process(&mut wave);
+            wave
+        })
+    }
+}
+
+fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Candidate {
+    let evidence = chirps.evidence;
+    let samples = evidence.cube.dims[4];
+    let bin_m = evidence.radar.range_resolution_m();
+    let range_m = line.bin as f64 * bin_m;
+    let waves = chirps.waves(line);
+    let chirp_count = (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
+    let energy = waves.iter().flatten().map(|value| value.norm_sqr()).sum::<f64>() * chirp_count;
+    let (starts_s, loop_s, frequency_hz) = (evidence.starts_s.clone(), evidence.radar.loop_period_s(), line.frequency_hz);
+    let frame_rate_hz = 1.0 / evidence.radar.frame_period_s;
+    Candidate {
+        id: None,
+        behaves_like: BEHAVES_LIKE,
+        estimates: vec![],
+        choice: None,
+        place: Place { range_m: Some([range_m - 1.5 * bin_m, range_m + 1.5 * bin_m]), ..Place::at("scene") },
+        p_value: p_value.max(f64::MIN_POSITIVE),
+        gain,
+        rung: Rung::F,
+        look_alikes: vec![],
+        statement: format!(
+            "The return {range_m:.2} m away swings at {frequency_hz:.1} Hz (or at that and a multiple of the {frame_rate_hz:.1} \
+             frames per second), in step from frame to frame, while the other ranges stay: a lamp or a machine is there."
+        ),
+        curve: None,
+        energy,
+        correction: Correction::Samples(Arc::new(move |cube| {
+            cube.each_chirp(|[frame, channel, index], chirp| {
+                let turn = Complex64::cis(TAU * frequency_hz * (starts_s[frame] + index as f64 * loop_s));
+                let [upper, lower] = [0, 1].map(|sideband| &waves[sideband][channel * samples..][..samples]);
+                for ((value, upper), lower) in chirp.iter_mut().zip(upper).zip(lower) {
+                    *value -= upper * turn + lower * turn.conj();
+                }
+            });
+        })),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::diagnosis::cube::{Cube, Loaded, Split};
+    use crate::radar::Radar;
+
+    const HUM_HZ: f64 = 100.0;
+
+    /// Two static returns, of which one swings, and somebody who moves, in noise.
+    fn evidence(depth: f64) -> Evidence {
+        let mut radar = Radar::small(8);
+        (radar.loops_per_frame, radar.samples_per_chirp) = (16, 64);
+        let dims = radar.dims();
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let [_, _, receivers, loops, samples] = dims;
+        let starts_s: Vec<f64> = (0..dims[0]).map(|frame| frame as f64 * radar.frame_period_s).collect();
+        let samples_all: Vec<Complex64> = (0..dims.iter().product::<usize>())
+            .map(|i| {
+                let (n, slow, rx, frame) =
+                    (i % samples, i / samples % loops, i / samples / loops % receivers, i / samples / loops / receivers);
+                let time = starts_s[frame] + slow as f64 * radar.loop_period_s();
+                let n = n as f64;
+                let mover = Complex64::cis(0.6 * n + 0.4 * slow as f64 + 1.9 * (frame * frame) as f64) * 4.0;
+                let lamp = Complex64::cis(1.8 * n - 0.2 * rx as f64) * 8.0 * (1.0 + depth * (TAU * HUM_HZ * time).cos());
+                Complex64::cis(0.9 * n + 0.4 * rx as f64) * 30.0 + mover + lamp + Complex64::new(normal(), normal())
+            })
+            .collect();
+        let loaded = Loaded {
+            cube: Cube::new(dims, samples_all),
+            split: Split { training: vec![0, 1, 3, 4, 5, 7], held_out: vec![2, 6], block_loops: None },
+            starts_s,
+            extremes: [-100.0, 100.0],
+            radar,
+        };
+        Evidence::new(loaded, None, None)
+    }
+
+    #[test]
+    fn a_humming_return_is_found_at_its_range_and_is_gone_once_it_is_explained() {
+        let before = evidence(0.3);
+        let found = find(&before).expect("it hums");
+        let [near, far] = found.place.range_m.unwrap();
+        let wanted = 1.8 / TAU * 64.0 * before.radar.range_resolution_m();
+        assert!((near..far).contains(&wanted), "{wanted} in {near} to {far}");
+        assert!(found.p_value < 1e-4 && found.gain > 10.0, "{} {}", found.p_value, found.gain);
+        let after = before.with(&found);
+        let energy = |evidence: &Evidence| evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum::<f64>();
+        let removed = energy(&before) - energy(&after);
+        let planted = 0.5 * (8.0f64 * 0.3).powi(2) * before.cube.samples.len() as f64;
+        assert!((removed / planted - 1.0).abs() < 0.2, "{removed} of {planted}");
+    }
+
+    #[test]
+    fn what_stands_or_moves_does_not_hum() {
+        assert!(find(&evidence(0.0)).is_none());
+    }
+}
