@@ -193,7 +193,8 @@ impl<'a> Chirps<'a> {
         line
     }
 
-    /// What the training frames' mean gains on the held-out ones, nats; all channels as one.
+    /// What the training frames' mean gains on the held-out ones, nats. Where the frames scatter by more than the noise,
+    /// something moves, which all channels share: they count as one.
     fn gain(&self, line: &Line) -> f64 {
         let (training, held_out) = (&self.evidence.split.training, &self.evidence.split.held_out);
         let channels = self.evidence.cube.channels();
@@ -208,7 +209,13 @@ impl<'a> Chirps<'a> {
                 gained += held_out.iter().map(|&frame| value(frame).norm_sqr() - (value(frame) - mean).norm_sqr()).sum::<f64>();
             }
         }
-        sidebands.len() as f64 * gained * (training.len() - 1) as f64 / scatter.max(f64::MIN_POSITIVE)
+        let numbers = (sidebands.len() * channels) as f64;
+        let variance = (scatter / (numbers * (training.len() - 1) as f64)).max(f64::MIN_POSITIVE);
+        let samples = self.evidence.cube.dims[4];
+        let taper: f64 = blackman_harris(samples).iter().map(|weight| weight * weight).sum();
+        let noise = self.evidence.noise().iter().sum::<f64>() / channels as f64 * taper / self.loops_s.len() as f64;
+        let independent = 1.0 + (channels - 1) as f64 * (noise / variance).min(1.0);
+        gained / variance * independent / channels as f64
     }
 
     /// What swings at plus and minus a frequency within a few bins of a range, `[sideband][channel · sample]`.
