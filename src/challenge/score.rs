@@ -16,6 +16,7 @@ use super::plan::scalable;
 use super::psychometric::{Logistic, chart};
 use super::report::{Measures, Report};
 use super::rules::*;
+use super::seal::measured;
 use super::secret::Secret;
 use super::table::{Aim, Row, markdown, middle, share};
 use crate::data::atomic::write_text;
@@ -52,11 +53,18 @@ pub struct Score {
     points: Vec<(f64, bool)>,
 }
 
-/// Verifies and scores. `twins`: the folder of [`super::twins`], where there is one.
+/// Verifies and scores. `twins`: the folder of [`super::twins`], where there is one. `again`: strengths are measured anew, by
+/// the yardstick of this program, and not taken from the truths.
 ///
 /// # Errors
 /// Anything that is not as it was committed to; the message names the case.
-pub fn score(challenge: &Path, answers_folder: &Path, twins: Option<&Path>, progress: &(dyn Fn(usize) + Sync)) -> Result<Score> {
+pub fn score(
+    challenge: &Path,
+    answers_folder: &Path,
+    twins: Option<&Path>,
+    again: bool,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<Score> {
     let commitments = Commitment::read_all(challenge)?;
     let answers = Answers::read(answers_folder)?;
     let root = joint_root(&commitments);
@@ -73,7 +81,11 @@ pub fn score(challenge: &Path, answers_folder: &Path, twins: Option<&Path>, prog
     let mut cases: Vec<Case> = leaves
         .par_iter()
         .map(|(name, leaf)| {
-            let case = one(challenge, answers_folder, twins, &answers, name, leaf)?;
+            let mut truth = truth(challenge, name, leaf)?;
+            if again && truth.strength.is_some() {
+                truth.strength = Some(measured(&truth.settings, Path::new(name))?);
+            }
+            let case = one(challenge, answers_folder, twins, &answers, name, &truth);
             progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1);
             Ok(case)
         })
@@ -114,9 +126,12 @@ fn nothing_else(challenge: &Path, leaves: &[(&String, &String)]) -> Result<()> {
     Ok(())
 }
 
-fn one(challenge: &Path, folder: &Path, twins: Option<&Path>, answers: &Answers, name: &str, leaf: &str) -> Result<Case> {
+fn truth(challenge: &Path, name: &str, leaf: &str) -> Result<Truth> {
     let sealed = open(challenge, name, leaf)?;
-    let truth = Truth::of(&sealed).map_err(|found| Error::field(name, "truth", found, "a truth of this version"))?;
+    Truth::of(&sealed).map_err(|found| Error::field(name, "truth", found, "a truth of this version"))
+}
+
+fn one(challenge: &Path, folder: &Path, twins: Option<&Path>, answers: &Answers, name: &str, truth: &Truth) -> Case {
     let report = match (answers.reports.get(name), answers.failures.get(name)) {
         (Some(_), _) => Report::read(&folder.join(name).join("report.json")).map_err(|error| error.to_string()),
         (None, Some(reason)) => Err(reason.clone()),
@@ -127,14 +142,14 @@ fn one(challenge: &Path, folder: &Path, twins: Option<&Path>, answers: &Answers,
         twins.and_then(|twins| read_json::<Report>(&twins.join(name).join("report.json")).ok()).map(|twin| twin.fit.before);
     let baseline = Recording::open(challenge.join("cases").join(name)).and_then(|case| baselines::statistics(&case)).ok();
     let (usual, before, after) = fit;
-    Ok(Case {
-        judgement: judge(name, &truth, &report),
+    Case {
+        judgement: judge(name, truth, &report),
         before: Measures { loglik_per_sample: before.loglik_per_sample, ..usual },
         after: Measures { ..after },
         oracle,
         baseline,
         concealed: false,
-    })
+    }
 }
 
 impl Case {

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 use super::commitment::{Commitment, Sealed, hash_file, hash_folder, leaf, merkle_root, read_json, sha256};
 use super::config::{ChallengeConfig, Stratum};
-use super::measure::{Scaled, Strength, strength};
+use super::measure::{Strength, strength};
 use super::plan::{Plan, plans};
 use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
 use super::secret::Secret;
@@ -166,21 +166,17 @@ fn record(config: &ChallengeConfig, plan: &mut Plan) -> Result<Recorded> {
     // What the converter does is not seen in samples that it never touched.
     scene.receiver.adc = plan.effects.iter().any(|(graded, _)| matches!(graded.id, "adc_saturation" | "lsb_stuck"));
     let world = scene.world(Path::new("."))?;
-    let clean = recording(&scene)?;
+    let (clean, clean_gain) = frames_of(&world)?;
     if plan.stratum == Stratum::Null {
-        return Ok(Recorded { world, frames: clean.frames, settings: scene, strength: None });
+        return Ok(Recorded { world, frames: clean, settings: scene, strength: None });
     }
-    let other = RecorderConfig { mesh_seed: Some(!scene.seed), noise_seed: Some(!scene.seed), ..scene.clone() };
-    let other_clean = recording(&other)?;
     let mut attempts = 1;
     loop {
-        let effects = plan.planted(config);
-        let other_planted = recording(&RecorderConfig { effects: effects.clone(), ..other.clone() })?;
-        let settings = RecorderConfig { effects, ..scene.clone() };
-        let planted = recording(&settings)?;
-        let strength = strength(&clean, &planted, [&other_clean, &other_planted]);
+        let settings = RecorderConfig { effects: plan.planted(config), ..scene.clone() };
+        let (frames, gain) = frames_of(&settings.world(Path::new("."))?)?;
+        let strength = strength(&clean, &frames, gain / clean_gain);
         if attempts == MOST_ATTEMPTS || as_meant(plan, &strength) {
-            return Ok(Recorded { world, frames: planted.frames, settings, strength: Some(strength) });
+            return Ok(Recorded { world, frames, settings, strength: Some(strength) });
         }
         attempts += 1;
     }
@@ -207,11 +203,10 @@ fn as_meant(plan: &mut Plan, strength: &Strength) -> bool {
     }
 }
 
-/// All frames.
-fn recording(settings: &RecorderConfig) -> Result<Scaled> {
-    let world = settings.world(Path::new("."))?;
-    let recorder = Recorder::new(&world)?;
-    Ok(Scaled { frames: recorder.frames().collect::<Result<_>>()?, gain: recorder.level().gain })
+/// All frames, and the receiver's gain.
+fn frames_of(world: &World) -> Result<(Vec<IfFrame>, f64)> {
+    let recorder = Recorder::new(world)?;
+    Ok((recorder.frames().collect::<Result<_>>()?, recorder.level().gain))
 }
 
 /// The recording without a truth and without labels.
@@ -219,12 +214,23 @@ fn write_case(recorded: &Recorded, case: &Path) -> Result<()> {
     write_frames(&recorded.world, &recorded.frames, case)
 }
 
+/// How strong the effects of a sealed case are by the yardstick of this program: records it again with and without them.
+pub fn measured(settings: &str, case: &Path) -> Result<Strength> {
+    let planted = settings_of(settings, case)?;
+    let clean = RecorderConfig { effects: EffectsConfig::default(), ..planted.clone() };
+    let (clean, clean_gain) = frames_of(&clean.world(Path::new("."))?)?;
+    let (planted, gain) = frames_of(&planted.world(Path::new("."))?)?;
+    Ok(strength(&clean, &planted, gain / clean_gain))
+}
+
+fn settings_of(settings: &str, case: &Path) -> Result<RecorderConfig> {
+    toml::from_str(settings).map_err(|error| Error::Parse { path: case.into(), message: error.to_string() })
+}
+
 /// Records the same scene, noise included, without its effects: what a perfect diagnosis would be left with.
 pub fn record_twin(settings: &str, case: &Path) -> Result<()> {
-    let settings: RecorderConfig =
-        toml::from_str(settings).map_err(|error| Error::Parse { path: case.into(), message: error.to_string() })?;
-    let settings = RecorderConfig { effects: EffectsConfig::default(), ..settings };
-    write_frames(&settings.world(Path::new("."))?, &recording(&settings)?.frames, case)
+    let world = RecorderConfig { effects: EffectsConfig::default(), ..settings_of(settings, case)? }.world(Path::new("."))?;
+    write_frames(&world, &frames_of(&world)?.0, case)
 }
 
 fn write_frames(world: &World, frames: &[IfFrame], case: &Path) -> Result<()> {

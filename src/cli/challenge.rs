@@ -82,6 +82,9 @@ struct Score {
     /// Folder of the twins' reports; without it no recovered misfit is given
     #[arg(long, value_name = "DIR")]
     twins: Option<PathBuf>,
+    /// Measure anew how strong the effects are: the truths hold what the program that sealed them measured
+    #[arg(long)]
+    measure: bool,
     /// Folder for results.md, score.json and psychometric.png [default: ANSWERS/score]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -170,7 +173,8 @@ fn twins(arguments: &Twins, common: &Common) -> Result<()> {
 fn score(arguments: &Score, common: &Common) -> Result<()> {
     let count = crate::challenge::commitment::Commitment::read_all(&arguments.challenge)?.iter().map(|part| part.cases).sum();
     let progress = Progress::new("scoring", count, common.quiet);
-    let scored = score::score(&arguments.challenge, &arguments.answers, arguments.twins.as_deref(), &|done| progress.set(done));
+    let Score { challenge, answers, twins, measure, .. } = arguments;
+    let scored = score::score(challenge, answers, twins.as_deref(), *measure, &|done| progress.set(done));
     progress.finish();
     let scored = scored?;
     let out = arguments.out.clone().unwrap_or_else(|| arguments.answers.join("score"));

@@ -114,9 +114,6 @@ pub struct RecorderConfig {
     /// Of the receiver's noise and the oscillator's alone, so that one truth can be recorded twice; absent: `seed`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_seed: Option<u64>,
-    /// Of the mesh's error alone: another body that the same handed-out mesh stands for; absent: `seed`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mesh_seed: Option<u64>,
     /// Overrides the radar's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frames: Option<usize>,
@@ -144,7 +141,6 @@ impl Default for RecorderConfig {
         Self {
             seed: 0,
             noise_seed: None,
-            mesh_seed: None,
             frames: None,
             interpolation: Interpolation::default(),
             mesh_error_m: 0.0,
@@ -193,7 +189,6 @@ impl RecorderConfig {
             effects: self.effects.clone(),
             seed: self.seed,
             noise_seed: self.noise_seed,
-            mesh_seed: self.mesh_seed,
         };
         world.check()?;
         Ok(world)

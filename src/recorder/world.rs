@@ -84,8 +84,6 @@ pub struct World {
     pub seed: u64,
     /// Of the receiver's noise and the oscillator's alone; absent: `seed`.
     pub noise_seed: Option<u64>,
-    /// Of the mesh's error alone; absent: `seed`.
-    pub mesh_seed: Option<u64>,
 }
 
 impl Default for World {
@@ -105,7 +103,6 @@ impl Default for World {
             effects: EffectsConfig::default(),
             seed: 0,
             noise_seed: None,
-            mesh_seed: None,
         }
     }
 }
@@ -159,13 +156,12 @@ impl World {
             Draw::Noise { frame } => 1000 + frame as u64,
             Draw::Effect { id, frame } => ((1 + id) << 40) + frame as u64,
         };
-        let seed = match draw {
-            Draw::MeshError => self.mesh_seed,
-            Draw::Noise { .. } => self.noise_seed,
-            Draw::Effect { id, .. } if effects::is_noise(id) => self.noise_seed,
-            _ => None,
+        let again = match draw {
+            Draw::Noise { .. } => true,
+            Draw::Effect { id, .. } => effects::is_noise(id),
+            _ => false,
         };
-        let mut rng = ChaCha8Rng::seed_from_u64(seed.unwrap_or(self.seed));
+        let mut rng = ChaCha8Rng::seed_from_u64(if again { self.noise_seed.unwrap_or(self.seed) } else { self.seed });
         rng.set_stream(stream);
         rng
     }

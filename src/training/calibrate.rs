@@ -40,7 +40,8 @@ struct Levels {
     frames: f64,
 }
 
-/// The simulator with gains and noise at the recordings' levels.
+/// The simulator with gains and noise at the recordings' levels. `known_body`: the body's gain stays as it is, as in another
+/// room before the same board.
 ///
 /// # Errors
 /// A recording without any signal, or a scene that returns nothing.
@@ -50,6 +51,7 @@ pub fn fit_levels(
     prepared: &[Prepared],
     frames: &[FrameId],
     heatmap: &HeatmapConfig,
+    known_body: bool,
 ) -> Result<Simulator> {
     // In the units of before, what is not linear would answer to the wrong amplitudes.
     let mut plain = simulator.clone().valid();
@@ -80,8 +82,12 @@ pub fn fit_levels(
     // Where one of them cannot be told apart, the other's level is the best guess.
     let decoders = &mut simulator.decoders;
     let any = (measured / levels.simulated).sqrt();
-    decoders.body_gain = decoders.body_gain.clone().scale(body.or(room).unwrap_or(any));
-    decoders.room_gain = decoders.room_gain.clone().scale(room.or(body).unwrap_or(any));
+    if known_body {
+        decoders.room_gain = decoders.room_gain.clone().scale(room.unwrap_or(1.0));
+    } else {
+        decoders.body_gain = decoders.body_gain.clone().scale(body.or(room).unwrap_or(any));
+        decoders.room_gain = decoders.room_gain.clone().scale(room.or(body).unwrap_or(any));
+    }
     // The rate is relative to the simulated amplitude, which the gains have just changed.
     let plain = simulator.clone().valid();
     let mut amplitude = 0.0;

@@ -31,8 +31,8 @@ pub struct TrainingConfig {
     /// Times that an epoch visits every frame; with few frames, one visit is too little between two validations.
     #[serde(skip_serializing_if = "is_one")]
     pub repeats: usize,
-    /// A checkpoint whose weights training starts from, such as that of another room; the optimiser starts anew. A
-    /// relative path starts from the config's folder.
+    /// A checkpoint whose weights training starts from, such as that of another room; the optimiser, the room's
+    /// gain and the noise start anew. A relative path starts from the config's folder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub start_from: Option<PathBuf>,
     /// Stop after this many epochs without a better validation loss; zero never stops early.

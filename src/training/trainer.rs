@@ -111,14 +111,13 @@ impl Trainer<'_> {
                         ),
                     });
                 }
-                // Another room's gain is another one, and with it the noise over the amplitude.
+                // Another room's gain is another one, and with it the noise over the amplitude; the receiver that set the
+                // body's level is the same one.
                 simulator = checkpoint::load_weights(folder, simulator)?;
-                simulator = calibrate::fit_levels(simulator, self.recordings, &prepared, &split.training, &self.config.heatmap)?;
-                simulator = checkpoint::with_stable_ids(simulator);
+                simulator = self.levels(simulator, &prepared, &split, true)?;
             }
             (None, None) => {
-                simulator = calibrate::fit_levels(simulator, self.recordings, &prepared, &split.training, &self.config.heatmap)?;
-                simulator = checkpoint::with_stable_ids(simulator);
+                simulator = self.levels(simulator, &prepared, &split, false)?;
             }
         }
         if !self.config.learn_effects {
@@ -180,6 +179,12 @@ impl Trainer<'_> {
     /// Without any.
     fn device(&self) -> &Device {
         &self.devices[0]
+    }
+
+    fn levels(&self, simulator: Simulator, prepared: &[Prepared], split: &FrameSplit, known_body: bool) -> Result<Simulator> {
+        let heatmap = &self.config.heatmap;
+        let fitted = calibrate::fit_levels(simulator, self.recordings, prepared, &split.training, heatmap, known_body)?;
+        Ok(checkpoint::with_stable_ids(fitted))
     }
 
     fn save(

@@ -1,9 +1,9 @@
-//! A static return that swings at one frequency ([`hum`]), or one behind the body that changes from frame to frame while all others stay: the body's shadow falls on it
-//! (card T7), or it stirs itself.
+//! Static returns that change while others stay: one that swings at one frequency ([`hum`]), and one behind the body that
+//! changes from frame to frame, because the body's shadow falls on it (card T7) or it stirs itself.
 //!
-//! What all static returns do together (gain, phase, a phase in proportion to the delay) is somebody else's affair and is
-//! taken from the other returns, frame by frame. Only the strong ranges beyond the body's reach are looked at, where
-//! nothing moves within a frame; a change must keep the pattern that the return has across the receivers.
+//! Of the latter: what all static returns do together (gain, phase, a phase in proportion to the delay) is somebody else's
+//! affair and is taken from the other returns, frame by frame. Only the strong ranges beyond the body's reach are looked
+//! at, where nothing moves within a frame; a change must keep the pattern that the return has across the receivers.
 
 mod hum;
 mod silhouette;

@@ -20,6 +20,8 @@ const FEWEST_CHANNELS: usize = 2;
 /// Deviations of the scores' law that the odd one's is out at least, and how many times the next one's.
 const STANDS_OUT: f64 = 10.0;
 const FROM_THE_NEXT: f64 = 2.0;
+/// Of the scores, which are sums of logarithms: without noise they would all be alike.
+const LEAST_SPREAD: f64 = 1e-3;
 /// Median absolute deviation to standard deviation of a normal law.
 const TO_DEVIATION: f64 = 1.4826;
 pub const BEHAVES_LIKE: &str = "single frame";
@@ -67,7 +69,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         return vec![];
     }
     // Scores of remains of movers have a longer tail than a normal law's.
-    let p_value = corrected((-scores[odd]).exp(), scores.len() as f64);
+    let p_value = corrected((-scores[odd]).exp(), scores.len() as f64).max(f64::MIN_POSITIVE);
     let total = |at: usize| deviations[at].power.iter().sum::<f64>();
     let usual = (0..deviations.len()).filter(|&at| at != odd).map(total).sum::<f64>() / (deviations.len() - 1) as f64;
     let ratio = total(odd) / usual.max(f64::MIN_POSITIVE);
@@ -128,7 +130,7 @@ fn scores(deviations: &[Deviation], channels: usize) -> Vec<f64> {
     let middle = median(&mut scores.clone());
     let mut apart: Vec<f64> = scores.iter().map(|score| (score - middle).abs()).collect();
     let spread = TO_DEVIATION * median(&mut apart);
-    scores.iter().map(|score| (score - middle) / spread.max(f64::MIN_POSITIVE)).collect()
+    scores.iter().map(|score| (score - middle) / spread.max(LEAST_SPREAD)).collect()
 }
 
 /// Mean chirps of the even and of the odd loops.

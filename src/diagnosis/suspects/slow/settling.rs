@@ -2,7 +2,6 @@
 
 use num_complex::Complex64;
 
-use super::UNDECIDED;
 use super::field::{Field, Part};
 use crate::diagnosis::statistics;
 
@@ -54,7 +53,7 @@ impl Settling {
             && (rest < PLAIN || rest < LEFT_OVER * self.free.held_out_gain)
             && self.amplitude.re.abs() > self.amplitude.im.abs()
             && self.loops > FEWEST_LOOPS
-            && self.training_gain > self.hum_gain + UNDECIDED
+            && self.training_gain > self.hum_gain
     }
 
     /// Relative to the settled state.
@@ -137,9 +136,9 @@ pub fn best(field: &Field, training: &[usize], held_out: &[usize]) -> Option<Set
 /// Frequencies of the mains that all frames see alike.
 fn locked(field: &Field) -> impl Iterator<Item = f64> {
     let starts: Vec<f64> = field.times_s.iter().step_by(field.loops).copied().collect();
-    let period = starts.get(1).map_or(0.0, |second| second - starts[0]);
-    let drift = move |hertz: f64| (hertz * period - (hertz * period).round()).abs() * starts.len() as f64;
-    MAINS_HZ.into_iter().filter(move |&hertz| period > 0.0 && drift(hertz) < LOCKED_TURNS)
+    let off = |turns: f64| (turns - turns.round()).abs();
+    let locked = move |hertz: f64| starts.iter().all(|start| off(hertz * (start - starts[0])) < LOCKED_TURNS);
+    MAINS_HZ.into_iter().filter(move |&hertz| locked(hertz))
 }
 
 /// Energy that a sinusoid takes out of values by loop whose mean is zero.
