@@ -1,4 +1,4 @@
-//! Static returns that change while others stay: one that swings at one frequency ([`hum`]), and one behind the body that
+//! Static returns that change while others stay: one that swings at one frequency (`hum`), and one behind the body that
 //! changes from frame to frame, because the body's shadow falls on it (card T7) or it stirs itself.
 //!
 //! Of the latter: what all static returns do together (gain, phase, a phase in proportion to the delay) is somebody else's
