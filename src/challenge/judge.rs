@@ -1,13 +1,16 @@
 //! One report held against one truth.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::commitment::Sealed;
+use super::commitment::{Sealed, open};
 use super::config::Stratum;
 use super::measure::Strength;
 use super::report::{Effect, Place, Report};
 use super::rules::{CONFIDENT, PLACE_M, RANGE_SLACK_M, look_alike, stage};
+use crate::error::{Error, Result};
 
 /// What a case holds.
 #[derive(Clone, Debug, Deserialize)]
@@ -21,6 +24,12 @@ pub struct Truth {
 }
 
 impl Truth {
+    /// Of a case, verified against its published leaf.
+    pub fn open(challenge: &Path, name: &str, leaf: &str) -> Result<Self> {
+        let sealed = open(challenge, name, leaf)?;
+        Self::of(&sealed).map_err(|found| Error::field(name, "truth", found, "a truth of this version"))
+    }
+
     pub fn of(sealed: &Sealed) -> std::result::Result<Self, String> {
         serde_json::from_value(sealed.truth.clone()).map_err(|error| error.to_string())
     }

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::answer::Answers;
 use super::baselines::{self, Statistics, TEMPLATES, quantile};
-use super::commitment::{Commitment, joint_root, open, read_json, sha256};
+use super::commitment::{Commitment, joint_root, read_json, sha256};
 use super::config::Stratum;
 use super::judge::{Judgement, Truth, judge};
 use super::plan::scalable;
@@ -81,7 +81,7 @@ pub fn score(
     let mut cases: Vec<Case> = leaves
         .par_iter()
         .map(|(name, leaf)| {
-            let mut truth = truth(challenge, name, leaf)?;
+            let mut truth = Truth::open(challenge, name, leaf)?;
             if again && truth.strength.is_some() {
                 truth.strength = Some(measured(&truth.settings, Path::new(name))?);
             }
@@ -124,11 +124,6 @@ fn nothing_else(challenge: &Path, leaves: &[(&String, &String)]) -> Result<()> {
         }
     }
     Ok(())
-}
-
-fn truth(challenge: &Path, name: &str, leaf: &str) -> Result<Truth> {
-    let sealed = open(challenge, name, leaf)?;
-    Truth::of(&sealed).map_err(|found| Error::field(name, "truth", found, "a truth of this version"))
 }
 
 fn one(challenge: &Path, folder: &Path, twins: Option<&Path>, answers: &Answers, name: &str, truth: &Truth) -> Case {

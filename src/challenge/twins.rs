@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use super::answer::{Answers, RunConfig, diagnose};
-use super::commitment::{Commitment, open};
+use super::commitment::Commitment;
 use super::config::Stratum;
 use super::judge::Truth;
 use super::seal::record_twin;
@@ -28,8 +28,7 @@ pub fn run(challenge: &Path, answers: &Path, out: &Path, config: &RunConfig, pro
         if !config.shard.holds(index) || folder.join("report.json").is_file() || folder.join("failure.json").is_file() {
             continue;
         }
-        let sealed = open(challenge, name, leaf)?;
-        let truth = Truth::of(&sealed).map_err(|found| Error::field(name, "truth", found, "a truth of this version"))?;
+        let truth = Truth::open(challenge, name, leaf)?;
         // A null is its own twin, and what is outside the library is not to be explained.
         if matches!(truth.stratum, Stratum::Null | Stratum::Outside | Stratum::Undetectable) {
             continue;

@@ -95,6 +95,13 @@ pub fn mean_chirp<'a>(chirps: impl Iterator<Item = &'a [Complex64]>, samples: us
     mean
 }
 
+impl Split {
+    fn new(frames: usize, block_loops: Option<usize>) -> Self {
+        let (held_out, training) = (0..frames).partition(|frame| frame % HELD_OUT_EVERY == HELD_OUT_EVERY / 2);
+        Self { training, held_out, block_loops }
+    }
+}
+
 impl Loaded {
     /// Reads a recording, at most `most_frames` of it.
     ///
@@ -137,8 +144,14 @@ impl Loaded {
                 (0..radar.frames).map(|block| whole.chirp_time_s(block / blocks, 0, block % blocks * loops)).collect()
             }
         };
-        let (held_out, training) = (0..radar.frames).partition(|frame| frame % HELD_OUT_EVERY == HELD_OUT_EVERY / 2);
-        Ok(Self { cube, radar, split: Split { training, held_out, block_loops }, starts_s, extremes })
+        Ok(Self { cube, split: Split::new(radar.frames, block_loops), radar, starts_s, extremes })
+    }
+
+    /// Frames as they are, from samples `[frame, tx, rx, loop, sample]`.
+    #[cfg(test)]
+    pub fn of_samples(radar: Radar, samples: Vec<Complex64>, extremes: [f64; 2]) -> Self {
+        let starts_s = (0..radar.frames).map(|frame| radar.chirp_time_s(frame, 0, 0)).collect();
+        Self { cube: Cube::new(radar.dims(), samples), split: Split::new(radar.frames, None), radar, starts_s, extremes }
     }
 
     pub fn is_real(&self) -> bool {

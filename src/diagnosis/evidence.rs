@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::{FftDirection, FftPlanner};
+use rustfft::{Fft, FftDirection, FftPlanner};
 
 use super::codes::{self, Component};
 use super::cube::{Cube, Loaded, Split};
@@ -236,6 +236,28 @@ pub fn blackman_harris(length: usize) -> Vec<f64> {
         .collect();
     let energy = raw.iter().map(|w: &f64| w * w).sum::<f64>().sqrt();
     raw.iter().map(|w| w / energy).collect()
+}
+
+/// Spectra of chirps under that window.
+pub struct Tapered {
+    taper: Vec<f64>,
+    fft: Arc<dyn Fft<f64>>,
+}
+
+impl Tapered {
+    pub fn new(samples: usize) -> Self {
+        Self { taper: blackman_harris(samples), fft: FftPlanner::new().plan_fft_forward(samples) }
+    }
+
+    /// Of chirps one after the other, times `scale`.
+    pub fn spectra(&self, chirps: &[Complex64], scale: f64) -> Vec<Complex64> {
+        let mut spectra = chirps.to_vec();
+        for chirp in spectra.chunks_exact_mut(self.taper.len()) {
+            chirp.iter_mut().zip(&self.taper).for_each(|(value, weight)| *value *= weight * scale);
+        }
+        self.fft.process(&mut spectra);
+        spectra
+    }
 }
 
 /// DFT of one chirp, with a Hann window of unit energy.

@@ -168,7 +168,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::diagnosis::cube::{Cube, Loaded, Split};
+    use crate::diagnosis::cube::Loaded;
     use crate::radar::Radar;
 
     /// A static tone in noise as codes, changed by channel.
@@ -187,16 +187,7 @@ mod tests {
                 Complex64::new(code(tone.re), tone.im.round())
             })
             .collect();
-        let (held_out, training) = (0..8).partition(|f| f % 4 == 2);
-        let starts_s = (0..8).map(|f| radar.chirp_time_s(f, 0, 0)).collect();
-        let loaded = Loaded {
-            cube: Cube::new(dims, samples),
-            radar,
-            split: Split { training, held_out, block_loops: None },
-            starts_s,
-            extremes: [-2e3, 2e3],
-        };
-        Evidence::new(loaded, None, None)
+        Evidence::new(Loaded::of_samples(radar, samples, [-2e3, 2e3]), None, None)
     }
 
     #[test]

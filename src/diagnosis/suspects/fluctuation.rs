@@ -14,7 +14,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
-use crate::diagnosis::evidence::{Evidence, blackman_harris};
+use crate::diagnosis::evidence::{Evidence, Tapered, blackman_harris};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 
@@ -105,12 +105,11 @@ impl Returns {
     fn new(evidence: &Evidence) -> Option<Self> {
         let [frames, _, _, loops, samples] = evidence.cube.dims;
         let (channels, bins) = (evidence.cube.channels(), evidence.range_bins());
-        let fast = blackman_harris(samples);
+        let fast = Tapered::new(samples);
         // Movers and the body's Doppler side lobes stay out of the mean.
         let slow = blackman_harris(loops);
         let sum: f64 = slow.iter().sum();
         let share: f64 = slow.iter().map(|w| (w / sum).powi(2)).sum();
-        let fft = FftPlanner::new().plan_fft_forward(samples);
         let noise = evidence.noise();
         if loops < 8 || noise.iter().any(|v| !v.is_finite() || *v <= 0.0) {
             return None;
@@ -118,9 +117,7 @@ impl Returns {
         let (mut spectra, mut variance, mut unrest) = (vec![], vec![], vec![0.0; bins]);
         for frame in 0..frames {
             for (channel, noise) in noise.iter().enumerate() {
-                let mut chirps: Vec<Complex64> =
-                    evidence.cube.channel(frame, channel).iter().enumerate().map(|(i, v)| v * fast[i % samples]).collect();
-                fft.process(&mut chirps);
+                let chirps = fast.spectra(evidence.cube.channel(frame, channel), 1.0);
                 for bin in 0..bins {
                     let at = |index: usize| chirps[index * samples + bin];
                     let mean: Complex64 = (0..loops).map(|index| at(index) * (slow[index] / sum)).sum();

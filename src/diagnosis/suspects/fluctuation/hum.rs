@@ -3,6 +3,7 @@
 //! Its two sidebands are alike and go on from frame to frame. What moves there has other phases in every frame, so the
 //! frames' own scatter is what a line must stand out of.
 
+use std::cmp::Ordering;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -10,7 +11,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use rustfft::FftPlanner;
 
-use crate::diagnosis::evidence::{Evidence, blackman_harris};
+use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
 use crate::diagnosis::statistics::corrected;
 
@@ -56,6 +57,12 @@ struct Line {
     ratio: f64,
 }
 
+impl Line {
+    fn weaker(&self, other: &Self) -> Ordering {
+        self.ratio.total_cmp(&other.ratio)
+    }
+}
+
 pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let training = &evidence.split.training;
     if training.len() < FEWEST_FRAMES || evidence.split.held_out.is_empty() || evidence.accepted.contains(&BEHAVES_LIKE) {
@@ -75,18 +82,20 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
         let start = LOWEST_HZ + cell as f64 * coarse;
         let sidebands = chirps.sidebands(start + 0.5 * coarse);
         let count = (coarse / fine).ceil() as usize;
-        (0..count)
-            .filter_map(|i| chirps.strongest(&sidebands, start + i as f64 * fine))
-            .max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+        (0..count).filter_map(|i| chirps.strongest(&sidebands, start + i as f64 * fine)).max_by(Line::weaker)
     };
-    let line = (0..cells).into_par_iter().filter_map(strongest).max_by(|a, b| a.ratio.total_cmp(&b.ratio))?;
+    let line = (0..cells).into_par_iter().filter_map(strongest).max_by(Line::weaker)?;
     let line = chirps.refined(line, 0.5 * fine);
     // As if all channels were one: what moves is alike in all of them.
     let freedom = training.len() as f64 - 1.0;
     let tried = (highest_hz - LOWEST_HZ) * duration_s * (chirps.bins / 2) as f64;
     let p_value = corrected((1.0 + line.ratio / freedom).powf(-freedom), tried);
-    let gain = chirps.gain(&line);
-    (p_value < 0.01 && gain > 0.0 && chirps.others_stay(&line)).then(|| candidate(&chirps, &line, p_value, gain))
+    if p_value >= 0.01 {
+        return None;
+    }
+    let swings = chirps.swings(line.frequency_hz);
+    let gain = chirps.gain(&line, &swings);
+    (gain > 0.0 && chirps.others_stay(&line, &swings)).then(|| candidate(&chirps, &line, p_value, gain))
 }
 
 impl<'a> Chirps<'a> {
@@ -96,19 +105,12 @@ impl<'a> Chirps<'a> {
         if loops < 8 || bins < 16 {
             return None;
         }
-        let taper = blackman_harris(samples);
-        let fft = FftPlanner::new().plan_fft_forward(samples);
-        let transformed = |values: &mut Vec<Complex64>| {
-            values.iter_mut().enumerate().for_each(|(i, value)| *value *= taper[i % samples]);
-            fft.process(values);
-        };
-        let mut still = evidence.still().to_vec();
-        transformed(&mut still);
+        let tapered = Tapered::new(samples);
+        let still = tapered.spectra(evidence.still(), 1.0);
         let spectra = (0..frames).into_par_iter().map(|frame| {
             let mut spectra = vec![Complex64::ZERO; loops * channels * bins];
             for channel in 0..channels {
-                let mut chirps = evidence.cube.channel(frame, channel).to_vec();
-                transformed(&mut chirps);
+                let chirps = tapered.spectra(evidence.cube.channel(frame, channel), 1.0);
                 for (index, chirp) in chirps.chunks_exact(samples).enumerate() {
                     for bin in 0..bins {
                         spectra[(index * channels + channel) * bins + bin] = chirp[bin] - still[channel * samples + bin];
@@ -153,6 +155,19 @@ impl<'a> Chirps<'a> {
         self.middles_s.iter().map(|time| Complex64::cis(sign * TAU * frequency_hz * time)).collect()
     }
 
+    /// Sidebands with the phases of the recording's beginning.
+    fn swings(&self, frequency_hz: f64) -> Sidebands {
+        let mut swings = self.sidebands(frequency_hz);
+        for (sideband, values) in swings.iter_mut().enumerate() {
+            let turns = self.turns(frequency_hz, sideband);
+            let size = values.len() / turns.len();
+            for (frame, turn) in values.chunks_exact_mut(size).zip(turns) {
+                frame.iter_mut().for_each(|value| *value *= turn);
+            }
+        }
+        swings
+    }
+
     /// The range at which a frequency stands out most.
     fn strongest(&self, sidebands: &Sidebands, frequency_hz: f64) -> Option<Line> {
         let training = &self.evidence.split.training;
@@ -188,56 +203,48 @@ impl<'a> Chirps<'a> {
     /// A line beside its true frequency has a scatter of its own.
     fn refined(&self, mut line: Line, mut step_hz: f64) -> Line {
         let sidebands = self.sidebands(line.frequency_hz);
-        let mut tries = 0;
-        while tries < REFINEMENTS {
+        for _ in 0..REFINEMENTS {
             let beside = [-step_hz, step_hz].map(|step| self.strongest(&sidebands, line.frequency_hz + step));
             match beside.into_iter().flatten().find(|beside| beside.ratio > line.ratio) {
                 Some(better) => line = better,
                 None => step_hz *= 0.5,
             }
-            tries += 1;
         }
         line
     }
 
     /// What the training frames' mean gains on the held-out ones, nats. Where the frames scatter by more than the noise,
     /// something moves, which all channels share: they count as one.
-    fn gain(&self, line: &Line) -> f64 {
+    fn gain(&self, line: &Line, swings: &Sidebands) -> f64 {
         let (training, held_out) = (&self.evidence.split.training, &self.evidence.split.held_out);
         let channels = self.evidence.cube.channels();
-        let sidebands = self.sidebands(line.frequency_hz);
         let (mut gained, mut scatter) = (0.0, 0.0);
-        for (sideband, values) in sidebands.iter().enumerate() {
-            let turns = self.turns(line.frequency_hz, sideband);
+        for values in swings {
             for channel in 0..channels {
-                let value = |frame: usize| values[(frame * channels + channel) * self.bins + line.bin] * turns[frame];
+                let value = |frame: usize| values[(frame * channels + channel) * self.bins + line.bin];
                 let mean = training.iter().map(|&frame| value(frame)).sum::<Complex64>() / training.len() as f64;
                 scatter += training.iter().map(|&frame| (value(frame) - mean).norm_sqr()).sum::<f64>();
                 gained += held_out.iter().map(|&frame| value(frame).norm_sqr() - (value(frame) - mean).norm_sqr()).sum::<f64>();
             }
         }
-        let numbers = (sidebands.len() * channels) as f64;
+        let numbers = (swings.len() * channels) as f64;
         let variance = (scatter / (numbers * (training.len() - 1) as f64)).max(f64::MIN_POSITIVE);
-        let samples = self.evidence.cube.dims[4];
-        let taper: f64 = blackman_harris(samples).iter().map(|weight| weight * weight).sum();
-        let noise = self.evidence.noise().iter().sum::<f64>() / channels as f64 * taper / self.loops_s.len() as f64;
+        // The taper's energy is one.
+        let noise = self.evidence.noise().iter().sum::<f64>() / (channels * self.loops_s.len()) as f64;
         let independent = 1.0 + (channels - 1) as f64 * (noise / variance).min(1.0);
         gained / variance * independent / channels as f64
     }
 
     /// Whether the other static returns, together, swing by much less of their own.
-    fn others_stay(&self, line: &Line) -> bool {
+    fn others_stay(&self, line: &Line, swings: &Sidebands) -> bool {
         let training = &self.evidence.split.training;
-        let sidebands = self.sidebands(line.frequency_hz);
         let channels = self.evidence.cube.channels();
-        let depth = |sideband: usize, wanted: &dyn Fn(usize) -> bool| -> f64 {
-            let turns = self.turns(line.frequency_hz, sideband);
+        let depth = |values: &[Complex64], wanted: &dyn Fn(usize) -> bool| -> f64 {
             let (mut dot, mut own) = (Complex64::ZERO, 0.0);
             for channel in 0..channels {
                 for bin in (0..self.bins).filter(|&bin| wanted(bin)) {
                     let still = self.still[channel * self.bins + bin];
-                    let swing =
-                        |&frame: &usize| sidebands[sideband][(frame * channels + channel) * self.bins + bin] * turns[frame];
+                    let swing = |&frame: &usize| values[(frame * channels + channel) * self.bins + bin];
                     dot += still.conj() * training.iter().map(swing).sum::<Complex64>() / training.len() as f64;
                     own += still.norm_sqr();
                 }
@@ -245,7 +252,7 @@ impl<'a> Chirps<'a> {
             dot.norm() / own.max(f64::MIN_POSITIVE)
         };
         let near = |bin: usize| bin.abs_diff(line.bin) <= REACH;
-        (0..2).all(|sideband| depth(sideband, &|bin| !near(bin)) < OTHERS * depth(sideband, &near))
+        swings.iter().all(|values| depth(values, &|bin| !near(bin)) < OTHERS * depth(values, &near))
     }
 
     /// What swings at plus and minus a frequency within a few bins of a range, `[sideband][channel · sample]`.
@@ -326,7 +333,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::diagnosis::cube::{Cube, Loaded, Split};
+    use crate::diagnosis::cube::Loaded;
     use crate::radar::Radar;
 
     const HUM_HZ: f64 = 100.0;
@@ -339,12 +346,11 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(4);
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
         let [_, _, receivers, loops, samples] = dims;
-        let starts_s: Vec<f64> = (0..dims[0]).map(|frame| frame as f64 * radar.frame_period_s).collect();
         let samples_all: Vec<Complex64> = (0..dims.iter().product::<usize>())
             .map(|i| {
                 let (n, slow, rx, frame) =
                     (i % samples, i / samples % loops, i / samples / loops % receivers, i / samples / loops / receivers);
-                let time = starts_s[frame] + slow as f64 * radar.loop_period_s();
+                let time = radar.chirp_time_s(frame, 0, slow);
                 let n = n as f64;
                 let mover = Complex64::cis(0.6 * n + 0.4 * slow as f64 + 1.9 * (frame * frame) as f64) * 4.0;
                 let swing = 1.0 + depth * (TAU * HUM_HZ * time).cos();
@@ -353,14 +359,7 @@ mod tests {
                 wall + mover + lamp + Complex64::new(normal(), normal())
             })
             .collect();
-        let loaded = Loaded {
-            cube: Cube::new(dims, samples_all),
-            split: Split { training: vec![0, 1, 3, 4, 5, 7], held_out: vec![2, 6], block_loops: None },
-            starts_s,
-            extremes: [-100.0, 100.0],
-            radar,
-        };
-        Evidence::new(loaded, None, None)
+        Evidence::new(Loaded::of_samples(radar, samples_all, [-100.0, 100.0]), None, None)
     }
 
     #[test]

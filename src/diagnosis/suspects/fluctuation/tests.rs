@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::diagnosis::cube::{Cube, Loaded, Split};
+use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::prediction::{BodyPrediction, Point};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::Room;
@@ -37,7 +37,6 @@ fn evidence(seed: u64, change: impl Fn(usize, usize) -> Complex64) -> Evidence {
             returns.sum::<Complex64>() + Complex64::new(normal(), normal())
         })
         .collect();
-    let (held_out, training) = (0..FRAMES).partition(|frame| frame % 4 == 2);
     let starts_s: Vec<f64> = (0..FRAMES).map(|frame| radar.chirp_time_s(frame, 0, 0)).collect();
     let points = |frame: usize| {
         let side_m = if covers(frame) { 0.0 } else { 0.7 };
@@ -53,17 +52,11 @@ fn evidence(seed: u64, change: impl Fn(usize, usize) -> Complex64) -> Evidence {
     let body = BodyPrediction {
         parts: vec!["body".into()],
         frames: (0..FRAMES).map(points).collect(),
-        middle_s: starts_s.clone(),
+        middle_s: starts_s,
         tracks: vec![],
     };
     let room = Room { front_m: Some(FRONT_M), floor_m: Some(1.2), ..Room::default() };
-    let loaded = Loaded {
-        cube: Cube::new(dims, samples),
-        radar,
-        split: Split { training, held_out, block_loops: None },
-        starts_s,
-        extremes: [-100.0, 100.0],
-    };
+    let loaded = Loaded::of_samples(radar, samples, [-100.0, 100.0]);
     Evidence::new(loaded, Some(room), Some(body))
 }
 

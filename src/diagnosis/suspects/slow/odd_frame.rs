@@ -154,7 +154,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::diagnosis::cube::{Loaded, Split};
+    use crate::diagnosis::cube::Loaded;
     use crate::radar::Radar;
 
     /// Two static returns and a slow mover in noise.
@@ -174,15 +174,7 @@ mod tests {
                 Complex64::cis(0.9 * n + 0.4 * rx as f64) * 30.0 + mover + Complex64::new(normal(), normal())
             })
             .collect();
-        let starts_s = (0..dims[0]).map(|frame| frame as f64 * radar.frame_period_s).collect();
-        let loaded = Loaded {
-            cube: Cube::new(dims, samples_all),
-            split: Split { training: vec![0, 1, 3, 4, 5, 7], held_out: vec![2, 6], block_loops: None },
-            starts_s,
-            extremes: [-100.0, 100.0],
-            radar,
-        };
-        Evidence::new(loaded, None, None)
+        Evidence::new(Loaded::of_samples(radar, samples_all, [-100.0, 100.0]), None, None)
     }
 
     #[test]

@@ -2,9 +2,8 @@
 
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 
-use crate::diagnosis::evidence::{Evidence, blackman_harris};
+use crate::diagnosis::evidence::{Evidence, Tapered};
 
 /// Spectra in units of the noise's deviation of a frame's mean chirp.
 pub struct Steady {
@@ -32,17 +31,11 @@ impl Steady {
         if loops < 4 || bins < 16 || noise.iter().any(|v| !v.is_finite() || *v <= 0.0) {
             return None;
         }
-        let taper = blackman_harris(samples);
-        let fft = FftPlanner::new().plan_fft_forward(samples);
+        let tapered = Tapered::new(samples);
         let of_frame = |frame: usize| -> (Vec<Complex64>, Vec<f64>) {
             let (mut means, mut scatter) = (Vec::with_capacity(channels * bins), vec![0.0; bins]);
             for (channel, variance) in noise.iter().enumerate() {
-                let scale = 1.0 / variance.sqrt();
-                let mut spectra: Vec<Complex64> = evidence.cube.channel(frame, channel).to_vec();
-                for chirp in spectra.chunks_exact_mut(samples) {
-                    chirp.iter_mut().zip(&taper).for_each(|(value, w)| *value *= w * scale);
-                }
-                fft.process(&mut spectra);
+                let spectra = tapered.spectra(evidence.cube.channel(frame, channel), 1.0 / variance.sqrt());
                 for bin in 0..bins {
                     let values = || spectra[bin..].iter().step_by(samples);
                     let mean = values().sum::<Complex64>() / loops as f64;

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::find;
-use crate::diagnosis::cube::{Cube, Loaded, Split};
+use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction};
 use crate::radar::Radar;
@@ -43,16 +43,7 @@ fn evidence(seed: u64, change: impl Fn(f64, usize, usize, f64) -> Complex64) -> 
             }
         }
     }
-    let (held_out, training) = (0..dims[0]).partition(|f| f % 4 == 2);
-    let starts_s = (0..dims[0]).map(|f| radar.chirp_time_s(f, 0, 0)).collect();
-    let loaded = Loaded {
-        cube: Cube::new(dims, samples),
-        radar,
-        split: Split { training, held_out, block_loops: None },
-        starts_s,
-        extremes: [-1e3, 1e3],
-    };
-    Evidence::new(loaded, None, None)
+    Evidence::new(Loaded::of_samples(radar, samples, [-1e3, 1e3]), None, None)
 }
 
 fn best(evidence: &Evidence) -> Option<Candidate> {
