@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use super::rules::MASKED_DB;
-use super::surviving;
+use super::surviving::{self, Draw};
 use crate::data::IfFrame;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::statistics::exponential_scale;
@@ -64,27 +64,38 @@ pub struct Frames {
     pub values: Vec<Vec<Complex64>>,
 }
 
+/// A scene under several draws of the mesh's error and the noise, with one receiver.
+pub struct Draws {
+    /// `[draw][frame]`
+    pub frames: Vec<Vec<IfFrame>>,
+    /// Without the person.
+    pub empty: Vec<Vec<IfFrame>>,
+    pub gain: f64,
+}
+
 impl Frames {
     pub fn count(&self) -> usize {
         self.values.len()
     }
 }
 
-/// `clean` and `planted`: the same scene, noise included, without and with the effect, `[frame]`. `gain`: of the second
-/// receiver over the first, which scale their samples on their own.
-pub fn strength(clean: &[IfFrame], planted: &[IfFrame], gain: f64) -> Strength {
-    let [tx, rx, loops, fast] = clean[0].dims;
-    let dims = [tx * rx, loops, fast];
-    let (clean, planted): (Vec<_>, Vec<_>) = (clean.iter().map(samples).collect(), planted.iter().map(samples).collect());
-    let effect: Vec<Vec<Complex64>> =
-        clean.iter().zip(&planted).map(|(x, y)| x.iter().zip(y).map(|(x, y)| y / gain - x).collect()).collect();
+/// `clean` and `planted`: the same scene, noise included, without and with the effect; all but what survives is of the
+/// first draw.
+pub fn strength(clean: &Draws, planted: &Draws) -> Strength {
+    let [tx, rx, loops, fast] = clean.frames[0][0].dims;
+    let gain = planted.gain / clean.gain;
+    let pairs = |clean: &[Vec<IfFrame>], planted: &[Vec<IfFrame>]| -> Vec<Draw> {
+        clean.iter().zip(planted).map(|(clean, planted)| draw(clean, planted, gain)).collect()
+    };
+    let (draws, empty) = (pairs(&clean.frames, &planted.frames), pairs(&clean.empty, &planted.empty));
+    let Draw { clean: Frames { values: clean, .. }, effect: Frames { values: effect, .. } } = &draws[0];
     // What only turns or scales the whole recording is no effect: its gain and phase are unknown.
     let common: Complex64 = clean.iter().flatten().zip(effect.iter().flatten()).map(|(x, e)| x.conj() * e).sum();
     let power: f64 = clean.iter().flatten().map(Complex64::norm_sqr).sum();
 
     let (mut total, mut kept, mut moving, mut count) = (0.0, 0.0, 0.0, 0.0);
     let (mut noise_powers, mut cells) = (vec![], vec![]);
-    for (frame, (x, e)) in clean.iter().zip(&effect).enumerate() {
+    for (frame, (x, e)) in clean.iter().zip(effect).enumerate() {
         let energy: f64 = e.iter().map(Complex64::norm_sqr).sum();
         total += energy;
         kept += if held_out(frame) { energy } else { 0.0 };
@@ -108,16 +119,24 @@ pub fn strength(clean: &[IfFrame], planted: &[IfFrame], gain: f64) -> Strength {
     let shared = (common.norm_sqr() / (power - noise * count).max(noise) / total.max(f64::MIN_POSITIVE)).min(1.0);
     (total, kept) = (total * (1.0 - shared), kept * (1.0 - shared));
     let d_prime = |energy: f64| (2.0 * energy / noise).sqrt();
-    let (clean, effect) = (Frames { dims, values: clean }, Frames { dims, values: effect });
     Strength {
         effect_to_noise_db: decibels(total / (noise * count)),
         effect_to_moving_db: decibels(total / moving),
         d_prime: d_prime(total),
         d_prime_held_out: d_prime(kept),
-        d_prime_surviving: surviving::d_prime(&clean, &effect, noise),
+        d_prime_surviving: surviving::d_prime(&draws, &empty, noise),
         below_cover_db: below_cover(&cells, noise * (tx * rx) as f64),
         gain_db: decibels(gain * gain),
     }
+}
+
+fn draw(clean: &[IfFrame], planted: &[IfFrame], gain: f64) -> Draw {
+    let [tx, rx, loops, fast] = clean[0].dims;
+    let of = |values| Frames { dims: [tx * rx, loops, fast], values };
+    let (clean, planted): (Vec<_>, Vec<_>) = (clean.iter().map(samples).collect(), planted.iter().map(samples).collect());
+    let difference = |(x, y): (&Vec<Complex64>, &Vec<Complex64>)| x.iter().zip(y).map(|(x, y)| y / gain - x).collect();
+    let effect = clean.iter().zip(&planted).map(difference).collect();
+    Draw { clean: of(clean), effect: of(effect) }
 }
 
 /// What is left of a channel's frame, `[loop, sample]`, without what stands still within the frame.
@@ -182,12 +201,16 @@ mod tests {
             .collect()
     }
 
+    fn one(frames: Vec<IfFrame>, gain: f64) -> Draws {
+        Draws { empty: vec![frames.clone()], frames: vec![frames], gain }
+    }
+
     #[test]
     fn a_known_tone_has_its_energy_whatever_the_gain() {
         let clean = frames(1.0, |_, _| Complex64::ZERO, Complex64::ONE);
         let tone = |slow: usize, fast: usize| Complex64::cis(-1.1 * slow as f64 + 2.2 * fast as f64) * 0.5;
         let planted = frames(1.0, tone, 0.4.into());
-        let found = strength(&clean, &planted, 0.4);
+        let found = strength(&one(clean, 1.0), &one(planted, 0.4));
         // 4096 samples, energy 0.25 each, noise of variance 2.
         let wanted = (2.0 * 4096.0 * 0.25 / 2.0f64).sqrt();
         assert!((found.d_prime / wanted - 1.0).abs() < 0.05, "{} against {wanted}", found.d_prime);
@@ -202,11 +225,12 @@ mod tests {
         let clean = frames(1.0, |_, _| Complex64::ZERO, Complex64::ONE);
         // The same cell as the mover, but from frame to frame alike only in one half of the chirps.
         let under = |slow: usize, fast: usize| Complex64::cis(0.95 * slow as f64 + 0.72 * fast as f64) * 2.0;
-        let found = strength(&clean, &frames(1.0, under, Complex64::ONE), 1.0);
+        let clean = one(clean, 1.0);
+        let found = strength(&clean, &one(frames(1.0, under, Complex64::ONE), 1.0));
         assert!(found.masked(), "{} dB", found.below_cover_db);
-        let nothing = strength(&clean, &clean, 1.0);
+        let nothing = strength(&clean, &clean);
         assert!(nothing.d_prime < 1e-3 && nothing.effect_to_noise_db < -60.0);
-        let turned = strength(&clean, &frames(1.0, |_, _| Complex64::ZERO, Complex64::cis(0.7)), 1.0);
+        let turned = strength(&clean, &one(frames(1.0, |_, _| Complex64::ZERO, Complex64::cis(0.7)), 1.0));
         assert!(turned.d_prime < 1.0, "{}", turned.d_prime);
     }
 }

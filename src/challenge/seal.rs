@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 use super::commitment::{Commitment, Sealed, hash_file, hash_folder, leaf, merkle_root, read_json, sha256};
 use super::config::{ChallengeConfig, Stratum};
-use super::measure::{Strength, strength};
+use super::measure::{Draws, Strength, strength};
 use super::plan::{Plan, plans};
 use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
 use super::secret::Secret;
@@ -24,13 +24,17 @@ use crate::data::atomic::write_text;
 use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, read_toml, write_recording};
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
-use crate::recorder::{EffectsConfig, Recorder, RecorderConfig, Returns, World};
+use crate::recorder::{EffectsConfig, ReceiverConfig, Recorder, RecorderConfig, Returns, World};
 
 /// All files of all cases were last changed then (1 January 2026), so that nothing is learned from when.
 const TIME_OF_FILES: u64 = 1_767_225_600;
 /// Attempts at what a kind of case asks for, after which the effect is taken as it is; what it then counts as is decided
 /// by what was measured, not by what was meant.
 const MOST_ATTEMPTS: usize = 4;
+/// Draws of the mesh's error by which is measured what of an effect survives it.
+const DRAWS: u64 = 4;
+/// And of the noise without the person.
+const EMPTY_DRAWS: u64 = 2;
 /// An undetectable effect is brought to this d′.
 const WEAK_D_PRIME: f64 = 1.0;
 
@@ -166,17 +170,17 @@ fn record(config: &ChallengeConfig, plan: &mut Plan) -> Result<Recorded> {
     // What the converter does is not seen in samples that it never touched.
     scene.receiver.adc = plan.effects.iter().any(|(graded, _)| matches!(graded.id, "adc_saturation" | "lsb_stuck"));
     let world = scene.world(Path::new("."))?;
-    let (clean, clean_gain) = frames_of(&world)?;
     if plan.stratum == Stratum::Null {
-        return Ok(Recorded { world, frames: clean, settings: scene, strength: None });
+        return Ok(Recorded { frames: frames_of(&world)?, world, settings: scene, strength: None });
     }
+    let clean = draws(&scene)?;
     let mut attempts = 1;
     loop {
         let settings = RecorderConfig { effects: plan.planted(config), ..scene.clone() };
-        let (frames, gain) = frames_of(&settings.world(Path::new("."))?)?;
-        let strength = strength(&clean, &frames, gain / clean_gain);
+        let mut planted = draws(&settings)?;
+        let strength = strength(&clean, &planted);
         if attempts == MOST_ATTEMPTS || as_meant(plan, &strength) {
-            return Ok(Recorded { world, frames, settings, strength: Some(strength) });
+            return Ok(Recorded { world, frames: planted.frames.swap_remove(0), settings, strength: Some(strength) });
         }
         attempts += 1;
     }
@@ -203,10 +207,27 @@ fn as_meant(plan: &mut Plan, strength: &Strength) -> bool {
     }
 }
 
-/// All frames, and the receiver's gain.
-fn frames_of(world: &World) -> Result<(Vec<IfFrame>, f64)> {
-    let recorder = Recorder::new(world)?;
-    Ok((recorder.frames().collect::<Result<_>>()?, recorder.level().gain))
+fn frames_of(world: &World) -> Result<Vec<IfFrame>> {
+    Recorder::new(world)?.frames().collect()
+}
+
+/// A scene, and what it would be with other errors of the mesh, other noise, and without the person.
+fn draws(settings: &RecorderConfig) -> Result<Draws> {
+    let folder = Path::new(".");
+    let empty = RecorderConfig { empty: true, effects: settings.effects.without_person(), ..settings.clone() };
+    let (world, empty) = (settings.world(folder)?, empty.world(folder)?);
+    let first = Recorder::new(&world)?;
+    let level = first.level();
+    let again = |world: &World, redraw: u64| {
+        let receiver = ReceiverConfig { level: Some(level), ..world.receiver };
+        frames_of(&World { redraw, receiver, ..world.clone() })
+    };
+    let mut frames = vec![first.frames().collect::<Result<Vec<_>>>()?];
+    for redraw in 1..DRAWS {
+        frames.push(again(&world, redraw)?);
+    }
+    let empty = (0..EMPTY_DRAWS).map(|redraw| again(&empty, redraw)).collect::<Result<_>>()?;
+    Ok(Draws { frames, empty, gain: level.gain })
 }
 
 /// The recording without a truth and without labels.
@@ -218,9 +239,7 @@ fn write_case(recorded: &Recorded, case: &Path) -> Result<()> {
 pub fn measured(settings: &str, case: &Path) -> Result<Strength> {
     let planted = settings_of(settings, case)?;
     let clean = RecorderConfig { effects: EffectsConfig::default(), ..planted.clone() };
-    let (clean, clean_gain) = frames_of(&clean.world(Path::new("."))?)?;
-    let (planted, gain) = frames_of(&planted.world(Path::new("."))?)?;
-    Ok(strength(&clean, &planted, gain / clean_gain))
+    Ok(strength(&draws(&clean)?, &draws(&planted)?))
 }
 
 fn settings_of(settings: &str, case: &Path) -> Result<RecorderConfig> {
@@ -230,7 +249,7 @@ fn settings_of(settings: &str, case: &Path) -> Result<RecorderConfig> {
 /// Records the same scene, noise included, without its effects: what a perfect diagnosis would be left with.
 pub fn record_twin(settings: &str, case: &Path) -> Result<()> {
     let world = RecorderConfig { effects: EffectsConfig::default(), ..settings_of(settings, case)? }.world(Path::new("."))?;
-    write_frames(&world, &frames_of(&world)?.0, case)
+    write_frames(&world, &frames_of(&world)?, case)
 }
 
 fn write_frames(world: &World, frames: &[IfFrame], case: &Path) -> Result<()> {
@@ -295,6 +314,34 @@ pub fn effects(config: &EffectsConfig) -> Vec<Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn other_draws_of_the_mesh_and_the_noise_are_no_effect_and_a_delayed_surface_is_next_to_none() {
+        let text = |effects: &str| {
+            format!(
+                "seed = 3\nmesh_error_m = 2e-3\nradar = \"small\"\n[surface]\nedge_m = 0.012\n[receiver]\nadc = false\n{effects}"
+            )
+        };
+        let scene = |effects: &str| RecorderConfig { frames: Some(4), ..toml::from_str(&text(effects)).unwrap() };
+        let clean = draws(&scene("")).unwrap();
+        let world = scene("").world(Path::new(".")).unwrap();
+        let level = Some(Recorder::new(&world).unwrap().level());
+        let again = |redraw: u64| {
+            let receiver = ReceiverConfig { level, ..world.receiver };
+            frames_of(&World { redraw: redraw + 100, receiver, ..world.clone() }).unwrap()
+        };
+        let redrawn =
+            Draws { frames: (0..DRAWS).map(again).collect(), empty: draws(&scene("")).unwrap().empty, gain: clean.gain };
+        let none = strength(&clean, &redrawn);
+        // Of so few draws, it is zero but for some units.
+        assert!(none.d_prime > 1000.0 && none.d_prime_surviving < 15.0, "{none:?}");
+        let of = |effects: &str| strength(&clean, &draws(&scene(effects)).unwrap());
+        let clothing = of("[effects.clothing_delay]\nextra_m = 1e-3\nbody_parts = [\"pelvis\", \"spine1\", \"spine2\"]\n");
+        // Where the cloth ends, next to the skin, there is a little that no smooth error of the mesh can do.
+        assert!(clothing.d_prime > 300.0 && clothing.d_prime_surviving < 0.05 * clothing.d_prime, "{clothing:?}");
+        let leakage = of("[effects.tx_leakage]\nrange_m = 0.1\nrelative = 0.1\n");
+        assert!(leakage.d_prime_surviving > 100.0, "{leakage:?}");
+    }
 
     #[test]
     fn truths_name_effects_by_id_and_the_rest_by_nothing() {

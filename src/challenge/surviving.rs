@@ -1,108 +1,80 @@
 //! What of an effect survives everything that nobody can know about the body and the room: the d′ of rung E of the
 //! capacity ladder (DIAGNOSIS.md, 0.6), which a millimetre of mesh error and learned reflectivities cannot explain away.
 //!
-//! Nuisances, each with the size that the recording itself has:
-//! - whatever stands still may return any amplitude at any range in every channel;
-//! - what moves is, in every frame, known only up to mixing: its return in a range-Doppler cell may be any combination of
-//!   the returns that reach the cell, with weights of unit variance. What channels differ by is not mixed away;
-//! - the power that moves in and around a cell is known, as it follows from where the surface is: a change of it counts
-//!   as much as one exponentially distributed power can show.
+//! A scene is recorded several times with and without the effect, each time with another draw of the mesh's error and of
+//! the thermal noise, and again without the person. Only what the effect does in *every* draw counts: sums go over pairs
+//! of different draws (U-statistics), so that what merely becomes another random pattern, as the return of a moved or
+//! delayed body does, counts nothing in the mean. Counted are
+//! - what is added where no body is, as the scenes without the person show it: what stands still against any amplitude of
+//!   the room at any range in every channel, the rest in every cell of range and Doppler against the covariance that the
+//!   channels have there with the person. It counts in full beside the body and little beneath it;
+//! - the change of that covariance (power in the cell, phases between the channels), as much as the independent looks at it
+//!   can show; one gain for all of the body's return is unknown.
+//!
+//! Not counted, though a recording shows it: what the body's phases have in common from frame to frame and from cell to
+//! cell. Counted, though learned reflectivities may hide it: powers that change with range or with the part of the body.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::measure::Frames;
 use crate::diagnosis::evidence::{spectrum, transform};
 
-/// A neighbourhood whose mean power is below this many times the noise's holds no return.
-const RETURN_OVER_NOISE: f64 = 4.0;
 /// A return reaches two cells to either side: half the main lobe of a Hann window.
-const REACH: std::ops::Range<usize> = 0..5;
-/// Cells per independent power: the noise bandwidth of two Hann windows, in bins.
-const CELLS_PER_POWER: f64 = 1.5 * 1.5;
+const REACH: usize = 2;
+/// Cells per independent look: the noise bandwidth of two Hann windows, in bins.
+const CELLS_PER_LOOK: f64 = 1.5 * 1.5;
 
-/// d′ of an effect, the difference that it makes to a recording (`clean`, noise included).
-/// `noise`: variance of a complex sample's noise.
-pub fn d_prime(clean: &Frames, effect: &Frames, noise: f64) -> f64 {
-    let (still, still_effect) = (clean.mean_chirp(), effect.mean_chirp());
-    let (mut squared, mut ratios) = (standing(&still, &still_effect, clean, noise), vec![]);
-    for frame in 0..clean.count() {
-        let (x, e) = (clean.maps_without(frame, &still), effect.maps_without(frame, &still_effect));
-        squared += moving(&x, &e, clean.dims, noise, &mut ratios);
-    }
-    // One gain for all of them is unknown.
-    let mean = ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
-    squared += ratios.iter().map(|ratio| (ratio - mean).powi(2)).sum::<f64>() / CELLS_PER_POWER;
-    squared.max(0.0).sqrt()
+/// One draw of the mesh's error and the noise.
+pub struct Draw {
+    pub clean: Frames,
+    /// What the effect adds to it.
+    pub effect: Frames,
 }
 
-/// Of the mean chirps, `[channel][sample]`.
-fn standing(still: &[Vec<Complex64>], effect: &[Vec<Complex64>], clean: &Frames, noise: f64) -> f64 {
-    let chirps = (clean.count() * clean.dims[1]) as f64;
-    let floor = noise / chirps;
-    let mut squared = 0.0;
-    for (x, e) in still.iter().zip(effect) {
-        let (x, e) = (spectrum(x), spectrum(e));
-        let bins = x.len();
-        for (bin, e) in e.iter().enumerate() {
-            let free: f64 = REACH.map(|step| x[(bin + bins + step - 2) % bins].norm_sqr()).sum();
-            squared += 2.0 * e.norm_sqr() / (floor + (free - REACH.len() as f64 * floor).max(0.0));
-        }
+/// d′ of an effect over several draws of the scene, and of the scene without the person. `noise`: variance of a complex
+/// sample's noise.
+pub fn d_prime(draws: &[Draw], empty: &[Draw], noise: f64) -> f64 {
+    let clean: Vec<Parted> = draws.iter().map(|draw| Parted::new(&draw.clean)).collect();
+    let effect: Vec<Parted> = draws.iter().map(|draw| Parted::new(&draw.effect)).collect();
+    let beside: Vec<Parted> = empty.iter().map(|draw| Parted::new(&draw.effect)).collect();
+    let frames = &draws[0].clean;
+    let mut moving = Moving::new(draws.len());
+    for frame in 0..frames.count() {
+        let maps = |of: &[Parted]| of.iter().map(|parted| parted.maps(frame)).collect();
+        let maps = Maps { clean: maps(&clean), effect: maps(&effect), beside: maps(&beside) };
+        moving.add(&maps, frames.dims, noise);
     }
-    squared
+    let chirps = (frames.count() * frames.dims[1]) as f64;
+    (standing(&clean, &beside, noise / chirps) + moving.squared()).max(0.0).sqrt()
 }
 
-/// Of one frame's maps, `[channel][doppler · range]`; `ratios` takes the logarithms of the powers' changes.
-fn moving(x: &[Vec<Complex64>], e: &[Vec<Complex64>], dims: [usize; 3], floor: f64, ratios: &mut Vec<f64>) -> f64 {
-    let [channels, loops, samples] = dims;
-    let mut squared = 0.0;
-    for doppler in 0..loops {
-        for range in 0..samples {
-            let cell = doppler * samples + range;
-            let around: Vec<usize> = REACH
-                .flat_map(|d| REACH.map(move |r| [d, r]))
-                .map(|[d, r]| (doppler + loops + d - 2) % loops * samples + (range + samples + r - 2) % samples)
-                .collect();
-            let power = |of: &dyn Fn(usize, usize) -> Complex64| -> f64 {
-                around.iter().map(|&at| (0..channels).map(|k| of(k, at).norm_sqr()).sum::<f64>()).sum()
-            };
-            let before = power(&|k, at| x[k][at]);
-            let background = floor * (channels * around.len()) as f64;
-            let here = DVector::from_iterator(channels, e.iter().map(|map| map[cell]));
-            if before < RETURN_OVER_NOISE * background {
-                squared += 2.0 * here.norm_squared() / floor;
-                continue;
-            }
-            let mixing = DMatrix::from_fn(channels, around.len(), |k, at| x[k][around[at]]);
-            let covariance = &mixing * mixing.adjoint() + DMatrix::identity(channels, channels) * Complex64::from(floor);
-            let whitened = covariance.cholesky().map(|factor| factor.solve(&here));
-            squared += whitened.map_or(0.0, |whitened| 2.0 * here.dotc(&whitened).re);
-            let after = power(&|k, at| x[k][at] + e[k][at]);
-            ratios.push(((after + background) / (before + background)).ln());
-        }
-    }
-    squared
+/// Frames, and what stands still in them.
+struct Parted<'a> {
+    frames: &'a Frames,
+    /// The mean chirp, `[channel][sample]`.
+    still: Vec<Vec<Complex64>>,
 }
 
-/// The maps of a frame without what stands still.
-impl Frames {
-    fn mean_chirp(&self) -> Vec<Vec<Complex64>> {
-        let [channels, loops, samples] = self.dims;
-        let weight = 1.0 / (loops * self.count()) as f64;
-        let mut mean = vec![vec![Complex64::ZERO; samples]; channels];
-        for frame in &self.values {
+impl<'a> Parted<'a> {
+    fn new(frames: &'a Frames) -> Self {
+        let [channels, loops, samples] = frames.dims;
+        let weight = 1.0 / (loops * frames.count()) as f64;
+        let mut still = vec![vec![Complex64::ZERO; samples]; channels];
+        for frame in &frames.values {
             for (index, value) in frame.iter().enumerate() {
-                mean[index / (loops * samples)][index % samples] += value * weight;
+                still[index / (loops * samples)][index % samples] += value * weight;
             }
         }
-        mean
+        Self { frames, still }
     }
 
-    fn maps_without(&self, frame: usize, still: &[Vec<Complex64>]) -> Vec<Vec<Complex64>> {
-        let [_, loops, samples] = self.dims;
-        let channels = self.values[frame].chunks_exact(loops * samples);
+    /// The maps of a frame without what stands still, `[channel][doppler · range]`.
+    fn maps(&self, frame: usize) -> Vec<Vec<Complex64>> {
+        let [_, loops, samples] = self.frames.dims;
+        let channels = self.frames.values[frame].chunks_exact(loops * samples);
         channels
-            .zip(still)
+            .zip(&self.still)
             .map(|(channel, still)| {
                 let moving: Vec<Complex64> = channel.iter().enumerate().map(|(i, value)| value - still[i % samples]).collect();
                 transform(&moving, samples)
@@ -111,9 +83,148 @@ impl Frames {
     }
 }
 
+/// Sum over all ordered pairs of different draws of the products of what they show, over the number of pairs.
+#[derive(Clone, Default)]
+struct Pairs {
+    sum: Vec<Complex64>,
+    own: f64,
+    draws: usize,
+}
+
+impl Pairs {
+    fn add(&mut self, shown: impl Iterator<Item = Complex64>) {
+        let first = self.sum.is_empty();
+        for (index, value) in shown.enumerate() {
+            if first {
+                self.sum.push(value);
+            } else {
+                self.sum[index] += value;
+            }
+            self.own += value.norm_sqr();
+        }
+        self.draws += 1;
+    }
+
+    fn mean(&self) -> f64 {
+        let pairs = self.draws * self.draws.saturating_sub(1);
+        (self.sum.iter().map(Complex64::norm_sqr).sum::<f64>() - self.own) / pairs.max(1) as f64
+    }
+}
+
+/// Of the mean chirps.
+fn standing(clean: &[Parted], effect: &[Parted], floor: f64) -> f64 {
+    let mut squared = 0.0;
+    for channel in 0..clean[0].still.len() {
+        let spectra = |of: &[Parted]| of.iter().map(|draw| spectrum(&draw.still[channel])).collect::<Vec<_>>();
+        let (clean, effect) = (spectra(clean), spectra(effect));
+        let bins = clean[0].len();
+        for bin in 0..bins {
+            let around = || (0..=2 * REACH).map(|step| (bin + bins + step - REACH) % bins);
+            let there: f64 = clean.iter().flat_map(|draw| around().map(|at| draw[at].norm_sqr())).sum();
+            let free = there / clean.len() as f64 - (2 * REACH + 1) as f64 * floor;
+            let mut pairs = Pairs::default();
+            effect.iter().for_each(|draw| pairs.add(std::iter::once(draw[bin])));
+            squared += 2.0 * pairs.mean() / (floor + free.max(0.0));
+        }
+    }
+    squared
+}
+
+/// One frame, `[draw][channel][doppler · range]`.
+struct Maps {
+    clean: Vec<Vec<Vec<Complex64>>>,
+    effect: Vec<Vec<Vec<Complex64>>>,
+    /// Of the effect in the scene without the person.
+    beside: Vec<Vec<Vec<Complex64>>>,
+}
+
+/// What the cells of all frames show.
+struct Moving {
+    squared: f64,
+    /// Of each draw's change of covariance, what one gain for the body's return would change: projection and its weight.
+    along_gain: Vec<f64>,
+    gain: f64,
+}
+
+impl Moving {
+    fn new(draws: usize) -> Self {
+        Self { squared: 0.0, along_gain: vec![0.0; draws], gain: 0.0 }
+    }
+
+    fn squared(&self) -> f64 {
+        let mut along = Pairs::default();
+        self.along_gain.iter().for_each(|&value| along.add(std::iter::once(value.into())));
+        self.squared - if self.gain > 0.0 { along.mean() / self.gain } else { 0.0 }
+    }
+
+    fn add(&mut self, maps: &Maps, dims: [usize; 3], floor: f64) {
+        let [channels, loops, samples] = dims;
+        let covariances = |value: &dyn Fn(usize, usize, usize) -> Complex64| -> Vec<Vec<DMatrix<Complex64>>> {
+            let of_draw = |draw| covariance(channels, [loops, samples], &|channel, cell| value(draw, channel, cell));
+            (0..maps.clean.len()).map(of_draw).collect()
+        };
+        let clean = covariances(&|draw, channel, cell| maps.clean[draw][channel][cell]);
+        let planted = covariances(&|draw, channel, cell| maps.clean[draw][channel][cell] + maps.effect[draw][channel][cell]);
+        let mean = |of: &[Vec<DMatrix<Complex64>>], cell: usize| {
+            of.iter().map(|draw| &draw[cell]).sum::<DMatrix<Complex64>>() * Complex64::from(1.0 / of.len() as f64)
+        };
+        for cell in 0..loops * samples {
+            let (before, after) = (mean(&clean, cell), mean(&planted, cell));
+            if let Some(whitener) = whitener(&before) {
+                let mut pairs = Pairs::default();
+                for map in &maps.beside {
+                    let effect = DMatrix::from_fn(channels, 1, |channel, _| map[channel][cell]);
+                    pairs.add((&whitener * effect).iter().copied());
+                }
+                self.squared += 2.0 * pairs.mean();
+            }
+            // Relative to the mean of before and after: a power that rises from nothing counts finitely.
+            if let Some(whitener) = whitener(&((&before + after) * Complex64::from(0.5))) {
+                let identity = DMatrix::<Complex64>::identity(channels, channels);
+                let gain = identity - &whitener * whitener.adjoint() * Complex64::from(floor);
+                let mut pairs = Pairs::default();
+                for (draw, (clean, planted)) in clean.iter().zip(&planted).enumerate() {
+                    let change = &whitener * (&planted[cell] - &clean[cell]) * whitener.adjoint();
+                    let along = change.iter().zip(gain.iter()).map(|(a, b)| (a * b.conj()).re).sum::<f64>();
+                    self.along_gain[draw] += along / CELLS_PER_LOOK;
+                    pairs.add(change.iter().copied());
+                }
+                self.squared += pairs.mean() / CELLS_PER_LOOK;
+                self.gain += gain.iter().map(Complex64::norm_sqr).sum::<f64>() / CELLS_PER_LOOK;
+            }
+        }
+    }
+}
+
+/// W with W C Wᴴ = 1; none for a covariance without noise.
+fn whitener(covariance: &DMatrix<Complex64>) -> Option<DMatrix<Complex64>> {
+    covariance.clone().cholesky()?.l().try_inverse()
+}
+
+/// The channels' covariance in and around every cell, `[doppler · range]`; both axes go round.
+fn covariance(
+    channels: usize,
+    [loops, samples]: [usize; 2],
+    value: &dyn Fn(usize, usize) -> Complex64,
+) -> Vec<DMatrix<Complex64>> {
+    let outer = |cell: usize| {
+        let here = DMatrix::from_fn(channels, 1, |channel, _| value(channel, cell));
+        &here * here.adjoint()
+    };
+    let own: Vec<DMatrix<Complex64>> = (0..loops * samples).map(outer).collect();
+    let weight = Complex64::from(1.0 / (2 * REACH + 1) as f64);
+    let along = |of: &[DMatrix<Complex64>], count: usize, at: &dyn Fn(usize, usize) -> usize| -> Vec<DMatrix<Complex64>> {
+        (0..loops * samples)
+            .map(|cell| (0..=2 * REACH).map(|step| &of[at(cell, count + step - REACH)]).sum::<DMatrix<Complex64>>() * weight)
+            .collect()
+    };
+    let over_range = along(&own, samples, &|cell, step| cell / samples * samples + (cell % samples + step) % samples);
+    along(&over_range, loops, &|cell, step| (cell / samples + step) % loops * samples + cell % samples)
+}
+
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
+    use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
@@ -145,30 +256,68 @@ mod tests {
         Frames { dims: of.dims, values: values.collect() }
     }
 
-    #[test]
-    fn where_nothing_else_is_the_d_prime_is_the_coherent_one() {
-        let clean = noisy(frames(4, |_, _, slow, fast| tone(4.0, 8.0, slow, fast) * 30.0), 1);
-        let effect = frames(4, |_, _, slow, fast| tone(-5.0, 20.0, slow, fast) * 0.3);
-        // 4096 samples of energy 0.09, noise of variance 2
-        let wanted = (2.0 * 4096.0 * 0.09 / 2.0f64).sqrt();
-        let found = d_prime(&clean, &effect, 2.0);
-        assert!((found / wanted - 1.0).abs() < 0.1, "{found} against {wanted}");
+    /// A body of several returns in each of many cells, every one of an unknown phase, and a wall.
+    fn scene(seed: u64, body: f64, delay: f64) -> Frames {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let phases: Vec<f64> = (0..60).map(|_| std::f64::consts::TAU * random.random::<f64>()).collect();
+        let person = |frame: usize, channel: usize, slow: usize, fast: usize| -> Complex64 {
+            let part = |(i, phase): (usize, &f64)| {
+                let place = i as f64 / 60.0;
+                let turned = Complex64::cis(phase + 40.0 * place * frame as f64 + 2.0 * place * channel as f64);
+                tone(2.0 + 5.0 * place, 6.0 + 8.0 * place + delay, slow, fast) * turned * body
+            };
+            phases.iter().enumerate().map(part).sum()
+        };
+        let wall = |slow: usize, fast: usize| tone(0.0, 20.0, slow, fast) * 30.0;
+        noisy(frames(6, |frame, channel, slow, fast| person(frame, channel, slow, fast) + wall(slow, fast)), seed)
+    }
+
+    /// d′ and the coherent one of what `effect` makes of a scene, by seed, strength of the body, and the scene itself.
+    fn both(effect: impl Fn(u64, f64, &Frames) -> Frames) -> [f64; 2] {
+        let draws = |body: f64, seeds: std::ops::Range<u64>| -> Vec<Draw> {
+            let draw = |seed| {
+                let clean = scene(seed, body, 0.0);
+                let effect = effect(seed, body, &clean);
+                Draw { clean, effect }
+            };
+            seeds.map(draw).collect()
+        };
+        let (draws, empty) = (draws(6.0, 1..4), draws(0.0, 4..6));
+        let coherent = draws[0].effect.values.iter().flatten().map(Complex64::norm_sqr).sum::<f64>().sqrt();
+        [d_prime(&draws, &empty, 2.0), coherent]
+    }
+
+    fn difference(a: &Frames, b: &Frames) -> Frames {
+        let values = a.values.iter().zip(&b.values).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect());
+        Frames { dims: a.dims, values: values.collect() }
     }
 
     #[test]
-    fn an_unknown_phase_of_the_body_and_an_amplitude_of_the_room_hide_what_only_changes_them() {
-        let body =
-            |frame: usize, slow: usize, fast: usize| tone(4.0, 8.0, slow, fast) * Complex64::cis(1.7 * frame as f64) * 30.0;
-        let clean = noisy(frames(4, |frame, _, slow, fast| body(frame, slow, fast) + tone(0.0, 20.0, slow, fast) * 30.0), 2);
-        let turned = frames(4, |frame, _, slow, fast| body(frame, slow, fast) * (Complex64::cis(0.4 * frame as f64) - 1.0));
-        let wall = frames(4, |_, _, slow, fast| tone(0.0, 20.0, slow, fast) * 6.0);
-        let coherent = |effect: &Frames| (effect.values.iter().flatten().map(Complex64::norm_sqr).sum::<f64>()).sqrt();
-        for effect in [&turned, &wall] {
-            let found = d_prime(&clean, effect, 2.0);
-            assert!(coherent(effect) > 200.0 && found < 8.0, "{} and {found}", coherent(effect));
+    fn where_nothing_else_is_the_d_prime_is_the_coherent_one() {
+        let [found, coherent] = both(|_, _, clean| frames(clean.count(), |_, _, slow, fast| tone(-5.0, 25.0, slow, fast) * 0.1));
+        assert!((found / coherent - 1.0).abs() < 0.15, "{found} against {coherent}");
+    }
+
+    #[test]
+    fn another_draw_of_the_body_and_another_amplitude_of_the_room_are_no_effect() {
+        let redrawn = both(|seed, body, clean| difference(&scene(seed + 100, body, 0.0), clean));
+        let brighter = both(|_, _, clean| frames(clean.count(), |_, _, slow, fast| tone(0.0, 20.0, slow, fast) * 6.0));
+        for [found, coherent] in [redrawn, brighter] {
+            assert!(coherent > 200.0 && found < 8.0, "{coherent} and {found}");
         }
-        // and a difference between the channels is not hidden
-        let one = frames(4, |frame, channel, slow, fast| body(frame, slow, fast) * if channel == 0 { 0.1 } else { -0.1 });
-        assert!(d_prime(&clean, &one, 2.0) > 30.0);
+    }
+
+    #[test]
+    fn power_elsewhere_and_differences_between_channels_are_seen_under_any_phases() {
+        let moved = both(|seed, body, clean| difference(&scene(seed + 100, body, 2.0), clean));
+        let [channels, loops, samples] = DIMS;
+        let turned = both(|_, _, clean| {
+            let factor = |i: usize| if (i / (loops * samples)).is_multiple_of(channels) { 0.2 } else { -0.2 };
+            let turn = |frame: &Vec<Complex64>| frame.iter().enumerate().map(|(i, value)| value * factor(i)).collect();
+            Frames { dims: DIMS, values: clean.values.iter().map(turn).collect() }
+        });
+        for [found, _] in [moved, turned] {
+            assert!(found > 15.0, "{found}");
+        }
     }
 }

@@ -189,6 +189,7 @@ impl RecorderConfig {
             effects: self.effects.clone(),
             seed: self.seed,
             noise_seed: self.noise_seed,
+            redraw: 0,
         };
         world.check()?;
         Ok(world)

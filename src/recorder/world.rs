@@ -84,6 +84,8 @@ pub struct World {
     pub seed: u64,
     /// Of the receiver's noise and the oscillator's alone; absent: `seed`.
     pub noise_seed: Option<u64>,
+    /// Another draw of the mesh's error and of the receiver's noise, everything else the same; 0: the one of the seed.
+    pub redraw: u64,
 }
 
 impl Default for World {
@@ -103,6 +105,7 @@ impl Default for World {
             effects: EffectsConfig::default(),
             seed: 0,
             noise_seed: None,
+            redraw: 0,
         }
     }
 }
@@ -161,8 +164,10 @@ impl World {
             Draw::Effect { id, .. } => effects::is_noise(id),
             _ => false,
         };
-        let mut rng = ChaCha8Rng::seed_from_u64(if again { self.noise_seed.unwrap_or(self.seed) } else { self.seed });
-        rng.set_stream(stream);
+        let redraw = if matches!(draw, Draw::MeshError | Draw::Noise { .. }) { self.redraw } else { 0 };
+        let seed = if again { self.noise_seed.unwrap_or(self.seed) } else { self.seed };
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(stream + (redraw << 24));
         rng
     }
 

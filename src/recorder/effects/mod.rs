@@ -150,6 +150,25 @@ impl EffectsConfig {
         *self == Self::default()
     }
 
+    /// Those that a scene without a person can have.
+    pub fn without_person(&self) -> Self {
+        Self {
+            soft_occlusion: None,
+            body_multibounce: None,
+            breathing: None,
+            heartbeat: None,
+            clothing_delay: None,
+            part_reflectivity: None,
+            pose_offset: None,
+            clock_offset: None,
+            clock_drift: None,
+            floor_bounce: None,
+            carried_reflector: None,
+            wall_ghost: vec![],
+            ..self.clone()
+        }
+    }
+
     /// Refuses what cannot work in this world; `key` names the table in messages.
     pub fn check(&self, world: &World, key: &str) -> Result<()> {
         self.check_bounds(key)?;
