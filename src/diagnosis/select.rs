@@ -34,6 +34,9 @@ const ROUGHLY: f64 = 0.1;
 /// What is named even where products of the signal with itself lie everywhere.
 const WHATEVER_THE_SIGNAL: [&str; 2] = ["iq_imbalance", "adc_saturation"];
 
+/// Stages of the signal's chain at which everything that is received is changed.
+const UPSTREAM: [&str; 2] = ["waveform", "receiver"];
+
 /// Two instances of an effect closer than this are one.
 const NEAR_M: f64 = 0.3;
 
@@ -100,7 +103,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
             (suspect.last_in_chain, !suspect.last_resort, worth)
         };
         let strongest = passing.iter().max_by(|a, b| order(a).partial_cmp(&order(b)).expect("gains are finite"));
-        let Some((suspect, best)) = strongest.map(|best| (&best.0, &best.1)) else {
+        let Some((suspect, best)) = strongest.map(|best| upstream(&original, evidence, best, &passing)) else {
             break;
         };
         if accepted.len() == thresholds.most {
@@ -164,6 +167,28 @@ fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
         && !apart(accepted.place.range_m, candidate.place.range_m)
         && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
     (is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside) && candidate.gain < ROUGHLY * accepted.gain
+}
+
+/// What acts on every return makes echoes of the body too, which look like paths of their own: where both are suspected,
+/// the one is accepted that leaves less.
+fn upstream<'a>(
+    original: &Evidence,
+    evidence: &Evidence,
+    best: &'a (usize, Candidate),
+    passing: &[&'a (usize, Candidate)],
+) -> &'a (usize, Candidate) {
+    let on_all = |candidate: &Candidate| {
+        let id = candidate.id.unwrap_or_default();
+        id == "radar_vibration" || (!id.is_empty() && UPSTREAM.contains(&candidate.place.stage.as_str()))
+    };
+    let others = passing.iter().filter(|(_, candidate)| on_all(candidate));
+    let Some(other) =
+        others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| best.1.behaves_like.starts_with(paths::PATH_LIKE))
+    else {
+        return best;
+    };
+    let left = |candidate: &Candidate| Misfit::after(original, &evidence.with(candidate)).loglik_per_sample;
+    if left(&other.1) > left(&best.1) { other } else { best }
 }
 
 fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> bool {

@@ -25,6 +25,9 @@ const PHASE_FLOOR_RAD: f64 = 1.5 * PI / 180.0;
 const GAIN_FLOOR_DB: f64 = 0.2;
 /// Chance below which receivers are not alike.
 const UNEVEN: f64 = 0.05;
+/// Of the unevenness (squares), what a coupling may leave: a random one of four receivers lies so near to one that a
+/// coupling makes with a probability of 1 %.
+const BY_CHANCE: f64 = 0.1;
 /// Cells that one independent draw is spread over by two Hann windows.
 const CELLS_PER_DRAW: f64 = 2.25;
 
@@ -81,11 +84,18 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
         // Receivers that differ in any other way remain different without it.
         let undone = |sums: &Sums| coupling::uncoupled(&evidence.radar, sums, coupling.strength);
         let rest: Option<Vec<Sums>> = training.iter().map(undone).collect();
-        if rest.is_some_and(|rest| judge(&evidence.radar, &rest).own > UNEVEN) {
-            return vec![coupling.candidate];
+        let rest = rest.map(|rest| judge(&evidence.radar, &rest)).filter(|rest| rest.own > UNEVEN);
+        if let Some(rest) = rest {
+            let mut candidate = coupling.candidate;
+            // Any receivers may look like that by chance, if not to the last digit.
+            if rest.unevenness > BY_CHANCE * judge(&evidence.radar, &training).unevenness {
+                candidate.look_alikes.push("channel_mismatch");
+                candidate.look_alikes.dedup();
+            }
+            return vec![candidate];
         }
     }
-    let Judgement { phases, gains, direction, own, bearing, aside } = judge(&evidence.radar, &training);
+    let Judgement { phases, gains, direction, own, bearing, aside, .. } = judge(&evidence.radar, &training);
     let (places, wave) = (places(&evidence.radar), TAU / evidence.radar.wavelength_m());
     if own < UNEVEN {
         let amplitudes: Vec<Complex64> = std::iter::once(Complex64::ONE)
@@ -118,6 +128,8 @@ struct Judgement {
     direction: f64,
     /// Chance that the rest, and the powers, are the body's.
     own: f64,
+    /// Sum of squares of the rest and of the gains, in units of their errors.
+    unevenness: f64,
     bearing: Mean,
     /// Chance that the direction is the body's.
     aside: f64,
@@ -143,6 +155,9 @@ fn judge(radar: &Radar, training: &[Sums]) -> Judgement {
         .map(|(rest, phase)| p(*rest, PHASE_FLOOR_RAD, phase.deviation))
         .chain(gains.iter().map(|gain| p(gain.value, GAIN_FLOOR_DB, gain.deviation)))
         .fold(1.0, f64::min);
+    let in_errors = |value: f64, error: f64| (value / error.max(1e-12)).powi(2);
+    let unevenness = rest.iter().zip(&phases).map(|(rest, phase)| in_errors(*rest, phase.deviation)).sum::<f64>()
+        + gains.iter().map(|gain| in_errors(gain.value, gain.deviation)).sum::<f64>();
     let tried = 2.0 * receivers as f64;
     let own = statistics::corrected(own, tried);
     let bearing = {
@@ -153,7 +168,7 @@ fn judge(radar: &Radar, training: &[Sums]) -> Judgement {
     };
     let floor = PHASE_FLOOR_RAD / PI;
     let aside = if spread > 0.0 { statistics::corrected(p(bearing.value, floor, bearing.deviation), tried) } else { 1.0 };
-    Judgement { phases, gains, direction, own, bearing, aside }
+    Judgement { phases, gains, direction, own, unevenness, bearing, aside }
 }
 
 /// Two-sided, of Student's law.

@@ -5,18 +5,29 @@
 
 use std::sync::Arc;
 
+use num_complex::Complex64;
 use rayon::prelude::*;
+use rustfft::FftPlanner;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::{Cube, Evidence};
 
+/// Fewest training frames with movers, and fewest loops.
+const FEWEST: usize = 6;
+/// Power of a Doppler cell over the noise's from which on its slope is read.
+const OVER_NOISE: f64 = 3.0;
+
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    if evidence.is_real() || evidence.accepted.contains(&"chirp_droop") || evidence.split.training.len() < 6 {
+    if evidence.is_real() || evidence.accepted.contains(&"chirp_droop") || evidence.cube.dims[3] < FEWEST {
         return vec![];
     }
-    let slopes: Vec<f64> = (0..evidence.cube.dims[0]).into_par_iter().map(|frame| slope_db(evidence, frame)).collect();
-    let training: Vec<f64> = evidence.split.training.iter().map(|&frame| slopes[frame]).collect();
+    let slopes: Vec<Option<f64>> = (0..evidence.cube.dims[0]).into_par_iter().map(|frame| slope_db(evidence, frame)).collect();
+    let training: Vec<f64> = evidence.split.training.iter().filter_map(|&frame| slopes[frame]).collect();
+    if training.len() < FEWEST {
+        return vec![];
+    }
     let count = training.len() as f64;
     let mean = training.iter().sum::<f64>() / count;
     let variance = training.iter().map(|slope| (slope - mean).powi(2)).sum::<f64>() / (count - 1.0);
@@ -31,7 +42,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         .split
         .held_out
         .iter()
-        .map(|&frame| (slopes[frame].powi(2) - (slopes[frame] - mean).powi(2)) / (4.0 * variance))
+        .filter_map(|&frame| slopes[frame])
+        .map(|slope| (slope.powi(2) - (slope - mean).powi(2)) / (4.0 * variance))
         .sum();
     if p_value > 1e-2 || gain <= 0.0 {
         return vec![];
@@ -65,26 +77,35 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }]
 }
 
-/// Slope of the power of what moves, decibels over the chirp.
-fn slope_db(evidence: &Evidence, frame: usize) -> f64 {
+/// Slope of the power of what moves, decibels over the chirp: the median over the frame's Doppler cells, each of which
+/// holds other parts of the body and hence another interference. None where nothing moves.
+fn slope_db(evidence: &Evidence, frame: usize) -> Option<f64> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let mut power = vec![0.0; samples];
     let own = evidence.cube.still(&[frame]);
-    let mut noise = 0.0;
+    let window = hann(loops);
+    let fft = FftPlanner::new().plan_fft_forward(loops);
+    // `[doppler, sample]`
+    let (mut power, mut noise) = (vec![0.0; loops * samples], 0.0);
     for channel in 0..evidence.cube.channels() {
-        noise += evidence.noise()[channel] * (loops - 1) as f64;
-        for chirp in evidence.cube.channel(frame, channel).chunks_exact(samples) {
-            let still = &own[channel * samples..][..samples];
-            power.iter_mut().zip(chirp.iter().zip(still)).for_each(|(sum, (value, still))| *sum += (value - still).norm_sqr());
+        noise += evidence.noise()[channel] * window.iter().map(|w| w * w).sum::<f64>();
+        let chirps = evidence.cube.channel(frame, channel);
+        for sample in 0..samples {
+            let still = own[channel * samples + sample];
+            let mut slow: Vec<Complex64> = (0..loops).map(|i| (chirps[i * samples + sample] - still) * window[i]).collect();
+            fft.process(&mut slow);
+            slow.iter().enumerate().for_each(|(doppler, value)| power[doppler * samples + sample] += value.norm_sqr());
         }
     }
     let centre = 0.5 * (samples as f64 - 1.0);
-    let (mut tilt, mut whole, mut spread) = (0.0, 0.0, 0.0);
-    for (n, power) in power.iter().enumerate() {
-        let x = (n as f64 - centre) / samples as f64;
-        tilt += x * power;
-        spread += x * x;
-        whole += (power - noise) / samples as f64;
-    }
-    10.0 / std::f64::consts::LN_10 * tilt / spread / whole.max(0.02 * noise).max(1e-300)
+    let place = |n: usize| (n as f64 - centre) / samples as f64;
+    let spread: f64 = (0..samples).map(|n| place(n).powi(2)).sum();
+    let slope = |power: &[f64]| {
+        let whole = power.iter().sum::<f64>() / samples as f64 - noise;
+        let tilt: f64 = power.iter().enumerate().map(|(n, power)| place(n) * power).sum();
+        (whole > OVER_NOISE * noise).then(|| 10.0 / std::f64::consts::LN_10 * tilt / spread / whole)
+    };
+    let mut slopes: Vec<f64> = power.chunks_exact(samples).filter_map(slope).collect();
+    slopes.sort_by(f64::total_cmp);
+    let count = slopes.len();
+    (count > 0).then(|| 0.5 * (slopes[(count - 1) / 2] + slopes[count / 2]))
 }

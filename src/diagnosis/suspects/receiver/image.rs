@@ -8,6 +8,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::harmonic::QUADRATIC;
 use super::support::{beat_hz, ranges_m};
 use crate::diagnosis::evidence::spectrum;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
@@ -16,6 +17,8 @@ use crate::diagnosis::{Cube, Evidence};
 
 /// Power of a parent over the noise.
 const STRONG: f64 = 100.0;
+/// Power that is left in the image's cells, over the noise's, from which on the image must be most of what is in them.
+const CROWDED: f64 = 1.5;
 /// The window's main lobe, cells to each side.
 const LOBE: usize = 3;
 
@@ -29,7 +32,9 @@ struct Sums {
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    if evidence.is_real() || evidence.accepted.contains(&"iq_imbalance") {
+    // Products of the signal are undone roughly: what they leave has images too.
+    let settled = ["iq_imbalance", QUADRATIC].iter().any(|id| evidence.accepted.contains(id));
+    if evidence.is_real() || settled {
         return vec![];
     }
     let frames = evidence.cube.dims[0];
@@ -50,6 +55,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // Neighbouring cells of a windowed map share their noise: the variance is that of white noise times the window's
     // equivalent noise bandwidth in both axes, and more where other things lie in the image's cells.
     let rest = (training.image - mu.norm_sqr() * training.parent) / training.cells as f64;
+    // What is there besides may have made the image, too: a receiver that is not linear has images that are none.
+    let explained = mu.norm_sqr() * training.parent / (training.image - training.cells as f64).max(1.0);
+    if rest > CROWDED && explained < 0.5 {
+        return vec![];
+    }
     let widening = 1.5 * 1.5 * rest.max(1.0);
     let variance = widening / training.parent;
     let p_value = corrected(chi2_tail(2.0 * mu.norm_sqr() / variance, 2.0), 1.0);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::drift::{Drift, Shape};
-use super::field::{Field, Part};
+use super::field::{Field, Part, ahead};
 use super::lines::Line;
 use super::random::Random;
 use super::settling::Settling;
@@ -28,11 +28,15 @@ fn stated_delay_s() -> f64 {
 type Deviation = Arc<dyn Fn([usize; 3]) -> f64 + Send + Sync>;
 
 fn correction(evidence: &Evidence, part: Part, deviation: Deviation) -> Correction {
-    let radar = evidence.radar.clone();
+    let (radar, room) = (evidence.radar.clone(), evidence.room.clone());
     Correction::Samples(Arc::new(move |cube: &mut Cube| match part {
         Part::Gain => undo::gain(cube, |at| (1.0 + deviation(at)).max(0.05).into()),
         Part::Phase => undo::gain(cube, |at| Complex64::cis(deviation(at))),
-        Part::Delay => undo::delay_phase(cube, &radar, |at| deviation(at)),
+        Part::Delay => undo::delay_phase(cube, &radar, |delay_s| delay_s, |at| deviation(at)),
+        Part::Boresight => {
+            let lever = |delay_s: f64| ahead(room.as_ref(), 0.5 * SPEED_OF_LIGHT * delay_s);
+            undo::delay_phase(cube, &radar, lever, |at| deviation(at));
+        }
     }))
 }
 
@@ -65,7 +69,7 @@ fn typical_delay_s(field: &Field) -> f64 {
 fn behaves_like(part: Part) -> &'static str {
     match part {
         Part::Gain => "slow-time gain",
-        Part::Phase => "slow-time phase",
+        Part::Phase | Part::Boresight => "slow-time phase",
         Part::Delay => "delay-proportional phase",
     }
 }
@@ -100,8 +104,9 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
             ),
             "receiver",
         ),
-        Part::Phase => {
+        Part::Phase | Part::Boresight => {
             let metres = evidence.radar.wavelength_m() / (4.0 * PI);
+            let where_ = if part == Part::Phase { "the same at all ranges" } else { "the more the farther ahead they are" };
             (
                 Some("radar_vibration"),
                 vec![
@@ -109,8 +114,8 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
                     Estimate::normal("frequency_hz", line.frequency_hz, line.frequency_deviation_hz),
                 ],
                 format!(
-                    "All static returns swing in phase together, by {:.3} rad at {hertz}{harmonics}, the same at all ranges: the \
-                     radar itself vibrates by {:.1} µm along its boresight.",
+                    "All static returns swing in phase together, by {:.3} rad at {hertz}{harmonics}, {where_}: the radar itself \
+                     vibrates by {:.1} µm along its boresight.",
                     amplitude,
                     1e6 * amplitude * metres
                 ),
@@ -171,7 +176,7 @@ pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -
             vec![Estimate::normal("db", db, 8.686 * drift.deviation)],
             format!("The gain of the radar {how}, by {db:+.3} dB, the same at all ranges: all static returns share it."),
         ),
-        Part::Phase => {
+        Part::Phase | Part::Boresight => {
             (None, vec![], format!("The phase of all static returns {how}, by {change:+.4} rad, the same at all ranges."))
         }
         Part::Delay => (
@@ -188,7 +193,7 @@ pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -
     let frames: Vec<f64> = (0..field.frames).map(|f| evidence.starts_s[f]).collect();
     let (unit, factor) = match part {
         Part::Gain => ("gain, dB", 8.686),
-        Part::Phase => ("phase, rad", 1.0),
+        Part::Phase | Part::Boresight => ("phase, rad", 1.0),
         Part::Delay => ("phase at 3 m, rad", stated_delay_s()),
     };
     let curve = Curve {

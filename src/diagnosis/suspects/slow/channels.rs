@@ -171,29 +171,39 @@ impl Relative {
         let mut value: Vec<Complex64> = (0..frames)
             .map(|f| cells(f).map(|i| self.value[i] * self.weight[i]).sum::<Complex64>() / weight[f].max(f64::MIN_POSITIVE))
             .collect();
+        let (excess, below) = self.excess(training)?;
         let total: f64 = training.iter().map(|&f| weight[f]).sum();
         let mean = training.iter().map(|&f| value[f] * weight[f]).sum::<Complex64>() / total.max(f64::MIN_POSITIVE);
-        let (mut between, mut within, mut above, mut below) = (0.0, 0.0, -1.0, 0.0);
+        let (mut between, mut above) = (0.0, -1.0);
         for &frame in training.iter().filter(|&&f| weight[f] > 0.0) {
             between += weight[frame] * (value[frame] - mean).norm_sqr();
             above += 1.0;
-            for i in cells(frame) {
-                within += self.weight[i] * (self.value[i] - value[frame]).norm_sqr();
-                below += 1.0;
-            }
-            below -= 1.0;
         }
-        if above < 4.0 || below < 4.0 {
+        if above < 4.0 {
             return None;
         }
-        // Ranges that scatter by more than the noise (the body's slow parts) make everything less sure.
-        let excess = (within / below).max(1.0);
         let ratio = between / above / excess;
         let law = FisherSnedecor::new(2.0 * above, 2.0 * below);
         let p_value = if ratio > 0.0 { law.map_or(1.0, |law| law.sf(ratio)) } else { 1.0 };
         value.iter_mut().for_each(|v| *v -= mean);
         weight.iter_mut().for_each(|w| *w /= excess);
         Some(Series { value, weight, p_value })
+    }
+}
+
+impl Relative {
+    /// Variance of the groups about their frame's mean over that of the noise, and its degrees of freedom: ranges that
+    /// scatter by more than the noise (the body's slow parts) make everything less sure.
+    fn excess(&self, training: &[usize]) -> Option<(f64, f64)> {
+        let (mut within, mut freedom) = (0.0, 0.0);
+        for &frame in training {
+            let cells = || (frame * self.groups..(frame + 1) * self.groups).filter(|&i| self.weight[i] > 0.0);
+            let weight: f64 = cells().map(|i| self.weight[i]).sum();
+            let mean = cells().map(|i| self.value[i] * self.weight[i]).sum::<Complex64>() / weight.max(f64::MIN_POSITIVE);
+            within += cells().map(|i| self.weight[i] * (self.value[i] - mean).norm_sqr()).sum::<f64>();
+            freedom += (cells().count() as f64 - 1.0).max(0.0);
+        }
+        (freedom >= 4.0).then(|| ((within / freedom).max(1.0), freedom))
     }
 }
 

@@ -7,12 +7,16 @@ use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 
 use crate::diagnosis::evidence::{Evidence, blackman_harris};
+use crate::radar::SPEED_OF_LIGHT;
+use crate::room::Room;
 
 /// Range cells whose gain is estimated together.
 #[derive(Clone, Debug)]
 pub struct Group {
     /// Mean delay of its static returns, weighted by their power.
     pub delay_s: f64,
+    /// Cosine to the boresight, mean over what the room has at that range; one where the room is not known.
+    pub ahead: f64,
     /// Its beat-frequency bins.
     pub bins: std::ops::Range<usize>,
 }
@@ -39,6 +43,8 @@ pub enum Part {
     Phase,
     /// Phase in proportion to the delay: an error of the local oscillator. Stated per second of delay.
     Delay,
+    /// Phase in proportion to the cosine to the boresight, along which the radar moves.
+    Boresight,
 }
 
 /// One number per chirp: the common deviation, with its inverse variance.
@@ -54,6 +60,38 @@ pub struct Series {
 const GAP: usize = 2;
 /// Power over the noise that a cell without a mover may have; its law is narrower than this.
 const CLEAN: f64 = 1.25;
+/// Share of a deviation's power across the channels that may lie aside of the static return's, where no range of a group
+/// is without: a strong phase that all share leaves as much where one cell holds returns from several directions.
+const ASIDE: f64 = 0.05;
+/// What a range would gain (nats) by a deviation that it shares, for its silence to tell anything.
+const TELLING_GAIN: f64 = 10.0;
+
+impl Part {
+    /// What a value of one means at some ranges.
+    pub fn lever(self, group: &Group) -> f64 {
+        match self {
+            Part::Gain | Part::Phase => 1.0,
+            Part::Delay => group.delay_s,
+            Part::Boresight => group.ahead,
+        }
+    }
+
+    /// The complex deviation that a value means there.
+    pub fn deviation(self, value: f64, group: &Group) -> Complex64 {
+        let value = value * self.lever(group);
+        if self == Part::Gain { value.into() } else { Complex64::new(0.0, value) }
+    }
+}
+
+/// Mean over the room's surfaces of the cosine to the boresight at which they lie at a range: those beside the radar, and
+/// the wall ahead of it.
+pub fn ahead(room: Option<&Room>, range_m: f64) -> f64 {
+    let Some(room) = room else { return 1.0 };
+    let beside = [room.left_m, room.right_m, room.floor_m, room.ceiling_m].into_iter().flatten();
+    let beside = beside.filter(|&distance| distance < range_m).map(|distance| (1.0 - (distance / range_m).powi(2)).sqrt());
+    let cosines: Vec<f64> = beside.chain(room.front_m.filter(|&front| front <= range_m).map(|front| front / range_m)).collect();
+    if cosines.is_empty() { 1.0 } else { cosines.iter().sum::<f64>() / cosines.len() as f64 }
+}
 
 impl Field {
     /// None where too little of the recording stands still.
@@ -85,7 +123,9 @@ impl Field {
                 let range = g * width..(g + 1) * width - GAP;
                 let sum: f64 = range.clone().filter(|&k| strong[k]).map(|k| power[k]).sum();
                 let mean = range.clone().filter(|&k| strong[k]).map(|k| power[k] * k as f64).sum::<f64>() / sum;
-                (sum > 0.0).then_some(Group { delay_s: mean * delay_of_bin, bins: range })
+                let delay_s = mean * delay_of_bin;
+                let ahead = ahead(evidence.room.as_ref(), 0.5 * SPEED_OF_LIGHT * delay_s);
+                (sum > 0.0).then_some(Group { delay_s, ahead, bins: range })
             })
             .collect();
         if groups.len() < 2 || evidence.split.held_out.is_empty() {
@@ -161,6 +201,28 @@ impl Field {
         }
     }
 
+    /// Whether most of the ranges that could contradict a deviation share it: one that is far stronger than the others (a
+    /// body that stands still for a while) must not speak for all. `predicted` gives it for frame, loop and group.
+    pub fn shared(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> bool {
+        let (mut agree, mut asked) = (0, 0);
+        for (g, group) in self.groups.iter().enumerate() {
+            let (mut gain, mut most) = (0.0, 0.0);
+            for frame in 0..self.frames {
+                let weight = self.weights(frame)[g];
+                for index in 0..self.loops {
+                    let (value, model) = (self.deviations(frame, index)[g], predicted(frame, index, group));
+                    gain += weight * (2.0 * (value * model.conj()).re - model.norm_sqr());
+                    most += weight * model.norm_sqr();
+                }
+            }
+            if most > TELLING_GAIN {
+                asked += 1;
+                agree += usize::from(gain > 0.0);
+            }
+        }
+        2 * agree > asked || asked == 0
+    }
+
     fn moments(&self, weights: &[f64]) -> [f64; 3] {
         let mut moments = [0.0; 3];
         for (weight, group) in weights.iter().zip(&self.groups) {
@@ -177,7 +239,7 @@ impl Field {
         let mut weight = Vec::with_capacity(self.frames);
         for frame in 0..self.frames {
             let kept: Vec<f64> = self.weights(frame).iter().enumerate().map(|(g, w)| if wanted(g) { *w } else { 0.0 }).collect();
-            let lever = |g: usize| if part == Part::Delay { self.groups[g].delay_s } else { 1.0 };
+            let lever = |g: usize| part.lever(&self.groups[g]);
             let information: f64 = kept.iter().enumerate().map(|(g, w)| w * lever(g) * lever(g)).sum();
             for index in 0..self.loops {
                 let sum: f64 = self
@@ -240,7 +302,7 @@ fn of_frame(
     let at = |channel: usize, index: usize, bin: usize| spectra[(channel * loops + index) * samples + bin];
     // A mover does not come from where the static return comes from: what is left across the channels shows it, and a
     // gain that all share does not.
-    let power: Vec<f64> = (0..bins)
+    let (power, aside): (Vec<f64>, Vec<f64>) = (0..bins)
         .map(|bin| {
             let own: f64 = (0..channels).map(|c| still[c * samples + bin].norm_sqr()).sum();
             let (mut all, mut along) = (0.0, 0.0);
@@ -253,28 +315,33 @@ fn of_frame(
                 }
                 along += dot.norm_sqr() / own.max(f64::MIN_POSITIVE);
             }
-            if channels > 1 { (all - along) / ((channels - 1) * loops) as f64 } else { all / loops as f64 }
+            let left = if channels > 1 { (all - along) / (channels - 1) as f64 } else { all };
+            (left / loops as f64, left / all.max(f64::MIN_POSITIVE))
         })
-        .collect();
+        .unzip();
     // The law of a mean of so many powers, five deviations wide.
     let freedom = (loops * (channels - 1).max(1)) as f64;
     let limit = CLEAN.max(1.0 + 5.0 / freedom.sqrt());
-    let quiet = |bin: usize| power[bin] < limit;
-    let clean: Vec<bool> = (0..bins).map(|bin| strong[bin] && (bin.saturating_sub(1)..(bin + 2).min(bins)).all(quiet)).collect();
+    let around = |bin: usize| bin.saturating_sub(1)..(bin + 2).min(bins);
+    let quiet = |bin: usize| around(bin).all(|k| power[k] < limit);
+    let shared = |bin: usize| around(bin).all(|k| power[k] < limit || aside[k] < ASIDE);
     let (mut values, mut weights) = (vec![Complex64::ZERO; loops * groups.len()], vec![0.0; groups.len()]);
     for (g, group) in groups.iter().enumerate() {
-        let own: f64 = group
-            .bins
-            .clone()
-            .filter(|&k| clean[k])
-            .map(|k| (0..channels).map(|c| still[c * samples + k].norm_sqr()).sum::<f64>())
-            .sum();
+        let wanted = |keep: &dyn Fn(usize) -> bool| group.bins.clone().filter(|&k| strong[k] && keep(k)).collect::<Vec<usize>>();
+        let mut used = wanted(&quiet);
+        let mut excess = 1.0;
+        if used.is_empty() {
+            used = wanted(&shared);
+            // What is left aside counts as noise.
+            excess = (used.iter().map(|&k| power[k]).sum::<f64>() / used.len().max(1) as f64).max(1.0);
+        }
+        let own: f64 = used.iter().map(|&k| (0..channels).map(|c| still[c * samples + k].norm_sqr()).sum::<f64>()).sum();
         if own <= 0.0 {
             continue;
         }
         for index in 0..loops {
             let mut dot = Complex64::ZERO;
-            for bin in group.bins.clone().filter(|&k| clean[k]) {
+            for &bin in &used {
                 for channel in 0..channels {
                     dot += still[channel * samples + bin].conj() * at(channel, index, bin);
                 }
@@ -285,13 +352,13 @@ fn of_frame(
         let mut variance = 0.0;
         for channel in 0..channels {
             let mut filter = vec![Complex64::ZERO; samples];
-            for bin in group.bins.clone().filter(|&k| clean[k]) {
+            for &bin in &used {
                 filter[bin] = still[channel * samples + bin].conj();
             }
             fft.process(&mut filter);
             variance += filter.iter().zip(taper).map(|(h, w)| h.norm_sqr() * w * w).sum::<f64>();
         }
-        weights[g] = own * own / variance;
+        weights[g] = own * own / (variance * excess);
     }
     (values, weights)
 }

@@ -18,13 +18,15 @@ mod tests;
 mod undo;
 
 use field::{Field, Part};
+use num_complex::Complex64;
 
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::Candidate;
 use crate::diagnosis::statistics;
 
-/// Kinds of looks that share one p-value: three parts, each for lines, drifts and randomness, and settling.
-const LOOKS: f64 = 10.0;
+/// Kinds of looks that share one p-value: three parts, each for lines, drifts and randomness, a radar that vibrates, and
+/// settling.
+const LOOKS: f64 = 11.0;
 /// Gain (nats) below which nothing is worth telling.
 const LEAST_GAIN: f64 = 3.0;
 /// Share of the gain that what is simpler, or has a name, needs.
@@ -52,25 +54,41 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     // Of a few parameters, and those that are free in every chirp.
     let (mut found, mut free): (Vec<Found>, Vec<Found>) = (vec![], vec![]);
-    for part in [Part::Gain, Part::Phase, Part::Delay] {
+    for part in [Part::Gain, Part::Phase, Part::Delay, Part::Boresight] {
+        if part == Part::Boresight && evidence.room.is_none() {
+            continue;
+        }
         let series = field.series(part, |_| true);
         // A radian at the farthest group.
         let farthest_s = field.groups.iter().map(|g| g.delay_s).fold(0.0, f64::max);
         let largest = if part == Part::Delay { 1.0 / farthest_s } else { 1.0 };
-        if let Some(line) = lines::strongest(&field, &series, training, held_out, largest) {
+        let line = lines::strongest(&field, &series, training, held_out, largest);
+        let of_line = |line: &lines::Line| {
+            let value = |frame: usize, index: usize| line.value(field.times_s[frame * field.loops + index]);
+            field.shared(|frame, index, group| part.deviation(value(frame, index), group))
+        };
+        if let Some(line) = line.filter(of_line) {
             let p_value = |freedom| (-lines::unsure(line.training_gain, freedom)).exp();
             let unsure = |freedom| (freedom, statistics::corrected(p_value(freedom), line.tried * LOOKS));
             let candidate = candidates::of_line(evidence, &field, part, &line);
             found.push(Found { candidate, unsure: line.freedom.map(unsure) });
         }
-        if let Some(drift) = drift::best(&field, &series, training, held_out) {
+        if part == Part::Boresight {
+            continue;
+        }
+        let of_drift = |drift: &drift::Drift| field.shared(|frame, _, group| part.deviation(drift.value(frame), group));
+        if let Some(drift) = drift::best(&field, &series, training, held_out).filter(of_drift) {
             found.push(candidates::of_drift(evidence, &field, part, &drift).into());
         }
         if let Some(random) = random::best(&field, part, training, held_out) {
             free.push(candidates::of_random(evidence, &field, part, &random).into());
         }
     }
-    if let Some(settling) = settling::best(&field, training, held_out) {
+    let of_settling = |settling: &settling::Settling| {
+        let mean = (0..field.loops).map(|index| settling.value(index)).sum::<Complex64>() / field.loops as f64;
+        field.shared(|_, index, _| settling.value(index) - mean)
+    };
+    if let Some(settling) = settling::best(&field, training, held_out).filter(of_settling) {
         let candidate = candidates::of_settling(evidence, &field, &settling);
         if candidate.id.is_some() { found.push(candidate.into()) } else { free.push(candidate.into()) }
     }

@@ -75,7 +75,7 @@ fn chirps(series: &Series, frame: usize) -> &[f64] {
 /// frequencies, of which the worse counts: what leaks from a mover is not white.
 fn common_to_halves(field: &Field, part: Part, training: &[usize]) -> Option<f64> {
     let count = field.groups.len();
-    let lever = |g: usize| if part == Part::Delay { field.groups[g].delay_s } else { 1.0 };
+    let lever = |g: usize| part.lever(&field.groups[g]);
     let information = |g: usize| training.iter().map(|&f| field.weights(f)[g]).sum::<f64>() * lever(g) * lever(g);
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|&a, &b| information(b).total_cmp(&information(a)));

@@ -5,11 +5,13 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::field::ahead;
 use super::find;
 use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction};
-use crate::radar::Radar;
+use crate::radar::{Radar, SPEED_OF_LIGHT};
+use crate::room::Room;
 
 /// Frames of 32 loops and 64 samples, four channels, returns all over the ranges about 30 dB above the noise.
 fn evidence(seed: u64, change: impl Fn(f64, usize, usize, f64) -> Complex64) -> Evidence {
@@ -92,6 +94,34 @@ fn a_common_phase_is_a_vibration_and_one_in_proportion_to_the_delay_is_none() {
     within(&found, "frequency_hz", 83.0);
     let found = found_once(evidence(3, |t, _, _, delay| Complex64::cis(2.5e6 * delay * swing(t))));
     assert_eq!((found.id, found.behaves_like), (None, "delay-proportional phase"));
+}
+
+#[test]
+fn a_phase_that_grows_towards_the_boresight_is_a_vibration() {
+    let room = Room { left_m: Some(1.5), right_m: Some(1.5), floor_m: Some(1.0), ..Room::default() };
+    let swing = |t: f64, delay_s: f64| {
+        let cosine = ahead(Some(&room), 0.5 * SPEED_OF_LIGHT * delay_s);
+        Complex64::cis(0.1 * cosine * (std::f64::consts::TAU * 27.0 * t).sin())
+    };
+    let evidence = Evidence { room: Some(room.clone()), ..evidence(21, |t, _, _, delay_s| swing(t, delay_s)) };
+    let found = found_once(evidence.changed());
+    assert_eq!(found.id, Some("radar_vibration"));
+    within(&found, "frequency_hz", 27.0);
+    within(&found, "amplitude_m", 0.1 * Radar::small(1).wavelength_m() / (2.0 * std::f64::consts::TAU));
+}
+
+#[test]
+fn one_strong_return_that_comes_late_is_no_gain_of_the_radar() {
+    let delay_of_bin = {
+        let radar = Radar::small(1);
+        radar.sample_rate_hz / (64.0 * radar.slope_hz_per_s)
+    };
+    let late = |frame: usize, delay_s: f64| {
+        let there = (delay_s / delay_of_bin - 27.0).abs() < 0.5;
+        if !there { 1.0 } else { f64::from(u8::from(frame >= 7)) * 30.0 }
+    };
+    let found = find(&evidence(22, |_, frame, _, delay_s| late(frame, delay_s).into()));
+    assert!(found.iter().all(|candidate| candidate.id != Some("gain_drift")), "{found:?}");
 }
 
 #[test]
