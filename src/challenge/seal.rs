@@ -339,7 +339,7 @@ mod tests {
         let clothing = of("[effects.clothing_delay]\nextra_m = 1e-3\nbody_parts = [\"pelvis\", \"spine1\", \"spine2\"]\n");
         // Where the cloth ends, next to the skin, there is a little that no smooth error of the mesh can do.
         assert!(clothing.d_prime > 300.0 && clothing.d_prime_surviving < 0.05 * clothing.d_prime, "{clothing:?}");
-        let leakage = of("[effects.tx_leakage]\nrange_m = 0.1\nrelative = 0.1\n");
+        let leakage = of("[effects.tx_leakage]\nrange_m = 0.1\nrelative = 1.0\n");
         assert!(leakage.d_prime_surviving > 100.0, "{leakage:?}");
     }
 

@@ -103,7 +103,8 @@ fn a_phase_that_grows_towards_the_boresight_is_a_vibration() {
         let cosine = ahead(Some(&room), 0.5 * SPEED_OF_LIGHT * delay_s);
         Complex64::cis(0.1 * cosine * (std::f64::consts::TAU * 27.0 * t).sin())
     };
-    let evidence = Evidence { room: Some(room.clone()), ..evidence(21, |t, _, _, delay_s| swing(t, delay_s)) };
+    let mut evidence = evidence(21, |t, _, _, delay_s| swing(t, delay_s));
+    evidence.room = Some(room.clone());
     let found = found_once(evidence.changed());
     assert_eq!(found.id, Some("radar_vibration"));
     within(&found, "frequency_hz", 27.0);
