@@ -60,9 +60,9 @@ pub struct Series {
 const GAP: usize = 2;
 /// Power over the noise that a cell without a mover may have; its law is narrower than this.
 const CLEAN: f64 = 1.25;
-/// Share of a deviation's power across the channels that may lie aside of the static return's, where no range of a group
-/// is without: a strong phase that all share leaves as much where one cell holds returns from several directions.
-const ASIDE: f64 = 0.05;
+/// Share of a deviation's power across the channels that may lie aside of the static return's: a strong phase that all
+/// share leaves as much where one cell holds returns from several directions.
+const ASIDE: f64 = 0.03;
 /// What a range would gain (nats) by a deviation that it shares, for its silence to tell anything.
 const TELLING_GAIN: f64 = 10.0;
 
@@ -302,7 +302,7 @@ fn of_frame(
     let at = |channel: usize, index: usize, bin: usize| spectra[(channel * loops + index) * samples + bin];
     // A mover does not come from where the static return comes from: what is left across the channels shows it, and a
     // gain that all share does not.
-    let (power, aside): (Vec<f64>, Vec<f64>) = (0..bins)
+    let power: Vec<f64> = (0..bins)
         .map(|bin| {
             let own: f64 = (0..channels).map(|c| still[c * samples + bin].norm_sqr()).sum();
             let (mut all, mut along) = (0.0, 0.0);
@@ -315,26 +315,21 @@ fn of_frame(
                 }
                 along += dot.norm_sqr() / own.max(f64::MIN_POSITIVE);
             }
-            let left = if channels > 1 { (all - along) / (channels - 1) as f64 } else { all };
-            (left / loops as f64, left / all.max(f64::MIN_POSITIVE))
+            match channels {
+                1 => all / loops as f64,
+                _ if all - along < ASIDE * all => 0.0,
+                _ => (all - along) / ((channels - 1) * loops) as f64,
+            }
         })
-        .unzip();
+        .collect();
     // The law of a mean of so many powers, five deviations wide.
     let freedom = (loops * (channels - 1).max(1)) as f64;
     let limit = CLEAN.max(1.0 + 5.0 / freedom.sqrt());
-    let around = |bin: usize| bin.saturating_sub(1)..(bin + 2).min(bins);
-    let quiet = |bin: usize| around(bin).all(|k| power[k] < limit);
-    let shared = |bin: usize| around(bin).all(|k| power[k] < limit || aside[k] < ASIDE);
+    let quiet = |bin: usize| power[bin] < limit;
+    let clean: Vec<bool> = (0..bins).map(|bin| strong[bin] && (bin.saturating_sub(1)..(bin + 2).min(bins)).all(quiet)).collect();
     let (mut values, mut weights) = (vec![Complex64::ZERO; loops * groups.len()], vec![0.0; groups.len()]);
     for (g, group) in groups.iter().enumerate() {
-        let wanted = |keep: &dyn Fn(usize) -> bool| group.bins.clone().filter(|&k| strong[k] && keep(k)).collect::<Vec<usize>>();
-        let mut used = wanted(&quiet);
-        let mut excess = 1.0;
-        if used.is_empty() {
-            used = wanted(&shared);
-            // What is left aside counts as noise.
-            excess = (used.iter().map(|&k| power[k]).sum::<f64>() / used.len().max(1) as f64).max(1.0);
-        }
+        let used: Vec<usize> = group.bins.clone().filter(|&k| clean[k]).collect();
         let own: f64 = used.iter().map(|&k| (0..channels).map(|c| still[c * samples + k].norm_sqr()).sum::<f64>()).sum();
         if own <= 0.0 {
             continue;
@@ -358,7 +353,7 @@ fn of_frame(
             fft.process(&mut filter);
             variance += filter.iter().zip(taper).map(|(h, w)| h.norm_sqr() * w * w).sum::<f64>();
         }
-        weights[g] = own * own / (variance * excess);
+        weights[g] = own * own / variance;
     }
     (values, weights)
 }
