@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::library;
 use crate::data::read_settings;
 use crate::error::{Error, Result};
 use crate::person::actions::Action;
@@ -147,6 +148,10 @@ impl Default for Scenes {
 #[serde(deny_unknown_fields)]
 pub struct ChallengeConfig {
     pub cases: usize,
+    /// Instead of a draw by shares: every effect once, at this place between its weakest (0) and its strongest (1), and
+    /// nulls up to the number of cases. To learn from, not to count: how strong the effects came out is not measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub every: Option<f64>,
     #[serde(default)]
     pub shares: Shares,
     #[serde(default)]
@@ -168,6 +173,15 @@ impl ChallengeConfig {
         self.radar.check("radar")?;
         if self.cases == 0 {
             return Err(Error::setting("cases", 0, "at least one case"));
+        }
+        if let Some(level) = self.every {
+            if !(0.0..=1.0).contains(&level) {
+                return Err(Error::setting("every", level, "between 0 (weakest) and 1 (strongest)"));
+            }
+            let least = (library::every().count() as f64 / (1.0 - FEWEST_NULLS)).ceil();
+            if (self.cases as f64) < least {
+                return Err(Error::setting("cases", self.cases, format!("at least {least}: every effect once, and the nulls")));
+            }
         }
         for stratum in Stratum::ALL {
             let share = self.shares.of(stratum);
@@ -241,7 +255,7 @@ mod tests {
     use super::*;
 
     fn config(cases: usize) -> ChallengeConfig {
-        ChallengeConfig { cases, shares: Shares::default(), scenes: Scenes::default(), radar: Radar::small(12) }
+        ChallengeConfig { cases, every: None, shares: Shares::default(), scenes: Scenes::default(), radar: Radar::small(12) }
     }
 
     #[test]
@@ -258,5 +272,13 @@ mod tests {
         let mut few = config(10);
         few.shares.null = 0.1;
         assert!(few.check().unwrap_err().to_string().contains("shares.null"));
+    }
+
+    #[test]
+    fn every_effect_needs_a_level_and_room_for_nulls() {
+        let every = |cases, level| ChallengeConfig { every: Some(level), ..config(cases) }.check();
+        every(120, 0.8).unwrap();
+        assert!(every(120, 1.5).unwrap_err().to_string().contains("every"));
+        assert!(every(60, 0.8).unwrap_err().to_string().contains("cases"));
     }
 }

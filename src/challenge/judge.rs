@@ -89,6 +89,18 @@ pub struct Judgement {
     pub said_hidden: bool,
 }
 
+impl Judgement {
+    /// What survives unknown phases and amplitudes, and what is coherent. What was planted without being measured counts as
+    /// strong.
+    pub fn d_primes(&self) -> [f64; 2] {
+        match self.strength {
+            Some(strength) => [strength.d_prime_surviving, strength.d_prime],
+            None if self.truth.is_empty() => [0.0; 2],
+            None => [f64::MAX; 2],
+        }
+    }
+}
+
 fn word(effect: &Value) -> String {
     effect["name"].as_str().or(effect["kind"].as_str()).unwrap_or("unknown").to_string()
 }

@@ -304,6 +304,11 @@ pub fn library() -> impl Iterator<Item = &'static Graded> {
     SINGLE.iter().chain(MANY)
 }
 
+/// Each effect once, those outside the library too.
+pub fn every() -> impl Iterator<Item = &'static Graded> {
+    library().chain(OUTSIDE)
+}
+
 pub fn graded(id: &str) -> Option<&'static Graded> {
     library().find(|graded| graded.id == id)
 }

@@ -33,21 +33,37 @@ pub struct Plan {
 
 /// All cases of a challenge, in the order of their numbers.
 pub fn plans(config: &ChallengeConfig, secret: &Secret) -> Vec<Plan> {
+    let mut random = secret.random("order", 0);
+    let dealt = match config.every {
+        Some(level) => every(config.cases, level, &mut random),
+        None => by_shares(config, random),
+    };
+    let plan = |(index, (stratum, effects))| {
+        let mut random = secret.random("scene", index);
+        let (scene, distance_m) = scene(config, secret.world_seed(index), &mut random);
+        Plan { index, stratum, effects, scene, distance_m, details: secret.random("effect", index), redrawn: 0 }
+    };
+    dealt.into_iter().enumerate().map(plan).collect()
+}
+
+/// What a case holds.
+type Dealt = (Stratum, Vec<(&'static Graded, f64)>);
+
+fn by_shares(config: &ChallengeConfig, mut random: ChaCha8Rng) -> Vec<Dealt> {
     let mut strata: Vec<Stratum> =
         Stratum::ALL.into_iter().zip(config.counts()).flat_map(|(stratum, count)| vec![stratum; count]).collect();
-    let mut random = secret.random("order", 0);
     strata.shuffle(&mut random);
     let mut decks = Decks::new(random);
-    strata
-        .into_iter()
-        .enumerate()
-        .map(|(index, stratum)| {
-            let mut random = secret.random("scene", index);
-            let effects = decks.draw(stratum);
-            let (scene, distance_m) = scene(config, secret.world_seed(index), &mut random);
-            Plan { index, stratum, effects, scene, distance_m, details: secret.random("effect", index), redrawn: 0 }
-        })
-        .collect()
+    strata.into_iter().map(|stratum| (stratum, decks.draw(stratum))).collect()
+}
+
+/// Every effect once, at one level, and nulls.
+fn every(cases: usize, level: f64, random: &mut ChaCha8Rng) -> Vec<Dealt> {
+    let stratum = |graded: &Graded| if library::graded(graded.id).is_some() { Stratum::Single } else { Stratum::Outside };
+    let mut dealt: Vec<Dealt> = library::every().map(|graded| (stratum(graded), vec![(graded, level)])).collect();
+    dealt.resize_with(cases.max(dealt.len()), || (Stratum::Null, vec![]));
+    dealt.shuffle(random);
+    dealt
 }
 
 /// Effects are dealt like cards, so that none is forgotten and none comes too often.
@@ -202,7 +218,7 @@ mod tests {
     use crate::radar::Radar;
 
     fn config(cases: usize) -> ChallengeConfig {
-        ChallengeConfig { cases, shares: Default::default(), scenes: Scenes::default(), radar: Radar::small(12) }
+        ChallengeConfig { cases, every: None, shares: Default::default(), scenes: Scenes::default(), radar: Radar::small(12) }
     }
 
     #[test]
@@ -220,6 +236,20 @@ mod tests {
         }
         let rooms: std::collections::BTreeSet<_> = a.iter().map(|p| format!("{:?}", p.scene.room)).collect();
         assert_eq!(rooms.len(), 400);
+    }
+
+    #[test]
+    fn every_effect_comes_once_beside_nulls() {
+        let config = ChallengeConfig { every: Some(0.7), ..config(120) };
+        let plans = plans(&config, &Secret::new(Some("z")));
+        let mut ids: Vec<&str> = plans.iter().flat_map(|plan| &plan.effects).map(|(effect, _)| effect.id).collect();
+        ids.sort_unstable();
+        let mut wanted: Vec<&str> = library::every().map(|effect| effect.id).collect();
+        wanted.sort_unstable();
+        assert_eq!(ids, wanted);
+        assert_eq!(plans.len(), 120);
+        assert!(plans.iter().all(|plan| plan.effects.is_empty() == (plan.stratum == Stratum::Null)));
+        assert!(plans.iter().flat_map(|plan| &plan.effects).all(|&(_, level)| level == 0.7));
     }
 
     #[test]

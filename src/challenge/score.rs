@@ -158,12 +158,12 @@ impl Case {
 
     /// What survives unknown phases of the body and amplitudes of the room.
     fn d_prime(&self) -> f64 {
-        self.judgement.strength.map_or(0.0, |strength| strength.d_prime_surviving)
+        self.judgement.d_primes()[0]
     }
 
     /// What an observer would see who knows everything but the effect.
     fn coherent_d_prime(&self) -> f64 {
-        self.judgement.strength.map_or(0.0, |strength| strength.d_prime)
+        self.judgement.d_primes()[1]
     }
 
     /// One effect of the library whose d′ says how hard it is.
@@ -215,7 +215,7 @@ fn mark_concealed(cases: &mut [Case]) {
 fn points(cases: &[Case]) -> Vec<(f64, bool)> {
     cases
         .iter()
-        .filter(|case| case.graded_single())
+        .filter(|case| case.graded_single() && case.judgement.strength.is_some())
         .map(|case| (case.d_prime().max(1e-3).log10(), case.judgement.claims))
         .collect()
 }
@@ -421,7 +421,7 @@ fn baseline_rows(cases: &[Case], nulls: &[&Case], singles: &[&Case], concealed: 
 
 /// What went wrong with a case, in a line; none if nothing did.
 fn failure(judgement: &Judgement) -> Option<String> {
-    let (d_prime, coherent) = judgement.strength.map_or((0.0, 0.0), |strength| (strength.d_prime_surviving, strength.d_prime));
+    let [d_prime, coherent] = judgement.d_primes();
     let reason = if let Some(reason) = &judgement.failure {
         format!("no usable report: {reason}")
     } else if judgement.stratum == Stratum::Null {
@@ -450,8 +450,12 @@ fn failure(judgement: &Judgement) -> Option<String> {
     } else {
         return None;
     };
+    let strength = match judgement.strength {
+        Some(_) => format!("d′ {d_prime:.1}, coherent {coherent:.1}"),
+        None => "not measured".into(),
+    };
     Some(format!(
-        "`{}` ({}, tier {}, {}, d′ {d_prime:.1}, coherent {coherent:.1}): {reason}",
+        "`{}` ({}, tier {}, {}, {strength}): {reason}",
         judgement.case,
         judgement.stratum.name(),
         judgement.tier,
@@ -489,7 +493,7 @@ impl Score {
     fn by_effect(&self) -> String {
         let mut counts: BTreeMap<&str, [usize; 3]> = BTreeMap::new();
         for judgement in &self.judgements {
-            let strong = judgement.strength.is_some_and(|strength| strength.d_prime_surviving >= OBVIOUS_D_PRIME);
+            let strong = judgement.d_primes()[0] >= OBVIOUS_D_PRIME;
             if let ([truth], true) = (&judgement.truth[..], strong) {
                 let count = counts.entry(truth).or_default();
                 count[0] += 1;

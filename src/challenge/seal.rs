@@ -170,8 +170,10 @@ fn record(config: &ChallengeConfig, plan: &mut Plan) -> Result<Recorded> {
     // What the converter does is not seen in samples that it never touched.
     scene.receiver.adc = plan.effects.iter().any(|(graded, _)| matches!(graded.id, "adc_saturation" | "lsb_stuck"));
     let world = scene.world(Path::new("."))?;
-    if plan.stratum == Stratum::Null {
-        return Ok(Recorded { frames: frames_of(&world)?, world, settings: scene, strength: None });
+    if plan.stratum == Stratum::Null || config.every.is_some() {
+        let settings = RecorderConfig { effects: plan.planted(config), ..scene };
+        let frames = frames_of(&settings.world(Path::new("."))?)?;
+        return Ok(Recorded { frames, world, settings, strength: None });
     }
     let clean = draws(&scene)?;
     let mut attempts = 1;

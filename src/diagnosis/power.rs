@@ -15,7 +15,7 @@ pub use fit::{Reach, fit_weights, improve, log_likelihood};
 pub use spread::Cells;
 
 use super::evidence::Evidence;
-use super::prediction::Point;
+use super::prediction::{Point, range_and_velocity};
 use crate::radar::Radar;
 
 /// Doppler bins on either side of zero that hold remains of what stands still.
@@ -64,8 +64,11 @@ impl PowerModel {
     pub fn new(evidence: &Evidence) -> Option<Self> {
         let body = evidence.body.as_ref()?;
         let cells = Cells::new(&evidence.radar);
-        let templates: Vec<Vec<Template>> =
-            body.frames.par_iter().map(|points| part_templates(&evidence.radar, &cells, points, body.parts.len())).collect();
+        let of_frame = |points: &Vec<Point>| {
+            let points = body.with_echoes(&evidence.radar, points.clone(), None);
+            part_templates(&evidence.radar, &cells, &points, body.parts.len())
+        };
+        let templates: Vec<Vec<Template>> = body.frames.par_iter().map(of_frame).collect();
         if templates.iter().flatten().all(|template| template.cells.is_empty()) {
             return None;
         }
@@ -141,20 +144,6 @@ impl PowerModel {
         let (maps, size) = (evidence.maps(), self.size());
         frames.iter().map(|&frame| log_likelihood(&maps[frame * size..(frame + 1) * size], expected(frame), &self.usable)).sum()
     }
-}
-
-/// Mean of the legs to all antennas, and how fast it grows.
-pub fn range_and_velocity(radar: &Radar, position_m: [f64; 3], velocity_mps: [f64; 3]) -> (f64, f64) {
-    let mean = |antennas: &[[f64; 3]]| {
-        let (range, speed) = antennas.iter().fold((0.0, 0.0), |(range, speed), antenna| {
-            let offset: [f64; 3] = std::array::from_fn(|axis| position_m[axis] - radar.position_m[axis] - antenna[axis]);
-            let length = norm(offset).max(1e-6);
-            (range + length, speed + dot(offset, velocity_mps) / length)
-        });
-        (range / antennas.len() as f64, speed / antennas.len() as f64)
-    };
-    let (sent, received) = (mean(&radar.tx_m), mean(&radar.rx_m));
-    (0.5 * (sent.0 + received.0), 0.5 * (sent.1 + received.1))
 }
 
 /// Templates of all parts and lobes of some points, `[part · 2 + lobe]`.

@@ -3,10 +3,12 @@
 //! Positions are good to millimetres only (errors of the mesh belong to the baseline), which is a whole wavelength of
 //! the round trip: the prediction is for delays, velocities, directions and powers, never for carrier phases.
 
+mod echo;
 mod track;
 
 use rayon::prelude::*;
 
+pub use echo::{Echo, mirrored_return, range_and_velocity};
 pub use track::Track;
 
 use crate::body::{Interpolation, PosedBody, Sampling, SurfaceConfig};
@@ -40,6 +42,8 @@ pub struct BodyPrediction {
     pub middle_s: Vec<f64>,
     /// How the points of every frame go on, `[frame]`; may be empty: then they go straight on.
     pub tracks: Vec<Track>,
+    /// In which ways it is seen again.
+    pub echoes: Vec<Echo>,
 }
 
 impl BodyPrediction {
@@ -75,13 +79,20 @@ impl BodyPrediction {
                 Ok((vertices.iter().map(point).collect(), frame.middle_s, track))
             })
             .collect::<Result<_>>()?;
-        let mut prediction = Self { parts, frames: vec![], middle_s: vec![], tracks: vec![] };
+        let mut prediction = Self { parts, frames: vec![], middle_s: vec![], tracks: vec![], echoes: vec![] };
         for (points, middle_s, track) in made {
             prediction.frames.push(points);
             prediction.middle_s.push(middle_s);
             prediction.tracks.push(track);
         }
         Ok(prediction)
+    }
+
+    /// Points with what is seen of them by longer ways.
+    pub fn with_echoes(&self, radar: &Radar, mut points: Vec<Point>, more: Option<Echo>) -> Vec<Point> {
+        let again: Vec<Point> = self.echoes.iter().chain(&more).flat_map(|echo| echo.points(radar, &points)).collect();
+        points.extend(again);
+        points
     }
 
     /// The points of a frame so much later in the motion, and whether that is known; beyond, they go straight on.

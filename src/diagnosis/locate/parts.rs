@@ -1,7 +1,7 @@
 //! Excess put back onto the body's parts and onto the walls.
 
 use crate::diagnosis::Evidence;
-use crate::diagnosis::power::range_and_velocity;
+use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::statistics::{corrected, mean_power_tail};
 
 use super::residual::Residual;

@@ -1,6 +1,6 @@
 //! Ways in which the body may be elsewhere, or at another time, than predicted.
 
-use crate::diagnosis::prediction::{BodyPrediction, Point};
+use crate::diagnosis::prediction::{BodyPrediction, Echo, Point};
 
 /// One of the effects that move the body in the maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,6 +17,8 @@ pub enum Change {
     Drift(f64),
     /// From frame `at` on, `count` frames later.
     Drop { at: usize, count: usize },
+    /// The body is seen by a longer way, too.
+    Again(Echo),
 }
 
 /// The body with changes of place and time.
@@ -40,7 +42,7 @@ impl Moves {
         }
     }
 
-    /// Points of a frame after the change, and whether they are still a prediction: beyond the recording's ends, points are
+    /// Points of a frame after the change, as far as they are seen directly, and whether they are still a prediction: beyond the recording's ends, points are
     /// only carried on as they moved.
     pub fn points(&self, body: &BodyPrediction, frame: usize, change: Change) -> (Vec<Point>, bool) {
         let delay = self.delay_s(body, frame, change);
@@ -64,6 +66,10 @@ impl Moves {
 
     /// The whole prediction after the change.
     pub fn apply(&self, body: &mut BodyPrediction, change: Change) {
+        if let Change::Again(echo) = change {
+            body.echoes.push(echo);
+            return;
+        }
         let frames = 0..body.frames.len();
         let moved = frames.clone().map(|frame| self.points(body, frame, change).0).collect();
         let track = |frame: usize| {
@@ -115,6 +121,7 @@ mod tests {
             Track::new(time, nodes.to_vec(), nodes.iter().map(step).collect())
         };
         BodyPrediction {
+            echoes: vec![],
             parts: vec!["body".into()],
             frames: middle_s.iter().map(|&time| vec![point(time)]).collect(),
             tracks: middle_s.iter().map(|&time| track(time)).collect(),

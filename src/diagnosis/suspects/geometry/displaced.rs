@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::again;
 use super::change::{Change, Moves, frame_period_s};
 use super::trial::{Score, Trial};
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
@@ -37,15 +38,15 @@ const KINDS: f64 = 3.0;
 const STEP_INFLATION: f64 = 3.0;
 
 /// An alternative, fitted.
-struct Fitted {
-    id: &'static str,
-    value: f64,
+pub struct Fitted {
+    pub id: &'static str,
+    pub value: f64,
     /// Of the value, from the scatter between the frames.
-    deviation: f64,
-    floor: f64,
+    pub deviation: f64,
+    pub floor: f64,
     /// Scatter of the frames over what the likelihood's curvature says: how overconfident it is.
-    inflation: f64,
-    score: Score,
+    pub inflation: f64,
+    pub score: Score,
 }
 
 pub fn find(trial: &Trial) -> Vec<Candidate> {
@@ -81,6 +82,7 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
         fitted.extend(refine(trial, "clock_drift", rate, 0.24 * period / duration, floor, Change::Drift));
     }
     fitted.extend(clock);
+    fitted.extend(again::best(trial, &coarse, &null));
     fitted.extend(lost_frames(trial, &null));
     // A ramp's slope is wrong by no more than the library allows it.
     let most_slope = slope_error::INFO.parameters[0].most;
@@ -120,7 +122,14 @@ fn best_of(trial: &Trial, frames: &[usize], values: impl Iterator<Item = f64>, c
 }
 
 /// Climbs to the likelihood's maximum: steps of equal length as long as they lead up, then parabolas through three values.
-fn refine(trial: &Trial, id: &'static str, start: f64, step: f64, floor: f64, change: impl Fn(f64) -> Change) -> Option<Fitted> {
+pub fn refine(
+    trial: &Trial,
+    id: &'static str,
+    start: f64,
+    step: f64,
+    floor: f64,
+    change: impl Fn(f64) -> Change,
+) -> Option<Fitted> {
     const ROUNDS: usize = 8;
     /// Halvings of the step.
     const FINEST: f64 = 0.25;
@@ -248,6 +257,15 @@ fn deviation(trial: &Trial, fit: &Fitted) -> f64 {
 fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, gain: f64) -> Candidate {
     let evidence = trial.evidence;
     let deviation = deviation(trial, fit);
+    if let Change::Again(echo) = fit.score.change {
+        return Candidate {
+            look_alikes,
+            p_value,
+            gain,
+            energy: energy(evidence),
+            ..again::candidate(trial, fit, echo, deviation)
+        };
+    }
     let normal = |name| vec![Estimate::normal(name, fit.value, deviation)];
     let (estimates, stage, rung, statement) = match fit.score.change {
         Change::Range(_) => (
@@ -288,6 +306,7 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
             Rung::D,
             format!("The motion's clock runs {:.2} % faster than the radar's.", 1e2 * fit.value),
         ),
+        Change::Again(_) => unreachable!("has a candidate of its own"),
         Change::Drop { at, count } => (
             vec![Estimate::normal("at", at as f64, 1.5), Estimate::normal("count", count as f64, 0.0)],
             "timing",

@@ -1,5 +1,6 @@
 //! Geometry and time: the body is not where or when it was predicted.
 
+mod again;
 mod change;
 mod channels;
 mod coupling;

@@ -65,6 +65,8 @@ impl<'a> Trial<'a> {
             .par_iter()
             .map(|&frame| {
                 let (points, inside) = self.moves.points(self.body, frame, change);
+                let again = if let Change::Again(echo) = change { Some(echo) } else { None };
+                let points = self.body.with_echoes(&self.evidence.radar, points, again);
                 let templates = part_templates(&self.evidence.radar, &self.model.cells, &points, self.body.parts.len());
                 (frame, Reach::new(&maps[frame * size..(frame + 1) * size], &templates, self.model.usable()), inside)
             })

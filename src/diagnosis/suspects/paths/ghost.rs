@@ -3,9 +3,8 @@
 use rayon::prelude::*;
 
 use super::scene::Scene;
-use crate::diagnosis::Point;
-use crate::diagnosis::power::{Template, range_and_velocity};
-use crate::radar::Radar;
+use crate::diagnosis::power::Template;
+use crate::diagnosis::prediction::mirrored_return;
 use crate::room::Boundary;
 
 /// A reflection at this boundary, as far as the powers outside the body's own support show it.
@@ -25,9 +24,6 @@ pub struct Ghost {
     pub coefficient: f64,
 }
 
-/// Rough skin returns as much to every side as at this cosine.
-const ROUGH: f64 = 0.1;
-
 /// One ghost per boundary of the room.
 pub fn ghosts(scene: &Scene) -> Vec<Ghost> {
     let Some(room) = &scene.evidence.room else { return vec![] };
@@ -38,10 +34,10 @@ fn ghost(scene: &Scene, boundary: Boundary, distance_m: f64) -> Option<Ghost> {
     let split = &scene.evidence.split;
     let once = templates(scene, boundary, distance_m, false);
     let twice = templates(scene, boundary, distance_m, true);
-    // Two reciprocal paths of one reflection each have 2 Γ² of the direct power, one of two reflections has Γ⁴.
+    // The two ways with one reflection have Γ² of a perfect mirror's power, the one with two has Γ⁴.
     let mut best = (0.0, vec![], 0.0);
     for coefficient in [0.0, 0.2, 0.5, 1.0f64] {
-        let ratio = (coefficient.powi(2) / 2.0) as f32;
+        let ratio = coefficient.powi(2) as f32;
         let both: Vec<Template> = (once.iter().zip(&twice).enumerate())
             .map(|(frame, (once, twice))| {
                 let map: Vec<f32> = once.iter().zip(twice).map(|(a, b)| a + ratio * b).collect();
@@ -70,7 +66,7 @@ fn ghost(scene: &Scene, boundary: Boundary, distance_m: f64) -> Option<Ghost> {
         gain_all: training + gain,
         gain,
         agreeing: seen.iter().filter(|gain| **gain > 0.0).count() as f64 / seen.len().max(1) as f64,
-        coefficient: (weight / 2.0).sqrt(),
+        coefficient: weight.sqrt(),
     })
 }
 
@@ -88,46 +84,4 @@ fn templates(scene: &Scene, boundary: Boundary, distance_m: f64, twice: bool) ->
             scene.model.template(returns)
         })
         .collect()
-}
-
-/// One point of the body, seen by way of a mirror.
-pub struct Mirrored {
-    /// Half the length of the path.
-    pub range_m: f64,
-    pub velocity_mps: f64,
-    /// Of its area over the ranges' fourth power.
-    pub spread: f64,
-    /// Between its normal and the middle of the two ways.
-    pub cosine: f64,
-}
-
-pub fn mirrored_return(radar: &Radar, point: &Point, boundary: Boundary, distance_m: f64, twice: bool) -> Mirrored {
-    let (axis, sign) = boundary.axis();
-    let mut image = *point;
-    image.position_m[axis] = 2.0 * sign * distance_m - point.position_m[axis];
-    image.velocity_mps[axis] *= -1.0;
-    let (near_m, near_mps) = range_and_velocity(radar, point.position_m, point.velocity_mps);
-    let (far_m, far_mps) = range_and_velocity(radar, image.position_m, image.velocity_mps);
-    let (near_m, far_m) = (near_m.max(0.1), far_m.max(0.1));
-    let near = way(radar, point.position_m);
-    // From the point itself the mirrored way leaves towards the radar's image.
-    let mut far = way(radar, image.position_m);
-    far[axis] *= -1.0;
-    let half: [f64; 3] = if twice { far } else { std::array::from_fn(|i| near[i] + far[i]) };
-    let length = half.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
-    let cosine = (half.iter().zip(point.normal).map(|(a, b)| a * b).sum::<f64>() / length).max(ROUGH);
-    let (range_m, velocity_mps, ranges) = if twice {
-        (far_m, far_mps, far_m.powi(4))
-    } else {
-        (0.5 * (near_m + far_m), 0.5 * (near_mps + far_mps), (near_m * far_m).powi(2))
-    };
-    Mirrored { range_m, velocity_mps, spread: point.area_m2 / ranges, cosine }
-}
-
-/// Unit vector to the radar.
-fn way(radar: &Radar, from_m: [f64; 3]) -> [f64; 3] {
-    let centre = radar.centre_m();
-    let way: [f64; 3] = std::array::from_fn(|axis| centre[axis] - from_m[axis]);
-    let length = way.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
-    way.map(|x| x / length)
 }

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use super::ghost::{Ghost, mirrored_return};
+use super::ghost::Ghost;
 use super::mover::energy;
 use super::removal::{empty_cells, patch};
 use super::scene::Scene;
+use crate::diagnosis::prediction::mirrored_return;
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Candidate, Correction, Estimate, Place, Rung};
 use crate::room::Boundary;

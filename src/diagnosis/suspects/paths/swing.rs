@@ -9,7 +9,7 @@ use super::scene::{STILL_BINS, Scene};
 use super::track::{Sighting, Track, sighting};
 use crate::diagnosis::Point;
 use crate::diagnosis::locate::CELLS_PER_VALUE;
-use crate::diagnosis::power::range_and_velocity;
+use crate::diagnosis::prediction::range_and_velocity;
 
 /// Powers over the noise at the peak that are tried.
 const LEVELS: [f32; 8] = [4.0, 10.0, 25.0, 63.0, 160.0, 400.0, 1000.0, 4000.0];

@@ -13,6 +13,7 @@ pub mod odd_frame;
 pub mod random;
 pub mod settling;
 pub mod steady;
+mod sway;
 #[cfg(test)]
 mod tests;
 mod undo;
@@ -50,7 +51,12 @@ impl From<Candidate> for Found {
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let Some(field) = Field::new(evidence) else { return vec![] };
+    let known = |candidate: &Candidate| candidate.id.is_some_and(|id| evidence.accepted.contains(&id));
+    let Some(field) = Field::new(evidence) else {
+        // No range stands still: nothing does, or returns from many directions swing.
+        let found = sway::find(evidence).map(|found| Candidate { p_value: statistics::corrected(found.p_value, LOOKS), ..found });
+        return found.into_iter().filter(|c| c.p_value < PASSED_ON && c.gain > LEAST_GAIN && !known(c)).collect();
+    };
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     // Of a few parameters, and those that are free in every chirp.
     let (mut found, mut free): (Vec<Found>, Vec<Found>) = (vec![], vec![]);
@@ -96,9 +102,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         for Found { candidate, .. } in list.iter_mut() {
             candidate.p_value = statistics::corrected(candidate.p_value, LOOKS);
         }
-        list.retain(|Found { candidate: c, .. }| {
-            c.p_value < PASSED_ON && c.gain > LEAST_GAIN && c.id.is_none_or(|id| !evidence.accepted.contains(&id))
-        });
+        list.retain(|Found { candidate: c, .. }| c.p_value < PASSED_ON && c.gain > LEAST_GAIN && !known(c));
     }
     // One cause shows in several looks. A law of few parameters wins where it explains nearly as much as what is free in
     // every chirp, and a name where it explains nearly as much as what has none.
