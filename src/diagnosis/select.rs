@@ -87,7 +87,9 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         let known = |candidate: &Candidate| {
             accepted.iter().any(|effect| is_same(&effect.candidate, candidate) || is_left_by(&effect.candidate, candidate))
         };
-        let mixed = evidence.products().mixed().is_some();
+        // So they do where products were taken out roughly.
+        let bent = |effect: &Accepted| effect.candidate.behaves_like == harmonic::QUADRATIC;
+        let mixed = evidence.products().mixed().is_some() || accepted.iter().any(bent);
         let passing: Vec<&(usize, Candidate)> = found
             .iter()
             .filter(|(suspect, candidate)| thresholds.passes(*suspect, candidate) && !known(candidate))

@@ -10,6 +10,7 @@ use super::scene::Scene;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::suspects::receiver::harmonic;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Rung};
 use crate::radar::SPEED_OF_LIGHT;
 
@@ -20,7 +21,7 @@ const LEAST_HALF_CELLS: usize = 4;
 /// A bounce between parts of the body is weaker than the direct return.
 const STRONGEST_COPY: f64 = 0.7;
 /// And not as weak as what sidelobes share with the main lobe.
-const WEAKEST_COPY: f64 = 0.01;
+const WEAKEST_COPY: f64 = 0.02;
 
 /// What one complex factor of a template gains.
 pub struct Fit {
@@ -82,6 +83,10 @@ pub fn matches(scene: &Scene, template: impl Fn(usize, usize) -> Vec<Complex64> 
 
 /// T9: the body once more, a fixed way later.
 pub fn multibounce(scene: &Scene, tried: f64) -> Option<Candidate> {
+    // Products of the signal with itself repeat the body, too.
+    if scene.evidence.accepted.contains(&harmonic::QUADRATIC) {
+        return None;
+    }
     let half_cells: Vec<usize> = (1..=MOST_HALF_CELLS.min(scene.bins)).collect();
     let sums = shifted_matches(scene, half_cells.len());
     let best = half_cells

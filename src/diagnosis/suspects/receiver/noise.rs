@@ -9,15 +9,24 @@ use rayon::prelude::*;
 use super::image::empty_bins;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
-use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale};
+use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale, median};
 
 /// Cells of a Hann-windowed map per independent one, with reserve for the quantile's inefficiency.
 const SHARED: f64 = 4.0;
 /// A cell's power over the noise, beyond which it is a stranger's.
 const STRANGER: f64 = 8.0;
 
-/// Windows' maps of the cells that are looked at, `[channel][cell]`.
-type Cells = Vec<Vec<Complex64>>;
+/// Share of the correlation that the middle one of all Doppler rows, and of all beat frequencies, must have: what a
+/// stranger's side lobes share lies in a few of them.
+const EVERYWHERE: f64 = 0.4;
+
+/// Cells that are looked at.
+struct Cells {
+    /// Windows' maps, `[channel][cell]`.
+    values: Vec<Vec<Complex64>>,
+    /// Beat-frequency bin and Doppler row, `[cell]`.
+    places: Vec<[usize; 2]>,
+}
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let empty = empty_bins(evidence);
@@ -128,17 +137,40 @@ fn coloured(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
 fn cells(evidence: &Evidence, frame: usize, bins: &[usize]) -> Cells {
     let [_, _, rx, loops, samples] = evidence.cube.dims;
     let maps: Vec<Vec<Complex64>> = (0..rx).map(|channel| evidence.range_doppler(frame, channel)).collect();
-    let mut cells = vec![vec![]; rx];
+    let mut cells = Cells { values: vec![vec![]; rx], places: vec![] };
     for &bin in bins {
         for doppler in 3..loops - 2 {
             let at = doppler * samples + bin;
             let ordinary = (0..rx).all(|c| maps[c][at].norm_sqr() < STRANGER * evidence.noise()[c]);
             if ordinary {
-                (0..rx).for_each(|c| cells[c].push(maps[c][at] / evidence.noise()[c].max(1e-300).sqrt()));
+                (0..rx).for_each(|c| cells.values[c].push(maps[c][at] / evidence.noise()[c].max(1e-300).sqrt()));
+                cells.places.push([bin, doppler]);
             }
         }
     }
     cells
+}
+
+/// Whether most Doppler rows and most beat frequencies share a correlation between the receivers.
+fn is_everywhere(evidence: &Evidence, bins: &[usize], found: &DMatrix<Complex64>) -> bool {
+    let (rx, loops, samples) = (evidence.cube.dims[2], evidence.cube.dims[3], evidence.cube.dims[4]);
+    let pairs: Vec<(usize, usize)> = (0..rx).flat_map(|a| (0..a).map(move |b| (a, b))).collect();
+    let whole: f64 = pairs.iter().map(|&pair| found[pair].norm_sqr()).sum();
+    let (mut by_bin, mut by_row) = (vec![(0.0, 0.0); samples], vec![(0.0, 0.0); loops]);
+    for &frame in &evidence.split.training {
+        let cells = cells(evidence, frame, bins);
+        for (cell, [bin, row]) in cells.places.iter().enumerate() {
+            let value = |c: usize| cells.values[c][cell];
+            let along: f64 = pairs.iter().map(|&(a, b)| (found[(a, b)].conj() * value(a) * value(b).conj()).re).sum();
+            for sums in [&mut by_bin[*bin], &mut by_row[*row]] {
+                *sums = (sums.0 + along, sums.1 + whole);
+            }
+        }
+    }
+    [by_bin, by_row].into_iter().all(|sums| {
+        let mut shares: Vec<f64> = sums.into_iter().filter(|sums| sums.1 > 0.0).map(|sums| sums.0 / sums.1).collect();
+        median(&mut shares) > EVERYWHERE
+    })
 }
 
 fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
@@ -150,7 +182,7 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
         let of: Vec<(DMatrix<Complex64>, f64)> = frames
             .par_iter()
             .map(|&frame| {
-                let cells = cells(evidence, frame, bins);
+                let cells = cells(evidence, frame, bins).values;
                 let matrix = DMatrix::from_fn(rx, rx, |a, b| cells[a].iter().zip(&cells[b]).map(|(a, b)| a * b.conj()).sum());
                 (matrix, cells[0].len() as f64)
             })
@@ -173,6 +205,9 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     let rho = (total / pairs).sqrt();
     // Far below a hundredth it is nobody's business, and strangers' tails begin to count.
     if p_value > 1e-3 || rho < 0.005 {
+        return None;
+    }
+    if !is_everywhere(evidence, bins, &found) {
         return None;
     }
     let (sum, held) = covariance(&evidence.split.held_out);

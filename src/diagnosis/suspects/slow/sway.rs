@@ -5,6 +5,7 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -359,7 +360,7 @@ fn candidate(
     [amplitude_m, deviation_m, frequency_deviation]: [f64; 3],
     (p_value, gain): (f64, f64),
 ) -> Candidate {
-    let (still, rx, samples) = (evidence.still().to_vec(), evidence.cube.dims[2], evidence.cube.dims[4]);
+    let (rx, samples) = (evidence.cube.dims[2], evidence.cube.dims[4]);
     let (starts, loop_s, chirp_s) = (evidence.starts_s.clone(), cells.loop_s, evidence.radar.chirp_period_s);
     let (frequency, phase) = (sway.frequency_hz, sway.phase);
     let at = move |frame: usize, channel: usize, index: usize| {
@@ -372,7 +373,7 @@ fn candidate(
         .sum();
     let radians = amplitude_m * 2.0 * TAU / evidence.radar.wavelength_m() * along.im.signum();
     let chirps = (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
-    let energy = 0.5 * chirps * patterns[0].iter().map(Complex64::norm_sqr).sum::<f64>();
+    let energy = 0.5 * chirps * patterns[1].iter().map(Complex64::norm_sqr).sum::<f64>();
     Candidate {
         id: Some("radar_vibration"),
         behaves_like: "slow-time phase",
@@ -401,33 +402,40 @@ fn candidate(
                 for (n, value) in chirp.iter_mut().enumerate() {
                     let place = channel * samples + n;
                     let swing: Complex64 =
-                        (0..HARMONICS).map(|order| patterns[order][place] * ((order + 1) as f64 * turn).cos()).sum();
+                        (1..=HARMONICS).map(|order| patterns[order][place] * (order as f64 * turn).cos()).sum();
                     // What moves lies ahead.
-                    *value = still[place] + (*value - swing - still[place]) * back;
+                    let still = patterns[0][place];
+                    *value = still + (*value - swing - still) * back;
                 }
             });
         })),
     }
 }
 
-/// What swings with the sinusoid and its harmonics in the training frames, `[order][channel · sample]`.
+/// What is constant, and what swings with the sinusoid and its harmonics, in the training frames: least squares,
+/// `[order][channel · sample]`. Short frames far apart do not make the harmonics orthogonal.
 fn patterns(evidence: &Evidence, at: &impl Fn(usize, usize, usize) -> f64) -> Vec<Vec<Complex64>> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let (channels, training) = (evidence.cube.channels(), &evidence.split.training);
-    let still = evidence.still();
-    let weight = 2.0 / (training.len() * loops) as f64;
-    let mut patterns = vec![vec![Complex64::ZERO; channels * samples]; HARMONICS];
+    let channels = evidence.cube.channels();
+    let size = HARMONICS + 1;
+    let mut patterns = vec![vec![Complex64::ZERO; channels * samples]; size];
     for channel in 0..channels {
-        for &frame in training {
-            for (index, chirp) in evidence.cube.channel(frame, channel).chunks_exact(samples).enumerate() {
+        let mut normal = DMatrix::<f64>::zeros(size, size);
+        let mut right = vec![vec![Complex64::ZERO; samples]; size];
+        for &frame in &evidence.split.training {
+            for (index, chirp) in evidence.cube.channel(frame, channel).chunks_exact(samples).take(loops).enumerate() {
                 let turn = at(frame, channel, index);
-                for (order, pattern) in patterns.iter_mut().enumerate() {
-                    let cosine = weight * ((order + 1) as f64 * turn).cos();
-                    for (n, value) in chirp.iter().enumerate() {
-                        let place = channel * samples + n;
-                        pattern[place] += (value - still[place]) * cosine;
-                    }
+                let basis: Vec<f64> = (0..size).map(|order| (order as f64 * turn).cos()).collect();
+                for (order, weight) in basis.iter().enumerate() {
+                    right[order].iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value * weight);
+                    basis.iter().enumerate().for_each(|(other, factor)| normal[(order, other)] += weight * factor);
                 }
+            }
+        }
+        let Some(inverse) = normal.try_inverse() else { continue };
+        for (order, pattern) in patterns.iter_mut().enumerate() {
+            for n in 0..samples {
+                pattern[channel * samples + n] = (0..size).map(|other| right[other][n] * inverse[(order, other)]).sum();
             }
         }
     }

@@ -131,6 +131,10 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     // Windowed noise is correlated, and so is what leaks: the shifts themselves tell the scale.
     let scale = (statistics::median(&mut scores.clone()) / std::f64::consts::LN_2).max(1.0);
     let best = (0..shifts.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
+    // What is highest at the shortest distance is no peak, but a return that reaches farther than it should.
+    if best == 0 {
+        return None;
+    }
     let (alpha, score) = training[best].paired();
     let p_value = statistics::corrected((-score / scale).exp(), shifts.len() as f64);
     let gain = held_out[best].gain(alpha) / scale;
