@@ -13,7 +13,7 @@ use crate::diagnosis::suspects::paths::PATH_LIKE;
 use crate::diagnosis::{Candidate, Correction, Estimate, Place, Rung};
 use crate::room::Boundary;
 
-/// Powers over the direct return's that are tried first.
+/// Powers over the direct return's that are tried first; the others only where the least of them gains anything.
 const POWERS: [f64; 3] = [3e-3, 0.03, 0.3];
 /// Longer ways that are tried first, range cells.
 const FARTHEST_CELLS: usize = 14;
@@ -59,13 +59,11 @@ pub fn best(trial: &Trial, coarse: &[usize]) -> Vec<Fitted> {
     let tried: Vec<(Echo, f64, f64)> = mirrors
         .chain(delayed)
         .filter(|echo| !evidence.accepted.contains(&id(*echo)))
-        .map(|echo| {
-            let gains = POWERS.map(|power| {
-                let score = trial.score(Change::Again(of_power(echo, power)), coarse, true);
-                (power, score.gain_over(&none, coarse))
-            });
-            let (power, gain) = gains.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).expect("some powers");
-            (echo, power, gain)
+        .filter_map(|echo| {
+            let gain = |power: f64| trial.score(Change::Again(of_power(echo, power)), coarse, true).gain_over(&none, coarse);
+            let least = gain(POWERS[0]);
+            let more = POWERS[1..].iter().map(|&power| (echo, power, gain(power)));
+            (least > 0.0).then(|| more.fold((echo, POWERS[0], least), |best, tried| if tried.2 > best.2 { tried } else { best }))
         })
         .collect();
     let mut found: Vec<Fitted> = vec![];

@@ -1,4 +1,4 @@
-//! Geometry and time: the body is not where or when it was predicted.
+//! Geometry and time: the body is not where or when it was predicted, or it is seen a second time among its own cells.
 
 mod again;
 mod change;
@@ -13,7 +13,7 @@ use trial::Trial;
 use crate::diagnosis::suspects::paths::OVER_THE_BODY;
 use crate::diagnosis::{Candidate, Evidence};
 
-/// At most one candidate for a change of the body's place or time, and one for what differs between receivers.
+/// At most one candidate for a change of the body's place or time or for an echo of it, and one for what differs between receivers.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(model) = evidence.power() else { return vec![] };
     let Some(body) = evidence.body.as_ref() else { return vec![] };
