@@ -172,7 +172,10 @@ fn record(config: &ChallengeConfig, plan: &mut Plan) -> Result<Recorded> {
     let world = scene.world(Path::new("."))?;
     if plan.stratum == Stratum::Null || config.every.is_some() {
         let settings = RecorderConfig { effects: plan.planted(config), ..scene };
-        let frames = frames_of(&settings.world(Path::new("."))?)?;
+        let frames = match plan.stratum {
+            Stratum::Null => frames_of(&world)?,
+            _ => frames_of(&settings.world(Path::new("."))?)?,
+        };
         return Ok(Recorded { frames, world, settings, strength: None });
     }
     let clean = draws(&scene)?;

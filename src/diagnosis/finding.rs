@@ -51,6 +51,16 @@ impl Place {
     pub fn at(stage: &str) -> Self {
         Self { stage: stage.into(), ..Self::default() }
     }
+
+    /// Where some returns are, each of a range (m) and a velocity (m/s).
+    pub fn spanning(stage: &str, returns: impl Iterator<Item = (f64, f64)>) -> Self {
+        let (mut low, mut high, mut slow, mut fast) = (f64::INFINITY, 0.0f64, f64::INFINITY, f64::NEG_INFINITY);
+        for (range, velocity) in returns {
+            (low, high) = (low.min(range), high.max(range));
+            (slow, fast) = (slow.min(velocity), fast.max(velocity));
+        }
+        Self { range_m: Some([low, high]), velocity_mps: Some([slow, fast]), ..Self::at(stage) }
+    }
 }
 
 /// The capacity ladder of DIAGNOSIS.md 3.0: how much freedom of the amplitudes a finding survives.

@@ -8,7 +8,7 @@ mod track;
 
 use rayon::prelude::*;
 
-pub use echo::{Echo, mirrored_return, range_and_velocity};
+pub use echo::{Echo, SIDE_SPREAD, mirror_id, mirrored_return, range_and_velocity};
 pub use track::Track;
 
 use crate::body::{Interpolation, PosedBody, Sampling, SurfaceConfig};

@@ -8,6 +8,13 @@ use crate::room::Boundary;
 
 /// Rough skin returns as much to every side as at this cosine.
 const ROUGH: f64 = 0.1;
+/// Bodies return this factor more or less in amplitude to one side than to another (standard deviation of the log).
+pub const SIDE_SPREAD: f64 = 0.3;
+
+/// What the body's image at a boundary is called.
+pub fn mirror_id(boundary: Boundary) -> &'static str {
+    if boundary == Boundary::Floor { "floor_bounce" } else { "wall_ghost" }
+}
 
 /// Power that comes beside the direct return, for every point of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]

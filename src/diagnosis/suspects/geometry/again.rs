@@ -2,15 +2,11 @@
 //! parts. Unlike the search for images where the body is not, this one looks at all cells, so that a second return that
 //! lies mostly among the direct one's cells is not taken for a body that stands elsewhere.
 
-use std::sync::Arc;
-
-use super::change::{Change, Moves};
+use super::change::Change;
 use super::displaced::{Fitted, refine};
 use super::trial::Trial;
-use crate::diagnosis::prediction::{Echo, range_and_velocity};
-use crate::diagnosis::statistics::corrected;
-use crate::diagnosis::suspects::paths::PATH_LIKE;
-use crate::diagnosis::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::prediction::{Echo, SIDE_SPREAD, mirror_id, range_and_velocity};
+use crate::diagnosis::{Estimate, Place};
 use crate::room::Boundary;
 
 /// Powers over the direct return's that are tried first; the others only where the least of them gains anything.
@@ -20,18 +16,15 @@ const FARTHEST_CELLS: usize = 14;
 const NEAREST_CELLS: usize = 2;
 /// Power of an echo that errors of the power model make by themselves.
 const FLOOR: f64 = 2e-3;
-/// Bodies return this factor more or less in amplitude to one side than to another (standard deviation of the log).
-const SIDE_SPREAD: f64 = 0.3;
-
-/// How overconfident the likelihood is: cells are not independent, and the power model is rough.
-const LIKELIHOOD_INFLATION: f64 = 1.5;
+/// How overconfident the likelihood is: cells are not independent, and the power model is rough. On 31 recordings without
+/// anything missing the largest gain was 0.5 nats.
+pub const INFLATION: f64 = 1.5;
 /// Share of an echo's gain that one which comes before its cause may have.
 const BEFORE: f64 = 0.3;
 
 fn id(echo: Echo) -> &'static str {
     match echo {
-        Echo::Mirror { boundary: Boundary::Floor, .. } => "floor_bounce",
-        Echo::Mirror { .. } => "wall_ghost",
+        Echo::Mirror { boundary, .. } => mirror_id(boundary),
         Echo::Delayed { .. } => "body_multibounce",
     }
 }
@@ -84,31 +77,27 @@ pub fn best(trial: &Trial, coarse: &[usize]) -> Vec<Fitted> {
     found
 }
 
-/// Of so much gained (nats) by the best of all echoes: a ratio of likelihoods, as [`super::displaced`] has it for steps. On 31
-/// recordings without anything missing the largest gain was 0.5 nats.
-pub fn p_value(gain: f64) -> f64 {
-    let tried = (Boundary::ALL.len() + FARTHEST_CELLS - NEAREST_CELLS + 1) * POWERS.len();
-    corrected((-gain / LIKELIHOOD_INFLATION).exp().min(1.0), tried as f64)
+/// How many echoes the best is chosen from.
+pub fn tried() -> f64 {
+    ((Boundary::ALL.len() + FARTHEST_CELLS - NEAREST_CELLS + 1) * POWERS.len()) as f64
 }
 
-pub fn candidate(trial: &Trial, fit: &Fitted, echo: Echo, deviation: f64) -> Candidate {
-    let evidence = trial.evidence;
-    let coefficient = fit.value.max(1e-6).sqrt();
-    let mut place = Place::at("propagation");
-    let (mut low, mut high, mut slow, mut fast) = (f64::INFINITY, 0.0f64, f64::INFINITY, f64::NEG_INFINITY);
-    for points in &trial.body.frames {
-        for point in echo.points(&evidence.radar, points) {
-            let (range, velocity) = range_and_velocity(&evidence.radar, point.position_m, point.velocity_mps);
-            (low, high) = (low.min(range), high.max(range));
-            (slow, fast) = (slow.min(velocity), fast.max(velocity));
-        }
+pub fn place(trial: &Trial, echo: Echo) -> Place {
+    let radar = &trial.evidence.radar;
+    let points = trial.body.frames.iter().flat_map(|points| echo.points(radar, points));
+    let returns = points.map(|point| range_and_velocity(radar, point.position_m, point.velocity_mps));
+    let place = Place::spanning("propagation", returns);
+    match echo {
+        Echo::Mirror { boundary, .. } => Place { boundary: Some(boundary.name().into()), ..place },
+        Echo::Delayed { .. } => Place { range_m: None, ..place },
     }
-    place.range_m = Some([low, high]);
-    place.velocity_mps = Some([slow, fast]);
-    let level_db = -20.0 * coefficient.log10();
-    let (estimates, statement) = match echo {
+}
+
+/// Estimates, and the sentence; `deviation`: of the power.
+pub fn described(trial: &Trial, echo: Echo, power: f64, deviation: f64) -> (Vec<Estimate>, String) {
+    let coefficient = power.max(1e-6).sqrt();
+    match echo {
         Echo::Mirror { boundary, .. } => {
-            place.boundary = Some(boundary.name().into());
             let rough = (SIDE_SPREAD * coefficient).hypot(0.5 * deviation / coefficient);
             (
                 vec![Estimate::normal("coefficient", coefficient, rough)],
@@ -119,32 +108,14 @@ pub fn candidate(trial: &Trial, fit: &Fitted, echo: Echo, deviation: f64) -> Can
                 ),
             )
         }
-        Echo::Delayed { extra_m, .. } => {
-            place.range_m = None;
-            (
-                vec![Estimate::normal("extra_m", extra_m, 0.3 / trial.model.cells.bins_per_m)],
-                format!(
-                    "The body's power comes a second time, {extra_m:.2} m behind itself and {level_db:.0} dB weaker, with the body's own \
-                     Doppler: it bounced between parts of the body."
-                ),
-            )
-        }
-    };
-    let (moves, change) = (Moves::new(evidence.radar.centre_m()), fit.score.change);
-    Candidate {
-        id: Some(fit.id),
-        behaves_like: PATH_LIKE,
-        estimates,
-        choice: place.boundary.clone(),
-        place,
-        p_value: 1.0,
-        gain: 0.0,
-        rung: Rung::D,
-        look_alikes: vec![],
-        statement,
-        curve: None,
-        energy: 0.0,
-        correction: Correction::Body(Arc::new(move |body| moves.apply(body, change))),
+        Echo::Delayed { extra_m, .. } => (
+            vec![Estimate::normal("extra_m", extra_m, 0.3 / trial.model.cells.bins_per_m)],
+            format!(
+                "The body's power comes a second time, {extra_m:.2} m behind itself and {:.0} dB weaker, with the body's own Doppler: \
+                 it bounced between parts of the body.",
+                -20.0 * coefficient.log10()
+            ),
+        ),
     }
 }
 
@@ -157,7 +128,7 @@ mod tests {
     use super::super::displaced;
     use super::*;
     use crate::diagnosis::cube::Loaded;
-    use crate::diagnosis::{BodyPrediction, Evidence, Point};
+    use crate::diagnosis::{BodyPrediction, Candidate, Correction, Evidence, Point};
     use crate::radar::{Radar, SPEED_OF_LIGHT};
     use crate::room::Room;
 

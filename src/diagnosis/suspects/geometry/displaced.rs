@@ -12,6 +12,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::again;
 use super::change::{Change, Moves, frame_period_s};
 use super::trial::{Score, Trial};
+use crate::diagnosis::suspects::paths::PATH_LIKE;
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
 use crate::effects::slope_error;
 
@@ -223,7 +224,8 @@ fn p_value(fit: &Fitted, null: &Score, training: &[usize]) -> f64 {
         return step_p_value(fit.score.gain_over(null, training), fit.score.inside.len());
     }
     if let Change::Again(_) = fit.score.change {
-        return again::p_value(fit.score.gain_over(null, training) / fit.inflation);
+        let gain = fit.score.gain_over(null, training) / fit.inflation;
+        return ratio_p_value(gain, again::INFLATION, again::tried());
     }
     let excess = (fit.value.abs() - fit.floor).max(0.0);
     let judged = training.iter().filter(|&&frame| fit.score.inside[frame] && null.inside[frame]).count();
@@ -244,8 +246,12 @@ fn most_lost(frames: usize) -> usize {
 /// weights that are fitted here are the same in number with and without the step. On 150 recordings without anything
 /// missing (two sealed sets that had been opened) the largest gain was 1.2 nats; from 30 on this is below 0.01.
 fn step_p_value(gain: f64, frames: usize) -> f64 {
-    let tried = (most_lost(frames) * frames).max(1) as f64;
-    crate::diagnosis::statistics::corrected((-gain / STEP_INFLATION).exp().min(1.0), tried)
+    ratio_p_value(gain, STEP_INFLATION, (most_lost(frames) * frames).max(1) as f64)
+}
+
+/// Of the best of several ratios of likelihoods (nats), which are overconfident by a factor.
+fn ratio_p_value(gain: f64, inflation: f64, tried: f64) -> f64 {
+    crate::diagnosis::statistics::corrected((-gain / inflation).exp().min(1.0), tried)
 }
 
 fn mean_range_m(trial: &Trial) -> f64 {
@@ -273,15 +279,6 @@ fn deviation(trial: &Trial, fit: &Fitted) -> f64 {
 fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, gain: f64) -> Candidate {
     let evidence = trial.evidence;
     let deviation = deviation(trial, fit);
-    if let Change::Again(echo) = fit.score.change {
-        return Candidate {
-            look_alikes,
-            p_value,
-            gain,
-            energy: energy(evidence),
-            ..again::candidate(trial, fit, echo, deviation)
-        };
-    }
     let normal = |name| vec![Estimate::normal(name, fit.value, deviation)];
     let (estimates, stage, rung, statement) = match fit.score.change {
         Change::Range(_) => (
@@ -322,7 +319,10 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
             Rung::D,
             format!("The motion's clock runs {:.2} % faster than the radar's.", 1e2 * fit.value),
         ),
-        Change::Again(_) => unreachable!("has a candidate of its own"),
+        Change::Again(echo) => {
+            let (estimates, statement) = again::described(trial, echo, fit.value, deviation);
+            (estimates, "propagation", Rung::D, statement)
+        }
         Change::Drop { at, count } => (
             vec![Estimate::normal("at", at as f64, 1.5), Estimate::normal("count", count as f64, 0.0)],
             "timing",
@@ -330,17 +330,22 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
             format!("From frame {at} on the body is {count} frame(s) later in its motion: frames were lost there."),
         ),
     };
-    let frames = match fit.score.change {
-        Change::Drop { at, .. } => Some((at..evidence.cube.dims[0]).collect()),
-        _ => None,
+    let place = match fit.score.change {
+        Change::Drop { at, .. } => Place { frames: Some((at..evidence.cube.dims[0]).collect()), ..Place::at(stage) },
+        Change::Again(echo) => again::place(trial, echo),
+        _ => Place::at(stage),
     };
     let (moves, change) = (Moves::new(evidence.radar.centre_m()), fit.score.change);
     Candidate {
         id: Some(fit.id),
-        behaves_like: if stage == "timing" { "time offset" } else { "range offset" },
+        behaves_like: match stage {
+            "timing" => "time offset",
+            "propagation" => PATH_LIKE,
+            _ => "range offset",
+        },
         estimates,
-        choice: None,
-        place: Place { frames, ..Place::at(stage) },
+        choice: place.boundary.clone(),
+        place,
         p_value,
         gain,
         rung,

@@ -6,33 +6,21 @@ use super::ghost::Ghost;
 use super::mover::energy;
 use super::removal::{empty_cells, patch};
 use super::scene::Scene;
-use crate::diagnosis::prediction::mirrored_return;
+use crate::diagnosis::prediction::{SIDE_SPREAD, mirror_id, mirrored_return};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Candidate, Correction, Estimate, Place, Rung};
-use crate::room::Boundary;
 
-/// Bodies return this factor more or less in amplitude to one side than to another (standard deviation of the log).
-const SIDE_SPREAD: f64 = 0.3;
 /// Log-likelihood within which two boundaries are not told apart.
 const CLOSE: f64 = 4.6;
 
 pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Candidate {
     let evidence = scene.evidence;
-    let (mut low, mut high, mut slow, mut fast) = (f64::INFINITY, 0.0f64, f64::INFINITY, f64::NEG_INFINITY);
-    if let (Some(body), Some(room)) = (&evidence.body, &evidence.room) {
-        let distance = room.distance_m(ghost.boundary).unwrap_or(0.0);
-        for point in body.frames.iter().flatten() {
-            let image = mirrored_return(&evidence.radar, point, ghost.boundary, distance, false);
-            (low, high) = (low.min(image.range_m), high.max(image.range_m));
-            (slow, fast) = (slow.min(image.velocity_mps), fast.max(image.velocity_mps));
-        }
-    }
+    let distance_m = evidence.room.as_ref().and_then(|room| room.distance_m(ghost.boundary)).unwrap_or(0.0);
+    let points = evidence.body.iter().flat_map(|body| body.frames.iter().flatten());
+    let images = points.map(|point| mirrored_return(&evidence.radar, point, ghost.boundary, distance_m, false));
+    let place = Place::spanning("propagation", images.map(|image| (image.range_m, image.velocity_mps)));
     let name = ghost.boundary.name();
-    let floor = ghost.boundary == Boundary::Floor;
-    let mut place = Place::at("propagation");
-    place.range_m = Some([low, high]);
-    place.velocity_mps = Some([slow, fast]);
-    place.boundary = Some(name.into());
+    let id = mirror_id(ghost.boundary);
     let peak = scene_power(scene, ghost);
     let statement = format!(
         "The body is seen a second time by way of the {name} boundary: power at half the summed lengths of the direct and \
@@ -42,10 +30,7 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
         10.0 * peak.max(1.0).log10()
     );
     let others = all.iter().filter(|other| other.boundary != ghost.boundary && ghost.gain - other.gain < CLOSE);
-    let mut look_alikes: Vec<&'static str> = others
-        .map(|other| if other.boundary == Boundary::Floor { "floor_bounce" } else { "wall_ghost" })
-        .filter(|id| *id != if floor { "floor_bounce" } else { "wall_ghost" })
-        .collect();
+    let mut look_alikes: Vec<&'static str> = others.map(|other| mirror_id(other.boundary)).filter(|other| *other != id).collect();
     look_alikes.dedup();
     let spread = 1.645 * SIDE_SPREAD;
     let coefficient = Estimate {
@@ -67,11 +52,11 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
         .map(|template| ghost.weight * template.power.iter().map(|&power| f64::from(power)).sum::<f64>())
         .sum();
     Candidate {
-        id: Some(if floor { "floor_bounce" } else { "wall_ghost" }),
+        id: Some(id),
         behaves_like: super::PATH_LIKE,
         estimates: vec![coefficient],
         choice: Some(name.into()),
-        place,
+        place: Place { boundary: Some(name.into()), ..place },
         p_value: corrected(chi2_tail(2.0 * ghost.gain_all, 2.0), tried),
         gain: ghost.gain,
         rung: Rung::F,

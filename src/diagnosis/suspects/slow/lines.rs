@@ -117,20 +117,7 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
     let best = (0..count).into_par_iter().map(|i| (i, power(i))).max_by(|a, b| a.1.total_cmp(&b.1))?;
     let gain = |f: f64| if (lowest..=highest).contains(&f) { fit(field, series, &frames, f, 1).2 } else { f64::NEG_INFINITY };
     // The peak is a parabola near its top.
-    let refined = |mut frequency: f64| {
-        let (mut width, mut centre) = (step, gain(frequency));
-        while width > 1e-3 * step {
-            let (left, right) = (gain(frequency - width), gain(frequency + width));
-            if left > centre {
-                (frequency, centre) = (frequency - width, left);
-            } else if right > centre {
-                (frequency, centre) = (frequency + width, right);
-            } else {
-                width *= 0.5;
-            }
-        }
-        (frequency, centre)
-    };
+    let refined = |frequency: f64| climb(gain, frequency, step, 1e-3 * step);
     let (mut frequency, mut centre) = refined(lowest + best.0 as f64 * step);
     // Gaps between frames make a comb of nearly equal peaks, a frame rate apart; the grid may have missed its top.
     let frame_rate = 1.0 / (field.times_s[loops] - field.times_s[0]);
@@ -200,6 +187,22 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
     line.amplitude_deviation *= background.sqrt();
     line.held_out_gain = series.gain(field, held_out, |_, _, time| line.value(time)) / background;
     Some(line)
+}
+
+/// The top near a start and its height: steps of one width as long as they lead up, then of half of it, down to the finest.
+pub fn climb(height: impl Fn(f64) -> f64, start: f64, width: f64, finest: f64) -> (f64, f64) {
+    let (mut at, mut top, mut width) = (start, height(start), width);
+    while width > finest {
+        let (left, right) = (height(at - width), height(at + width));
+        if left > top {
+            (at, top) = (at - width, left);
+        } else if right > top {
+            (at, top) = (at + width, right);
+        } else {
+            width *= 0.5;
+        }
+    }
+    (at, top)
 }
 
 /// Power of a frame at the line's frequency after the line is taken out, relative to the noise's.

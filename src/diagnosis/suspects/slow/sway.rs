@@ -10,11 +10,11 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::field::ahead;
+use super::lines::climb;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
-use crate::radar::SPEED_OF_LIGHT;
 
 /// Bins over which the window spreads what is independent.
 const BINS_PER_VALUE: f64 = 2.0;
@@ -134,17 +134,8 @@ impl Cells {
         let known: Vec<&Sums> = sums.iter().filter(|sums| sums.determinant() > DETERMINED).collect();
         let gain = |phase: f64| known.iter().map(|sums| sums.along(phase)).map(|(q, n)| q.norm_sqr() / n).sum::<f64>();
         let phases = (0..PHASES).map(|i| std::f64::consts::PI * i as f64 / PHASES as f64);
-        let (mut phase, mut top) =
-            phases.map(|phase| (phase, gain(phase))).max_by(|a, b| a.1.total_cmp(&b.1)).expect("some phases");
-        let mut width = std::f64::consts::PI / PHASES as f64;
-        while width > 1e-3 {
-            let (left, right) = (gain(phase - width), gain(phase + width));
-            if left.max(right) > top {
-                (phase, top) = if left > right { (phase - width, left) } else { (phase + width, right) };
-            } else {
-                width *= 0.5;
-            }
-        }
+        let (first, _) = phases.map(|phase| (phase, gain(phase))).max_by(|a, b| a.1.total_cmp(&b.1)).expect("some phases");
+        let (phase, top) = climb(gain, first, std::f64::consts::PI / PHASES as f64, 1e-3);
         let pattern = sums
             .iter()
             .map(|sums| {
@@ -269,18 +260,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
             f64::NEG_INFINITY
         }
     };
-    let refined = |mut frequency: f64| {
-        let (mut width, mut top) = (0.5 * step, gain(frequency));
-        while width > 0.01 * step {
-            let (left, right) = (gain(frequency - width), gain(frequency + width));
-            if left.max(right) > top {
-                (frequency, top) = if left > right { (frequency - width, left) } else { (frequency + width, right) };
-            } else {
-                width *= 0.5;
-            }
-        }
-        (frequency, top)
-    };
+    let refined = |frequency: f64| climb(gain, frequency, 0.5 * step, 0.01 * step);
     let count = ((highest - lowest) / step).max(0.0) as usize;
     let tried =
         (0..count).into_par_iter().map(|index| lowest + index as f64 * step).map(|frequency| (frequency, gain(frequency)));
@@ -298,17 +278,15 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     if found <= 0.0 || sway.likeness < LIKENESS {
         return None;
     }
-    let (amplitude, deviation) = amplitude(evidence, &cells, &sway)?;
+    let (radians, deviation) = amplitude(evidence, &cells, &sway)?;
     let curvature = (2.0 * top - gain(frequency - 0.1 * step) - gain(frequency + 0.1 * step)) / (0.1 * step).powi(2);
     let frequency_deviation = if curvature > 0.0 { curvature.sqrt().recip() } else { step };
-    let metres = evidence.radar.wavelength_m() / (2.0 * TAU);
-    Some(candidate(evidence, &cells, &sway, [amplitude * metres, deviation * metres, frequency_deviation], (p_value, found)))
+    Some(candidate(evidence, &cells, &sway, [radians, deviation, frequency_deviation], (p_value, found)))
 }
 
-/// Of the phase along the boresight (rad), with its deviation; none where the ranges do not share it.
+/// Of the phase along the boresight (rad), with its sign, and its deviation; none where the ranges do not share it.
 fn amplitude(evidence: &Evidence, cells: &Cells, sway: &Sway) -> Option<(f64, f64)> {
-    let bin_m =
-        0.5 * SPEED_OF_LIGHT * evidence.radar.sample_rate_hz / (evidence.cube.dims[4] as f64 * evidence.radar.slope_hz_per_s);
+    let bin_m = evidence.radar.range_resolution_m();
     let (mut groups, mut along, mut of_still, mut of_pattern) = (vec![], Complex64::ZERO, 0.0, 0.0);
     for start in (0..cells.bins).step_by(GROUP_BINS) {
         let lever = ahead(evidence.room.as_ref(), (start as f64 + 0.5 * GROUP_BINS as f64) * bin_m).powi(2);
@@ -350,14 +328,15 @@ fn amplitude(evidence: &Evidence, cells: &Cells, sway: &Sway) -> Option<(f64, f6
     // 2 J₁(φ) / J₀(φ) = φ + φ³/8 + …
     let measured = square.sqrt();
     let phase = (0..20).fold(measured, |phase, _| measured - phase.powi(3) / 8.0);
-    (phase < LARGEST && phase > 0.0).then(|| (phase, deviation.hypot(PATTERN * phase)))
+    // The pattern is i times what stands still where that comes from ahead.
+    (phase < LARGEST && phase > 0.0).then(|| (phase.copysign(along.im), deviation.hypot(PATTERN * phase)))
 }
 
 fn candidate(
     evidence: &Evidence,
     cells: &Cells,
     sway: &Sway,
-    [amplitude_m, deviation_m, frequency_deviation]: [f64; 3],
+    [radians, deviation, frequency_deviation]: [f64; 3],
     (p_value, gain): (f64, f64),
 ) -> Candidate {
     let (rx, samples) = (evidence.cube.dims[2], evidence.cube.dims[4]);
@@ -367,11 +346,8 @@ fn candidate(
         TAU * frequency * (starts[frame] + index as f64 * loop_s + (channel / rx) as f64 * chirp_s) + phase
     };
     let patterns = patterns(evidence, &at);
-    // The sign of the phase: the pattern is i times what stands still where that comes from ahead.
-    let along: Complex64 = (0..sway.pattern.len())
-        .filter_map(|cell| sway.pattern[cell].map(|(pattern, _)| cells.still[cell].conj() * pattern))
-        .sum();
-    let radians = amplitude_m * 2.0 * TAU / evidence.radar.wavelength_m() * along.im.signum();
+    let metres = evidence.radar.wavelength_m() / (2.0 * TAU);
+    let (amplitude_m, deviation_m) = (radians.abs() * metres, deviation * metres);
     let chirps = (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
     let energy = 0.5 * chirps * patterns[1].iter().map(Complex64::norm_sqr).sum::<f64>();
     Candidate {
@@ -415,15 +391,14 @@ fn candidate(
 /// What is constant, and what swings with the sinusoid and its harmonics, in the training frames: least squares,
 /// `[order][channel · sample]`. Short frames far apart do not make the harmonics orthogonal.
 fn patterns(evidence: &Evidence, at: &impl Fn(usize, usize, usize) -> f64) -> Vec<Vec<Complex64>> {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let channels = evidence.cube.channels();
+    let (channels, samples) = (evidence.cube.channels(), evidence.cube.dims[4]);
     let size = HARMONICS + 1;
     let mut patterns = vec![vec![Complex64::ZERO; channels * samples]; size];
     for channel in 0..channels {
         let mut normal = DMatrix::<f64>::zeros(size, size);
         let mut right = vec![vec![Complex64::ZERO; samples]; size];
         for &frame in &evidence.split.training {
-            for (index, chirp) in evidence.cube.channel(frame, channel).chunks_exact(samples).take(loops).enumerate() {
+            for (index, chirp) in evidence.cube.channel(frame, channel).chunks_exact(samples).enumerate() {
                 let turn = at(frame, channel, index);
                 let basis: Vec<f64> = (0..size).map(|order| (order as f64 * turn).cos()).collect();
                 for (order, weight) in basis.iter().enumerate() {
