@@ -346,6 +346,11 @@ mod tests {
         assert!(clothing.d_prime > 300.0 && clothing.d_prime_surviving < 0.05 * clothing.d_prime, "{clothing:?}");
         let leakage = of("[effects.tx_leakage]\nrange_m = 0.1\nrelative = 1.0\n");
         assert!(leakage.d_prime_surviving > 100.0, "{leakage:?}");
+        // Beside the body it is of the same strength in a room with the person and in one without.
+        let mover = of("[[effects.moving_reflector]]\nposition_m = [-1.2, 1.5, 0.0]\naxis = [0.0, 1.0, 0.0]\nswing_m = 0.2\n\
+                        rate_hz = 1.0\namplitude = 0.05\n");
+        let share = mover.d_prime_surviving / mover.d_prime;
+        assert!((0.6..1.1).contains(&share), "{share} of {mover:?}");
     }
 
     #[test]

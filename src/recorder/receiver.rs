@@ -33,6 +33,8 @@ pub struct ReceiverConfig {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Level {
+    /// What the amplitudes of added reflectors are relative to: the body's return, in units of the transmitted wave.
+    pub body: f64,
     /// What levels relative to the peak sample are relative to, in units of the transmitted wave.
     pub peak: f64,
     /// Codes per unit of the transmitted wave.
@@ -59,9 +61,12 @@ impl ReceiverConfig {
                 .with_hint("a fraction above 1 saturates the converter"));
         }
         if let Some(level) = &self.level {
-            for (name, value, least) in
-                [("peak", level.peak, 0.0), ("gain", level.gain, f64::MIN_POSITIVE), ("noise_codes", level.noise_codes, 0.0)]
-            {
+            for (name, value, least) in [
+                ("body", level.body, 0.0),
+                ("peak", level.peak, 0.0),
+                ("gain", level.gain, f64::MIN_POSITIVE),
+                ("noise_codes", level.noise_codes, 0.0),
+            ] {
                 if !(value.is_finite() && value >= least) {
                     return Err(Error::setting(format!("{key}.level.{name}"), value, "a finite number that is not negative"));
                 }

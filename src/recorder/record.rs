@@ -25,6 +25,8 @@ pub struct Recorder {
     /// The board as a receiver, and as a transmitter (R6).
     board: Option<[(Paths, Radar); 2]>,
     movers: Vec<Mover>,
+    /// What amplitudes of added reflectors are relative to.
+    body: f64,
     /// The peak sample before the receiver, without effects of the receiver: what relative levels are relative to.
     peak: f64,
     chain: Chain,
@@ -48,7 +50,8 @@ impl Recorder {
             Ok(signal)
         };
         let bodies = previews.iter().map(|&frame| body(frame)).collect::<Result<Vec<Signal>>>()?;
-        let mut level = bodies.iter().map(Signal::root_mean_square).fold(0.0, f64::max);
+        let own = || bodies.iter().map(Signal::root_mean_square).fold(0.0, f64::max);
+        let mut level = world.receiver.level.map_or_else(own, |level| level.body);
         let mut paths = Paths::new(world, scatter, &stages.wide, level)?;
         if level == 0.0 {
             level = largest(paths.surroundings.still());
@@ -67,7 +70,8 @@ impl Recorder {
         };
         let unknown = || random_phase(&mut world.random(Draw::Gain));
         let phase = if world.receiver.unknown_phase { unknown() } else { Complex64::ONE };
-        let mut recorder = Self { world: world.clone(), stages, paths, board, movers, peak: 0.0, chain, phase, receiver };
+        let mut recorder =
+            Self { world: world.clone(), stages, paths, board, movers, body: level, peak: 0.0, chain, phase, receiver };
         recorder.settle(&bodies)?;
         Ok(recorder)
     }
@@ -93,7 +97,7 @@ impl Recorder {
 
     /// The board's gain and noise, for other recordings with the same.
     pub fn level(&self) -> Level {
-        Level { peak: self.peak, gain: self.receiver.gain.re, noise_codes: self.receiver.noise_codes }
+        Level { body: self.body, peak: self.peak, gain: self.receiver.gain.re, noise_codes: self.receiver.noise_codes }
     }
 
     /// The IF before noise and converter, `[tx, rx, loop, sample]`, in units of the transmitted wave.
