@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::field::{Field, Series};
+use super::field::{Field, Part};
 use crate::diagnosis::statistics;
 
 /// How the mean of a frame depends on its time.
@@ -19,7 +19,8 @@ pub struct Drift {
     pub shape: Shape,
     /// Of the change from the first to the last frame, or of the step.
     pub deviation: f64,
-    /// Corrected for the shapes that were tried, and for scatter of the frames beyond the noise.
+    /// Of the better of two tests, against the scatter of the frames about the shape and against what the body's slow parts
+    /// do, corrected for the shapes that were tried.
     pub p_value: f64,
     pub held_out_gain: f64,
     frames: usize,
@@ -56,16 +57,11 @@ fn place(frame: usize, frames: usize) -> f64 {
 const DEGREE: usize = 3;
 
 /// The shape that explains the training frames best, more freedom paid for (BIC).
-pub fn best(field: &Field, series: &Series, training: &[usize], held_out: &[usize]) -> Option<Drift> {
+pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -> Option<Drift> {
+    let series = &field.series(part, |_| true);
     let loops = series.loops as f64;
-    let points: Vec<(usize, f64, f64)> = training
-        .iter()
-        .filter(|&&f| series.weight[f] > 0.0)
-        .map(|&f| {
-            let mean = series.value[f * series.loops..(f + 1) * series.loops].iter().sum::<f64>() / loops;
-            (f, mean, series.weight[f] * loops)
-        })
-        .collect();
+    let points: Vec<(usize, f64, f64)> =
+        training.iter().filter(|&&f| series.weight[f] > 0.0).map(|&f| (f, series.mean(f), series.weight[f] * loops)).collect();
     if points.len() < 5 {
         return None;
     }
@@ -124,7 +120,9 @@ pub fn best(field: &Field, series: &Series, training: &[usize], held_out: &[usiz
     // Frames that scatter by more than the noise (the body's slow parts) make everything less sure.
     let excess = (misfit / freedom_left).max(1.0);
     let ratio = (scatter - misfit).max(0.0) / freedom / (misfit / freedom_left).max(1.0);
-    let p = fisher_tail(ratio, freedom, freedom_left);
+    let own = fisher_tail(ratio, freedom, freedom_left);
+    let unlike = unlike_the_body(field, part, training, (scatter - misfit).max(0.0), freedom);
+    let p = unlike.map_or(own, |unlike| statistics::corrected(own.min(unlike), 2.0));
     let drift = Drift {
         shape,
         deviation: (variance * excess).sqrt(),
@@ -149,13 +147,78 @@ pub fn best(field: &Field, series: &Series, training: &[usize], held_out: &[usiz
     // Judged without it, the date is then read from those frames as well.
     if let Shape::Step([before, after], at) = drift.shape {
         let late = |frame: usize| {
-            let mean = series.value[frame * series.loops..(frame + 1) * series.loops].iter().sum::<f64>() / loops;
+            let mean = series.mean(frame);
             (mean - after).abs() < (mean - before).abs()
         };
         let date = (0..field.frames).find(|&f| if open(f) { late(f) } else { f >= at }).unwrap_or(at);
         return Some(Drift { shape: Shape::Step([before, after], date), held_out_gain, ..drift });
     }
     Some(Drift { held_out_gain, ..drift })
+}
+
+/// Probability of a drift that moves the training frames' scatter by `scatter` (with `freedom` parameters), were it the body's
+/// slow parts: these turn at random in every range, so that they change its gain as much as its phase, and each range
+/// otherwise than the next. None where too few ranges tell.
+fn unlike_the_body(field: &Field, part: Part, training: &[usize], scatter: f64, freedom: f64) -> Option<f64> {
+    const FEWEST_RANGES: f64 = 2.0;
+    let (degree, ranges) = (DEGREE as f64, 0..field.groups.len());
+    let whole = Slow::fit(field, part, training, |_| true)?;
+    // Of each range that stands still: what its other component does slowly, and what its own does otherwise than all.
+    let odd: Vec<f64> = ranges
+        .filter_map(|only| {
+            let own = Slow::fit(field, part, training, |group| group == only)?;
+            let other = Slow::fit(field, part.other(), training, |group| group == only)?;
+            Some(own.distance(&whole.coefficients) + other.distance(&[0.0; DEGREE]))
+        })
+        .collect();
+    let (sum, squares) = (odd.iter().sum::<f64>(), odd.iter().map(|e| e * e).sum::<f64>());
+    let telling = sum * sum / squares;
+    if telling.is_nan() || telling < FEWEST_RANGES {
+        return None;
+    }
+    let count = odd.len() as f64;
+    let usual = (sum / (degree * (2.0 * count - 1.0))).max(1.0);
+    Some(fisher_tail(scatter / freedom / usual, freedom, degree * (2.0 * telling - 1.0)))
+}
+
+/// What some ranges do slowly in the training frames: a polynomial of degree [`DEGREE`].
+struct Slow {
+    /// Without the constant.
+    coefficients: [f64; DEGREE],
+    /// Inverse of their covariance.
+    information: nalgebra::DMatrix<f64>,
+}
+
+impl Slow {
+    fn fit(field: &Field, part: Part, training: &[usize], wanted: impl Fn(usize) -> bool) -> Option<Self> {
+        let series = field.series(part, wanted);
+        let frames: Vec<usize> = training.iter().copied().filter(|&frame| series.weight[frame] > 0.0).collect();
+        if frames.len() < DEGREE + 3 {
+            return None;
+        }
+        let size = DEGREE + 1;
+        let (mut normal, mut right) = (nalgebra::DMatrix::<f64>::zeros(size, size), nalgebra::DVector::<f64>::zeros(size));
+        for &frame in &frames {
+            let row = powers(frame, field.frames);
+            right += &row * (series.weight[frame] * series.loops as f64 * series.mean(frame));
+            normal += &row * row.transpose() * (series.weight[frame] * series.loops as f64);
+        }
+        let solved = normal.clone().cholesky()?.solve(&right);
+        // Schur complement: the constant is free.
+        let (first, rest) = (normal[(0, 0)], normal.view((1, 0), (DEGREE, 1)));
+        let information = normal.view((1, 1), (DEGREE, DEGREE)) - rest * rest.transpose() / first;
+        Some(Self { coefficients: std::array::from_fn(|power| solved[power + 1]), information })
+    }
+
+    /// From other coefficients, in squares of standard deviations.
+    fn distance(&self, other: &[f64; DEGREE]) -> f64 {
+        let apart = nalgebra::DVector::from_fn(DEGREE, |power, _| self.coefficients[power] - other[power]);
+        (&self.information * &apart).dot(&apart)
+    }
+}
+
+fn powers(frame: usize, frames: usize) -> nalgebra::DVector<f64> {
+    nalgebra::DVector::from_fn(DEGREE + 1, |power, _| place(frame, frames).powi(power as i32))
 }
 
 /// Probability that a ratio of variances exceeds this.

@@ -76,6 +76,11 @@ impl Part {
         }
     }
 
+    /// A part that is read from the other component of the same deviations.
+    pub fn other(self) -> Self {
+        if self == Part::Gain { Part::Phase } else { Part::Gain }
+    }
+
     /// The complex deviation that a value means there.
     pub fn deviation(self, value: f64, group: &Group) -> Complex64 {
         let value = value * self.lever(group);
@@ -258,6 +263,11 @@ impl Field {
 }
 
 impl Series {
+    /// Of a frame.
+    pub fn mean(&self, frame: usize) -> f64 {
+        self.value[frame * self.loops..(frame + 1) * self.loops].iter().sum::<f64>() / self.loops as f64
+    }
+
     /// Log-likelihood that some frames gain by a prediction, of which `predicted` gives frame, loop and radar time.
     pub fn gain(&self, field: &Field, frames: &[usize], predicted: impl Fn(usize, usize, f64) -> f64) -> f64 {
         let mut gain = 0.0;

@@ -134,6 +134,24 @@ fn a_drift_and_a_step_are_measured() {
     assert_eq!(step.place.frames, Some(vec![7, 8, 9, 10, 11]));
 }
 
+/// At some ranges something moves slowly besides, by far more than the noise, and otherwise at each of them.
+#[test]
+fn a_drift_is_told_from_slow_parts_of_a_body() {
+    let radar = Radar::small(1);
+    let delay_of_bin = radar.sample_rate_hz / (64.0 * radar.slope_hz_per_s);
+    let wandering = |frame: usize, delay_s: f64| {
+        let (bin, time) = (delay_s / delay_of_bin, frame as f64 / 11.0);
+        let turn = Complex64::cis(2.0 * time * (1.0 + (0.9 * bin).sin()) + 1.7 * bin);
+        if (14.0..30.0).contains(&bin) { 1.0 + 0.04 * turn } else { Complex64::ONE }
+    };
+    let wanders = |seed: u64| evidence(seed, |_, frame, _, delay_s| wandering(frame, delay_s));
+    assert!(best(&wanders(24)).is_none_or(|found| found.id != Some("gain_drift")));
+    let drifts = evidence(25, |_, frame, _, delay_s| wandering(frame, delay_s) * (1.0 + 0.1 * frame as f64 / 11.0));
+    let found = best(&drifts).expect("nothing found");
+    assert_eq!(found.id, Some("gain_drift"));
+    within(&found, "db", 20.0 * 1.1f64.log10());
+}
+
 #[test]
 fn the_first_chirps_of_a_frame_settle() {
     let found = found_once(evidence(6, |_, _, index, _| (1.0 - 0.1 * (-(index as f64) / 5.0).exp()).into()));
