@@ -14,12 +14,14 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::change::{Change, Moves};
 use super::coupling;
 use crate::diagnosis::power::{PowerModel, part_templates};
-use crate::diagnosis::suspects::slow;
+use crate::diagnosis::suspects::{paths::still_power, slow};
 use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, Rung, statistics};
 use crate::radar::Radar;
 
 /// Expected power over the noise from which on a cell is used.
 const LEAST_POWER: f32 = 10.0;
+/// Share of what stands still that may be left at low Doppler when it was taken out.
+const STILL_LEFT: f64 = 1e-3;
 /// What the power model's errors do to a phase and to a power between neighbouring receivers (half a wavelength).
 const PHASE_FLOOR_RAD: f64 = 1.5 * PI / 180.0;
 const GAIN_FLOOR_DB: f64 = 0.2;
@@ -71,8 +73,9 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     if receivers < 2 || hopped || evidence.accepted.contains(&"channel_mismatch") {
         return vec![];
     }
+    let still = still_power(evidence);
     let sums: Vec<Option<Sums>> =
-        (0..evidence.cube.dims[0]).into_par_iter().map(|frame| sums(evidence, model, body, frame)).collect();
+        (0..evidence.cube.dims[0]).into_par_iter().map(|frame| sums(evidence, model, body, &still, frame)).collect();
     let of = |frames: &[usize]| frames.iter().filter_map(|&frame| sums[frame].clone()).collect::<Vec<Sums>>();
     let (training, held_out) = (of(&evidence.split.training), of(&evidence.split.held_out));
     if training.len() < 6 || held_out.is_empty() {
@@ -176,12 +179,16 @@ pub fn tail(t: f64, freedom: f64) -> f64 {
     if t <= 0.0 { 1.0 } else { StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| 2.0 * law.sf(t)) }
 }
 
-/// None where the body fills too few cells.
-fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: usize) -> Option<Sums> {
+/// None where the body fills too few cells. `still`: power of what stands still, by range.
+fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &[f64], frame: usize) -> Option<Sums> {
     let radar = &evidence.radar;
     let (receivers, transmitters) = (radar.rx_m.len(), radar.tx_m.len());
     let expected = model.expected(frame);
-    let cells: Vec<usize> = (0..model.size()).filter(|&cell| model.usable()[cell] && expected[cell] > LEAST_POWER).collect();
+    let map = &evidence.maps()[frame * model.size()..(frame + 1) * model.size()];
+    let samples = evidence.cube.dims[4];
+    // A body that hardly moves is known by what it leaves of itself where what stands still was taken out.
+    let of_the_body = |cell: usize| model.usable()[cell] || f64::from(map[cell]) > STILL_LEFT * still[cell % samples];
+    let cells: Vec<usize> = (0..model.size()).filter(|&cell| expected[cell] > LEAST_POWER && of_the_body(cell)).collect();
     if cells.len() < 10 {
         return None;
     }
@@ -208,7 +215,12 @@ fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: u
     for tx in 0..transmitters {
         let maps: Vec<_> = (0..receivers).map(|rx| evidence.range_doppler(frame, tx * receivers + rx)).collect();
         for (index, &cell) in cells.iter().enumerate() {
-            let weight = 1.0 / (f64::from(expected[cell]) * noise[tx * receivers].max(f64::MIN_POSITIVE));
+            // A cell tells as much as any other about what its receivers have in common, however loud its speckle is.
+            let power = (0..receivers)
+                .map(|rx| maps[rx][cell].norm_sqr() / noise[tx * receivers + rx].max(f64::MIN_POSITIVE))
+                .sum::<f64>()
+                / receivers as f64;
+            let weight = 1.0 / ((power + f64::from(LEAST_POWER)) * noise[tx * receivers].max(f64::MIN_POSITIVE));
             result.cells += 1.0;
             for rx in 0..receivers {
                 let phase: f64 = (0..3)

@@ -18,6 +18,7 @@ mod tests;
 use crate::diagnosis::{Candidate, Evidence};
 
 use scene::Scene;
+pub use scene::still_power;
 
 /// A ghost must predict at least this share of the held-out frames that show it.
 const AGREEING: f64 = 0.6;
