@@ -119,6 +119,29 @@ fn two_effects_of_the_receiver_are_told_apart() {
     close(value(&report, "ramp_edge_transient", "samples"), 2.0, 0.1);
 }
 
+/// Almost all of this person's return is where what stands still was taken out.
+#[test]
+fn receivers_that_differ_are_told_by_a_person_who_hardly_moves() {
+    let folder = tempfile::tempdir().unwrap();
+    let person = "seed = 31\nframes = 12\nmesh_error_m = 2e-3\n[person]\naction = \"torso_rotation\"\n[surface]\nedge_m = 0.012";
+    let clean = report(&recorded(folder.path(), person));
+    assert_eq!(clean.verdict, Verdict::NoMismatch, "{:?}", clean.effects);
+    let folder = tempfile::tempdir().unwrap();
+    let uneven = format!("{person}\n[effects.channel_mismatch]\ngain_db = [0.0, 2.5]\nphase_deg = [0.0, 0.0]");
+    let found = report(&recorded(folder.path(), &uneven));
+    assert_eq!(ids(&found), ["channel_mismatch"]);
+    close(found.effects[0].parameters["gain_db"].value.as_array().unwrap()[1].as_f64().unwrap(), 2.5, 0.5);
+}
+
+/// All receivers hear a burst from one direction, but only while it lasts.
+#[test]
+fn a_few_bursts_are_no_noise_that_receivers_share() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "seed = 32\nframes = 12\neffects.interference = { bursts = 3, relative = 0.4, azimuth_deg = 9.0 }";
+    let found = report(&recorded(folder.path(), text));
+    assert!(!ids(&found).contains(&"correlated_noise"), "{:?}", ids(&found));
+}
+
 #[test]
 fn what_has_no_name_is_located_and_left_unnamed() {
     let Some(report) = planted("p8") else { return };

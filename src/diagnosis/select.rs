@@ -31,11 +31,21 @@ impl DiagnosisConfig {
 const ROUGH: [&str; 2] = ["additive fast-time", harmonic::QUADRATIC];
 const ROUGHLY: f64 = 0.1;
 
+/// What is undone chirp by chirp, each by its own estimate, leaves a little of everything that moves: paths below this share
+/// of its gain.
+const BY_CHIRP: [&str; 2] = ["phase_noise", "chirp_start_jitter"];
+const SLIGHTLY: f64 = 0.01;
+/// What it also leaves, at the chirps' edges, looks like these; a true one was there before.
+const LIKE_EDGES: [&str; 4] = ["ramp_edge_transient", "if_highpass", "if_lowpass", "if_delay"];
+
 /// What is named even where products of the signal with itself lie everywhere.
 const WHATEVER_THE_SIGNAL: [&str; 2] = ["iq_imbalance", "adc_saturation"];
 
 /// Stages of the signal's chain at which everything that is received is changed.
 const UPSTREAM: [&str; 2] = ["waveform", "receiver"];
+
+/// What raises the held-out frames' dB error by this factor as it is undone is not what happened.
+const FAR_WORSE: f64 = 1.6;
 
 /// Two instances of an effect closer than this are one.
 const NEAR_M: f64 = 0.3;
@@ -75,6 +85,10 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     // Candidates of the round before that could still turn out to be the same thing as what was accepted in it.
     let mut pending: Vec<Candidate> = vec![];
     let mut misfit = before;
+    // Names that would make everything far worse.
+    let mut refused: Vec<&'static str> = vec![];
+    // Names that passed on the untouched recording.
+    let mut at_first: Option<Vec<&'static str>> = None;
     for _ in 0..=thresholds.most {
         let evidence = current.as_ref().unwrap_or(&original);
         let found = suspicions(evidence);
@@ -90,10 +104,19 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         // So they do where products were taken out roughly.
         let bent = |effect: &Accepted| effect.candidate.behaves_like == harmonic::QUADRATIC;
         let mixed = evidence.products().mixed().is_some() || accepted.iter().any(bent);
+        let passes = |(suspect, candidate): &&(usize, Candidate)| thresholds.passes(*suspect, candidate);
+        let ids = || found.iter().filter(passes).filter_map(|(_, candidate)| candidate.id).collect();
+        let at_first: &Vec<&'static str> = at_first.get_or_insert_with(ids);
+        let by_chirp = accepted.iter().any(|effect| effect.candidate.id.is_some_and(|id| BY_CHIRP.contains(&id)));
+        let may_be_named = |id: &str| {
+            (!mixed || WHATEVER_THE_SIGNAL.contains(&id))
+                && (!by_chirp || !LIKE_EDGES.contains(&id) || at_first.contains(&id))
+                && !refused.contains(&id)
+        };
         let passing: Vec<&(usize, Candidate)> = found
             .iter()
-            .filter(|(suspect, candidate)| thresholds.passes(*suspect, candidate) && !known(candidate))
-            .filter(|(_, candidate)| !mixed || candidate.id.is_none_or(|id| WHATEVER_THE_SIGNAL.contains(&id)))
+            .filter(passes)
+            .filter(|(_, candidate)| !known(candidate) && candidate.id.is_none_or(may_be_named))
             .collect();
         if let Some(last) = accepted.last_mut() {
             settle_rivals(last, &pending, &passing, thresholds);
@@ -111,10 +134,16 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         if accepted.len() == thresholds.most {
             break;
         }
-        progress(&best.statement);
-        pending = passing.iter().map(|(_, other)| other.clone()).filter(|other| !std::ptr::eq(other, best)).collect();
         let next = evidence.with(best);
         let after = Misfit::after(&original, &next);
+        if let Some(id) = best.id
+            && after.db_mse > FAR_WORSE * misfit.db_mse
+        {
+            refused.push(id);
+            continue;
+        }
+        progress(&best.statement);
+        pending = passing.iter().map(|(_, other)| other.clone()).filter(|other| !std::ptr::eq(other, best)).collect();
         accepted.push(Accepted {
             suspect: *suspect,
             candidate: best.clone(),
@@ -168,7 +197,9 @@ fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
         && accepted.place.boundary.is_none()
         && !apart(accepted.place.range_m, candidate.place.range_m)
         && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
+    let by_chirp = accepted.id.is_some_and(|id| BY_CHIRP.contains(&id)) && is_path(candidate);
     (is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside) && candidate.gain < ROUGHLY * accepted.gain
+        || by_chirp && candidate.gain < SLIGHTLY * accepted.gain
 }
 
 /// What acts on every return makes echoes of the body too, which look like paths of their own: where both are suspected,

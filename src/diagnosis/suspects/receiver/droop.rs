@@ -16,6 +16,8 @@ use crate::diagnosis::{Cube, Evidence};
 
 /// Fewest training frames with movers, and fewest loops.
 const FEWEST: usize = 6;
+/// Correlation of neighbouring frames' slopes beyond which nothing more is lost.
+const MOST_ALIKE: f64 = 0.8;
 /// Power of a Doppler cell over the noise's from which on its slope is read.
 const OVER_NOISE: f64 = 3.0;
 
@@ -34,21 +36,25 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if variance <= 0.0 || !variance.is_finite() {
         return vec![];
     }
-    let t = mean / (variance / count).sqrt();
-    // Neighbouring frames of a slow person share some of their interference: half as many count.
-    let Ok(law) = StudentsT::new(0.0, 1.0, (0.5 * count - 1.0).max(1.0)) else { return vec![] };
-    let p_value = (2.0 * law.sf(t.abs() / std::f64::consts::SQRT_2)).min(1.0);
+    // Neighbouring frames of a slow person share some of their interference: fewer count.
+    let neighbours: f64 = training.windows(2).map(|pair| (pair[0] - mean) * (pair[1] - mean)).sum();
+    let alike = (neighbours / (count - 1.0) / variance).clamp(0.0, MOST_ALIKE);
+    let independent = count * (1.0 - alike) / (1.0 + alike);
+    let error = (variance / independent).sqrt();
+    let Ok(law) = StudentsT::new(0.0, 1.0, (independent - 1.0).max(1.0)) else { return vec![] };
+    let p_value = (2.0 * law.sf(mean.abs() / error)).min(1.0);
     let gain: f64 = evidence
         .split
         .held_out
         .iter()
         .filter_map(|&frame| slopes[frame])
-        .map(|slope| (slope.powi(2) - (slope - mean).powi(2)) / (4.0 * variance))
-        .sum();
+        .map(|slope| (slope.powi(2) - (slope - mean).powi(2)) / (2.0 * variance))
+        .sum::<f64>()
+        * independent
+        / count;
     if p_value > 1e-2 || gain <= 0.0 {
         return vec![];
     }
-    let error = (2.0 * variance / count).sqrt();
     let samples = evidence.cube.dims[4] as f64;
     let db = -mean;
     let total: f64 = evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum();

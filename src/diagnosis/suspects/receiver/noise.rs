@@ -16,8 +16,8 @@ const SHARED: f64 = 4.0;
 /// A cell's power over the noise, beyond which it is a stranger's.
 const STRANGER: f64 = 8.0;
 
-/// Share of the correlation that the middle one of all Doppler rows, and of all beat frequencies, must have: what a
-/// stranger's side lobes share lies in a few of them.
+/// Share of the correlation that the middle one of all Doppler rows, of all beat frequencies, and of all frames must have:
+/// what a stranger's side lobes or some bursts share lies in a few of them.
 const EVERYWHERE: f64 = 0.4;
 
 /// Cells that are looked at.
@@ -151,23 +151,24 @@ fn cells(evidence: &Evidence, frame: usize, bins: &[usize]) -> Cells {
     cells
 }
 
-/// Whether most Doppler rows and most beat frequencies share a correlation between the receivers.
+/// Whether most Doppler rows, most beat frequencies and most frames share a correlation between the receivers.
 fn is_everywhere(evidence: &Evidence, bins: &[usize], found: &DMatrix<Complex64>) -> bool {
     let (rx, loops, samples) = (evidence.cube.dims[2], evidence.cube.dims[3], evidence.cube.dims[4]);
     let pairs: Vec<(usize, usize)> = (0..rx).flat_map(|a| (0..a).map(move |b| (a, b))).collect();
     let whole: f64 = pairs.iter().map(|&pair| found[pair].norm_sqr()).sum();
     let (mut by_bin, mut by_row) = (vec![(0.0, 0.0); samples], vec![(0.0, 0.0); loops]);
+    let mut by_frame = vec![(0.0, 0.0); evidence.cube.dims[0]];
     for &frame in &evidence.split.training {
         let cells = cells(evidence, frame, bins);
         for (cell, [bin, row]) in cells.places.iter().enumerate() {
             let value = |c: usize| cells.values[c][cell];
             let along: f64 = pairs.iter().map(|&(a, b)| (found[(a, b)].conj() * value(a) * value(b).conj()).re).sum();
-            for sums in [&mut by_bin[*bin], &mut by_row[*row]] {
+            for sums in [&mut by_bin[*bin], &mut by_row[*row], &mut by_frame[frame]] {
                 *sums = (sums.0 + along, sums.1 + whole);
             }
         }
     }
-    [by_bin, by_row].into_iter().all(|sums| {
+    [by_bin, by_row, by_frame].into_iter().all(|sums| {
         let mut shares: Vec<f64> = sums.into_iter().filter(|sums| sums.1 > 0.0).map(|sums| sums.0 / sums.1).collect();
         median(&mut shares) > EVERYWHERE
     })

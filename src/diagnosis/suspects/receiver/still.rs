@@ -23,6 +23,8 @@ const LONGEST_EDGE: usize = 16;
 /// Share of what a free field explains that named elements must reach.
 const ENOUGH: f64 = 0.8;
 const MOST_ELEMENTS: usize = 8;
+/// Of the peak sample: beside a converter at its rail, a smaller constant may be what was guessed of the lost samples.
+const LEAST_BENT_OFFSET_DB: f64 = -40.0;
 
 #[derive(Clone, Debug, PartialEq)]
 enum Element {
@@ -48,18 +50,18 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let free_gain = field.gain(None, &field.mean);
     let explained = field.gain(None, &fitted.predicted);
     let named = elements.iter().any(|element| !matches!(element, Element::Image | Element::Square));
-    let spent: f64 = elements.iter().map(|element| unknowns(element, field.channels())).sum();
     let without = residual(&elements, &fitted, &field, &images);
     // A field far stronger than any filter's traces needs no second thought.
     let plain = explained >= 0.98 * free_gain && fitted.likelihood > 1e5;
     // A converter at its rail bends everything; what remains of it has no shape of its own, least of all a filter's.
     let bent = evidence.accepted.contains(&"adc_saturation");
     let filter = if plain || bent { None } else { response::find(evidence, &field, &without) };
-    // A filter has one unknown where a field has many: by the information criterion's price for each.
+    // A filter has one unknown where a field has many: by the information criterion's price for each. What is added explains
+    // itself as well as any filter does; a filter's traces it does not.
     if let Some(found) = &filter
         && found.likelihood > 12.0
         && found.likelihood >= ENOUGH * (free - 0.5 * field.freedom())
-        && (!named || found.likelihood - found.additive > penalty(&field) * (2.0 - spent))
+        && (!named || found.likelihood > found.additive.max(0.0))
     {
         return vec![found.candidate.clone()];
     }
@@ -286,6 +288,10 @@ fn candidate(
         * (amplitudes.iter().fold(0.0f64, |a, &b| a.max(b))
             / amplitudes.iter().fold(f64::INFINITY, |a, &b| a.min(b)).max(1e-300))
         .log10();
+    let bent = evidence.accepted.contains(&"adc_saturation");
+    if bent && *element == Element::Offset && level_db < LEAST_BENT_OFFSET_DB {
+        return None;
+    }
     let mut place = Place::at("receiver");
     let deviation = (field.variance.iter().sum::<f64>() / channels as f64 / evidence.split.training.len() as f64).sqrt();
     let (id, estimates, statement) = match *element {
