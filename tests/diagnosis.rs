@@ -127,10 +127,10 @@ fn receivers_that_differ_are_told_by_a_person_who_hardly_moves() {
     let clean = report(&recorded(folder.path(), person));
     assert_eq!(clean.verdict, Verdict::NoMismatch, "{:?}", clean.effects);
     let folder = tempfile::tempdir().unwrap();
-    let uneven = format!("{person}\n[effects.channel_mismatch]\ngain_db = [0.0, 2.5]\nphase_deg = [0.0, 0.0]");
+    let uneven = format!("{person}\n[effects.channel_mismatch]\ngain_db = [0.0, 4.0]\nphase_deg = [0.0, 0.0]");
     let found = report(&recorded(folder.path(), &uneven));
     assert_eq!(ids(&found), ["channel_mismatch"]);
-    close(found.effects[0].parameters["gain_db"].value.as_array().unwrap()[1].as_f64().unwrap(), 2.5, 0.5);
+    close(found.effects[0].parameters["gain_db"].value.as_array().unwrap()[1].as_f64().unwrap(), 4.0, 0.6);
 }
 
 /// All receivers hear a burst from one direction, but only while it lasts.
