@@ -133,15 +133,6 @@ fn receivers_that_differ_are_told_by_a_person_who_hardly_moves() {
     close(found.effects[0].parameters["gain_db"].value.as_array().unwrap()[1].as_f64().unwrap(), 4.0, 0.6);
 }
 
-/// All receivers hear a burst from one direction, but only while it lasts.
-#[test]
-fn a_few_bursts_are_no_noise_that_receivers_share() {
-    let folder = tempfile::tempdir().unwrap();
-    let text = "seed = 32\nframes = 12\neffects.interference = { bursts = 3, relative = 0.4, azimuth_deg = 9.0 }";
-    let found = report(&recorded(folder.path(), text));
-    assert!(!ids(&found).contains(&"correlated_noise"), "{:?}", ids(&found));
-}
-
 #[test]
 fn what_has_no_name_is_located_and_left_unnamed() {
     let Some(report) = planted("p8") else { return };

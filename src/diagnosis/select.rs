@@ -89,9 +89,11 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     let mut refused: Vec<&'static str> = vec![];
     // Names that passed on the untouched recording.
     let mut at_first: Option<Vec<&'static str>> = None;
+    // What was heard in a round that only refused a name: nothing has changed since.
+    let mut heard: Option<Vec<(usize, Candidate)>> = None;
     for _ in 0..=thresholds.most {
         let evidence = current.as_ref().unwrap_or(&original);
-        let found = suspicions(evidence);
+        let found = heard.take().unwrap_or_else(|| suspicions(evidence));
         p_value.get_or_insert_with(|| {
             // The limit of the whole at which the strongest suspicion would just pass.
             let shares: f64 = SUSPECTS.iter().map(|suspect| suspect.share).sum();
@@ -107,7 +109,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         let passes = |(suspect, candidate): &&(usize, Candidate)| thresholds.passes(*suspect, candidate);
         let ids = || found.iter().filter(passes).filter_map(|(_, candidate)| candidate.id).collect();
         let at_first: &Vec<&'static str> = at_first.get_or_insert_with(ids);
-        let by_chirp = accepted.iter().any(|effect| effect.candidate.id.is_some_and(|id| BY_CHIRP.contains(&id)));
+        let by_chirp = accepted.iter().any(|effect| is_by_chirp(&effect.candidate));
         let may_be_named = |id: &str| {
             (!mixed || WHATEVER_THE_SIGNAL.contains(&id))
                 && (!by_chirp || !LIKE_EDGES.contains(&id) || at_first.contains(&id))
@@ -140,6 +142,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
             && after.db_mse > FAR_WORSE * misfit.db_mse
         {
             refused.push(id);
+            heard = Some(found);
             continue;
         }
         progress(&best.statement);
@@ -186,6 +189,10 @@ fn is_rough(candidate: &Candidate) -> bool {
     candidate.id.is_none() && ROUGH.contains(&candidate.behaves_like)
 }
 
+fn is_by_chirp(candidate: &Candidate) -> bool {
+    candidate.id.is_some_and(|id| BY_CHIRP.contains(&id))
+}
+
 /// Whether a candidate may be no more than what a rough correction left, or what a moving path left around its range.
 fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let is_path = |candidate: &Candidate| {
@@ -197,7 +204,7 @@ fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
         && accepted.place.boundary.is_none()
         && !apart(accepted.place.range_m, candidate.place.range_m)
         && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
-    let by_chirp = accepted.id.is_some_and(|id| BY_CHIRP.contains(&id)) && is_path(candidate);
+    let by_chirp = is_by_chirp(accepted) && is_path(candidate);
     (is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside) && candidate.gain < ROUGHLY * accepted.gain
         || by_chirp && candidate.gain < SLIGHTLY * accepted.gain
 }

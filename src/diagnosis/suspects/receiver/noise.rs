@@ -241,3 +241,44 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
         correction: Correction::None,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::diagnosis::cube::Loaded;
+    use crate::radar::Radar;
+
+    /// Noise of four receivers; `shared`: amplitude of what all of them hear, by frame and chirp.
+    fn noise(shared: impl Fn(usize, usize) -> f64) -> Evidence {
+        let mut radar = Radar::small(12);
+        (radar.loops_per_frame, radar.samples_per_chirp) = (32, 64);
+        radar.tx_m = vec![[0.0; 3]];
+        radar.rx_m = (0..4).map(|rx| [0.0019 * f64::from(rx), 0.0, 0.0]).collect();
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut normal =
+            || -> Complex64 { Complex64::new(StandardNormal.sample(&mut random), StandardNormal.sample(&mut random)) };
+        let mut samples = vec![];
+        for frame in 0..12 {
+            let common: Vec<Complex64> = (0..32 * 64).map(|i| normal() * shared(frame, i / 64)).collect();
+            for _ in 0..4 {
+                samples.extend(common.iter().map(|common| common + normal()));
+            }
+        }
+        Evidence::new(Loaded::of_samples(radar, samples, [-1e3, 1e3]), None, None)
+    }
+
+    #[test]
+    fn what_receivers_share_all_the_time_is_correlated_noise_and_bursts_are_none() {
+        let bins: Vec<usize> = (2..63).collect();
+        let always = correlated(&noise(|_, _| 0.3), &bins).expect("nothing found");
+        let rho = always.estimates[0].values[0];
+        assert!((rho - 0.09 / 1.09).abs() < 0.02, "{rho}");
+        let bursts = noise(|frame, chirp| if [0, 5].contains(&frame) && chirp % 8 == 0 { 2.0 } else { 0.0 });
+        assert!(correlated(&bursts, &bins).is_none());
+        assert!(correlated(&noise(|_, _| 0.0), &bins).is_none());
+    }
+}

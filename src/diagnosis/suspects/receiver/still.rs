@@ -53,15 +53,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let without = residual(&elements, &fitted, &field, &images);
     // A field far stronger than any filter's traces needs no second thought.
     let plain = explained >= 0.98 * free_gain && fitted.likelihood > 1e5;
-    // A converter at its rail bends everything; what remains of it has no shape of its own, least of all a filter's.
-    let bent = evidence.accepted.contains(&"adc_saturation");
+    let bent = is_bent(evidence);
     let filter = if plain || bent { None } else { response::find(evidence, &field, &without) };
-    // A filter has one unknown where a field has many: by the information criterion's price for each. What is added explains
-    // itself as well as any filter does; a filter's traces it does not.
+    // What is added explains itself as well as any filter does; a filter's traces it does not.
     if let Some(found) = &filter
         && found.likelihood > 12.0
         && found.likelihood >= ENOUGH * (free - 0.5 * field.freedom())
-        && (!named || found.likelihood > found.additive.max(0.0))
+        && (!named || found.likelihood > found.additive)
     {
         return vec![found.candidate.clone()];
     }
@@ -72,6 +70,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         return vec![];
     }
     unexplained(evidence, &field, p_free, free_gain).into_iter().collect()
+}
+
+/// A converter at its rail bends everything; what remains of it has no shape of its own, least of all a filter's.
+fn is_bent(evidence: &Evidence) -> bool {
+    evidence.accepted.contains(&"adc_saturation")
 }
 
 /// Still chirps less what the elements make of them.
@@ -288,8 +291,7 @@ fn candidate(
         * (amplitudes.iter().fold(0.0f64, |a, &b| a.max(b))
             / amplitudes.iter().fold(f64::INFINITY, |a, &b| a.min(b)).max(1e-300))
         .log10();
-    let bent = evidence.accepted.contains(&"adc_saturation");
-    if bent && *element == Element::Offset && level_db < LEAST_BENT_OFFSET_DB {
+    if is_bent(evidence) && *element == Element::Offset && level_db < LEAST_BENT_OFFSET_DB {
         return None;
     }
     let mut place = Place::at("receiver");

@@ -1,8 +1,9 @@
 //! What changes from frame to frame: a slow drift, or a step with a date.
 
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::field::{Field, Part};
+use super::field::{Field, Part, Series};
 use crate::diagnosis::statistics;
 
 /// How the mean of a frame depends on its time.
@@ -56,12 +57,35 @@ fn place(frame: usize, frames: usize) -> f64 {
 /// Highest power of a drift.
 const DEGREE: usize = 3;
 
+/// Frame, mean of its chirps, and how sure that is (inverse variance).
+type Point = (usize, f64, f64);
+
+fn points(series: &Series, frames: &[usize]) -> Vec<Point> {
+    let known = frames.iter().filter(|&&frame| series.weight[frame] > 0.0);
+    known.map(|&frame| (frame, series.mean(frame), series.weight[frame] * series.loops as f64)).collect()
+}
+
+fn powers(frame: usize, degree: usize, frames: usize) -> DVector<f64> {
+    DVector::from_fn(degree + 1, |power, _| place(frame, frames).powi(power as i32))
+}
+
+/// Least squares: coefficients, lowest power first, and the normal equations' matrix.
+fn polynomial(points: &[Point], degree: usize, frames: usize) -> Option<(DVector<f64>, Cholesky<f64, Dyn>)> {
+    let (mut normal, mut right) = (DMatrix::zeros(degree + 1, degree + 1), DVector::zeros(degree + 1));
+    for &(frame, value, weight) in points {
+        let row = powers(frame, degree, frames);
+        right += &row * (weight * value);
+        normal += &row * row.transpose() * weight;
+    }
+    let normal = normal.cholesky()?;
+    Some((normal.solve(&right), normal))
+}
+
 /// The shape that explains the training frames best, more freedom paid for (BIC).
-pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -> Option<Drift> {
-    let series = &field.series(part, |_| true);
-    let loops = series.loops as f64;
-    let points: Vec<(usize, f64, f64)> =
-        training.iter().filter(|&&f| series.weight[f] > 0.0).map(|&f| (f, series.mean(f), series.weight[f] * loops)).collect();
+///
+/// `series`: of `part`, from all ranges.
+pub fn best(field: &Field, part: Part, series: &Series, training: &[usize], held_out: &[usize]) -> Option<Drift> {
+    let points = points(series, training);
     if points.len() < 5 {
         return None;
     }
@@ -80,21 +104,10 @@ pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -
         }
     };
     for degree in 1..=DEGREE.min(points.len() - 4) {
-        let size = degree + 1;
-        let row = |frame: usize| -> Vec<f64> { (0..size).map(|p| place(frame, field.frames).powi(p as i32)).collect() };
-        let mut normal = nalgebra::DMatrix::<f64>::zeros(size, size);
-        let mut right = nalgebra::DVector::<f64>::zeros(size);
-        for &(frame, value, weight) in &points {
-            let row = nalgebra::DVector::from_vec(row(frame));
-            right += &row * (weight * value);
-            normal += &row * row.transpose() * weight;
-        }
-        let Some(solved) = normal.cholesky() else { continue };
-        let c = solved.solve(&right);
-        let misfit =
-            points.iter().map(|(f, v, w)| w * (v - c.iter().zip(row(*f)).map(|(c, x)| c * x).sum::<f64>()).powi(2)).sum();
-        let ends = nalgebra::DVector::from_iterator(size, (0..size).map(|p| if p % 2 == 1 { 2.0 } else { 0.0 }));
-        let variance = ends.dot(&solved.solve(&ends));
+        let Some((c, normal)) = polynomial(&points, degree, field.frames) else { continue };
+        let misfit = points.iter().map(|(f, v, w)| w * (v - c.dot(&powers(*f, degree, field.frames))).powi(2)).sum();
+        let ends = DVector::from_fn(degree + 1, |power, _| if power % 2 == 1 { 2.0 } else { 0.0 });
+        let variance = ends.dot(&normal.solve(&ends));
         offer(Shape::Smooth(c.iter().copied().collect()), misfit, degree as f64, variance);
     }
     for at in 1..field.frames {
@@ -121,7 +134,7 @@ pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -
     let excess = (misfit / freedom_left).max(1.0);
     let ratio = (scatter - misfit).max(0.0) / freedom / (misfit / freedom_left).max(1.0);
     let own = fisher_tail(ratio, freedom, freedom_left);
-    let unlike = unlike_the_body(field, part, training, (scatter - misfit).max(0.0), freedom);
+    let unlike = unlike_the_body(field, part, &points, training, (scatter - misfit).max(0.0), freedom);
     let p = unlike.map_or(own, |unlike| statistics::corrected(own.min(unlike), 2.0));
     let drift = Drift {
         shape,
@@ -159,15 +172,15 @@ pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -
 /// Probability of a drift that moves the training frames' scatter by `scatter` (with `freedom` parameters), were it the body's
 /// slow parts: these turn at random in every range, so that they change its gain as much as its phase, and each range
 /// otherwise than the next. None where too few ranges tell.
-fn unlike_the_body(field: &Field, part: Part, training: &[usize], scatter: f64, freedom: f64) -> Option<f64> {
+fn unlike_the_body(field: &Field, part: Part, points: &[Point], training: &[usize], scatter: f64, freedom: f64) -> Option<f64> {
     const FEWEST_RANGES: f64 = 2.0;
-    let (degree, ranges) = (DEGREE as f64, 0..field.groups.len());
-    let whole = Slow::fit(field, part, training, |_| true)?;
+    let whole = Slow::fit(points, field.frames)?;
+    let of =
+        |part: Part, only: usize| Slow::fit(&self::points(&field.series(part, |group| group == only), training), field.frames);
     // Of each range that stands still: what its other component does slowly, and what its own does otherwise than all.
-    let odd: Vec<f64> = ranges
+    let odd: Vec<f64> = (0..field.groups.len())
         .filter_map(|only| {
-            let own = Slow::fit(field, part, training, |group| group == only)?;
-            let other = Slow::fit(field, part.other(), training, |group| group == only)?;
+            let (own, other) = (of(part, only)?, of(part.other(), only)?);
             Some(own.distance(&whole.coefficients) + other.distance(&[0.0; DEGREE]))
         })
         .collect();
@@ -176,7 +189,7 @@ fn unlike_the_body(field: &Field, part: Part, training: &[usize], scatter: f64, 
     if telling.is_nan() || telling < FEWEST_RANGES {
         return None;
     }
-    let count = odd.len() as f64;
+    let (degree, count) = (DEGREE as f64, odd.len() as f64);
     let usual = (sum / (degree * (2.0 * count - 1.0))).max(1.0);
     Some(fisher_tail(scatter / freedom / usual, freedom, degree * (2.0 * telling - 1.0)))
 }
@@ -186,39 +199,24 @@ struct Slow {
     /// Without the constant.
     coefficients: [f64; DEGREE],
     /// Inverse of their covariance.
-    information: nalgebra::DMatrix<f64>,
+    information: DMatrix<f64>,
 }
 
 impl Slow {
-    fn fit(field: &Field, part: Part, training: &[usize], wanted: impl Fn(usize) -> bool) -> Option<Self> {
-        let series = field.series(part, wanted);
-        let frames: Vec<usize> = training.iter().copied().filter(|&frame| series.weight[frame] > 0.0).collect();
-        if frames.len() < DEGREE + 3 {
+    fn fit(points: &[Point], frames: usize) -> Option<Self> {
+        if points.len() < DEGREE + 3 {
             return None;
         }
-        let size = DEGREE + 1;
-        let (mut normal, mut right) = (nalgebra::DMatrix::<f64>::zeros(size, size), nalgebra::DVector::<f64>::zeros(size));
-        for &frame in &frames {
-            let row = powers(frame, field.frames);
-            right += &row * (series.weight[frame] * series.loops as f64 * series.mean(frame));
-            normal += &row * row.transpose() * (series.weight[frame] * series.loops as f64);
-        }
-        let solved = normal.clone().cholesky()?.solve(&right);
-        // Schur complement: the constant is free.
-        let (first, rest) = (normal[(0, 0)], normal.view((1, 0), (DEGREE, 1)));
-        let information = normal.view((1, 1), (DEGREE, DEGREE)) - rest * rest.transpose() / first;
+        let (solved, normal) = polynomial(points, DEGREE, frames)?;
+        let information = normal.inverse().view((1, 1), (DEGREE, DEGREE)).clone_owned().try_inverse()?;
         Some(Self { coefficients: std::array::from_fn(|power| solved[power + 1]), information })
     }
 
     /// From other coefficients, in squares of standard deviations.
     fn distance(&self, other: &[f64; DEGREE]) -> f64 {
-        let apart = nalgebra::DVector::from_fn(DEGREE, |power, _| self.coefficients[power] - other[power]);
+        let apart = DVector::from_fn(DEGREE, |power, _| self.coefficients[power] - other[power]);
         (&self.information * &apart).dot(&apart)
     }
-}
-
-fn powers(frame: usize, frames: usize) -> nalgebra::DVector<f64> {
-    nalgebra::DVector::from_fn(DEGREE + 1, |power, _| place(frame, frames).powi(power as i32))
 }
 
 /// Probability that a ratio of variances exceeds this.

@@ -83,7 +83,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             continue;
         }
         let of_drift = |drift: &drift::Drift| field.shared(|frame, _, group| part.deviation(drift.value(frame), group));
-        if let Some(drift) = drift::best(&field, part, training, held_out).filter(of_drift) {
+        if let Some(drift) = drift::best(&field, part, &series, training, held_out).filter(of_drift) {
             found.push(candidates::of_drift(evidence, &field, part, &drift).into());
         }
         if let Some(random) = random::best(&field, part, training, held_out) {
