@@ -23,6 +23,31 @@ pub struct Calibration {
     simulated: f64,
 }
 
+/// σ of each component of a receiver's noise, mean over up to so many frames of every recording: from the median of their
+/// static-removed range-Doppler maps, which neither the room nor the person fills.
+///
+/// # Errors
+/// Samples that cannot be read.
+pub fn noise_level<'a>(recordings: impl IntoIterator<Item = &'a Recording>, frames: usize) -> Result<f64> {
+    let (mut variance, mut count) = (0.0, 0.0);
+    for recording in recordings {
+        let radar = &recording.radar;
+        let moving = Moving::new(radar);
+        for frame in spread(radar, frames) {
+            variance +=
+                moving.floor(&moving.map(&measured_frame(recording, frame)?)) / HeatmapConfig::default().noise_gain(radar);
+            count += 1.0;
+        }
+    }
+    Ok((variance / f64::max(count, 1.0)).sqrt())
+}
+
+/// Up to so many frames of a recording, evenly.
+fn spread(radar: &Radar, frames: usize) -> impl Iterator<Item = usize> + use<> {
+    let (all, count) = (radar.frames, frames.clamp(1, radar.frames.max(1)).min(radar.frames));
+    (0..count).map(move |part| (2 * part + 1) * all / (2 * count))
+}
+
 impl Calibration {
     /// Looks at up to `frames` frames of a recording, spread over it.
     ///
@@ -31,9 +56,7 @@ impl Calibration {
     pub fn add(&mut self, recording: &Recording, baseline: &dyn Baseline, frames: usize) -> Result<()> {
         let radar = baseline.radar();
         let moving = Moving::new(radar);
-        let count = frames.clamp(1, radar.frames.max(1)).min(radar.frames);
-        for part in 0..count {
-            let frame = (2 * part + 1) * radar.frames / (2 * count);
+        for frame in spread(radar, frames) {
             let measured = moving.map(&measured_frame(recording, frame)?);
             let simulated = moving.map(&baseline.clean_signal(frame)?.to_host());
             self.measured += person_power(&measured, moving.floor(&measured));
@@ -96,13 +119,13 @@ mod tests {
 
     use super::*;
     use crate::{
-        baselines::{MmGpe, MmGpeConfig, Rendering, RfGenesis, RfGenesisConfig, test_support::*},
+        baselines::{BaselineNoise, MmGpe, MmGpeConfig, Rendering, RfGenesis, RfGenesisConfig, test_support::*},
         data::{IfFrame, IfLayout, RecordingContents, write_recording},
         person::Person,
     };
 
     /// A recording of what a baseline itself makes, so many times louder.
-    fn louder(baseline: &dyn Baseline, person: &Person, gain: f64, folder: &std::path::Path) -> Recording {
+    fn louder(baseline: &dyn Baseline, person: &Person, gain: f64, noise: BaselineNoise, folder: &std::path::Path) -> Recording {
         let radar = baseline.radar();
         let contents = RecordingContents {
             radar,
@@ -113,7 +136,7 @@ mod tests {
             layout: IfLayout::Complex,
             truth: None,
         };
-        let rendering = Rendering { baseline, gain, noise: Some(1) };
+        let rendering = Rendering { baseline, gain, noise };
         let [_, tx, rx, loops, samples] = radar.dims();
         write_recording(folder, &contents, &mut |frame| {
             let signal = rendering.frame(frame)?;
@@ -132,12 +155,25 @@ mod tests {
         let released = RfGenesis::new(&radar, &person, &RfGenesisConfig::released(), &device).unwrap();
         for (baseline, gain) in [(&mmgpe as &dyn Baseline, 730.0), (&released as &dyn Baseline, 4e7)] {
             let folder = tempfile::tempdir().unwrap();
-            let recording = louder(baseline, &person, gain, &folder.path().join("recording"));
+            let noise = BaselineNoise::Rate { seed: 1 };
+            let recording = louder(baseline, &person, gain, noise, &folder.path().join("recording"));
             let mut calibration = Calibration::default();
             calibration.add(&recording, baseline, 2).unwrap();
             let found = calibration.gain().unwrap();
             assert!((found / gain - 1.0).abs() < 0.01, "{found}, wanted {gain}");
         }
+    }
+
+    #[test]
+    fn a_known_noise_is_found_again_beside_the_person() {
+        let radar = Radar { frames: 3, ..radar() };
+        let person = moving_ball([0.2, 2.5, 0.0], 0.1, [0.3, 1.2, 0.0]);
+        let mmgpe = MmGpe::new(&radar, &person, &MmGpeConfig::default(), &Device::flex()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let noise = BaselineNoise::Level { seed: 4, deviation: 3.0 };
+        let recording = louder(&mmgpe, &person, 1e5, noise, &folder.path().join("recording"));
+        let found = noise_level([&recording], 3).unwrap();
+        assert!((found / 3.0 - 1.0).abs() < 0.05, "{found}");
     }
 
     #[test]

@@ -15,9 +15,9 @@ mod rf_genesis;
 mod test_support;
 mod two_bounce;
 
-pub use calibrate::Calibration;
+pub use calibrate::{Calibration, noise_level};
 pub use mmgpe::{MmGpe, MmGpeConfig};
-pub use noise::{NOISE_RATE, Rendering};
+pub use noise::{BaselineNoise, NOISE_RATE, Rendering};
 pub use rf_genesis::{RfGenesis, RfGenesisConfig, Schedule, Strength};
 pub use two_bounce::{TwoBounce, TwoBounceConfig};
 

@@ -18,7 +18,8 @@ use super::{
 };
 use crate::{
     baselines::{
-        Baseline, Calibration, MmGpe, MmGpeConfig, NOISE_RATE, Rendering, RfGenesis, RfGenesisConfig, TwoBounce, TwoBounceConfig,
+        Baseline, BaselineNoise, Calibration, MmGpe, MmGpeConfig, NOISE_RATE, Rendering, RfGenesis, RfGenesisConfig, TwoBounce,
+        TwoBounceConfig, noise_level,
     },
     data::{
         Recording,
@@ -45,11 +46,14 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "gain")]
     calibrate: Vec<PathBuf>,
     /// Frames of each training recording that are looked at
-    #[arg(long, value_name = "COUNT", default_value_t = 4, requires = "calibrate")]
+    #[arg(long, value_name = "COUNT", default_value_t = 4)]
     calibration_frames: usize,
     /// The gain, as an earlier baseline.json has it
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     gain: Option<f64>,
+    /// Training recordings of the same radar whose receiver noise is added, in place of the paper's share of the signal
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "clean")]
+    receiver_noise: Vec<PathBuf>,
     /// Of the noise
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -83,7 +87,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 
     let out = arguments.out.out.clone().unwrap_or_else(|| "runs/baseline".into());
     let folder = AtomicFolder::create(&out)?;
-    let rendering = Rendering { baseline: &*baseline, gain, noise: (!arguments.clean).then_some(arguments.seed) };
+    let noise = noise(arguments, &recording)?;
+    let rendering = Rendering { baseline: &*baseline, gain, noise };
     let mut seconds = 0.0;
     let sequence = Sequence {
         radar: &recording.radar,
@@ -107,7 +112,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         "checkpoint": arguments.checkpoint,
         "gain": gain,
         "calibrated_on": arguments.calibrate,
-        "noise_rate": (!arguments.clean).then_some(NOISE_RATE),
+        "noise_rate": matches!(noise, BaselineNoise::Rate { .. }).then_some(NOISE_RATE),
+        "noise_level": if let BaselineNoise::Level { deviation, .. } = noise { Some(deviation) } else { None },
         "seed": arguments.seed,
         "frames": frames,
         "seconds_per_frame": seconds_per_frame,
@@ -216,15 +222,33 @@ fn gain(arguments: &Arguments, common: &Common, maker: &Maker, simulated: &Recor
     let progress = Progress::new("calibrating", arguments.calibrate.len(), common.quiet);
     let mut calibration = Calibration::default();
     for (done, folder) in arguments.calibrate.iter().enumerate() {
-        let recording = open(folder)?;
-        if !report::is_same_radar(&recording.radar, &simulated.radar) {
-            let expected = format!("that of {}", arguments.recording.display());
-            return Err(Error::field(folder.join("recording.toml"), "radar", "another radar", expected)
-                .with_hint("calibrate on recordings of the radar that is simulated"));
-        }
+        let recording = of_same_radar(folder, arguments, simulated)?;
         calibration.add(&recording, &*maker.make(folder, &recording)?, arguments.calibration_frames)?;
         progress.set(done + 1);
     }
     progress.finish();
     calibration.gain()
+}
+
+fn of_same_radar(folder: &Path, arguments: &Arguments, simulated: &Recording) -> Result<Recording> {
+    let recording = open(folder)?;
+    if !recording.radar.is_same_board(&simulated.radar) {
+        let expected = format!("that of {}", arguments.recording.display());
+        return Err(Error::field(folder.join("recording.toml"), "radar", "another radar", expected)
+            .with_hint("calibrate on recordings of the radar that is simulated"));
+    }
+    Ok(recording)
+}
+
+fn noise(arguments: &Arguments, simulated: &Recording) -> Result<BaselineNoise> {
+    let seed = arguments.seed;
+    if arguments.clean {
+        return Ok(BaselineNoise::None);
+    }
+    if arguments.receiver_noise.is_empty() {
+        return Ok(BaselineNoise::Rate { seed });
+    }
+    let recordings: Vec<Recording> =
+        arguments.receiver_noise.iter().map(|folder| of_same_radar(folder, arguments, simulated)).collect::<Result<_>>()?;
+    Ok(BaselineNoise::Level { seed, deviation: noise_level(&recordings, arguments.calibration_frames)? })
 }

@@ -50,16 +50,11 @@ pub(super) fn tell_notes(loaded: &LoadedRecording) {
 
 /// A trained simulator speaks for one radar; the number of frames is free.
 pub(super) fn same_radar(folder: &Path, found: &Radar, trained: &Radar) -> Result<()> {
-    if is_same_radar(found, trained) {
+    if found.is_same_board(trained) {
         return Ok(());
     }
     Err(Error::field(folder.join("recording.toml"), "radar", "another radar", "that of the checkpoint")
         .with_hint("train on a recording of this radar first; `hybridsim check` shows both"))
-}
-
-/// The number of frames and the rail may differ.
-pub(super) fn is_same_radar(a: &Radar, b: &Radar) -> bool {
-    (Radar { frames: b.frames, full_scale_codes: b.full_scale_codes, ..a.clone() }) == *b
 }
 
 /// Draws heatmaps of recordings of one radar.

@@ -9,6 +9,7 @@ use crate::{
     data::atomic,
     error::{Error, Result},
     experiments::{self, Plan, ReproduceConfig, Store, report, results, stage::read_record, stage::stage_folder},
+    lpips::Lpips,
 };
 
 #[derive(Args)]
@@ -42,6 +43,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         return Ok(());
     }
     let devices = devices(&common.device)?;
+    if let Some(lpips) = &config.comparison.lpips {
+        // A file that is none is refused now, not after the trainings.
+        Lpips::open(lpips, &devices[0])?;
+    }
     // As Burn prints it, without the wrapping type.
     let name = format!("{:?}", devices[0]).trim_start_matches("Device<").trim_end_matches('>').to_lowercase();
     let store = Store::open(&out, name)?;
@@ -58,7 +63,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 /// What was typed, as far as it decides the numbers.
 fn command(arguments: &Arguments, common: &Common) -> String {
     let sets: String = common.set.iter().map(|set| format!(" --set '{set}'")).collect();
-    format!("hybridsim reproduce {}{sets}", arguments.config.display())
+    let lpips = arguments.lpips.typed();
+    format!("hybridsim reproduce {}{sets}{lpips} --device {}", arguments.config.display(), common.device)
 }
 
 fn list(plan: &Plan, out: &Path) {

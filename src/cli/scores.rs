@@ -2,7 +2,7 @@
 
 use std::{fmt::Write, path::PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use crate::{
@@ -32,6 +32,15 @@ enum NetworkName {
 }
 
 impl LpipsArguments {
+    /// As it was typed, with a space before it; empty without.
+    pub fn typed(&self) -> String {
+        let (Some(network), Some(weights), Some(heads)) = (self.lpips, &self.lpips_weights, &self.lpips_heads) else {
+            return String::new();
+        };
+        let network = network.to_possible_value().expect("none is hidden");
+        format!(" --lpips {} --lpips-weights {} --lpips-heads {}", network.get_name(), weights.display(), heads.display())
+    }
+
     pub fn config(&self) -> Option<LpipsConfig> {
         let network = match self.lpips? {
             NetworkName::Alex => Network::Alex,

@@ -118,6 +118,10 @@ pub struct ReproduceConfig {
     pub variants: Vec<Variant>,
     #[serde(default = "all_baselines")]
     pub baselines: Vec<BaselineName>,
+    /// Each baseline a second time with the receiver's noise, as measured in the training recordings: the paper's noise is a
+    /// share of each method's own signal, which a method without the room's returns has little of.
+    #[serde(default = "yes")]
+    pub receiver_noise: bool,
     #[serde(default = "all_protocols")]
     pub protocols: Vec<Protocol>,
     /// The action of the training subject whose recording the detective looks at.
@@ -146,6 +150,10 @@ fn all_variants() -> Vec<Variant> {
 
 fn all_baselines() -> Vec<BaselineName> {
     BaselineName::ALL.to_vec()
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn all_protocols() -> Vec<Protocol> {

@@ -3,6 +3,7 @@
 //!
 //! - [`config`]: what is asked for
 //! - [`takes`], [`variants`]: who does what in which recording; ours and its ablations
+//! - [`preflight`]: what cannot work is refused before anything is recorded
 //! - [`task`], [`mod@plan`]: every stage with what it depends on, before any of them runs
 //! - [`stage`], [`mod@run`], [`steps`]: each is done once, under the hash of all that it depends on
 //! - [`results`], [`paper`], [`tables`], [`report`]: numbers, the paper's, and both side by side
@@ -10,6 +11,7 @@
 pub mod config;
 pub mod paper;
 pub mod plan;
+pub mod preflight;
 pub mod report;
 pub mod results;
 pub mod run;

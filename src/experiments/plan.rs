@@ -8,8 +8,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use serde_json::Value;
+use sha2::{Digest, Sha256};
 
 use super::config::{BaselineName, Protocol, ReproduceConfig, SubjectSplit};
+use super::preflight::{self, Board};
 use super::stage::{Key, read_record, stage_folder};
 use super::takes::{Take, check_split, takes_in};
 use super::task::Task;
@@ -23,6 +25,8 @@ use crate::training::TrainingConfig;
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     Baseline(BaselineName),
+    /// A baseline with the noise that the training recordings' receiver has, in place of the paper's share of the signal.
+    ReceiverNoise(BaselineName),
     Variant(Variant),
     /// The same truth recorded again with other noise: no simulator can do better.
     Again,
@@ -37,6 +41,7 @@ impl Method {
     pub fn id(self) -> String {
         match self {
             Self::Baseline(name) => name.id().into(),
+            Self::ReceiverNoise(name) => format!("{}-receiver-noise", name.id()),
             Self::Variant(variant) => variant.id().into(),
             Self::Again => "again".into(),
             Self::Adapted(frames) => format!("adapted_{frames}"),
@@ -48,6 +53,7 @@ impl Method {
     pub fn title(self) -> String {
         match self {
             Self::Baseline(name) => name.title().into(),
+            Self::ReceiverNoise(name) => format!("{}, receiver's noise", name.title()),
             Self::Variant(variant) => variant.title().into(),
             Self::Again => "measured again (ceiling)".into(),
             Self::Adapted(frames) => format!("HybridSim, adapted to {frames} frames"),
@@ -98,6 +104,7 @@ struct Place {
     recordings: PathBuf,
     again: Again,
     takes: Vec<Take>,
+    board: Board,
 }
 
 /// The same truth recorded a second time, for some subjects.
@@ -116,6 +123,8 @@ impl Place {
 struct Planner<'a> {
     config: &'a ReproduceConfig,
     root: &'a Path,
+    /// Of the files behind LPIPS.
+    weights: Option<String>,
     plan: Plan,
 }
 
@@ -124,7 +133,8 @@ struct Planner<'a> {
 /// # Errors
 /// Sites that cannot be read or split as asked for.
 pub fn plan(config: &ReproduceConfig, root: &Path) -> Result<Plan> {
-    let mut planner = Planner { config, root, plan: Plan::default() };
+    let weights = config.comparison.lpips.as_ref().map(|lpips| digest(&[&lpips.weights, &lpips.heads])).transpose()?;
+    let mut planner = Planner { config, root, weights, plan: Plan::default() };
     let first = planner.place("site", &config.site)?;
     let second = config.second_room.as_deref().map(|site| planner.place("second_room", site)).transpose()?;
     planner.all(&first, second.as_ref())?;
@@ -146,6 +156,12 @@ impl Planner<'_> {
             && second.of_subject(training).next().is_none()
         {
             return Err(Error::setting("second_room", second.recordings.display(), format!("recordings of {training}")));
+        }
+        preflight::check(self.config, "site", &first.board)?;
+        preflight::check_recognition(self.config, &first.board)?;
+        if let Some(second) = second {
+            preflight::check(self.config, "second_room", &second.board)?;
+            preflight::check_adaptation(self.config, &first.board, &second.board, second.of_subject(training).count())?;
         }
         let trained = self.trainings(first)?;
         let adapted = second.map(|second| self.adaptations(second, &trained[&Variant::Ours]));
@@ -178,10 +194,12 @@ impl Planner<'_> {
         if path.is_dir() {
             let recordings = path.canonicalize().map_err(|error| Error::read(path, error))?;
             let takes = takes_in(&recordings)?;
-            let key = Key::new(name, &(&recordings, &takes), &[]);
-            return Ok(Place { stage: None, key, recordings, again: Again::default(), takes });
+            let key = Key::new(name, &(&recordings, &takes, contents(&recordings)?), &[]);
+            let board = Board::of_recordings(&recordings, &takes)?;
+            return Ok(Place { stage: None, key, recordings, again: Again::default(), takes, board });
         }
         let config = SiteConfig::read(path, &[])?;
+        let board = Board::of_site(&config)?;
         if config.unseen.contains(&self.config.split.training) {
             let expected = format!("a subject that {} does not list as unseen", path.display());
             return Err(Error::setting("split.training", &self.config.split.training, expected));
@@ -206,6 +224,7 @@ impl Planner<'_> {
             recordings: folder.join("recordings"),
             again: Again { folder: folder.join("again"), subjects: again },
             takes,
+            board,
         })
     }
 
@@ -257,7 +276,9 @@ impl Planner<'_> {
     fn methods(&mut self, place: &Place, trained: &BTreeMap<Variant, Trained>) {
         let config = self.config;
         let SubjectSplit { training, unseen } = &config.split;
-        let baselines = config.baselines.iter().map(|&name| Method::Baseline(name));
+        let rules: &[fn(BaselineName) -> Method] =
+            if config.receiver_noise { &[Method::Baseline, Method::ReceiverNoise] } else { &[Method::Baseline] };
+        let baselines = config.baselines.iter().flat_map(|&name| rules.iter().map(move |rule| rule(name)));
         let mut methods: Vec<(Method, MethodStages)> = baselines
             .chain(config.variants.iter().map(|&variant| Method::Variant(variant)))
             .map(|method| (method, MethodStages::default()))
@@ -274,7 +295,11 @@ impl Planner<'_> {
                         stages.train = Some(trained[&variant].stage);
                         self.simulate(*method, place, take, &trained[&variant])
                     }
-                    Method::Baseline(name) => self.baseline(name, place, take, ours),
+                    Method::Baseline(name) => self.baseline(name, None, place, take, ours),
+                    Method::ReceiverNoise(name) => {
+                        let noise = self.noise_level(place);
+                        self.baseline(name, Some(noise), place, take, ours)
+                    }
                     _ => unreachable!("the first site has baselines and variants"),
                 };
                 stages.simulate.push(simulate);
@@ -331,7 +356,8 @@ impl Planner<'_> {
     }
 
     /// A baseline's simulation of a recording: with our direct path, or at the level that the training recordings have.
-    fn baseline(&mut self, method: BaselineName, place: &Place, take: &Take, ours: &Trained) -> usize {
+    /// With the noise that a stage has measured, or the paper's.
+    fn baseline(&mut self, method: BaselineName, noise: Option<usize>, place: &Place, take: &Take, ours: &Trained) -> usize {
         let (parent, gain, checkpoint) = match method {
             BaselineName::TwoBounce => (ours.stage, None, Some(ours.checkpoint.clone())),
             _ => {
@@ -342,8 +368,17 @@ impl Planner<'_> {
             }
         };
         let (recording, name, seed) = (place.recordings.join(&take.name), take.name.clone(), self.config.seed);
-        let task = Task::Baseline { method, recording, name, gain, checkpoint, seed };
-        self.add(format!("simulate/{}/{}", method.id(), take.name), vec![parent], Some(place), task)
+        let noise_level = noise.map(|stage| self.folder(stage).join("noise.json"));
+        let task = Task::Baseline { method, recording, name, gain, checkpoint, noise_level, seed };
+        let id = if noise.is_some() { Method::ReceiverNoise(method) } else { Method::Baseline(method) }.id();
+        let parents = std::iter::once(parent).chain(noise).collect();
+        self.add(format!("simulate/{id}/{}", take.name), parents, Some(place), task)
+    }
+
+    /// Of the receiver, as the training recordings show it.
+    fn noise_level(&mut self, place: &Place) -> usize {
+        let (recordings, names) = training_takes(self.config, place);
+        self.add("noise_level".into(), vec![], Some(place), Task::NoiseLevel { recordings, names })
     }
 
     /// Scores of a simulated recording, where its subject is one that is scored.
@@ -381,6 +416,7 @@ impl Planner<'_> {
             name: take.name.clone(),
             held_out_fraction: held_out.then_some(self.config.training.validation_fraction),
             comparison: Box::new(self.config.comparison.clone()),
+            weights: self.weights.clone(),
         }
     }
 
@@ -457,6 +493,36 @@ impl MethodStages {
             self.cross_actions.push(take.action.clone());
         }
     }
+}
+
+/// First digits of the hash of some files.
+fn digest(files: &[&PathBuf]) -> Result<String> {
+    let mut digest = Sha256::new();
+    for file in files {
+        digest.update(std::fs::read(file).map_err(|error| Error::read(file.as_path(), error))?);
+    }
+    Ok(digest.finalize().iter().take(6).map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Every file below a folder with its size and when it was written: what is changed there is done again.
+fn contents(folder: &Path) -> Result<Vec<(String, u64, u128)>> {
+    let mut found = vec![];
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(at) = folders.pop() {
+        for entry in std::fs::read_dir(&at).map_err(|error| Error::read(&at, error))?.flatten() {
+            let path = entry.path();
+            let about = std::fs::metadata(&path).map_err(|error| Error::read(&path, error))?;
+            if about.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let written = about.modified().ok().and_then(|time| time.duration_since(std::time::UNIX_EPOCH).ok());
+            let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
+            found.push((name, about.len(), written.map_or(0, |since| since.as_nanos())));
+        }
+    }
+    found.sort();
+    Ok(found)
 }
 
 /// Folders and names of the recordings that simulators learn from.

@@ -13,7 +13,8 @@ fn place(name: &str) -> Place {
     let takes: Vec<Take> = SUBJECTS.iter().flat_map(|subject| ACTIONS.map(|action| take(subject, action))).collect();
     let recordings = Path::new("/measured").join(name);
     let again = Again { folder: "/again".into(), subjects: vec!["s1".into(), "s2".into()] };
-    Place { stage: None, key: Key::new(name, &takes, &[]), recordings, again, takes }
+    let board = Board { radar: crate::radar::Radar::small(24), room: None };
+    Place { stage: None, key: Key::new(name, &takes, &[]), recordings, again, takes, board }
 }
 
 fn config() -> ReproduceConfig {
@@ -21,7 +22,7 @@ fn config() -> ReproduceConfig {
 }
 
 fn planned(config: &ReproduceConfig) -> Plan {
-    let mut planner = Planner { config, root: Path::new("/out"), plan: Plan::default() };
+    let mut planner = Planner { config, root: Path::new("/out"), weights: None, plan: Plan::default() };
     planner.all(&place("site"), Some(&place("second_room"))).unwrap();
     planner.plan
 }
@@ -51,7 +52,7 @@ fn nothing_is_learned_from_what_it_is_tested_on() {
                 trainings += 1;
                 assert!(names.iter().all(|name| name.starts_with("s1_")) && recordings.len() == ACTIONS.len());
             }
-            Task::Calibrate { names, .. } => assert!(names.iter().all(|name| name.starts_with("s1_"))),
+            Task::Calibrate { names, .. } | Task::NoiseLevel { names, .. } => assert!(names.iter().all(|name| name.starts_with("s1_"))),
             Task::Compare { name, held_out_fraction, .. } => {
                 assert_eq!(held_out_fraction.is_some(), name.starts_with("s1_"), "{name}");
             }
@@ -118,7 +119,7 @@ fn adaptations_start_from_ours_and_take_as_many_steps_whatever_the_frames() {
 #[test]
 fn a_second_room_without_the_training_subject_is_refused() {
     let config = config();
-    let mut planner = Planner { config: &config, root: Path::new("/out"), plan: Plan::default() };
+    let mut planner = Planner { config: &config, root: Path::new("/out"), weights: None, plan: Plan::default() };
     let mut second = place("second_room");
     second.takes.retain(|take| take.subject != "s1");
     let error = planner.all(&place("site"), Some(&second)).unwrap_err().to_string();

@@ -26,6 +26,10 @@ pub fn write(folder: &Path, config: &ReproduceConfig, results: &Results, command
         config.split.unseen,
     )
     .expect("text grows");
+    if results.programs.len() > 1 {
+        let builds: Vec<String> = results.programs.iter().map(|(build, stages)| format!("{build} ({stages})")).collect();
+        writeln!(text, "The stages were done by several builds of the program: {}.\n", builds.join(", ")).expect("text grows");
+    }
     text += &tables(results);
     atomic::write_text(folder.join("results.md"), &text)?;
     let json = serde_json::to_string_pretty(results).expect("plain data");

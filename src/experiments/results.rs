@@ -10,8 +10,10 @@ use super::config::Protocol;
 use super::plan::{Method, MethodStages, Plan};
 use super::stage::{Record, Store};
 use super::steps::{Speed, read_json};
+use super::variants::Variant;
 use crate::error::{Error, Result};
-use crate::evaluation::{Evaluation, SequenceSummary, over_sequences};
+use crate::evaluation::{Evaluation, ScoreSummary, SequenceSummary, over_sequences};
+use crate::metrics::Spread;
 
 /// The action on which the paper looks at the graph convolution more closely (table 6).
 pub const ARM_SWING: &str = "walk_back_forth_armswing";
@@ -26,6 +28,8 @@ pub struct MethodResults {
     pub intra: Option<SequenceSummary>,
     /// The unseen subject.
     pub cross: Option<SequenceSummary>,
+    /// The full simulator's PSNR less this method's, recording by recording of the unseen subject.
+    pub behind: Option<Behind>,
     /// The unseen subject's walking back and forth with arm swing.
     pub arm_swing: Option<SequenceSummary>,
     pub recognition: BTreeMap<Protocol, Recognised>,
@@ -33,6 +37,29 @@ pub struct MethodResults {
     pub training: Option<Training>,
     /// Over all simulated recordings.
     pub speed: Option<Speed>,
+}
+
+/// Paired differences of PSNR, dB.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Behind {
+    pub global: Option<Spread>,
+    pub moving: Option<Spread>,
+    pub person: Option<Spread>,
+}
+
+impl Behind {
+    /// None where the two were not scored on the same recordings.
+    fn of(ours: &[Evaluation], other: &[Evaluation]) -> Option<Self> {
+        let region = |of: fn(&Evaluation) -> Option<&ScoreSummary>| {
+            let pairs = ours.iter().zip(other).filter_map(|(ours, other)| Some((of(ours)?, of(other)?)));
+            Spread::of(pairs.map(|(ours, other)| ours.psnr_db.mean - other.psnr_db.mean))
+        };
+        (!ours.is_empty() && ours.len() == other.len()).then(|| Self {
+            global: region(|evaluation| evaluation.global.as_ref()),
+            moving: region(|evaluation| evaluation.moving.as_ref()),
+            person: region(|evaluation| evaluation.person.as_ref()),
+        })
+    }
 }
 
 /// A share of the test windows, with its 95 % interval over recordings.
@@ -47,6 +74,8 @@ pub struct Share {
 pub struct Recognised {
     pub accuracy: Share,
     pub macro_f1: Share,
+    /// Exact 95 % interval of the share of whole recordings that are judged rightly.
+    pub sequence_interval: [f64; 2],
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -65,21 +94,28 @@ pub struct Results {
     /// Wall clock by kind of stage, seconds; what was cached counts as it was when it was made.
     pub seconds: BTreeMap<String, f64>,
     pub device: String,
+    /// Stages by the build that did them: a stage is not done again because the program has changed.
+    pub programs: BTreeMap<String, usize>,
 }
 
 /// Reads what a plan's stages left; `records` are in the plan's order.
 pub fn collect(plan: &Plan, store: &Store, records: &[Record]) -> Result<Results> {
     let folder = |stage: usize| store.folder(&plan.stages[stage].key);
+    let scores = |stages: &[usize]| read_all::<Evaluation>(stages.iter().map(|&stage| folder(stage).join("scores.json")));
+    let full = plan.methods.iter().find(|(method, _)| *method == Method::Variant(Variant::Ours));
+    let ours = scores(full.map_or(&[], |(_, stages)| &stages.cross))?;
     let methods = plan
         .methods
         .iter()
         .map(|(method, stages)| {
+            let cross = scores(&stages.cross)?;
             Ok(MethodResults {
                 id: method.id(),
                 method: *method,
-                intra: summary(&read_all(stages.intra.iter().map(|&stage| folder(stage).join("scores.json")))?),
-                cross: summary(&read_all(stages.cross.iter().map(|&stage| folder(stage).join("scores.json")))?),
-                arm_swing: summary(&read_all(arm_swing(stages).map(|stage| folder(stage).join("scores.json")))?),
+                intra: summary(&scores(&stages.intra)?),
+                behind: Behind::of(&ours, &cross),
+                cross: summary(&cross),
+                arm_swing: summary(&scores(&arm_swing(stages).collect::<Vec<_>>())?),
                 recognition: stages
                     .recognition
                     .iter()
@@ -103,8 +139,10 @@ pub fn collect(plan: &Plan, store: &Store, records: &[Record]) -> Result<Results
         let kind = record.name.split('/').next().expect("the first part").to_string();
         *seconds.entry(kind).or_default() += record.seconds;
     }
+    let mut programs = BTreeMap::new();
+    records.iter().for_each(|record| *programs.entry(record.program.clone()).or_default() += 1);
     let device = records.last().map(|record| record.device.clone()).unwrap_or_default();
-    Ok(Results { methods, effects: effects.transpose()?, seconds, device })
+    Ok(Results { methods, effects: effects.transpose()?, seconds, device, programs })
 }
 
 fn arm_swing(stages: &MethodStages) -> impl Iterator<Item = usize> + '_ {

@@ -62,9 +62,10 @@ fn work(stage: &Stage, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut(us
             simulate::simulate(&task, folder, bench, step)
         }
         Task::Calibrate { method, recordings, .. } => baseline::calibrate(*method, recordings, folder, bench, step),
-        Task::Baseline { method, recording, name, gain, checkpoint, seed } => {
-            let (gain, checkpoint) = (gain.as_deref(), checkpoint.as_deref());
-            let task = baseline::Task { method: *method, recording, name, gain, checkpoint, seed: *seed };
+        Task::NoiseLevel { recordings, .. } => baseline::measure_noise(recordings, folder, step),
+        Task::Baseline { method, recording, name, gain, checkpoint, noise_level, seed } => {
+            let [gain, checkpoint, noise_level] = [gain, checkpoint, noise_level].map(Option::as_deref);
+            let task = baseline::Task { method: *method, recording, name, gain, checkpoint, noise_level, seed: *seed };
             baseline::simulate(&task, folder, bench, step)
         }
         Task::Compare { measured, simulated, held_out_fraction, comparison, .. } => {

@@ -47,6 +47,9 @@ impl Key {
 pub struct Record {
     pub name: String,
     pub version: String,
+    /// First digits of the hash of the program that did it.
+    #[serde(default)]
+    pub program: String,
     /// Folders of the stages that this one read.
     pub parents: Vec<String>,
     pub settings: Value,
@@ -61,6 +64,7 @@ pub struct Record {
 pub struct Store {
     root: PathBuf,
     device: String,
+    program: String,
     /// Held for as long as this process writes here.
     _lock: File,
 }
@@ -78,7 +82,7 @@ impl Store {
                 hint: Some("wait for it, or choose another folder with --out".into()),
             });
         }
-        Ok(Self { root: root.into(), device: device.into(), _lock: lock })
+        Ok(Self { root: root.into(), device: device.into(), program: program(), _lock: lock })
     }
 
     /// Where the results of a stage are, or will be.
@@ -112,6 +116,7 @@ impl Store {
         let record = Record {
             name: key.name.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
+            program: self.program.clone(),
             parents,
             settings,
             device: self.device.clone(),
@@ -128,6 +133,16 @@ impl Store {
         let _ = fs::remove_dir_all(&target);
         fs::rename(&unfinished, &target).map_err(|error| Error::write(&target, error))?;
         Ok(record)
+    }
+}
+
+/// Which build this is; empty where the program cannot be read.
+fn program() -> String {
+    let bytes = std::env::current_exe().and_then(fs::read).unwrap_or_default();
+    if bytes.is_empty() {
+        String::new()
+    } else {
+        Sha256::digest(bytes).iter().take(4).map(|byte| format!("{byte:02x}")).collect()
     }
 }
 

@@ -61,6 +61,12 @@ pub enum Task {
         recordings: Vec<PathBuf>,
         names: Vec<String>,
     },
+    /// Leaves `noise.json`: what the receiver adds to each component of a sample.
+    NoiseLevel {
+        #[serde(skip)]
+        recordings: Vec<PathBuf>,
+        names: Vec<String>,
+    },
     /// Leaves what `Simulate` does.
     Baseline {
         method: BaselineName,
@@ -71,6 +77,9 @@ pub enum Task {
         gain: Option<PathBuf>,
         #[serde(skip)]
         checkpoint: Option<PathBuf>,
+        /// Absent: the paper's noise.
+        #[serde(skip)]
+        noise_level: Option<PathBuf>,
         seed: u64,
     },
     /// Leaves `scores.json`.
@@ -83,6 +92,9 @@ pub enum Task {
         /// Scored are the frames that training held out, so large a part of the recording; all by default.
         held_out_fraction: Option<f64>,
         comparison: Box<ComparisonConfig>,
+        /// Hash of the files behind LPIPS.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        weights: Option<String>,
     },
     /// Leaves `classifier/`, with `recognition.json` and `confusion.png`.
     Recognise {

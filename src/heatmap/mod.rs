@@ -26,6 +26,8 @@ pub use windows::Window;
 
 use serde::{Deserialize, Serialize};
 
+use crate::radar::{Radar, Sampling};
+
 /// How IF samples become maps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -49,6 +51,15 @@ impl HeatmapConfig {
     /// The floor as an amplitude, for [`power_db`] and [`Map::db`].
     pub fn floor_amplitude(&self, peak_amplitude: f64) -> f64 {
         peak_amplitude * 10f64.powf(self.floor_db / 20.0)
+    }
+
+    /// Mean power of a cell for white noise of variance 1 in each component of a sample.
+    pub fn noise_gain(&self, radar: &Radar) -> f64 {
+        let squares = |weights: Vec<f64>| weights.iter().map(|weight| weight * weight).sum::<f64>();
+        let over_range = squares(self.range_window.weights(radar.samples_per_chirp));
+        let over_doppler = squares(self.doppler_window.weights(radar.loops_per_frame));
+        // Two components; or one, whose amplitude the maps double.
+        over_range * over_doppler * if radar.sampling == Sampling::Real { 4.0 } else { 2.0 }
     }
 }
 

@@ -82,6 +82,11 @@ impl Radar {
         highest_beat_hz * SPEED_OF_LIGHT / (2.0 * self.slope_hz_per_s)
     }
 
+    /// Whether two recordings are of one radar with the same settings: the number of frames and the rail may differ.
+    pub fn is_same_board(&self, other: &Self) -> bool {
+        (Self { frames: other.frames, full_scale_codes: other.full_scale_codes, ..self.clone() }) == *other
+    }
+
     /// From one chirp of a transmitter to its next.
     pub fn loop_period_s(&self) -> f64 {
         self.chirp_period_s * self.tx_m.len() as f64

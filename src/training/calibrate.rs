@@ -16,7 +16,7 @@ use crate::{
     complex::Complex,
     error::{Error, Result},
     heatmap::{HeatmapConfig, RangeDoppler, remove_loop_mean},
-    radar::{Radar, Sampling},
+    radar::Sampling,
     simulator::{Mode, Simulator, Surfaces},
 };
 
@@ -147,7 +147,7 @@ impl Levels {
         self.simulated += values(of_body.clone().power()).iter().chain(&values(of_room.clone().power())).sum::<f64>();
         let moving = power(remove_loop_mean(measured.clone()));
         let floor = median(&moving) / LN_2;
-        self.noise += floor / noise_gain(radar, heatmap);
+        self.noise += floor / heatmap.noise_gain(radar);
         self.frames += 1.0;
         for (measured, simulated) in moving.iter().zip(power(remove_loop_mean(of_body))) {
             if *measured > ABOVE_NOISE * floor {
@@ -160,15 +160,6 @@ impl Levels {
         self.simulated_still += still(of_room);
         Ok(())
     }
-}
-
-/// Power of a heatmap's cell for white noise of variance 1 in each component of a sample.
-fn noise_gain(radar: &Radar, heatmap: &HeatmapConfig) -> f64 {
-    let squares = |weights: Vec<f64>| weights.iter().map(|weight| weight * weight).sum::<f64>();
-    let over_range = squares(heatmap.range_window.weights(radar.samples_per_chirp));
-    let over_doppler = squares(heatmap.doppler_window.weights(radar.loops_per_frame));
-    // Two components; or one, whose amplitude the maps double.
-    over_range * over_doppler * if radar.sampling == Sampling::Real { 4.0 } else { 2.0 }
 }
 
 fn median(values: &[f64]) -> f64 {

@@ -9,20 +9,34 @@ use super::bench::{Bench, seed_of};
 use super::measure::{read_json, write_json};
 use super::simulate::write_frames;
 use crate::baselines::{
-    Baseline, Calibration, MmGpe, MmGpeConfig, Rendering, RfGenesis, RfGenesisConfig, TwoBounce, TwoBounceConfig,
+    Baseline, BaselineNoise, Calibration, MmGpe, MmGpeConfig, Rendering, RfGenesis, RfGenesisConfig, TwoBounce, TwoBounceConfig,
+    noise_level,
 };
 use crate::data::Recording;
 use crate::error::{Error, Result};
 use crate::experiments::config::BaselineName;
 use crate::person::Person;
 
-/// Frames of each training recording that the gain is found on.
+/// Frames of each training recording that gain and noise are found on.
 const CALIBRATION_FRAMES: usize = 4;
 
 /// Amplitude from a method's own unit to the receiver's.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Gain {
     gain: f64,
+}
+
+/// σ of each component of a sample.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct NoiseLevel {
+    deviation: f64,
+}
+
+/// Measures the receiver's noise in training recordings.
+pub fn measure_noise(recordings: &[PathBuf], folder: &Path, step: &mut dyn FnMut(usize, usize)) -> Result<()> {
+    let opened: Vec<Recording> = recordings.iter().map(Recording::open).collect::<Result<_>>()?;
+    step(0, recordings.len());
+    write_json(&folder.join("noise.json"), &NoiseLevel { deviation: noise_level(&opened, CALIBRATION_FRAMES)? })
 }
 
 /// Finds a method's one gain on training recordings.
@@ -49,6 +63,8 @@ pub struct Task<'a> {
     /// Absent for a method that is in the receiver's unit already.
     pub gain: Option<&'a Path>,
     pub checkpoint: Option<&'a Path>,
+    /// Absent: the paper's noise.
+    pub noise_level: Option<&'a Path>,
     pub seed: u64,
 }
 
@@ -56,8 +72,14 @@ pub fn simulate(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn Fn
     let recording = Recording::open(task.recording)?;
     let baseline = open(task.method, &recording, task.checkpoint, bench.device())?;
     let gain = task.gain.map(read_json::<Gain>).transpose()?.map_or(1.0, |found| found.gain);
-    let rendering = Rendering { baseline: &*baseline, gain, noise: Some(seed_of(task.seed, task.name)) };
-    write_frames(folder, &recording, &|_| Ok(()), &mut |frame| rendering.frame(frame), step)
+    let seed = seed_of(task.seed, task.name);
+    let noise = match task.noise_level.map(read_json::<NoiseLevel>).transpose()? {
+        Some(NoiseLevel { deviation }) => BaselineNoise::Level { seed, deviation },
+        None => BaselineNoise::Rate { seed },
+    };
+    let rendering = Rendering { baseline: &*baseline, gain, noise };
+    let speed = write_frames(folder, &recording, &|_| Ok(()), &mut |frame| rendering.frame(frame), step)?;
+    write_json(&folder.join("speed.json"), &speed)
 }
 
 /// # Errors

@@ -28,12 +28,14 @@ pub struct Bench {
     pub devices: Vec<Device>,
     training: Option<(Vec<PathBuf>, Geometry, Rc<Vec<LoadedRecording>>)>,
     simulated: (PathBuf, HashMap<Geometry, Rc<LoadedRecording>>),
+    /// What the geometry of the simulated recording took.
+    geometry_s: HashMap<Geometry, f64>,
     lpips: Option<(LpipsConfig, Rc<Lpips>)>,
 }
 
 impl Bench {
     pub fn new(devices: &[Device]) -> Self {
-        Self { devices: devices.to_vec(), training: None, simulated: Default::default(), lpips: None }
+        Self { devices: devices.to_vec(), training: None, simulated: Default::default(), geometry_s: HashMap::new(), lpips: None }
     }
 
     /// # Panics
@@ -72,6 +74,7 @@ impl Bench {
         self.training = None;
         if self.simulated.0 != folder {
             self.simulated = (folder.into(), HashMap::new());
+            self.geometry_s.clear();
         }
         let wanted = geometry(config);
         if let Some(known) = self.simulated.1.get(&wanted) {
@@ -80,6 +83,16 @@ impl Bench {
         let loaded = Rc::new(LoadedRecording::open(folder, config, false)?);
         self.simulated.1.insert(wanted, loaded.clone());
         Ok(loaded)
+    }
+}
+
+impl Bench {
+    /// The longest that the geometry of the simulated recording has taken; a simulator that needed `seconds` for it may have
+    /// found it done.
+    pub fn charged_geometry_s(&mut self, config: &SimulatorConfig, seconds: f64) -> f64 {
+        let known = self.geometry_s.entry(geometry(config)).or_default();
+        *known = known.max(seconds);
+        *known
     }
 }
 

@@ -15,7 +15,7 @@ use crate::training::{FrameSplit, Split};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Speed {
     pub frames: usize,
-    /// Poses and visibility, seconds over all frames; next to nothing where another method has asked before.
+    /// Poses and visibility, seconds over all frames; a baseline's count as part of its signal.
     pub geometry_s: f64,
     /// From there to samples.
     pub signal_s: f64,

@@ -29,7 +29,10 @@ pub fn simulate(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn Fn
     let simulation = Simulation::new(&simulator, &loaded.scene, seed_of(task.seed, task.name), true);
     // Where everything is and who is seen; kept for the next method.
     let look = |frame| loaded.scene.view(frame).map(drop);
-    write_frames(folder, &loaded.recording, &look, &mut |frame| simulation.frame(frame), step)
+    let speed = write_frames(folder, &loaded.recording, &look, &mut |frame| simulation.frame(frame), step)?;
+    // Whoever comes first works it out; the others are charged as much.
+    let speed = Speed { geometry_s: bench.charged_geometry_s(&config, speed.geometry_s), ..speed };
+    write_json(&folder.join("speed.json"), &speed)
 }
 
 /// A trained simulator, with the graph convolution kept on at inference or not.
@@ -41,15 +44,15 @@ fn open(checkpoint: &Path, graph_at_inference: bool, device: &Device) -> Result<
     Ok((load_weights(checkpoint, with_stable_ids(simulator))?, config))
 }
 
-/// Writes `recording/`, the same scene as the measured one with simulated samples, and `speed.json`, where the time of
-/// `look` counts as that of the geometry.
+/// Writes `recording/`, the same scene as the measured one with simulated samples; the time of `look` counts as that of the
+/// geometry.
 pub fn write_frames(
     folder: &Path,
     recording: &Recording,
     look: &dyn Fn(usize) -> Result<()>,
     simulated: &mut dyn FnMut(usize) -> Result<Vec<Complex32>>,
     step: &mut dyn FnMut(usize, usize),
-) -> Result<()> {
+) -> Result<Speed> {
     let radar = &recording.radar;
     let complex = radar.sampling == Sampling::Complex;
     let contents = RecordingContents {
@@ -76,5 +79,5 @@ pub fn write_frames(
         let im = complex.then(|| signal.iter().map(|value| value.im).collect());
         Ok(IfFrame::new([tx, rx, loops, samples], signal.iter().map(|value| value.re).collect(), im))
     })?;
-    write_json(&folder.join("speed.json"), &speed)
+    Ok(speed)
 }
