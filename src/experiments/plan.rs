@@ -212,10 +212,7 @@ impl Planner<'_> {
         // Posing everybody, as the plan of a site does, is not needed again once they are recorded.
         let takes = match read_record(&folder) {
             Some(_) => takes_in(&folder.join("recordings"))?,
-            None => site::sequences(&config, &settings_folder)?
-                .into_iter()
-                .map(|sequence| Take { name: sequence.name, subject: sequence.subject, action: sequence.action.name().into() })
-                .collect(),
+            None => planned(&config, &settings_folder)?,
         };
         let key = self.plan.stages[stage].key.clone();
         Ok(Place {
@@ -493,6 +490,15 @@ impl MethodStages {
             self.cross_actions.push(take.action.clone());
         }
     }
+}
+
+/// The recordings that a site will have, in the order in which [`takes_in`] finds them afterwards: keys depend on it.
+fn planned(config: &SiteConfig, settings_folder: &Path) -> Result<Vec<Take>> {
+    let take =
+        |sequence: site::Sequence| Take { name: sequence.name, subject: sequence.subject, action: sequence.action.name().into() };
+    let mut takes: Vec<Take> = site::sequences(config, settings_folder)?.into_iter().map(take).collect();
+    takes.sort();
+    Ok(takes)
 }
 
 /// First digits of the hash of some files.

@@ -52,7 +52,9 @@ fn nothing_is_learned_from_what_it_is_tested_on() {
                 trainings += 1;
                 assert!(names.iter().all(|name| name.starts_with("s1_")) && recordings.len() == ACTIONS.len());
             }
-            Task::Calibrate { names, .. } | Task::NoiseLevel { names, .. } => assert!(names.iter().all(|name| name.starts_with("s1_"))),
+            Task::Calibrate { names, .. } | Task::NoiseLevel { names, .. } => {
+                assert!(names.iter().all(|name| name.starts_with("s1_")))
+            }
             Task::Compare { name, held_out_fraction, .. } => {
                 assert_eq!(held_out_fraction.is_some(), name.starts_with("s1_"), "{name}");
             }
@@ -68,8 +70,8 @@ fn nothing_is_learned_from_what_it_is_tested_on() {
             _ => {}
         }
     }
-    // Ten variants less the one that shares its training, and the second room's two.
-    assert_eq!((trainings, classifiers), (9 + 2, 2 * (4 + 10 + 1)));
+    // Ten variants less the one that shares its training, and the second room's two; four baselines under two kinds of noise.
+    assert_eq!((trainings, classifiers), (9 + 2, 2 * (2 * 4 + 10 + 1)));
 }
 
 #[test]
@@ -124,4 +126,14 @@ fn a_second_room_without_the_training_subject_is_refused() {
     second.takes.retain(|take| take.subject != "s1");
     let error = planner.all(&place("site"), Some(&second)).unwrap_err().to_string();
     assert!(error.contains("`second_room`") && error.contains("recordings of s1"), "{error}");
+}
+
+/// A run that is started again must find what it did.
+#[test]
+fn takes_are_planned_in_the_order_in_which_they_are_found() {
+    let config = SiteConfig::read(Path::new("configs/site_reproduce_smoke.toml"), &[]).unwrap();
+    let names: Vec<String> = super::planned(&config, Path::new("configs")).unwrap().into_iter().map(|take| take.name).collect();
+    let mut sorted = names.clone();
+    sorted.sort();
+    assert!(names == sorted && names.len() == 8, "{names:?}");
 }

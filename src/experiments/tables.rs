@@ -188,6 +188,9 @@ fn recognition(results: &Results) -> String {
                 exact one of whole recordings judged by their windows' mean; that of F1 is over recordings drawn again. First two \
                 columns: the classifier learned from simulations of the unseen subject's own motions, as in the paper; last two: of \
                 the other subjects' motions.";
+    if results.methods.iter().all(|found| found.recognition.is_empty()) {
+        return String::new();
+    }
     let mut table = Table::new("Recognition (paper, table 2)", note, &columns);
     for found in compared(results) {
         let same = recognised(found.recognition.get(&Protocol::SameMotions), paper::cross(found.method));
