@@ -191,6 +191,11 @@ fn baselines_write_recordings_with_the_labels_of_what_they_imitate() {
         assert!(about["gain"].as_f64().unwrap() > 0.0 && about["seconds_per_frame"].as_f64().unwrap() > 0.0);
         assert_eq!(about["noise_rate"], 0.025);
     }
+    let arguments = ["baseline", "mmgpe", &recorded, "-q", "--device", "flex", "--out", "noisy", "--receiver-noise", &recorded];
+    assert!(hybridsim(&arguments, folder.path()).status.success());
+    let about = std::fs::read_to_string(folder.path().join("noisy/baseline.json")).unwrap();
+    let about: serde_json::Value = serde_json::from_str(&about).unwrap();
+    assert!(about["noise_rate"].is_null() && about["noise_level"].as_f64().unwrap() > 0.0, "{about}");
     let refused = |arguments: &[&str]| hybridsim(&[&["baseline"], arguments].concat(), folder.path());
     assert_refused(&refused(&["two-bounce", &recorded]), 2, &["--checkpoint belongs to two-bounce", "hint: "]);
     assert_refused(&refused(&["mmgpe", &recorded, "--set", "diffus=1"]), 2, &["unknown key `diffus`", "`diffuse`"]);
@@ -223,6 +228,14 @@ fn effects_are_part_of_the_checkpoint_and_can_be_left_out() {
     assert_refused(&hybridsim(&wrong, folder.path()), 2, &["`simulator.effects.0.id` is if_hipass", "if_highpass"]);
     let recorded = recording().display().to_string();
     let output = hybridsim(&["evaluate", "--checkpoint", "run/best", &recorded, "-q", "--without-effects"], folder.path());
+    assert!(output.status.success(), "{}", err(&output));
+    let shown = hybridsim(&["check", "run/best"], folder.path());
+    assert!(String::from_utf8_lossy(&shown.stdout).contains("effect if_highpass: corner_hz"), "{shown:?}");
+    // Another training may start from its weights with other effects.
+    let start = format!("training.start_from={:?}", folder.path().join("run/best").display().to_string());
+    let sets = ["--set", "training.epochs=1", "--set", &recordings, "--set", "simulator.effects=[]", "--set", &start];
+    let output =
+        hybridsim(&[&["train", &test_config(), "-q", "--device", "flex", "--out", "onwards"], &sets[..]].concat(), folder.path());
     assert!(output.status.success(), "{}", err(&output));
 }
 

@@ -210,30 +210,64 @@ fn a_recording_that_says_nothing_gets_that_answer() {
     let found = report(&noise);
     assert_eq!(found.verdict, Verdict::Undecided);
     assert!(found.reason.contains("too noisy"), "{}", found.reason);
-    let dead = folder.path().join("dead");
-    rewritten(&plain, &dead, |_, re, im| {
-        let half = re.len() / 2;
-        re[half..].fill(0.0);
-        im[half..].fill(0.0);
+    let undecided = |name: &str, change: &dyn Fn(usize, &mut [f32], &mut [f32])| {
+        let folder = folder.path().join(name);
+        rewritten(&plain, &folder, change);
+        let found = report(&folder);
+        assert_eq!(found.verdict, Verdict::Undecided, "{name}");
+        found.reason
+    };
+    let second = |values: &mut [f32]| values.len() / 2..values.len();
+    let dead = undecided("dead", &|_, re, im| {
+        let of = second(re);
+        re[of.clone()].fill(0.0);
+        im[of].fill(0.0);
     });
-    let found = report(&dead);
-    assert_eq!(found.verdict, Verdict::Undecided);
-    assert!(found.reason.contains("rx 1"), "{}", found.reason);
+    assert!(dead.contains("rx 1 is constant") && !dead.contains("frames"), "{dead}");
+    let dies = undecided("dies", &|frame, re, im| {
+        let of = second(re);
+        if frame >= 5 {
+            re[of.clone()].fill(0.0);
+            im[of].fill(0.0);
+        }
+    });
+    assert!(dies.contains("rx 1 is constant in 3 frames from 5 to 7"), "{dies}");
+    let missing = undecided("missing", &|_, _, im| im.fill(0.0));
+    assert!(missing.contains("Q of tx 0 rx 0 is constant"), "{missing}");
+    let deaf = undecided("deaf", &|frame, re, im| {
+        for at in second(re) {
+            let drawn_at = 2 * (frame * 2 * 32 * 64 + at);
+            (re[at], im[at]) = (100.0 * drawn[drawn_at] as f32, 100.0 * drawn[drawn_at + 1] as f32);
+        }
+    });
+    assert!(deaf.contains("rx 1 holds nothing but noise"), "{deaf}");
+    let saturated = undecided("saturated", &|_, re, im| re.iter_mut().chain(im).for_each(|value| *value = 9.0 * value.signum()));
+    assert!(saturated.contains("saturated"), "{saturated}");
 }
 
 #[test]
 fn a_body_in_the_wrong_place_is_reported_not_fitted_away() {
     let folder = tempfile::tempdir().unwrap();
     let plain = recorded(folder.path(), "seed = 5");
-    let moved = folder.path().join("recording/recording.toml");
-    let text = std::fs::read_to_string(&moved).unwrap();
+    let header = folder.path().join("recording/recording.toml");
+    let text = std::fs::read_to_string(&header).unwrap();
+    let reason = |text: String| {
+        std::fs::write(&header, text).unwrap();
+        let found = report(&plain);
+        assert_eq!(found.verdict, Verdict::Undecided, "{:?}", found.audit);
+        found.reason
+    };
     let line = text.lines().find(|line| line.starts_with("origin_m")).unwrap();
     let origin: Vec<f64> = line.split(['[', ']', ',']).filter_map(|part| part.trim().parse().ok()).collect();
-    let farther = format!("origin_m = [{}, {}, {}]", origin[0], origin[1] + 1.2, origin[2]);
-    std::fs::write(&moved, text.replace(line, &farther)).unwrap();
-    let found = report(&plain);
-    assert_eq!(found.verdict, Verdict::Undecided, "{:?}", found.audit);
-    assert!(found.reason.contains("wrong place"), "{}", found.reason);
+    let at = |y: f64| text.replace(line, &format!("origin_m = [{}, {y}, {}]", origin[0], origin[2]));
+    let farther = reason(at(origin[1] + 1.2));
+    assert!(farther.contains("wrong place"), "{farther}");
+    let outside = reason(at(origin[1] + 6.0));
+    assert!(outside.contains("behind the front boundary"), "{outside}");
+    // A room that ends before the body.
+    let line = text.lines().find(|line| line.starts_with("front_m")).unwrap();
+    let small = reason(text.replace(line, "front_m = 1.0"));
+    assert!(small.contains("behind the front boundary, which is 1.00 m away"), "{small}");
 }
 
 /// Nothing planted, with honest imperfections: millimetres of mesh error, unknown phase, different people and noise.

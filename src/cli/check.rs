@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use burn::tensor::Device;
 use clap::Args;
 
 use super::{Common, Out, report};
@@ -27,7 +28,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let path = &arguments.path;
     if path.join("checkpoint.toml").is_file() {
-        let state = checkpoint::read_state(path)?;
+        let (simulator, state) = checkpoint::open(path, &Device::flex())?;
         say!(
             "checkpoint of hybridsim {}, {} epochs, best in epoch {}",
             state.version,
@@ -35,6 +36,12 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
             state.progress.best_epoch + 1
         );
         show_radar(&state.site.radar, state.site.room.as_ref());
+        for effect in simulator.effects.settings() {
+            let values = effect.parameters.iter().map(|(name, values)| format!("{name} {values:.4?}"));
+            let values: Vec<String> = effect.choice.iter().cloned().chain(values).collect();
+            let off = if effect.enabled { "" } else { " (switched off)" };
+            say!("effect {}{off}: {}", effect.id, values.join(", "));
+        }
         return Ok(());
     }
     if path.is_dir() {

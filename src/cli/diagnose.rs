@@ -5,6 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use burn::tensor::Device;
 use clap::Args;
 
 use super::{Common, device, progress::Progress};
@@ -16,6 +17,7 @@ use crate::{
         simulate::{Simulated, Start, before_and_after},
     },
     error::{Error, Result},
+    training::checkpoint,
 };
 
 #[derive(Args)]
@@ -38,6 +40,16 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         Some(path) => Config::read(path, &common.set)?,
         None => Config::defaults(&common.set)?,
     };
+    // What would be refused after the diagnosis is refused before it; an earlier answer must not pass for this one's.
+    let device = device(&common.device)?;
+    if let Some(checkpoint) = &arguments.checkpoint {
+        checkpoint::read_state(checkpoint)?;
+    }
+    for earlier in ["report.json", "report.html"].map(|name| arguments.out.join(name)) {
+        if earlier.exists() {
+            std::fs::remove_file(&earlier).map_err(|error| Error::write(&earlier, error))?;
+        }
+    }
     let recording = Recording::open(&arguments.recording)?;
     let progress = Progress::new("diagnosing", config.diagnosis.most + 2 * config.diagnosis.epochs, common.quiet);
     let mut steps = 0;
@@ -48,7 +60,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     let mut diagnosis = diagnosis::diagnose(&recording, &config.diagnosis, &mut tell)?;
     std::fs::create_dir_all(&arguments.out).map_err(|error| Error::write(&arguments.out, error))?;
-    let simulated = simulate(arguments, common, &config, &mut diagnosis, &mut tell)?;
+    let simulated = simulate(arguments, &device, &config, &mut diagnosis, &mut tell)?;
     let html = diagnosis::html::html(&diagnosis, simulated.as_ref())?;
     progress.finish();
     write(&arguments.out, &diagnosis, &html)?;
@@ -59,25 +71,34 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 /// The trained simulator, without and with what was found.
 fn simulate(
     arguments: &Arguments,
-    common: &Common,
+    device: &Device,
     config: &Config,
     diagnosis: &mut Diagnosis,
     tell: &mut dyn FnMut(&str),
 ) -> Result<Option<Simulated>> {
+    let (effects, keep) = (diagnosis.effects(), arguments.out.join("simulator"));
+    // One with another recording's effects must not stay.
+    if keep.exists() {
+        std::fs::remove_dir_all(&keep).map_err(|error| Error::write(&keep, error))?;
+    }
     if diagnosis.explanation.is_none() || config.diagnosis.epochs == 0 {
         return Ok(None);
     }
-    let effects = diagnosis.effects();
     let start = Start {
         simulator: &config.simulator,
         learning: &config.training,
         epochs: config.diagnosis.epochs,
         seed: config.diagnosis.seed,
-        device: &device(&common.device)?,
+        device,
         checkpoint: arguments.checkpoint.as_deref(),
     };
-    let simulated = before_and_after(&arguments.recording, &effects, &start, &arguments.out.join("simulator"), tell)?;
+    let simulated = before_and_after(&arguments.recording, &effects, &start, &keep, tell)?;
     diagnosis.report.simulator = simulated.as_ref().map(|simulated| simulated.fit);
+    if simulated.is_none() {
+        let note =
+            "no simulator was trained, and no checkpoint left: neither body nor room is known, or there are fewer than 4 frames";
+        diagnosis.report.notes.push(note.into());
+    }
     Ok(simulated)
 }
 

@@ -7,8 +7,10 @@ use serde::{Deserialize, Serialize};
 use super::cube::Loaded;
 use super::evidence::{Evidence, spectrum};
 use super::prediction::Point;
+use super::statistics::median;
 use super::support::Support;
 use crate::radar::Radar;
+use crate::room::Boundary;
 
 /// One thing that was checked.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,9 +30,24 @@ impl Check {
 /// How much stronger a wrong convention must fit before it is believed, dB of energy at the predicted cells.
 const CLEARLY_DB: f64 = 6.0;
 /// Largest shift of the body that counts as an effect and not as a wrong scene.
-const CALIBRATION_M: f64 = 0.6;
+const CALIBRATION_M: f64 = 0.45;
 /// A cell counts as a return above this many times the noise.
 const RETURN: f64 = 20.0;
+/// Least energy over the noise where the motion puts the body.
+const PRESENT_DB: f64 = 2.0;
+/// Sine of the direction by which a body must be aside, and how well the receivers' phases must then agree, before it is
+/// believed: receivers that differ by chance are in no such order.
+const ASIDE: f64 = 0.3;
+const ALIGNED: f64 = 0.93;
+/// How far a motion may leave the room: the radar's place is known no better.
+const OUTSIDE_M: f64 = 0.3;
+/// A channel whose strongest return is weaker than the middle channel's by this much hears nothing.
+const DEAF_DB: f64 = 20.0;
+/// Share of the samples at the ends of the range from which on nothing can be restored.
+const SATURATED: f64 = 0.3;
+/// Fewest samples of a chirp, and fewest chirps of a transmitter in a frame, that say anything.
+const FEWEST_SAMPLES: usize = 16;
+const FEWEST_LOOPS: usize = 2;
 
 /// All checks.
 pub fn audit(evidence: &Evidence) -> Vec<Check> {
@@ -40,7 +57,9 @@ pub fn audit(evidence: &Evidence) -> Vec<Check> {
         checks.push(iq_order(evidence));
     }
     checks.extend(doppler_sign(evidence));
+    checks.extend(body_in_room(evidence));
     checks.extend(body_place(evidence));
+    checks.extend(body_direction(evidence));
     checks.extend(transmitter_order(evidence));
     checks.extend(room_ranges(evidence));
     checks.extend(numerics(evidence));
@@ -49,24 +68,29 @@ pub fn audit(evidence: &Evidence) -> Vec<Check> {
 
 /// Whether a check is about a convention that must hold before physics is looked for.
 pub fn is_convention(check: &Check) -> bool {
-    ["iq_order", "doppler_sign", "tx_order", "body_place", "room"].contains(&check.check.as_str())
+    ["iq_order", "doppler_sign", "tx_order", "body_in_room", "body_place", "body_direction", "room"]
+        .contains(&check.check.as_str())
 }
 
 /// Why nothing can be said about a recording, if so.
 pub fn undecidable(evidence: &Evidence, checks: &[Check]) -> Option<String> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    if samples < FEWEST_SAMPLES || loops < FEWEST_LOOPS {
+        return Some(format!(
+            "too little: {samples} samples a chirp and {loops} loops a frame, where {FEWEST_SAMPLES} and {FEWEST_LOOPS} are the \
+             least that say anything"
+        ));
+    }
     if let Some(bad) = checks.iter().find(|check| check.check == "channels" && !check.ok) {
         return Some(format!("a channel holds no signal: {}", bad.found));
     }
-    let samples = evidence.cube.dims[4];
-    let loops = (evidence.cube.dims[3] * evidence.split.training.len()) as f64;
-    let strongest = (0..evidence.cube.channels())
-        .flat_map(|channel| {
-            let variance = evidence.noise()[channel].max(f64::MIN_POSITIVE);
-            spectrum(&evidence.still()[channel * samples..][..samples])
-                .into_iter()
-                .map(move |value| value.norm_sqr() * loops / variance)
-        })
-        .fold(0.0, f64::max);
+    if rail_share(evidence) > SATURATED {
+        return Some(format!(
+            "saturated: {:.0} % of the samples lie at the ends of the converter's range",
+            100.0 * rail_share(evidence)
+        ));
+    }
+    let strongest = (0..evidence.cube.channels()).map(|channel| strongest_still(evidence, channel)).fold(0.0, f64::max);
     let moving = evidence.maps().iter().copied().fold(0.0, f32::max);
     // The mean of many cells' strongest noise value is about its logarithm.
     if strongest < RETURN && moving < RETURN as f32 {
@@ -78,33 +102,73 @@ pub fn undecidable(evidence: &Evidence, checks: &[Check]) -> Option<String> {
     None
 }
 
-fn channels(evidence: &Evidence) -> Vec<Check> {
-    let dead: Vec<String> = (0..evidence.cube.channels())
-        .filter(|&channel| {
-            (0..evidence.cube.dims[0]).all(|frame| {
-                let values = evidence.cube.channel(frame, channel);
-                values.iter().all(|value| *value == values[0])
-            })
-        })
-        .map(|channel| format!("tx {} rx {}", channel / evidence.cube.dims[2], channel % evidence.cube.dims[2]))
-        .collect();
-    let found = if dead.is_empty() { "all channels vary".into() } else { format!("constant: {}", dead.join(", ")) };
-    vec![Check::new("channels", "no channel is constant or missing", found, dead.is_empty())]
+/// Power of a channel's strongest static return over the noise of its mean.
+fn strongest_still(evidence: &Evidence, channel: usize) -> f64 {
+    let samples = evidence.cube.dims[4];
+    let loops = (evidence.cube.dims[3] * evidence.split.training.len()) as f64;
+    let variance = evidence.noise()[channel].max(f64::MIN_POSITIVE);
+    let spectrum = spectrum(&evidence.still()[channel * samples..][..samples]);
+    spectrum.into_iter().map(|value| value.norm_sqr() * loops / variance).fold(0.0, f64::max)
 }
 
-/// Samples that pile up at a converter's rail.
-fn rail(evidence: &Evidence) -> Check {
+fn channels(evidence: &Evidence) -> Vec<Check> {
+    let [frames, _, rx, ..] = evidence.cube.dims;
+    let name = |channel: usize| format!("tx {} rx {}", channel / rx, channel % rx);
+    let is_constant = |values: &[Complex64], part: fn(&Complex64) -> f64| values.iter().all(|v| part(v) == part(&values[0]));
+    let mut bad: Vec<String> = vec![];
+    for channel in 0..evidence.cube.channels() {
+        let of_frame = |frame: usize| evidence.cube.channel(frame, channel);
+        let both = |frame: &usize| is_constant(of_frame(*frame), |v| v.re) && is_constant(of_frame(*frame), |v| v.im);
+        let dead: Vec<usize> = (0..frames).filter(both).collect();
+        if dead.len() == frames {
+            bad.push(format!("{} is constant", name(channel)));
+        } else if let (Some(first), Some(last)) = (dead.first(), dead.last()) {
+            let frames = if dead.len() == 1 { "frame".into() } else { format!("{} frames from", dead.len()) };
+            let until = if dead.len() == 1 { String::new() } else { format!(" to {last}") };
+            bad.push(format!("{} is constant in {frames} {first}{until}", name(channel)));
+        } else if !evidence.is_real() {
+            for (what, part) in [("I", (|v| v.re) as fn(&Complex64) -> f64), ("Q", |v| v.im)] {
+                if (0..frames).all(|frame| is_constant(of_frame(frame), part)) {
+                    bad.push(format!("{what} of {} is constant", name(channel)));
+                }
+            }
+        }
+    }
+    if bad.is_empty() {
+        let returns: Vec<f64> = (0..evidence.cube.channels()).map(|channel| strongest_still(evidence, channel)).collect();
+        let middle = median(&mut returns.clone());
+        let deaf = |&channel: &usize| {
+            returns[channel] < RETURN && 10.0 * (middle / returns[channel].max(f64::MIN_POSITIVE)).log10() > DEAF_DB
+        };
+        bad.extend((0..returns.len()).filter(deaf).map(|channel| format!("{} holds nothing but noise", name(channel))));
+    }
+    let found = if bad.is_empty() { "all channels vary".into() } else { bad.join(", ") };
+    vec![Check::new("channels", "no channel is constant, missing or deaf", found, bad.is_empty())]
+}
+
+/// Share of the sampled components that lie at the recording's extremes.
+fn rail_share(evidence: &Evidence) -> f64 {
     let [low, high] = evidence.extremes;
-    let at = |value: f64, rail: f64| (value - rail).abs() < 0.5;
-    let parts = evidence.cube.samples.iter().flat_map(|value| [value.re, value.im]);
+    // Half a code, or a hair of the range for samples that are no codes.
+    let tolerance = if evidence.codes.is_some() { 0.5 } else { 1e-6 * (high - low) };
+    let at = |value: f64, rail: f64| (value - rail).abs() <= tolerance;
+    // Of a receiver without quadrature, the imaginary part was never sampled.
+    let sampled = if evidence.is_real() { 1 } else { 2 };
+    let parts = evidence.cube.samples.iter().flat_map(|value| [value.re, value.im].into_iter().take(sampled));
     let (mut count, mut all) = (0usize, 0usize);
     for part in parts {
         all += 1;
         count += usize::from(at(part, low) || at(part, high));
     }
-    let share = count as f64 / all.max(1) as f64;
+    count as f64 / all.max(1) as f64
+}
+
+/// Samples that pile up at a converter's rail.
+fn rail(evidence: &Evidence) -> Check {
+    let [low, high] = evidence.extremes;
+    let share = rail_share(evidence);
     // The extremes of a recording without clipping are reached once or twice.
-    let ok = evidence.is_real() || share < 1e-4;
+    let ok = share < 1e-4;
     Check::new(
         "converter_range",
         "the extreme codes are rare",
@@ -191,6 +255,34 @@ fn doppler_sign(evidence: &Evidence) -> Option<Check> {
     ))
 }
 
+/// Whether the motion stays in the room.
+fn body_in_room(evidence: &Evidence) -> Option<Check> {
+    let (body, room) = (evidence.body.as_ref()?, evidence.room.as_ref()?);
+    let beyond = |boundary: Boundary| -> Option<f64> {
+        let (distance, (axis, sign)) = (room.distance_m(boundary)?, boundary.axis());
+        // The middle of the body's points: a hand may reach through a wall that is not where it was measured.
+        let of_frame = |points: &Vec<Point>| {
+            let mut along: Vec<f64> = points.iter().map(|point| sign * point.position_m[axis] - distance).collect();
+            (!along.is_empty()).then(|| median(&mut along))
+        };
+        body.frames.iter().filter_map(of_frame).reduce(f64::max)
+    };
+    let farthest = room.boundaries().into_iter().filter_map(|boundary| Some((boundary, beyond(boundary)?)));
+    let (boundary, outside) = farthest.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let ok = outside <= OUTSIDE_M;
+    let found = if ok {
+        "it does".into()
+    } else {
+        let distance = room.distance_m(boundary).unwrap_or_default();
+        format!(
+            "the motion puts the body {outside:.2} m behind the {} boundary, which is {distance:.2} m away: the body's place or the \
+             room's size is wrong",
+            boundary.name()
+        )
+    };
+    Some(Check::new("body_in_room", "the body stays in the room", found, ok))
+}
+
 /// Whether the body is where the motion says, or somewhere else, or the motion belongs to other frames.
 fn body_place(evidence: &Evidence) -> Option<Check> {
     let body = evidence.body.as_ref()?;
@@ -214,9 +306,12 @@ fn body_place(evidence: &Evidence) -> Option<Check> {
         return None;
     }
     // Nearer than that it is a matter of calibration, which has effects of its own.
-    let ok = best - here < CLEARLY_DB || best_m.abs() < CALIBRATION_M;
+    let elsewhere = best - here >= CLEARLY_DB && best_m.abs() >= CALIBRATION_M;
+    let ok = !elsewhere && (here >= PRESENT_DB || best - here >= CLEARLY_DB);
     let found = if ok {
         format!("{here:.1} dB over the noise at the predicted ranges and velocities")
+    } else if !elsewhere {
+        format!("{here:.1} dB over the noise there: no body is heard where the motion puts it, nor at other ranges")
     } else {
         format!(
             "{here:.1} dB there, but {best:.1} dB {:.2} m {}: the body is in the wrong place, or the motion belongs to other frames",
@@ -225,6 +320,58 @@ fn body_place(evidence: &Evidence) -> Option<Check> {
         )
     };
     Some(Check::new("body_place", "moving energy where the motion puts the body", found, ok))
+}
+
+/// Whether the receivers' phases in the body's cells come from where the motion puts the body.
+fn body_direction(evidence: &Evidence) -> Option<Check> {
+    let [_, _, receivers, loops, samples] = evidence.cube.dims;
+    let (body, radar) = (evidence.body.as_ref().filter(|_| receivers >= 3)?, &evidence.radar);
+    let mut sums = vec![Complex64::ZERO; receivers];
+    for &frame in &evidence.split.training {
+        let Some(points) = body.frames.get(frame).filter(|points| !points.is_empty()) else { continue };
+        let maps: Vec<Vec<Complex64>> = (0..receivers).map(|rx| evidence.range_doppler(frame, rx)).collect();
+        for point in points.iter().step_by(points.len().div_ceil(200).max(1)) {
+            let [range, velocity] = range_and_velocity(point, radar);
+            let bin = (range / radar.range_resolution_m()).round() as usize;
+            let doppler = (velocity / radar.velocity_resolution_mps()).round() as i64;
+            if bin >= samples || doppler.abs() < 3 {
+                continue;
+            }
+            let cell = doppler.rem_euclid(loops as i64) as usize * samples + bin;
+            let distance = |rx: usize| {
+                let antenna = radar.rx_position_m(rx);
+                (0..3).map(|axis| (point.position_m[axis] - antenna[axis]).powi(2)).sum::<f64>().sqrt()
+            };
+            for (rx, sum) in sums.iter_mut().enumerate() {
+                let turns = (distance(rx) - distance(0)) / radar.wavelength_m();
+                *sum += maps[rx][cell] * maps[0][cell].conj() * Complex64::cis(-std::f64::consts::TAU * turns);
+            }
+        }
+    }
+    let phasors: Vec<Complex64> = sums.iter().filter(|sum| sum.norm() > 0.0).map(|sum| sum / sum.norm()).collect();
+    if phasors.len() < receivers {
+        return None;
+    }
+    // A shift of the direction's sine turns every receiver by its place across.
+    let fit = |sine: f64| {
+        let turned = |rx: usize| {
+            let across = radar.rx_position_m(rx)[0] - radar.rx_position_m(0)[0];
+            phasors[rx] * Complex64::cis(std::f64::consts::TAU * across * sine / radar.wavelength_m())
+        };
+        (0..receivers).map(turned).sum::<Complex64>().norm() / receivers as f64
+    };
+    let best = (-50..=50).map(|step| 0.02 * f64::from(step)).max_by(|a, b| fit(*a).total_cmp(&fit(*b)))?;
+    let ok = best.abs() < ASIDE || fit(best) < ALIGNED || fit(0.0) > 0.75 * fit(best);
+    let found = if ok {
+        "array phases do not contradict it".into()
+    } else {
+        let side = if best > 0.0 { "right" } else { "left" };
+        let degrees = best.abs().asin().to_degrees();
+        format!(
+            "array phases put it {degrees:.0}° farther to the {side}: the body is in the wrong place, or the receivers in another order"
+        )
+    };
+    Some(Check::new("body_direction", "the body in the direction where the motion puts it", found, ok))
 }
 
 /// With several transmitters: the order whose array phases agree best with the body's direction.
@@ -331,7 +478,9 @@ pub fn limits(loaded: &Loaded, body: bool, room: bool) -> Vec<String> {
     }
     if !room {
         notes.push(
-            "the room's size is unknown: wall images were not looked for, and echoes of any range count as the room".into(),
+            "the room's size is unknown: wall images were not looked for, and echoes of any range (with I and Q, up to half the \
+             unambiguous one) count as the room"
+                .into(),
         );
     }
     if loaded.is_real() {

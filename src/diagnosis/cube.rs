@@ -52,11 +52,6 @@ impl Cube {
         Self { dims, samples }
     }
 
-    /// Largest magnitude of a sample.
-    pub fn peak(&self) -> f64 {
-        self.samples.iter().map(Complex64::norm_sqr).fold(0.0, f64::max).sqrt()
-    }
-
     pub fn channels(&self) -> usize {
         self.dims[1] * self.dims[2]
     }

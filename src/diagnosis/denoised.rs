@@ -10,6 +10,9 @@ use super::evidence::{Evidence, fft_2d};
 /// Power over the noise's mean from which on a cell holds signal.
 const SIGNAL: f64 = 12.0;
 
+/// How well the peak sample is known (standard deviation): it is one sample of the strongest frame's speckle.
+pub const PEAK_DB: f64 = 0.7;
+
 /// What stands still and the range-Doppler cells that stand out, `[loop, sample]` of one frame and channel.
 pub fn channel(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Complex64> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
@@ -28,4 +31,18 @@ pub fn channel(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Complex
 /// All channels of a frame, `[tx · rx][loop · sample]`.
 pub fn frame(evidence: &Evidence, frame: usize) -> Vec<Vec<Complex64>> {
     (0..evidence.cube.channels()).into_par_iter().map(|index| channel(evidence, frame, index)).collect()
+}
+
+/// Largest magnitude of what the samples hold besides a term, which is given by channel and sample; where it is none they do
+/// not count. Of many samples the noise's own largest may be above that of the signal.
+pub fn peak_beside(evidence: &Evidence, term: impl Fn(usize, usize) -> Option<Complex64> + Sync) -> f64 {
+    let ([frames, .., samples], channels) = (evidence.cube.dims, evidence.cube.channels());
+    let of = |index: usize| {
+        let (frame, channel) = (index / channels, index % channels);
+        let terms: Vec<Option<Complex64>> = (0..samples).map(|sample| term(channel, sample)).collect();
+        let clean = self::channel(evidence, frame, channel);
+        let rest = clean.iter().enumerate().filter_map(|(i, value)| terms[i % samples].map(|term| (value - term).norm_sqr()));
+        rest.fold(0.0, f64::max)
+    };
+    (0..frames * channels).into_par_iter().map(of).reduce(|| 0.0, f64::max).sqrt()
 }

@@ -9,6 +9,7 @@ use rustfft::{Fft, FftDirection, FftPlanner};
 
 use super::codes::{self, Component};
 use super::cube::{Cube, Loaded, Split};
+use super::denoised;
 use super::power::PowerModel;
 use super::prediction::BodyPrediction;
 use super::products::Products;
@@ -20,6 +21,9 @@ use crate::room::Room;
 const SHAPE_BINS: usize = 5;
 /// Ratio to the mean from which on the noise counts as shaped.
 const SHAPED: f32 = 1.3;
+
+/// Share of the strongest cell below which there is not even noise.
+const EMPTIED: f64 = 1e-20;
 
 /// What the suspects look at. Cheap products are computed once and shared.
 #[derive(Clone)]
@@ -37,11 +41,12 @@ pub struct Evidence {
     pub extremes: [f64; 2],
     /// Of the raw samples; none where they are no whole numbers.
     pub codes: Option<Arc<Vec<Component>>>,
-    noise: OnceLock<Vec<f64>>,
+    pub(super) noise: OnceLock<Vec<f64>>,
     still: OnceLock<Vec<Complex64>>,
     maps: OnceLock<Vec<f32>>,
     power: OnceLock<Option<Arc<PowerModel>>>,
     products: OnceLock<Products>,
+    peak: OnceLock<f64>,
 }
 
 impl Evidence {
@@ -63,6 +68,7 @@ impl Evidence {
             maps: OnceLock::new(),
             power: OnceLock::new(),
             products: OnceLock::new(),
+            peak: OnceLock::new(),
         }
     }
 
@@ -74,6 +80,7 @@ impl Evidence {
             maps: OnceLock::new(),
             power: OnceLock::new(),
             products: OnceLock::new(),
+            peak: OnceLock::new(),
             ..self
         }
     }
@@ -117,6 +124,9 @@ impl Evidence {
                                 .collect::<Vec<_>>()
                         })
                         .collect();
+                    // What corrections have emptied says nothing of the noise.
+                    let strongest = powers.iter().copied().fold(0.0, f64::max);
+                    powers.retain(|power| *power > EMPTIED * strongest);
                     statistics::exponential_scale(&mut powers, 0.35)
                 })
                 .collect()
@@ -140,6 +150,11 @@ impl Evidence {
     /// Products of the signal with itself where neither room nor body can be.
     pub fn products(&self) -> &Products {
         self.products.get_or_init(|| Products::new(self))
+    }
+
+    /// Largest magnitude of the signal without most of its noise: what levels are relative to.
+    pub fn peak(&self) -> f64 {
+        *self.peak.get_or_init(|| denoised::peak_beside(self, |_, _| Some(Complex64::ZERO)))
     }
 
     /// One frame and channel after the transforms with Hann windows of unit energy (white noise keeps its variance),

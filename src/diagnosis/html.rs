@@ -66,12 +66,18 @@ pub fn lead(report: &Report) -> String {
             "Nothing was left out that this recording could show: body, static room and noise explain it.".into()
         }
         Verdict::Explained | Verdict::PartlyExplained => {
-            let mut text = first(&report.effects[0].statement);
+            let effect = &report.effects[0];
+            let mut text = first(&effect.statement);
+            if !effect.indistinguishable_from.is_empty() {
+                let others: Vec<String> = effect.indistinguishable_from.iter().map(|id| title(id).to_lowercase()).collect();
+                let _ = write!(text, " This recording cannot tell it from: {}.", others.join("; "));
+            }
             if report.effects.len() > 1 {
                 let _ = write!(text, " And {} more, below.", count(report.effects.len() - 1, "effect"));
             }
             if !report.unexplained.is_empty() {
-                let _ = write!(text, " Besides, {} without a name remains.", count(report.unexplained.len(), "mismatch"));
+                let remain = if report.unexplained.len() == 1 { "remains" } else { "remain" };
+                let _ = write!(text, " Besides, {} without a name {remain}.", count(report.unexplained.len(), "mismatch"));
             }
             text
         }
@@ -86,8 +92,13 @@ fn count(number: usize, what: &str) -> String {
     if number == 1 { format!("one {what}") } else { format!("{number} {what}{plural}") }
 }
 
+/// Of an effect, or its id.
+fn title(id: &str) -> &str {
+    crate::effects::info(id).map_or(id, |info| info.title)
+}
+
 fn section(page: &mut String, number: usize, effect: &Effect, curve: Option<&str>) {
-    let title = crate::effects::info(&effect.id).map_or(effect.id.as_str(), |info| info.title);
+    let title = title(&effect.id);
     let _ = write!(
         page,
         "<h2>{number}. {title}</h2><p>{statement}</p>",
@@ -110,8 +121,7 @@ fn section(page: &mut String, number: usize, effect: &Effect, curve: Option<&str
     let evidence = &effect.evidence;
     let _ = write!(
         page,
-        "<p>How sure: chance of such a finding with nothing missing {}; held-out data become e<sup>{:.0}</sup> times more \
-         probable; mean squared dB error on held-out cells {:.2} → {:.2} dB². It stays significant up to rung {:?}: {}.</p>",
+        "<p>How sure: chance of such a finding with nothing missing {}; the held-out data's log-likelihood grows by {:.0} nats; mean squared dB error on held-out cells {:.2} → {:.2} dB². It stays significant up to rung {:?}: {}.</p>",
         probability(evidence.p_value),
         evidence.held_out_loglik_gain,
         evidence.held_out_db_mse_before,
@@ -139,7 +149,7 @@ fn without_name(page: &mut String, unexplained: &Unexplained, curve: Option<&str
     let _ = write!(
         page,
         "<h2>Without a name: {}</h2><p>{}</p><p>Chance of such a finding with nothing missing {}; energy {:.1} dB against what \
-         moves in the recording; held-out data become e<sup>{:.0}</sup> times more probable with the fitted term.</p>",
+         moves in the recording; the held-out data's log-likelihood grows by {:.0} nats with the fitted term.</p>",
         escape(&unexplained.behaves_like),
         escape(&unexplained.statement),
         probability(unexplained.p_value),
@@ -164,6 +174,12 @@ fn fit(page: &mut String, report: &Report, pictures: &Pictures) {
             write!(page, "<tr><td>{name}<td>{:.4}<td>{:.2}<td>{:.2}", misfit.loglik_per_sample, misfit.db_mse, misfit.psnr_db);
     }
     page.push_str("</table>");
+    if !report.effects.is_empty() && report.fit.after.loglik_per_sample <= report.fit.before.loglik_per_sample {
+        page.push_str(
+            "<p>These are windowed range-Doppler cells, amplitudes free, as the usual scores see them: what was found hardly shows \
+             there. It shows in its own test on the same held-out data, given with each effect above.</p>",
+        );
+    }
     if let Some(simulator) = &report.simulator {
         page.push_str("<p>The trained simulator, with its own learned reflectivities:</p><table><tr><th><th>error, dB²<th>PSNR, dB<th>SSIM<th>person's cells, dB");
         for (name, scores) in [("as it was", simulator.before), ("with the effects", simulator.after)] {
@@ -332,7 +348,10 @@ impl Pictures {
         let path = folder.path().join("picture.png");
         for (title, evidence) in [
             ("Before: the recording against the baseline", &diagnosis.original),
-            ("After: the recording with the effects taken into account, against the baseline", &explanation.evidence),
+            (
+                "After: what of the recording is left with the effects taken out (what they hid is dark), against the baseline",
+                &explanation.evidence,
+            ),
         ] {
             if explanation.accepted.is_empty() && !std::ptr::eq(evidence, &diagnosis.original) {
                 continue;

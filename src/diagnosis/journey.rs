@@ -36,9 +36,10 @@ pub struct Diagnosis {
 impl Diagnosis {
     /// What was found, as settings of the simulator in its own units.
     pub fn effects(&self) -> Vec<EffectSetting> {
-        let reference = self.original.cube.peak();
-        let accepted = self.explanation.iter().flat_map(|explanation| &explanation.accepted);
-        accepted.filter_map(|effect| effect.candidate.setting(reference)).collect()
+        let Some(explanation) = &self.explanation else { return vec![] };
+        // Levels are relative to the signal without what was added to it.
+        let reference = explanation.evidence.peak();
+        explanation.accepted.iter().filter_map(|effect| effect.candidate.setting(reference)).collect()
     }
 }
 
@@ -86,7 +87,8 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     }
     if let Some(wrong) = report.audit.iter().find(|check| !check.ok && audit::is_convention(check)) {
         // Physics fitted under a wrong convention would only imitate it.
-        report.reason = format!("a convention is wrong, which comes before any physics: {}", wrong.found);
+        report.reason =
+            format!("a convention, or the scene as it is stated, is wrong, which comes before any physics: {}", wrong.found);
         return Ok(Diagnosis { report, radar, original, explanation: None });
     }
     progress("locating the residual");

@@ -137,7 +137,7 @@ pub fn limits(evidence: &Evidence, found: &[&str], moving_energy: f64, threshold
     if evidence.is_real() || moving_energy <= 0.0 {
         return vec![];
     }
-    let reference = evidence.cube.peak();
+    let reference = evidence.peak();
     let of = |salt: &Salt| {
         let strength = |step: usize| salt.least * (salt.most / salt.least).powf(step as f64 / (STEPS - 1) as f64);
         // The least step that is found, as if all above it were.

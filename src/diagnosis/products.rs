@@ -80,7 +80,7 @@ impl Products {
     /// Nothing of a real recording, or where no cells are empty.
     pub fn new(evidence: &Evidence) -> Self {
         let empty = empty_bins(evidence);
-        let peak = evidence.cube.peak();
+        let peak = evidence.peak();
         if evidence.is_real() || !empty.contains(&true) || peak <= 0.0 {
             return Self::default();
         }

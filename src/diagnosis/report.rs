@@ -61,7 +61,7 @@ pub struct Effect {
     #[serde(rename = "where")]
     pub place: Place,
     pub evidence: Evidence,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Null where nothing else would explain the recording as well.
     pub separate_by: Option<String>,
 }
 
@@ -79,7 +79,7 @@ pub struct Unexplained {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NotDetectable {
     pub id: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Null where there is no bound: it may be of any strength.
     pub at_most_db: Option<f64>,
     pub reason: String,
 }

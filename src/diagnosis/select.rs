@@ -47,6 +47,10 @@ const UPSTREAM: [&str; 2] = ["waveform", "receiver"];
 /// What raises the held-out frames' dB error by this factor as it is undone is not what happened.
 const FAR_WORSE: f64 = 1.6;
 
+/// So many paths of one name are told: a person whom nobody tracked is made of many more, and other effects must have their
+/// turn.
+const MOST_ALIKE: usize = 6;
+
 /// Two instances of an effect closer than this are one.
 const NEAR_M: f64 = 0.3;
 
@@ -114,6 +118,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
             (!mixed || WHATEVER_THE_SIGNAL.contains(&id))
                 && (!by_chirp || !LIKE_EDGES.contains(&id) || at_first.contains(&id))
                 && !refused.contains(&id)
+                && accepted.iter().filter(|effect| effect.candidate.id == Some(id)).count() < MOST_ALIKE
         };
         let passing: Vec<&(usize, Candidate)> = found
             .iter()
@@ -331,6 +336,10 @@ impl Evidence {
     /// The same with one more effect taken into account.
     pub fn with(&self, candidate: &Candidate) -> Self {
         let mut next = self.clone().changed();
+        if candidate.behaves_like.starts_with(paths::PATH_LIKE) || candidate.behaves_like == excess::BEHAVES_LIKE {
+            // Where paths were cut out there is not even noise left.
+            next.noise = self.noise.clone();
+        }
         match &candidate.correction {
             Correction::Samples(undo) => undo(&mut next.cube),
             Correction::Body(change) => {

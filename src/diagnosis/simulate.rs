@@ -66,10 +66,12 @@ pub fn before_and_after(
         ..start.learning.clone()
     };
     let scratch = AtomicFolder::replacing(keep)?;
-    let mut train = |config: &SimulatorConfig, name: &str| -> Result<Simulator> {
+    // The second one goes on from the first, where that was there before.
+    let onwards = TrainingConfig { start_from: start.checkpoint.map(Path::to_path_buf), ..learning.clone() };
+    let mut train = |config: &SimulatorConfig, learning: &TrainingConfig, name: &str| -> Result<Simulator> {
         let folder = scratch.path().join(name);
         let trainer = Trainer {
-            config: &learning,
+            config: learning,
             simulator_config: config,
             seed: start.seed,
             recordings: &recordings,
@@ -87,12 +89,16 @@ pub fn before_and_after(
     };
     let baseline = match start.checkpoint {
         Some(folder) => checkpoint::open(folder, start.device)?.0,
-        None => train(&config, "without")?,
+        None => train(&config, &learning, "without")?,
     };
     let before = Held::of(&recordings[0], &baseline, &held_out, start.seed)?;
-    let with = SimulatorConfig { effects: effects.to_vec(), ..config };
-    let after =
-        if effects.is_empty() { None } else { Some(Held::of(&recordings[0], &train(&with, "with")?, &held_out, start.seed)?) };
+    // What the checkpoint knows already stays, unless it was found again.
+    let known = config.effects.iter().filter(|known| effects.iter().all(|found| found.id != known.id)).cloned();
+    let with = SimulatorConfig { effects: known.chain(effects.iter().cloned()).collect(), ..config.clone() };
+    let after = match effects {
+        [] => None,
+        _ => Some(Held::of(&recordings[0], &train(&with, &onwards, "with")?, &held_out, start.seed)?),
+    };
     let after = after.as_ref().unwrap_or(&before);
     let maps = [before.measured.clone(), before.simulated.clone(), after.simulated.clone()];
     let fit = SimulatorFit { before: before.scores, after: after.scores };

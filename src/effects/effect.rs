@@ -12,6 +12,9 @@ use super::{
     values::{FIXED, Values},
 };
 
+/// Decibels of a factor of e.
+const NEPER_DB: f64 = 20.0 * std::f64::consts::LOG10_E;
+
 /// One parameter, in units that suit an optimiser: its value is neutral + scale · raw.
 #[derive(Module, Debug)]
 pub struct Parameter {
@@ -27,12 +30,14 @@ pub struct Parameter {
 
 impl Parameter {
     /// The scale is the size of what the values start from, so that a step of the optimiser is a share of it; or half
-    /// the prior's width where they start neutral (1 where only the recording knows the unit).
+    /// the prior's width where they start neutral (1 where only the recording knows the unit). Decibels are logarithms
+    /// already: their scale is at most a factor of e.
     fn new(name: &str, values: &[f64], info: &EffectInfo, device: &Device) -> Self {
         let parameter = info.parameter(name).unwrap_or_else(|| panic!("{} has no parameter {name}", info.id));
         let away: Vec<f64> = values.iter().map(|value| value - parameter.neutral).collect();
         let size = (away.iter().map(|x| x * x).sum::<f64>() / away.len() as f64).sqrt();
         let scale = match size {
+            size if size > NEPER_DB && parameter.unit.starts_with("dB") => NEPER_DB,
             size if size > 0.0 => size,
             _ if parameter.is_relative() => 1.0,
             _ => 0.5 * (parameter.most - parameter.least),

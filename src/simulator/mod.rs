@@ -58,6 +58,13 @@ pub enum Mode {
     },
 }
 
+impl Simulator {
+    /// The same with other effects, which `config` names.
+    pub fn with_effects(self, config: &SimulatorConfig, effects: Effects) -> Self {
+        Self { effects, config: config.clone(), ..self }
+    }
+}
+
 impl SimulatorConfig {
     /// A simulator as it is before training; equal seeds give equal parameters on every backend.
     ///

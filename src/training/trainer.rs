@@ -103,17 +103,29 @@ impl Trainer<'_> {
             }
             (None, Some(folder)) => {
                 let state = checkpoint::read_state(folder)?;
-                if state.simulator != *self.simulator_config || state.site.body_extent != self.site.body_extent {
+                let plain = |config: &SimulatorConfig| SimulatorConfig { effects: vec![], ..config.clone() };
+                let same = plain(&state.simulator) == plain(self.simulator_config);
+                if !same || state.site.body_extent != self.site.body_extent {
                     return Err(Error::Usage {
                         message: format!("{}: a checkpoint of another simulator", folder.display()),
                         hint: Some(
-                            "training.start_from needs the [simulator] settings that the checkpoint was trained with".into(),
+                            "training.start_from needs the [simulator] settings that the checkpoint was trained with; only the \
+                             effects may differ"
+                                .into(),
                         ),
                     });
                 }
                 // Another room's gain is another one, and with it the noise over the amplitude; the receiver that set the
                 // body's level is the same one.
-                simulator = checkpoint::load_weights(folder, simulator)?;
+                simulator = if state.simulator.effects == self.simulator_config.effects {
+                    checkpoint::load_weights(folder, simulator)?
+                } else {
+                    // New effects start from their settings.
+                    let effects = simulator.effects.clone();
+                    let plain = state.simulator.init(state.site.body_extent, state.seed, &device);
+                    let known = checkpoint::load_weights(folder, checkpoint::with_stable_ids(plain))?;
+                    checkpoint::with_stable_ids(known.with_effects(self.simulator_config, effects))
+                };
                 simulator = self.levels(simulator, &prepared, &split, true)?;
             }
             (None, None) => {

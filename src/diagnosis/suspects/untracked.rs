@@ -15,6 +15,8 @@ use crate::diagnosis::evidence::{Evidence, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics;
 
+/// Standard deviation of how high something stands, which receivers in a row do not show, over its range.
+const HEIGHT: f64 = 0.3;
 /// Doppler bins around zero where a Hann window leaves what stands still.
 const STILL_BINS: usize = 1;
 /// Nearer ones belong to leakage, offsets and low-frequency noise.
@@ -123,8 +125,8 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
         let across = range_m * deviation.to_radians();
         vec![Estimate::list(
             "position_m",
-            &[range_m * s, range_m * c],
-            &[(across * c).abs().max(0.3 * bin_m), (across * s).abs().max(0.3 * bin_m)],
+            &[range_m * s, range_m * c, 0.0],
+            &[(across * c).abs().max(0.3 * bin_m), (across * s).abs().max(0.3 * bin_m), HEIGHT * range_m],
         )]
     });
     Some(Candidate {

@@ -321,7 +321,8 @@ fn mismatch(
         rung: Rung::E,
         look_alikes: vec![],
         statement: format!(
-            "The receivers differ: against the first, receivers 1 to {} are {} dB stronger and {}° ahead, which no direction of the body explains.",
+            "The receivers differ: against the first, the gains of receivers 1 to {} are {} dB and their phases {}°, which no direction \
+             of the body explains.",
             receivers - 1,
             text(gains.iter().map(|gain| gain.value).collect(), 2),
             text(phases.iter().map(|phase| phase.value * degrees).collect(), 1),

@@ -24,7 +24,7 @@ const CLOCK_ROUGH: f64 = 0.08;
 /// Alternatives within so many nats are said to be indistinguishable.
 const ALIKE_NATS: f64 = 4.6;
 /// Ranges looked at first.
-const RANGE_GRID_M: [f64; 9] = [-0.3, -0.2, -0.12, -0.06, 0.0, 0.06, 0.12, 0.2, 0.3];
+const RANGE_GRID_M: [f64; 11] = [-0.4, -0.3, -0.2, -0.12, -0.06, 0.0, 0.06, 0.12, 0.2, 0.3, 0.4];
 /// Times looked at first, in frame periods.
 const CLOCK_GRID: [f64; 13] = [-3.0, -2.0, -1.0, -0.6, -0.3, -0.15, 0.0, 0.15, 0.3, 0.6, 1.0, 2.0, 3.0];
 /// Rates of clocks looked at first.
@@ -285,7 +285,7 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
             normal("offset_m"),
             "scene",
             Rung::D,
-            format!("The body appears {:.1} mm farther than it stands, at whatever range.", 1e3 * fit.value),
+            format!("The body appears {} than it stands, at whatever range.", farther(fit.value)),
         ),
         Change::Scale(_) => (
             normal("relative"),
@@ -301,7 +301,7 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
             vec![Estimate::list("offset_m", &[0.0, fit.value, 0.0], &[UNSEEN_M, deviation, UNSEEN_M])],
             "scene",
             Rung::D,
-            format!("The body stands {:.1} mm farther along boresight than stated.", 1e3 * fit.value),
+            format!("The body stands {} along boresight than stated.", farther(fit.value)),
         ),
         Change::Clock(_) => (
             normal("offset_s"),
@@ -361,4 +361,9 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
 fn energy(evidence: &Evidence) -> f64 {
     let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
     total * evidence.noise().iter().sum::<f64>()
+}
+
+/// "3.0 mm nearer".
+fn farther(metres: f64) -> String {
+    format!("{:.1} mm {}", 1e3 * metres.abs(), if metres < 0.0 { "nearer" } else { "farther" })
 }

@@ -83,7 +83,7 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
     if found.held_out < super::LEAST_GAIN || p_value > 1e-3 {
         return None;
     }
-    let peak = scene.evidence.cube.peak();
+    let peak = scene.evidence.peak();
     let (value, deviation) = (found.factor.norm() * peak, peak * found.deviation.max(0.05 * found.factor.norm()));
     let level_db = 20.0 * value.max(1e-12).log10();
     let (estimate, stage, statement) = match kind {
@@ -96,7 +96,7 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
             ),
         ),
         Kind::Harmonic => (
-            Estimate::normal("level_db", level_db, 8.7 * deviation / value.max(1e-12)),
+            Estimate::normal("level_db", level_db, denoised::PEAK_DB.hypot(8.7 * deviation / value.max(1e-12))),
             "receiver",
             format!(
                 "everything has a second harmonic, at twice its beat frequency and velocity and with twice the phase of every \

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::products::{Law, Product};
-use crate::diagnosis::{Cube, Evidence};
+use crate::diagnosis::{Cube, Evidence, denoised};
 
 pub const QUADRATIC: &str = "quadratic in the signal";
 
@@ -33,7 +33,7 @@ fn candidate(evidence: &Evidence, law: Law) -> Candidate {
     let (id, estimate, statement) = if product == Product::Cube {
         (
             "compression",
-            Estimate::normal("level", -kappa.re, 0.71 * scatter),
+            Estimate::normal("level", -kappa.re, (0.71 * scatter).hypot(2.0 * denoised::PEAK_DB / 8.7 * level)),
             format!(
                 "strong samples come out too small: the receiver compresses, the strongest sample by {:.2} %; its third-order \
                  products lie where neither the room nor the body can be",
@@ -43,7 +43,7 @@ fn candidate(evidence: &Evidence, law: Law) -> Candidate {
     } else {
         (
             "second_harmonic",
-            Estimate::normal("level_db", level_db, 8.7 * 0.71 * scatter / level),
+            Estimate::normal("level_db", level_db, denoised::PEAK_DB.hypot(8.7 * 0.71 * scatter / level)),
             format!(
                 "everything has a second harmonic, at twice its beat frequency and velocity: {level_db:.1} dB at the strongest \
                  sample; it follows the square of the measured signal in phase"

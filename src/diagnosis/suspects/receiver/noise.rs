@@ -16,6 +16,9 @@ const SHARED: f64 = 4.0;
 /// A cell's power over the noise, beyond which it is a stranger's.
 const STRANGER: f64 = 8.0;
 
+/// How well a real noise follows the law, as a logarithm's deviation.
+const LAW: f64 = 0.05;
+
 /// Share of the correlation that the middle one of all Doppler rows, of all beat frequencies, and of all frames must have:
 /// what a stranger's side lobes or some bursts share lies in a few of them.
 const EVERYWHERE: f64 = 0.4;
@@ -64,24 +67,26 @@ fn coloured(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let rate = evidence.radar.sample_rate_hz;
     let hertz: Vec<f64> = bins.iter().map(|&bin| bin.min(samples - bin) as f64 * rate / samples as f64).collect();
+    let step = rate / samples as f64;
     let per_frame = (evidence.cube.channels() * (loops - 5)) as f64 / SHARED;
     let found = spectrum(evidence, &evidence.split.training, bins);
     let held = spectrum(evidence, &evidence.split.held_out, bins);
     let count = per_frame * evidence.split.training.len() as f64;
     let fit = |knee: f64, power: f64| {
-        let shape: Vec<f64> = hertz.iter().map(|f| 1.0 + (knee / f).powf(power)).collect();
+        // A Hann window mixes a cell with its neighbours.
+        let of = |f: f64| 1.0 + (knee / f).powf(power);
+        let shape: Vec<f64> = hertz.iter().map(|f| (of(f - step) + 4.0 * of(*f) + of(f + step)) / 6.0).collect();
         let level = found.iter().zip(&shape).map(|(p, s)| p / s).sum::<f64>() / bins.len() as f64;
         let likelihood: f64 = found.iter().zip(&shape).map(|(p, s)| -(level * s).ln() - p / (level * s)).sum::<f64>() * count;
         (likelihood, level, shape)
     };
     let (white, white_level, _) = fit(0.0, 1.0);
-    let grid: Vec<(f64, f64)> = (0..40)
-        .flat_map(|i| (1..=10).map(move |j| (i, j)))
-        .map(|(i, j)| (0.05 * rate / samples as f64 * 1.22f64.powi(i), 0.25 * f64::from(j)))
-        .filter(|&(knee, _)| knee < 0.5 * rate)
+    let likelihood = |[knee, power]: [f64; 2]| if knee < 0.5 * rate { fit(knee, power).0 } else { f64::NEG_INFINITY };
+    let grid: Vec<[f64; 2]> = (0..40)
+        .flat_map(|i| (1..=10).map(move |j| [0.05 * rate / samples as f64 * 1.22f64.powi(i), 0.25 * f64::from(j)]))
         .collect();
-    let fits: Vec<(f64, f64, f64)> = grid.iter().map(|&(knee, power)| (fit(knee, power).0, knee, power)).collect();
-    let &(best, knee, power) = fits.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let first = grid.into_iter().max_by(|a, b| likelihood(*a).total_cmp(&likelihood(*b)))?;
+    let Top { at: [knee, power], height: best, deviations } = climb(likelihood, first);
     let p_value = corrected(chi2_tail(2.0 * (best - white), 2.0), 20.0);
     if p_value > 1e-3 {
         return None;
@@ -94,20 +99,16 @@ fn coloured(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
         .map(|(p, s)| -(level * s).ln() - p / (level * s) + white_level.ln() + p / white_level)
         .sum::<f64>()
         * held_count;
-    let near: Vec<&(f64, f64, f64)> = fits.iter().filter(|fit| best - fit.0 < 2.0).collect();
-    let range = |value: fn(&(f64, f64, f64)) -> f64, step: [f64; 2]| {
-        let (low, high) = near.iter().fold((f64::INFINITY, 0.0f64), |(a, b), fit| (a.min(value(fit)), b.max(value(fit))));
-        [low * step[0], high * step[1]]
-    };
     let excess = found.iter().sum::<f64>() / bins.len() as f64 / level - 1.0;
     let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
+    let of = |name: &'static str, value: f64, deviation: f64| {
+        let factor = (1.645 * deviation.hypot(LAW)).exp();
+        Estimate { name, values: vec![value], ci90: vec![[value / factor, value * factor]] }
+    };
     Some(Candidate {
         id: Some("coloured_noise"),
         behaves_like: "noise over beat frequency",
-        estimates: vec![
-            Estimate { name: "knee_hz", values: vec![knee], ci90: vec![range(|fit| fit.1, [0.9, 1.1])] },
-            Estimate { name: "power", values: vec![power], ci90: vec![range(|fit| fit.2, [0.9, 1.1])] },
-        ],
+        estimates: vec![of("knee_hz", knee, deviations[0]), of("power", power, deviations[1])],
         choice: None,
         place: Place::at("noise"),
         p_value,
@@ -131,6 +132,36 @@ fn coloured(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
         energy: excess.max(0.0) * level * noise * evidence.cube.samples.len() as f64,
         correction: Correction::None,
     })
+}
+
+/// The top of a likelihood of two positive parameters, with the deviations of their logarithms.
+struct Top {
+    at: [f64; 2],
+    height: f64,
+    deviations: [f64; 2],
+}
+
+/// From the best of a grid, by steps along both logarithms and their diagonals.
+fn climb(likelihood: impl Fn([f64; 2]) -> f64, first: [f64; 2]) -> Top {
+    const STEPS: [[f64; 2]; 8] =
+        [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
+    let moved = |at: [f64; 2], step: [f64; 2], width: f64| [0, 1].map(|i| at[i] * (width * step[i]).exp());
+    let (mut at, mut height, mut width) = (first, likelihood(first), 0.2);
+    while width > 1e-3 {
+        let near = STEPS.map(|step| moved(at, step, width)).map(|next| (next, likelihood(next)));
+        let (next, found) = near.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).expect("some steps");
+        if found > height { (at, height) = (next, found) } else { width *= 0.5 }
+    }
+    // Curvature, from second differences wide enough for the rounding.
+    let wide = 0.02;
+    let second = |a: [f64; 2], b: [f64; 2]| {
+        (2.0 * height - likelihood(moved(at, a, wide)) - likelihood(moved(at, b, wide))) / (wide * wide)
+    };
+    let [aa, bb] = [second(STEPS[0], STEPS[1]), second(STEPS[2], STEPS[3])];
+    let ab = 0.5 * (second(STEPS[4], STEPS[5]) - aa - bb);
+    let determinant = aa * bb - ab * ab;
+    let deviation = |other: f64| if determinant > 0.0 && other > 0.0 { (other / determinant).sqrt().min(1.0) } else { 1.0 };
+    Top { at, height, deviations: [deviation(bb), deviation(aa)] }
 }
 
 /// Whitened by each channel's own power; cells with a stranger in any channel are left out.

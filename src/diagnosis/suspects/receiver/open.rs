@@ -12,7 +12,7 @@ use super::support::{beat_hz, energy, range_m, ranges_m, tone};
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
-use crate::diagnosis::{Cube, Evidence};
+use crate::diagnosis::{Cube, Evidence, denoised};
 
 /// A leakage's cluster of returns ends here.
 const NEAR_M: f64 = 0.3;
@@ -86,9 +86,8 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
         .iter()
         .map(|chirp| (0..samples).map(|n| if indices.contains(&n) { chirp[n] } else { Complex64::ZERO }).collect())
         .collect();
-    let nothing = vec![vec![Complex64::ZERO; samples]; still.len()];
     let inner = if at_end { samples - count..samples } else { 0..count };
-    let peak = super::still::peak_without(&evidence.cube, &nothing, inner);
+    let peak = denoised::peak_beside(evidence, |_, n| (!inner.contains(&n)).then_some(Complex64::ZERO));
     let level_db = 20.0 * (wildest.sqrt() / peak.max(1e-300)).log10();
     let affected = indices.clone();
     Some(Candidate {
@@ -105,10 +104,11 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
         rung: Rung::F,
         look_alikes: vec![],
         statement: format!(
-            "the {} {count} sample{} of every chirp jump to {:.0} codes, {:.0} dB above the strongest sample in between, \
+            "the {} {} of every chirp jump{} to {:.0} codes, {:.0} dB above the strongest sample in between, \
              in all channels: the ADC runs into the {} of the ramp",
             if at_end { "last" } else { "first" },
-            if count == 1 { "" } else { "s" },
+            if count == 1 { "sample".into() } else { format!("{count} samples") },
+            if count == 1 { "s" } else { "" },
             wildest.sqrt(),
             10.0 * (wildest / largest).log10(),
             if at_end { "end" } else { "beginning" },
@@ -226,7 +226,7 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         })
         .collect();
     let largest = term.iter().flatten().map(|value| value.norm()).fold(0.0, f64::max);
-    let peak_sample = super::still::peak_without(&evidence.cube, &term, 0..0);
+    let peak_sample = denoised::peak_beside(evidence, |channel, n| Some(term[channel][n]));
     let level_db = 20.0 * (largest / peak_sample.max(1e-300)).log10();
     let resolution = range_m(evidence, rate / samples as f64);
     let channels = still.len();

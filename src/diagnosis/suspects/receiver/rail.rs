@@ -9,17 +9,20 @@ use super::declip::Declip;
 use super::image::empty_bins;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::corrected;
-use crate::diagnosis::{Cube, Evidence};
+use crate::diagnosis::{Cube, Evidence, denoised};
 
 /// Fewest components at the rail.
 const FEWEST: usize = 8;
+
+fn parts(value: &Complex64) -> [f64; 2] {
+    [value.re, value.im]
+}
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // It is looked for once, in the samples as they were recorded.
     if !evidence.accepted.is_empty() || evidence.is_real() {
         return vec![];
     }
-    let parts = |value: &Complex64| [value.re, value.im];
     let mut candidates = vec![];
     let largest = evidence.extremes[1].max(-evidence.extremes[0]);
     if largest <= 0.0 {
@@ -57,19 +60,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let declip = Declip::new(&empty_bins(evidence), largest, tolerance).map(Arc::new);
     let (level, ci90) = match &declip {
         Some(declip) => {
-            let strongest = |chirp: &[Complex64]| chirp.iter().flat_map(parts).map(f64::abs).fold(0.0, f64::max);
-            let level = evidence
-                .cube
-                .samples
-                .par_chunks_exact(samples)
-                .filter(|chirp| strongest(chirp) >= largest - tolerance)
-                .map(|chirp| {
-                    let mut whole = chirp.to_vec();
-                    declip.restore(&mut whole);
-                    strongest(&whole)
-                })
-                .reduce(|| largest, f64::max)
-                / largest;
+            let level = strongest(evidence, declip, &hit_frames) / largest;
             // The strongest of many restored values is one of the worse restored ones, and the noise is restored with it.
             let beyond = level - 1.0;
             (level, [1.0 + 0.5 * beyond, 1.0 + 1.25 * beyond + 0.05])
@@ -107,4 +98,16 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         correction,
     });
     candidates
+}
+
+/// Largest component of the signal as it was before it was cut, without most of its noise.
+fn strongest(evidence: &Evidence, declip: &Declip, hits: &[usize]) -> f64 {
+    let mut whole = evidence.clone().changed();
+    whole.cube.each_chirp(|_, chirp| declip.restore(chirp));
+    let channels = whole.cube.channels();
+    let of = |index: usize| {
+        let clean = denoised::channel(&whole, index / channels, index % channels);
+        clean.iter().flat_map(parts).map(f64::abs).fold(0.0, f64::max)
+    };
+    (0..hits.len() * channels).into_par_iter().filter(|index| hits[index / channels] > 0).map(of).reduce(|| 0.0, f64::max)
 }

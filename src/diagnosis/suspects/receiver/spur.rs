@@ -13,7 +13,7 @@ use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::locate::Residual;
 use crate::diagnosis::power::Cells;
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
-use crate::diagnosis::{Cube, Evidence};
+use crate::diagnosis::{Cube, Evidence, denoised};
 
 /// Share of the power around a tone that it may leave: a mover's Doppler changes, and it leaves more.
 const LEFT_OVER: f64 = 0.2;
@@ -69,7 +69,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         })
         .sum();
     let strength = (amplitudes.iter().map(Complex64::norm_sqr).sum::<f64>() / amplitudes.len() as f64).sqrt();
-    let peak = evidence.cube.peak();
+    let peak = evidence.peak();
     let level_db = 20.0 * (strength / (peak - strength).max(1e-300)).log10();
     let rate = evidence.radar.sample_rate_hz;
     let wrapped = if fast > 0.5 { fast - 1.0 } else { fast };
@@ -80,7 +80,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         behaves_like: "tone",
         estimates: vec![
             Estimate::normal("frequency_hz", frequency_hz, 0.02 * rate / samples as f64),
-            Estimate::normal("level_db", level_db, 0.3),
+            Estimate::normal("level_db", level_db, denoised::PEAK_DB),
         ],
         choice: None,
         place: Place::at("receiver"),
@@ -89,7 +89,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         rung: Rung::F,
         look_alikes: vec![],
         statement: format!(
-            "a continuous tone at {:.4} MHz (or {:.4} MHz, as sampled), {level_db:.1} dB to the peak sample, runs through all frames \
+            "a continuous tone at {:.4} MHz (or {:.4} MHz, as sampled), {level_db:.1} dB relative to the peak sample, runs through all frames \
              where nothing of the room or the body can stay; its phase advances by {:.3} turns per chirp",
             frequency_hz * 1e-6,
             (wrapped - wrapped.signum()) * rate * 1e-6,

@@ -14,7 +14,7 @@ use super::response;
 use super::support::{beat_hz, dot, energy, range_m, tone};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
-use crate::diagnosis::{Cube, Evidence};
+use crate::diagnosis::{Cube, Evidence, denoised};
 
 /// Leakage over the board is nearer than this.
 const NEAR_M: f64 = 0.5;
@@ -279,7 +279,7 @@ fn candidate(
         Element::End(count) => samples - count..samples,
         _ => 0..0,
     };
-    let peak = peak_without(&evidence.cube, &term, skipped.clone());
+    let peak = denoised::peak_beside(evidence, |channel, n| (!skipped.contains(&n)).then(|| term[channel][n]));
     let scene = (field.still.iter().map(|chirp| energy(chirp)).sum::<f64>() / (channels * samples) as f64).sqrt();
     let largest = term.iter().flatten().map(|value| value.norm()).fold(0.0, f64::max);
     // Of the strongest sample, mean over the channels: single ones hold the scene's own value too.
@@ -312,7 +312,7 @@ fn candidate(
             let (i, q) = (each(|a| a.re), each(|a| a.im));
             let statement = format!(
                 "a constant was left out that each receiver adds to all its samples: {} codes in the largest, {level_db:.1} dB \
-                 to the signal's peak sample; it lies at beat frequency zero exactly and does not change over time",
+                 relative to the signal's peak sample; it lies at beat frequency zero exactly and does not change over time",
                 digits(largest)
             );
             ("dc_offset", vec![Estimate::list("i", &i, &error), Estimate::list("q", &q, &error)], statement)
@@ -330,10 +330,10 @@ fn candidate(
             let error = if curvature > 0.0 { curvature.recip().sqrt() } else { 0.05 };
             place.range_m = Some([range, range]);
             // One level stands for channels that differ.
-            let level_deviation = 0.2 + 0.3 * spread_db / (channels as f64).sqrt();
+            let level_deviation = denoised::PEAK_DB.hypot(0.3 * spread_db / (channels as f64).sqrt());
             let statement = format!(
                 "a return {range:.3} m away, nearer than anything in the room, that never changes: the transmitters leak into \
-                 the receivers over the board, {level_db:.1} dB to the signal's peak sample, {spread_db:.1} dB apart between \
+                 the receivers over the board, {level_db:.1} dB relative to the signal's peak sample, {spread_db:.1} dB apart between \
                  channels"
             );
             (
@@ -349,10 +349,10 @@ fn candidate(
             let at_end = matches!(element, Element::End(_));
             let indices: Vec<usize> = if at_end { (samples - count..samples).collect() } else { (0..count).collect() };
             let statement = format!(
-                "the {} {count} sample{} of every chirp hold{} a value that is added and never changes, up to {} codes \
-                 ({level_db:.1} dB to the signal's peak sample): the ADC runs into the {} of the ramp",
+                "the {} {} of every chirp hold{} a value that is added and never changes, up to {} codes \
+                 ({level_db:.1} dB relative to the signal's peak sample): the ADC runs into the {} of the ramp",
                 if at_end { "last" } else { "first" },
-                if count == 1 { "" } else { "s" },
+                if count == 1 { "sample".into() } else { format!("{count} samples") },
                 if count == 1 { "s" } else { "" },
                 digits(largest),
                 if at_end { "end" } else { "beginning" },
@@ -366,7 +366,11 @@ fn candidate(
                         values: vec![count as f64],
                         ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]],
                     },
-                    Estimate::normal("level_db", level_db, 8.7 * 0.7 * scene / (level * (channels as f64).sqrt()) + 0.3),
+                    Estimate::normal(
+                        "level_db",
+                        level_db,
+                        denoised::PEAK_DB.hypot(8.7 * 0.7 * scene / (level * (channels as f64).sqrt())),
+                    ),
                 ],
                 statement,
             )
@@ -431,24 +435,6 @@ pub fn subtract(term: Vec<Vec<Complex64>>) -> Correction {
     Correction::Samples(Arc::new(move |cube: &mut Cube| {
         cube.each_chirp(|[_, channel, _], chirp| chirp.iter_mut().zip(&term[channel]).for_each(|(value, term)| *value -= term));
     }))
-}
-
-/// Largest sample once a still term is taken away, some samples of every chirp not counted.
-pub fn peak_without(cube: &Cube, term: &[Vec<Complex64>], skipped: std::ops::Range<usize>) -> f64 {
-    let [frames, .., samples] = cube.dims;
-    let mut peak = 0.0f64;
-    for frame in 0..frames {
-        for (channel, term) in term.iter().enumerate() {
-            for chirp in cube.channel(frame, channel).chunks_exact(samples) {
-                for (n, (value, term)) in chirp.iter().zip(term).enumerate() {
-                    if !skipped.contains(&n) {
-                        peak = peak.max((value - term).norm_sqr());
-                    }
-                }
-            }
-        }
-    }
-    peak.sqrt()
 }
 
 /// A number with three significant digits.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::drift::{Drift, Shape};
-use super::field::{Field, Part, ahead};
+use super::field::{Field, PATTERN, Part, ahead};
 use super::lines::Line;
 use super::random::Random;
 use super::settling::Settling;
@@ -90,7 +90,9 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
     let deviation: Deviation = Arc::new(move |at| scale * (shape.value(time(at)) - shape.constant));
     let amplitude = scale * line.amplitude();
     let interval = 1.645 * line.frequency_deviation_hz;
-    let hertz = format!("{:.2} ± {:.2} Hz", line.frequency_hz, interval);
+    // As many places as the interval has.
+    let places = (2.0 - interval.max(1e-6).log10().floor()).clamp(2.0, 5.0) as usize - 1;
+    let hertz = format!("{:.places$} ± {:.places$} Hz", line.frequency_hz, interval);
     let harmonics =
         if line.amplitudes.len() > 1 { format!(", with harmonics up to the {}th", line.amplitudes.len()) } else { String::new() };
     let (id, estimates, statement, stage) = match part {
@@ -105,12 +107,15 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
             "receiver",
         ),
         Part::Phase | Part::Boresight => {
-            let metres = evidence.radar.wavelength_m() / (4.0 * PI);
+            // What moves along the boresight turns the returns by its cosine, whether or not the ranges tell it apart.
+            let along = if part == Part::Phase { field.mean_ahead() } else { 1.0 };
+            let metres = evidence.radar.wavelength_m() / (4.0 * PI * along);
+            let deviation = line.amplitude_deviation.hypot(PATTERN * amplitude);
             let where_ = if part == Part::Phase { "the same at all ranges" } else { "the more the farther ahead they are" };
             (
                 Some("radar_vibration"),
                 vec![
-                    Estimate::normal("amplitude_m", amplitude * metres, line.amplitude_deviation * metres),
+                    Estimate::normal("amplitude_m", amplitude * metres, deviation * metres),
                     Estimate::normal("frequency_hz", line.frequency_hz, line.frequency_deviation_hz),
                 ],
                 format!(

@@ -1,5 +1,6 @@
 //! What all strong static returns have in common in a chirp: their complex gain relative to their mean over time.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use num_complex::Complex64;
@@ -66,6 +67,9 @@ const ASIDE: f64 = 0.03;
 /// What a range would gain (nats) by a deviation that it shares, for its silence to tell anything.
 const TELLING_GAIN: f64 = 10.0;
 
+/// Share that is uncertain of an amplitude along the boresight: how much returns from where is not known.
+pub const PATTERN: f64 = 0.2;
+
 impl Part {
     /// What a value of one means at some ranges.
     pub fn lever(self, group: &Group) -> f64 {
@@ -88,14 +92,30 @@ impl Part {
     }
 }
 
-/// Mean over the room's surfaces of the cosine to the boresight at which they lie at a range: those beside the radar, and
-/// the wall ahead of it.
+/// Mean cosine to the boresight of what the room's surfaces before the radar return from a range: of the ring that each of them
+/// has there, as rough surfaces return by the sine of grazing (constant γ), seen by antennas of one gain in all directions.
 pub fn ahead(room: Option<&Room>, range_m: f64) -> f64 {
+    const DIRECTIONS: usize = 48;
     let Some(room) = room else { return 1.0 };
-    let beside = [room.left_m, room.right_m, room.floor_m, room.ceiling_m].into_iter().flatten();
-    let beside = beside.filter(|&distance| distance < range_m).map(|distance| (1.0 - (distance / range_m).powi(2)).sqrt());
-    let cosines: Vec<f64> = beside.chain(room.front_m.filter(|&front| front <= range_m).map(|front| front / range_m)).collect();
-    if cosines.is_empty() { 1.0 } else { cosines.iter().sum::<f64>() / cosines.len() as f64 }
+    let (low, high) = room.extent_m(range_m);
+    let (mut sum, mut all) = (0.0, 0.0);
+    for boundary in room.boundaries() {
+        let (axis, sign) = boundary.axis();
+        let Some(distance) = room.distance_m(boundary).filter(|&distance| distance < range_m) else { continue };
+        let radius = (range_m * range_m - distance * distance).sqrt();
+        for direction in 0..DIRECTIONS {
+            let (sine, cosine) = (TAU * (direction as f64 + 0.5) / DIRECTIONS as f64).sin_cos();
+            let mut place = [0.0; 3];
+            (place[axis], place[(axis + 1) % 3], place[(axis + 2) % 3]) = (sign * distance, radius * cosine, radius * sine);
+            let inside = (0..3).filter(|&other| other != axis).all(|other| (low[other]..=high[other]).contains(&place[other]));
+            let cosine = place[1] / range_m;
+            if inside && cosine > 0.0 {
+                let weight = distance / range_m;
+                (sum, all) = (sum + weight * cosine, all + weight);
+            }
+        }
+    }
+    if all > 0.0 { sum / all } else { 1.0 }
 }
 
 impl Field {
@@ -155,6 +175,17 @@ impl Field {
 
     pub fn deviations(&self, frame: usize, index: usize) -> &[Complex64] {
         &self.deviation[(frame * self.loops + index) * self.groups.len()..][..self.groups.len()]
+    }
+
+    /// Mean cosine to the boresight of the static returns, as sure as each group is.
+    pub fn mean_ahead(&self) -> f64 {
+        let (mut sum, mut all) = (0.0, 0.0);
+        for frame in 0..self.frames {
+            for (group, weight) in self.groups.iter().zip(self.weights(frame)) {
+                (sum, all) = (sum + weight * group.ahead, all + weight);
+            }
+        }
+        if all > 0.0 { sum / all } else { 1.0 }
     }
 
     pub fn weights(&self, frame: usize) -> &[f64] {

@@ -33,6 +33,8 @@ const HARMONIC_GAIN: f64 = 10.0;
 const ALIAS_GAIN: f64 = 4.6;
 /// A background above this many times the noise is more than noise.
 const LOUD: f64 = 1.5;
+/// What moves besides is not white: it shifts a line by such a share of a resolution cell.
+const COLOURED: f64 = 0.02;
 /// Points per resolution cell of a frame's own spectrum.
 const PADDING: usize = 16;
 
@@ -183,7 +185,7 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
         line.freedom = Some((2 * frames.len()).saturating_sub(2 * harmonics + 1).max(1) as f64);
     }
     line.training_gain /= background;
-    line.frequency_deviation_hz *= background.sqrt();
+    line.frequency_deviation_hz = (line.frequency_deviation_hz * background.sqrt()).hypot(COLOURED / duration_s);
     line.amplitude_deviation *= background.sqrt();
     line.held_out_gain = series.gain(field, held_out, |_, _, time| line.value(time)) / background;
     Some(line)

@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::field::ahead;
+use super::field::{PATTERN, ahead};
 use super::lines::climb;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, Tapered};
@@ -44,8 +44,6 @@ const ALIAS_GAIN: f64 = 4.6;
 const HIGHEST_HZ: f64 = 300.0;
 /// Harmonics that are taken out again.
 const HARMONICS: usize = 3;
-/// What the pattern over directions leaves uncertain of the amplitude.
-const PATTERN: f64 = 0.08;
 /// A phase beyond that is no small deviation (rad).
 const LARGEST: f64 = 1.5;
 
