@@ -162,8 +162,11 @@ fn a_real_person_breathes_at_fourteen_per_minute() {
     close(60.0 * value(&report, "breathing", "rate_hz"), 14.3, 0.5);
 }
 
+/// Of a frame's samples: its index, I and Q.
+type Change<'a> = &'a dyn Fn(usize, &mut [f32], &mut [f32]);
+
 /// Rewrites the samples of a recording.
-fn rewritten(from: &Path, to: &Path, change: impl Fn(usize, &mut [f32], &mut [f32])) {
+fn rewritten(from: &Path, to: &Path, change: Change) {
     let recording = Recording::open(from).unwrap();
     let contents = RecordingContents {
         radar: &recording.radar,
@@ -189,7 +192,7 @@ fn conventions_come_before_physics() {
     assert!(report(&plain).audit.iter().all(|check| check.ok), "{:?}", report(&plain).audit);
     // I and Q the other way round: conjugated samples.
     let swapped = folder.path().join("swapped");
-    rewritten(&plain, &swapped, |_, _, im| im.iter_mut().for_each(|value| *value = -*value));
+    rewritten(&plain, &swapped, &|_, _, im| im.iter_mut().for_each(|value| *value = -*value));
     let found = report(&swapped);
     assert_eq!(found.verdict, Verdict::Undecided);
     assert!(found.reason.contains("I and Q"), "{}", found.reason);
@@ -201,7 +204,7 @@ fn a_recording_that_says_nothing_gets_that_answer() {
     let plain = recorded(folder.path(), "seed = 4");
     let noise = folder.path().join("noise");
     let drawn = support::numbers(5, 2 * 8 * 2 * 32 * 64, -1.0, 1.0);
-    rewritten(&plain, &noise, |frame, re, im| {
+    rewritten(&plain, &noise, &|frame, re, im| {
         for (i, (re, im)) in re.iter_mut().zip(im).enumerate() {
             let at = 2 * (frame * 2 * 32 * 64 + i);
             (*re, *im) = (drawn[at] as f32, drawn[at + 1] as f32);
@@ -210,7 +213,7 @@ fn a_recording_that_says_nothing_gets_that_answer() {
     let found = report(&noise);
     assert_eq!(found.verdict, Verdict::Undecided);
     assert!(found.reason.contains("too noisy"), "{}", found.reason);
-    let undecided = |name: &str, change: &dyn Fn(usize, &mut [f32], &mut [f32])| {
+    let undecided = |name: &str, change: Change| {
         let folder = folder.path().join(name);
         rewritten(&plain, &folder, change);
         let found = report(&folder);
