@@ -108,7 +108,10 @@ fn a_phase_that_grows_towards_the_boresight_is_a_vibration() {
     let found = found_once(evidence.changed());
     assert_eq!(found.id, Some("radar_vibration"));
     within(&found, "frequency_hz", 27.0);
-    within(&found, "amplitude_m", 0.1 * Radar::small(1).wavelength_m() / (2.0 * std::f64::consts::TAU));
+    // Its interval is wide, for where returns come from is not known; here they come from where the room says.
+    let (amplitude, truth) = (&found.estimates[0], 0.1 * Radar::small(1).wavelength_m() / (2.0 * std::f64::consts::TAU));
+    assert_eq!(amplitude.name, "amplitude_m");
+    assert!((amplitude.values[0] / truth - 1.0).abs() < 0.1, "{amplitude:?} of {truth}");
 }
 
 #[test]
