@@ -48,9 +48,9 @@ impl Rendering<'_> {
     pub fn frame(&self, frame: usize) -> Result<Vec<Complex32>> {
         let clean = self.baseline.clean_signal(frame)?.scale_by(self.gain);
         let (seed, law) = match self.noise {
-            BaselineNoise::None => return Ok(clean.to_host()),
+            // A law of level zero would learn one.
+            BaselineNoise::None | BaselineNoise::Level { deviation: 0.0, .. } => return Ok(clean.to_host()),
             BaselineNoise::Rate { seed } => (seed, NoiseConfig { law: NoiseLaw::Fixed, rate: NOISE_RATE, level: 0.0 }),
-            BaselineNoise::Level { deviation: 0.0, .. } => return Ok(clean.to_host()),
             BaselineNoise::Level { seed, deviation } => {
                 (seed, NoiseConfig { law: NoiseLaw::Constant, rate: NOISE_RATE, level: deviation })
             }

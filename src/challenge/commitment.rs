@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use super::secret::hex;
+use crate::data::hex;
 use crate::error::{Error, Result};
 
 /// `commitment.json`, or one of several where the cases were sealed in shards.

@@ -5,6 +5,8 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::data::hex;
+
 /// 32 bytes, as hexadecimal digits in `sealed/secret.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Secret {
@@ -44,10 +46,6 @@ impl Secret {
     pub fn salt(&self, index: usize) -> String {
         hex(&self.derived("salt", index))
     }
-}
-
-pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

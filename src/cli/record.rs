@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 use super::{Common, Out, progress::Progress};
 use crate::{
     config::Config,
+    data::hex,
     error::Result,
     recorder::{self, RecorderConfig},
 };
@@ -39,8 +40,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 pub(crate) fn recorded(config: &RecorderConfig, config_path: &Path, quiet: bool) -> Result<PathBuf> {
     let text = toml::to_string(config).expect("settings are plain data");
     let digest = Sha256::digest(format!("{} {text}", env!("CARGO_PKG_VERSION")));
-    let name: String = digest.iter().take(6).map(|byte| format!("{byte:02x}")).collect();
-    let folder = Path::new("runs/recordings").join(name);
+    let folder = Path::new("runs/recordings").join(hex(&digest[..6]));
     if !folder.is_dir() {
         make(config, config_path, &folder, quiet)?;
     }

@@ -6,12 +6,14 @@
 pub mod arrays;
 pub mod atomic;
 pub mod bodies;
+mod hex;
 pub mod motions;
 pub mod recording;
 pub mod settings;
 mod shard;
 
 pub use bodies::{read_body, write_body};
+pub use hex::hex;
 pub use motions::{read_motion, write_motion};
 pub use recording::{IfFrame, IfLayout, Recording, RecordingContents, write_recording};
 pub use settings::{read_settings, read_toml};

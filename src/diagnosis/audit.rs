@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use super::cube::Loaded;
 use super::evidence::{Evidence, spectrum};
-use super::prediction::Point;
+use super::prediction::{BodyPrediction, Point};
 use super::statistics::median;
 use super::support::Support;
+use crate::paths::distance;
 use crate::radar::Radar;
 use crate::room::Boundary;
 
@@ -84,11 +85,9 @@ pub fn undecidable(evidence: &Evidence, checks: &[Check]) -> Option<String> {
     if let Some(bad) = checks.iter().find(|check| check.check == "channels" && !check.ok) {
         return Some(format!("a channel holds no signal: {}", bad.found));
     }
-    if rail_share(evidence) > SATURATED {
-        return Some(format!(
-            "saturated: {:.0} % of the samples lie at the ends of the converter's range",
-            100.0 * rail_share(evidence)
-        ));
+    let at_rail = rail_share(evidence);
+    if at_rail > SATURATED {
+        return Some(format!("saturated: {:.0} % of the samples lie at the ends of the converter's range", 100.0 * at_rail));
     }
     let strongest = (0..evidence.cube.channels()).map(|channel| strongest_still(evidence, channel)).fold(0.0, f64::max);
     let moving = evidence.maps().iter().copied().fold(0.0, f32::max);
@@ -322,14 +321,13 @@ fn body_place(evidence: &Evidence) -> Option<Check> {
     Some(Check::new("body_place", "moving energy where the motion puts the body", found, ok))
 }
 
-/// Whether the receivers' phases in the body's cells come from where the motion puts the body.
-fn body_direction(evidence: &Evidence) -> Option<Check> {
-    let [_, _, receivers, loops, samples] = evidence.cube.dims;
-    let (body, radar) = (evidence.body.as_ref().filter(|_| receivers >= 3)?, &evidence.radar);
-    let mut sums = vec![Complex64::ZERO; receivers];
+/// Visits the cells of the body's points that move, in the training frames: `see` gets the point, its radial velocity, and
+/// what the channels hold there.
+fn moving_cells(evidence: &Evidence, body: &BodyPrediction, channels: &[usize], mut see: impl FnMut(&Point, f64, &[Complex64])) {
+    let ([_, _, _, loops, samples], radar) = (evidence.cube.dims, &evidence.radar);
     for &frame in &evidence.split.training {
         let Some(points) = body.frames.get(frame).filter(|points| !points.is_empty()) else { continue };
-        let maps: Vec<Vec<Complex64>> = (0..receivers).map(|rx| evidence.range_doppler(frame, rx)).collect();
+        let maps: Vec<Vec<Complex64>> = channels.iter().map(|&channel| evidence.range_doppler(frame, channel)).collect();
         for point in points.iter().step_by(points.len().div_ceil(200).max(1)) {
             let [range, velocity] = range_and_velocity(point, radar);
             let bin = (range / radar.range_resolution_m()).round() as usize;
@@ -338,16 +336,29 @@ fn body_direction(evidence: &Evidence) -> Option<Check> {
                 continue;
             }
             let cell = doppler.rem_euclid(loops as i64) as usize * samples + bin;
-            let distance = |rx: usize| {
-                let antenna = radar.rx_position_m(rx);
-                (0..3).map(|axis| (point.position_m[axis] - antenna[axis]).powi(2)).sum::<f64>().sqrt()
-            };
-            for (rx, sum) in sums.iter_mut().enumerate() {
-                let turns = (distance(rx) - distance(0)) / radar.wavelength_m();
-                *sum += maps[rx][cell] * maps[0][cell].conj() * Complex64::cis(-std::f64::consts::TAU * turns);
-            }
+            see(point, velocity, &maps.iter().map(|map| map[cell]).collect::<Vec<_>>());
         }
     }
+}
+
+/// What a channel's cell has in common with the first channel's once a longer path, in metres, is taken out.
+fn aligned(own: Complex64, first: Complex64, path_m: f64, radar: &Radar) -> Complex64 {
+    own * first.conj() * Complex64::cis(-std::f64::consts::TAU * path_m / radar.wavelength_m())
+}
+
+/// Whether the receivers' phases in the body's cells come from where the motion puts the body.
+fn body_direction(evidence: &Evidence) -> Option<Check> {
+    let receivers = evidence.cube.dims[2];
+    let (body, radar) = (evidence.body.as_ref().filter(|_| receivers >= 3)?, &evidence.radar);
+    let mut sums = vec![Complex64::ZERO; receivers];
+    // Those of the first transmitter.
+    let channels: Vec<usize> = (0..receivers).collect();
+    moving_cells(evidence, body, &channels, |point, _, seen| {
+        let path = |rx: usize| distance(point.position_m, radar.rx_position_m(rx));
+        for (rx, sum) in sums.iter_mut().enumerate() {
+            *sum += aligned(seen[rx], seen[0], path(rx) - path(0), radar);
+        }
+    });
     let phasors: Vec<Complex64> = sums.iter().filter(|sum| sum.norm() > 0.0).map(|sum| sum / sum.norm()).collect();
     if phasors.len() < receivers {
         return None;
@@ -376,35 +387,21 @@ fn body_direction(evidence: &Evidence) -> Option<Check> {
 
 /// With several transmitters: the order whose array phases agree best with the body's direction.
 fn transmitter_order(evidence: &Evidence) -> Option<Check> {
-    let [_, transmitters, receivers, loops, samples] = evidence.cube.dims;
+    let [_, transmitters, receivers, ..] = evidence.cube.dims;
     let body = evidence.body.as_ref().filter(|_| (2..=4).contains(&transmitters))?;
     let radar = &evidence.radar;
     // Phase of every transmitter against the first over the strongest cell near the body, with geometry and slot taken out.
     let mut sums = vec![vec![Complex64::ZERO; transmitters]; transmitters];
-    for &frame in &evidence.split.training {
-        let Some(points) = body.frames.get(frame).filter(|points| !points.is_empty()) else { continue };
-        let maps: Vec<Vec<Complex64>> = (0..transmitters).map(|tx| evidence.range_doppler(frame, tx * receivers)).collect();
-        for point in points.iter().step_by(points.len().div_ceil(200).max(1)) {
-            let [range, velocity] = range_and_velocity(point, radar);
-            let bin = (range / radar.range_resolution_m()).round() as usize;
-            let doppler = (velocity / radar.velocity_resolution_mps()).round() as i64;
-            if bin >= samples || doppler.abs() < 3 {
-                continue;
-            }
-            let cell = doppler.rem_euclid(loops as i64) as usize * samples + bin;
-            let distance = |tx: usize| {
-                let antenna = radar.tx_position_m(tx);
-                (0..3).map(|axis| (point.position_m[axis] - antenna[axis]).powi(2)).sum::<f64>().sqrt()
-            };
-            for slot in 1..transmitters {
-                for (antenna, sum) in sums[slot].iter_mut().enumerate() {
-                    let path = distance(antenna) - distance(0) + 2.0 * velocity * slot as f64 * radar.chirp_period_s;
-                    let turns = path / radar.wavelength_m();
-                    *sum += maps[slot][cell] * maps[0][cell].conj() * Complex64::cis(-std::f64::consts::TAU * turns);
-                }
+    let channels: Vec<usize> = (0..transmitters).map(|tx| tx * receivers).collect();
+    moving_cells(evidence, body, &channels, |point, velocity, seen| {
+        let path = |tx: usize| distance(point.position_m, radar.tx_position_m(tx));
+        for slot in 1..transmitters {
+            let moved = 2.0 * velocity * slot as f64 * radar.chirp_period_s;
+            for (antenna, sum) in sums[slot].iter_mut().enumerate() {
+                *sum += aligned(seen[slot], seen[0], path(antenna) - path(0) + moved, radar);
             }
         }
-    }
+    });
     let best: Vec<usize> = (1..transmitters)
         .map(|slot| (1..transmitters).max_by(|&a, &b| sums[slot][a].norm().total_cmp(&sums[slot][b].norm())).unwrap_or(slot))
         .collect();

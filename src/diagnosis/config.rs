@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::data::hex;
 use crate::error::{Error, Result};
 
 /// When something is claimed, and what is done to show it. Every report names these settings and their hash.
@@ -51,7 +52,6 @@ impl DiagnosisConfig {
     pub fn fingerprint(&self) -> String {
         let text = toml::to_string(self).expect("plain data").replace('\n', "; ");
         let digest = Sha256::digest(text.as_bytes());
-        let hash: String = digest.iter().take(6).map(|byte| format!("{byte:02x}")).collect();
-        format!("{} (sha256 {hash})", text.trim_end_matches("; "))
+        format!("{} (sha256 {})", text.trim_end_matches("; "), hex(&digest[..6]))
     }
 }

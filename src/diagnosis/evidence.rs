@@ -124,7 +124,7 @@ impl Evidence {
                                 .collect::<Vec<_>>()
                         })
                         .collect();
-                    // What corrections have emptied says nothing of the noise.
+                    // Frames without a signal say nothing of the noise.
                     let strongest = powers.iter().copied().fold(0.0, f64::max);
                     powers.retain(|power| *power > EMPTIED * strongest);
                     statistics::exponential_scale(&mut powers, 0.35)

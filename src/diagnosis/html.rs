@@ -121,7 +121,8 @@ fn section(page: &mut String, number: usize, effect: &Effect, curve: Option<&str
     let evidence = &effect.evidence;
     let _ = write!(
         page,
-        "<p>How sure: chance of such a finding with nothing missing {}; the held-out data's log-likelihood grows by {:.0} nats; mean squared dB error on held-out cells {:.2} → {:.2} dB². It stays significant up to rung {:?}: {}.</p>",
+        "<p>How sure: chance of such a finding with nothing missing {}; the held-out data's log-likelihood grows by {:.0} \
+         nats; mean squared dB error on held-out cells {:.2} → {:.2} dB². It stays significant up to rung {:?}: {}.</p>",
         probability(evidence.p_value),
         evidence.held_out_loglik_gain,
         evidence.held_out_db_mse_before,

@@ -13,9 +13,10 @@ use sha2::{Digest, Sha256};
 use super::config::{BaselineName, Protocol, ReproduceConfig, SubjectSplit};
 use super::preflight::{self, Board};
 use super::stage::{Key, read_record, stage_folder};
-use super::takes::{Take, check_split, takes_in};
+use super::takes::{Take, check_split, read_takes, takes_in};
 use super::task::Task;
 use super::variants::Variant;
+use crate::data::hex;
 use crate::error::{Error, Result};
 use crate::site::{self, SiteConfig};
 use crate::training::TrainingConfig;
@@ -193,9 +194,10 @@ impl Planner<'_> {
     fn place(&mut self, name: &str, path: &Path) -> Result<Place> {
         if path.is_dir() {
             let recordings = path.canonicalize().map_err(|error| Error::read(path, error))?;
-            let takes = takes_in(&recordings)?;
+            let mut board = None;
+            let takes = read_takes(&recordings, &mut |recording| Board::join(&mut board, recording))?;
+            let (_, board) = board.expect("no takes are refused");
             let key = Key::new(name, &(&recordings, &takes, contents(&recordings)?), &[]);
-            let board = Board::of_recordings(&recordings, &takes)?;
             return Ok(Place { stage: None, key, recordings, again: Again::default(), takes, board });
         }
         let config = SiteConfig::read(path, &[])?;
@@ -507,7 +509,7 @@ fn digest(files: &[&PathBuf]) -> Result<String> {
     for file in files {
         digest.update(std::fs::read(file).map_err(|error| Error::read(file.as_path(), error))?);
     }
-    Ok(digest.finalize().iter().take(6).map(|byte| format!("{byte:02x}")).collect())
+    Ok(hex(&digest.finalize()[..6]))
 }
 
 /// Every file below a folder with its size and when it was written: what is changed there is done again.

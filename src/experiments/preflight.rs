@@ -1,16 +1,15 @@
 //! What would be refused hours later is refused before anything is recorded.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use super::config::ReproduceConfig;
-use super::takes::Take;
 use crate::data::Recording;
 use crate::error::{Error, Result};
 use crate::lpips::Lpips;
 use crate::radar::Radar;
 use crate::room::Room;
 use crate::site::SiteConfig;
-use crate::training::{FrameSplit, Split};
+use crate::training::{FrameSplit, Split, refuse_ambiguous_ranges};
 
 /// What all recordings of a place have in common.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,31 +30,28 @@ impl Board {
         Ok(Self { radar, room: Some(config.record.room.clone()) })
     }
 
-    /// Of recordings that a user made.
+    /// That of a user's recordings, one after the other; `known`: the first one's folder, and what they had in common so far.
     ///
     /// # Errors
-    /// Recordings that cannot be read, or of different radars or rooms.
-    pub fn of_recordings(folder: &Path, takes: &[Take]) -> Result<Self> {
-        let mut known: Option<Self> = None;
-        for take in takes {
-            let recording = Recording::open(folder.join(&take.name))?;
-            let Some(board) = &mut known else {
-                known = Some(Self { radar: recording.radar, room: recording.room });
-                continue;
-            };
-            let path = folder.join(&take.name).join("recording.toml");
-            if !recording.radar.is_same_board(&board.radar) {
-                let expected = format!("that of {}", takes[0].name);
-                return Err(Error::field(path, "radar", "another radar", expected).with_hint("a site has one radar"));
-            }
-            if recording.room != board.room {
-                let expected = format!("that of {}", takes[0].name);
-                return Err(Error::field(path, "room", "another room", expected)
-                    .with_hint("one simulator learns one room: the other is for `second_room`"));
-            }
-            board.radar.frames = board.radar.frames.min(recording.radar.frames);
+    /// A recording of another radar or room than those before.
+    pub fn join(known: &mut Option<(PathBuf, Self)>, recording: &Recording) -> Result<()> {
+        let Some((first, board)) = known else {
+            let board = Self { radar: recording.radar.clone(), room: recording.room.clone() };
+            *known = Some((recording.folder.clone(), board));
+            return Ok(());
+        };
+        let other = |key: &str, found: &str, hint: &str| {
+            let path = recording.folder.join("recording.toml");
+            Err(Error::field(path, key, found, format!("that of {}", first.display())).with_hint(hint))
+        };
+        if !recording.radar.is_same_board(&board.radar) {
+            return other("radar", "another radar", "a site has one radar");
         }
-        known.ok_or_else(|| Error::Usage { message: format!("{}: holds no recordings", folder.display()), hint: None })
+        if recording.room != board.room {
+            return other("room", "another room", "one simulator learns one room: the other is for `second_room`");
+        }
+        board.radar.frames = board.radar.frames.min(recording.radar.frames);
+        Ok(())
     }
 }
 
@@ -65,13 +61,7 @@ impl Board {
 /// A room beyond the radar's unambiguous range, maps too small for LPIPS.
 pub fn check(config: &ReproduceConfig, key: &str, board: &Board) -> Result<()> {
     let Board { radar, room } = board;
-    if let Some(farthest) = room.as_ref().and_then(Room::farthest_wall_m)
-        && farthest > radar.max_range_m()
-    {
-        let expected = format!("within the radar's unambiguous range of {:.2} m", radar.max_range_m());
-        return Err(Error::setting(key, format!("a room up to {farthest:.2} m away"), expected)
-            .with_hint("a higher sample rate or a lower slope reaches farther; `hybridsim check` shows the limits"));
-    }
+    refuse_ambiguous_ranges(radar, room.as_ref(), |found, expected| Error::setting(key, format!("a room {found}"), expected))?;
     if config.comparison.lpips.is_some() {
         Lpips::check_dims([radar.loops_per_frame, radar.samples_per_chirp])?;
     }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::data::atomic;
+use crate::data::{atomic, hex};
 use crate::error::{Error, Result};
 
 const RECORD: &str = "stage.json";
@@ -32,8 +32,7 @@ impl Key {
         let parents: Vec<String> = parents.iter().map(|parent| parent.folder()).collect();
         let all = json!({ "name": name, "settings": settings, "parents": parents, "version": env!("CARGO_PKG_VERSION") });
         let digest = Sha256::digest(all.to_string());
-        let hash = digest.iter().take(6).map(|byte| format!("{byte:02x}")).collect();
-        Self { name, hash }
+        Self { name, hash: hex(&digest[..6]) }
     }
 
     /// `NAME-HASH`.
@@ -139,11 +138,7 @@ impl Store {
 /// Which build this is; empty where the program cannot be read.
 fn program() -> String {
     let bytes = std::env::current_exe().and_then(fs::read).unwrap_or_default();
-    if bytes.is_empty() {
-        String::new()
-    } else {
-        Sha256::digest(bytes).iter().take(4).map(|byte| format!("{byte:02x}")).collect()
-    }
+    if bytes.is_empty() { String::new() } else { hex(&Sha256::digest(bytes)[..4]) }
 }
 
 /// Where a stage's results are below a reproduction's folder.

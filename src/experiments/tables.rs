@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::config::{BaselineName, Protocol};
 use super::paper::{self, Paper};
 use super::plan::Method;
-use super::results::{MethodResults, Recognised, Results, Share};
+use super::results::{Behind, MethodResults, Recognised, Results, Share};
 use super::variants::Variant;
 use crate::evaluation::{ScoreSummary, SequenceSummary};
 use crate::metrics::Spread;
@@ -130,11 +130,10 @@ fn of(results: &Results, method: Method) -> Option<&MethodResults> {
 
 /// Baselines, ours, and the ceiling.
 fn compared(results: &Results) -> impl Iterator<Item = &MethodResults> {
-    results
-        .methods
-        .iter()
-        .filter(|found| !matches!(found.method, Method::Adapted(_) | Method::FromScratch(_)))
-        .filter(|found| !matches!(found.method, Method::Variant(variant) if variant != Variant::Ours))
+    results.methods.iter().filter(|found| {
+        use Method::{Again, Baseline, ReceiverNoise};
+        matches!(found.method, Baseline(_) | ReceiverNoise(_) | Method::Variant(Variant::Ours) | Again)
+    })
 }
 
 const UNITS: &str = "PSNR in dB; mean ± half the 95 % interval over recordings (paper)";
@@ -173,13 +172,14 @@ fn behind(results: &Results) -> String {
     let columns = ["method", "all cells", "static removed", "person's cells"];
     let mut table = Table::new("HybridSim's lead, paired", note, &columns);
     let others = results.methods.iter().filter(|found| found.method != Method::Variant(Variant::Ours));
-    let mut rows = 0;
-    for (found, lead) in others.filter_map(|found| Some((found, found.behind?))) {
-        let leads = [lead.global, lead.moving, lead.person].map(|lead| number(lead, 2, None));
-        table.row(&cells(found.method.title(), leads));
-        rows += 1;
+    let leads: Vec<(Method, Behind)> = others.filter_map(|found| Some((found.method, found.behind?))).collect();
+    if leads.is_empty() {
+        return String::new();
     }
-    if rows == 0 { String::new() } else { table.end() }
+    for (method, lead) in leads {
+        table.row(&cells(method.title(), [lead.global, lead.moving, lead.person].map(|lead| number(lead, 2, None))));
+    }
+    table.end()
 }
 
 fn recognition(results: &Results) -> String {

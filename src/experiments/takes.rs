@@ -21,6 +21,11 @@ pub struct Take {
 /// # Errors
 /// A folder without any; a recording that cannot be read or lacks one of the labels.
 pub fn takes_in(folder: &Path) -> Result<Vec<Take>> {
+    read_takes(folder, &mut |_| Ok(()))
+}
+
+/// The same; `look` sees every recording while it is open.
+pub fn read_takes(folder: &Path, look: &mut dyn FnMut(&Recording) -> Result<()>) -> Result<Vec<Take>> {
     let entries = std::fs::read_dir(folder).map_err(|error| Error::read(folder, error))?;
     let mut found: Vec<PathBuf> =
         entries.flatten().map(|entry| entry.path()).filter(|path| path.join("recording.toml").is_file()).collect();
@@ -31,11 +36,16 @@ pub fn takes_in(folder: &Path) -> Result<Vec<Take>> {
             hint: Some("name a folder whose folders are recordings, or the config of a site".into()),
         });
     }
-    found.iter().map(|path| take(path)).collect()
+    let mut read = |path: &PathBuf| {
+        let recording = Recording::open(path)?;
+        let take = take(path, &recording)?;
+        look(&recording)?;
+        Ok(take)
+    };
+    found.iter().map(&mut read).collect()
 }
 
-fn take(folder: &Path) -> Result<Take> {
-    let recording = Recording::open(folder)?;
+fn take(folder: &Path, recording: &Recording) -> Result<Take> {
     let label = |name: &str| {
         recording.labels.get(name).cloned().ok_or_else(|| {
             Error::field(folder.join("recording.toml"), format!("labels.{name}"), "missing", format!("the {name}"))

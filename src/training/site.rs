@@ -12,6 +12,7 @@ use crate::{
     features::Extent,
     person::{Person, Placement},
     radar::Radar,
+    room::Room,
     simulator::{Scene, SimulatorConfig},
 };
 
@@ -28,7 +29,8 @@ impl LoadedRecording {
     pub fn open(folder: &Path, config: &SimulatorConfig, strict: bool) -> Result<Self> {
         let recording = Recording::open(folder)?;
         if strict {
-            refuse_ambiguous_ranges(folder, &recording)?;
+            let refusal = |found, expected| Error::field(folder.join("recording.toml"), "room", found, expected);
+            refuse_ambiguous_ranges(&recording.radar, recording.room.as_ref(), refusal)?;
         }
         let scene = Scene::new(&recording.radar, recording.room.as_ref(), recording.person(), config)?;
         let loaded = Self { folder: folder.into(), recording, scene };
@@ -141,17 +143,14 @@ pub fn load_recordings(folders: &[PathBuf], config: &SimulatorConfig) -> Result<
 
 /// A radar whose unambiguous range ends inside the room folds far echoes onto near ones: training would teach
 /// the near surfaces to imitate them.
-fn refuse_ambiguous_ranges(folder: &Path, recording: &Recording) -> Result<()> {
-    let Some(farthest) = recording.room.as_ref().and_then(|room| room.farthest_wall_m()) else { return Ok(()) };
-    let limit = recording.radar.max_range_m();
+/// `refusal` gets what was found and what was expected.
+pub fn refuse_ambiguous_ranges(radar: &Radar, room: Option<&Room>, refusal: impl Fn(String, String) -> Error) -> Result<()> {
+    let Some(farthest) = room.and_then(Room::farthest_wall_m) else { return Ok(()) };
+    let limit = radar.max_range_m();
     if farthest > limit {
-        return Err(Error::field(
-            folder.join("recording.toml"),
-            "room",
-            format!("up to {farthest:.2} m away"),
-            format!("within the radar's unambiguous range of {limit:.2} m"),
-        )
-        .with_hint("a higher sample rate or a lower slope reaches farther; `hybridsim check` shows the limits"));
+        let expected = format!("within the radar's unambiguous range of {limit:.2} m");
+        return Err(refusal(format!("up to {farthest:.2} m away"), expected)
+            .with_hint("a higher sample rate or a lower slope reaches farther; `hybridsim check` shows the limits"));
     }
     Ok(())
 }
