@@ -321,13 +321,16 @@ fn body_place(evidence: &Evidence) -> Option<Check> {
     Some(Check::new("body_place", "moving energy where the motion puts the body", found, ok))
 }
 
-/// Visits the cells of the body's points that move, in the training frames: `see` gets the point, its radial velocity, and
-/// what the channels hold there.
+/// Visits the cells of the body's points that move, in the training frames, where they hold a return that the same range has
+/// not at all velocities (a spur does): `see` gets the point, its radial velocity, and what the channels hold there.
 fn moving_cells(evidence: &Evidence, body: &BodyPrediction, channels: &[usize], mut see: impl FnMut(&Point, f64, &[Complex64])) {
     let ([_, _, _, loops, samples], radar) = (evidence.cube.dims, &evidence.radar);
     for &frame in &evidence.split.training {
         let Some(points) = body.frames.get(frame).filter(|points| !points.is_empty()) else { continue };
         let maps: Vec<Vec<Complex64>> = channels.iter().map(|&channel| evidence.range_doppler(frame, channel)).collect();
+        let usual: Vec<f64> = (0..samples)
+            .map(|bin| median(&mut (0..loops).map(|row| maps[0][row * samples + bin].norm_sqr()).collect::<Vec<_>>()))
+            .collect();
         for point in points.iter().step_by(points.len().div_ceil(200).max(1)) {
             let [range, velocity] = range_and_velocity(point, radar);
             let bin = (range / radar.range_resolution_m()).round() as usize;
@@ -336,6 +339,9 @@ fn moving_cells(evidence: &Evidence, body: &BodyPrediction, channels: &[usize], 
                 continue;
             }
             let cell = doppler.rem_euclid(loops as i64) as usize * samples + bin;
+            if maps[0][cell].norm_sqr() < RETURN * usual[bin] {
+                continue;
+            }
             see(point, velocity, &maps.iter().map(|map| map[cell]).collect::<Vec<_>>());
         }
     }

@@ -122,6 +122,9 @@ pub struct ReproduceConfig {
     /// share of each method's own signal, which a method without the room's returns has little of.
     #[serde(default = "yes")]
     pub receiver_noise: bool,
+    /// The site once more with another draw of its mesh's error: what a simulator can reach that knows the body no better.
+    #[serde(default = "yes")]
+    pub other_mesh: bool,
     #[serde(default = "all_protocols")]
     pub protocols: Vec<Protocol>,
     /// The action of the training subject whose recording the detective looks at.

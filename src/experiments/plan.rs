@@ -31,6 +31,9 @@ pub enum Method {
     Variant(Variant),
     /// The same truth recorded again with other noise: no simulator can do better.
     Again,
+    /// The same with another draw of the mesh's error too: nobody who knows the body no better can foretell how its returns
+    /// interfere.
+    OtherMesh,
     /// Ours brought to the second room by so many of its frames; with zero, as it was.
     Adapted(usize),
     /// Trained from the beginning on so many frames of the second room, as many steps long.
@@ -45,6 +48,7 @@ impl Method {
             Self::ReceiverNoise(name) => format!("{}-receiver-noise", name.id()),
             Self::Variant(variant) => variant.id().into(),
             Self::Again => "again".into(),
+            Self::OtherMesh => "other_mesh".into(),
             Self::Adapted(frames) => format!("adapted_{frames}"),
             Self::FromScratch(frames) => format!("from_scratch_{frames}"),
         }
@@ -57,6 +61,7 @@ impl Method {
             Self::ReceiverNoise(name) => format!("{}, receiver's noise", name.title()),
             Self::Variant(variant) => variant.title().into(),
             Self::Again => "measured again (ceiling)".into(),
+            Self::OtherMesh => "measured with another mesh error".into(),
             Self::Adapted(frames) => format!("HybridSim, adapted to {frames} frames"),
             Self::FromScratch(frames) => format!("HybridSim, trained on {frames} frames only"),
         }
@@ -96,6 +101,9 @@ pub struct Plan {
     pub diagnosis: Option<usize>,
 }
 
+/// The settings' name of the site where everything is compared.
+const FIRST: &str = "site";
+
 /// Where measured recordings are.
 struct Place {
     /// The stage that records them; none where the user did.
@@ -104,6 +112,8 @@ struct Place {
     key: Key,
     recordings: PathBuf,
     again: Again,
+    /// The stage that records it with another draw of the mesh's error.
+    other_mesh: Option<usize>,
     takes: Vec<Take>,
     board: Board,
 }
@@ -136,7 +146,7 @@ struct Planner<'a> {
 pub fn plan(config: &ReproduceConfig, root: &Path) -> Result<Plan> {
     let weights = config.comparison.lpips.as_ref().map(|lpips| digest(&[&lpips.weights, &lpips.heads])).transpose()?;
     let mut planner = Planner { config, root, weights, plan: Plan::default() };
-    let first = planner.place("site", &config.site)?;
+    let first = planner.place(FIRST, &config.site)?;
     let second = config.second_room.as_deref().map(|site| planner.place("second_room", site)).transpose()?;
     planner.all(&first, second.as_ref())?;
     Ok(planner.plan)
@@ -198,7 +208,7 @@ impl Planner<'_> {
             let takes = read_takes(&recordings, &mut |recording| Board::join(&mut board, recording))?;
             let (_, board) = board.expect("no takes are refused");
             let key = Key::new(name, &(&recordings, &takes, contents(&recordings)?), &[]);
-            return Ok(Place { stage: None, key, recordings, again: Again::default(), takes, board });
+            return Ok(Place { stage: None, key, recordings, again: Again::default(), other_mesh: None, takes, board });
         }
         let config = SiteConfig::read(path, &[])?;
         let board = Board::of_site(&config)?;
@@ -208,6 +218,7 @@ impl Planner<'_> {
         }
         let settings_folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         let again = config.again.clone();
+        let other_mesh = self.other_mesh(name, &config, &settings_folder);
         let task = Task::Site { config: Box::new(config.clone()), settings_folder: settings_folder.clone() };
         let stage = self.add(name.into(), vec![], None, task);
         let folder = self.folder(stage);
@@ -222,9 +233,25 @@ impl Planner<'_> {
             key,
             recordings: folder.join("recordings"),
             again: Again { folder: folder.join("again"), subjects: again },
+            other_mesh,
             takes,
             board,
         })
+    }
+
+    /// The compared subjects of the first site as another mesh of the same error has them.
+    fn other_mesh(&mut self, name: &str, config: &SiteConfig, settings_folder: &Path) -> Option<usize> {
+        if !(self.config.other_mesh && name == FIRST && config.record.mesh_error_m > 0.0) {
+            return None;
+        }
+        let SubjectSplit { training, unseen } = &self.config.split;
+        let compared = |subject: &&String| [training, unseen].contains(subject);
+        let mut config = SiteConfig { again: vec![], ..config.clone() };
+        config.subjects.retain(|subject| compared(&subject));
+        config.unseen.retain(|subject| compared(&subject));
+        config.record.redraw += 1;
+        let task = Task::Site { config: Box::new(config), settings_folder: settings_folder.to_path_buf() };
+        Some(self.add("other_mesh".into(), vec![], None, task))
     }
 
     fn trainings(&mut self, place: &Place) -> Result<BTreeMap<Variant, Trained>> {
@@ -282,7 +309,7 @@ impl Planner<'_> {
             .chain(config.variants.iter().map(|&variant| Method::Variant(variant)))
             .map(|method| (method, MethodStages::default()))
             .collect();
-        let mut again = MethodStages::default();
+        let [mut again, mut other_mesh] = [MethodStages::default(), MethodStages::default()];
         // Everybody is needed where the classifier learns from others.
         let everybody = config.protocols.contains(&Protocol::OtherSubjects);
         let needed = |take: &&Take| everybody || take.subject == *training || take.subject == *unseen;
@@ -306,7 +333,11 @@ impl Planner<'_> {
                 self.scores(stages, *method, place, take, simulate, simulated);
             }
             if place.again.subjects.contains(&take.subject) {
-                self.scores_again(&mut again, place, take, place.again.folder.join(&take.name));
+                self.scores_again(&mut again, Method::Again, place, take, place.again.folder.join(&take.name), None);
+            }
+            if let Some(stage) = place.other_mesh {
+                let recorded = self.folder(stage).join("recordings").join(&take.name);
+                self.scores_again(&mut other_mesh, Method::OtherMesh, place, take, recorded, Some(stage));
             }
         }
         for (method, stages) in &mut methods {
@@ -340,6 +371,14 @@ impl Planner<'_> {
             }
         }
         self.plan.methods.extend(methods);
+        if let Some(stage) = place.other_mesh {
+            let recorded = self.folder(stage).join("recordings");
+            let folders = place.of_subject(unseen).map(|take| recorded.join(&take.name)).collect();
+            let id = Method::OtherMesh.id();
+            let learned = self.recognition(id, Protocol::SameMotions, place, vec![stage], folders);
+            other_mesh.recognition.insert(Protocol::SameMotions, learned);
+            self.plan.methods.push((Method::OtherMesh, other_mesh));
+        }
         self.plan.methods.push((Method::Again, again));
     }
 
@@ -399,11 +438,21 @@ impl Planner<'_> {
         stages.note(stage, take, held_out);
     }
 
-    fn scores_again(&mut self, stages: &mut MethodStages, place: &Place, take: &Take, again: PathBuf) {
+    /// Scores of what was recorded in place of a simulation, by a stage of its own or with the site.
+    fn scores_again(
+        &mut self,
+        stages: &mut MethodStages,
+        method: Method,
+        place: &Place,
+        take: &Take,
+        again: PathBuf,
+        by: Option<usize>,
+    ) {
         let held_out = take.subject == self.config.split.training;
         if held_out || take.subject == self.config.split.unseen {
             let task = self.compare(place, take, again, held_out);
-            let stage = self.add(format!("compare/again/{}", take.name), vec![], Some(place), task);
+            let parents = by.into_iter().collect();
+            let stage = self.add(format!("compare/{}/{}", method.id(), take.name), parents, Some(place), task);
             stages.note(stage, take, held_out);
         }
     }

@@ -14,7 +14,7 @@ fn place(name: &str) -> Place {
     let recordings = Path::new("/measured").join(name);
     let again = Again { folder: "/again".into(), subjects: vec!["s1".into(), "s2".into()] };
     let board = Board { radar: crate::radar::Radar::small(24), room: None };
-    Place { stage: None, key: Key::new(name, &takes, &[]), recordings, again, takes, board }
+    Place { stage: None, key: Key::new(name, &takes, &[]), recordings, again, other_mesh: None, takes, board }
 }
 
 fn config() -> ReproduceConfig {
@@ -136,4 +136,18 @@ fn takes_are_planned_in_the_order_in_which_they_are_found() {
     let mut sorted = names.clone();
     sorted.sort();
     assert!(names == sorted && names.len() == 8, "{names:?}");
+}
+
+#[test]
+fn another_mesh_is_recorded_of_the_compared_subjects_only() {
+    let config = config();
+    let mut planner = Planner { config: &config, root: Path::new("/out"), weights: None, plan: Plan::default() };
+    let mut site = SiteConfig { unseen: vec!["s2".into()], again: vec!["s2".into()], ..SiteConfig::default() };
+    assert_eq!(planner.other_mesh(FIRST, &site, Path::new("")), None);
+    site.record.mesh_error_m = 2e-3;
+    assert_eq!(planner.other_mesh("second_room", &site, Path::new("")), None);
+    let stage = planner.other_mesh(FIRST, &site, Path::new("")).unwrap();
+    let Task::Site { config: other, .. } = &planner.plan.stages[stage].task else { panic!("a site") };
+    assert_eq!((&other.subjects[..], &other.again[..], other.record.redraw), (&["s1".to_string(), "s2".into()][..], &[][..], 1));
+    other.check().unwrap();
 }

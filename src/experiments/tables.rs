@@ -131,8 +131,8 @@ fn of(results: &Results, method: Method) -> Option<&MethodResults> {
 /// Baselines, ours, and the ceiling.
 fn compared(results: &Results) -> impl Iterator<Item = &MethodResults> {
     results.methods.iter().filter(|found| {
-        use Method::{Again, Baseline, ReceiverNoise};
-        matches!(found.method, Baseline(_) | ReceiverNoise(_) | Method::Variant(Variant::Ours) | Again)
+        use Method::{Again, Baseline, OtherMesh, ReceiverNoise};
+        matches!(found.method, Baseline(_) | ReceiverNoise(_) | Method::Variant(Variant::Ours) | Again | OtherMesh)
     })
 }
 

@@ -114,6 +114,10 @@ pub struct RecorderConfig {
     /// Of the receiver's noise and the oscillator's alone, so that one truth can be recorded twice; absent: `seed`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_seed: Option<u64>,
+    /// Another draw of the mesh's error and of the receiver's noise, everything else the same: the motion as another
+    /// equally wrong mesh has it.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub redraw: u64,
     /// Overrides the radar's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frames: Option<usize>,
@@ -136,11 +140,16 @@ pub struct RecorderConfig {
     pub effects: EffectsConfig,
 }
 
+fn is_zero(number: &u64) -> bool {
+    *number == 0
+}
+
 impl Default for RecorderConfig {
     fn default() -> Self {
         Self {
             seed: 0,
             noise_seed: None,
+            redraw: 0,
             frames: None,
             interpolation: Interpolation::default(),
             mesh_error_m: 0.0,
@@ -189,7 +198,7 @@ impl RecorderConfig {
             effects: self.effects.clone(),
             seed: self.seed,
             noise_seed: self.noise_seed,
-            redraw: 0,
+            redraw: self.redraw,
         };
         world.check()?;
         Ok(world)
