@@ -239,13 +239,15 @@ impl Planner<'_> {
         })
     }
 
-    /// The compared subjects of the first site as another mesh of the same error has them.
+    /// The compared subjects of the first site as another mesh of the same error has them, and the subject on whom the
+    /// receiver's gain is settled.
     fn other_mesh(&mut self, name: &str, config: &SiteConfig, settings_folder: &Path) -> Option<usize> {
         if !(self.config.other_mesh && name == FIRST && config.record.mesh_error_m > 0.0) {
             return None;
         }
         let SubjectSplit { training, unseen } = &self.config.split;
-        let compared = |subject: &&String| [training, unseen].contains(subject);
+        let settled = config.subjects.first()?;
+        let compared = |subject: &&String| [training, unseen, settled].contains(subject);
         let mut config = SiteConfig { again: vec![], ..config.clone() };
         config.subjects.retain(|subject| compared(&subject));
         config.unseen.retain(|subject| compared(&subject));

@@ -54,7 +54,9 @@ pub fn sequences(config: &SiteConfig, settings_folder: &Path) -> Result<Vec<Sequ
         stays_inside(&world, config.margin_m, &sequence.name)
     })?;
     if config.record.receiver.level.is_none() {
-        let level = Recorder::new(&all[0].recorder.world(settings_folder)?)?.level();
+        // Another draw of the mesh is heard by the same receiver.
+        let first = RecorderConfig { redraw: 0, ..all[0].recorder.clone() };
+        let level = Recorder::new(&first.world(settings_folder)?)?.level();
         all.iter_mut().for_each(|sequence| sequence.recorder.receiver.level = Some(level));
     }
     Ok(all)

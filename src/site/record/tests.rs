@@ -1,7 +1,7 @@
 use super::*;
 use crate::person::actions::Action;
 use crate::radar::Radar;
-use crate::recorder::{RadarChoice, Returns};
+use crate::recorder::{RadarChoice, Recorder, RecorderConfig, Returns};
 
 /// Two subjects, two actions, two frames of a tiny radar.
 fn tiny() -> SiteConfig {
@@ -75,6 +75,20 @@ fn a_second_take_differs_by_noise_alone_and_repetitions_by_their_style() {
     let read = |path: &str| fs::read(still.join(path).join("if.npy")).unwrap();
     assert_eq!(read("recordings/s2_arm_swing_1"), read("again/s2_arm_swing_1"));
     assert_ne!(read("recordings/s2_arm_swing_1"), read("recordings/s2_arm_swing_2"));
+}
+
+#[test]
+fn another_draw_of_the_mesh_moves_the_body_and_not_the_receivers_gain() {
+    let mut config = tiny();
+    config.record.mesh_error_m = 2e-3;
+    let first = |config: &SiteConfig| sequences(config, Path::new("")).unwrap()[0].recorder.clone();
+    let (before, redrawn) = (first(&config), {
+        config.record.redraw = 1;
+        first(&config)
+    });
+    assert_eq!(before.receiver, redrawn.receiver);
+    let field = |settings: &RecorderConfig| Recorder::new(&settings.world(Path::new("")).unwrap()).unwrap().field(0).unwrap();
+    assert_ne!(field(&before), field(&redrawn));
 }
 
 #[test]

@@ -139,7 +139,6 @@ impl Mover {
             10.0 * self.power.log10(),
             self.unlike
         );
-        let nothing = vec![false; scene.size()];
         let cells: Vec<(usize, Vec<usize>)> = (0..scene.frames())
             .filter_map(|frame| {
                 let seen = sightings.iter().find(|s| s.frame == frame);
@@ -150,8 +149,12 @@ impl Mover {
                 };
                 let power = seen.map_or(self.power, |s| s.power);
                 let expected = scene.model.template([(at.0, at.1, power)].into_iter());
-                let kept = if scene.over_body { &nothing } else { scene.model.support(frame) };
-                Some((frame, patch(&expected, scene.map(frame), kept, scene.samples, 0.05)))
+                // Over the body, what is mostly the body's stays: emptied, it would look like a body that returns less.
+                let body = scene.model.expected(frame);
+                let is_bodys = |cell: usize| !scene.over_body || body[cell] > expected[cell];
+                let reached = scene.model.support(frame).iter().enumerate();
+                let kept: Vec<bool> = reached.map(|(cell, reached)| *reached && is_bodys(cell)).collect();
+                Some((frame, patch(&expected, scene.map(frame), &kept, scene.samples, 0.05)))
             })
             .collect();
         let still = scene.evidence.still().to_vec();

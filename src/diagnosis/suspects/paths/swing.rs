@@ -22,8 +22,10 @@ const PHASES: usize = 16;
 const MOST_FRAMES: usize = 48;
 const LONGEST_S: f64 = 10.0;
 const FEWEST_FRAMES: usize = 8;
-/// Degrees of freedom of the heavy tail of powers about their mean.
+/// Degrees of freedom of the heavy tail of the body's powers about their mean.
 const TAIL: f32 = 8.0;
+/// And at most, where there is but noise.
+const LONGEST_TAIL: f32 = 100.0;
 /// Power over what else is expected from which on a frame shows the swing itself.
 const PLAIN: f32 = 4.0;
 /// Steps by which the fit closes in.
@@ -51,9 +53,9 @@ pub fn strongest(scene: &Scene) -> Option<Mover> {
     let step_hz = 0.1 / length_s;
     let rates: Vec<f64> = (4..(FASTEST_HZ / step_hz) as usize).map(|step| step as f64 * step_hz).collect();
     let times: Vec<f64> = training.iter().map(|&frame| middle_s(scene, frame)).collect();
-    let bank = |&rate_hz: &f64| -> Option<(f32, Law)> {
+    let bank = |&rate_hz: &f64| -> Tried {
         let omega = std::f64::consts::TAU * rate_hz;
-        let mut best: Option<(f32, Law)> = None;
+        let mut tried = Tried::default();
         for swing_m in (0..SWINGS.2).map(|step| SWINGS.0 * SWINGS.1.powi(step as i32)) {
             if omega * swing_m * scene.model.cells.doppler_per_mps < (STILL_BINS + 1) as f64 {
                 continue;
@@ -70,16 +72,16 @@ pub fn strongest(scene: &Scene) -> Option<Mover> {
                     })
                     .collect();
                 for &range in &ranges {
-                    let gain = table.gain(&places, range as i64);
-                    if best.is_none_or(|best| gain > best.0) {
-                        best = Some((gain, [scene.range_m(range as f64), law[1], law[2], rate_hz]));
-                    }
+                    tried.hear(table.gain(&places, range as i64), [scene.range_m(range as f64), law[1], law[2], rate_hz]);
                 }
             }
         }
-        best
+        tried
     };
-    let (_, law) = rates.par_iter().filter_map(bank).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    // In one order, so that sums round alike in every run.
+    let tried: Vec<Tried> = rates.par_iter().map(bank).collect();
+    let tried = tried.into_iter().fold(Tried::default(), Tried::and);
+    let (_, law) = tried.best?;
     let (mut law, mut power) = ground.fitted(law, &LEVELS, length_s, &training);
     // A long recording tells the rate better than a part of it, which must not be off by a turn at once.
     let mut count = training.len();
@@ -94,8 +96,9 @@ pub fn strongest(scene: &Scene) -> Option<Mover> {
     }
     let gain = |frames: &[usize]| ground.gain(law, power, frames) / CELLS_PER_VALUE;
     let held_out = gain(&scene.evidence.split.held_out);
-    let tried = (rates.len() * SWINGS.2 * PHASES * ranges.len() * LEVELS.len()) as f64;
-    let p_value = (tried.ln() - gain(every)).min(0.0).exp();
+    // A likelihood ratio is large by chance no more often than its inverse says: that of the training frames, mean over all
+    // that was tried, times that of the others, which had no part in choosing.
+    let p_value = (-tried.mean_log() - held_out).min(0.0).exp();
     if held_out <= 0.0 {
         return None;
     }
@@ -117,6 +120,39 @@ pub fn strongest(scene: &Scene) -> Option<Mover> {
         power: f64::from(power),
         unlike: "its frames follow one swing, which the body's returns around it do not",
     })
+}
+
+/// What a bank of templates gained.
+#[derive(Clone, Copy, Default)]
+struct Tried {
+    best: Option<(f32, Law)>,
+    /// Of likelihood ratios.
+    sum: f64,
+    count: f64,
+}
+
+impl Tried {
+    /// `gain`: in cells, several of which make a value.
+    fn hear(&mut self, gain: f32, law: Law) {
+        if self.best.is_none_or(|best| gain > best.0) {
+            self.best = Some((gain, law));
+        }
+        self.sum += (f64::from(gain) / CELLS_PER_VALUE).min(500.0).exp();
+        // The gain is that of the best level.
+        self.count += LEVELS.len() as f64;
+    }
+
+    fn and(self, other: Self) -> Self {
+        let best = match (self.best, other.best) {
+            (Some(a), Some(b)) => Some(if b.0 > a.0 { b } else { a }),
+            (a, b) => a.or(b),
+        };
+        Self { best, sum: self.sum + other.sum, count: self.count + other.count }
+    }
+
+    fn mean_log(&self) -> f64 {
+        (self.sum / self.count.max(1.0)).max(f64::MIN_POSITIVE).ln()
+    }
 }
 
 /// Log-likelihoods gained by a swing's power in a place, `[frame][doppler · bins + range]` for each level.
@@ -167,14 +203,18 @@ impl<'a> Ground<'a> {
         Self { scene, expected: (0..scene.frames()).into_par_iter().map(of_frame).collect() }
     }
 
-    /// Of one cell.
+    /// Of one cell. Noise is another one in every channel and its level is known; the body's returns are nearly the same in
+    /// all, and how strong they are is known less well. The mixture's powers follow an F law.
     fn cell(&self, frame: usize, cell: usize, more: f32) -> f32 {
         let expected = self.expected[frame][cell];
         if expected.is_infinite() {
             return 0.0;
         }
         let power = self.scene.map(frame)[cell];
-        let law = |expected: f32| -expected.ln() - (TAIL + 1.0) * (power / (TAIL * expected)).ln_1p();
+        let body = (expected - 1.0).max(0.0) / expected;
+        let looks = (body * body + (1.0 - body).powi(2) / self.scene.channels as f32).recip();
+        let tail = (TAIL / (body * body)).min(LONGEST_TAIL);
+        let law = |expected: f32| -looks * expected.ln() - (tail + looks) * (looks * power / (tail * expected)).ln_1p();
         law(expected + more) - law(expected)
     }
 
