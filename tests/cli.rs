@@ -177,7 +177,7 @@ fn a_network_without_its_files_is_no_network() {
 fn baselines_write_recordings_with_the_labels_of_what_they_imitate() {
     let folder = tempfile::tempdir().unwrap();
     let recorded = recording().display().to_string();
-    for method in ["mmgpe", "rf-genesis", "rf-genesis-released"] {
+    for method in ["mmgpe", "mmgpe-surface", "rf-genesis", "rf-genesis-released"] {
         let arguments = ["baseline", method, &recorded, "-q", "--device", "flex", "--calibrate", &recorded, "--out", method];
         let output = hybridsim(&arguments, folder.path());
         assert!(output.status.success(), "{method}: {}", err(&output));

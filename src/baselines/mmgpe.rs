@@ -9,6 +9,9 @@
 //! - Back faces are culled by the vertex normal, occluded vertices by hidden point removal, both in the middle of a frame.
 //! - Spreading 1/(d_tx d_rx); phase f_c τ + S t τ at the true time of every chirp, transmitters in their order.
 //! - No room, no second bounce.
+//!
+//! [`MmGpeConfig::over_the_surface`] is no method of others but a control: the same lobes, with every facet integrated as our
+//! dense surface does. What it gains over the vertices is the sampling's, not the network's.
 
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use nalgebra::Vector3;
@@ -16,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Baseline, check_range};
 use crate::{
-    body::Interpolation,
+    body::{Displacement, Interpolation, Sampling, SurfaceConfig, facets},
     complex::Complex,
     error::Result,
     if_signal::{SumForm, direct_signal},
@@ -37,20 +40,29 @@ pub struct MmGpeConfig {
     pub exponent: f64,
     /// Between poses.
     pub interpolation: Interpolation,
+    /// Where the reflectors sit; facets return by their area, with their phase integrated over it.
+    pub surface: SurfaceConfig,
 }
 
 impl Default for MmGpeConfig {
     fn default() -> Self {
-        Self { diffuse: 0.3, specular: 0.7, exponent: 10.0, interpolation: Interpolation::default() }
+        let (interpolation, surface) = (Interpolation::default(), SurfaceConfig::default());
+        Self { diffuse: 0.3, specular: 0.7, exponent: 10.0, interpolation, surface }
     }
 }
 
 impl MmGpeConfig {
+    /// Summed over all of the surface in place of its vertices.
+    pub fn over_the_surface() -> Self {
+        Self { surface: SurfaceConfig { sampling: Sampling::Facets, ..SurfaceConfig::default() }, ..Self::default() }
+    }
+
     /// Refuses what no reflector has.
     pub fn check(&self) -> Result<()> {
         check_range("diffuse", self.diffuse, 0.0, 1.0)?;
         check_range("specular", self.specular, 0.0, 1.0)?;
-        check_range("exponent", self.exponent, 0.0, 1e4)
+        check_range("exponent", self.exponent, 0.0, 1e4)?;
+        self.surface.check("surface")
     }
 
     /// What a unit normal answers from one unit direction to another.
@@ -76,12 +88,13 @@ impl MmGpe {
     /// Settings that cannot work, or a person who cannot be posed.
     pub fn new(radar: &Radar, person: &Person, config: &MmGpeConfig, device: &Device) -> Result<Self> {
         config.check()?;
-        let sampled = SimulatorConfig { interpolation: config.interpolation, ..SimulatorConfig::default() };
+        let (interpolation, surface) = (config.interpolation, config.surface.clone());
+        let sampled = SimulatorConfig { interpolation, surface, ..SimulatorConfig::default() };
         let scene = Scene::new(radar, None, Some(person), &sampled)?;
         Ok(Self { config: config.clone(), scene, device: device.clone() })
     }
 
-    /// Visible vertices and what they return.
+    /// Visible vertices, or facets, and what they return.
     fn returns(&self, view: &FrameView) -> (Vec<usize>, Vec<f64>) {
         let Some(body) = &view.body else { return Default::default() };
         let [tx_m, rx_m] = antenna_centres(self.radar());
@@ -89,9 +102,19 @@ impl MmGpe {
             let place = Vector3::from(body.position_m[vertex]);
             let towards = |antenna_m: [f64; 3]| (Vector3::from(antenna_m) - place).normalize();
             let found = self.config.response(Vector3::from(body.normal[vertex]), towards(tx_m), towards(rx_m));
-            (found > 0.0).then_some((vertex, found))
+            let size = if self.scene.facets { body.area_m2[vertex] } else { 1.0 };
+            (found > 0.0).then_some((vertex, found * size))
         };
         view.direct.body.iter().filter_map(response).unzip()
+    }
+}
+
+impl MmGpe {
+    /// Phase per metre of every point on the way from a transmitter to the receivers' middle, `[point, chirp]`.
+    fn wavevector(&self, reference_m: &[[f64; 3]], displacement: &Displacement, tx: usize) -> Displacement {
+        let radar = self.radar();
+        let antennas = [radar.tx_position_m(tx), antenna_centres(radar)[1]];
+        facets::wavevector(reference_m, displacement, antennas, radar.wavelength_m())
     }
 }
 
@@ -106,10 +129,18 @@ impl Baseline for MmGpe {
         let (Some(body), Some(posed)) = (&self.scene.body, &view.body) else { unreachable!("the scene has a person") };
         let reference_m: Vec<[f64; 3]> = vertices.iter().map(|&vertex| posed.position_m[vertex]).collect();
         let response = TensorData::new(response, [vertices.len(), 1]).convert_dtype(DType::F32);
-        let amplitude = Amplitude::real(Tensor::from_data(response, &self.device));
+        let response: Tensor<2> = Tensor::from_data(response, &self.device);
         let loops = self.radar().loops_per_frame;
         Ok(transmitters(self.radar(), |tx| {
-            let displacement = body.displacement(posed, &vertices, tx * loops..(tx + 1) * loops, None, &self.device);
+            let chirps = tx * loops..(tx + 1) * loops;
+            let displacement = body.displacement(posed, &vertices, chirps.clone(), None, &self.device);
+            let amplitude = if self.scene.facets {
+                let edges = body.facet_edges(posed, &vertices, chirps, &self.device);
+                let integral = facets::facet_integral(&edges, &self.wavevector(&reference_m, &displacement, tx));
+                Amplitude { re: integral.re * response.clone(), im: Some(integral.im * response.clone()) }
+            } else {
+                Amplitude::real(response.clone())
+            };
             let points = Points { reference_m: &reference_m, displacement: &displacement, amplitude: &amplitude };
             direct_signal(points, self.radar(), tx, Dechirp::Paper, SumForm::Auto)
         }))
@@ -136,6 +167,19 @@ pub(super) fn transmitters(radar: &Radar, signal: impl Fn(usize) -> Complex<3>) 
 mod tests {
     use super::*;
     use crate::baselines::test_support::{moving_ball, peak, radar};
+
+    #[test]
+    fn over_the_surface_a_ball_of_twice_the_radius_returns_about_four_times_the_power() {
+        let radar = radar();
+        let power = |radius: f64| {
+            let person = moving_ball([0.4, 2.8, 0.1], radius, [0.0, 0.0, 0.0]);
+            let surface = MmGpe::new(&radar, &person, &MmGpeConfig::over_the_surface(), &Device::flex()).unwrap();
+            let signal: Vec<num_complex::Complex32> = surface.clean_signal(0).unwrap().to_host();
+            signal.iter().map(|value| f64::from(value.norm_sqr())).sum::<f64>()
+        };
+        let ratio = power(0.04) / power(0.02);
+        assert!((2.0..8.0).contains(&ratio), "{ratio}");
+    }
 
     #[test]
     fn a_moving_ball_is_in_its_range_and_doppler_bin() {

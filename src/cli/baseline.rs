@@ -70,6 +70,8 @@ pub(crate) struct Arguments {
 enum Method {
     /// Visible vertices with fixed reflectivity
     Mmgpe,
+    /// The same over all of the surface
+    MmgpeSurface,
     /// A grid of rays, corrected
     RfGenesis,
     /// A grid of rays, with the released code's errors
@@ -160,6 +162,7 @@ impl Maker {
         }
         let settings = match method {
             Method::Mmgpe => with_sets(MmGpeConfig::default(), &common.set)?,
+            Method::MmgpeSurface => with_sets(MmGpeConfig::over_the_surface(), &common.set)?,
             Method::RfGenesis => with_sets(RfGenesisConfig::default(), &common.set)?,
             Method::RfGenesisReleased => with_sets(RfGenesisConfig::released(), &common.set)?,
             Method::TwoBounce => with_sets(TwoBounceConfig::default(), &common.set)?,
@@ -178,7 +181,7 @@ impl Maker {
             })
         };
         Ok(match self.method {
-            Method::Mmgpe => Box::new(MmGpe::new(radar, person()?, &self.config(), &self.device)?),
+            Method::Mmgpe | Method::MmgpeSurface => Box::new(MmGpe::new(radar, person()?, &self.config(), &self.device)?),
             Method::RfGenesis | Method::RfGenesisReleased => {
                 Box::new(RfGenesis::new(radar, person()?, &self.config(), &self.device)?)
             }

@@ -21,11 +21,13 @@ pub enum BaselineName {
     RfGenesis,
     RfGenesisReleased,
     Mmgpe,
+    /// A control: mmGPE-like lobes on the surface that our variant `dense_surface` sums.
+    MmgpeSurface,
     TwoBounce,
 }
 
 impl BaselineName {
-    pub const ALL: [Self; 4] = [Self::RfGenesis, Self::RfGenesisReleased, Self::Mmgpe, Self::TwoBounce];
+    pub const ALL: [Self; 5] = [Self::RfGenesis, Self::RfGenesisReleased, Self::Mmgpe, Self::MmgpeSurface, Self::TwoBounce];
 
     /// As in settings, folders and `hybridsim baseline`.
     pub fn id(self) -> &'static str {
@@ -33,6 +35,7 @@ impl BaselineName {
             Self::RfGenesis => "rf-genesis",
             Self::RfGenesisReleased => "rf-genesis-released",
             Self::Mmgpe => "mmgpe",
+            Self::MmgpeSurface => "mmgpe-surface",
             Self::TwoBounce => "two-bounce",
         }
     }
@@ -43,6 +46,7 @@ impl BaselineName {
             Self::RfGenesis => "RF-Genesis-like",
             Self::RfGenesisReleased => "RF-Genesis-like, as released",
             Self::Mmgpe => "mmGPE-like",
+            Self::MmgpeSurface => "mmGPE-like, dense surface",
             Self::TwoBounce => "two-bounce mirror tracer",
         }
     }

@@ -107,7 +107,9 @@ pub fn tables(results: &Results) -> String {
         &variants(&[Variant::GcnAtInference, Variant::WithoutGcn, Variant::Ours]),
     );
     text += &arm_swing(results);
-    text += &ablation(results, "Surface: vertices or all of it", "", &variants(&[Variant::DenseSurface, Variant::Ours]));
+    let mut surfaces = variants(&[Variant::DenseSurface, Variant::Ours]);
+    surfaces.extend([BaselineName::MmgpeSurface, BaselineName::Mmgpe].map(Method::ReceiverNoise));
+    text += &ablation(results, "Surface: vertices or all of it", "", &surfaces);
     let found = match &results.effects {
         Some(effects) if effects.is_empty() => "The detective found nothing that was left out.".into(),
         Some(effects) => format!("Found in one training recording: {}.", effects.join(", ")),

@@ -94,6 +94,7 @@ fn open(method: BaselineName, recording: &Recording, checkpoint: Option<&Path>, 
     };
     Ok(match method {
         BaselineName::Mmgpe => Box::new(MmGpe::new(radar, person()?, &MmGpeConfig::default(), device)?),
+        BaselineName::MmgpeSurface => Box::new(MmGpe::new(radar, person()?, &MmGpeConfig::over_the_surface(), device)?),
         BaselineName::RfGenesis => Box::new(RfGenesis::new(radar, person()?, &RfGenesisConfig::default(), device)?),
         BaselineName::RfGenesisReleased => Box::new(RfGenesis::new(radar, person()?, &RfGenesisConfig::released(), device)?),
         BaselineName::TwoBounce => {
