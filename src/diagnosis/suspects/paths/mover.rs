@@ -77,7 +77,7 @@ impl Mover {
         };
         let sines: Vec<f64> = sightings.iter().filter_map(|s| s.sine).collect();
         let mut estimates = vec![];
-        let mut place = Place::at("scene");
+        let mut place = Place::at(if self.id == Some("range_alias") { "propagation" } else { "scene" });
         place.range_m = Some([ranges[0] - 0.5 * cell_m, ranges[1] + 0.5 * cell_m]);
         place.velocity_mps = Some(velocities);
         let mut whereabouts = String::new();
