@@ -40,8 +40,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let filtered = ["if_highpass", "if_lowpass", "coloured_noise"].iter().any(|id| evidence.accepted.contains(id));
     let colour = if filtered { None } else { coloured(evidence, &bins) };
-    // Receivers that were uncoupled again share the noise that each of them had for itself.
-    let known = ["correlated_noise", "mutual_coupling"].iter().any(|id| evidence.accepted.contains(id));
+    // Receivers that were uncoupled again share the noise that each of them had for itself, and what a converter at its rail
+    // cut off bursts and peaks is the same in all of them.
+    let known = ["correlated_noise", "mutual_coupling", "adc_saturation"].iter().any(|id| evidence.accepted.contains(id));
     let correlation = if known { None } else { correlated(evidence, &bins) };
     colour.into_iter().chain(correlation).collect()
 }
