@@ -19,11 +19,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{Baseline, check_range};
 use crate::{
-    body::{Displacement, Interpolation, Sampling, SurfaceConfig, facets},
+    body::{Interpolation, Sampling, SurfaceConfig},
     complex::Complex,
     error::Result,
     if_signal::{SumForm, direct_signal},
-    paths::{Amplitude, Dechirp, Points},
+    paths::{Dechirp, Points},
     person::Person,
     radar::Radar,
     simulator::{FrameView, Scene, SimulatorConfig},
@@ -97,7 +97,7 @@ impl MmGpe {
     /// Visible vertices, or facets, and what they return.
     fn returns(&self, view: &FrameView) -> (Vec<usize>, Vec<f64>) {
         let Some(body) = &view.body else { return Default::default() };
-        let [tx_m, rx_m] = antenna_centres(self.radar());
+        let [tx_m, rx_m] = self.radar().antenna_centres_m();
         let response = |&vertex: &usize| {
             let place = Vector3::from(body.position_m[vertex]);
             let towards = |antenna_m: [f64; 3]| (Vector3::from(antenna_m) - place).normalize();
@@ -106,15 +106,6 @@ impl MmGpe {
             (found > 0.0).then_some((vertex, found * size))
         };
         view.direct.body.iter().filter_map(response).unzip()
-    }
-}
-
-impl MmGpe {
-    /// Phase per metre of every point on the way from a transmitter to the receivers' middle, `[point, chirp]`.
-    fn wavevector(&self, reference_m: &[[f64; 3]], displacement: &Displacement, tx: usize) -> Displacement {
-        let radar = self.radar();
-        let antennas = [radar.tx_position_m(tx), antenna_centres(radar)[1]];
-        facets::wavevector(reference_m, displacement, antennas, radar.wavelength_m())
     }
 }
 
@@ -132,28 +123,12 @@ impl Baseline for MmGpe {
         let response: Tensor<2> = Tensor::from_data(response, &self.device);
         let loops = self.radar().loops_per_frame;
         Ok(transmitters(self.radar(), |tx| {
-            let chirps = tx * loops..(tx + 1) * loops;
-            let displacement = body.displacement(posed, &vertices, chirps.clone(), None, &self.device);
-            let amplitude = if self.scene.facets {
-                let edges = body.facet_edges(posed, &vertices, chirps, &self.device);
-                let integral = facets::facet_integral(&edges, &self.wavevector(&reference_m, &displacement, tx));
-                Amplitude { re: integral.re * response.clone(), im: Some(integral.im * response.clone()) }
-            } else {
-                Amplitude::real(response.clone())
-            };
+            let displacement = body.displacement(posed, &vertices, tx * loops..(tx + 1) * loops, None, &self.device);
+            let amplitude = self.scene.body_amplitude(posed, &vertices, (&reference_m, &displacement), tx, response.clone());
             let points = Points { reference_m: &reference_m, displacement: &displacement, amplitude: &amplitude };
             direct_signal(points, self.radar(), tx, Dechirp::Paper, SumForm::Auto)
         }))
     }
-}
-
-/// Middle of the transmitters and of the receivers, metres, radar frame.
-pub(super) fn antenna_centres(radar: &Radar) -> [[f64; 3]; 2] {
-    [&radar.tx_m, &radar.rx_m].map(|antennas| {
-        std::array::from_fn(|axis| {
-            radar.position_m[axis] + antennas.iter().map(|antenna| antenna[axis]).sum::<f64>() / antennas.len() as f64
-        })
-    })
 }
 
 /// `[rx, loop, sample]` of every transmitter, stacked.
@@ -189,7 +164,7 @@ mod tests {
             let signal = MmGpe::new(&radar, &person, &MmGpeConfig::default(), &Device::flex()).unwrap().clean_signal(0).unwrap();
             let [found, range] = peak(&radar, signal);
             // The near side, from the antennas' middle; its radial velocity is that of the ball along the line of sight.
-            let [tx, rx] = antenna_centres(&radar);
+            let [tx, rx] = radar.antenna_centres_m();
             let distance = |antenna: [f64; 3]| (Vector3::new(0.4, 2.8, 0.1) - Vector3::from(antenna)).norm();
             let wanted = 0.5 * (distance(tx) + distance(rx)) - 0.02;
             assert!((range - wanted).abs() <= 0.5 * radar.range_resolution_m() + 0.02, "{range} m, wanted {wanted} m");

@@ -27,10 +27,7 @@ use burn::tensor::{DType, Device, Tensor, TensorData};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Baseline, check_range,
-    mmgpe::{antenna_centres, transmitters},
-};
+use super::{Baseline, check_range, mmgpe::transmitters};
 use crate::{
     body::{Displacement, Interpolation, PosedBody, SurfaceConfig},
     complex::Complex,
@@ -235,7 +232,7 @@ struct Path {
 impl Path {
     fn new(radar: &Radar) -> Self {
         Self {
-            antennas_m: antenna_centres(radar),
+            antennas_m: radar.antenna_centres_m(),
             wavelength_m: SPEED_OF_LIGHT / radar.start_frequency_hz,
             slope_hz_per_s: radar.slope_hz_per_s,
         }

@@ -99,9 +99,10 @@ enum Command {
     Infer(infer::Arguments),
     /// Simulate a recording's motion as others do, to compare with
     ///
-    /// mmgpe: every visible vertex reflects with fixed lobes; mmgpe-surface: every visible facet, integrated. rf-genesis: rays through a pixel grid, one return for each
-    /// hit; rf-genesis-released: the same with the errors of its released code. two-bounce: a checkpoint's direct path,
-    /// with mirrors in place of its indirect path. Writes a recording folder as infer does, and baseline.json.
+    /// mmgpe: every visible vertex reflects with fixed lobes; mmgpe-surface: every visible facet, integrated.
+    /// rf-genesis: rays through a pixel grid, one return for each hit; rf-genesis-released: the same with the errors
+    /// of its released code. two-bounce: a checkpoint's direct path, with mirrors in place of its indirect path.
+    /// Writes a recording folder as infer does, and baseline.json.
     Baseline(baseline::Arguments),
     /// Compare simulated with measured heatmaps
     ///

@@ -125,6 +125,15 @@ impl Radar {
         std::array::from_fn(|axis| self.position_m[axis] + self.rx_m[rx][axis])
     }
 
+    /// Mean positions of the transmitters and of the receivers.
+    pub fn antenna_centres_m(&self) -> [[f64; 3]; 2] {
+        [&self.tx_m, &self.rx_m].map(|antennas| {
+            std::array::from_fn(|axis| {
+                self.position_m[axis] + antennas.iter().map(|antenna| antenna[axis]).sum::<f64>() / antennas.len() as f64
+            })
+        })
+    }
+
     /// Mean position of all antennas: the viewpoint of the direct path.
     pub fn centre_m(&self) -> [f64; 3] {
         let count = (self.tx_m.len() + self.rx_m.len()) as f64;

@@ -115,7 +115,7 @@ pub struct RecorderConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_seed: Option<u64>,
     /// Another draw of the mesh's error and of the receiver's noise, everything else the same: the motion as another
-    /// equally wrong mesh has it.
+    /// equally wrong mesh has it. The receiver's gain follows the recording; a site keeps that of its first sequence.
     #[serde(skip_serializing_if = "is_zero")]
     pub redraw: u64,
     /// Overrides the radar's.

@@ -7,7 +7,7 @@ use super::{
     surfaces::{column, rows, towards, vectors},
 };
 use crate::{
-    body::{Displacement, facets},
+    body::Displacement,
     complex::Complex,
     if_signal::indirect_signal,
     paths::{Amplitude, Points},
@@ -55,7 +55,7 @@ impl Simulator {
             let radar = &scene.radar;
             let parts = groups.iter().map(|group| {
                 let (displacement, weighed) = self.as_seen(group, tx, device);
-                let amplitude = group.facet_amplitude(weighed, &displacement, tx, device);
+                let amplitude = group.amplitude(weighed, &displacement, tx);
                 let points =
                     Points { reference_m: &group.visible.reference_m, displacement: &displacement, amplitude: &amplitude };
                 let (dechirp, form) = (self.config.dechirp, self.config.sum);
@@ -150,7 +150,8 @@ impl Simulator {
     fn microfacet_response(&self, visible: &Visible<'_>, surface: &Surface) -> Response {
         let radar = &visible.scene.radar;
         let (normal, incident) = self.illumination(visible);
-        let outgoing = self.towards(visible, mean(&radar.rx_m, radar.position_m));
+        let [_, receivers_m] = radar.antenna_centres_m();
+        let outgoing = self.towards(visible, receivers_m);
         let amplitude = microfacet::amplitude(&surface.material, normal, incident, outgoing, self.config.response);
         Response { amplitude, offset_m: None }
     }
@@ -172,7 +173,8 @@ impl Simulator {
     fn illumination(&self, visible: &Visible<'_>) -> (Tensor<3>, Tensor<3>) {
         let radar = &visible.scene.radar;
         let normal = vectors(visible.normals().into_iter(), &self.device());
-        (normal, self.towards(visible, mean(&radar.tx_m, radar.position_m)))
+        let [transmitters_m, _] = radar.antenna_centres_m();
+        (normal, self.towards(visible, transmitters_m))
     }
 
     fn towards(&self, visible: &Visible<'_>, place: [f64; 3]) -> Tensor<3> {
@@ -225,27 +227,11 @@ impl Group<'_> {
         }
     }
 
-    /// The amplitude with the closed-form integral over each facet, where facets are what is sampled.
-    fn facet_amplitude(&self, amplitude: Tensor<2>, displacement: &Displacement, tx: usize, device: &Device) -> Amplitude {
+    fn amplitude(&self, amplitude: Tensor<2>, displacement: &Displacement, tx: usize) -> Amplitude {
         let Visible { scene, view, kind, points, reference_m } = &self.visible;
-        match (kind, &scene.body, &view.body) {
-            (Kind::Body, Some(body), Some(frame)) if scene.facets => {
-                let radar = &scene.radar;
-                let loops = radar.loops_per_frame;
-                let antennas = [radar.tx_position_m(tx), mean(&radar.rx_m, radar.position_m)];
-                let wavevector = facets::wavevector(reference_m, displacement, antennas, radar.wavelength_m());
-                let edges = body.facet_edges(frame, points, tx * loops..(tx + 1) * loops, device);
-                let integral = facets::facet_integral(&edges, &wavevector);
-                Amplitude { re: integral.re * amplitude.clone(), im: Some(integral.im * amplitude) }
-            }
+        match (kind, &view.body) {
+            (Kind::Body, Some(frame)) => scene.body_amplitude(frame, points, (reference_m, displacement), tx, amplitude),
             _ => Amplitude::real(amplitude),
         }
     }
-}
-
-/// Mean position of antennas, radar frame.
-fn mean(antennas: &[[f64; 3]], position_m: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|axis| {
-        position_m[axis] + antennas.iter().map(|antenna| antenna[axis]).sum::<f64>() / antennas.len() as f64
-    })
 }

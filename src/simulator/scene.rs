@@ -5,13 +5,15 @@ use std::{
     sync::{Arc, Mutex},
 };
 
+use burn::tensor::Tensor;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::SimulatorConfig;
 use crate::{
-    body::{BodyFrame, PosedBody, Sampling},
+    body::{BodyFrame, Displacement, PosedBody, Sampling, facets},
     error::Result,
+    paths::Amplitude,
     person::{JOINT_NAMES, Person},
     radar::Radar,
     room::Room,
@@ -88,6 +90,33 @@ impl Scene {
             flattest,
             views: Mutex::new(VecDeque::new()),
         })
+    }
+
+    /// What some points of the body return of a real amplitude: with the closed-form integral over each facet, where facets
+    /// are what is sampled.
+    ///
+    /// # Shapes
+    /// - `reference_m`: `[point, xyz]`, `displacement` in the transmitter's chirps: components `[point, chirp]`, metres
+    /// - `amplitude`: `[point, 1]`
+    ///
+    /// # Gradient
+    /// Flows to amplitude and displacement.
+    pub(crate) fn body_amplitude(
+        &self,
+        frame: &BodyFrame,
+        points: &[usize],
+        (reference_m, displacement): (&[[f64; 3]], &Displacement),
+        tx: usize,
+        amplitude: Tensor<2>,
+    ) -> Amplitude {
+        let Some(body) = self.body.as_ref().filter(|_| self.facets) else { return Amplitude::real(amplitude) };
+        let (radar, loops) = (&self.radar, self.radar.loops_per_frame);
+        let [_, receivers_m] = radar.antenna_centres_m();
+        let antennas = [radar.tx_position_m(tx), receivers_m];
+        let wavevector = facets::wavevector(reference_m, displacement, antennas, radar.wavelength_m());
+        let edges = body.facet_edges(frame, points, tx * loops..(tx + 1) * loops, &amplitude.device());
+        let integral = facets::facet_integral(&edges, &wavevector);
+        Amplitude { re: integral.re * amplitude.clone(), im: Some(integral.im * amplitude) }
     }
 
     /// Range of the farthest echo that the scene can hold, metres.

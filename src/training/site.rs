@@ -143,7 +143,9 @@ pub fn load_recordings(folders: &[PathBuf], config: &SimulatorConfig) -> Result<
 
 /// A radar whose unambiguous range ends inside the room folds far echoes onto near ones: training would teach
 /// the near surfaces to imitate them.
-/// `refusal` gets what was found and what was expected.
+///
+/// # Errors
+/// Such a radar: `refusal` gets what was found and what was expected.
 pub fn refuse_ambiguous_ranges(radar: &Radar, room: Option<&Room>, refusal: impl Fn(String, String) -> Error) -> Result<()> {
     let Some(farthest) = room.and_then(Room::farthest_wall_m) else { return Ok(()) };
     let limit = radar.max_range_m();

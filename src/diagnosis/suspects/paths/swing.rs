@@ -94,8 +94,7 @@ pub fn strongest(scene: &Scene) -> Option<Mover> {
     if swing > WIDEST_SWING_M {
         return None;
     }
-    let gain = |frames: &[usize]| ground.gain(law, power, frames) / CELLS_PER_VALUE;
-    let held_out = gain(&scene.evidence.split.held_out);
+    let held_out = ground.gain(law, power, &scene.evidence.split.held_out) / CELLS_PER_VALUE;
     // A likelihood ratio is large by chance no more often than its inverse says: that of the training frames, mean over all
     // that was tried, times that of the others, which had no part in choosing.
     let p_value = (-tried.mean_log() - held_out).min(0.0).exp();
