@@ -1,18 +1,19 @@
 //! What of an effect survives everything that nobody can know about the body and the room: the d′ of rung E of the
 //! capacity ladder (DIAGNOSIS.md, 0.6), which a millimetre of mesh error and learned reflectivities cannot explain away.
 //!
-//! A scene is recorded several times with and without the effect, each time with another draw of the mesh's error and of
-//! the thermal noise, and again without the person. Only what the effect does in *every* draw counts: sums go over pairs
-//! of different draws (U-statistics), so that what merely becomes another random pattern, as the return of a moved or
-//! delayed body does, counts nothing in the mean. Counted are
-//! - what is added where no body is, as the scenes without the person show it: what stands still against any amplitude of
-//!   the room at any range in every channel, the rest in every cell of range and Doppler against the covariance that the
-//!   channels have there with the person. It counts in full beside the body and little beneath it;
+//! A scene is recorded several times with and without the effect, each time with another draw of the mesh's error, of what
+//! the skin returns where, and of the thermal noise, and again without the person. Only what the effect does in *every* draw
+//! counts: sums go over pairs of different draws (U-statistics), so that what merely becomes another random pattern, as the
+//! return of a moved or delayed body does, counts nothing in the mean; how far so few draws scatter is told by the pairs,
+//! and what is counted is what is sure. Counted are
+//! - what is added where no body is, as the scenes without the person show it: what stands still where it is stronger than
+//!   any amplitude that the room is likely to have there, the rest in every cell of range and Doppler against the covariance
+//!   that the channels have there with the person. It counts in full beside the body and little beneath it;
 //! - the change of that covariance (power in the cell, phases between the channels), as much as the independent looks at it
 //!   can show; one gain for all of the body's return is unknown.
 //!
 //! Not counted, though a recording shows it: what the body's phases have in common from frame to frame and from cell to
-//! cell. Counted, though learned reflectivities may hide it: powers that change with range or with the part of the body.
+//! cell. Counted, though nobody can foresee it: what an effect drew at random, as the phases of an oscillator's noise.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -24,6 +25,10 @@ use crate::diagnosis::evidence::{spectrum, transform};
 const REACH: usize = 2;
 /// Cells per independent look: the noise bandwidth of two Hann windows, in bins.
 const CELLS_PER_LOOK: f64 = 1.5 * 1.5;
+/// Power over the room's own from which what is added to it is no longer taken for another amplitude of it.
+const ABOVE_ROOM: f64 = 4.0;
+/// Cells along Doppler and range beyond which what a draw shows is taken for independent.
+const BLOCK: [usize; 2] = [8, 16];
 
 /// One draw of the mesh's error and the noise.
 pub struct Draw {
@@ -32,12 +37,36 @@ pub struct Draw {
     pub effect: Frames,
 }
 
-/// d′ of an effect over several draws of the scene, and of the scene without the person. `noise`: variance of a complex
-/// sample's noise.
-pub fn d_prime(draws: &[Draw], empty: &[Draw], noise: f64) -> f64 {
+/// Standard deviations below its estimate at which a number is sure, to 95 %.
+const SURE: f64 = 1.645;
+
+/// A square of d′, as few draws give it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Squared {
+    /// Its mean over the draws that could have been is the true one: it may come out below zero.
+    pub value: f64,
+    pub deviation: f64,
+}
+
+impl Squared {
+    /// d′ is this or more: what turns one random pattern into another has no mean, but scatters as much as the pattern.
+    pub fn sure(self) -> f64 {
+        (self.value - SURE * self.deviation).max(0.0).sqrt()
+    }
+
+    fn add(&mut self, other: Self) {
+        self.value += other.value;
+        self.deviation = self.deviation.hypot(other.deviation);
+    }
+}
+
+/// Square of d′ of an effect over several draws of the scene, and of the scene without the person. `noise`: variance of a
+/// complex sample's noise.
+pub fn d_prime_squared(draws: &[Draw], empty: &[Draw], noise: f64) -> Squared {
     let clean: Vec<Parted> = draws.iter().map(|draw| Parted::new(&draw.clean)).collect();
     let effect: Vec<Parted> = draws.iter().map(|draw| Parted::new(&draw.effect)).collect();
     let beside: Vec<Parted> = empty.iter().map(|draw| Parted::new(&draw.effect)).collect();
+    let room: Vec<Parted> = empty.iter().map(|draw| Parted::new(&draw.clean)).collect();
     let frames = &draws[0].clean;
     let mut moving = Moving::new(draws.len());
     for frame in 0..frames.count() {
@@ -46,7 +75,9 @@ pub fn d_prime(draws: &[Draw], empty: &[Draw], noise: f64) -> f64 {
         moving.add(&maps, frames.dims, noise);
     }
     let chirps = (frames.count() * frames.dims[1]) as f64;
-    (standing(&clean, &beside, noise / chirps) + moving.squared()).max(0.0).sqrt()
+    let mut squared = standing([&room, &beside, &clean], noise / chirps);
+    squared.add(moving.squared());
+    squared
 }
 
 /// Frames, and what stands still in them.
@@ -83,51 +114,80 @@ impl<'a> Parted<'a> {
     }
 }
 
-/// Sum over all ordered pairs of different draws of the products of what they show, over the number of pairs.
-#[derive(Clone, Default)]
+/// Products of what the draws show, summed over neighbouring cells: one for every pair of different draws.
+#[derive(Clone)]
 struct Pairs {
-    sum: Vec<Complex64>,
-    own: f64,
-    draws: usize,
+    products: Vec<f64>,
 }
 
 impl Pairs {
-    fn add(&mut self, shown: impl Iterator<Item = Complex64>) {
-        let first = self.sum.is_empty();
-        for (index, value) in shown.enumerate() {
-            if first {
-                self.sum.push(value);
-            } else {
-                self.sum[index] += value;
-            }
-            self.own += value.norm_sqr();
-        }
-        self.draws += 1;
+    fn new(draws: usize) -> Self {
+        Self { products: vec![0.0; draws * draws.saturating_sub(1) / 2] }
     }
 
-    fn mean(&self) -> f64 {
-        let pairs = self.draws * self.draws.saturating_sub(1);
-        (self.sum.iter().map(Complex64::norm_sqr).sum::<f64>() - self.own) / pairs.max(1) as f64
+    /// Adds cells, each draw's values in turn.
+    fn add(&mut self, shown: &[Vec<Complex64>], weight: f64) {
+        let different = shown.iter().enumerate().flat_map(|(index, one)| shown[..index].iter().map(move |other| (one, other)));
+        for (product, (one, other)) in self.products.iter_mut().zip(different) {
+            *product += one.iter().zip(other).map(|(a, b)| (a * b.conj()).re).sum::<f64>() * weight;
+        }
+    }
+
+    /// Mean over the pairs, and its deviation as they scatter: pairs of draws without anything in common are not correlated.
+    fn squared(&self) -> Squared {
+        let count = self.products.len() as f64;
+        let value = self.products.iter().sum::<f64>() / count.max(1.0);
+        let scatter = self.products.iter().map(|product| (product - value).powi(2)).sum::<f64>();
+        Squared { value, deviation: (scatter / (count * (count - 1.0)).max(1.0)).sqrt() }
     }
 }
 
-/// Of the mean chirps.
-fn standing(clean: &[Parted], effect: &[Parted], floor: f64) -> f64 {
-    let mut squared = 0.0;
-    for channel in 0..clean[0].still.len() {
-        let spectra = |of: &[Parted]| of.iter().map(|draw| spectrum(&draw.still[channel])).collect::<Vec<_>>();
-        let (clean, effect) = (spectra(clean), spectra(effect));
-        let bins = clean[0].len();
-        for bin in 0..bins {
-            let around = || (0..=2 * REACH).map(|step| (bin + bins + step - REACH) % bins);
-            let there: f64 = clean.iter().flat_map(|draw| around().map(|at| draw[at].norm_sqr())).sum();
-            let free = there / clean.len() as f64 - (2 * REACH + 1) as f64 * floor;
-            let mut pairs = Pairs::default();
-            effect.iter().for_each(|draw| pairs.add(std::iter::once(draw[bin])));
-            squared += 2.0 * pairs.mean() / (floor + free.max(0.0));
+/// Of the mean chirps: what stands out of any amplitudes that the room could have, and is no turn of all of it. `room`: without
+/// the person, `effect`: what is added there, `scene`: with the person, whose mean is noise to it.
+fn standing([room, effect, scene]: [&[Parted]; 3], floor: f64) -> Squared {
+    let spectra = |of: &Parted| of.still.iter().map(|still| spectrum(still)).collect::<Vec<_>>();
+    let [room, scene] = [room, scene].map(|of| of.iter().map(spectra).collect::<Vec<_>>());
+    let effect: Vec<_> = effect.iter().zip(&room).map(|(effect, room)| unturned(room, spectra(effect))).collect();
+    let bins = room[0][0].len();
+    let count = (2 * REACH + 1) as f64;
+    let mut squared = Squared::default();
+    for channel in 0..room[0].len() {
+        // Over the noise, in a return's width, mean over the draws.
+        let power = |bin: usize, draws: usize, value: &dyn Fn(usize, usize) -> Complex64| -> f64 {
+            let around = |draw: usize| (0..=2 * REACH).map(move |step| (draw, (bin + bins + step - REACH) % bins));
+            let sum: f64 = (0..draws).flat_map(around).map(|(draw, at)| value(draw, at).norm_sqr()).sum();
+            sum / draws as f64 - count * floor
+        };
+        for start in (0..bins).step_by(BLOCK[1]) {
+            let mut pairs = Pairs::new(effect.len());
+            for bin in start..(start + BLOCK[1]).min(bins) {
+                let before = power(bin, room.len(), &|draw, at| room[draw][channel][at]);
+                let after = power(bin, room.len(), &|draw, at| room[draw][channel][at] + effect[draw][channel][at]);
+                // Only what is surely the room's.
+                if after < ABOVE_ROOM * (before - 2.0 * floor * (count / room.len() as f64).sqrt()) {
+                    continue;
+                }
+                let free = power(bin, scene.len(), &|draw, at| scene[draw][channel][at]);
+                let shown: Vec<Vec<Complex64>> = effect.iter().map(|draw| vec![draw[channel][bin]]).collect();
+                pairs.add(&shown, 2.0 / (floor + free.max(0.0)));
+            }
+            squared.add(pairs.squared());
         }
     }
     squared
+}
+
+/// What an effect adds beside a turn of all that is there, `[channel][bin]`: nobody knows the phase.
+fn unturned(clean: &[Vec<Complex64>], effect: Vec<Vec<Complex64>>) -> Vec<Vec<Complex64>> {
+    let pairs = || clean.iter().flatten().zip(effect.iter().flatten());
+    let kept: Complex64 = pairs().map(|(x, e)| x.conj() * (x + e)).sum();
+    if kept == Complex64::ZERO {
+        return effect;
+    }
+    let back = kept.conj() / kept.norm();
+    let of =
+        |(clean, effect): (&Vec<Complex64>, &Vec<Complex64>)| clean.iter().zip(effect).map(|(x, e)| (x + e) * back - x).collect();
+    clean.iter().zip(&effect).map(of).collect()
 }
 
 /// One frame, `[draw][channel][doppler · range]`.
@@ -140,7 +200,8 @@ struct Maps {
 
 /// What the cells of all frames show.
 struct Moving {
-    squared: f64,
+    squared: Squared,
+    changed: Squared,
     /// Of each draw's change of covariance, what one gain for the body's return would change: projection and its weight.
     along_gain: Vec<f64>,
     gain: f64,
@@ -148,13 +209,19 @@ struct Moving {
 
 impl Moving {
     fn new(draws: usize) -> Self {
-        Self { squared: 0.0, along_gain: vec![0.0; draws], gain: 0.0 }
+        Self { squared: Squared::default(), changed: Squared::default(), along_gain: vec![0.0; draws], gain: 0.0 }
     }
 
-    fn squared(&self) -> f64 {
-        let mut along = Pairs::default();
-        self.along_gain.iter().for_each(|&value| along.add(std::iter::once(value.into())));
-        self.squared - if self.gain > 0.0 { along.mean() / self.gain } else { 0.0 }
+    fn squared(self) -> Squared {
+        let mut squared = self.squared;
+        squared.add(self.changed);
+        if self.gain > 0.0 {
+            let mut along = Pairs::new(self.along_gain.len());
+            let shown: Vec<Vec<Complex64>> = self.along_gain.iter().map(|&value| vec![value.into()]).collect();
+            along.add(&shown, -1.0 / self.gain);
+            squared.add(along.squared());
+        }
+        squared
     }
 
     fn add(&mut self, maps: &Maps, dims: [usize; 3], floor: f64) {
@@ -168,31 +235,37 @@ impl Moving {
         let mean = |of: &[Vec<DMatrix<Complex64>>], cell: usize| {
             of.iter().map(|draw| &draw[cell]).sum::<DMatrix<Complex64>>() * Complex64::from(1.0 / of.len() as f64)
         };
+        let across = samples.div_ceil(BLOCK[1]);
+        let blocks = loops.div_ceil(BLOCK[0]) * across;
+        let mut added = vec![Pairs::new(maps.beside.len()); blocks];
+        let mut changed = vec![Pairs::new(clean.len()); blocks];
         for cell in 0..loops * samples {
+            let block = cell / samples / BLOCK[0] * across + cell % samples / BLOCK[1];
             let (before, after) = (mean(&clean, cell), mean(&planted, cell));
             if let Some(whitener) = whitener(&before) {
-                let mut pairs = Pairs::default();
-                for map in &maps.beside {
+                let shown = |map: &Vec<Vec<Complex64>>| {
                     let effect = DMatrix::from_fn(channels, 1, |channel, _| map[channel][cell]);
-                    pairs.add((&whitener * effect).iter().copied());
-                }
-                self.squared += 2.0 * pairs.mean();
+                    (&whitener * effect).as_slice().to_vec()
+                };
+                added[block].add(&maps.beside.iter().map(shown).collect::<Vec<_>>(), 2.0);
             }
             // Relative to the mean of before and after: a power that rises from nothing counts finitely.
             if let Some(whitener) = whitener(&((&before + after) * Complex64::from(0.5))) {
                 let identity = DMatrix::<Complex64>::identity(channels, channels);
                 let gain = identity - &whitener * whitener.adjoint() * Complex64::from(floor);
-                let mut pairs = Pairs::default();
+                let mut shown = vec![];
                 for (draw, (clean, planted)) in clean.iter().zip(&planted).enumerate() {
                     let change = &whitener * (&planted[cell] - &clean[cell]) * whitener.adjoint();
                     let along = change.iter().zip(gain.iter()).map(|(a, b)| (a * b.conj()).re).sum::<f64>();
                     self.along_gain[draw] += along / CELLS_PER_LOOK;
-                    pairs.add(change.iter().copied());
+                    shown.push(change.as_slice().to_vec());
                 }
-                self.squared += pairs.mean() / CELLS_PER_LOOK;
+                changed[block].add(&shown, 1.0 / CELLS_PER_LOOK);
                 self.gain += gain.iter().map(Complex64::norm_sqr).sum::<f64>() / CELLS_PER_LOOK;
             }
         }
+        added.iter().for_each(|pairs| self.squared.add(pairs.squared()));
+        changed.iter().for_each(|pairs| self.changed.add(pairs.squared()));
     }
 }
 
@@ -282,9 +355,9 @@ mod tests {
             };
             seeds.map(draw).collect()
         };
-        let (draws, empty) = (draws(6.0, 1..4), draws(0.0, 4..6));
+        let (draws, empty) = (draws(6.0, 1..5), draws(0.0, 5..8));
         let coherent = draws[0].effect.values.iter().flatten().map(Complex64::norm_sqr).sum::<f64>().sqrt();
-        [d_prime(&draws, &empty, 2.0), coherent]
+        [d_prime_squared(&draws, &empty, 2.0).sure(), coherent]
     }
 
     fn difference(a: &Frames, b: &Frames) -> Frames {
@@ -299,12 +372,18 @@ mod tests {
     }
 
     #[test]
-    fn another_draw_of_the_body_and_another_amplitude_of_the_room_are_no_effect() {
+    fn another_draw_of_the_body_and_another_room_of_the_same_strength_are_no_effect() {
         let redrawn = both(|seed, body, clean| difference(&scene(seed + 100, body, 0.0), clean));
-        let brighter = both(|_, _, clean| frames(clean.count(), |_, _, slow, fast| tone(0.0, 20.0, slow, fast) * 6.0));
-        for [found, coherent] in [redrawn, brighter] {
-            assert!(coherent > 200.0 && found < 8.0, "{coherent} and {found}");
+        let factor = |gain: Complex64| {
+            both(move |_, _, clean| frames(clean.count(), |_, _, slow, fast| tone(0.0, 20.0, slow, fast) * 30.0 * (gain - 1.0)))
+        };
+        let [brighter, turned, opposite] = [1.2.into(), Complex64::cis(1.0), Complex64::from(-1.0)].map(factor);
+        for [found, coherent] in [redrawn, brighter, turned, opposite] {
+            assert!(coherent > 200.0 && found < 4.0, "{coherent} and {found}");
         }
+        // Ten times as strong, it is something else: each return stands out as far as it is above the room.
+        let [found, _] = factor(10.0.into());
+        assert!(found > 10.0, "{found}");
     }
 
     #[test]

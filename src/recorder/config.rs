@@ -199,6 +199,7 @@ impl RecorderConfig {
             seed: self.seed,
             noise_seed: self.noise_seed,
             redraw: self.redraw,
+            other_skin: 0,
         };
         world.check()?;
         Ok(world)

@@ -86,6 +86,8 @@ pub struct World {
     pub noise_seed: Option<u64>,
     /// Another draw of the mesh's error and of the receiver's noise, everything else the same; 0: the one of the seed.
     pub redraw: u64,
+    /// Another draw of what the body's surface returns where, everything else the same.
+    pub other_skin: u64,
 }
 
 impl Default for World {
@@ -106,6 +108,7 @@ impl Default for World {
             seed: 0,
             noise_seed: None,
             redraw: 0,
+            other_skin: 0,
         }
     }
 }
@@ -164,7 +167,11 @@ impl World {
             Draw::Effect { id, .. } => effects::is_noise(id),
             _ => false,
         };
-        let redraw = if matches!(draw, Draw::MeshError | Draw::Noise { .. }) { self.redraw } else { 0 };
+        let redraw = match draw {
+            Draw::MeshError | Draw::Noise { .. } => self.redraw,
+            Draw::Reflectivity | Draw::Elements => self.other_skin,
+            _ => 0,
+        };
         let seed = if again { self.noise_seed.unwrap_or(self.seed) } else { self.seed };
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(stream + (redraw << 24));
