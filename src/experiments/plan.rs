@@ -376,9 +376,11 @@ impl Planner<'_> {
         if let Some(stage) = place.other_mesh {
             let recorded = self.folder(stage).join("recordings");
             let folders = place.of_subject(unseen).map(|take| recorded.join(&take.name)).collect();
-            let id = Method::OtherMesh.id();
-            let learned = self.recognition(id, Protocol::SameMotions, place, vec![stage], folders);
-            other_mesh.recognition.insert(Protocol::SameMotions, learned);
+            if config.protocols.contains(&Protocol::SameMotions) {
+                let id = Method::OtherMesh.id();
+                let learned = self.recognition(id, Protocol::SameMotions, place, vec![stage], folders);
+                other_mesh.recognition.insert(Protocol::SameMotions, learned);
+            }
             self.plan.methods.push((Method::OtherMesh, other_mesh));
         }
         self.plan.methods.push((Method::Again, again));

@@ -75,6 +75,14 @@ fn nothing_is_learned_from_what_it_is_tested_on() {
 }
 
 #[test]
+fn without_protocols_no_classifier_learns() {
+    let config = ReproduceConfig { protocols: vec![], ..config() };
+    let mut planner = Planner { config: &config, root: Path::new("/out"), weights: None, plan: Plan::default() };
+    planner.all(&Place { other_mesh: Some(0), ..place("site") }, None).unwrap();
+    assert!(!planner.plan.stages.iter().any(|stage| matches!(stage.task, Task::Recognise { .. })));
+}
+
+#[test]
 fn the_graph_at_inference_is_ours_used_differently() {
     let plan = planned(&config());
     let (ours, graph) = (method(&plan, Method::Variant(Variant::Ours)), method(&plan, Method::Variant(Variant::GcnAtInference)));
