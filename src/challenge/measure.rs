@@ -118,14 +118,13 @@ pub fn strength(clean: &Draws, planted: &Draws) -> Strength {
     moving = (moving - noise * count).max(noise);
     let shared = (common.norm_sqr() / (power - noise * count).max(noise) / total.max(f64::MIN_POSITIVE)).min(1.0);
     (total, kept) = (total * (1.0 - shared), kept * (1.0 - shared));
-    let surviving = surviving::d_prime_squared(&draws, &empty, noise);
     let d_prime = |energy: f64| (2.0 * energy / noise).sqrt();
     Strength {
         effect_to_noise_db: decibels(total / (noise * count)),
         effect_to_moving_db: decibels(total / moving),
         d_prime: d_prime(total),
         d_prime_held_out: d_prime(kept),
-        d_prime_surviving: surviving.sure(),
+        d_prime_surviving: surviving::d_prime(&draws, &empty, noise),
         below_cover_db: below_cover(&cells, noise * (tx * rx) as f64),
         gain_db: decibels(gain * gain),
     }

@@ -29,40 +29,19 @@ const CELLS_PER_LOOK: f64 = 1.5 * 1.5;
 const ABOVE_ROOM: f64 = 4.0;
 /// Cells along Doppler and range beyond which what a draw shows is taken for independent.
 const BLOCK: [usize; 2] = [8, 16];
+/// Standard deviations below its estimate at which a number is sure, to 95 %.
+const SURE: f64 = 1.645;
 
-/// One draw of the mesh's error and the noise.
+/// One draw of the mesh's error, the skin and the noise.
 pub struct Draw {
     pub clean: Frames,
     /// What the effect adds to it.
     pub effect: Frames,
 }
 
-/// Standard deviations below its estimate at which a number is sure, to 95 %.
-const SURE: f64 = 1.645;
-
-/// A square of d′, as few draws give it.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Squared {
-    /// Its mean over the draws that could have been is the true one: it may come out below zero.
-    pub value: f64,
-    pub deviation: f64,
-}
-
-impl Squared {
-    /// d′ is this or more: what turns one random pattern into another has no mean, but scatters as much as the pattern.
-    pub fn sure(self) -> f64 {
-        (self.value - SURE * self.deviation).max(0.0).sqrt()
-    }
-
-    fn add(&mut self, other: Self) {
-        self.value += other.value;
-        self.deviation = self.deviation.hypot(other.deviation);
-    }
-}
-
-/// Square of d′ of an effect over several draws of the scene, and of the scene without the person. `noise`: variance of a
+/// d′ that an effect surely has over several draws of the scene, and of the scene without the person. `noise`: variance of a
 /// complex sample's noise.
-pub fn d_prime_squared(draws: &[Draw], empty: &[Draw], noise: f64) -> Squared {
+pub fn d_prime(draws: &[Draw], empty: &[Draw], noise: f64) -> f64 {
     let clean: Vec<Parted> = draws.iter().map(|draw| Parted::new(&draw.clean)).collect();
     let effect: Vec<Parted> = draws.iter().map(|draw| Parted::new(&draw.effect)).collect();
     let beside: Vec<Parted> = empty.iter().map(|draw| Parted::new(&draw.effect)).collect();
@@ -77,7 +56,7 @@ pub fn d_prime_squared(draws: &[Draw], empty: &[Draw], noise: f64) -> Squared {
     let chirps = (frames.count() * frames.dims[1]) as f64;
     let mut squared = standing([&room, &beside, &clean], noise / chirps);
     squared.add(moving.squared());
-    squared
+    squared.sure()
 }
 
 /// Frames, and what stands still in them.
@@ -111,6 +90,26 @@ impl<'a> Parted<'a> {
                 transform(&moving, samples)
             })
             .collect()
+    }
+}
+
+/// A square of d′, as few draws give it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Squared {
+    /// Its mean over the draws that could have been is the true one: it may come out below zero.
+    value: f64,
+    deviation: f64,
+}
+
+impl Squared {
+    /// d′ is this or more: what turns one random pattern into another has no mean, but scatters as much as the pattern.
+    fn sure(self) -> f64 {
+        (self.value - SURE * self.deviation).max(0.0).sqrt()
+    }
+
+    fn add(&mut self, other: Self) {
+        self.value += other.value;
+        self.deviation = self.deviation.hypot(other.deviation);
     }
 }
 
@@ -201,7 +200,6 @@ struct Maps {
 /// What the cells of all frames show.
 struct Moving {
     squared: Squared,
-    changed: Squared,
     /// Of each draw's change of covariance, what one gain for the body's return would change: projection and its weight.
     along_gain: Vec<f64>,
     gain: f64,
@@ -209,12 +207,11 @@ struct Moving {
 
 impl Moving {
     fn new(draws: usize) -> Self {
-        Self { squared: Squared::default(), changed: Squared::default(), along_gain: vec![0.0; draws], gain: 0.0 }
+        Self { squared: Squared::default(), along_gain: vec![0.0; draws], gain: 0.0 }
     }
 
     fn squared(self) -> Squared {
         let mut squared = self.squared;
-        squared.add(self.changed);
         if self.gain > 0.0 {
             let mut along = Pairs::new(self.along_gain.len());
             let shown: Vec<Vec<Complex64>> = self.along_gain.iter().map(|&value| vec![value.into()]).collect();
@@ -264,8 +261,7 @@ impl Moving {
                 self.gain += gain.iter().map(Complex64::norm_sqr).sum::<f64>() / CELLS_PER_LOOK;
             }
         }
-        added.iter().for_each(|pairs| self.squared.add(pairs.squared()));
-        changed.iter().for_each(|pairs| self.changed.add(pairs.squared()));
+        added.iter().chain(&changed).for_each(|pairs| self.squared.add(pairs.squared()));
     }
 }
 
@@ -357,7 +353,7 @@ mod tests {
         };
         let (draws, empty) = (draws(6.0, 1..5), draws(0.0, 5..8));
         let coherent = draws[0].effect.values.iter().flatten().map(Complex64::norm_sqr).sum::<f64>().sqrt();
-        [d_prime_squared(&draws, &empty, 2.0).sure(), coherent]
+        [d_prime(&draws, &empty, 2.0), coherent]
     }
 
     fn difference(a: &Frames, b: &Frames) -> Frames {

@@ -374,9 +374,9 @@ impl Planner<'_> {
         }
         self.plan.methods.extend(methods);
         if let Some(stage) = place.other_mesh {
-            let recorded = self.folder(stage).join("recordings");
-            let folders = place.of_subject(unseen).map(|take| recorded.join(&take.name)).collect();
             if config.protocols.contains(&Protocol::SameMotions) {
+                let recorded = self.folder(stage).join("recordings");
+                let folders = place.of_subject(unseen).map(|take| recorded.join(&take.name)).collect();
                 let id = Method::OtherMesh.id();
                 let learned = self.recognition(id, Protocol::SameMotions, place, vec![stage], folders);
                 other_mesh.recognition.insert(Protocol::SameMotions, learned);
