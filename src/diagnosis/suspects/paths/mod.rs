@@ -1,5 +1,8 @@
 //! Returns from where neither the body nor the static room can be: mirror images, strangers that move, echoes.
 
+mod bank;
+mod beams;
+mod coloured;
 mod echo;
 mod ghost;
 mod image;
@@ -26,6 +29,8 @@ const AGREEING: f64 = 0.6;
 const LEAST_GAIN: f64 = 6.0;
 /// Of a track that follows the law of a thing that moves: faint products of two paths come near it.
 const LEAST_GAIN_TRACK: f64 = 12.0;
+/// Of a swing that no single frame shows: where the body is not quite where it should be, something near it comes close to one.
+const LEAST_GAIN_SWING: f64 = 10.0;
 /// Of a track that follows no law of motion: remains of a strong path that was taken out look like that.
 const LEAST_GAIN_UNNAMED: f64 = 25.0;
 /// Of a second path: it must be no remains of the first.
@@ -42,6 +47,9 @@ pub const OVER_THE_BODY: &str = "path-like, over the body";
 /// Effects of which there may be several.
 pub const MANY: [&str; 3] = ["wall_ghost", "floor_bounce", "moving_reflector"];
 
+/// How the body is seen otherwise or again: what their removal leaves is the body's.
+const AGAIN: [&str; 5] = ["wall_ghost", "floor_bounce", "body_multibounce", "object_radar_object", "soft_occlusion"];
+
 /// Mirror images of the body at the room's boundaries, and movers that are none.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let mut found: Vec<Candidate> = still_point::find(evidence).into_iter().collect();
@@ -50,7 +58,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         let elsewhere = moving.iter().any(|found| found.gain > LEAST_GAIN);
         found.extend(moving);
         if !elsewhere {
-            let swing = swing::strongest(&scene).filter(|swing| swing.gain > LEAST_GAIN);
+            let remains = AGAIN.iter().any(|id| evidence.accepted.contains(id));
+            let swing = if remains { None } else { swing::strongest(&scene) };
+            let swing = swing.filter(|swing| swing.mover.gain > LEAST_GAIN_SWING);
             let over = scene.over_the_body();
             // What single frames show needs no law.
             found.extend(over_the_body(&over).or_else(|| swing.map(|swing| swinging(&swing, &over))));
@@ -73,7 +83,7 @@ fn over_the_body(scene: &Scene) -> Option<Candidate> {
 }
 
 /// A swing; without a name it is what has no law either.
-fn swinging(swing: &mover::Mover, scene: &Scene) -> Candidate {
+fn swinging(swing: &swing::Found, scene: &Scene) -> Candidate {
     let found = swing.candidate(scene, TRIED);
     if found.id.is_some() { found } else { Candidate { behaves_like: OVER_THE_BODY, ..found } }
 }

@@ -29,6 +29,8 @@ pub struct Mover {
     /// Held-out frames, nats.
     pub gain: f64,
     pub power: f64,
+    /// Standard deviation of its direction (x over range); none: as the sightings scatter.
+    pub sine_error: Option<f64>,
     /// Why it is not the body.
     pub unlike: &'static str,
 }
@@ -62,7 +64,7 @@ impl Mover {
             "neither the body nor its mirror images can be there"
         };
         let pendulum = pendulum.and_then(|_| fit(scene, &track.sightings)).or(pendulum);
-        Some(Self { track, pendulum, id, gain, power, unlike })
+        Some(Self { track, pendulum, id, gain, power, sine_error: None, unlike })
     }
 
     pub fn candidate(&self, scene: &Scene, tried: f64) -> Candidate {
@@ -84,7 +86,7 @@ impl Mover {
         if !sines.is_empty() {
             let sine = median(&mut sines.clone());
             let spread = median(&mut sines.iter().map(|s| (s - sine).abs()).collect::<Vec<_>>()) * 1.48;
-            let sine_error = spread / (sines.len() as f64).sqrt() * 1.25 + 0.01;
+            let sine_error = self.sine_error.unwrap_or(spread / (sines.len() as f64).sqrt() * 1.25) + 0.01;
             let azimuth = sine.clamp(-1.0, 1.0).asin();
             let (x, y) = (mean_m * sine, mean_m * azimuth.cos());
             let at = scene.evidence.radar.position_m;

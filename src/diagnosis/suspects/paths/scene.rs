@@ -28,8 +28,6 @@ pub struct Scene<'a> {
     pub bins: usize,
     /// Channels that a power is the mean of.
     pub channels: f64,
-    /// Range bins that the body has power in during some frame.
-    pub visited: Vec<bool>,
     /// Cells of a map where in every frame remains of the room can be, or nothing is received.
     never: Vec<bool>,
     /// These, and where the body can be.
@@ -113,7 +111,7 @@ impl<'a> Scene<'a> {
             samples,
             bins,
             channels,
-            visited,
+
             never,
             taken,
             reached,
@@ -171,6 +169,11 @@ impl<'a> Scene<'a> {
 
     pub fn base(&self, frame: usize) -> &[f32] {
         &self.base[frame * self.size()..(frame + 1) * self.size()]
+    }
+
+    /// Expected power without any sidelobes.
+    pub fn floor(&self, frame: usize) -> &[f32] {
+        &self.floor[frame * self.size()..(frame + 1) * self.size()]
     }
 
     /// A map's powers in the cells of a frame that are free to look at.

@@ -1,317 +1,344 @@
-//! A thing that swings among the body's returns: frame by frame it drowns in them, but its frames together follow one law.
-//! Every swing is tried against what the body is expected to be (a bank of templates), then the best one is fitted.
+//! A thing that swings, too weak or too much among the body's returns to be seen in one frame: its frames together follow one
+//! law. Every swing is tried on what tones explain of each frame (a bank), the best ones are fitted and judged by all frames.
 
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::bank::{Gains, LEVELS, Swing, Table, around, climb, widths};
+use super::beams::{Beams, Look};
 use super::mover::{Mover, WIDEST_SWING_M, middle_s};
 use super::pendulum::{Law, Pendulum, at};
-use super::scene::{STILL_BINS, Scene};
-use super::track::{Sighting, Track, sighting};
-use crate::diagnosis::Point;
-use crate::diagnosis::locate::CELLS_PER_VALUE;
+use super::scene::Scene;
+use super::track::{Sighting, Track};
 use crate::diagnosis::prediction::range_and_velocity;
+use crate::diagnosis::{Candidate, Correction, Point};
 
-/// Powers over the noise at the peak that are tried.
-const LEVELS: [f32; 8] = [4.0, 10.0, 25.0, 63.0, 160.0, 400.0, 1000.0, 4000.0];
-/// Rates are tried up to this.
-const FASTEST_HZ: f64 = 4.0;
-/// Swings that are tried: the smallest, the ratio to the next, how many.
-const SWINGS: (f64, f64, usize) = (0.02, 1.5, 8);
-const PHASES: usize = 16;
-/// Training frames that the bank is laid over, and how long they may last: rates are as fine as that is long.
+/// Samples of all channels and frames that the bank is laid over, at most so many frames that last so long.
+const MOST_SAMPLES: usize = 1 << 21;
 const MOST_FRAMES: usize = 48;
 const LONGEST_S: f64 = 10.0;
 const FEWEST_FRAMES: usize = 8;
 /// Degrees of freedom of the heavy tail of the body's powers about their mean.
-const TAIL: f32 = 8.0;
+const TAIL: f64 = 8.0;
 /// And at most, where there is but noise.
-const LONGEST_TAIL: f32 = 100.0;
-/// Power over what else is expected from which on a frame shows the swing itself.
-const PLAIN: f32 = 4.0;
-/// Steps by which the fit closes in.
-const STEPS: usize = 24;
+const LONGEST_TAIL: f64 = 100.0;
+/// Share of the body's power in a look times this: how likely it is that the look shows something that was not expected at all,
+/// and by how much that exceeds what was.
+const STRAY: f64 = 0.05;
+const STRAY_POWER: f64 = 30.0;
+/// Cells of the fine grid beside a swing's ranges where what stands still may be taken for it.
+const BESIDE: i64 = 4;
+/// Share of a swing's gain from which on something that stands still explains it.
+const NEARLY: f64 = 0.6;
+/// A body's point so close in Doppler and range (cells: a clock that is a little off moves a limb by as much) and
+/// in direction is where the swing is (x over range).
+const NEAR: [f64; 2] = [2.0, 1.5];
+const SAME_DIRECTION: f64 = 0.35;
+/// Share of the variance of a swing's ranges that those of the body leave, below which it goes where the body goes.
+const PARALLEL: f64 = 0.3;
+/// What chance does more often is no swing.
+const LEAST_LIKELY: f64 = 1e-2;
+/// Drop of the log-likelihood at the ends of a 90 % interval, and in standard deviations.
+const DROP: f64 = 1.35;
+const DEVIATIONS: f64 = 1.645;
 
-/// Expected powers without a swing, `[frame][doppler · samples + range]`; infinite where nothing can be seen.
-struct Ground<'a> {
-    scene: &'a Scene<'a>,
-    expected: Vec<Vec<f32>>,
+pub struct Found {
+    pub mover: Mover,
+    tones: Vec<Tone>,
 }
 
-/// None where nothing gains, or no frame shows what the law says.
-pub fn strongest(scene: &Scene) -> Option<Mover> {
-    let ground = Ground::new(scene);
-    let every = &scene.evidence.split.training;
-    let start_s = middle_s(scene, *every.first()?);
+/// What a frame shows of it.
+#[derive(Clone)]
+struct Tone {
+    frame: usize,
+    /// Doppler and range in cells.
+    place: (f64, f64),
+    amplitudes: Vec<Complex64>,
+}
+
+impl Found {
+    pub fn candidate(&self, scene: &Scene, tried: f64) -> Candidate {
+        let tones = self.tones.clone();
+        let correction = Correction::Samples(Arc::new(move |cube| {
+            let dims = cube.dims;
+            let turns = |cells: f64, length: usize| -> Vec<Complex64> {
+                (0..length).map(|i| Complex64::cis(TAU * cells * i as f64 / length as f64)).collect()
+            };
+            for tone in &tones {
+                let (slow, fast) = (turns(tone.place.0, dims[3]), turns(tone.place.1, dims[4]));
+                for (channel, amplitude) in tone.amplitudes.iter().enumerate() {
+                    let start = (tone.frame * tone.amplitudes.len() + channel) * dims[3] * dims[4];
+                    for (chirp, turn) in cube.samples[start..].chunks_exact_mut(dims[4]).zip(&slow) {
+                        let amplitude = amplitude * turn;
+                        chirp.iter_mut().zip(&fast).for_each(|(value, turn)| *value -= amplitude * turn);
+                    }
+                }
+            }
+        }));
+        Candidate { correction, ..self.mover.candidate(scene, tried) }
+    }
+}
+
+/// None where nothing gains.
+pub fn strongest(scene: &Scene) -> Option<Found> {
+    let split = &scene.evidence.split;
+    let start_s = middle_s(scene, *split.training.first()?);
     let in_span = |frame: &usize| middle_s(scene, *frame) - start_s < LONGEST_S;
-    let training: Vec<usize> = every.iter().copied().filter(in_span).take(MOST_FRAMES).collect();
-    let length_s = middle_s(scene, *training.last()?) - start_s;
+    let most = MOST_FRAMES.min(MOST_SAMPLES / (scene.size() * scene.evidence.cube.channels()));
+    let training: Vec<usize> = split.training.iter().copied().filter(in_span).take(most).collect();
+    let last = *training.last()?;
+    let length_s = middle_s(scene, last) - start_s;
     if length_s <= 0.0 || training.len() < FEWEST_FRAMES {
         return None;
     }
+    let held_out: Vec<usize> = split.held_out.iter().copied().filter(|frame| *frame <= last + 1).collect();
+    let mut ground = Ground { scene, beams: Beams::new(scene) };
+    ground.beams.prepare(&training);
+    ground.beams.prepare(&held_out);
     let table = ground.table(&training);
-    let ranges: Vec<usize> = (0..scene.bins).filter(|&range| scene.visited[range]).collect();
-    let step_hz = 0.1 / length_s;
-    let rates: Vec<f64> = (4..(FASTEST_HZ / step_hz) as usize).map(|step| step as f64 * step_hz).collect();
-    let times: Vec<f64> = training.iter().map(|&frame| middle_s(scene, frame)).collect();
-    let bank = |&rate_hz: &f64| -> Tried {
-        let omega = std::f64::consts::TAU * rate_hz;
-        let mut tried = Tried::default();
-        for swing_m in (0..SWINGS.2).map(|step| SWINGS.0 * SWINGS.1.powi(step as i32)) {
-            if omega * swing_m * scene.model.cells.doppler_per_mps < (STILL_BINS + 1) as f64 {
-                continue;
-            }
-            for phase in 0..PHASES {
-                let (sine, cosine) = (std::f64::consts::TAU * phase as f64 / PHASES as f64).sin_cos();
-                let law = [0.0, swing_m * sine, swing_m * cosine, rate_hz];
-                let places: Vec<(i64, i64)> = times
-                    .iter()
-                    .map(|&time| {
-                        let (range_m, velocity) = at(law, time);
-                        let (doppler, range) = scene.model.cells.place(range_m, velocity);
-                        (doppler.round() as i64, range.round() as i64)
-                    })
-                    .collect();
-                for &range in &ranges {
-                    tried.hear(table.gain(&places, range as i64), [scene.range_m(range as f64), law[1], law[2], rate_hz]);
-                }
-            }
-        }
-        tried
-    };
-    // In one order, so that sums round alike in every run.
-    let tried: Vec<Tried> = rates.par_iter().map(bank).collect();
-    let tried = tried.into_iter().fold(Tried::default(), Tried::and);
-    let (_, law) = tried.best?;
-    let (mut law, mut power) = ground.fitted(law, &LEVELS, length_s, &training);
+    let (guesses, tried) = table.bank(scene, length_s);
+    let fits = guesses.iter().map(|guess| ground.fitted(*guess, &training, length_s));
+    let judged = fits.map(|(swing, gain)| (swing, gain, ground.gain(swing, &held_out)));
+    let (mut best, mut gain, again) = judged.max_by(|a, b| (a.1 + a.2).total_cmp(&(b.1 + b.2)))?;
+    // A likelihood ratio is large by chance no more often than its inverse says: that of all frames, one of all that were tried.
+    // Where something that stands still is not steady, it must be beaten.
+    let ranges = table.places(scene, best.law).into_iter().map(|place| place.1);
+    let ranges = ranges.clone().min()? - BESIDE..=ranges.max()? + BESIDE;
+    let standing = table.standing(ranges).map_or((0.0, 0.0), |(standing, tried)| {
+        let of_frame = |&frame: &usize| ground.gain_at(frame, standing.place, standing.sine, standing.power);
+        (standing.gain + held_out.iter().map(of_frame).sum::<f64>(), tried.ln())
+    });
+    let p_value = (tried.ln() + (standing.0 - standing.1).max(0.0) - gain - again).min(0.0).exp();
+    if again <= 0.0
+        || standing.0 > NEARLY * (gain + again)
+        || p_value > LEAST_LIKELY
+        || best.law[1].hypot(best.law[2]) > WIDEST_SWING_M
+    {
+        return None;
+    }
     // A long recording tells the rate better than a part of it, which must not be off by a turn at once.
-    let mut count = training.len();
+    let (every, mut count) = (&split.training, training.len());
+    if count < every.len() {
+        let all: Vec<usize> = (0..scene.frames()).collect();
+        ground.beams.prepare(&all);
+    }
     while count < every.len() {
         count = (2 * count).min(every.len());
         let longer = &every[..count];
-        (law, power) = ground.fitted(law, &[power], middle_s(scene, longer[count - 1]) - start_s, longer);
+        (best, gain) = ground.fitted(best, longer, middle_s(scene, longer[count - 1]) - start_s);
     }
-    let swing = law[1].hypot(law[2]);
-    if swing > WIDEST_SWING_M {
+    ground.beams.prepare(&split.held_out);
+    let again = ground.gain(best, &split.held_out);
+    let deviations = ground.deviations(best, gain, &every[..count], middle_s(scene, every[count - 1]) - start_s);
+    // What may as well not swing at all only flickers.
+    if DEVIATIONS * deviations[1] > best.law[1].hypot(best.law[2]) {
         return None;
     }
-    let held_out = ground.gain(law, power, &scene.evidence.split.held_out) / CELLS_PER_VALUE;
-    // A likelihood ratio is large by chance no more often than its inverse says: that of the training frames, mean over all
-    // that was tried, times that of the others, which had no part in choosing.
-    let p_value = (-tried.mean_log() - held_out).min(0.0).exp();
-    if held_out <= 0.0 {
-        return None;
-    }
-    let sightings: Vec<Sighting> = (0..scene.frames()).filter_map(|frame| ground.sighting(law, frame)).collect();
-    let length_s = middle_s(scene, *every.last()?) - start_s;
-    let pendulum = Pendulum {
-        mean_m: law[0],
-        sine_m: law[1],
-        cosine_m: law[2],
-        rate_hz: law[3],
-        left: 0.0,
-        deviations: [0.2 * scene.range_m(1.0), 0.1 * swing, 0.05 / length_s],
+    let named = !ground.moves_with_the_body(best);
+    let [mean_m, sine_m, cosine_m, rate_hz] = best.law;
+    let power = best.log_power.exp();
+    let sightings = (0..scene.frames()).map(|frame| {
+        let (range_m, velocity_mps) = at(best.law, middle_s(scene, frame));
+        // At the peak after two Hann windows.
+        Sighting { frame, range_m, velocity_mps, power: power / 2.25, sine: Some(best.sine) }
+    });
+    let mover = Mover {
+        track: Track { sightings: sightings.collect(), p_value },
+        pendulum: Some(Pendulum {
+            mean_m,
+            sine_m,
+            cosine_m,
+            rate_hz,
+            left: 0.0,
+            deviations: [deviations[0], deviations[1], deviations[2]],
+        }),
+        id: named.then_some("moving_reflector"),
+        gain: again,
+        power: power / 2.25,
+        sine_error: Some(deviations[3]),
+        unlike: "its frames follow one swing, which nothing else around it does",
     };
-    (!sightings.is_empty()).then_some(Mover {
-        track: Track { sightings, p_value },
-        pendulum: Some(pendulum),
-        id: (!ground.moves_with_the_body(law)).then_some("moving_reflector"),
-        gain: held_out,
-        power: f64::from(power),
-        unlike: "its frames follow one swing, which the body's returns around it do not",
-    })
+    Some(Found { mover, tones: ground.tones(best) })
 }
 
-/// What a bank of templates gained.
-#[derive(Clone, Copy, Default)]
-struct Tried {
-    best: Option<(f32, Law)>,
-    /// Of likelihood ratios.
-    sum: f64,
-    count: f64,
+struct Ground<'a> {
+    scene: &'a Scene<'a>,
+    beams: Beams<'a>,
 }
 
-impl Tried {
-    /// `gain`: in cells, several of which make a value.
-    fn hear(&mut self, gain: f32, law: Law) {
-        if self.best.is_none_or(|best| gain > best.0) {
-            self.best = Some((gain, law));
-        }
-        self.sum += (f64::from(gain) / CELLS_PER_VALUE).min(500.0).exp();
-        // The gain is that of the best level.
-        self.count += LEVELS.len() as f64;
-    }
-
-    fn and(self, other: Self) -> Self {
-        let best = match (self.best, other.best) {
-            (Some(a), Some(b)) => Some(if b.0 > a.0 { b } else { a }),
-            (a, b) => a.or(b),
+impl Ground<'_> {
+    /// Log-likelihood gained by so much energy in a look. Noise is another one for every transmitter and its level is known;
+    /// the body's returns are nearly the same, and how strong they are is known less well. The mixture's powers follow an F law.
+    fn cell(&self, look: Look, more: f64) -> f64 {
+        let tx = self.scene.evidence.radar.tx_m.len() as f64;
+        let looks = (look.body * look.body + (1.0 - look.body).powi(2) / tx).recip();
+        let tail = (TAIL / (look.body * look.body)).min(LONGEST_TAIL);
+        // Logarithm of the density in units of what is expected, but for what does not depend on that.
+        let constant = gamma_ratio(tail, looks);
+        let law = |expected: f64| {
+            let ratio = look.power / expected;
+            let exponent = constant + (looks - 1.0) * (look.power / look.expected).max(1e-9).ln()
+                - looks * (expected / look.expected).ln()
+                - (tail + looks) * (looks * ratio / tail).ln_1p();
+            exponent.exp()
         };
-        Self { best, sum: self.sum + other.sum, count: self.count + other.count }
-    }
-
-    fn mean_log(&self) -> f64 {
-        (self.sum / self.count.max(1.0)).max(f64::MIN_POSITIVE).ln()
-    }
-}
-
-/// Log-likelihoods gained by a swing's power in a place, `[frame][doppler · bins + range]` for each level.
-struct Table {
-    frames: Vec<Vec<[f32; LEVELS.len()]>>,
-    loops: i64,
-    bins: i64,
-}
-
-impl Table {
-    /// Of the level that explains most.
-    fn gain(&self, places: &[(i64, i64)], range: i64) -> f32 {
-        let mut sums = [0.0f32; LEVELS.len()];
-        for (cells, &(doppler, step)) in self.frames.iter().zip(places) {
-            let range = range + step;
-            if (0..self.bins).contains(&range) {
-                let cell = &cells[(doppler.rem_euclid(self.loops) * self.bins + range) as usize];
-                sums.iter_mut().zip(cell).for_each(|(sum, gain)| *sum += gain);
-            }
-        }
-        sums.into_iter().fold(f32::NEG_INFINITY, f32::max)
-    }
-}
-
-impl<'a> Ground<'a> {
-    fn new(scene: &'a Scene<'a>) -> Self {
-        let (loops, samples, bins) = (scene.loops, scene.samples, scene.bins);
-        let of_frame = |frame: usize| -> Vec<f32> {
-            let (body, support, base) = (scene.model.expected(frame), scene.model.support(frame), scene.base(frame));
-            let loudest = |doppler: usize, range: usize| {
-                let rows = [doppler, (doppler + 1) % loops, (doppler + loops - 1) % loops];
-                let ranges = range.saturating_sub(1)..(range + 2).min(samples);
-                rows.into_iter().flat_map(|row| ranges.clone().map(move |range| body[row * samples + range])).fold(1.0, f32::max)
-            };
-            (0..loops * samples)
-                .map(|cell| {
-                    let (doppler, range) = (cell / samples, cell % samples);
-                    if range >= bins || doppler.min(loops - doppler) as i64 <= STILL_BINS {
-                        f32::INFINITY
-                    } else if support[cell] {
-                        loudest(doppler, range)
-                    } else {
-                        base[cell].max(loudest(doppler, range))
-                    }
-                })
-                .collect()
-        };
-        Self { scene, expected: (0..scene.frames()).into_par_iter().map(of_frame).collect() }
-    }
-
-    /// Of one cell. Noise is another one in every channel and its level is known; the body's returns are nearly the same in
-    /// all, and how strong they are is known less well. The mixture's powers follow an F law.
-    fn cell(&self, frame: usize, cell: usize, more: f32) -> f32 {
-        let expected = self.expected[frame][cell];
-        if expected.is_infinite() {
-            return 0.0;
-        }
-        let power = self.scene.map(frame)[cell];
-        let body = (expected - 1.0).max(0.0) / expected;
-        let looks = (body * body + (1.0 - body).powi(2) / self.scene.channels as f32).recip();
-        let tail = (TAIL / (body * body)).min(LONGEST_TAIL);
-        let law = |expected: f32| -looks * expected.ln() - (tail + looks) * (looks * power / (tail * expected)).ln_1p();
-        law(expected + more) - law(expected)
+        let stray = STRAY * look.body;
+        let ratio = look.power / look.expected / STRAY_POWER;
+        let strays = stray / STRAY_POWER * (1.0 + ratio).powi(-2);
+        (((1.0 - stray) * law(look.expected + more) + strays) / ((1.0 - stray) * law(look.expected) + strays).max(1e-300))
+            .max(1e-300)
+            .ln()
     }
 
     fn table(&self, frames: &[usize]) -> Table {
-        /// Share of the peak beside it, for a place that is known to half a cell.
-        const BESIDE: f32 = 0.3;
-        let (loops, samples, bins) = (self.scene.loops, self.scene.samples, self.scene.bins);
-        let of_frame = |&frame: &usize| {
-            let mut cells = vec![[0.0; LEVELS.len()]; loops * bins];
-            for (place, gains) in cells.iter_mut().enumerate() {
-                let (doppler, range) = (place / bins, place % bins);
-                for (level, gain) in LEVELS.into_iter().zip(gains) {
-                    for (row, slow) in [(doppler, 1.0), ((doppler + 1) % loops, BESIDE), ((doppler + loops - 1) % loops, BESIDE)]
-                    {
-                        for near in range.saturating_sub(1)..(range + 2).min(bins) {
-                            let fast = if near == range { 1.0 } else { BESIDE };
-                            *gain += self.cell(frame, row * samples + near, level * slow * fast);
-                        }
-                    }
-                }
-            }
-            cells
+        let (rows, columns) = (self.beams.rows(), self.beams.columns());
+        let of_frame = |&frame: &usize| -> (Vec<Vec<Gains>>, Vec<Vec<Gains>>) {
+            let of_beam = |looks: Vec<Look>| {
+                let gains = |cell: usize| LEVELS.map(|level| self.cell(looks[cell], level.into()) as f32);
+                let cells: Vec<Gains> = (0..rows * columns).map(|cell| gains(cell % columns * rows + cell / columns)).collect();
+                let around = around(&cells, rows);
+                (cells, around)
+            };
+            self.beams.looks(frame).into_iter().map(of_beam).unzip()
         };
-        Table { frames: frames.par_iter().map(of_frame).collect(), loops: loops as i64, bins: bins as i64 }
+        let (cells, around) = frames.par_iter().map(of_frame).unzip();
+        let times_s = frames.iter().map(|&frame| middle_s(self.scene, frame)).collect();
+        Table { sines: self.beams.sines.clone(), rows: rows as i64, columns: columns as i64, times_s, cells, around }
     }
 
-    fn gain(&self, law: Law, power: f32, frames: &[usize]) -> f64 {
-        let of_frame = |&frame: &usize| -> f64 {
-            let (range_m, velocity) = at(law, middle_s(self.scene, frame));
-            let template = self.scene.model.template([(range_m, velocity, 1.0)].into_iter());
-            let shown = template.iter().enumerate().filter(|(_, share)| **share > 0.01);
-            shown.map(|(cell, share)| f64::from(self.cell(frame, cell, power * share))).sum()
-        };
+    fn place(&self, law: Law, frame: usize) -> (f64, f64) {
+        let (range_m, velocity) = at(law, middle_s(self.scene, frame));
+        self.scene.model.cells.place(range_m, velocity)
+    }
+
+    fn gain(&self, swing: Swing, frames: &[usize]) -> f64 {
+        let power = swing.log_power.exp();
+        let of_frame = |&frame: &usize| self.gain_at(frame, self.place(swing.law, frame), swing.sine, power);
         frames.par_iter().map(of_frame).sum()
     }
 
-    /// The best law and power near a first guess: one after another is moved as long as that helps, then by less.
-    fn fitted(&self, law: Law, powers: &[f32], length_s: f64, frames: &[usize]) -> (Law, f32) {
-        let cell_m = self.scene.range_m(1.0);
-        let swing = law[1].hypot(law[2]);
-        let mut width = [0.5 * cell_m, 0.25 * swing, 0.25 * swing, 0.05 / length_s, 0.5];
-        let gain = |now: [f64; 5]| self.gain([now[0], now[1], now[2], now[3]], now[4].exp() as f32, frames);
-        let start = |level: f32| [law[0], law[1], law[2], law[3], f64::from(level).ln()];
-        let mut now = powers.iter().map(|&power| start(power)).max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(start(1.0));
-        let mut best = gain(now);
-        for _ in 0..STEPS {
-            let mut moved = false;
-            for axis in 0..now.len() {
-                for sign in [-1.0, 1.0] {
-                    let mut other = now;
-                    other[axis] += sign * width[axis];
-                    let found = gain(other);
-                    if found > best {
-                        (now, best, moved) = (other, found, true);
+    fn gain_at(&self, frame: usize, place: (f64, f64), sine: f64, power: f64) -> f64 {
+        self.beams.look(frame, place, sine).map_or(0.0, |look| self.cell(look, power))
+    }
+
+    /// The best swing near a first guess, and its gain.
+    fn fitted(&self, guess: Swing, frames: &[usize], length_s: f64) -> (Swing, f64) {
+        let [mean, sine, cosine, rate] = widths(self.scene, guess.law, length_s);
+        let widths = [0.5 * mean, 0.5 * sine, 0.5 * cosine, 0.5 * rate, 0.1, 0.5];
+        let gain = |now: [f64; 6]| self.gain(swing(now), frames);
+        let start = numbers(guess);
+        let (found, gain) = climb(start, gain(start), &widths, gain, |a, b| a > b);
+        (swing(found), gain)
+    }
+
+    /// Of mean, swing, rate and direction: half of where the likelihood has fallen to that of a 90 % interval's ends, the
+    /// others fitted again.
+    fn deviations(&self, best: Swing, gain: f64, frames: &[usize], length_s: f64) -> [f64; 4] {
+        let swing_m = best.law[1].hypot(best.law[2]);
+        let first = [0.1 * self.scene.range_m(1.0), 0.05 * swing_m, 0.01 / length_s, 0.01];
+        let most = [2.0 * self.scene.range_m(1.0), swing_m, 0.5 / length_s, 0.5];
+        let moved = |axis: usize, step: f64| -> Swing {
+            let mut swing = best;
+            match axis {
+                0 => swing.law[0] += step,
+                1 => [1, 2].into_iter().for_each(|part| swing.law[part] *= 1.0 + step / swing_m),
+                2 => swing.law[3] += step,
+                _ => swing.sine += step,
+            }
+            swing
+        };
+        let profile = |axis: usize, step: f64| -> f64 {
+            let start = moved(axis, step);
+            let gain = |now: [f64; 6]| {
+                let mut free = swing(now);
+                // The one that is asked for stays.
+                match axis {
+                    0 => free.law[0] = start.law[0],
+                    1 => {
+                        let scale = start.law[1].hypot(start.law[2]) / free.law[1].hypot(free.law[2]).max(1e-9);
+                        (free.law[1], free.law[2]) = (free.law[1] * scale, free.law[2] * scale);
                     }
+                    2 => free.law[3] = start.law[3],
+                    _ => free.sine = start.sine,
                 }
-            }
-            if !moved {
-                width.iter_mut().for_each(|width| *width *= 0.6);
-            }
-        }
-        ([now[0], now[1], now[2], now[3]], now[4].exp() as f32)
-    }
-
-    /// Whether some point of the body is at the swing's range and velocity in most frames in which it moves: then it may
-    /// be a limb whose returns are stronger than expected.
-    fn moves_with_the_body(&self, law: Law) -> bool {
-        let Some(body) = &self.scene.evidence.body else { return false };
-        let cells = &self.scene.model.cells;
-        let (mut with, mut seen) = (0, 0);
-        for frame in 0..self.scene.frames() {
-            let (range_m, velocity) = at(law, middle_s(self.scene, frame));
-            let (doppler, range) = cells.place(range_m, velocity);
-            if doppler.abs() <= STILL_BINS as f64 {
-                continue;
-            }
-            seen += 1;
-            let near = |point: &Point| {
-                let (range_m, velocity) = range_and_velocity(&self.scene.evidence.radar, point.position_m, point.velocity_mps);
-                let place = cells.place(range_m, velocity);
-                (place.0 - doppler).abs() < 1.0 && (place.1 - range).abs() < 1.0
+                self.gain(free, frames)
             };
-            with += usize::from(body.frames[frame].iter().any(near));
-        }
-        2 * with > seen
+            let [mean, sine, cosine, rate] = widths(self.scene, best.law, length_s).map(|width| 0.3 * width);
+            climb(numbers(start), gain(numbers(start)), &[mean, sine, cosine, rate, 0.05, 0.3], gain, |a, b| a > b).1
+        };
+        std::array::from_fn(|axis| {
+            let side = |sign: f64| {
+                let mut step = first[axis];
+                while step < most[axis] && profile(axis, sign * step) > gain - DROP {
+                    step *= 1.5;
+                }
+                step.min(most[axis])
+            };
+            side(-1.0).max(side(1.0)) / DEVIATIONS
+        })
     }
 
-    /// Where a frame shows the swing itself, plainly more than all else.
-    fn sighting(&self, law: Law, frame: usize) -> Option<Sighting> {
-        let (range_m, velocity) = at(law, middle_s(self.scene, frame));
-        let (doppler, range) = self.scene.model.cells.place(range_m, velocity);
-        let range = range.round();
-        if !(0.0..self.scene.bins as f64).contains(&range) {
-            return None;
-        }
-        let row = (doppler.round() as i64).rem_euclid(self.scene.loops as i64) as usize;
-        let cell = row * self.scene.samples + range as usize;
-        let plain = self.scene.map(frame)[cell] > PLAIN * self.expected[frame][cell];
-        plain.then(|| Sighting { range_m, velocity_mps: velocity, ..sighting(self.scene, frame, cell) })
+    /// Whether some point of the body is where the swing is in most frames, so that it may be a limb whose returns are stronger
+    /// than expected; or the swing goes where the body goes, so that it may be the body seen in another way.
+    fn moves_with_the_body(&self, swing: Swing) -> bool {
+        let evidence = self.scene.evidence;
+        let Some(body) = &evidence.body else { return false };
+        let centre = evidence.radar.centre_m();
+        let with = (0..self.scene.frames()).filter(|&frame| {
+            let (doppler, range) = self.place(swing.law, frame);
+            body.frames[frame].iter().any(|point: &Point| {
+                let (range_m, velocity) = range_and_velocity(&evidence.radar, point.position_m, point.velocity_mps);
+                let place = self.scene.model.cells.place(range_m, velocity);
+                let sine = (point.position_m[0] - centre[0]) / range_m.max(1e-6);
+                (place.0 - doppler).abs() < NEAR[0]
+                    && (place.1 - range).abs() < NEAR[1]
+                    && (sine - swing.sine).abs() < SAME_DIRECTION
+            })
+        });
+        let ranges: Vec<[f64; 2]> = (0..self.scene.frames())
+            .filter_map(|frame| {
+                let (sum, weight) = self.beams.body(frame).iter().fold((0.0, 0.0), |(sum, weight), (point, power)| {
+                    let range_m = range_and_velocity(&evidence.radar, point.position_m, point.velocity_mps).0;
+                    (sum + power * range_m, weight + power)
+                });
+                (weight > 0.0).then(|| [at(swing.law, middle_s(self.scene, frame)).0, sum / weight])
+            })
+            .collect();
+        let spread = |values: &dyn Fn(&[f64; 2]) -> f64| -> f64 {
+            let mean = ranges.iter().map(values).sum::<f64>() / ranges.len().max(1) as f64;
+            ranges.iter().map(|range| (values(range) - mean).powi(2)).sum()
+        };
+        2 * with.count() > self.scene.frames() || spread(&|[swing, body]| swing - body) < PARALLEL * spread(&|[swing, _]| *swing)
     }
+
+    /// Most probable amplitudes, given that they are as strong as fitted.
+    fn tones(&self, swing: Swing) -> Vec<Tone> {
+        let power = swing.log_power.exp();
+        (0..self.scene.frames())
+            .filter_map(|frame| {
+                let place = self.place(swing.law, frame);
+                let look = self.beams.look(frame, place, swing.sine)?;
+                let sure = power / (power + look.expected);
+                let amplitudes = self.beams.tone(frame, place, swing.sine)?.into_iter().map(|value| value * sure).collect();
+                Some(Tone { frame, place, amplitudes })
+            })
+            .collect()
+    }
+}
+
+/// Logarithm of what makes the density of an F law's ratio (so many looks, a heavy tail) one.
+fn gamma_ratio(tail: f64, looks: f64) -> f64 {
+    use statrs::function::gamma::ln_gamma;
+    ln_gamma(tail + looks) - ln_gamma(tail) - ln_gamma(looks) + looks * (looks / tail).ln()
+}
+
+fn numbers(Swing { law: [mean, sine, cosine, rate], sine: direction, log_power }: Swing) -> [f64; 6] {
+    [mean, sine, cosine, rate, direction, log_power]
+}
+
+fn swing([mean, sine, cosine, rate, direction, log_power]: [f64; 6]) -> Swing {
+    Swing { law: [mean, sine, cosine, rate], sine: direction.clamp(-1.0, 1.0), log_power }
 }

@@ -4,6 +4,7 @@ use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::beams::{Beams, Look};
 use super::{find, scene::Scene, swing};
 use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::misfit::Misfit;
@@ -157,13 +158,43 @@ fn what_was_taken_out_of_a_channel_counts_as_foretold_by_those_before_it() {
 fn a_swing_among_the_bodys_returns_is_found_by_its_law() {
     let among = made(0.0, 2.0, 2.2);
     let scene = Scene::new(&among).unwrap();
-    let found = swing::strongest(&scene).unwrap();
+    let found = swing::strongest(&scene).unwrap().mover;
     let fit = found.pendulum.unwrap();
     assert!((fit.rate_hz - 0.8).abs() < 0.08 && (fit.mean_m - 2.2).abs() < 0.1, "{fit:?}");
     assert!(found.gain > 6.0 && found.track.p_value < 1e-3, "{} {}", found.gain, found.track.p_value);
     let alone = evidence(0.0, 0.0);
     let nothing = swing::strongest(&Scene::new(&alone).unwrap());
-    assert!(nothing.is_none_or(|found| found.track.p_value > 0.01 || found.gain < 6.0));
+    assert!(nothing.is_none_or(|found| found.mover.track.p_value > 0.01 || found.mover.gain < 6.0));
+}
+
+#[test]
+fn a_swing_too_weak_for_any_single_frame_is_found_by_all_of_them() {
+    // In a frame 8 times the energy of the noise in one cell, of which there are thousands.
+    let weak = made(0.0, 0.044, 1.0);
+    let scene = Scene::new(&weak).unwrap();
+    let found = swing::strongest(&scene).unwrap().mover;
+    let fit = found.pendulum.unwrap();
+    assert_eq!(found.id, Some("moving_reflector"));
+    assert!((fit.rate_hz - 0.8).abs() < 0.1 && (fit.swing_m() - 0.12).abs() < 0.04 && (fit.mean_m - 1.0).abs() < 0.1, "{fit:?}");
+    let near = |sighting: &super::track::Sighting| (1.0..40.0).contains(&sighting.power);
+    assert!(found.gain > 6.0 && found.track.p_value < 1e-4 && found.track.sightings.iter().all(near), "{}", found.track.p_value);
+}
+
+#[test]
+fn away_from_the_body_looks_are_those_of_noise_and_where_it_is_a_tone_must_be_stronger() {
+    let alone = evidence(0.0, 0.0);
+    let scene = Scene::new(&alone).unwrap();
+    let mut beams = Beams::new(&scene);
+    beams.prepare(&[4]);
+    let looks: Vec<Look> = beams.looks(4).into_iter().flatten().collect();
+    let (among, away): (Vec<&Look>, Vec<&Look>) = looks.iter().partition(|look| look.body > 0.9);
+    let ratios: Vec<f64> = away.iter().filter(|look| look.body < 0.02).map(|look| look.power / look.expected).collect();
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    let beyond = ratios.iter().filter(|ratio| **ratio > 4.0).count() as f64 / ratios.len() as f64;
+    assert!((mean - 1.0).abs() < 0.06 && (0.7..1.3).contains(&(beyond / (-4.0f64).exp())), "{mean} {beyond}");
+    assert!(among.len() > 100, "{}", among.len());
+    let louder = among.iter().filter(|look| look.power > 10.0 * look.expected).count();
+    assert!(50 * louder < among.len(), "{louder} of {}", among.len());
 }
 
 #[test]

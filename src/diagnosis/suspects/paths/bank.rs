@@ -1,0 +1,242 @@
+//! A bank of swings: what each of them would gain over all frames, from a table of what a tone in every cell gains.
+
+use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
+
+use rayon::prelude::*;
+
+use super::coloured::FINE;
+use super::pendulum::{Law, at};
+use super::scene::Scene;
+
+/// Energies of the swing in a frame over the noise that are tried.
+pub const LEVELS: [f32; 4] = [3.0, 12.0, 60.0, 600.0];
+/// Rates are tried up to this, and from so many turns in the recording on.
+const FASTEST_HZ: f64 = 4.0;
+const SLOWEST_TURNS: usize = 4;
+/// Swings that are tried: the smallest, the ratio to the next, how many.
+const SWINGS: (f64, f64, usize) = (0.02, 1.25, 13);
+/// Fewest and most phases that are tried.
+const PHASES: (f64, f64) = (8.0, 48.0);
+/// Doppler bins that a swing must move by.
+const LEAST_BINS: f64 = 0.4;
+/// Between two laws of the bank there are so many that differ.
+const BETWEEN: f64 = 16.0;
+/// Laws of every rate that are fitted, and of all that are fitted exactly.
+const KEPT: usize = 16;
+const FITTED: usize = 16;
+/// Steps by which the fit closes in.
+const STEPS: usize = 24;
+
+/// A swing with its direction and strength.
+#[derive(Clone, Copy, Debug)]
+pub struct Swing {
+    pub law: Law,
+    /// Direction: x over range.
+    pub sine: f64,
+    /// Of the energy in a frame over the noise.
+    pub log_power: f64,
+}
+
+/// Log-likelihoods gained by a swing's energy in a place, `[frame][beam][doppler · range]` for each level.
+pub struct Table {
+    pub sines: Vec<f64>,
+    pub rows: i64,
+    pub columns: i64,
+    /// Of the middle of every frame.
+    pub times_s: Vec<f64>,
+    pub cells: Vec<Vec<Vec<Gains>>>,
+    /// The same, of the best of the cells around.
+    pub around: Vec<Vec<Vec<Gains>>>,
+}
+
+pub type Gains = [f32; LEVELS.len()];
+
+impl Table {
+    fn gain(&self, places: &[(i64, i64)], beam: usize) -> (f32, usize) {
+        let mut sums = [0.0f32; LEVELS.len()];
+        for (cells, &(doppler, range)) in self.cells.iter().zip(places) {
+            if (0..self.columns).contains(&range) {
+                let cell = &cells[beam][(doppler.rem_euclid(self.rows) * self.columns + range) as usize];
+                sums.iter_mut().zip(cell).for_each(|(sum, gain)| *sum += gain);
+            }
+        }
+        strongest_level(&sums)
+    }
+
+    /// Of a law at every range that it may be laid to.
+    fn along(&self, places: &[(i64, i64)], beam: usize, sums: &mut [Gains]) {
+        sums.fill([0.0; LEVELS.len()]);
+        for (cells, &(doppler, step)) in self.around.iter().zip(places) {
+            let row = &cells[beam][(doppler.rem_euclid(self.rows) * self.columns) as usize..][..self.columns as usize];
+            let (from, to) = (step.max(0) as usize, (-step).max(0) as usize);
+            for (sum, gain) in sums.iter_mut().skip(to).zip(row.iter().skip(from)) {
+                sum.iter_mut().zip(gain).for_each(|(sum, gain)| *sum += gain);
+            }
+        }
+    }
+
+    pub fn places(&self, scene: &Scene, law: Law) -> Vec<(i64, i64)> {
+        let place = |&time: &f64| {
+            let (range_m, velocity) = at(law, time);
+            let (doppler, range) = scene.model.cells.place(range_m, velocity);
+            ((FINE as f64 * doppler).round() as i64, (FINE as f64 * range).round() as i64)
+        };
+        self.times_s.iter().map(place).collect()
+    }
+
+    /// The best laws, and how many were tried.
+    pub fn bank(&self, scene: &Scene, length_s: f64) -> (Vec<Swing>, f64) {
+        let step_hz = 0.1 / length_s;
+        let rates: Vec<f64> = (SLOWEST_TURNS..(FASTEST_HZ / step_hz) as usize).map(|step| step as f64 * step_hz).collect();
+        let of_rate = |&rate_hz: &f64| -> (Vec<(f32, Swing)>, f64) {
+            let (mut kept, mut tried): (Vec<(f32, Swing)>, f64) = (vec![], 0.0);
+            let mut sums = vec![[0.0; LEVELS.len()]; self.columns as usize];
+            let cells = &scene.model.cells;
+            for swing_m in (0..SWINGS.2).map(|step| SWINGS.0 * SWINGS.1.powi(step as i32)) {
+                let bins = TAU * rate_hz * swing_m * cells.doppler_per_mps;
+                if !(LEAST_BINS..0.5 * scene.loops as f64).contains(&bins) {
+                    continue;
+                }
+                // Neighbours are two cells of the fine grid apart.
+                let phases = (0.5 * TAU * FINE as f64 * bins.max(swing_m * cells.bins_per_m)).ceil();
+                let phases = phases.clamp(PHASES.0, PHASES.1) as usize;
+                for phase in 0..phases {
+                    let (sine, cosine) = (TAU * phase as f64 / phases as f64).sin_cos();
+                    let places = self.places(scene, [0.0, swing_m * sine, swing_m * cosine, rate_hz]);
+                    for beam in 0..self.sines.len() {
+                        self.along(&places, beam, &mut sums);
+                        tried += sums.len() as f64;
+                        for (range, sums) in sums.iter().enumerate() {
+                            let (gain, level) = strongest_level(sums);
+                            if kept.len() < KEPT || gain > kept[KEPT - 1].0 {
+                                let mean_m = scene.range_m(range as f64 / FINE as f64);
+                                let law = [mean_m, swing_m * sine, swing_m * cosine, rate_hz];
+                                let found = Swing { law, sine: self.sines[beam], log_power: f64::from(LEVELS[level]).ln() };
+                                let at = kept.partition_point(|other| other.0 >= gain);
+                                kept.insert(at, (gain, found));
+                                kept.truncate(KEPT);
+                            }
+                        }
+                    }
+                }
+            }
+            let climbed = kept.into_iter().map(|(_, swing)| self.climbed(scene, swing, length_s)).collect();
+            (climbed, tried)
+        };
+        // In one order, so that sums round alike in every run.
+        let of_rates: Vec<(Vec<(f32, Swing)>, f64)> = rates.par_iter().map(of_rate).collect();
+        let tried: f64 = of_rates.iter().map(|rate| rate.1).sum();
+        let mut best: Vec<(f32, Swing)> = of_rates.into_iter().flat_map(|rate| rate.0).collect();
+        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut chosen: Vec<(f32, Swing)> = vec![];
+        for (gain, swing) in best {
+            // Several climbs end on one summit.
+            if chosen.len() < FITTED && chosen.iter().all(|other| (other.0 - gain).abs() > 1e-3) {
+                chosen.push((gain, swing));
+            }
+        }
+        (chosen.into_iter().map(|(_, swing)| swing).collect(), tried * BETWEEN * LEVELS.len() as f64)
+    }
+
+    /// Moved as long as that helps, then by less.
+    fn climbed(&self, scene: &Scene, swing: Swing, length_s: f64) -> (f32, Swing) {
+        let beam = self.sines.iter().position(|sine| *sine == swing.sine).unwrap_or(0);
+        let gain = |law: Law| self.gain(&self.places(scene, law), beam);
+        let start = gain(swing.law);
+        let widths = widths(scene, swing.law, length_s);
+        let (law, (gain, level)) = climb(swing.law, start, &widths, gain, |a, b| a.0 > b.0);
+        (gain, Swing { law, log_power: f64::from(LEVELS[level]).ln(), ..swing })
+    }
+
+    /// The best power that comes at one range and one Doppler in every frame, near a swing's ranges, and how many were tried: what
+    /// is not steady about a thing that stands still, which never moves.
+    pub fn standing(&self, ranges: RangeInclusive<i64>) -> Option<(Standing, f64)> {
+        let places = |doppler: i64, range: i64| vec![(doppler, range); self.times_s.len()];
+        let mut best: Option<Standing> = None;
+        let mut tried = 0.0;
+        for range in ranges.filter(|range| (0..self.columns).contains(range)) {
+            for doppler in 0..self.rows {
+                for (beam, &sine) in self.sines.iter().enumerate() {
+                    tried += LEVELS.len() as f64;
+                    let (gain, level) = self.gain(&places(doppler, range), beam);
+                    if best.as_ref().is_none_or(|best| f64::from(gain) > best.gain) {
+                        let place = (doppler as f64 / FINE as f64, range as f64 / FINE as f64);
+                        best = Some(Standing { gain: gain.into(), place, sine, power: LEVELS[level].into() });
+                    }
+                }
+            }
+        }
+        best.map(|best| (best, tried))
+    }
+}
+
+pub struct Standing {
+    pub gain: f64,
+    /// Doppler and range in cells.
+    pub place: (f64, f64),
+    pub sine: f64,
+    pub power: f64,
+}
+
+/// Which level explains most.
+fn strongest_level(sums: &Gains) -> (f32, usize) {
+    let mut best = (sums[0], 0);
+    for (level, &sum) in sums.iter().enumerate().skip(1) {
+        if sum > best.0 {
+            best = (sum, level);
+        }
+    }
+    best
+}
+
+/// First steps of mean, sine, cosine and rate.
+pub fn widths(scene: &Scene, law: Law, length_s: f64) -> Law {
+    let swing = law[1].hypot(law[2]);
+    [0.5 * scene.range_m(1.0), 0.2 * swing, 0.2 * swing, 0.05 / length_s]
+}
+
+/// One number after another is moved as long as that helps, then by less.
+pub fn climb<const N: usize, T: Copy>(
+    mut now: [f64; N],
+    mut best: T,
+    widths: &[f64; N],
+    gain: impl Fn([f64; N]) -> T,
+    better: impl Fn(T, T) -> bool,
+) -> ([f64; N], T) {
+    let mut widths = *widths;
+    for _ in 0..STEPS {
+        let mut moved = false;
+        for axis in 0..N {
+            for sign in [-1.0, 1.0] {
+                let mut other = now;
+                other[axis] += sign * widths[axis];
+                let found = gain(other);
+                if better(found, best) {
+                    (now, best, moved) = (other, found, true);
+                }
+            }
+        }
+        if !moved {
+            widths.iter_mut().for_each(|width| *width *= 0.6);
+        }
+    }
+    (now, best)
+}
+
+/// By level, of every cell and its neighbours, `[doppler · range]`.
+pub fn around(cells: &[Gains], rows: usize) -> Vec<Gains> {
+    let columns = cells.len() / rows;
+    let better = |best: &mut Gains, other: &Gains| best.iter_mut().zip(other).for_each(|(best, gain)| *best = best.max(*gain));
+    let mut along = cells.to_vec();
+    for (cell, best) in along.iter_mut().enumerate() {
+        let (row, column) = (cell / columns, cell % columns);
+        (column.saturating_sub(1)..(column + 2).min(columns)).for_each(|near| better(best, &cells[row * columns + near]));
+    }
+    let mut around = along.clone();
+    for (cell, best) in around.iter_mut().enumerate() {
+        let (row, column) = (cell / columns, cell % columns);
+        [(row + 1) % rows, (row + rows - 1) % rows].into_iter().for_each(|near| better(best, &along[near * columns + column]));
+    }
+    around
+}
