@@ -11,9 +11,11 @@ use super::scene::Scene;
 
 /// Energies of the swing in a frame over the noise that are tried.
 pub const LEVELS: [f32; 4] = [3.0, 12.0, 60.0, 600.0];
-/// Rates are tried up to this, and from so many turns in the recording on.
+/// Rates are tried up to this, as far as every turn has so many frames (with fewer, a swing is but a few places that come again
+/// and again), and from so many steps on.
 const FASTEST_HZ: f64 = 4.0;
-const SLOWEST_TURNS: usize = 4;
+const FRAMES_PER_TURN: f64 = 5.0;
+const FIRST_STEP: usize = 4;
 /// Swings that are tried: the smallest, the ratio to the next, how many.
 const SWINGS: (f64, f64, usize) = (0.02, 1.25, 13);
 /// Fewest and most phases that are tried.
@@ -88,7 +90,8 @@ impl Table {
     /// The best laws, and how many were tried.
     pub fn bank(&self, scene: &Scene, length_s: f64) -> (Vec<Swing>, f64) {
         let step_hz = 0.1 / length_s;
-        let rates: Vec<f64> = (SLOWEST_TURNS..(FASTEST_HZ / step_hz) as usize).map(|step| step as f64 * step_hz).collect();
+        let fastest_hz = FASTEST_HZ.min(1.0 / (FRAMES_PER_TURN * scene.evidence.radar.frame_period_s));
+        let rates: Vec<f64> = (FIRST_STEP..=(fastest_hz / step_hz) as usize).map(|step| step as f64 * step_hz).collect();
         let of_rate = |&rate_hz: &f64| -> (Vec<(f32, Swing)>, f64) {
             let (mut kept, mut tried): (Vec<(f32, Swing)>, f64) = (vec![], 0.0);
             let mut sums = vec![[0.0; LEVELS.len()]; self.columns as usize];
