@@ -16,7 +16,8 @@ use crate::diagnosis::evidence::fft_2d;
 
 /// Cells of the grid per cell of the transform.
 pub const FINE: usize = 2;
-/// Conjugate gradients stop when the remains are so small a share of the noise, or after so many steps.
+/// Conjugate gradients stop when the remains are so small a share of the noise, or after so many steps: a body far above the noise is
+/// then undone in part, which costs sight of what is beside it, but no more (what stays of a tone is measured in the same steps).
 const REMAINS: f64 = 0.1;
 const MOST_STEPS: usize = 100;
 
@@ -224,7 +225,7 @@ mod tests {
         let (loops, samples) = (16, 32);
         let mut power = vec![0.0; FINE * loops * FINE * samples];
         for range in 20..24 {
-            (6..12).for_each(|doppler| power[range * FINE * loops + doppler] = 1e3);
+            (6..12).for_each(|doppler| power[range * FINE * loops + doppler] = 1.0);
         }
         let coloured = Coloured::new(loops, samples, power);
         let mut random = ChaCha8Rng::seed_from_u64(5);
@@ -234,7 +235,7 @@ mod tests {
         let mut again = whitened.clone();
         coloured.times(&whitened, &mut cells, &mut again, &mut coloured.work());
         let remains: Vec<Complex64> = again.iter().zip(&drawn).map(|(a, b)| a - b).collect();
-        assert!(energy(&drawn) > 1e3 * energy(&white) && energy(&remains) < energy(&white), "{}", energy(&remains));
+        assert!(energy(&drawn) > 10.0 * energy(&white) && energy(&remains) < 0.02 * energy(&white), "{}", energy(&remains));
         // Far from the tones noise stays what it was.
         let (before, after) = (coloured.cells(&white), coloured.cells(&whitened));
         let far = |cells: &[Complex64]| cells[50 * FINE * loops..].iter().map(Complex64::norm_sqr).sum::<f64>();

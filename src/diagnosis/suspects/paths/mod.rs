@@ -47,8 +47,17 @@ pub const OVER_THE_BODY: &str = "path-like, over the body";
 /// Effects of which there may be several.
 pub const MANY: [&str; 3] = ["wall_ghost", "floor_bounce", "moving_reflector"];
 
-/// How the body is seen otherwise or again: what their removal leaves is the body's.
-const AGAIN: [&str; 5] = ["wall_ghost", "floor_bounce", "body_multibounce", "object_radar_object", "soft_occlusion"];
+/// What leaves remains when it is taken out that no single frame shows and that move by a law: how the body is seen otherwise or
+/// again, and things that move themselves.
+const LEAVE_REMAINS: [&str; 7] = [
+    "wall_ghost",
+    "floor_bounce",
+    "body_multibounce",
+    "object_radar_object",
+    "soft_occlusion",
+    "moving_reflector",
+    "range_alias",
+];
 
 /// Mirror images of the body at the room's boundaries, and movers that are none.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -58,7 +67,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         let elsewhere = moving.iter().any(|found| found.gain > LEAST_GAIN);
         found.extend(moving);
         if !elsewhere {
-            let remains = AGAIN.iter().any(|id| evidence.accepted.contains(id));
+            let remains = LEAVE_REMAINS.iter().any(|id| evidence.accepted.contains(id));
             let swing = if remains { None } else { swing::strongest(&scene) };
             let swing = swing.filter(|swing| swing.mover.gain > LEAST_GAIN_SWING);
             let over = scene.over_the_body();
