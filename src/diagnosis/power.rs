@@ -125,6 +125,13 @@ impl PowerModel {
         LOBES.iter().enumerate().map(of).sum()
     }
 
+    /// Power that a point of the body is expected to have in the peak.
+    pub fn peak(&self, radar: &Radar, point: Point) -> f64 {
+        let (range_m, _) = range_and_velocity(radar, point.position_m, point.velocity_mps);
+        let (power, facing) = power_and_facing(&point, range_m, radar.centre_m());
+        power * self.reflectivity(point.part, facing)
+    }
+
     /// Expected power of some parts alone (such as a limb), `[doppler, range]`.
     pub fn of_parts(&self, frame: usize, parts: impl Fn(usize) -> bool) -> Vec<f32> {
         let mut map = vec![0.0; self.size()];
@@ -152,9 +159,7 @@ pub fn part_templates(radar: &Radar, cells: &Cells, points: &[Point], parts: usi
     let centre = radar.centre_m();
     for &point in points {
         let (range_m, velocity) = range_and_velocity(radar, point.position_m, point.velocity_mps);
-        let to_radar: [f64; 3] = std::array::from_fn(|axis| centre[axis] - point.position_m[axis]);
-        let facing = (dot(to_radar, point.normal) / norm(to_radar).max(1e-6)).max(0.0);
-        let power = point.area_m2 / range_m.max(0.1).powi(4);
+        let (power, facing) = power_and_facing(&point, range_m, centre);
         for (lobe, &exponent) in LOBES.iter().enumerate() {
             let Some(map) = maps.get_mut(point.part * LOBES.len() + lobe) else { continue };
             if map.is_empty() {
@@ -164,6 +169,13 @@ pub fn part_templates(radar: &Radar, cells: &Cells, points: &[Point], parts: usi
         }
     }
     maps.iter().map(|map| Template::of(map)).collect()
+}
+
+/// What a point at a range would return with a reflectivity of one, and the cosine at which it faces the radar.
+fn power_and_facing(point: &Point, range_m: f64, centre: [f64; 3]) -> (f64, f64) {
+    let to_radar: [f64; 3] = std::array::from_fn(|axis| centre[axis] - point.position_m[axis]);
+    let facing = (dot(to_radar, point.normal) / norm(to_radar).max(1e-6)).max(0.0);
+    (point.area_m2 / range_m.max(0.1).powi(4), facing)
 }
 
 /// Noise and weighted templates.

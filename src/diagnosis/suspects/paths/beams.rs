@@ -9,12 +9,13 @@ use rayon::prelude::*;
 
 use super::coloured::{Coloured, FINE};
 use super::scene::{STILL_BINS, Scene, still_power};
+use super::steering::{aperture_m, beam, power, steering, wave};
 use crate::diagnosis::Point;
 use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::power::Cells;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::statistics::median;
-use crate::radar::{Radar, SPEED_OF_LIGHT};
+use crate::radar::Radar;
 
 /// Beams per beam width of the receivers.
 const BEAMS_PER_WIDTH: f64 = 1.6;
@@ -42,8 +43,10 @@ pub struct Beams<'a> {
     rest: Vec<f64>,
     /// Power of what stands still over the noise of a frame's map, by range.
     clutter: Vec<f64>,
-    /// Phase per metre of aperture and unit of sine.
-    wave: f64,
+    /// The body's points in every frame with the power that each is expected to have in the peak.
+    body: Vec<Vec<(Point, f64)>>,
+    /// The transform to the fine grid.
+    fine: Coloured,
 }
 
 struct Frame {
@@ -69,16 +72,15 @@ pub struct Look {
 impl<'a> Beams<'a> {
     pub fn new(scene: &'a Scene<'a>) -> Self {
         let evidence = scene.evidence;
-        let wave = TAU * (evidence.radar.carrier_hz() + 0.5 * evidence.radar.bandwidth_hz()) / SPEED_OF_LIGHT;
-        let sines = sines(&evidence.radar, wave);
         let mut beams = Self {
             scene,
-            sines,
+            sines: sines(&evidence.radar),
             frames: (0..scene.frames()).map(|_| None).collect(),
             still: vec![],
             rest: vec![],
             clutter: still_power(evidence),
-            wave,
+            body: (0..scene.frames()).into_par_iter().map(|frame| body(scene, frame)).collect(),
+            fine: Coloured::new(scene.loops, scene.samples, vec![0.0; FINE * FINE * scene.size()]),
         };
         (beams.still, beams.rest) = beams.what_stands();
         beams
@@ -89,6 +91,11 @@ impl<'a> Beams<'a> {
         let missing: Vec<usize> = frames.iter().copied().filter(|&frame| self.frames[frame].is_none()).collect();
         let made: Vec<Frame> = missing.par_iter().map(|&frame| self.frame(frame)).collect();
         missing.into_iter().zip(made).for_each(|(frame, made)| self.frames[frame] = Some(made));
+    }
+
+    /// The body's points in a frame with the power that each is expected to have in the peak.
+    pub fn body(&self, frame: usize) -> &[(Point, f64)] {
+        &self.body[frame]
     }
 
     pub fn rows(&self) -> usize {
@@ -102,9 +109,7 @@ impl<'a> Beams<'a> {
     /// Of every cell of the fine grid in a prepared frame, `[beam][range · doppler]`.
     pub fn looks(&self, frame: usize) -> Vec<Vec<Look>> {
         let Some(made) = &self.frames[frame] else { return vec![] };
-        let (loops, samples) = (self.scene.loops, self.scene.samples);
-        let plain = Coloured::new(loops, samples, vec![0.0; FINE * FINE * loops * samples]);
-        let cells: Vec<Vec<Complex64>> = made.whitened.iter().map(|channel| plain.cells(channel)).collect();
+        let cells: Vec<Vec<Complex64>> = made.whitened.iter().map(|channel| self.fine.cells(channel)).collect();
         let count = self.rows() * self.columns();
         let steering: Vec<Vec<Complex64>> = self.sines.iter().map(|&sine| self.steering(sine)).collect();
         let mut looks: Vec<Vec<Look>> = steering.iter().map(|_| Vec::with_capacity(count)).collect();
@@ -159,13 +164,12 @@ impl<'a> Beams<'a> {
 
     /// Energy over the noise in a beam of the whitened cells, mean over the transmitters.
     fn power(&self, values: &[Complex64], steering: &[Complex64]) -> f64 {
-        let sum: f64 = values.chunks_exact(steering.len()).map(|values| beam(values, steering).norm_sqr()).sum();
-        sum / (self.scene.loops * self.scene.samples * values.len()) as f64
+        power(values, steering) / (self.scene.size() * values.len()) as f64
     }
 
     /// Undoes the phases that a direction has at the receivers.
     fn steering(&self, sine: f64) -> Vec<Complex64> {
-        self.scene.evidence.radar.rx_m.iter().map(|at| Complex64::cis(self.wave * at[0] * sine)).collect()
+        steering(&self.scene.evidence.radar, sine)
     }
 
     fn nearest(&self, sine: f64) -> usize {
@@ -213,7 +217,7 @@ impl<'a> Beams<'a> {
         let mut power = vec![0.0; rows * all];
         // From the peak after two Hann windows to a sample.
         let gain = 2.25 / (loops * samples);
-        for (point, level) in self.body(frame) {
+        for &(point, level) in self.body(frame) {
             let (range_m, velocity) = range_and_velocity(&self.scene.evidence.radar, point.position_m, point.velocity_mps);
             let (doppler, range) = self.scene.model.cells.place(range_m, velocity);
             let split = |place: f64, length: usize| {
@@ -230,23 +234,6 @@ impl<'a> Beams<'a> {
             }
         }
         power
-    }
-
-    /// The body's points with the power that each is expected to have in the peak.
-    pub fn body(&self, frame: usize) -> Vec<(Point, f64)> {
-        let evidence = self.scene.evidence;
-        let Some(body) = &evidence.body else { return vec![] };
-        let centre = evidence.radar.centre_m();
-        let points = body.with_echoes(&evidence.radar, body.frames[frame].clone(), None);
-        let level = |point: Point| {
-            let (range_m, _) = range_and_velocity(&evidence.radar, point.position_m, point.velocity_mps);
-            let way: [f64; 3] = std::array::from_fn(|axis| centre[axis] - point.position_m[axis]);
-            let length = way.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
-            let facing = way.iter().zip(point.normal).map(|(a, b)| a * b).sum::<f64>() / length;
-            let power = point.area_m2 / range_m.max(0.1).powi(4) * self.scene.model.reflectivity(point.part, facing);
-            (point, power)
-        };
-        points.into_iter().map(level).filter(|(_, power)| *power > 0.0 && power.is_finite()).collect()
     }
 
     /// What stands still, `[channel · samples + sample]`: the mean over the training frames, at every range of those most in
@@ -310,11 +297,10 @@ impl<'a> Beams<'a> {
         let (scene, rx_m) = (self.scene, &self.scene.evidence.radar.rx_m);
         let (samples, rows) = (scene.samples, self.rows());
         let cells: &Cells = &scene.model.cells;
-        let body = self.body(frame);
         let centre = scene.evidence.radar.centre_m();
         let mut map = vec![0.0f32; scene.size()];
         let mut beams = vec![vec![0.0f32; scene.size()]; self.sines.len()];
-        for (point, level) in &body {
+        for (point, level) in self.body(frame) {
             let (range_m, velocity) = range_and_velocity(&scene.evidence.radar, point.position_m, point.velocity_mps);
             let way: [f64; 3] = std::array::from_fn(|axis| point.position_m[axis] - centre[axis]);
             let sine = way[0] / way.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
@@ -347,27 +333,17 @@ impl<'a> Beams<'a> {
         const FEWEST: usize = 8;
         let clutter = &self.clutter;
         let (rows, bins) = (self.rows(), self.scene.bins);
-        let (loops, samples) = (self.scene.loops, self.scene.samples);
+        let cells: Vec<Vec<Complex64>> = whitened.iter().map(|channel| self.fine.cells(channel)).collect();
+        let scale = 1.0 / (self.scene.size() * whitened.len()) as f64;
         for slow in -STILL_BINS..=STILL_BINS {
             let row = (FINE as i64 * slow).rem_euclid(rows as i64) as usize;
-            // The mean chirp at this Doppler, then its transform.
-            let mut power = vec![0.0f64; bins];
-            for channel in whitened {
-                let mut chirp = vec![Complex64::ZERO; samples];
-                for (i, values) in channel.chunks_exact(samples).enumerate() {
-                    let turn = Complex64::cis(-TAU * slow as f64 * i as f64 / loops as f64);
-                    chirp.iter_mut().zip(values).for_each(|(sum, value)| *sum += value * turn);
-                }
-                let scale = 1.0 / ((loops * samples) as f64 * whitened.len() as f64);
-                rustfft::FftPlanner::new().plan_fft_forward(samples).process(&mut chirp);
-                power.iter_mut().zip(&chirp).for_each(|(sum, value)| *sum += value.norm_sqr() * scale);
-            }
+            let power = |cell: usize| cells.iter().map(|channel| channel[cell].norm_sqr()).sum::<f64>() * scale;
             let mut shares: Vec<f64> = (0..bins)
                 .filter(|&range| clutter[range] > STRONG)
                 .map(|range| {
                     let cell = FINE * range * rows + row;
                     let (left, usual) = (f64::from(share[cell]), f64::from(expected[0][cell]));
-                    (power[range] / (left * left) - 1.5 * usual).max(0.0) / clutter[range]
+                    (power(cell) / (left * left) - 1.5 * usual).max(0.0) / clutter[range]
                 })
                 .collect();
             let smear = if shares.len() < FEWEST { 0.0 } else { 3.0 * median(&mut shares) };
@@ -383,21 +359,22 @@ impl<'a> Beams<'a> {
     }
 }
 
-/// Directions that the receivers tell apart, and some between.
-fn sines(radar: &Radar, wave: f64) -> Vec<f64> {
-    let ends = radar.rx_m.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| [low.min(at[0]), high.max(at[0])]);
-    let aperture = ends[1] - ends[0];
-    let count = radar.rx_m.len() as f64;
-    if radar.rx_m.len() < 2 || aperture <= 0.0 {
-        return vec![0.0];
-    }
-    let width = TAU / (wave * aperture * count / (count - 1.0));
-    let beams = ((2.0 / width * BEAMS_PER_WIDTH).ceil() as usize).clamp(1, 16);
-    (0..beams).map(|beam| (2.0 * beam as f64 + 1.0) / beams as f64 - 1.0).collect()
+/// The body's points, other ways included, with the power that each is expected to have in the peak.
+fn body(scene: &Scene, frame: usize) -> Vec<(Point, f64)> {
+    let radar = &scene.evidence.radar;
+    let Some(body) = &scene.evidence.body else { return vec![] };
+    let points = body.with_echoes(radar, body.frames[frame].clone(), None);
+    let level = |point: Point| (point, scene.model.peak(radar, point));
+    points.into_iter().map(level).filter(|(_, power)| *power > 0.0 && power.is_finite()).collect()
 }
 
-fn beam(values: &[Complex64], steering: &[Complex64]) -> Complex64 {
-    values.iter().zip(steering).map(|(value, turn)| value * turn).sum()
+/// Directions that the receivers tell apart, and some between.
+fn sines(radar: &Radar) -> Vec<f64> {
+    let Some(aperture) = aperture_m(radar) else { return vec![0.0] };
+    let count = radar.rx_m.len() as f64;
+    let width = TAU / (wave(radar) * aperture * count / (count - 1.0));
+    let beams = ((2.0 / width * BEAMS_PER_WIDTH).ceil() as usize).clamp(1, 16);
+    (0..beams).map(|beam| (2.0 * beam as f64 + 1.0) / beams as f64 - 1.0).collect()
 }
 
 /// A little of every cell's power moved to its neighbours.

@@ -11,6 +11,7 @@ mod pendulum;
 mod product;
 mod removal;
 mod scene;
+mod steering;
 mod still_point;
 mod swing;
 mod track;
@@ -68,7 +69,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         found.extend(moving);
         if !elsewhere {
             let remains = LEAVE_REMAINS.iter().any(|id| evidence.accepted.contains(id));
-            let swing = if remains { None } else { swing::strongest(&scene) };
+            let swing = (!remains).then(|| swing::strongest(&scene)).flatten();
             let swing = swing.filter(|swing| swing.mover.gain > LEAST_GAIN_SWING);
             let over = scene.over_the_body();
             // What single frames show needs no law.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
+use super::steering::{power, steering};
 use crate::diagnosis::evidence::{hann, transform};
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, Rung};
@@ -134,16 +135,8 @@ fn directed(radar: &Radar) -> bool {
 /// Power per channel that arrives from a direction (x over range); the receivers of each transmitter add coherently.
 fn beam(radar: &Radar, spectra: &Spectra, bin: usize, sine: Option<f64>) -> f64 {
     let Some(sine) = sine else { return mean(spectra, &[bin]) };
-    let count = radar.rx_m.len();
-    let wave = std::f64::consts::TAU * (radar.carrier_hz() + 0.5 * radar.bandwidth_hz()) / SPEED_OF_LIGHT;
-    let power: f64 = spectra
-        .chunks_exact(count)
-        .map(|receivers| {
-            let parts = receivers.iter().zip(&radar.rx_m);
-            parts.map(|(values, at)| values[bin] * Complex64::cis(wave * at[0] * sine)).sum::<Complex64>().norm_sqr()
-        })
-        .sum();
-    power / (count * spectra.len()) as f64
+    let values: Vec<Complex64> = spectra.iter().map(|channel| channel[bin]).collect();
+    power(&values, &steering(radar, sine)) / (radar.rx_m.len() * spectra.len()) as f64
 }
 
 /// Where a tone's peak lies beside a cell of a Hann window, from its amplitude and its neighbours'.

@@ -170,34 +170,34 @@ struct Ground<'a> {
 }
 
 impl Ground<'_> {
-    /// Log-likelihood gained by so much energy in a look. Noise is another one for every transmitter and its level is known;
+    /// Log-likelihood gained in a look by so much energy. Noise is another one for every transmitter and its level is known;
     /// the body's returns are nearly the same, and how strong they are is known less well. The mixture's powers follow an F law.
-    fn cell(&self, look: Look, more: f64) -> f64 {
+    fn gained(&self, look: Look) -> impl Fn(f64) -> f64 {
         let tx = self.scene.evidence.radar.tx_m.len() as f64;
         let looks = (look.body * look.body + (1.0 - look.body).powi(2) / tx).recip();
         let tail = (TAIL / (look.body * look.body)).min(LONGEST_TAIL);
-        // Logarithm of the density in units of what is expected, but for what does not depend on that.
-        let constant = gamma_ratio(tail, looks);
-        let law = |expected: f64| {
-            let ratio = look.power / expected;
-            let exponent = constant + (looks - 1.0) * (look.power / look.expected).max(1e-9).ln()
-                - looks * (expected / look.expected).ln()
-                - (tail + looks) * (looks * ratio / tail).ln_1p();
-            exponent.exp()
-        };
+        let constant = gamma_ratio(tail, looks) + (looks - 1.0) * (look.power / look.expected).max(1e-9).ln();
         let stray = STRAY * look.body;
-        let ratio = look.power / look.expected / STRAY_POWER;
-        let strays = stray / STRAY_POWER * (1.0 + ratio).powi(-2);
-        (((1.0 - stray) * law(look.expected + more) + strays) / ((1.0 - stray) * law(look.expected) + strays).max(1e-300))
-            .max(1e-300)
-            .ln()
+        let strays = stray / STRAY_POWER * (1.0 + look.power / look.expected / STRAY_POWER).powi(-2);
+        // Density of the power over what is expected without any more.
+        let density = move |expected: f64| {
+            let exponent = constant
+                - looks * (expected / look.expected).ln()
+                - (tail + looks) * (looks * (look.power / expected) / tail).ln_1p();
+            (1.0 - stray) * exponent.exp() + strays
+        };
+        let without = density(look.expected).max(1e-300);
+        move |more| (density(look.expected + more) / without).max(1e-300).ln()
     }
 
     fn table(&self, frames: &[usize]) -> Table {
         let (rows, columns) = (self.beams.rows(), self.beams.columns());
         let of_frame = |&frame: &usize| -> (Vec<Vec<Gains>>, Vec<Vec<Gains>>) {
             let of_beam = |looks: Vec<Look>| {
-                let gains = |cell: usize| LEVELS.map(|level| self.cell(looks[cell], level.into()) as f32);
+                let gains = |cell: usize| {
+                    let gained = self.gained(looks[cell]);
+                    LEVELS.map(|level| gained(level.into()) as f32)
+                };
                 let cells: Vec<Gains> = (0..rows * columns).map(|cell| gains(cell % columns * rows + cell / columns)).collect();
                 let around = around(&cells, rows);
                 (cells, around)
@@ -221,7 +221,7 @@ impl Ground<'_> {
     }
 
     fn gain_at(&self, frame: usize, place: (f64, f64), sine: f64, power: f64) -> f64 {
-        self.beams.look(frame, place, sine).map_or(0.0, |look| self.cell(look, power))
+        self.beams.look(frame, place, sine).map_or(0.0, |look| self.gained(look)(power))
     }
 
     /// The best swing near a first guess, and its gain.

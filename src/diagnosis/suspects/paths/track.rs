@@ -5,9 +5,9 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::scene::Scene;
+use super::steering::{aperture_m, power, steering};
 use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::statistics::{chi2_tail, mean_power_tail};
-use crate::radar::SPEED_OF_LIGHT;
 
 /// One frame's sighting.
 #[derive(Clone, Copy, Debug)]
@@ -109,7 +109,7 @@ fn surprise(scene: &Scene, frame: usize) -> Surprise {
 }
 
 /// Centre of gravity of the power around a peak, and where it arrives from.
-pub fn sighting(scene: &Scene, frame: usize, cell: usize) -> Sighting {
+fn sighting(scene: &Scene, frame: usize, cell: usize) -> Sighting {
     let map = scene.map(frame);
     // The peak may lie beside the most unlikely cell.
     let neighbours = |cell: usize| -> Vec<(i64, i64, usize)> {
@@ -153,27 +153,13 @@ fn hann_shift(ratio: f64) -> f64 {
     ((2.0 * ratio - 1.0) / (ratio + 1.0)).clamp(-0.5, 0.5)
 }
 
-/// x over range of the direction of arrival, from the receivers of each transmitter: the array phase falls towards it.
+/// x over range of the direction of arrival, from the receivers of each transmitter.
 fn sine(scene: &Scene, frame: usize, cell: usize) -> Option<f64> {
     let radar = &scene.evidence.radar;
-    let [_, tx, rx, ..] = scene.evidence.cube.dims;
-    let aperture = radar.rx_m.iter().map(|a| a[0]).fold(f64::NEG_INFINITY, f64::max)
-        - radar.rx_m.iter().map(|a| a[0]).fold(f64::INFINITY, f64::min);
-    if rx < 2 || aperture <= 0.0 {
-        return None;
-    }
-    let values: Vec<Complex64> = (0..tx * rx).map(|channel| scene.evidence.range_doppler(frame, channel)[cell]).collect();
-    let wave = std::f64::consts::TAU * (radar.carrier_hz() + 0.5 * radar.bandwidth_hz()) / SPEED_OF_LIGHT;
-    let beam = |sine: f64| -> f64 {
-        values
-            .chunks_exact(rx)
-            .map(|values| {
-                let sum: Complex64 =
-                    values.iter().zip(&radar.rx_m).map(|(value, at)| value * Complex64::cis(wave * at[0] * sine)).sum();
-                sum.norm_sqr()
-            })
-            .sum()
-    };
+    aperture_m(radar)?;
+    let channels = 0..scene.evidence.cube.channels();
+    let values: Vec<Complex64> = channels.map(|channel| scene.evidence.range_doppler(frame, channel)[cell]).collect();
+    let beam = |sine: f64| power(&values, &steering(radar, sine));
     (-60..=60).map(|step| f64::from(step) / 60.0).max_by(|&a, &b| beam(a).total_cmp(&beam(b))).map(|coarse| {
         (-10..=10)
             .map(|step| (coarse + f64::from(step) / 600.0).clamp(-1.0, 1.0))
