@@ -95,6 +95,12 @@ impl Split {
         let (held_out, training) = (0..frames).partition(|frame| frame % HELD_OUT_EVERY == HELD_OUT_EVERY / 2);
         Self { training, held_out, block_loops }
     }
+
+    /// Share of all frames that is held out.
+    pub fn held_out_share(&self) -> f64 {
+        let held_out = self.held_out.len() as f64;
+        held_out / (self.training.len() as f64 + held_out).max(1.0)
+    }
 }
 
 impl Loaded {

@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::cube::Cube;
 use super::prediction::BodyPrediction;
+use super::statistics::chi2_tail;
 use crate::effects::{self, EffectSetting};
+use crate::radar::Radar;
 
 /// A parameter of an effect, or a list of them, with 90 % intervals.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,6 +103,9 @@ pub struct Curve {
     pub series: Vec<(String, Vec<f64>, Vec<f64>)>,
 }
 
+/// Chance above which numbers may as well be neutral.
+const LIKELY: f64 = 0.05;
+
 /// One thing that may have been left out.
 #[derive(Clone)]
 pub struct Candidate {
@@ -128,10 +133,29 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// Without its name where all the numbers that it gives may as well be those at which the effect does nothing: something is
+    /// there, but not surely this.
+    pub fn named_if_sure(self) -> Self {
+        let Some(info) = self.id.and_then(effects::info) else { return self };
+        let (mut square, mut freedom) = (0.0, 0.0);
+        for estimate in &self.estimates {
+            let Some(parameter) = info.parameters.iter().find(|parameter| parameter.name == estimate.name) else { continue };
+            for (value, [low, high]) in estimate.values.iter().zip(&estimate.ci90).filter(|(_, [low, high])| high > low) {
+                square += ((value - parameter.neutral) / ((high - low) / (2.0 * 1.645))).powi(2);
+                freedom += 1.0;
+            }
+        }
+        if freedom == 0.0 || chi2_tail(square, freedom) < LIKELY {
+            return self;
+        }
+        let statement = format!("{} But its size may as well be none, so something else is likely.", self.statement);
+        Self { id: None, look_alikes: vec![], statement, ..self }
+    }
+
     /// As the simulator takes it; `None` for what has no name, and for what its operator cannot be told.
     ///
     /// `reference`: the recording's peak sample, to which levels are relative.
-    pub fn setting(&self, reference: f64) -> Option<EffectSetting> {
+    pub fn setting(&self, reference: f64, radar: &Radar) -> Option<EffectSetting> {
         let info = effects::info(self.id?)?;
         let choice = self.choice.clone().or(self.place.boundary.clone()).or(self.place.body_part.clone());
         let mut setting = EffectSetting { id: info.id.into(), enabled: true, parameters: BTreeMap::new(), choice };
@@ -143,7 +167,13 @@ impl Candidate {
                 let value = value / unit;
                 if parameter.is_relative() { value } else { value.clamp(parameter.least, parameter.most) }
             };
-            setting.parameters.insert(estimate.name.into(), estimate.values.iter().map(within).collect());
+            let mut values: Vec<f64> = estimate.values.iter().map(within).collect();
+            if info.id == "antenna_position" {
+                // Found of the receivers along x; the operator moves all antennas along all axes.
+                let receivers = values.iter().flat_map(|&x| [x, 0.0, 0.0]);
+                values = std::iter::repeat_n(0.0, 3 * radar.tx_m.len()).chain(receivers).collect();
+            }
+            setting.parameters.insert(estimate.name.into(), values);
         }
         if info.parameters.iter().any(|parameter| parameter.name == "reference") {
             setting.parameters.insert("reference".into(), vec![reference]);
@@ -163,5 +193,34 @@ impl std::fmt::Debug for Candidate {
             self.estimates.iter().map(|e| (e.name, &e.values)).collect::<Vec<_>>(),
             self.statement
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_may_be_of_no_size_has_no_name() {
+        let of = |estimates: Vec<Estimate>| Candidate {
+            id: Some("dc_offset"),
+            behaves_like: "additive fast-time",
+            estimates,
+            choice: None,
+            place: Place::at("receiver"),
+            p_value: 1e-9,
+            gain: 30.0,
+            rung: Rung::E,
+            look_alikes: vec!["tx_leakage"],
+            statement: "Something.".into(),
+            curve: None,
+            energy: 1.0,
+            correction: Correction::None,
+        };
+        let i = |value: f64| Estimate::list("i", &[value, 0.1], &[1.0, 1.0]);
+        let unsure = of(vec![i(0.5), Estimate::normal("q", -0.2, 1.0)]).named_if_sure();
+        assert!(unsure.id.is_none() && unsure.look_alikes.is_empty() && unsure.statement.len() > 20);
+        assert_eq!(of(vec![i(5.0), Estimate::normal("q", -0.2, 1.0)]).named_if_sure().id, Some("dc_offset"));
+        assert_eq!(of(vec![]).named_if_sure().id, Some("dc_offset"));
     }
 }

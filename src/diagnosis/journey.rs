@@ -39,7 +39,11 @@ impl Diagnosis {
         let Some(explanation) = &self.explanation else { return vec![] };
         // Levels are relative to the signal without what was added to it.
         let reference = explanation.evidence.peak();
-        explanation.accepted.iter().filter_map(|effect| effect.candidate.setting(reference)).collect()
+        explanation
+            .accepted
+            .iter()
+            .filter_map(|effect| effect.candidate.setting(reference, &explanation.evidence.radar))
+            .collect()
     }
 }
 

@@ -26,7 +26,7 @@ const SUPPORT_LEVEL: f32 = 0.1;
 const SUPPORT_MARGIN: i64 = 2;
 /// A part reflects with a broad and a narrow lobe, each of its own weight: powers of the cosine of the angle between the
 /// normal and the radar. One lobe of a wrong width shifts a whole body by 5 mm.
-const LOBES: [i32; 2] = [1, 8];
+pub const LOBES: [i32; 2] = [1, 8];
 
 /// A map of few cells: indices into `[doppler, range]` and power.
 #[derive(Clone, Debug, Default, PartialEq)]

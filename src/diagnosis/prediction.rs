@@ -31,6 +31,14 @@ pub struct Point {
     pub part: usize,
 }
 
+/// The middle of a part of the body, over its whole surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Centre {
+    /// Radar frame.
+    pub position_m: [f64; 3],
+    pub velocity_mps: [f64; 3],
+}
+
 /// Visible points of every frame.
 #[derive(Clone, Debug)]
 pub struct BodyPrediction {
@@ -38,6 +46,8 @@ pub struct BodyPrediction {
     pub parts: Vec<String>,
     /// `[frame][point]`
     pub frames: Vec<Vec<Point>>,
+    /// Middle of every part, seen or not, `[frame][part]`; empty for a sequence of meshes.
+    pub centres: Vec<Vec<Centre>>,
     /// Radar time of the middle of every frame.
     pub middle_s: Vec<f64>,
     /// How the points of every frame go on, `[frame]`; may be empty: then they go straight on.
@@ -62,7 +72,7 @@ impl BodyPrediction {
         let (parts, of_vertex) = parts(person);
         let duration_s = radar.frame_duration_s();
         let period_s = period(starts_s).unwrap_or(duration_s);
-        let made: Vec<(Vec<Point>, f64, Track)> = starts_s
+        let made: Vec<(Vec<Point>, Vec<Centre>, f64, Track)> = starts_s
             .par_iter()
             .map(|&start| {
                 let frame = body.frame(&[start, start + duration_s])?;
@@ -76,12 +86,14 @@ impl BodyPrediction {
                     part: of_vertex.get(vertex).copied().unwrap_or(0),
                 };
                 let track = track(&body, &frame.position_m, &vertices, frame.middle_s, period_s)?;
-                Ok((vertices.iter().map(point).collect(), frame.middle_s, track))
+                let centres = centres(&frame.position_m, &frame.velocity_mps, &of_vertex, parts.len());
+                Ok((vertices.iter().map(point).collect(), centres, frame.middle_s, track))
             })
             .collect::<Result<_>>()?;
-        let mut prediction = Self { parts, frames: vec![], middle_s: vec![], tracks: vec![], echoes: vec![] };
-        for (points, middle_s, track) in made {
+        let mut prediction = Self { parts, frames: vec![], centres: vec![], middle_s: vec![], tracks: vec![], echoes: vec![] };
+        for (points, centres, middle_s, track) in made {
             prediction.frames.push(points);
+            prediction.centres.push(centres);
             prediction.middle_s.push(middle_s);
             prediction.tracks.push(track);
         }
@@ -154,6 +166,27 @@ fn track(body: &PosedBody, middle_m: &[[f64; 3]], vertices: &[usize], middle_s: 
 }
 
 /// The parts' names, and the part of every vertex: the joint that moves it most.
+/// Means over the vertices of every part; none where no vertex is told to belong to a part.
+fn centres(position_m: &[[f64; 3]], velocity_mps: &[[f64; 3]], of_vertex: &[usize], parts: usize) -> Vec<Centre> {
+    if of_vertex.len() != position_m.len() {
+        return vec![];
+    }
+    let mut sums = vec![([0.0; 3], [0.0; 3], 0.0f64); parts];
+    for ((position, velocity), &part) in position_m.iter().zip(velocity_mps).zip(of_vertex) {
+        let (place, speed, count) = &mut sums[part];
+        for axis in 0..3 {
+            place[axis] += position[axis];
+            speed[axis] += velocity[axis];
+        }
+        *count += 1.0;
+    }
+    let mean = |(place, speed, count): ([f64; 3], [f64; 3], f64)| Centre {
+        position_m: place.map(|sum| sum / count.max(1.0)),
+        velocity_mps: speed.map(|sum| sum / count.max(1.0)),
+    };
+    sums.into_iter().map(mean).collect()
+}
+
 fn parts(person: &Person) -> (Vec<String>, Vec<usize>) {
     match person {
         Person::Skinned { model, .. } => {

@@ -347,9 +347,9 @@ const NEVER: [(&[&str], &str); 5] = [
          free; the same body would have to be seen from the same side in several directions",
     ),
     (
-        &["antenna_position", "tdm_phase"],
-        "within the body's few degrees of direction and its velocities they are phases of channels, which are reported as such \
-         (channel_mismatch); a target over ±40° of direction would tell them apart",
+        &["tdm_phase"],
+        "within the body's few velocities it is a phase of channels, which is reported as such (channel_mismatch); a faster target \
+         would tell them apart",
     ),
     (
         &["breathing", "heartbeat"],

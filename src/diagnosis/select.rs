@@ -38,6 +38,11 @@ const SLIGHTLY: f64 = 0.01;
 /// What it also leaves, at the chirps' edges, looks like these; a true one was there before.
 const LIKE_EDGES: [&str; 4] = ["ramp_edge_transient", "if_highpass", "if_lowpass", "if_delay"];
 
+/// What a radar that vibrates leaves: turns of what stands still that are not quite undone, and their sidebands, up to this share of
+/// its gain (which counts what is left).
+const TURNS: [&str; 2] = ["slow-time phase", "delay-proportional phase"];
+const SHAKEN: f64 = 0.5;
+
 /// What is named even where products of the signal with itself lie everywhere.
 const WHATEVER_THE_SIGNAL: [&str; 2] = ["iq_imbalance", "adc_saturation"];
 
@@ -210,8 +215,10 @@ fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
         && !apart(accepted.place.range_m, candidate.place.range_m)
         && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
     let by_chirp = is_by_chirp(accepted) && is_path(candidate);
-    (is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside) && candidate.gain < ROUGHLY * accepted.gain
-        || by_chirp && candidate.gain < SLIGHTLY * accepted.gain
+    // How much the returns of each range turn when the radar moves is known roughly: sidebands are left of them.
+    let shaken = accepted.id == Some("radar_vibration") && is_path(candidate);
+    let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside || shaken;
+    roughly && candidate.gain < ROUGHLY * accepted.gain || by_chirp && candidate.gain < SLIGHTLY * accepted.gain
 }
 
 /// What acts on every return makes echoes of the body too, which look like paths of their own: where both are suspected,
@@ -245,7 +252,7 @@ fn suspicions(evidence: &Evidence) -> Vec<(usize, Candidate)> {
     // The shared products first, so that suspects do not wait for one another.
     evidence.maps();
     let ask = |(index, suspect): (usize, &Suspect)| -> Vec<(usize, Candidate)> {
-        (suspect.find)(evidence).into_iter().map(|candidate| (index, candidate)).collect()
+        (suspect.find)(evidence).into_iter().map(|candidate| (index, candidate.named_if_sure())).collect()
     };
     SUSPECTS.par_iter().enumerate().flat_map_iter(ask).collect()
 }
@@ -328,7 +335,7 @@ fn again(
             && candidate.choice == effect.candidate.choice
             && thresholds.passes(effect.suspect, candidate)
     };
-    let found = (SUSPECTS[effect.suspect].find)(&evidence).into_iter().filter(same);
+    let found = (SUSPECTS[effect.suspect].find)(&evidence).into_iter().map(Candidate::named_if_sure).filter(same);
     found.max_by(|a, b| a.gain.total_cmp(&b.gain))
 }
 

@@ -1,6 +1,6 @@
 //! Small statistics that several suspects need; distributions come from `statrs`.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Gamma, Normal};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Gamma, Normal};
 use statrs::function::beta::inv_beta_reg;
 
 /// Scale of an exponential distribution from its lower `quantile` (between 0 and 1): large values do not count.
@@ -23,9 +23,19 @@ pub fn mean_power_tail(mean: f64, count: f64) -> f64 {
     if mean <= 0.0 { 1.0 } else { Gamma::new(count, count).map_or(1.0, |law| law.sf(mean)) }
 }
 
+/// Probability that a ratio of variances of so many degrees of freedom each exceeds this.
+pub fn fisher_tail(ratio: f64, above: f64, below: f64) -> f64 {
+    if ratio <= 0.0 { 1.0 } else { FisherSnedecor::new(above, below).map_or(1.0, |law| law.sf(ratio)) }
+}
+
 /// Probability that a standard normal deviates by more than this, both ways.
 pub fn normal_tails(z: f64) -> f64 {
     2.0 * Normal::standard().sf(z.abs())
+}
+
+/// Probability of so many events or more where a mean number is expected.
+pub fn poisson_tail(count: usize, mean: f64) -> f64 {
+    if count == 0 { 1.0 } else { Gamma::new(count as f64, 1.0).map_or(1.0, |law| law.cdf(mean)) }
 }
 
 /// The smallest of `tried` independent p-values, made a p-value again (Šidák).
@@ -62,6 +72,8 @@ mod tests {
         assert!((chi2_tail(3.841, 1.0) - 0.05).abs() < 1e-4);
         assert!((normal_tails(1.96) - 0.05).abs() < 1e-4);
         assert!((mean_power_tail(2.0, 1.0) - (-2.0f64).exp()).abs() < 1e-9);
+        assert!((poisson_tail(1, 0.1) - (1.0 - (-0.1f64).exp())).abs() < 1e-9);
+        assert!((poisson_tail(2, 0.1) - (1.0 - 1.1 * (-0.1f64).exp())).abs() < 1e-9);
         assert!((corrected(1e-12, 10.0) - 1e-11).abs() < 1e-16);
         let [low, high] = binomial_interval(0, 300, 0.95);
         assert!(low == 0.0 && (high - 0.01222).abs() < 1e-4, "{high}");

@@ -1,5 +1,6 @@
 //! One file per family of effects: each looks at the evidence and says what it has found.
 
+pub mod carried;
 pub mod codes;
 pub mod excess;
 pub mod fluctuation;
@@ -55,5 +56,6 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect::new("extra paths", paths::find),
     Suspect { share: 8.0, ..Suspect::new("geometry", geometry::find) },
     Suspect::new("changing static returns", fluctuation::find),
+    carried::SUSPECT,
     Suspect { last_resort: true, ..Suspect::new("excess power", excess::find) },
 ];

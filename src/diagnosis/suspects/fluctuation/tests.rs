@@ -50,6 +50,7 @@ fn evidence(seed: u64, change: impl Fn(usize, usize) -> Complex64) -> Evidence {
         (0..20).flat_map(|i| (0..30).map(move |j| (i, j))).map(|(i, j)| at(i, j)).collect()
     };
     let body = BodyPrediction {
+        centres: vec![],
         echoes: vec![],
         parts: vec!["body".into()],
         frames: (0..FRAMES).map(points).collect(),

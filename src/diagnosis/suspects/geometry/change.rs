@@ -1,6 +1,6 @@
 //! Ways in which the body may be elsewhere, or at another time, than predicted.
 
-use crate::diagnosis::prediction::{BodyPrediction, Echo, Point};
+use crate::diagnosis::prediction::{BodyPrediction, Centre, Echo, Point};
 
 /// One of the effects that move the body in the maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,18 +50,21 @@ impl Moves {
             let (nearest, rest) = nearest(body, frame, delay);
             return body.later(nearest, rest);
         }
-        let moved = |point: &Point| {
-            let sight: [f64; 3] = std::array::from_fn(|axis| point.position_m[axis] - self.centre_m[axis]);
-            let range = sight.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
-            let shift: [f64; 3] = match change {
-                Change::Range(offset) => sight.map(|x| x / range * offset),
-                Change::Scale(relative) => sight.map(|x| x * relative),
-                Change::Offset(offset) => offset,
-                _ => [0.0; 3],
-            };
-            Point { position_m: std::array::from_fn(|axis| point.position_m[axis] + shift[axis]), ..*point }
-        };
+        let moved = |point: &Point| Point { position_m: self.moved(point.position_m, change), ..*point };
         (body.frames[frame].iter().map(moved).collect(), true)
+    }
+
+    /// Where something is seen after a change of place.
+    fn moved(&self, position_m: [f64; 3], change: Change) -> [f64; 3] {
+        let sight: [f64; 3] = std::array::from_fn(|axis| position_m[axis] - self.centre_m[axis]);
+        let range = sight.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
+        let shift: [f64; 3] = match change {
+            Change::Range(offset) => sight.map(|x| x / range * offset),
+            Change::Scale(relative) => sight.map(|x| x * relative),
+            Change::Offset(offset) => offset,
+            _ => [0.0; 3],
+        };
+        std::array::from_fn(|axis| position_m[axis] + shift[axis])
     }
 
     /// The whole prediction after the change.
@@ -76,7 +79,16 @@ impl Moves {
             let (nearest, rest) = nearest(body, frame, self.delay_s(body, frame, change));
             body.tracks.get(nearest).map(|track| track.from(rest))
         };
-        body.tracks = frames.filter_map(track).collect();
+        let centres = |frame: usize| -> Vec<Centre> {
+            let Some(centres) = body.centres.get(frame) else { return vec![] };
+            let delay_s = self.delay_s(body, frame, change);
+            let later = |centre: &Centre| -> [f64; 3] {
+                std::array::from_fn(|axis| centre.position_m[axis] + delay_s * centre.velocity_mps[axis])
+            };
+            centres.iter().map(|centre| Centre { position_m: self.moved(later(centre), change), ..*centre }).collect()
+        };
+        let (centres, tracks) = (frames.clone().map(centres).collect(), frames.filter_map(track).collect());
+        (body.centres, body.tracks) = (centres, tracks);
         body.frames = moved;
     }
 }
@@ -122,6 +134,7 @@ mod tests {
         };
         BodyPrediction {
             echoes: vec![],
+            centres: vec![],
             parts: vec!["body".into()],
             frames: middle_s.iter().map(|&time| vec![point(time)]).collect(),
             tracks: middle_s.iter().map(|&time| track(time)).collect(),

@@ -13,6 +13,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::change::{Change, Moves};
 use super::coupling;
+use super::places::{self, Moments, neighbours};
 use crate::diagnosis::power::{PowerModel, part_templates};
 use crate::diagnosis::suspects::{paths::still_power, slow};
 use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, Rung, statistics};
@@ -20,6 +21,9 @@ use crate::radar::Radar;
 
 /// Expected power over the noise from which on a cell is used.
 const LEAST_POWER: f32 = 10.0;
+/// Cells of a group that is judged on its own, at least, and groups of a frame, at most.
+const GROUP_CELLS: usize = 12;
+const MOST_GROUPS: usize = 6;
 /// Share of what stands still that may be left at low Doppler when it was taken out.
 const STILL_LEFT: f64 = 1e-3;
 /// What the power model's errors do to a phase and to a power between neighbouring receivers (half a wavelength).
@@ -38,6 +42,8 @@ const CELLS_PER_DRAW: f64 = 2.25;
 pub struct Sums {
     /// `[rx, rx]`, the second one conjugated.
     pub products: Vec<Complex64>,
+    /// Of the neighbours along x.
+    pub along: Vec<Moments>,
     pub cells: f64,
     pub range_m: f64,
     /// Mean x of the cells' directions (unit vectors).
@@ -45,6 +51,22 @@ pub struct Sums {
 }
 
 impl Sums {
+    /// Of several groups of cells at once.
+    fn together(groups: &[Self]) -> Self {
+        let mut sum = groups[0].clone();
+        sum.sine *= sum.cells;
+        for group in &groups[1..] {
+            sum.products.iter_mut().zip(&group.products).for_each(|(sum, product)| *sum += product);
+            for (sum, own) in sum.along.iter_mut().zip(&group.along) {
+                sum.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+            }
+            sum.cells += group.cells;
+            sum.sine += group.sine * group.cells;
+        }
+        sum.sine /= sum.cells.max(1.0);
+        sum
+    }
+
     pub fn receivers(&self) -> usize {
         self.products.len().isqrt()
     }
@@ -70,36 +92,35 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     let receivers = evidence.radar.rx_m.len();
     // One channel whose gain hopped was brought to its own mean, which need not be that of the others.
     let hopped = evidence.accepted.contains(&slow::channels::BEHAVES_LIKE);
-    if receivers < 2 || hopped || evidence.accepted.contains(&"channel_mismatch") {
+    if receivers < 2 || hopped || evidence.accepted.contains(&"antenna_position") {
         return vec![];
     }
     let still = still_power(evidence);
-    let sums: Vec<Option<Sums>> =
+    let units: Vec<Option<Vec<Sums>>> =
         (0..evidence.cube.dims[0]).into_par_iter().map(|frame| sums(evidence, model, body, &still, frame)).collect();
+    let sums: Vec<Option<Sums>> = units.iter().map(|units| units.as_ref().map(|units| Sums::together(units))).collect();
     let of = |frames: &[usize]| frames.iter().filter_map(|&frame| sums[frame].clone()).collect::<Vec<Sums>>();
     let (training, held_out) = (of(&evidence.split.training), of(&evidence.split.held_out));
     if training.len() < 6 || held_out.is_empty() {
         return vec![];
     }
-    if !evidence.accepted.contains(&"mutual_coupling")
-        && let Some(coupling) = coupling::find(evidence, &training, &held_out)
-    {
-        // Receivers that differ in any other way remain different without it.
-        let undone = |sums: &Sums| coupling::uncoupled(&evidence.radar, sums, coupling.strength);
-        let rest: Option<Vec<Sums>> = training.iter().map(undone).collect();
-        let rest = rest.map(|rest| judge(&evidence.radar, &rest)).filter(|rest| rest.own > UNEVEN);
-        if let Some(rest) = rest {
-            let mut candidate = coupling.candidate;
-            // Any receivers may look like that by chance, if not to the last digit.
-            if rest.unevenness > BY_CHANCE * judge(&evidence.radar, &training).unevenness {
-                candidate.look_alikes.push("channel_mismatch");
-                candidate.look_alikes.dedup();
-            }
-            return vec![candidate];
+    let groups: Vec<&[Sums]> = units.iter().flatten().map(Vec::as_slice).collect();
+    // Receivers that differ do so in every direction alike, but displaced ones may look as if they differed in the mean one.
+    let displaced = places::find(evidence, &groups);
+    if evidence.accepted.contains(&"channel_mismatch") {
+        return displaced.into_iter().collect();
+    }
+    let coupled = if evidence.accepted.contains(&"mutual_coupling") { None } else { coupled(evidence, &training, &held_out) };
+    // A coupling turns phases with the direction, too, and changes powers besides.
+    match (displaced, coupled) {
+        (Some(displaced), coupled) if coupled.as_ref().is_none_or(|coupled| coupled.gain < displaced.gain) => {
+            return vec![displaced];
         }
+        (_, Some(coupled)) => return vec![coupled],
+        _ => {}
     }
     let Judgement { phases, gains, direction, own, bearing, aside, .. } = judge(&evidence.radar, &training);
-    let (places, wave) = (places(&evidence.radar), TAU / evidence.radar.wavelength_m());
+    let (places, wave) = (along(&evidence.radar), TAU / evidence.radar.wavelength_m());
     if own < UNEVEN {
         let amplitudes: Vec<Complex64> = std::iter::once(Complex64::ONE)
             .chain(
@@ -113,13 +134,32 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
         let amplitudes: Vec<Complex64> = places.iter().map(|x| Complex64::cis(-direction * wave * x)).collect();
         let gain = likelihood_gain(&training, &held_out, &amplitudes);
         let range_m = training.iter().map(|sums| sums.range_m).sum::<f64>() / training.len() as f64;
-        return (gain > 0.0).then(|| displaced(evidence, bearing, range_m, moves, aside, gain)).into_iter().collect();
+        return (gain > 0.0).then(|| aside_of(evidence, bearing, range_m, moves, aside, gain)).into_iter().collect();
     }
     vec![]
 }
 
+/// A coupling, where receivers do not differ in any other way.
+fn coupled(evidence: &Evidence, training: &[Sums], held_out: &[Sums]) -> Option<Candidate> {
+    let coupling = coupling::find(evidence, training, held_out)?;
+    // Receivers that differ in any other way remain different without it.
+    let undone = |sums: &Sums| coupling::uncoupled(&evidence.radar, sums, coupling.strength);
+    let rest: Vec<Sums> = training.iter().map(undone).collect::<Option<_>>()?;
+    let rest = judge(&evidence.radar, &rest);
+    if rest.own <= UNEVEN {
+        return None;
+    }
+    let mut candidate = coupling.candidate;
+    // Any receivers may look like that by chance, if not to the last digit.
+    if rest.unevenness > BY_CHANCE * judge(&evidence.radar, training).unevenness {
+        candidate.look_alikes.push("channel_mismatch");
+        candidate.look_alikes.dedup();
+    }
+    Some(candidate)
+}
+
 /// Places of the receivers along x, from the first one.
-fn places(radar: &Radar) -> Vec<f64> {
+fn along(radar: &Radar) -> Vec<f64> {
     radar.rx_m.iter().map(|rx| rx[0] - radar.rx_m[0][0]).collect()
 }
 
@@ -144,7 +184,7 @@ fn judge(radar: &Radar, training: &[Sums]) -> Judgement {
     let phases: Vec<Mean> = (1..receivers).map(|rx| phase(training, rx)).collect();
     let gains: Vec<Mean> = (1..receivers).map(|rx| gain_db(training, rx)).collect();
     // The part that is a direction: least squares through the receivers' places, of every frame on its own.
-    let (places, wave) = (places(radar), TAU / radar.wavelength_m());
+    let (places, wave) = (along(radar), TAU / radar.wavelength_m());
     let spread: f64 = places.iter().map(|x| x * x).sum();
     let sine = |phases: &[f64]| -phases.iter().zip(&places[1..]).map(|(phase, x)| phase * x).sum::<f64>() / (spread * wave);
     let values: Vec<f64> = phases.iter().map(|phase| phase.value).collect();
@@ -179,8 +219,8 @@ pub fn tail(t: f64, freedom: f64) -> f64 {
     if t <= 0.0 { 1.0 } else { StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| 2.0 * law.sf(t)) }
 }
 
-/// None where the body fills too few cells. `still`: power of what stands still, by range.
-fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &[f64], frame: usize) -> Option<Sums> {
+/// By groups of neighbouring cells; none where the body fills too few cells. `still`: power of what stands still, by range.
+fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &[f64], frame: usize) -> Option<Vec<Sums>> {
     let radar = &evidence.radar;
     let (receivers, transmitters) = (radar.rx_m.len(), radar.tx_m.len());
     let expected = model.expected(frame);
@@ -209,31 +249,49 @@ fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &
         std::array::from_fn(|axis| mean(&|position| (position[axis] - centre[axis]) / range(position)));
     let range_m = points.iter().map(|point| range(point.position_m)).sum::<f64>() / points.len().max(1) as f64;
     let noise = evidence.noise();
-    let sine = direction[0].iter().map(|&x| f64::from(x)).sum::<f64>() / cells.len() as f64;
-    let mut result = Sums { products: vec![Complex64::ZERO; receivers * receivers], cells: 0.0, range_m, sine };
-    let mut steered = vec![Complex64::ZERO; receivers];
-    for tx in 0..transmitters {
-        let maps: Vec<_> = (0..receivers).map(|rx| evidence.range_doppler(frame, tx * receivers + rx)).collect();
-        for (index, &cell) in cells.iter().enumerate() {
-            // A cell tells as much as any other about what its receivers have in common, however loud its speckle is.
-            let power = (0..receivers)
-                .map(|rx| maps[rx][cell].norm_sqr() / noise[tx * receivers + rx].max(f64::MIN_POSITIVE))
-                .sum::<f64>()
-                / receivers as f64;
-            let weight = 1.0 / ((power + f64::from(LEAST_POWER)) * noise[tx * receivers].max(f64::MIN_POSITIVE));
-            result.cells += 1.0;
-            for rx in 0..receivers {
-                let phase: f64 = (0..3)
-                    .map(|axis| (radar.rx_m[rx][axis] - radar.rx_m[0][axis]) * f64::from(direction[axis][index]) * wave)
-                    .sum();
-                steered[rx] = maps[rx][cell] * Complex64::cis(phase);
-            }
-            for (i, product) in result.products.iter_mut().enumerate() {
-                *product += steered[i / receivers] * steered[i % receivers].conj() * weight;
+    let maps: Vec<_> = (0..transmitters * receivers).map(|channel| evidence.range_doppler(frame, channel)).collect();
+    let pairs = neighbours(radar);
+    let groups = (cells.len() / GROUP_CELLS).clamp(1, MOST_GROUPS);
+    let of_group = |group: usize| {
+        let members = group * cells.len() / groups..(group + 1) * cells.len() / groups;
+        let sine = direction[0][members.clone()].iter().map(|&x| f64::from(x)).sum::<f64>() / members.len() as f64;
+        let mut sums = Sums {
+            products: vec![Complex64::ZERO; receivers * receivers],
+            along: vec![Moments::default(); pairs.len()],
+            cells: 0.0,
+            range_m,
+            sine,
+        };
+        let mut steered = vec![Complex64::ZERO; receivers];
+        for (maps, noise) in maps.chunks_exact(receivers).zip(noise.chunks_exact(receivers)) {
+            for index in members.clone() {
+                let cell = cells[index];
+                // A cell tells as much as any other about what its receivers have in common, however loud its speckle is.
+                let power = (0..receivers).map(|rx| maps[rx][cell].norm_sqr() / noise[rx].max(f64::MIN_POSITIVE)).sum::<f64>()
+                    / receivers as f64;
+                let weight = 1.0 / ((power + f64::from(LEAST_POWER)) * noise[0].max(f64::MIN_POSITIVE));
+                sums.cells += 1.0;
+                for rx in 0..receivers {
+                    let phase: f64 = (0..3)
+                        .map(|axis| (radar.rx_m[rx][axis] - radar.rx_m[0][axis]) * f64::from(direction[axis][index]) * wave)
+                        .sum();
+                    steered[rx] = maps[rx][cell] * Complex64::cis(phase);
+                }
+                for (i, product) in sums.products.iter_mut().enumerate() {
+                    *product += steered[i / receivers] * steered[i % receivers].conj() * weight;
+                }
+                for (along, &[far, near]) in sums.along.iter_mut().zip(&pairs) {
+                    let mut cross = steered[far] * steered[near].conj() * weight;
+                    for moment in along.iter_mut() {
+                        *moment += cross;
+                        cross *= f64::from(direction[0][index]);
+                    }
+                }
             }
         }
-    }
-    Some(result)
+        sums
+    };
+    Some((0..groups).map(of_group).collect())
 }
 
 /// Phase of a receiver against the first, radians.
@@ -337,7 +395,7 @@ fn mismatch(
     }
 }
 
-fn displaced(evidence: &Evidence, bearing: Mean, range_m: f64, moves: Moves, p_value: f64, gain: f64) -> Candidate {
+fn aside_of(evidence: &Evidence, bearing: Mean, range_m: f64, moves: Moves, p_value: f64, gain: f64) -> Candidate {
     let (offset, deviation) = (bearing.value * range_m, bearing.deviation.hypot(0.5 * PHASE_FLOOR_RAD / PI) * range_m);
     let change = Change::Offset([offset, 0.0, 0.0]);
     let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();

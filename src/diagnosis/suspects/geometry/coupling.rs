@@ -96,7 +96,7 @@ pub fn uncoupled(radar: &Radar, sums: &Sums, strength: Complex64) -> Option<Sums
     });
     let inverse = coupled.try_inverse()?;
     let products = &inverse * DMatrix::from_row_slice(count, count, &sums.products) * inverse.adjoint();
-    Some(Sums { products: products.transpose().as_slice().to_vec(), ..*sums })
+    Some(Sums { products: products.transpose().as_slice().to_vec(), ..sums.clone() })
 }
 
 /// The coupling that, undone, leaves receivers as alike as can be; none where the array cannot tell.
@@ -239,7 +239,7 @@ mod tests {
                         *product += steered[i / 4] * steered[i % 4].conj();
                     }
                 }
-                Sums { products, cells: CELLS as f64, range_m: 3.0, sine }
+                Sums { products, along: vec![], cells: CELLS as f64, range_m: 3.0, sine }
             })
             .collect()
     }

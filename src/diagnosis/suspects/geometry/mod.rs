@@ -5,6 +5,7 @@ mod change;
 mod channels;
 mod coupling;
 mod displaced;
+mod places;
 mod trial;
 
 use change::Moves;

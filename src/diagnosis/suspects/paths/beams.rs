@@ -9,16 +9,13 @@ use rayon::prelude::*;
 
 use super::coloured::{Coloured, FINE};
 use super::scene::{STILL_BINS, Scene, still_power};
-use super::steering::{aperture_m, beam, power, steering, wave};
+use super::steering::{beam, power, sines, steering};
 use crate::diagnosis::Point;
 use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::power::Cells;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::statistics::median;
-use crate::radar::Radar;
 
-/// Beams per beam width of the receivers.
-const BEAMS_PER_WIDTH: f64 = 1.6;
 /// The body may return so much more than is expected of it.
 const SAFETY: f64 = 2.0;
 /// Share of a tone's power that errors of velocity and range carry into the neighbours on the fine grid.
@@ -366,15 +363,6 @@ fn body(scene: &Scene, frame: usize) -> Vec<(Point, f64)> {
     let points = body.with_echoes(radar, body.frames[frame].clone(), None);
     let level = |point: Point| (point, scene.model.peak(radar, point));
     points.into_iter().map(level).filter(|(_, power)| *power > 0.0 && power.is_finite()).collect()
-}
-
-/// Directions that the receivers tell apart, and some between.
-fn sines(radar: &Radar) -> Vec<f64> {
-    let Some(aperture) = aperture_m(radar) else { return vec![0.0] };
-    let count = radar.rx_m.len() as f64;
-    let width = TAU / (wave(radar) * aperture * count / (count - 1.0));
-    let beams = ((2.0 / width * BEAMS_PER_WIDTH).ceil() as usize).clamp(1, 16);
-    (0..beams).map(|beam| (2.0 * beam as f64 + 1.0) / beams as f64 - 1.0).collect()
 }
 
 /// A little of every cell's power moved to its neighbours.

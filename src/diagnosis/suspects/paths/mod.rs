@@ -23,6 +23,7 @@ use crate::diagnosis::{Candidate, Evidence};
 
 use scene::Scene;
 pub use scene::still_power;
+pub use steering::{beam, sines, steering};
 
 /// A ghost must predict at least this share of the held-out frames that show it.
 const AGREEING: f64 = 0.6;
@@ -38,6 +39,10 @@ const LEAST_GAIN_UNNAMED: f64 = 25.0;
 const LEAST_GAIN_AGAIN: f64 = 50.0;
 /// Share of a track's or an image's gain from which on a product of the signal with itself explains as much.
 const NEARLY: f64 = 0.5;
+/// Share of a mirror image's gain from which on a copy of the body, phases and all, may be the same thing; and a wall returns no
+/// more than this.
+const ALIKE: f64 = 0.25;
+const STRONGEST_WALL: f64 = 0.75;
 /// Kinds of answers that this family may give: every one is a chance to be wrong.
 const TRIED: f64 = 6.0;
 
@@ -123,6 +128,22 @@ fn moving(scene: &Scene) -> Vec<Candidate> {
     if let Some(product) = &product {
         found.retain(|found| product.gain < NEARLY * found.gain);
     }
-    found.extend(echo::multibounce(scene, TRIED).into_iter().chain(product));
+    let mut again = echo::multibounce(scene, TRIED);
+    if let Some(again) = &mut again {
+        told_apart(&mut found, again);
+    }
+    found.extend(again.into_iter().chain(product));
     found
+}
+
+/// A wall behind the radar returns nearly the same of a body before it as the body's own echoes do: a copy that keeps its phases.
+fn told_apart(found: &mut Vec<Candidate>, again: &mut Candidate) {
+    let alike = |found: &Candidate| found.id == Some("wall_ghost") && again.gain > ALIKE * found.gain;
+    let Some(index) = found.iter().position(alike) else { return };
+    if found[index].estimates.iter().any(|estimate| estimate.name == "coefficient" && estimate.values[0].abs() > STRONGEST_WALL) {
+        found.remove(index);
+        again.look_alikes.push("wall_ghost");
+    } else {
+        found[index].look_alikes.push("body_multibounce");
+    }
 }

@@ -6,6 +6,9 @@ use num_complex::Complex64;
 
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
+/// Beams per beam width of the receivers.
+const BEAMS_PER_WIDTH: f64 = 1.6;
+
 /// Undoes the phases that a direction (x over range) has at the receivers, at the middle of the band: the array phase falls
 /// towards it.
 pub fn steering(radar: &Radar, sine: f64) -> Vec<Complex64> {
@@ -32,4 +35,13 @@ pub fn beam(values: &[Complex64], steering: &[Complex64]) -> Complex64 {
 /// Power of the beams of all transmitters, `[tx · rx]`.
 pub fn power(values: &[Complex64], steering: &[Complex64]) -> f64 {
     values.chunks_exact(steering.len()).map(|values| beam(values, steering).norm_sqr()).sum()
+}
+
+/// Directions that the receivers tell apart, and some between.
+pub fn sines(radar: &Radar) -> Vec<f64> {
+    let Some(aperture) = aperture_m(radar) else { return vec![0.0] };
+    let count = radar.rx_m.len() as f64;
+    let width = TAU / (wave(radar) * aperture * count / (count - 1.0));
+    let beams = ((2.0 / width * BEAMS_PER_WIDTH).ceil() as usize).clamp(1, 16);
+    (0..beams).map(|beam| (2.0 * beam as f64 + 1.0) / beams as f64 - 1.0).collect()
 }

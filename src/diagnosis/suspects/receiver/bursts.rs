@@ -9,6 +9,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::crossings::{self, Crossings};
 use super::support::energy;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::{corrected, median};
@@ -16,17 +17,29 @@ use crate::diagnosis::{Cube, Evidence};
 
 /// A sample's power over that of its surroundings, beyond which it is a burst's: e^−25 for noise.
 const HIGH: f64 = 25.0;
+/// Chance above which crossings that no single sample shows are none.
+const LEAST_LIKELY: f64 = 1e-3;
+/// For each crossing that hardly stands out there may be so many that do not.
+const UNSEEN: f64 = 5.0;
 /// Samples next to it that count once it is known to be hit.
 const NEXT: f64 = 6.0;
 
 /// A hit stretch of one chirp.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Burst {
-    frame: usize,
-    channel: usize,
-    chirp: usize,
-    first: usize,
-    last: usize,
+pub struct Burst {
+    pub frame: usize,
+    pub channel: usize,
+    pub chirp: usize,
+    pub first: usize,
+    pub last: usize,
+}
+
+impl Burst {
+    fn overlaps(&self, other: &Self) -> bool {
+        (self.frame, self.channel, self.chirp) == (other.frame, other.channel, other.chirp)
+            && self.first <= other.last
+            && other.first <= self.last
+    }
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -35,10 +48,17 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         return vec![];
     }
     let channels = evidence.cube.channels();
-    let bursts: Vec<Burst> = (0..frames * channels)
+    let mut bursts: Vec<Burst> = (0..frames * channels)
         .into_par_iter()
         .flat_map_iter(|index| of_channel(evidence, index / channels, index % channels))
         .collect();
+    let strong = bursts.len();
+    let crossings = crossings::find(evidence).filter(|crossings| crossings.p_value < LEAST_LIKELY);
+    if let Some(crossings) = &crossings {
+        // What one channel shows on its own has its extent from there.
+        let weak = crossings.bursts.iter().filter(|weak| bursts.iter().all(|burst| !burst.overlaps(weak)));
+        bursts.extend(weak.copied().collect::<Vec<_>>());
+    }
     let total = (frames * channels * loops * samples) as f64;
     // Bursts are rare: what hits every chirp is something else.
     let hit: usize = bursts.iter().map(|burst| burst.last + 1 - burst.first).sum();
@@ -50,20 +70,20 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         bursts.iter().map(|burst| (burst.frame, burst.channel / rx, burst.chirp)).collect();
     let together = bursts.len() as f64 / places.len() as f64;
     let seen_by_all = rx > 1 && together > 0.5 * rx as f64;
-    let p_value = corrected((-HIGH * bursts.len() as f64).exp(), total);
-    let held: BTreeSet<usize> = evidence.split.held_out.iter().copied().collect();
-    let mut gain = 0.0;
-    let mut removed = 0.0;
+    let alone = corrected((-HIGH * strong as f64).exp(), total);
+    let p_value = crossings.as_ref().map_or(alone, |crossings| alone.min(crossings.p_value));
+    let (mut gain, mut removed) = (0.0, 0.0);
     for burst in &bursts {
         let repaired = repair(&evidence.cube, burst);
         let chirp = chirp_of(&evidence.cube, burst);
         let energy: f64 = repaired.iter().zip(&chirp[burst.first..]).map(|(a, b)| (a - b).norm_sqr()).sum();
         removed += energy;
-        if held.contains(&burst.frame) {
-            gain += energy / evidence.noise()[burst.channel].max(1e-300);
-        }
+        let unforeseen = stencil_noise(burst.chirp, loops);
+        gain += energy / (unforeseen * evidence.noise()[burst.channel]).max(1e-300) - repaired.len() as f64;
     }
-    // Few bursts may all be in training frames; then the training frames' own say is worth its share.
+    // Few bursts may all be in training frames. Each is judged by what its neighbours foretell, in whatever frame it is: the
+    // gain is what held-out frames would show in the mean over which of them are held out.
+    gain *= evidence.split.held_out_share();
     if gain <= 0.0 {
         return vec![];
     }
@@ -84,7 +104,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         (false, false) => ("impulsive_noise", vec!["interference"]),
     };
     let count = places.len() as f64;
-    let estimates = if id == "interference" { vec![Estimate::normal("bursts", count, 0.1 * count + 0.6)] } else { vec![] };
+    let estimates = if id == "interference" { vec![bursts_in_all(count, crossings.as_ref())] } else { vec![] };
     let statement = if id == "interference" {
         format!(
             "{count} chirps hold a burst of {lengths:.0} samples that all receivers see at once and that neither the chirp before \
@@ -116,6 +136,15 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }]
 }
 
+/// How many there are: beside those that hardly stand out, and where things move too fast to look, are others.
+fn bursts_in_all(count: f64, crossings: Option<&Crossings>) -> Estimate {
+    let (seen, faint) = crossings.map_or((1.0, 0.0), |crossings| (crossings.seen, crossings.faint));
+    let value = count * (1.0 + faint * (1.0 / seen.max(0.1) - 1.0));
+    let error = 1.645 * (0.1 * count + 0.6);
+    let most = value * (1.0 + UNSEEN * faint) + error;
+    Estimate { name: "bursts", values: vec![value], ci90: vec![[count - error, most]] }
+}
+
 fn chirp_of<'a>(cube: &'a Cube, burst: &Burst) -> &'a [Complex64] {
     let samples = cube.dims[4];
     &cube.channel(burst.frame, burst.channel)[burst.chirp * samples..][..samples]
@@ -132,11 +161,20 @@ fn neighbours(chirp: usize, loops: usize) -> [usize; 2] {
     }
 }
 
+/// What its neighbours foretell of a chirp, by sample: at the ends a straight line is continued, in the middle it is halved.
+fn weights(chirp: usize, loops: usize) -> [f64; 2] {
+    if chirp == 0 || chirp + 1 == loops { [2.0, -1.0] } else { [0.5, 0.5] }
+}
+
+/// Variance of the noise in a [`difference`], over that in a sample.
+fn stencil_noise(chirp: usize, loops: usize) -> f64 {
+    1.0 + weights(chirp, loops).iter().map(|weight| weight * weight).sum::<f64>()
+}
+
 /// A chirp less what its neighbours let expect of it.
 fn difference(signal: &[Complex64], chirp: usize, loops: usize, samples: usize) -> Vec<Complex64> {
     let [a, b] = neighbours(chirp, loops);
-    // At the ends a straight line is continued, in the middle it is halved.
-    let (from_a, from_b) = if chirp == 0 || chirp + 1 == loops { (2.0, -1.0) } else { (0.5, 0.5) };
+    let [from_a, from_b] = weights(chirp, loops);
     (0..samples)
         .map(|n| signal[chirp * samples + n] - signal[a * samples + n] * from_a - signal[b * samples + n] * from_b)
         .collect()

@@ -1,6 +1,7 @@
 //! The receiver and its noise: what lives in fast time, beat frequency and amplitude, and needs no body to be seen.
 
 pub mod bursts;
+mod crossings;
 pub mod declip;
 pub mod droop;
 pub mod field;

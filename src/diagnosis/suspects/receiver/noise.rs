@@ -23,6 +23,9 @@ const LAW: f64 = 0.05;
 /// what a stranger's side lobes or some bursts share lies in a few of them.
 const EVERYWHERE: f64 = 0.4;
 
+/// Parts of a recording that are foretold by the others.
+const FOLDS: usize = 4;
+
 /// Cells that are looked at.
 struct Cells {
     /// Windows' maps, `[channel][cell]`.
@@ -206,36 +209,72 @@ fn is_everywhere(evidence: &Evidence, bins: &[usize], found: &DMatrix<Complex64>
     })
 }
 
+/// What receivers share, summed over cells.
+struct Shared {
+    /// Products of every two, the second one conjugated.
+    products: DMatrix<Complex64>,
+    cells: f64,
+}
+
+impl Shared {
+    fn none(receivers: usize) -> Self {
+        Self { products: DMatrix::zeros(receivers, receivers), cells: 0.0 }
+    }
+
+    fn of(evidence: &Evidence, frame: usize, bins: &[usize]) -> Self {
+        let values = cells(evidence, frame, bins).values;
+        let product = |a: usize, b: usize| values[a].iter().zip(&values[b]).map(|(a, b)| a * b.conj()).sum();
+        Self { products: DMatrix::from_fn(values.len(), values.len(), product), cells: values[0].len() as f64 }
+    }
+
+    fn and(self, other: &Self) -> Self {
+        Self { products: self.products + &other.products, cells: self.cells + other.cells }
+    }
+
+    /// Windows share 2.25 cells.
+    fn independent(&self) -> f64 {
+        self.cells / 2.25
+    }
+
+    /// Root mean square of every receiver.
+    fn scales(&self) -> Vec<f64> {
+        (0..self.products.nrows()).map(|rx| (self.products[(rx, rx)].re / self.cells.max(1.0)).max(1e-300).sqrt()).collect()
+    }
+
+    fn correlations(&self, scales: &[f64]) -> DMatrix<Complex64> {
+        let receivers = self.products.nrows();
+        DMatrix::from_fn(receivers, receivers, |a, b| self.products[(a, b)] / (self.cells.max(1.0) * scales[a] * scales[b]))
+    }
+
+    /// Log-likelihood that other cells gain by these correlations, beside these powers alone.
+    fn gain(&self, others: &Self) -> Option<f64> {
+        let scales = self.scales();
+        let (expected, seen) = (self.correlations(&scales), others.correlations(&scales));
+        let determinant = expected.determinant().re;
+        let inverse = expected.try_inverse()?;
+        (determinant > 0.0).then(|| others.independent() * (seen.trace().re - (inverse * seen).trace().re - determinant.ln()))
+    }
+}
+
 fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     let rx = evidence.cube.dims[2];
     if rx < 2 {
         return None;
     }
-    let covariance = |frames: &[usize]| {
-        let of: Vec<(DMatrix<Complex64>, f64)> = frames
-            .par_iter()
-            .map(|&frame| {
-                let cells = cells(evidence, frame, bins).values;
-                let matrix = DMatrix::from_fn(rx, rx, |a, b| cells[a].iter().zip(&cells[b]).map(|(a, b)| a * b.conj()).sum());
-                (matrix, cells[0].len() as f64)
-            })
-            .collect();
-        let zero = (DMatrix::zeros(rx, rx), 0.0);
-        of.into_iter().fold(zero, |(sum, count), (matrix, cells)| (sum + matrix, count + cells))
-    };
-    let (sum, count) = covariance(&evidence.split.training);
-    if count < 100.0 {
+    let of_frames: Vec<Shared> =
+        (0..evidence.cube.dims[0]).into_par_iter().map(|frame| Shared::of(evidence, frame, bins)).collect();
+    let sum = |frames: &mut dyn Iterator<Item = usize>| frames.fold(Shared::none(rx), |sum, frame| sum.and(&of_frames[frame]));
+    let training = sum(&mut evidence.split.training.iter().copied());
+    if training.cells < 100.0 {
         return None;
     }
-    let scale: Vec<f64> = (0..rx).map(|c| (sum[(c, c)].re / count).max(1e-300).sqrt()).collect();
-    let of = |sum: &DMatrix<Complex64>, count: f64| DMatrix::from_fn(rx, rx, |a, b| sum[(a, b)] / (count * scale[a] * scale[b]));
-    let found = of(&sum, count);
-    // Independent cells: windows share 2.25 of them.
-    let independent = count / 2.25;
+    let found = training.correlations(&training.scales());
+    let independent = training.independent();
     let pairs = (rx * (rx - 1) / 2) as f64;
     let total: f64 = (0..rx).flat_map(|a| (0..a).map(move |b| (a, b))).map(|(a, b)| found[(a, b)].norm_sqr()).sum();
     let p_value = chi2_tail(2.0 * independent * total, 2.0 * pairs);
-    let rho = (total / pairs).sqrt();
+    // Of what is found, chance has its share.
+    let rho = (total / pairs - 1.0 / independent).max(0.0).sqrt();
     // Far below a hundredth it is nobody's business, and strangers' tails begin to count.
     if p_value > 1e-3 || rho < 0.005 {
         return None;
@@ -243,15 +282,14 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     if !is_everywhere(evidence, bins, &found) {
         return None;
     }
-    let (sum, held) = covariance(&evidence.split.held_out);
-    let held_found = of(&sum, held.max(1.0));
-    let inverse = found.clone().try_inverse()?;
-    let determinant = found.determinant().re;
-    if determinant <= 0.0 {
-        return None;
-    }
-    let trace: f64 = (0..rx).map(|a| held_found[(a, a)].re).sum();
-    let gain = held / 2.25 * (trace - (&inverse * &held_found).trace().re - determinant.ln());
+    // Few held-out frames say little of so many numbers: every frame is foretold by those of the other folds.
+    let gain: f64 = (0..FOLDS)
+        .map(|fold| {
+            let rest = sum(&mut (0..of_frames.len()).filter(|frame| frame % FOLDS != fold));
+            let fold = sum(&mut (0..of_frames.len()).filter(|frame| frame % FOLDS == fold));
+            rest.gain(&fold).unwrap_or(f64::NEG_INFINITY)
+        })
+        .sum();
     let error = (2.0 * independent * pairs).sqrt().recip() + 0.02 * rho;
     let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
     Some(Candidate {

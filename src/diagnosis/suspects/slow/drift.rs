@@ -1,10 +1,9 @@
 //! What changes from frame to frame: a slow drift, or a step with a date.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::field::{Field, Part, Series};
-use crate::diagnosis::statistics;
+use crate::diagnosis::statistics::{self, fisher_tail};
 
 /// How the mean of a frame depends on its time.
 #[derive(Clone, Debug, PartialEq)]
@@ -217,9 +216,4 @@ impl Slow {
         let apart = DVector::from_fn(DEGREE, |power, _| self.coefficients[power] - other[power]);
         (&self.information * &apart).dot(&apart)
     }
-}
-
-/// Probability that a ratio of variances exceeds this.
-fn fisher_tail(ratio: f64, above: f64, below: f64) -> f64 {
-    if ratio <= 0.0 { 1.0 } else { FisherSnedecor::new(above, below).map_or(1.0, |law| law.sf(ratio)) }
 }

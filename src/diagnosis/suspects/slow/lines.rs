@@ -21,6 +21,8 @@ pub struct Line {
     pub tried: f64,
     pub frequency_deviation_hz: f64,
     pub amplitude_deviation: f64,
+    /// Of the spectra at its frequency, over the noise; the gains and deviations count it.
+    pub background: f64,
     /// Degrees of freedom of the background that the gains are in units of; none where it is the noise's, which is known.
     pub freedom: Option<f64>,
 }
@@ -32,7 +34,7 @@ const HARMONIC_GAIN: f64 = 10.0;
 /// Aliases that explain only so much less (nats) cannot be told apart.
 const ALIAS_GAIN: f64 = 4.6;
 /// A background above this many times the noise is more than noise.
-const LOUD: f64 = 1.5;
+pub const LOUD: f64 = 1.5;
 /// What moves besides is not white: it shifts a line by such a share of a resolution cell.
 const COLOURED: f64 = 0.02;
 /// Points per resolution cell of a frame's own spectrum.
@@ -173,6 +175,7 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
             0.5 / duration_s
         },
         amplitude_deviation: (2.0 / total).sqrt(),
+        background: 1.0,
         freedom: None,
     };
     // What leaks from movers is no line: it raises the spectra of single frames at that frequency.
@@ -184,6 +187,7 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
     if slow || background > LOUD {
         line.freedom = Some((2 * frames.len()).saturating_sub(2 * harmonics + 1).max(1) as f64);
     }
+    line.background = background;
     line.training_gain /= background;
     line.frequency_deviation_hz = (line.frequency_deviation_hz * background.sqrt()).hypot(COLOURED / duration_s);
     line.amplitude_deviation *= background.sqrt();

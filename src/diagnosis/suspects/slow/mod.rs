@@ -34,6 +34,8 @@ const LEAST_GAIN: f64 = 3.0;
 const NEARLY: f64 = 0.8;
 /// Difference of gains (nats) that decides nothing.
 const UNDECIDED: f64 = 4.6;
+/// p-value below which a law that a background makes unsure is sure.
+const SURE: f64 = 1e-3;
 /// p-value below which a candidate is passed on.
 const PASSED_ON: f64 = 0.01;
 
@@ -42,11 +44,15 @@ struct Found {
     candidate: Candidate,
     /// Of a line on a background that is hardly known: its degrees of freedom, and the p-value that this leaves.
     unsure: Option<(f64, f64)>,
+    /// Gain over the noise alone, where it is sure.
+    explained: f64,
+    /// Of a line with more than noise beside it.
+    loud: bool,
 }
 
 impl From<Candidate> for Found {
     fn from(candidate: Candidate) -> Self {
-        Self { candidate, unsure: None }
+        Self { explained: candidate.gain, candidate, unsure: None, loud: false }
     }
 }
 
@@ -77,7 +83,10 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             let p_value = |freedom| (-lines::unsure(line.training_gain, freedom)).exp();
             let unsure = |freedom| (freedom, statistics::corrected(p_value(freedom), line.tried * LOOKS));
             let candidate = candidates::of_line(evidence, &field, part, &line);
-            found.push(Found { candidate, unsure: line.freedom.map(unsure) });
+            let unsure = line.freedom.map(unsure);
+            let sure = unsure.is_none_or(|(_, p_value)| p_value < SURE);
+            let explained = if sure { line.background * candidate.gain } else { candidate.gain };
+            found.push(Found { explained, candidate, unsure, loud: line.background > lines::LOUD });
         }
         if part == Part::Boresight {
             continue;
@@ -105,18 +114,24 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         list.retain(|Found { candidate: c, .. }| c.p_value < PASSED_ON && c.gain > LEAST_GAIN && !known(c));
     }
     // One cause shows in several looks. A law of few parameters wins where it explains nearly as much as what is free in
-    // every chirp, and a name where it explains nearly as much as what has none.
-    let most = |of: &[Found]| of.iter().map(|found| found.candidate.gain).fold(0.0, f64::max);
+    // every chirp (over the noise alone: a background that makes a law unsure is part of what is free in every chirp), and a name
+    // where it explains nearly as much as what has none.
+    let most = |of: &[Found]| of.iter().map(|found| found.explained).fold(0.0, f64::max);
     if found.is_empty() || most(&found) < NEARLY * most(&free) {
         found.append(&mut free);
     }
     // Of another kind it wins only where the recording cannot tell.
-    let named = found.iter().map(|found| &found.candidate).filter(|candidate| candidate.id.is_some());
-    let names: Vec<(&str, f64)> = named.map(|candidate| (candidate.behaves_like, candidate.gain)).collect();
-    let taken = |c: &Candidate| {
-        names.iter().any(|(like, gain)| (*like == c.behaves_like && *gain > NEARLY * c.gain) || *gain > c.gain - UNDECIDED)
+    let named = found.iter().filter(|found| found.candidate.id.is_some());
+    let names: Vec<(&str, f64)> = named.map(|found| (found.candidate.behaves_like, found.explained)).collect();
+    // A law without a name must fit to the noise where one with a name explains nearly as much: how strong static returns turn
+    // when the radar itself moves depends on where they are, which is known roughly.
+    let explained = names.iter().map(|name| name.1).fold(0.0, f64::max);
+    found.retain(|found| found.candidate.id.is_some() || !found.loud || explained < NEARLY * found.explained);
+    let taken = |other: &Found| {
+        let like_it = |like: &str, gain: f64| like == other.candidate.behaves_like && gain > NEARLY * other.explained;
+        names.iter().any(|&(like, gain)| like_it(like, gain) || gain > other.explained - UNDECIDED)
     };
-    found.retain(|Found { candidate, .. }| candidate.id.is_some() || !taken(candidate));
+    found.retain(|found| found.candidate.id.is_some() || !taken(found));
     found.sort_by(|a, b| b.candidate.gain.total_cmp(&a.candidate.gain));
     let rivals: Vec<(Option<&'static str>, f64)> = found.iter().map(|found| (found.candidate.id, found.candidate.gain)).collect();
     for Found { candidate, .. } in &mut found {
@@ -131,9 +146,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         }
     }
     // Only now: what a line explains best is no better explained by something else because the line is unsure.
-    let judged = |Found { mut candidate, unsure }| {
+    let judged = |Found { mut candidate, unsure, .. }| {
         if let Some((freedom, p_value)) = unsure {
-            candidate.gain = lines::unsure(candidate.gain, freedom);
+            if p_value > SURE {
+                candidate.gain = lines::unsure(candidate.gain, freedom);
+            }
             candidate.p_value = p_value;
         }
         candidate
