@@ -216,9 +216,12 @@ fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
         && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
     let by_chirp = is_by_chirp(accepted) && is_path(candidate);
     // How much the returns of each range turn when the radar moves is known roughly: sidebands are left of them.
-    let shaken = accepted.id == Some("radar_vibration") && is_path(candidate);
-    let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside || shaken;
-    roughly && candidate.gain < ROUGHLY * accepted.gain || by_chirp && candidate.gain < SLIGHTLY * accepted.gain
+    let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
+    let shaken = accepted.id == Some("radar_vibration") && (turns || is_path(candidate));
+    let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
+    roughly && candidate.gain < ROUGHLY * accepted.gain
+        || shaken && candidate.gain < SHAKEN * accepted.gain
+        || by_chirp && candidate.gain < SLIGHTLY * accepted.gain
 }
 
 /// What acts on every return makes echoes of the body too, which look like paths of their own: where both are suspected,
