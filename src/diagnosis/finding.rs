@@ -154,15 +154,21 @@ impl Candidate {
 
     /// As the simulator takes it; `None` for what has no name, and for what its operator cannot be told.
     ///
-    /// `reference`: the recording's peak sample, to which levels are relative.
-    pub fn setting(&self, reference: f64, radar: &Radar) -> Option<EffectSetting> {
+    /// `reference`: the recording's peak sample, to which levels are relative; `body_rms`: of the body's moving return, to which
+    /// amplitudes of reflectors are.
+    pub fn setting(&self, reference: f64, body_rms: f64, radar: &Radar) -> Option<EffectSetting> {
         let info = effects::info(self.id?)?;
         let choice = self.choice.clone().or(self.place.boundary.clone()).or(self.place.body_part.clone());
         let mut setting = EffectSetting { id: info.id.into(), enabled: true, parameters: BTreeMap::new(), choice };
         for estimate in &self.estimates {
             let Some(parameter) = info.parameters.iter().find(|parameter| parameter.name == estimate.name) else { continue };
-            // Offsets are found in the recording's codes.
-            let unit = if parameter.unit == "of the reference" && info.id == "dc_offset" { reference } else { 1.0 };
+            let unit = match parameter.unit {
+                // Offsets are found in the recording's codes.
+                "of the reference" if info.id == "dc_offset" => reference,
+                // Amplitudes of reflectors as they arrive, and the simulator wants them at one metre.
+                "recording's unit·m²" => 1.0 / (body_rms * self.range_m(radar)?.powi(2)).max(f64::MIN_POSITIVE),
+                _ => 1.0,
+            };
             let within = |value: &f64| {
                 let value = value / unit;
                 if parameter.is_relative() { value } else { value.clamp(parameter.least, parameter.most) }
@@ -179,6 +185,15 @@ impl Candidate {
             setting.parameters.insert("reference".into(), vec![reference]);
         }
         setting.check("effect").is_ok().then_some(setting)
+    }
+}
+
+impl Candidate {
+    /// Of a thing that has a place.
+    fn range_m(&self, radar: &Radar) -> Option<f64> {
+        let centre = radar.centre_m();
+        let of = |at: [f64; 3]| (0..3).map(|axis| (at[axis] - centre[axis]).powi(2)).sum::<f64>().sqrt();
+        self.place.position_m.map(of).or(self.place.range_m.map(|[near, far]| 0.5 * (near + far)))
     }
 }
 

@@ -12,6 +12,7 @@ use super::report::{
     probability_of_nothing,
 };
 use super::select::{Explanation, explain};
+use super::suspects::paths::body_rms;
 use crate::data::Recording;
 use crate::effects::EffectSetting;
 use crate::error::{Error, Result};
@@ -39,11 +40,8 @@ impl Diagnosis {
         let Some(explanation) = &self.explanation else { return vec![] };
         // Levels are relative to the signal without what was added to it.
         let reference = explanation.evidence.peak();
-        explanation
-            .accepted
-            .iter()
-            .filter_map(|effect| effect.candidate.setting(reference, &explanation.evidence.radar))
-            .collect()
+        let (radar, body_rms) = (&explanation.evidence.radar, body_rms(&explanation.evidence).unwrap_or(reference));
+        explanation.accepted.iter().filter_map(|effect| effect.candidate.setting(reference, body_rms, radar)).collect()
     }
 }
 

@@ -133,6 +133,11 @@ fn candidate(
         skin.iter().map(|lobes| lobes.iter().zip(&found.weights).map(|(lobe, weight)| weight * total(lobe)).sum::<f64>()).sum();
     let level = (body_power / skin.len() as f64 * noise / samples).sqrt();
     let relative = amplitude / level.max(f64::MIN_POSITIVE);
+    let middles = body.centres.iter().map(|centres| {
+        let Centre { position_m, velocity_mps } = centres[found.part];
+        range_and_velocity(&evidence.radar, position_m, velocity_mps)
+    });
+    let place = Place::spanning("scene", middles);
     let power: f64 = (0..skin.len()).map(|frame| weight * total(&point(evidence, model, body, found.part, frame))).sum();
     let beside = if others.is_empty() {
         String::new()
@@ -144,7 +149,7 @@ fn candidate(
         behaves_like: "return of one part of the body",
         estimates: vec![Estimate::normal("amplitude", relative, LEVEL_ERROR * relative)],
         choice: None,
-        place: Place { body_part: Some(name.into()), ..Place::at("scene") },
+        place: Place { body_part: Some(name.into()), ..place },
         p_value: 1.0,
         gain: 0.0,
         rung: Rung::B,

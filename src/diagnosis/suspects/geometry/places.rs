@@ -273,7 +273,7 @@ mod tests {
             assert!(low <= offset && offset <= high, "{:?}", found.estimates);
         }
         // As the simulator takes them: of every antenna, along all axes.
-        let setting = found.setting(1.0, &evidence.radar).expect("no setting");
+        let setting = found.setting(1.0, 1.0, &evidence.radar).expect("no setting");
         let values = &setting.parameters["offset_m"];
         assert!(values.len() == 3 * (1 + RECEIVERS) && values[6] == found.estimates[0].values[1], "{values:?}");
         for seed in 2..12 {

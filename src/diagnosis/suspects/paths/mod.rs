@@ -24,6 +24,7 @@ use crate::diagnosis::{Candidate, Evidence};
 use scene::Scene;
 pub use scene::still_power;
 pub use steering::{beam, sines, steering};
+pub use still_point::body_rms;
 
 /// A ghost must predict at least this share of the held-out frames that show it.
 const AGREEING: f64 = 0.6;

@@ -237,7 +237,7 @@ fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candi
 }
 
 /// Root mean square of what moves, in a channel's samples, without the noise.
-fn body_rms(evidence: &Evidence) -> Option<f64> {
+pub fn body_rms(evidence: &Evidence) -> Option<f64> {
     evidence.body.as_ref()?;
     let samples = evidence.cube.dims[4];
     let (mut sum, mut noise) = (0.0, 0.0);

@@ -34,6 +34,8 @@ const LEAST_GAIN: f64 = 3.0;
 const NEARLY: f64 = 0.8;
 /// Difference of gains (nats) that decides nothing.
 const UNDECIDED: f64 = 4.6;
+/// Turns of a line in a frame that tell it from a drift.
+const TELLING_TURNS: f64 = 0.2;
 /// p-value below which a law that a background makes unsure is sure.
 const SURE: f64 = 1e-3;
 /// p-value below which a candidate is passed on.
@@ -44,15 +46,17 @@ struct Found {
     candidate: Candidate,
     /// Of a line on a background that is hardly known: its degrees of freedom, and the p-value that this leaves.
     unsure: Option<(f64, f64)>,
-    /// Gain over the noise alone, where it is sure.
+    /// Gain over the noise alone, where that is sure.
     explained: f64,
     /// Of a line with more than noise beside it.
     loud: bool,
+    /// Whether a frame sees so much of a line's turn that it cannot be taken for a drift from frame to frame.
+    within_frames: bool,
 }
 
 impl From<Candidate> for Found {
     fn from(candidate: Candidate) -> Self {
-        Self { explained: candidate.gain, candidate, unsure: None, loud: false }
+        Self { explained: candidate.gain, candidate, unsure: None, loud: false, within_frames: true }
     }
 }
 
@@ -64,6 +68,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         return found.into_iter().filter(|c| c.p_value < PASSED_ON && c.gain > LEAST_GAIN && !known(c)).collect();
     };
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
+    let frame_s = evidence.radar.frame_duration_s();
     // Of a few parameters, and those that are free in every chirp.
     let (mut found, mut free): (Vec<Found>, Vec<Found>) = (vec![], vec![]);
     for part in [Part::Gain, Part::Phase, Part::Delay, Part::Boresight] {
@@ -85,8 +90,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             let candidate = candidates::of_line(evidence, &field, part, &line);
             let unsure = line.freedom.map(unsure);
             let sure = unsure.is_none_or(|(_, p_value)| p_value < SURE);
-            let explained = if sure { line.background * candidate.gain } else { candidate.gain };
-            found.push(Found { explained, candidate, unsure, loud: line.background > lines::LOUD });
+            let within_frames = line.frequency_hz * frame_s > TELLING_TURNS;
+            let explained = if sure && within_frames { line.background * candidate.gain } else { candidate.gain };
+            found.push(Found { explained, candidate, unsure, loud: line.background > lines::LOUD, within_frames });
         }
         if part == Part::Boresight {
             continue;
@@ -122,14 +128,18 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     // Of another kind it wins only where the recording cannot tell.
     let named = found.iter().filter(|found| found.candidate.id.is_some());
-    let names: Vec<(&str, f64)> = named.map(|found| (found.candidate.behaves_like, found.explained)).collect();
+    let names: Vec<(&str, f64, bool)> =
+        named.map(|found| (found.candidate.behaves_like, found.explained, found.loud && found.within_frames)).collect();
     // A law without a name must fit to the noise where one with a name explains nearly as much: how strong static returns turn
     // when the radar itself moves depends on where they are, which is known roughly.
     let explained = names.iter().map(|name| name.1).fold(0.0, f64::max);
     found.retain(|found| found.candidate.id.is_some() || !found.loud || explained < NEARLY * found.explained);
     let taken = |other: &Found| {
         let like_it = |like: &str, gain: f64| like == other.candidate.behaves_like && gain > NEARLY * other.explained;
-        names.iter().any(|&(like, gain)| like_it(like, gain) || gain > other.explained - UNDECIDED)
+        // Where it leaves much itself it must explain clearly more.
+        let more =
+            |gain: f64, loud: bool| if loud { NEARLY * gain > other.explained } else { gain > other.explained - UNDECIDED };
+        names.iter().any(|&(like, gain, loud)| like_it(like, gain) || more(gain, loud))
     };
     found.retain(|found| found.candidate.id.is_some() || !taken(found));
     found.sort_by(|a, b| b.candidate.gain.total_cmp(&a.candidate.gain));
@@ -146,9 +156,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         }
     }
     // Only now: what a line explains best is no better explained by something else because the line is unsure.
-    let judged = |Found { mut candidate, unsure, .. }| {
+    let judged = |Found { mut candidate, unsure, within_frames, .. }| {
         if let Some((freedom, p_value)) = unsure {
-            if p_value > SURE {
+            if p_value > SURE || !within_frames {
                 candidate.gain = lines::unsure(candidate.gain, freedom);
             }
             candidate.p_value = p_value;
