@@ -134,7 +134,7 @@ pub struct Candidate {
 
 impl Candidate {
     /// Without its name where all the numbers that it gives may as well be those at which the effect does nothing: something is
-    /// there, but not surely this.
+    /// there, but not surely this. For suspects whose p-value says that something is there, and not that these numbers are.
     pub fn named_if_sure(self) -> Self {
         let Some(info) = self.id.and_then(effects::info) else { return self };
         let (mut square, mut freedom) = (0.0, 0.0);

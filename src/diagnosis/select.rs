@@ -255,7 +255,7 @@ fn suspicions(evidence: &Evidence) -> Vec<(usize, Candidate)> {
     // The shared products first, so that suspects do not wait for one another.
     evidence.maps();
     let ask = |(index, suspect): (usize, &Suspect)| -> Vec<(usize, Candidate)> {
-        (suspect.find)(evidence).into_iter().map(|candidate| (index, candidate.named_if_sure())).collect()
+        (suspect.find)(evidence).into_iter().map(|candidate| (index, candidate)).collect()
     };
     SUSPECTS.par_iter().enumerate().flat_map_iter(ask).collect()
 }
@@ -338,7 +338,7 @@ fn again(
             && candidate.choice == effect.candidate.choice
             && thresholds.passes(effect.suspect, candidate)
     };
-    let found = (SUSPECTS[effect.suspect].find)(&evidence).into_iter().map(Candidate::named_if_sure).filter(same);
+    let found = (SUSPECTS[effect.suspect].find)(&evidence).into_iter().filter(same);
     found.max_by(|a, b| a.gain.total_cmp(&b.gain))
 }
 

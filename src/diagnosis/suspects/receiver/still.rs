@@ -64,7 +64,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         return vec![found.candidate.clone()];
     }
     if explained >= ENOUGH * free_gain {
-        return (0..elements.len()).filter_map(|index| candidate(evidence, &field, &images, &elements, &fitted, index)).collect();
+        // The field is sure; what an element's numbers are is another question.
+        let found = (0..elements.len()).filter_map(|index| candidate(evidence, &field, &images, &elements, &fitted, index));
+        return found.map(Candidate::named_if_sure).collect();
     }
     if free_gain < 20.0 || bent {
         return vec![];
