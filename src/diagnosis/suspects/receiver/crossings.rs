@@ -355,7 +355,7 @@ mod tests {
     use crate::diagnosis::cube::Loaded;
     use crate::radar::Radar;
 
-    const CHIRPS: [(usize, usize); 4] = [(1, 9), (4, 20), (5, 3), (10, 27)];
+    const CHIRPS: [(usize, usize); 4] = [(1, 9), (4, 20), (5, 3), (10, 15)];
 
     /// Noise of four receivers and a thing that moves; `added`: to a receiver's sample of the chirps that are hit, so many after
     /// the fortieth.
