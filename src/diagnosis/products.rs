@@ -54,17 +54,20 @@ pub struct Law {
     /// Of κ, complex.
     pub scatter: f64,
     pub p_value: f64,
-    /// Of held-out frames.
+    /// Of frames that the others foretell, all in turn.
     pub gain: f64,
     pub peak: f64,
 }
 
 /// A magnitude squared at least this large beside a square makes it no harmonic.
 const BESIDE: f64 = 0.3;
-/// Least gain on held-out frames for it, nats.
+/// Least gain on other frames for it, nats.
 const LEAST_GAIN: f64 = 20.0;
 /// Chance below which it is there.
 const SURELY: f64 = 1e-6;
+
+/// Parts of the frames, each of which is foretold by the others.
+const FOLDS: usize = 4;
 
 const PRODUCTS: [Product; 3] = [Product::Square, Product::Magnitude, Product::Cube];
 
@@ -88,7 +91,7 @@ impl Products {
         let sums: Vec<[Sums; 3]> = frames.into_par_iter().map(|frame| of_frame(evidence, frame, &empty, peak)).collect();
         let [square, magnitude, cube] = std::array::from_fn(|index| {
             let of_product: Vec<Sums> = sums.iter().map(|sums| sums[index]).collect();
-            judged(evidence, PRODUCTS[index], &of_product, peak)
+            judged(PRODUCTS[index], &of_product, peak)
         });
         Self { square, magnitude, cube }
     }
@@ -108,8 +111,8 @@ impl Products {
     }
 }
 
-/// None where it is not to be expected, or held-out frames are worse with it. `sums`: by frame.
-fn judged(evidence: &Evidence, product: Product, sums: &[Sums], peak: f64) -> Option<Law> {
+/// None where it is not to be expected, or frames that it was not fitted to are worse with it. `sums`: by frame.
+fn judged(product: Product, sums: &[Sums], peak: f64) -> Option<Law> {
     let over = |frames: &[usize]| {
         frames.iter().fold(Sums::default(), |a, &frame| Sums {
             cross: a.cross + sums[frame].cross,
@@ -118,20 +121,27 @@ fn judged(evidence: &Evidence, product: Product, sums: &[Sums], peak: f64) -> Op
             cells: a.cells + sums[frame].cells,
         })
     };
-    let training = over(&evidence.split.training);
-    if training.template <= 0.0 {
+    let all: Vec<usize> = (0..sums.len()).collect();
+    let whole = over(&all);
+    if whole.template <= 0.0 {
         return None;
     }
-    let kappa = training.cross / training.template;
-    let rest = (training.found - kappa.norm_sqr() * training.template) / training.cells.max(1) as f64;
+    let kappa = whole.cross / whole.template;
+    let rest = (whole.found - kappa.norm_sqr() * whole.template) / whole.cells.max(1) as f64;
     // Windowed neighbours share their noise; other things in the cells count as more of it.
     let widening = 2.25 * rest.max(1.0);
-    let variance = widening / training.template;
+    let variance = widening / whole.template;
     // Frames must agree on it as well as the noise lets expect.
-    let scatter = jackknife(sums, &evidence.split.training).max(variance.sqrt());
+    let scatter = jackknife(sums, &all).max(variance.sqrt());
     let p_value = corrected(chi2_tail(2.0 * kappa.norm_sqr() / (scatter * scatter), 2.0), 2.0);
-    let held_out = over(&evidence.split.held_out);
-    let gain = (2.0 * (kappa.conj() * held_out.cross).re - kappa.norm_sqr() * held_out.template) / widening;
+    // Every frame is foretold by those of the other folds.
+    let of_fold = |fold: usize| {
+        let [rest, fold] = [false, true]
+            .map(|inside| over(&all.iter().copied().filter(|frame| (frame % FOLDS == fold) == inside).collect::<Vec<_>>()));
+        let kappa = rest.cross / rest.template.max(f64::MIN_POSITIVE);
+        (2.0 * (kappa.conj() * fold.cross).re - kappa.norm_sqr() * fold.template) / widening
+    };
+    let gain: f64 = (0..FOLDS).map(of_fold).sum();
     // A receiver that expands instead of compressing, or turns phases more than amplitudes, is none.
     let possible = gain > 0.0 && !(product == Product::Cube && kappa.re > 0.0);
     possible.then_some(Law { product, kappa, scatter, p_value, gain, peak })
@@ -183,10 +193,10 @@ impl Sums {
     }
 }
 
-fn jackknife(sums: &[Sums], training: &[usize]) -> f64 {
-    let all = training.iter().fold((Complex64::ZERO, 0.0), |a, &f| (a.0 + sums[f].cross, a.1 + sums[f].template));
-    let count = training.len() as f64;
-    let spread: f64 = training
+fn jackknife(sums: &[Sums], frames: &[usize]) -> f64 {
+    let all = frames.iter().fold((Complex64::ZERO, 0.0), |a, &f| (a.0 + sums[f].cross, a.1 + sums[f].template));
+    let count = frames.len() as f64;
+    let spread: f64 = frames
         .iter()
         .filter(|&&f| all.1 > sums[f].template)
         .map(|&f| ((all.0 - sums[f].cross) / (all.1 - sums[f].template) - all.0 / all.1).norm_sqr())

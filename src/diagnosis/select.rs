@@ -19,12 +19,16 @@ impl DiagnosisConfig {
         self.alarm * SUSPECTS[suspect].share / SUSPECTS.iter().map(|suspect| suspect.share).sum::<f64>()
     }
 
-    /// What has no name may be anything, so it must gain more.
+    /// What has no name may be anything, so it must gain more, unless chance cannot have made it.
     pub(super) fn passes(&self, suspect: usize, candidate: &Candidate) -> bool {
-        let least = if candidate.id.is_some() { self.gain } else { self.nameless_gain };
+        let sure = candidate.id.is_some() || candidate.p_value < NO_CHANCE;
+        let least = if sure { self.gain } else { self.nameless_gain };
         candidate.p_value <= self.p_value(suspect) && candidate.gain >= least && candidate.gain.is_finite()
     }
 }
+
+/// p-value below which what has no name needs no more than what has one.
+const NO_CHANCE: f64 = 1e-12;
 
 /// What has no name is modelled roughly, and these are modelled most roughly of all: what they leave, up to this share of
 /// their gain, takes any shape; and they come after whatever gains more than it.
@@ -42,9 +46,16 @@ const LIKE_EDGES: [&str; 4] = ["ramp_edge_transient", "if_highpass", "if_lowpass
 /// its gain (which counts what is left).
 const TURNS: [&str; 2] = ["slow-time phase", "delay-proportional phase"];
 const SHAKEN: f64 = 0.5;
+const FADING: &str = "slow-time gain";
 
 /// What is named even where products of the signal with itself lie everywhere.
 const WHATEVER_THE_SIGNAL: [&str; 2] = ["iq_imbalance", "adc_saturation"];
+
+/// What is cut out where it is plain, and goes on below the noise.
+const BURSTS: [&str; 2] = ["interference", "impulsive_noise"];
+
+/// What explains a little of anything that moves near the body: remains of a strong path that was taken out.
+const OF_REMAINS: [&str; 2] = ["body_multibounce", "carried_reflector"];
 
 /// Stages of the signal's chain at which everything that is received is changed.
 const UPSTREAM: [&str; 2] = ["waveform", "receiver"];
@@ -115,7 +126,12 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         // So they do where products were taken out roughly.
         let bent = |effect: &Accepted| effect.candidate.behaves_like == harmonic::QUADRATIC;
         let mixed = evidence.products().mixed().is_some() || accepted.iter().any(bent);
-        let passes = |(suspect, candidate): &&(usize, Candidate)| thresholds.passes(*suspect, candidate);
+        // What was taken out leaves remains that chance has not made either.
+        let first = accepted.is_empty();
+        let passes = |(suspect, candidate): &&(usize, Candidate)| {
+            let remains = !first && candidate.id.is_none() && candidate.gain < thresholds.nameless_gain;
+            thresholds.passes(*suspect, candidate) && !remains
+        };
         let ids = || found.iter().filter(passes).filter_map(|(_, candidate)| candidate.id).collect();
         let at_first: &Vec<&'static str> = at_first.get_or_insert_with(ids);
         let by_chirp = accepted.iter().any(|effect| is_by_chirp(&effect.candidate));
@@ -140,27 +156,35 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
             (suspect.last_in_chain, !suspect.last_resort, worth)
         };
         let strongest = passing.iter().max_by(|a, b| order(a).partial_cmp(&order(b)).expect("gains are finite"));
-        let Some((suspect, best)) = strongest.map(|best| upstream(&original, evidence, best, &passing)) else {
+        let Some(strongest) = strongest.map(|best| upstream(&original, evidence, best, &passing)) else {
             break;
         };
+        let (suspect, best) = strongest;
         if accepted.len() == thresholds.most {
             break;
         }
-        let next = evidence.with(best);
-        let after = Misfit::after(&original, &next);
+        let mut best = best.clone();
+        let mut next = evidence.with(&best);
+        let mut after = Misfit::after(&original, &next);
         if let Some(id) = best.id
             && after.db_mse > FAR_WORSE * misfit.db_mse
         {
-            refused.push(id);
-            heard = Some(found);
-            continue;
+            if !SUSPECTS[*suspect].last_in_chain {
+                refused.push(id);
+                heard = Some(found);
+                continue;
+            }
+            // What the codes themselves show is there, even where it cannot be undone.
+            best.correction = Correction::None;
+            next = evidence.with(&best);
+            after = misfit;
         }
         progress(&best.statement);
-        pending = passing.iter().map(|(_, other)| other.clone()).filter(|other| !std::ptr::eq(other, best)).collect();
+        pending = passing.iter().filter(|other| !std::ptr::eq(**other, strongest)).map(|(_, other)| other.clone()).collect();
         accepted.push(Accepted {
             suspect: *suspect,
-            candidate: best.clone(),
             rivals: best.look_alikes.clone(),
+            candidate: best,
             probability: 1.0,
             before: misfit,
             after,
@@ -208,18 +232,27 @@ fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let is_path = |candidate: &Candidate| {
         candidate.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_none_or(|id| paths::MANY.contains(&id))
     };
+    let is_of_paths = |candidate: &Candidate| is_path(candidate) || candidate.id.is_some_and(|id| OF_REMAINS.contains(&id));
     // An image of the body is all over the place: what else is there is something else.
     let beside = is_path(accepted)
-        && is_path(candidate)
+        && is_of_paths(candidate)
         && accepted.place.boundary.is_none()
         && !apart(accepted.place.range_m, candidate.place.range_m)
         && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
     let by_chirp = is_by_chirp(accepted) && is_path(candidate);
-    // How much the returns of each range turn when the radar moves is known roughly: sidebands are left of them.
+    // How much the returns of each range turn when the radar moves is known roughly: sidebands are left of them, which do not
+    // swing in range; and large turns change how much is received.
+    let vibrates = accepted.id == Some("radar_vibration");
     let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
-    let shaken = accepted.id == Some("radar_vibration") && (turns || is_path(candidate));
+    let swings =
+        candidate.estimates.iter().any(|estimate| estimate.name == "rate_hz") && candidate.gain > SLIGHTLY * accepted.gain;
+    let shaken = vibrates && (turns || is_path(candidate) && !swings);
+    let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
-    roughly && candidate.gain < ROUGHLY * accepted.gain
+    // What bursts leave below the noise of single samples is in all receivers at once.
+    let bursts = accepted.id.is_some_and(|id| BURSTS.contains(&id)) && candidate.id == Some("correlated_noise");
+    (roughly || fades) && candidate.gain < ROUGHLY * accepted.gain
+        || bursts && candidate.gain < accepted.gain
         || shaken && candidate.gain < SHAKEN * accepted.gain
         || by_chirp && candidate.gain < SLIGHTLY * accepted.gain
 }
@@ -331,7 +364,10 @@ fn again(
     thresholds: &DiagnosisConfig,
 ) -> Option<Candidate> {
     let effect = &accepted[index];
-    let others = accepted.iter().enumerate().filter(|(other, _)| *other != index && !without.contains(other));
+    // An image or a product of what the antennas do otherwise is that of the signal with it: what is in the receiver is undone first.
+    let before = |other: &Accepted| effect.candidate.place.stage == "receiver" && other.candidate.place.stage == "antenna";
+    let stands = |(other, accepted): &(usize, &Accepted)| *other != index && !without.contains(other) && !before(accepted);
+    let others = accepted.iter().enumerate().filter(stands);
     let evidence = others.fold(original.clone(), |evidence, (_, effect)| evidence.with(&effect.candidate));
     let same = |candidate: &Candidate| {
         candidate.id == effect.candidate.id

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::Suspect;
+use super::{Suspect, paths};
 use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::power::{LOBES, PowerModel, Template, fit_weights, log_likelihood, sum};
 use crate::diagnosis::prediction::{Centre, range_and_velocity};
@@ -14,6 +14,8 @@ use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence
 
 /// Power over that of the part's own skin, dB, from which on it is no skin.
 const LEAST_DB: f64 = 8.0;
+/// Share of the whole body's power that a part's skin counts as at least.
+const LEAST_SHARE: f64 = 0.01;
 /// Parts of one body differ: their log-likelihood ratios scatter by so much more than those of one reflectivity.
 const UNEVEN: f64 = 2.0;
 /// Standard deviation of the amplitude, as a share: a level that other parts tell.
@@ -37,7 +39,9 @@ struct Found {
 fn find(evidence: &Evidence) -> Vec<Candidate> {
     let (Some(model), Some(body)) = (evidence.power(), evidence.body.as_ref()) else { return vec![] };
     let parts = body.parts.len();
-    if parts < 2 || body.centres.len() != body.frames.len() || evidence.accepted.contains(&"carried_reflector") {
+    // Remains of paths that were taken out are near the body, too.
+    let remains = paths::LEAVE_REMAINS.iter().any(|id| evidence.accepted.contains(id));
+    if parts < 2 || remains || body.centres.len() != body.frames.len() || evidence.accepted.contains(&"carried_reflector") {
         return vec![];
     }
     let skin: Vec<Vec<Template>> = (0..body.frames.len()).into_par_iter().map(|frame| skin(model, frame)).collect();
@@ -52,7 +56,8 @@ fn find(evidence: &Evidence) -> Vec<Candidate> {
         let of_skin = |lobes: &Vec<Template>| -> f64 {
             lobes[part * LOBES.len()..(part + 1) * LOBES.len()].iter().zip(&with).map(|(lobe, weight)| weight * total(lobe)).sum()
         };
-        let own: f64 = model.lobes.iter().map(of_skin).sum();
+        // Skin that is hardly seen would make anything look strong.
+        let own = model.lobes.iter().map(of_skin).sum::<f64>().max(LEAST_SHARE * of_body(&skin, &with));
         let over_skin_db = 10.0 * (strength / own.max(f64::MIN_POSITIVE)).max(1e-30).log10();
         Found { part, training: gained[0] - alone[0], held_out: gained[1] - alone[1], weights: with, over_skin_db }
     };
@@ -101,6 +106,11 @@ fn total(template: &Template) -> f64 {
     template.power.iter().map(|&power| f64::from(power)).sum()
 }
 
+/// Power of all skin in all frames.
+fn of_body(skin: &[Vec<Template>], weights: &[f64]) -> f64 {
+    skin.iter().flat_map(|lobes| lobes.iter().zip(weights)).map(|(lobe, weight)| weight * total(lobe)).sum()
+}
+
 /// Weights that training frames make most likely, and the log-likelihoods of training and held-out frames.
 fn fitted(evidence: &Evidence, model: &PowerModel, templates: &[Vec<Template>]) -> (Vec<f64>, [f64; 2]) {
     let (maps, size, usable) = (evidence.maps(), model.size(), model.usable());
@@ -129,9 +139,7 @@ fn candidate(
     let start_m = range_and_velocity(&evidence.radar, body.centres[0][found.part].position_m, [0.0; 3]).0.max(0.1);
     // From the peak after two Hann windows to a sample; the body's level is that of all its skin.
     let amplitude = (weight * start_m.powi(-4) * 2.25 * noise / samples).sqrt();
-    let body_power: f64 =
-        skin.iter().map(|lobes| lobes.iter().zip(&found.weights).map(|(lobe, weight)| weight * total(lobe)).sum::<f64>()).sum();
-    let level = (body_power / skin.len() as f64 * noise / samples).sqrt();
+    let level = (of_body(skin, &found.weights) / skin.len() as f64 * noise / samples).sqrt();
     let relative = amplitude / level.max(f64::MIN_POSITIVE);
     let middles = body.centres.iter().map(|centres| {
         let Centre { position_m, velocity_mps } = centres[found.part];

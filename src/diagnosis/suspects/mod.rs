@@ -23,7 +23,7 @@ pub struct Suspect {
     /// is there needs little; what errors of the mesh blur needs more.
     pub share: f64,
     pub find: fn(&Evidence) -> Vec<Candidate>,
-    /// Looks at the codes as the converter gave them: what is corrected comes after it and takes nothing back.
+    /// Looks at the codes as they were recorded: what is corrected happened before and takes nothing back.
     pub last_in_chain: bool,
     /// Is heard only where nobody else has anything to say.
     pub last_resort: bool,
@@ -49,6 +49,8 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect::new("slow time", slow::find),
     Suspect::new("one channel", slow::channels::find),
     Suspect::new("single frame", slow::odd_frame::find),
+    Suspect { last_in_chain: true, ..Suspect::new("slipped samples", slow::slip::find) },
+    Suspect { last_in_chain: true, ..Suspect::new("repeated frames", slow::repeated::find) },
     Suspect { last_in_chain: true, ..Suspect::new("converter's codes", codes::find) },
     Suspect::new("chirp", waveform::find),
     Suspect::new("vital signs", vital::find),

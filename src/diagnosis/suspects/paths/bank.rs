@@ -21,7 +21,7 @@ const SWINGS: (f64, f64, usize) = (0.02, 1.25, 13);
 /// Fewest and most phases that are tried.
 const PHASES: (f64, f64) = (8.0, 48.0);
 /// Doppler bins that a swing must move by.
-const LEAST_BINS: f64 = 0.4;
+pub const LEAST_BINS: f64 = 0.4;
 /// Between two laws of the bank there are so many that differ.
 const BETWEEN: f64 = 16.0;
 /// Laws of every rate that are fitted, and of all that are fitted exactly.

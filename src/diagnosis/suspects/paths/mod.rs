@@ -55,8 +55,8 @@ pub const OVER_THE_BODY: &str = "path-like, over the body";
 pub const MANY: [&str; 3] = ["wall_ghost", "floor_bounce", "moving_reflector"];
 
 /// What leaves remains when it is taken out that no single frame shows and that move by a law: how the body is seen otherwise or
-/// again, and things that move themselves.
-const LEAVE_REMAINS: [&str; 7] = [
+/// again, things that move themselves, and a receiver in which all these change one another.
+pub const LEAVE_REMAINS: [&str; 8] = [
     "wall_ghost",
     "floor_bounce",
     "body_multibounce",
@@ -64,6 +64,7 @@ const LEAVE_REMAINS: [&str; 7] = [
     "soft_occlusion",
     "moving_reflector",
     "range_alias",
+    "compression",
 ];
 
 /// Mirror images of the body at the room's boundaries, and movers that are none.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::bank::{Gains, LEVELS, Swing, Table, around, climb, widths};
+use super::bank::{Gains, LEAST_BINS, LEVELS, Swing, Table, around, climb, widths};
 use super::beams::{Beams, Look};
 use super::mover::{Mover, WIDEST_SWING_M, middle_s};
 use super::pendulum::{Law, Pendulum, at};
@@ -133,8 +133,10 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
     ground.beams.prepare(&split.held_out);
     let again = ground.gain(best, &split.held_out);
     let deviations = ground.deviations(best, gain, &every[..count], middle_s(scene, every[count - 1]) - start_s);
-    // What may as well not swing at all only flickers.
-    if DEVIATIONS * deviations[1] > best.law[1].hypot(best.law[2]) {
+    // What may as well not swing at all, or is always in the cell of what stands still, only flickers.
+    let swing_m = best.law[1].hypot(best.law[2]);
+    let bins = TAU * best.law[3] * swing_m * scene.model.cells.doppler_per_mps;
+    if DEVIATIONS * deviations[1] > swing_m || bins.max(swing_m * scene.model.cells.bins_per_m) < LEAST_BINS {
         return None;
     }
     let named = !ground.moves_with_the_body(best);

@@ -10,6 +10,9 @@ use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::products::{Law, Product};
 use crate::diagnosis::{Cube, Evidence, denoised};
 
+/// Steps by which a distortion is undone: each leaves a part of the last in proportion to how strong the distortion is.
+const STEPS: usize = 6;
+
 pub const QUADRATIC: &str = "quadratic in the signal";
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -92,9 +95,8 @@ fn nonlinear(evidence: &Evidence, behaves_like: &'static str, laws: Vec<Law>, st
             cube.each_chirp(|_, chirp| {
                 chirp.iter_mut().for_each(|value| {
                     let found = *value;
-                    // The distortion of the undistorted signal: two steps are enough for what is small.
-                    let first = found - distortion(found);
-                    *value = found - distortion(first);
+                    // The distortion of the undistorted signal.
+                    *value = (0..STEPS).fold(found, |value, _| found - distortion(value));
                 });
             });
         })),

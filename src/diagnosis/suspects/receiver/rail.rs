@@ -7,12 +7,16 @@ use rayon::prelude::*;
 
 use super::declip::Declip;
 use super::image::empty_bins;
+use crate::diagnosis::evidence::spectrum;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::{Cube, Evidence, denoised};
 
 /// Fewest components at the rail.
 const FEWEST: usize = 8;
+/// Bins around zero beat frequency that a leakage fills, where its power is more than this share of the strongest return's.
+const BOARD_BINS: usize = 8;
+const LEAKING: f64 = 0.01;
 
 fn parts(value: &Complex64) -> [f64; 2] {
     [value.re, value.im]
@@ -57,7 +61,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let held_share = held_at as f64 / at as f64;
     let share = at as f64 / (2 * evidence.cube.samples.len()) as f64;
     // How far the signal would have gone: from what the empty beat frequencies say of it, or else as for a Gaussian.
-    let declip = Declip::new(&empty_bins(evidence), largest, tolerance).map(Arc::new);
+    let declip = Declip::new(&silent_bins(evidence), largest, tolerance).map(Arc::new);
     let (level, ci90) = match &declip {
         Some(declip) => {
             let level = strongest(evidence, declip, &hit_frames) / largest;
@@ -98,6 +102,23 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         correction,
     });
     candidates
+}
+
+/// Beat frequencies where nothing returns: neither room nor body, nor what leaks over the board.
+fn silent_bins(evidence: &Evidence) -> Vec<bool> {
+    let mut empty = empty_bins(evidence);
+    let samples = empty.len();
+    let mut power = vec![0.0; samples];
+    for chirp in evidence.still().chunks_exact(samples) {
+        power.iter_mut().zip(spectrum(chirp)).for_each(|(sum, value)| *sum += value.norm_sqr());
+    }
+    let near: Vec<usize> = (0..samples).filter(|&bin| bin.min(samples - bin) <= BOARD_BINS).collect();
+    let most = |bins: &[usize]| bins.iter().map(|&bin| power[bin]).fold(0.0, f64::max);
+    let all: Vec<usize> = (0..samples).collect();
+    if most(&near) > LEAKING * most(&all) {
+        near.iter().for_each(|&bin| empty[bin] = false);
+    }
+    empty
 }
 
 /// Largest component of the signal as it was before it was cut, without most of its noise.

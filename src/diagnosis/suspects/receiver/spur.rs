@@ -15,8 +15,12 @@ use crate::diagnosis::power::Cells;
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 use crate::diagnosis::{Cube, Evidence, denoised};
 
-/// Share of the power around a tone that it may leave: a mover's Doppler changes, and it leaves more.
+/// Share of the power around a tone that it may leave, where little else is: a mover's Doppler changes, and it leaves more.
 const LEFT_OVER: f64 = 0.2;
+/// Standard deviations by which noise may add to that.
+const CHANCE: f64 = 2.0;
+/// Samples in which its frequencies are looked for.
+const SEARCHED: usize = 1 << 17;
 /// Range bins that a mover must have passed during the recording.
 const LEAVES_BINS: f64 = 6.0;
 /// Cells around the tone to each side, in both axes.
@@ -53,7 +57,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let start = (doppler as f64 / loops as f64, range as f64 / samples as f64);
     let (slow, fast) = refined(evidence, start);
     let amplitudes = amplitudes_of(&evidence.cube, slow, fast);
-    if left_over(evidence, (slow, fast), &amplitudes) > LEFT_OVER {
+    let Around { before, after, deviation } = around(evidence, (slow, fast), &amplitudes);
+    if after > LEFT_OVER * before + CHANCE * deviation {
         return vec![];
     }
     let noise = evidence.noise();
@@ -146,8 +151,15 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Power around the tone over the noise in held-out frames once it is taken away, over that before.
-fn left_over(evidence: &Evidence, (slow, fast): (f64, f64), amplitudes: &[Complex64]) -> f64 {
+/// Power around a tone over the noise in the quieter half of the held-out frames, with it and once it is taken away.
+struct Around {
+    before: f64,
+    after: f64,
+    /// Of either, by the noise alone.
+    deviation: f64,
+}
+
+fn around(evidence: &Evidence, (slow, fast): (f64, f64), amplitudes: &[Complex64]) -> Around {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let channels = evidence.cube.channels();
     let near = |turns: f64, length: usize| -> Vec<usize> {
@@ -159,21 +171,25 @@ fn left_over(evidence: &Evidence, (slow, fast): (f64, f64), amplitudes: &[Comple
         dopplers.iter().flat_map(|doppler| ranges.iter().map(move |range| doppler * samples + range)).collect();
     let tone: Vec<Complex64> = (0..loops * samples).map(|i| tone(slow, fast, i / samples, i % samples)).collect();
     let tone = transform(&tone, samples);
-    let parts: Vec<(usize, usize)> =
-        evidence.split.held_out.iter().flat_map(|&frame| (0..channels).map(move |channel| (frame, channel))).collect();
-    let (before, after) = parts
-        .into_par_iter()
-        .map(|(frame, channel)| {
-            let map = evidence.range_doppler(frame, channel);
-            let (amplitude, noise) = (amplitudes[frame * channels + channel], evidence.noise()[channel]);
-            let excess = |share: f64| -> f64 {
-                let powers = cells.iter().map(|&cell| (map[cell] - share * amplitude * tone[cell]).norm_sqr() - noise);
-                powers.sum::<f64>() / noise.max(1e-300)
+    // A line is in all frames; a mover that comes near it is not.
+    let mut frames: Vec<[f64; 2]> = (evidence.split.held_out.par_iter())
+        .map(|&frame| {
+            let of_channel = |channel: usize| {
+                let map = evidence.range_doppler(frame, channel);
+                let (amplitude, noise) = (amplitudes[frame * channels + channel], evidence.noise()[channel]);
+                [0.0, 1.0].map(|share| -> f64 {
+                    let powers = cells.iter().map(|&cell| (map[cell] - share * amplitude * tone[cell]).norm_sqr() - noise);
+                    powers.sum::<f64>() / noise.max(1e-300)
+                })
             };
-            (excess(0.0), excess(1.0))
+            (0..channels).map(of_channel).fold([0.0; 2], |sum, own| [sum[0] + own[0], sum[1] + own[1]])
         })
-        .reduce(|| (0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
-    after / before.max(1e-300)
+        .collect();
+    frames.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    frames.truncate(frames.len().div_ceil(2));
+    let deviation = ((frames.len() * channels * cells.len()) as f64).sqrt();
+    let [before, after] = frames.into_iter().fold([0.0; 2], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
+    Around { before, after, deviation }
 }
 
 /// Of amplitude 1, at a sample of a chirp of a frame.
@@ -207,10 +223,13 @@ fn amplitudes_of(cube: &Cube, slow: f64, fast: f64) -> Vec<Complex64> {
 /// Frequencies over slow and fast time, turns per chirp and per sample, where the tone is strongest.
 fn refined(evidence: &Evidence, start: (f64, f64)) -> (f64, f64) {
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let few = Cube::new(
-        [2, 1, 1, loops, samples],
-        evidence.split.training.iter().take(2).flat_map(|&frame| evidence.cube.channel(frame, 0).to_vec()).collect(),
-    );
+    let channels = evidence.cube.channels();
+    let frames = (SEARCHED / (channels * loops * samples)).clamp(2, evidence.split.training.len().max(2));
+    let searched = evidence.split.training.iter().take(frames);
+    let few: Vec<Complex64> = searched
+        .flat_map(|&frame| (0..channels).flat_map(move |channel| evidence.cube.channel(frame, channel).to_vec()))
+        .collect();
+    let few = Cube::new([few.len() / (channels * loops * samples), 1, channels, loops, samples], few);
     let power = |slow: f64, fast: f64| amplitudes_of(&few, slow, fast).iter().map(Complex64::norm_sqr).sum::<f64>();
     let mut best = start;
     let mut step = (0.25 / loops as f64, 0.25 / samples as f64);

@@ -18,6 +18,8 @@ use crate::diagnosis::{Cube, Evidence, denoised};
 
 /// Leakage over the board is nearer than this.
 const NEAR_M: f64 = 0.5;
+/// Half the size of a board.
+const BOARD_M: f64 = 0.01;
 /// Longest transient at an edge, samples.
 const LONGEST_EDGE: usize = 16;
 /// Share of what a free field explains that named elements must reach.
@@ -329,8 +331,10 @@ fn candidate(
                 field.fit(&templates(&moved, images)).likelihood
             };
             let curvature = (2.0 * fitted.likelihood - at(turns + step) - at(turns - step)) / (0.002f64 * 0.002);
-            let error = if curvature > 0.0 { curvature.recip().sqrt() } else { 0.05 };
-            place.range_m = Some([range, range]);
+            let error = if curvature > 0.0 { curvature.recip().sqrt() } else { 0.05 }.max(5e-4);
+            // A board has more than one path, within its own size.
+            let reach = (1.645 * error).max(BOARD_M);
+            place.range_m = Some([range - reach, range + reach]);
             // One level stands for channels that differ.
             let level_deviation = denoised::PEAK_DB.hypot(0.3 * spread_db / (channels as f64).sqrt());
             let statement = format!(
@@ -340,10 +344,7 @@ fn candidate(
             );
             (
                 "tx_leakage",
-                vec![
-                    Estimate::normal("range_m", range, error.max(5e-4)),
-                    Estimate::normal("level_db", level_db, level_deviation),
-                ],
+                vec![Estimate::normal("range_m", range, error), Estimate::normal("level_db", level_db, level_deviation)],
                 statement,
             )
         }

@@ -134,7 +134,7 @@ fn scores(deviations: &[Deviation], channels: usize) -> Vec<f64> {
 }
 
 /// Mean chirps of the even and of the odd loops.
-fn halves(channel: &[Complex64], samples: usize) -> [Vec<Complex64>; 2] {
+pub fn halves(channel: &[Complex64], samples: usize) -> [Vec<Complex64>; 2] {
     let mut sums = [vec![Complex64::ZERO; samples], vec![Complex64::ZERO; samples]];
     let mut counts = [0.0; 2];
     for (index, chirp) in channel.chunks_exact(samples).enumerate() {
