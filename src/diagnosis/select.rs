@@ -249,10 +249,12 @@ fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let shaken = vibrates && (turns || is_path(candidate) && !swings);
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
+    // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it.
+    let behind = accepted.place.stage == "timing" && candidate.id == Some("body_multibounce");
     // What bursts leave below the noise of single samples is in all receivers at once.
     let bursts = accepted.id.is_some_and(|id| BURSTS.contains(&id)) && candidate.id == Some("correlated_noise");
     (roughly || fades) && candidate.gain < ROUGHLY * accepted.gain
-        || bursts && candidate.gain < accepted.gain
+        || (bursts || behind) && candidate.gain < accepted.gain
         || shaken && candidate.gain < SHAKEN * accepted.gain
         || by_chirp && candidate.gain < SLIGHTLY * accepted.gain
 }

@@ -16,6 +16,8 @@ use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence
 const LEAST_DB: f64 = 8.0;
 /// Share of the whole body's power that a part's skin counts as at least.
 const LEAST_SHARE: f64 = 0.01;
+/// What hardly moves is mostly where what stands still was taken out: how strong it is, its sidelobes do not tell.
+const LEAST_SEEN: f64 = 0.3;
 /// Parts of one body differ: their log-likelihood ratios scatter by so much more than those of one reflectivity.
 const UNEVEN: f64 = 2.0;
 /// Standard deviation of the amplitude, as a share: a level that other parts tell.
@@ -34,6 +36,8 @@ struct Found {
     weights: Vec<f64>,
     /// Of its power over its part's.
     over_skin_db: f64,
+    /// Share of its power in cells that are looked at.
+    seen: f64,
 }
 
 fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -59,13 +63,14 @@ fn find(evidence: &Evidence) -> Vec<Candidate> {
         // Skin that is hardly seen would make anything look strong.
         let own = model.lobes.iter().map(of_skin).sum::<f64>().max(LEAST_SHARE * of_body(&skin, &with));
         let over_skin_db = 10.0 * (strength / own.max(f64::MIN_POSITIVE)).max(1e-30).log10();
-        Found { part, training: gained[0] - alone[0], held_out: gained[1] - alone[1], weights: with, over_skin_db }
+        let seen = seen(&points, model.usable());
+        Found { part, training: gained[0] - alone[0], held_out: gained[1] - alone[1], weights: with, over_skin_db, seen }
     };
     let found: Vec<Found> = (0..parts).into_par_iter().map(of_part).collect();
     let gain = |found: &Found| found.training + found.held_out;
     let Some(best) = found.iter().max_by(|a, b| gain(a).total_cmp(&gain(b))) else { return vec![] };
     let nats = model.independent / CELLS_PER_VALUE;
-    if best.over_skin_db < LEAST_DB || best.held_out <= 0.0 {
+    if best.over_skin_db < LEAST_DB || best.seen < LEAST_SEEN || best.held_out <= 0.0 {
         return vec![];
     }
     let p_value = statistics::corrected(statistics::chi2_tail(2.0 * nats * best.training / UNEVEN, 1.0), parts as f64);
@@ -104,6 +109,15 @@ fn sparse(map: &[f32]) -> Template {
 
 fn total(template: &Template) -> f64 {
     template.power.iter().map(|&power| f64::from(power)).sum()
+}
+
+/// Share of a part's point that lies in cells that are looked at, over all frames.
+fn seen(points: &[Template], usable: &[bool]) -> f64 {
+    let used = |template: &Template| -> f64 {
+        let cells = template.cells.iter().zip(&template.power).filter(|(cell, _)| usable[**cell as usize]);
+        cells.map(|(_, &power)| f64::from(power)).sum()
+    };
+    points.iter().map(used).sum::<f64>() / points.iter().map(total).sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
 /// Power of all skin in all frames.
