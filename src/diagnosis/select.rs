@@ -46,6 +46,7 @@ const LIKE_EDGES: [&str; 4] = ["ramp_edge_transient", "if_highpass", "if_lowpass
 /// its gain (which counts what is left).
 const TURNS: [&str; 2] = ["slow-time phase", "delay-proportional phase"];
 const SHAKEN: f64 = 0.5;
+const NEARLY: f64 = 0.8;
 const FADING: &str = "slow-time gain";
 
 /// What is named even where products of the signal with itself lie everywhere.
@@ -107,8 +108,8 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     let mut misfit = before;
     // Names that would make everything far worse.
     let mut refused: Vec<&'static str> = vec![];
-    // Names that passed on the untouched recording.
-    let mut at_first: Option<Vec<&'static str>> = None;
+    // Names that passed on the untouched recording, and what they gained.
+    let mut at_first: Option<Vec<(&'static str, f64)>> = None;
     // What was heard in a round that only refused a name: nothing has changed since.
     let mut heard: Option<Vec<(usize, Candidate)>> = None;
     for _ in 0..=thresholds.most {
@@ -120,9 +121,6 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
             let weighted = |(suspect, candidate): &(usize, Candidate)| candidate.p_value * shares / SUSPECTS[*suspect].share;
             found.iter().map(weighted).fold(1.0, f64::min)
         });
-        let known = |candidate: &Candidate| {
-            accepted.iter().any(|effect| is_same(&effect.candidate, candidate) || is_left_by(&effect.candidate, candidate))
-        };
         // So they do where products were taken out roughly.
         let bent = |effect: &Accepted| effect.candidate.behaves_like == harmonic::QUADRATIC;
         let mixed = evidence.products().mixed().is_some() || accepted.iter().any(bent);
@@ -132,12 +130,21 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
             let remains = !first && candidate.id.is_none() && candidate.gain < thresholds.nameless_gain;
             thresholds.passes(*suspect, candidate) && !remains
         };
-        let ids = || found.iter().filter(passes).filter_map(|(_, candidate)| candidate.id).collect();
-        let at_first: &Vec<&'static str> = at_first.get_or_insert_with(ids);
+        let named = || found.iter().filter(passes).filter_map(|(_, candidate)| Some((candidate.id?, candidate.gain))).collect();
+        let at_first: &Vec<(&'static str, f64)> = at_first.get_or_insert_with(named);
+        // What a radar that vibrates leaves is less than there was before it was undone.
+        let was_there = |effect: &Accepted, candidate: &Candidate| {
+            let as_much = |&(id, gain): &(&str, f64)| candidate.id == Some(id) && candidate.gain > NEARLY * gain;
+            effect.candidate.id == Some("radar_vibration") && at_first.iter().any(as_much)
+        };
+        let left = |effect: &Accepted, candidate: &Candidate| {
+            is_same(&effect.candidate, candidate) || is_left_by(&effect.candidate, candidate) && !was_there(effect, candidate)
+        };
+        let known = |candidate: &Candidate| accepted.iter().any(|effect| left(effect, candidate));
         let by_chirp = accepted.iter().any(|effect| is_by_chirp(&effect.candidate));
         let may_be_named = |id: &str| {
             (!mixed || WHATEVER_THE_SIGNAL.contains(&id))
-                && (!by_chirp || !LIKE_EDGES.contains(&id) || at_first.contains(&id))
+                && (!by_chirp || !LIKE_EDGES.contains(&id) || at_first.iter().any(|first| first.0 == id))
                 && !refused.contains(&id)
                 && accepted.iter().filter(|effect| effect.candidate.id == Some(id)).count() < MOST_ALIKE
         };
@@ -240,13 +247,11 @@ fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
         && !apart(accepted.place.range_m, candidate.place.range_m)
         && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
     let by_chirp = is_by_chirp(accepted) && is_path(candidate);
-    // How much the returns of each range turn when the radar moves is known roughly: sidebands are left of them, which do not
-    // swing in range; and large turns change how much is received.
+    // How much the returns of each range turn when the radar moves is known roughly: sidebands are left of them; and large
+    // turns change how much is received.
     let vibrates = accepted.id == Some("radar_vibration");
     let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
-    let swings =
-        candidate.estimates.iter().any(|estimate| estimate.name == "rate_hz") && candidate.gain > SLIGHTLY * accepted.gain;
-    let shaken = vibrates && (turns || is_path(candidate) && !swings);
+    let shaken = vibrates && (turns || is_path(candidate));
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it.
