@@ -6,6 +6,7 @@
 
 use rayon::prelude::*;
 
+use super::slow::repeated;
 use super::{Suspect, paths};
 use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::power::{LOBES, PowerModel, Template, fit_weights, log_likelihood, sum};
@@ -43,8 +44,8 @@ struct Found {
 fn find(evidence: &Evidence) -> Vec<Candidate> {
     let (Some(model), Some(body)) = (evidence.power(), evidence.body.as_ref()) else { return vec![] };
     let parts = body.parts.len();
-    // Remains of paths that were taken out are near the body, too.
-    let remains = paths::LEAVE_REMAINS.iter().any(|id| evidence.accepted.contains(id));
+    // Remains of paths that were taken out are near the body, too, and in a copied frame the body is not where it is said to be.
+    let remains = paths::LEAVE_REMAINS.iter().chain([&repeated::BEHAVES_LIKE]).any(|id| evidence.accepted.contains(id));
     if parts < 2 || remains || body.centres.len() != body.frames.len() || evidence.accepted.contains(&"carried_reflector") {
         return vec![];
     }
