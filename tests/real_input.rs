@@ -15,7 +15,7 @@ use hybridsim::{
 fn training_on_a_planted_recording_lowers_its_loss() {
     let Some(shared) = support::shared("") else { return };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/recording.toml");
-    let sets = ["training.epochs=2", "simulator.room.patches=400", "training.validation_fraction=0.7"].map(String::from);
+    let sets = ["training.epochs=6", "simulator.room.patches=400", "training.validation_fraction=0.7"].map(String::from);
     let mut config = Config::read(&path, &sets).unwrap();
     config.data.recordings = vec![shared.join("recordings/planted/p1")];
     let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
@@ -31,8 +31,8 @@ fn training_on_a_planted_recording_lowers_its_loss() {
         })
         .unwrap();
     println!("held-out losses {losses:?} dB²");
-    assert!(losses[1] < losses[0], "held-out losses {losses:?}");
-    assert!(losses[1] < 1000.0, "held-out losses {losses:?}");
+    // Far more than what another order of rounding changes: a quarter, on this recording.
+    assert!(losses[5] < 0.9 * losses[0], "held-out losses {losses:?}");
 }
 
 #[test]

@@ -41,6 +41,9 @@ pub struct Loaded {
 const FEWEST_FRAMES: usize = 4;
 /// Every so many-th frame is held out.
 const HELD_OUT_EVERY: usize = 4;
+/// Parts of the frames, each of which is foretold by the others, where few held-out ones would say little: every so many-th
+/// frame is in one.
+pub const FOLDS: usize = 4;
 /// At most one loop in so many is dropped by cutting into equal blocks.
 const MOST_DROPPED: usize = 20;
 /// Fewest loops in a block.

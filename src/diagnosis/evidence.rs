@@ -232,6 +232,24 @@ impl Evidence {
     }
 }
 
+#[cfg(test)]
+impl Evidence {
+    /// What `signal` says of frame, channel, loop and sample, in white noise of variance 2: for tests.
+    pub fn in_noise(radar: Radar, seed: u64, signal: impl Fn([usize; 4]) -> Complex64) -> Self {
+        use rand::SeedableRng;
+        use rand_distr::{Distribution, StandardNormal};
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let [_, tx, rx, loops, samples] = radar.dims();
+        let places = (0..radar.dims().iter().product::<usize>()).map(|i| {
+            let chirp = i / samples;
+            [chirp / (loops * tx * rx), chirp / loops % (tx * rx), chirp % loops, i % samples]
+        });
+        let all = places.map(|place| signal(place) + Complex64::new(normal(), normal())).collect();
+        Self::new(Loaded::of_samples(radar, all, [-1e3, 1e3]), None, None)
+    }
+}
+
 /// Periodic Hann window of unit energy.
 pub fn hann(length: usize) -> Vec<f64> {
     let window: Vec<f64> = (0..length).map(|i| (std::f64::consts::PI * (i as f64 + 0.5) / length as f64).sin().powi(2)).collect();

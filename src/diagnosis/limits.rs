@@ -169,7 +169,7 @@ fn salted(evidence: &Evidence, salt: &Salt, strength: f64, reference: f64, thres
         salt.suspects.contains(&suspect.name)
             && (suspect.find)(&with).iter().any(|candidate| {
                 let named = candidate.id == Some(salt.id) || candidate.look_alikes.contains(&salt.id);
-                named && thresholds.passes(index, candidate)
+                named && thresholds.passes(index, candidate, true)
             })
     };
     SUSPECTS.iter().enumerate().any(heard).then_some(added)

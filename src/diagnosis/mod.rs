@@ -20,6 +20,7 @@ pub mod locate;
 pub mod power;
 pub mod prediction;
 pub mod products;
+mod remains;
 pub mod report;
 pub mod select;
 pub mod simulate;

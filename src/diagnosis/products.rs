@@ -6,7 +6,7 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::cube::mean_chirp;
+use super::cube::{FOLDS, mean_chirp};
 use super::denoised;
 use super::evidence::{Evidence, spectrum, transform};
 use super::statistics::{chi2_tail, corrected};
@@ -66,9 +66,6 @@ const LEAST_GAIN: f64 = 20.0;
 /// Chance below which it is there.
 const SURELY: f64 = 1e-6;
 
-/// Parts of the frames, each of which is foretold by the others.
-const FOLDS: usize = 4;
-
 const PRODUCTS: [Product; 3] = [Product::Square, Product::Magnitude, Product::Cube];
 
 /// What was found of each.
@@ -113,16 +110,7 @@ impl Products {
 
 /// None where it is not to be expected, or frames that it was not fitted to are worse with it. `sums`: by frame.
 fn judged(product: Product, sums: &[Sums], peak: f64) -> Option<Law> {
-    let over = |frames: &[usize]| {
-        frames.iter().fold(Sums::default(), |a, &frame| Sums {
-            cross: a.cross + sums[frame].cross,
-            template: a.template + sums[frame].template,
-            found: a.found + sums[frame].found,
-            cells: a.cells + sums[frame].cells,
-        })
-    };
-    let all: Vec<usize> = (0..sums.len()).collect();
-    let whole = over(&all);
+    let whole = total(sums.iter());
     if whole.template <= 0.0 {
         return None;
     }
@@ -132,12 +120,13 @@ fn judged(product: Product, sums: &[Sums], peak: f64) -> Option<Law> {
     let widening = 2.25 * rest.max(1.0);
     let variance = widening / whole.template;
     // Frames must agree on it as well as the noise lets expect.
-    let scatter = jackknife(sums, &all).max(variance.sqrt());
+    let scatter = jackknife(sums, &whole).max(variance.sqrt());
     let p_value = corrected(chi2_tail(2.0 * kappa.norm_sqr() / (scatter * scatter), 2.0), 2.0);
     // Every frame is foretold by those of the other folds.
     let of_fold = |fold: usize| {
-        let [rest, fold] = [false, true]
-            .map(|inside| over(&all.iter().copied().filter(|frame| (frame % FOLDS == fold) == inside).collect::<Vec<_>>()));
+        let part =
+            |inside: bool| total((0..sums.len()).filter(|frame| (frame % FOLDS == fold) == inside).map(|frame| &sums[frame]));
+        let [rest, fold] = [part(false), part(true)];
         let kappa = rest.cross / rest.template.max(f64::MIN_POSITIVE);
         (2.0 * (kappa.conj() * fold.cross).re - kappa.norm_sqr() * fold.template) / widening
     };
@@ -193,13 +182,23 @@ impl Sums {
     }
 }
 
-fn jackknife(sums: &[Sums], frames: &[usize]) -> f64 {
-    let all = frames.iter().fold((Complex64::ZERO, 0.0), |a, &f| (a.0 + sums[f].cross, a.1 + sums[f].template));
-    let count = frames.len() as f64;
-    let spread: f64 = frames
+fn total<'a>(sums: impl Iterator<Item = &'a Sums>) -> Sums {
+    sums.fold(Sums::default(), |a, b| Sums {
+        cross: a.cross + b.cross,
+        template: a.template + b.template,
+        found: a.found + b.found,
+        cells: a.cells + b.cells,
+    })
+}
+
+/// Scatter of κ among the frames.
+fn jackknife(sums: &[Sums], whole: &Sums) -> f64 {
+    let without = |sums: &Sums| (whole.cross - sums.cross) / (whole.template - sums.template);
+    let spread: f64 = sums
         .iter()
-        .filter(|&&f| all.1 > sums[f].template)
-        .map(|&f| ((all.0 - sums[f].cross) / (all.1 - sums[f].template) - all.0 / all.1).norm_sqr())
+        .filter(|sums| whole.template > sums.template)
+        .map(|sums| (without(sums) - whole.cross / whole.template).norm_sqr())
         .sum();
+    let count = sums.len() as f64;
     (spread * (count - 1.0) / count).sqrt()
 }

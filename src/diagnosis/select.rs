@@ -10,6 +10,7 @@ use super::config::DiagnosisConfig;
 use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
+use super::remains::{ROUGHLY, is_by_chirp, is_left_by, is_rough, is_same};
 use super::suspects::receiver::harmonic;
 use super::suspects::{SUSPECTS, Suspect, excess, paths};
 
@@ -19,9 +20,10 @@ impl DiagnosisConfig {
         self.alarm * SUSPECTS[suspect].share / SUSPECTS.iter().map(|suspect| suspect.share).sum::<f64>()
     }
 
-    /// What has no name may be anything, so it must gain more, unless chance cannot have made it.
-    pub(super) fn passes(&self, suspect: usize, candidate: &Candidate) -> bool {
-        let sure = candidate.id.is_some() || candidate.p_value < NO_CHANCE;
+    /// What has no name may be anything, so it must gain more, unless chance cannot have made it. `untouched`: what was taken
+    /// out of a recording leaves remains, which chance has not made either.
+    pub(super) fn passes(&self, suspect: usize, candidate: &Candidate, untouched: bool) -> bool {
+        let sure = candidate.id.is_some() || untouched && candidate.p_value < NO_CHANCE;
         let least = if sure { self.gain } else { self.nameless_gain };
         candidate.p_value <= self.p_value(suspect) && candidate.gain >= least && candidate.gain.is_finite()
     }
@@ -30,33 +32,15 @@ impl DiagnosisConfig {
 /// p-value below which what has no name needs no more than what has one.
 const NO_CHANCE: f64 = 1e-12;
 
-/// What has no name is modelled roughly, and these are modelled most roughly of all: what they leave, up to this share of
-/// their gain, takes any shape; and they come after whatever gains more than it.
-const ROUGH: [&str; 2] = ["additive fast-time", harmonic::QUADRATIC];
-const ROUGHLY: f64 = 0.1;
-
-/// What is undone chirp by chirp, each by its own estimate, leaves a little of everything that moves: paths below this share
-/// of its gain.
-const BY_CHIRP: [&str; 2] = ["phase_noise", "chirp_start_jitter"];
-const SLIGHTLY: f64 = 0.01;
-/// What it also leaves, at the chirps' edges, looks like these; a true one was there before.
+/// What undoing chirp by chirp leaves at the chirps' edges looks like these; a true one was there before.
 const LIKE_EDGES: [&str; 4] = ["ramp_edge_transient", "if_highpass", "if_lowpass", "if_delay"];
 
-/// What a radar that vibrates leaves: turns of what stands still that are not quite undone, and their sidebands, up to this share of
-/// its gain (which counts what is left).
-const TURNS: [&str; 2] = ["slow-time phase", "delay-proportional phase"];
-const SHAKEN: f64 = 0.5;
+/// What gains less than this share of what it gained before a vibration was undone is what the vibration leaves; what gains more
+/// was there all along.
 const NEARLY: f64 = 0.8;
-const FADING: &str = "slow-time gain";
 
 /// What is named even where products of the signal with itself lie everywhere.
 const WHATEVER_THE_SIGNAL: [&str; 2] = ["iq_imbalance", "adc_saturation"];
-
-/// What is cut out where it is plain, and goes on below the noise.
-const BURSTS: [&str; 2] = ["interference", "impulsive_noise"];
-
-/// What explains a little of anything that moves near the body: remains of a strong path that was taken out.
-const OF_REMAINS: [&str; 2] = ["body_multibounce", "carried_reflector"];
 
 /// Stages of the signal's chain at which everything that is received is changed.
 const UPSTREAM: [&str; 2] = ["waveform", "receiver"];
@@ -67,9 +51,6 @@ const FAR_WORSE: f64 = 1.6;
 /// So many paths of one name are told: a person whom nobody tracked is made of many more, and other effects must have their
 /// turn.
 const MOST_ALIKE: usize = 6;
-
-/// Two instances of an effect closer than this are one.
-const NEAR_M: f64 = 0.3;
 
 /// An accepted candidate with what it changed.
 #[derive(Clone, Debug)]
@@ -124,12 +105,8 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         // So they do where products were taken out roughly.
         let bent = |effect: &Accepted| effect.candidate.behaves_like == harmonic::QUADRATIC;
         let mixed = evidence.products().mixed().is_some() || accepted.iter().any(bent);
-        // What was taken out leaves remains that chance has not made either.
-        let first = accepted.is_empty();
-        let passes = |(suspect, candidate): &&(usize, Candidate)| {
-            let remains = !first && candidate.id.is_none() && candidate.gain < thresholds.nameless_gain;
-            thresholds.passes(*suspect, candidate) && !remains
-        };
+        let untouched = accepted.is_empty();
+        let passes = |(suspect, candidate): &&(usize, Candidate)| thresholds.passes(*suspect, candidate, untouched);
         let named = || found.iter().filter(passes).filter_map(|(_, candidate)| Some((candidate.id?, candidate.gain))).collect();
         let at_first: &Vec<(&'static str, f64)> = at_first.get_or_insert_with(named);
         // What a radar that vibrates leaves is less than there was before it was undone.
@@ -210,60 +187,6 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     Explanation { accepted, evidence, p_value: p_value.unwrap_or(1.0), before, after }
 }
 
-/// Whether a candidate is what was accepted already and could not be removed in full: a second instance of an effect must
-/// lie at another place.
-fn is_same(accepted: &Candidate, candidate: &Candidate) -> bool {
-    let (old, new) = (&accepted.place, &candidate.place);
-    accepted.id == candidate.id
-        && accepted.behaves_like == candidate.behaves_like
-        && old.boundary == new.boundary
-        && old.body_part == new.body_part
-        && old.rx == new.rx
-        && !apart(old.range_m, new.range_m)
-        && !apart(old.velocity_mps, new.velocity_mps)
-        && old.position_m.is_none_or(|old| {
-            new.position_m.is_none_or(|new| (0..3).map(|axis| (old[axis] - new[axis]).powi(2)).sum::<f64>() < NEAR_M * NEAR_M)
-        })
-}
-
-fn is_rough(candidate: &Candidate) -> bool {
-    candidate.id.is_none() && ROUGH.contains(&candidate.behaves_like)
-}
-
-fn is_by_chirp(candidate: &Candidate) -> bool {
-    candidate.id.is_some_and(|id| BY_CHIRP.contains(&id))
-}
-
-/// Whether a candidate may be no more than what a rough correction left, or what a moving path left around its range.
-fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
-    let is_path = |candidate: &Candidate| {
-        candidate.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_none_or(|id| paths::MANY.contains(&id))
-    };
-    let is_of_paths = |candidate: &Candidate| is_path(candidate) || candidate.id.is_some_and(|id| OF_REMAINS.contains(&id));
-    // An image of the body is all over the place: what else is there is something else.
-    let beside = is_path(accepted)
-        && is_of_paths(candidate)
-        && accepted.place.boundary.is_none()
-        && !apart(accepted.place.range_m, candidate.place.range_m)
-        && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
-    let by_chirp = is_by_chirp(accepted) && is_path(candidate);
-    // How much the returns of each range turn when the radar moves is known roughly: sidebands are left of them; and large
-    // turns change how much is received.
-    let vibrates = accepted.id == Some("radar_vibration");
-    let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
-    let shaken = vibrates && (turns || is_path(candidate));
-    let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
-    let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
-    // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it.
-    let behind = accepted.place.stage == "timing" && candidate.id == Some("body_multibounce");
-    // What bursts leave below the noise of single samples is in all receivers at once.
-    let bursts = accepted.id.is_some_and(|id| BURSTS.contains(&id)) && candidate.id == Some("correlated_noise");
-    (roughly || fades) && candidate.gain < ROUGHLY * accepted.gain
-        || (bursts || behind) && candidate.gain < accepted.gain
-        || shaken && candidate.gain < SHAKEN * accepted.gain
-        || by_chirp && candidate.gain < SLIGHTLY * accepted.gain
-}
-
 /// What acts on every return makes echoes of the body too, which look like paths of their own: where both are suspected,
 /// the one is accepted that leaves less.
 fn upstream<'a>(
@@ -284,10 +207,6 @@ fn upstream<'a>(
     };
     let left = |candidate: &Candidate| Misfit::after(original, &evidence.with(candidate)).loglik_per_sample;
     if left(&other.1) > left(&best.1) { other } else { best }
-}
-
-fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> bool {
-    matches!((a, b), (Some(a), Some(b)) if a[1] < b[0] || b[1] < a[0])
 }
 
 /// What every suspect has to say.
@@ -379,7 +298,7 @@ fn again(
     let same = |candidate: &Candidate| {
         candidate.id == effect.candidate.id
             && candidate.choice == effect.candidate.choice
-            && thresholds.passes(effect.suspect, candidate)
+            && thresholds.passes(effect.suspect, candidate, true)
     };
     let found = (SUSPECTS[effect.suspect].find)(&evidence).into_iter().filter(same);
     found.max_by(|a, b| a.gain.total_cmp(&b.gain))

@@ -328,12 +328,7 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Candidate
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
-    use crate::diagnosis::cube::Loaded;
     use crate::radar::Radar;
 
     const HUM_HZ: f64 = 100.0;
@@ -342,24 +337,15 @@ mod tests {
     fn evidence(depth: f64, both: bool) -> Evidence {
         let mut radar = Radar::small(8);
         (radar.loops_per_frame, radar.samples_per_chirp) = (16, 64);
-        let dims = radar.dims();
-        let mut random = ChaCha8Rng::seed_from_u64(4);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let [_, _, receivers, loops, samples] = dims;
-        let samples_all: Vec<Complex64> = (0..dims.iter().product::<usize>())
-            .map(|i| {
-                let (n, slow, rx, frame) =
-                    (i % samples, i / samples % loops, i / samples / loops % receivers, i / samples / loops / receivers);
-                let time = radar.chirp_time_s(frame, 0, slow);
-                let n = n as f64;
-                let mover = Complex64::cis(0.6 * n + 0.4 * slow as f64 + 1.9 * (frame * frame) as f64) * 4.0;
-                let swing = 1.0 + depth * (TAU * HUM_HZ * time).cos();
-                let lamp = Complex64::cis(1.8 * n - 0.2 * rx as f64) * 8.0 * swing;
-                let wall = Complex64::cis(0.9 * n + 0.4 * rx as f64) * 30.0 * if both { swing } else { 1.0 };
-                wall + mover + lamp + Complex64::new(normal(), normal())
-            })
-            .collect();
-        Evidence::new(Loaded::of_samples(radar, samples_all, [-100.0, 100.0]), None, None)
+        let clock = radar.clone();
+        Evidence::in_noise(radar, 4, |[frame, rx, slow, n]| {
+            let (time, n) = (clock.chirp_time_s(frame, 0, slow), n as f64);
+            let mover = Complex64::cis(0.6 * n + 0.4 * slow as f64 + 1.9 * (frame * frame) as f64) * 4.0;
+            let swing = 1.0 + depth * (TAU * HUM_HZ * time).cos();
+            let lamp = Complex64::cis(1.8 * n - 0.2 * rx as f64) * 8.0 * swing;
+            let wall = Complex64::cis(0.9 * n + 0.4 * rx as f64) * 30.0 * if both { swing } else { 1.0 };
+            wall + mover + lamp
+        })
     }
 
     #[test]

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::channels::Sums;
+use crate::diagnosis::cube::FOLDS;
 use crate::diagnosis::statistics::{corrected, fisher_tail};
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
 use crate::radar::Radar;
@@ -22,8 +23,6 @@ const FLOOR: f64 = 0.02;
 const LIKELY: f64 = 1e-3;
 /// The family's looks at the receivers.
 const TRIED: f64 = 2.0;
-/// Parts of a recording that are foretold by the others.
-const FOLDS: usize = 4;
 /// Groups of cells per contrast that are needed for an error of it.
 const FEWEST: usize = 8;
 

@@ -347,12 +347,7 @@ impl<'a> Block<'a> {
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
-    use crate::diagnosis::cube::Loaded;
     use crate::radar::Radar;
 
     const CHIRPS: [(usize, usize); 4] = [(1, 9), (4, 20), (5, 3), (10, 15)];
@@ -364,15 +359,10 @@ mod tests {
         (radar.loops_per_frame, radar.samples_per_chirp) = (32, 128);
         radar.tx_m = vec![[0.0; 3]];
         radar.rx_m = (0..4).map(|rx| [0.5 * f64::from(rx) * radar.wavelength_m(), 0.0, 0.0]).collect();
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let samples = (0..12 * 4 * 32 * 128).map(|i| {
-            let (frame, rx, chirp, n) = (i / (4 * 32 * 128), i / (32 * 128) % 4, i / 128 % 32, i % 128);
+        Evidence::in_noise(radar, seed, |[frame, rx, chirp, n]| {
             let moving = Complex64::cis(0.3 * chirp as f64 + 0.7 * n as f64 + 0.5 * rx as f64) * 3.0;
-            let hit = if CHIRPS.contains(&(frame, chirp)) { added(rx, n as f64 - 40.0) } else { Complex64::ZERO };
-            moving + hit + Complex64::new(normal(), normal())
-        });
-        Evidence::new(Loaded::of_samples(radar, samples.collect(), [-1e3, 1e3]), None, None)
+            moving + if CHIRPS.contains(&(frame, chirp)) { added(rx, n as f64 - 40.0) } else { Complex64::ZERO }
+        })
     }
 
     #[test]

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::image::empty_bins;
 use crate::diagnosis::Evidence;
+use crate::diagnosis::cube::FOLDS;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale, median};
 
@@ -22,9 +23,6 @@ const LAW: f64 = 0.05;
 /// Share of the correlation that the middle one of all Doppler rows, of all beat frequencies, and of all frames must have:
 /// what a stranger's side lobes or some bursts share lies in a few of them.
 const EVERYWHERE: f64 = 0.4;
-
-/// Parts of a recording that are foretold by the others.
-const FOLDS: usize = 4;
 
 /// Cells that are looked at.
 struct Cells {

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 
 use super::declip::Declip;
 use super::image::empty_bins;
-use crate::diagnosis::evidence::spectrum;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::suspects::paths::still_power;
 use crate::diagnosis::{Cube, Evidence, denoised};
 
 /// Fewest components at the rail.
@@ -107,15 +107,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
 /// Beat frequencies where nothing returns: neither room nor body, nor what leaks over the board.
 fn silent_bins(evidence: &Evidence) -> Vec<bool> {
     let mut empty = empty_bins(evidence);
-    let samples = empty.len();
-    let mut power = vec![0.0; samples];
-    for chirp in evidence.still().chunks_exact(samples) {
-        power.iter_mut().zip(spectrum(chirp)).for_each(|(sum, value)| *sum += value.norm_sqr());
-    }
+    let power = still_power(evidence);
+    let samples = power.len();
     let near: Vec<usize> = (0..samples).filter(|&bin| bin.min(samples - bin) <= BOARD_BINS).collect();
     let most = |bins: &[usize]| bins.iter().map(|&bin| power[bin]).fold(0.0, f64::max);
-    let all: Vec<usize> = (0..samples).collect();
-    if most(&near) > LEAKING * most(&all) {
+    if most(&near) > LEAKING * power.iter().copied().fold(0.0, f64::max) {
         near.iter().for_each(|&bin| empty[bin] = false);
     }
     empty

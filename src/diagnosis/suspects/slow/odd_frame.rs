@@ -149,32 +149,18 @@ pub fn halves(channel: &[Complex64], samples: usize) -> [Vec<Complex64>; 2] {
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
-    use crate::diagnosis::cube::Loaded;
     use crate::radar::Radar;
 
     /// Two static returns and a slow mover in noise.
     fn evidence(slip: usize) -> Evidence {
         let mut radar = Radar::small(8);
         (radar.loops_per_frame, radar.samples_per_chirp) = (16, 64);
-        let dims = radar.dims();
-        let mut random = ChaCha8Rng::seed_from_u64(4);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let [_, _, receivers, loops, samples] = dims;
-        let samples_all: Vec<Complex64> = (0..dims.iter().product::<usize>())
-            .map(|i| {
-                let (n, slow, rx, frame) =
-                    (i % samples, i / samples % loops, i / samples / loops % receivers, i / samples / loops / receivers);
-                let n = if (frame, rx) == (3, 1) { n + slip } else { n } as f64;
-                let mover = Complex64::cis(0.6 * n + 0.03 * slow as f64 + 1.9 * frame as f64) * 4.0;
-                Complex64::cis(0.9 * n + 0.4 * rx as f64) * 30.0 + mover + Complex64::new(normal(), normal())
-            })
-            .collect();
-        Evidence::new(Loaded::of_samples(radar, samples_all, [-100.0, 100.0]), None, None)
+        Evidence::in_noise(radar, 4, |[frame, rx, slow, n]| {
+            let n = if (frame, rx) == (3, 1) { n + slip } else { n } as f64;
+            let mover = Complex64::cis(0.6 * n + 0.03 * slow as f64 + 1.9 * frame as f64) * 4.0;
+            Complex64::cis(0.9 * n + 0.4 * rx as f64) * 30.0 + mover
+        })
     }
 
     #[test]

@@ -1,10 +1,8 @@
 //! Frames that are copies of earlier ones, sample by sample: noise never comes again, so the recorder wrote them twice.
 
-use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
-
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
+use crate::diagnosis::suspects::receiver::field::distance;
 
 pub const BEHAVES_LIKE: &str = "repeated frames";
 
@@ -19,18 +17,14 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if copies.is_empty() || 2 * copies.len() >= frames {
         return vec![];
     }
-    let size = evidence.cube.samples.len() / frames.max(1);
-    let still = evidence.still();
-    let samples = evidence.cube.dims[4];
-    let chirps_of = |frame: usize| {
-        let channels = 0..evidence.cube.channels();
-        channels.flat_map(move |channel| {
-            let still = &still[channel * samples..][..samples];
-            evidence.cube.channel(frame, channel).chunks_exact(samples).map(move |chirp| (chirp, still))
-        })
-    };
+    let size = evidence.cube.samples.len() / frames;
+    let (still, samples) = (evidence.still(), evidence.cube.dims[4]);
     let moving = |frame: usize| -> f64 {
-        chirps_of(frame).flat_map(|(chirp, still)| chirp.iter().zip(still)).map(|(value, still)| (value - still).norm_sqr()).sum()
+        let of_channel = |channel: usize| -> f64 {
+            let still = &still[channel * samples..][..samples];
+            evidence.cube.channel(frame, channel).chunks_exact(samples).map(|chirp| distance(chirp, still)).sum()
+        };
+        (0..evidence.cube.channels()).map(of_channel).sum()
     };
     let list: Vec<String> = copies.iter().map(|[copy, of]| format!("{copy} (of {of})")).collect();
     vec![Candidate {
@@ -60,17 +54,7 @@ fn copies(evidence: &Evidence) -> Vec<[usize; 2]> {
     let [frames, ..] = evidence.cube.dims;
     let size = evidence.cube.samples.len() / frames.max(1);
     let of = |frame: usize| &evidence.cube.samples[frame * size..(frame + 1) * size];
-    let mut seen: HashMap<u64, usize> = HashMap::new();
-    let mut copies = vec![];
-    for frame in 0..frames {
-        let mut hasher = DefaultHasher::new();
-        of(frame).iter().for_each(|value| (value.re.to_bits(), value.im.to_bits()).hash(&mut hasher));
-        let first = *seen.entry(hasher.finish()).or_insert(frame);
-        if first != frame && of(first) == of(frame) {
-            copies.push([frame, first]);
-        }
-    }
-    copies
+    (0..frames).filter_map(|frame| (0..frame).find(|&other| of(other) == of(frame)).map(|other| [frame, other])).collect()
 }
 
 #[cfg(test)]

@@ -17,6 +17,10 @@ use crate::diagnosis::Cube;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
 use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::suspects::receiver::{
+    field::distance,
+    support::{dot, energy},
+};
 
 /// Fewest frames, loops and samples that tell a slip.
 const FEWEST: [usize; 3] = [4, 4, 32];
@@ -64,7 +68,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let (Some(&first), Some(&last)) = (slipped.first(), slipped.last()) else { return vec![] };
     let most = slipped.iter().map(|&frame| late[frame]).max_by_key(|late| late.abs()).unwrap_or(0);
     let tried = (2 * reach * (frames - 1)) as f64;
-    let energy = slipped.iter().map(|&frame| moved(&evidence.cube, frame, late[frame])).sum();
+    let changed = slipped.iter().map(|&frame| moved(&evidence.cube, frame, late[frame])).sum();
     vec![Candidate {
         id: None,
         behaves_like: BEHAVES_LIKE,
@@ -83,7 +87,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         ),
         place: Place { frames: Some(slipped), ..Place::at("receiver") },
         curve: None,
-        energy,
+        energy: changed,
         correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
             cube.each_chirp(|[frame, ..], chirp| turn(chirp, late[frame]))
         })),
@@ -105,15 +109,14 @@ fn step(before: &[[Vec<Complex64>; 2]], after: &[[Vec<Complex64>; 2]], noise: &[
 
 /// Energy by which `after` is not `before` so many samples on.
 fn apart(before: &[Complex64], after: &[Complex64], inner: Range<usize>, lag: i64) -> f64 {
-    inner.map(|n| (after[n] - before[(n as i64 + lag) as usize]).norm_sqr()).sum()
+    let late = |n: usize| (n as i64 + lag) as usize;
+    distance(&after[inner.clone()], &before[late(inner.start)..late(inner.end)])
 }
 
 /// Energy by which `after` is not `before` with another gain and phase.
 fn scaled(before: &[Complex64], after: &[Complex64], inner: Range<usize>) -> f64 {
     let (before, after) = (&before[inner.clone()], &after[inner]);
-    let cross: Complex64 = before.iter().zip(after).map(|(before, after)| before.conj() * after).sum();
-    let energy = |values: &[Complex64]| values.iter().map(|value| value.norm_sqr()).sum::<f64>();
-    energy(after) - cross.norm_sqr() / energy(before).max(f64::MIN_POSITIVE)
+    energy(after) - dot(before, after).norm_sqr() / energy(before).max(f64::MIN_POSITIVE)
 }
 
 /// Brings samples that come so many too late back to their place.
@@ -128,40 +131,27 @@ fn moved(cube: &Cube, frame: usize, late: i64) -> f64 {
     let change = |chirp: &[Complex64]| -> f64 {
         let mut right = chirp.to_vec();
         turn(&mut right, late);
-        right.iter().zip(chirp).map(|(right, found)| (right - found).norm_sqr()).sum()
+        distance(&right, chirp)
     };
     chirps.map(change).sum()
 }
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
-    use crate::diagnosis::cube::Loaded;
     use crate::radar::Radar;
 
     /// Three static returns and a mover in noise; from frame 5 on as `change` has it: so many samples late, turned by a phase.
     fn evidence(late: usize, phase: f64) -> Evidence {
         let mut radar = Radar::small(8);
         (radar.loops_per_frame, radar.samples_per_chirp) = (16, 64);
-        let dims = radar.dims();
-        let mut random = ChaCha8Rng::seed_from_u64(4);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let [_, _, receivers, loops, samples] = dims;
-        let all: Vec<Complex64> = (0..dims.iter().product::<usize>())
-            .map(|i| {
-                let (n, slow, frame) = (i % samples, i / samples % loops, i / samples / loops / receivers);
-                let changed = frame >= 5;
-                let n = n as f64 - if changed { late as f64 } else { 0.0 };
-                let room = Complex64::cis(0.9 * n) * 30.0 + Complex64::cis(0.3 * n + 1.0) * 20.0 + Complex64::cis(1.7 * n) * 10.0;
-                let mover = Complex64::cis(0.6 * n + 0.03 * slow as f64 + 1.9 * frame as f64) * 4.0;
-                (room + mover) * Complex64::cis(if changed { phase } else { 0.0 }) + Complex64::new(normal(), normal())
-            })
-            .collect();
-        Evidence::new(Loaded::of_samples(radar, all, [-100.0, 100.0]), None, None)
+        Evidence::in_noise(radar, 4, |[frame, _, slow, n]| {
+            let changed = frame >= 5;
+            let n = n as f64 - if changed { late as f64 } else { 0.0 };
+            let room = Complex64::cis(0.9 * n) * 30.0 + Complex64::cis(0.3 * n + 1.0) * 20.0 + Complex64::cis(1.7 * n) * 10.0;
+            let mover = Complex64::cis(0.6 * n + 0.03 * slow as f64 + 1.9 * frame as f64) * 4.0;
+            (room + mover) * Complex64::cis(if changed { phase } else { 0.0 })
+        })
     }
 
     #[test]

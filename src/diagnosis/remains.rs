@@ -1,0 +1,87 @@
+//! What an accepted effect leaves behind: itself, where it could not be removed in full, and what a rough correction makes.
+
+use super::finding::Candidate;
+use super::suspects::receiver::harmonic;
+use super::suspects::{excess, paths};
+
+/// What has no name is modelled roughly, and these are modelled most roughly of all: what they leave, up to this share of
+/// their gain, takes any shape; and they come after whatever gains more than it.
+const ROUGH: [&str; 2] = ["additive fast-time", harmonic::QUADRATIC];
+pub const ROUGHLY: f64 = 0.1;
+
+/// What is undone chirp by chirp, each by its own estimate, leaves a little of everything that moves: paths below this share
+/// of its gain.
+const BY_CHIRP: [&str; 2] = ["phase_noise", "chirp_start_jitter"];
+const SLIGHTLY: f64 = 0.01;
+/// What a radar that vibrates leaves: turns of what stands still that are not quite undone, and their sidebands, up to this share of
+/// its gain (which counts what is left).
+const TURNS: [&str; 2] = ["slow-time phase", "delay-proportional phase"];
+const SHAKEN: f64 = 0.5;
+const FADING: &str = "slow-time gain";
+
+/// What is cut out where it is plain, and goes on below the noise.
+const BURSTS: [&str; 2] = ["interference", "impulsive_noise"];
+
+/// What explains a little of anything that moves near the body: remains of a strong path that was taken out.
+const OF_REMAINS: [&str; 2] = ["body_multibounce", "carried_reflector"];
+
+/// Two instances of an effect closer than this are one.
+const NEAR_M: f64 = 0.3;
+
+/// Whether a candidate is what was accepted already and could not be removed in full: a second instance of an effect must
+/// lie at another place.
+pub fn is_same(accepted: &Candidate, candidate: &Candidate) -> bool {
+    let (old, new) = (&accepted.place, &candidate.place);
+    accepted.id == candidate.id
+        && accepted.behaves_like == candidate.behaves_like
+        && old.boundary == new.boundary
+        && old.body_part == new.body_part
+        && old.rx == new.rx
+        && !apart(old.range_m, new.range_m)
+        && !apart(old.velocity_mps, new.velocity_mps)
+        && old.position_m.is_none_or(|old| {
+            new.position_m.is_none_or(|new| (0..3).map(|axis| (old[axis] - new[axis]).powi(2)).sum::<f64>() < NEAR_M * NEAR_M)
+        })
+}
+
+pub fn is_rough(candidate: &Candidate) -> bool {
+    candidate.id.is_none() && ROUGH.contains(&candidate.behaves_like)
+}
+
+pub fn is_by_chirp(candidate: &Candidate) -> bool {
+    candidate.id.is_some_and(|id| BY_CHIRP.contains(&id))
+}
+
+/// Whether a candidate may be no more than what a rough correction left, or what a moving path left around its range.
+pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
+    let is_path = |candidate: &Candidate| {
+        candidate.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_none_or(|id| paths::MANY.contains(&id))
+    };
+    let is_of_paths = |candidate: &Candidate| is_path(candidate) || candidate.id.is_some_and(|id| OF_REMAINS.contains(&id));
+    // An image of the body is all over the place: what else is there is something else.
+    let beside = is_path(accepted)
+        && is_of_paths(candidate)
+        && accepted.place.boundary.is_none()
+        && !apart(accepted.place.range_m, candidate.place.range_m)
+        && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
+    let by_chirp = is_by_chirp(accepted) && is_path(candidate);
+    // How much the returns of each range turn when the radar moves is known roughly: sidebands are left of them; and large
+    // turns change how much is received.
+    let vibrates = accepted.id == Some("radar_vibration");
+    let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
+    let shaken = vibrates && (turns || is_path(candidate));
+    let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
+    let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
+    // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it.
+    let behind = accepted.place.stage == "timing" && candidate.id == Some("body_multibounce");
+    // What bursts leave below the noise of single samples is in all receivers at once.
+    let bursts = accepted.id.is_some_and(|id| BURSTS.contains(&id)) && candidate.id == Some("correlated_noise");
+    // Up to which share of what was gained.
+    [(roughly || fades, ROUGHLY), (bursts || behind, 1.0), (shaken, SHAKEN), (by_chirp, SLIGHTLY)]
+        .into_iter()
+        .any(|(holds, share)| holds && candidate.gain < share * accepted.gain)
+}
+
+fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> bool {
+    matches!((a, b), (Some(a), Some(b)) if a[1] < b[0] || b[1] < a[0])
+}
