@@ -57,10 +57,10 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let is_path = |candidate: &Candidate| {
         candidate.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_none_or(|id| paths::MANY.contains(&id))
     };
-    let is_of_paths = |candidate: &Candidate| is_path(candidate) || candidate.id.is_some_and(|id| OF_REMAINS.contains(&id));
+    let of_remains = candidate.id.is_some_and(|id| OF_REMAINS.contains(&id));
     // An image of the body is all over the place: what else is there is something else.
     let beside = is_path(accepted)
-        && is_of_paths(candidate)
+        && (is_path(candidate) || of_remains)
         && accepted.place.boundary.is_none()
         && !apart(accepted.place.range_m, candidate.place.range_m)
         && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
@@ -73,7 +73,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it.
-    let behind = accepted.place.stage == "timing" && candidate.id == Some("body_multibounce");
+    let behind = accepted.place.stage == "timing" && of_remains;
     // What bursts leave below the noise of single samples is in all receivers at once.
     let bursts = accepted.id.is_some_and(|id| BURSTS.contains(&id)) && candidate.id == Some("correlated_noise");
     // Up to which share of what was gained.

@@ -4,15 +4,17 @@
 //! two receivers belongs to the receivers. A phase that grows in proportion to the receivers' places is a direction, and
 //! might as well be the body's; anything else, and any difference of power, cannot be. Neither depends on amplitudes.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{LN_10, PI, TAU};
 use std::sync::Arc;
 
+use nalgebra::DVector;
 use num_complex::Complex64;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::change::{Change, Moves};
 use super::coupling;
+use super::estimated::Estimated;
 use super::places::{self, Moments, neighbours};
 use crate::diagnosis::power::{PowerModel, part_templates};
 use crate::diagnosis::suspects::{paths::still_power, slow};
@@ -29,6 +31,8 @@ const STILL_LEFT: f64 = 1e-3;
 /// What the power model's errors do to a phase and to a power between neighbouring receivers (half a wavelength).
 const PHASE_FLOOR_RAD: f64 = 1.5 * PI / 180.0;
 const GAIN_FLOOR_DB: f64 = 0.2;
+/// Decibels of a natural logarithm of an amplitude.
+const DECIBEL: f64 = 20.0 / LN_10;
 /// Chance below which receivers are not alike.
 const UNEVEN: f64 = 0.05;
 /// Of the unevenness (squares), what a coupling may leave: a random one of four receivers lies so near to one that a
@@ -52,7 +56,7 @@ pub struct Sums {
 
 impl Sums {
     /// Of several groups of cells at once.
-    fn together(groups: &[Self]) -> Self {
+    pub fn together(groups: &[Self]) -> Self {
         let mut sum = groups[0].clone();
         sum.sine *= sum.cells;
         for group in &groups[1..] {
@@ -65,6 +69,17 @@ impl Sums {
         }
         sum.sine /= sum.cells.max(1.0);
         sum
+    }
+
+    /// Without one of those that were put together; the mean direction stays.
+    pub fn without(&self, part: &Self) -> Self {
+        let mut rest = self.clone();
+        rest.products.iter_mut().zip(&part.products).for_each(|(rest, product)| *rest -= product);
+        for (rest, own) in rest.along.iter_mut().zip(&part.along) {
+            rest.iter_mut().zip(own).for_each(|(rest, own)| *rest -= own);
+        }
+        rest.cells -= part.cells;
+        rest
     }
 
     pub fn receivers(&self) -> usize {
@@ -120,6 +135,8 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
         _ => {}
     }
     let Judgement { phases, gains, direction, own, bearing, aside, .. } = judge(&evidence.radar, &training);
+    let together = unlike(&evidence.radar, &groups).filter(|together| together.p_value < own);
+    let own = statistics::corrected(together.as_ref().map_or(own, |together| together.p_value), 2.0);
     let (places, wave) = (along(&evidence.radar), TAU / evidence.radar.wavelength_m());
     if own < UNEVEN {
         let amplitudes: Vec<Complex64> = std::iter::once(Complex64::ONE)
@@ -127,7 +144,7 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
                 phases.iter().zip(&gains).map(|(phase, gain)| Complex64::from_polar(10f64.powf(gain.value / 20.0), phase.value)),
             )
             .collect();
-        let gain = likelihood_gain(&training, &held_out, &amplitudes);
+        let gain = together.map_or_else(|| likelihood_gain(&training, &held_out, &amplitudes), |together| together.gain);
         return (gain > 0.0).then(|| mismatch(evidence, &phases, &gains, amplitudes, own, gain)).into_iter().collect();
     }
     if aside < 0.05 {
@@ -212,6 +229,31 @@ fn judge(radar: &Radar, training: &[Sums]) -> Judgement {
     let floor = PHASE_FLOOR_RAD / PI;
     let aside = if spread > 0.0 { statistics::corrected(p(bearing.value, floor, bearing.deviation), tried) } else { 1.0 };
     Judgement { phases, gains, direction, own, unevenness, bearing, aside }
+}
+
+/// Whether receivers are alike.
+struct Unlike {
+    p_value: f64,
+    gain: f64,
+}
+
+/// From the groups of all frames: powers against the first one's, and what differs between the phases of neighbours of one
+/// baseline, all at once. None where too few groups tell it.
+fn unlike(radar: &Radar, frames: &[&[Sums]]) -> Option<Unlike> {
+    let contrast = places::contrast(radar)?;
+    let receivers = radar.rx_m.len();
+    // As deviations; as bounds they are two of them.
+    let floors: Vec<f64> = std::iter::repeat_n(0.5 * GAIN_FLOOR_DB / DECIBEL, receivers - 1)
+        .chain(std::iter::repeat_n(0.5 * PHASE_FLOOR_RAD, contrast.nrows()))
+        .collect();
+    let numbers = |sums: &Sums| -> Option<DVector<f64>> {
+        let phases = &contrast * DVector::from_iterator(sums.along.len(), sums.along.iter().map(|along| along[0].arg()));
+        let gains = (1..receivers).map(|rx| 0.5 * (sums.own(rx) / sums.own(0)).ln());
+        let all = DVector::from_iterator(floors.len(), gains.chain(phases.iter().copied()));
+        all.iter().all(|value| value.is_finite()).then_some(all)
+    };
+    let found = Estimated::new(frames, &floors, numbers)?;
+    Some(Unlike { p_value: found.p_value()?, gain: found.foretold(frames, numbers)? })
 }
 
 /// Two-sided, of Student's law.

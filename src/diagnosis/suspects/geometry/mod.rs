@@ -5,6 +5,7 @@ mod change;
 mod channels;
 mod coupling;
 mod displaced;
+mod estimated;
 mod places;
 mod trial;
 

@@ -10,8 +10,8 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::channels::Sums;
-use crate::diagnosis::cube::FOLDS;
-use crate::diagnosis::statistics::{corrected, fisher_tail};
+use super::estimated::Estimated;
+use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
 use crate::radar::Radar;
 
@@ -23,8 +23,6 @@ const FLOOR: f64 = 0.02;
 const LIKELY: f64 = 1e-3;
 /// The family's looks at the receivers.
 const TRIED: f64 = 2.0;
-/// Groups of cells per contrast that are needed for an error of it.
-const FEWEST: usize = 8;
 
 /// Products of the neighbours along x over some cells, weighted with the powers 0, 1 and 2 of the sine of the cells' directions.
 pub type Moments = [Complex64; 3];
@@ -39,34 +37,18 @@ pub fn neighbours(radar: &Radar) -> Vec<[usize; 2]> {
 /// `frames`: groups of cells, by frame.
 pub fn find(evidence: &Evidence, frames: &[&[Sums]]) -> Option<Candidate> {
     let contrast = contrast(&evidence.radar)?;
-    let freedom = contrast.nrows() as f64;
-    let found = Growth::new(frames, &contrast)?;
-    // Hotelling's law of a mean whose covariance comes from as many groups.
-    let below = found.groups - freedom;
-    let ratio = found.square(&found.values)? * below / (freedom * (found.groups - 1.0));
-    let p_value = corrected(fisher_tail(ratio, freedom, below), TRIED);
+    let grown = |sums: &Sums| growth(sums, &contrast);
+    let found = Estimated::new(frames, &vec![FLOOR; contrast.nrows()], grown)?;
+    let p_value = corrected(found.p_value()?, TRIED);
     if p_value > LIKELY {
         return None;
     }
-    // How much better each fold is foretold by the others: its own fit has the same covariance but for its number.
-    let gain: Option<f64> = (0..FOLDS)
-        .map(|fold| {
-            let part = |inside: bool| {
-                let of_fold = move |index: &usize| (index % FOLDS == fold) == inside;
-                (0..frames.len()).filter(of_fold).map(|index| frames[index]).collect::<Vec<&[Sums]>>()
-            };
-            let (rest, held) = (part(false), part(true));
-            let [expected, seen] = [Growth::fitted(&total(&rest), &contrast)?, Growth::fitted(&total(&held), &contrast)?];
-            let share = held.iter().map(|groups| groups.len()).sum::<usize>() as f64 / found.groups;
-            Some(0.5 * share * (found.square(&seen)? - found.square(&(&seen - &expected))?))
-        })
-        .sum();
-    let gain = gain.filter(|gain| *gain > 0.0)?;
+    let gain = found.foretold(frames, grown).filter(|gain| *gain > 0.0)?;
     Some(candidate(evidence, &contrast, &found, p_value, gain))
 }
 
 /// Differences between pairs of one baseline, `[difference, pair]` with orthonormal rows. None where no two pairs are alike.
-fn contrast(radar: &Radar) -> Option<DMatrix<f64>> {
+pub fn contrast(radar: &Radar) -> Option<DMatrix<f64>> {
     let pairs = neighbours(radar);
     let baselines: Vec<f64> = pairs.iter().map(|[far, near]| radar.rx_m[*far][0] - radar.rx_m[*near][0]).collect();
     let alike = |a: f64, b: f64| (a - b).abs() < SAME_BASELINE * a.abs().max(b.abs());
@@ -84,78 +66,18 @@ fn contrast(radar: &Radar) -> Option<DMatrix<f64>> {
     (!rows.is_empty()).then(|| DMatrix::from_fn(rows.len(), pairs.len(), |row, pair| rows[row][pair]))
 }
 
-/// In the contrasts, how the phase of a pair grows with the sine.
-struct Growth {
-    values: DVector<f64>,
-    covariance: DMatrix<f64>,
-    groups: f64,
-}
-
-impl Growth {
-    /// With the errors that come from leaving out one group after the other, or one frame, whichever is more: what is wrong of a
-    /// frame's body is wrong of all its groups.
-    fn new(frames: &[&[Sums]], contrast: &DMatrix<f64>) -> Option<Self> {
-        let all = total(frames);
-        let values = Self::fitted(&all, contrast)?;
-        let groups: Vec<Vec<Moments>> = frames.iter().flat_map(|groups| groups.iter().map(|group| group.along.clone())).collect();
-        if groups.len() < FEWEST * contrast.nrows() {
-            return None;
-        }
-        let by_frame: Vec<Vec<Moments>> = frames.iter().map(|groups| total(&[*groups])).collect();
-        let mut covariance = jackknife(&all, &groups, contrast)?;
-        let of_frames = jackknife(&all, &by_frame, contrast)?;
-        covariance *= (of_frames.trace() / covariance.trace().max(f64::MIN_POSITIVE)).max(1.0);
-        (0..covariance.nrows()).for_each(|i| covariance[(i, i)] += FLOOR * FLOOR);
-        Some(Self { values, covariance, groups: groups.len() as f64 })
-    }
-
-    /// In units of the covariance.
-    fn square(&self, values: &DVector<f64>) -> Option<f64> {
-        Some(values.dot(&self.covariance.clone().cholesky()?.solve(values)))
-    }
-
-    /// A straight line through the phases of every pair, by weighted least squares.
-    fn fitted(total: &[Moments], contrast: &DMatrix<f64>) -> Option<DVector<f64>> {
-        let slope = |moments: &Moments| {
-            let [zero, one, two] = moments.map(|moment| moment * Complex64::cis(-moments[0].arg()));
-            (one.im * zero.re - zero.im * one.re) / (zero.re * two.re - one.re * one.re)
-        };
-        let values = contrast * DVector::from_iterator(total.len(), total.iter().map(slope));
-        values.iter().all(|value| value.is_finite()).then_some(values)
-    }
-}
-
-/// Covariance from leaving out one part after the other.
-fn jackknife(all: &[Moments], parts: &[Vec<Moments>], contrast: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let without = |part: &Vec<Moments>| -> Option<DVector<f64>> {
-        let rest: Vec<Moments> =
-            all.iter().zip(part).map(|(all, own)| std::array::from_fn(|order| all[order] - own[order])).collect();
-        Growth::fitted(&rest, contrast)
+/// In the contrasts, how the phase of a pair grows with the sine: a straight line through the phases of every pair, by weighted
+/// least squares.
+fn growth(sums: &Sums, contrast: &DMatrix<f64>) -> Option<DVector<f64>> {
+    let slope = |moments: &Moments| {
+        let [zero, one, two] = moments.map(|moment| moment * Complex64::cis(-moments[0].arg()));
+        (one.im * zero.re - zero.im * one.re) / (zero.re * two.re - one.re * one.re)
     };
-    let without: Vec<DVector<f64>> = parts.iter().map(without).collect::<Option<_>>()?;
-    let count = without.len() as f64;
-    let mean = without.iter().sum::<DVector<f64>>() / count;
-    let mut covariance = DMatrix::zeros(mean.len(), mean.len());
-    for other in &without {
-        let off = other - &mean;
-        covariance += &off * off.transpose() * ((count - 1.0) / count);
-    }
-    Some(covariance)
+    let values = contrast * DVector::from_iterator(sums.along.len(), sums.along.iter().map(slope));
+    values.iter().all(|value| value.is_finite()).then_some(values)
 }
 
-/// Of all groups at once, by pair.
-fn total(frames: &[&[Sums]]) -> Vec<Moments> {
-    let mut groups = frames.iter().flat_map(|groups| groups.iter()).map(|group| &group.along);
-    let mut total = groups.next().cloned().unwrap_or_default();
-    for group in groups {
-        for (total, own) in total.iter_mut().zip(group) {
-            total.iter_mut().zip(own).for_each(|(total, own)| *total += own);
-        }
-    }
-    total
-}
-
-fn candidate(evidence: &Evidence, contrast: &DMatrix<f64>, found: &Growth, p_value: f64, gain: f64) -> Candidate {
+fn candidate(evidence: &Evidence, contrast: &DMatrix<f64>, found: &Estimated, p_value: f64, gain: f64) -> Candidate {
     let radar = &evidence.radar;
     let wave = TAU / radar.wavelength_m();
     let pairs = neighbours(radar);

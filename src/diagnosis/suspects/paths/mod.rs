@@ -33,7 +33,7 @@ const LEAST_GAIN: f64 = 6.0;
 /// Of a track that follows the law of a thing that moves: faint products of two paths come near it.
 const LEAST_GAIN_TRACK: f64 = 12.0;
 /// Of a swing that no single frame shows: where the body is not quite where it should be, something near it comes close to one.
-const LEAST_GAIN_SWING: f64 = 10.0;
+const LEAST_GAIN_SWING: f64 = 8.0;
 /// Of a track that follows no law of motion: remains of a strong path that was taken out look like that.
 const LEAST_GAIN_UNNAMED: f64 = 25.0;
 /// Of a second path: it must be no remains of the first.

@@ -13,6 +13,7 @@ use super::mover::{Mover, WIDEST_SWING_M, middle_s};
 use super::pendulum::{Law, Pendulum, at};
 use super::scene::Scene;
 use super::track::{Sighting, Track};
+use crate::diagnosis::cube::FOLDS;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::{Candidate, Correction, Point};
 
@@ -29,6 +30,8 @@ const LONGEST_TAIL: f64 = 100.0;
 /// and by how much that exceeds what was.
 const STRAY: f64 = 0.05;
 const STRAY_POWER: f64 = 30.0;
+/// Log-likelihood of a look from which on its say is bounded.
+const MOST_NATS: f64 = 12.0;
 /// Cells of the fine grid beside a swing's ranges where what stands still may be taken for it.
 const BESIDE: i64 = 4;
 /// Share of a swing's gain from which on something that stands still explains it.
@@ -131,7 +134,7 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
         (best, gain) = ground.fitted(best, longer, middle_s(scene, longer[count - 1]) - start_s);
     }
     ground.beams.prepare(&split.held_out);
-    let again = ground.gain(best, &split.held_out);
+    let again = split.held_out_share() * ground.foretold(best, start_s);
     let deviations = ground.deviations(best, gain, &every[..count], middle_s(scene, every[count - 1]) - start_s);
     // What may as well not swing at all, or is always in the cell of what stands still, only flickers.
     let swing_m = best.law[1].hypot(best.law[2]);
@@ -189,7 +192,7 @@ impl Ground<'_> {
             (1.0 - stray) * exponent.exp() + strays
         };
         let without = density(look.expected).max(1e-300);
-        move |more| (density(look.expected + more) / without).max(1e-300).ln()
+        move |more| bounded((density(look.expected + more) / without).max(1e-300).ln())
     }
 
     fn table(&self, frames: &[usize]) -> Table {
@@ -234,6 +237,17 @@ impl Ground<'_> {
         let start = numbers(guess);
         let (found, gain) = climb(start, gain(start), &widths, gain, |a, b| a > b);
         (swing(found), gain)
+    }
+
+    /// What all frames gain, each foretold by those of the other folds: few held-out ones may all be among the body's returns.
+    fn foretold(&self, best: Swing, start_s: f64) -> f64 {
+        let frames = self.scene.frames();
+        let length_s = middle_s(self.scene, frames - 1) - start_s;
+        let of_fold = |fold: usize| {
+            let (held, rest): (Vec<usize>, Vec<usize>) = (0..frames).partition(|frame| frame % FOLDS == fold);
+            self.gain(self.fitted(best, &rest, length_s).0, &held)
+        };
+        (0..FOLDS).map(of_fold).sum()
     }
 
     /// Of mean, swing, rate and direction: half of where the likelihood has fallen to that of a 90 % interval's ends, the
@@ -283,13 +297,13 @@ impl Ground<'_> {
         })
     }
 
-    /// Whether some point of the body is where the swing is in most frames, so that it may be a limb whose returns are stronger
-    /// than expected; or the swing goes where the body goes, so that it may be the body seen in another way.
+    /// Whether some point of the body is where the swing is in the frames that show most of it, so that it may be a limb whose
+    /// returns are stronger than expected; or the swing goes where the body goes, so that it may be the body seen in another way.
     fn moves_with_the_body(&self, swing: Swing) -> bool {
         let evidence = self.scene.evidence;
         let Some(body) = &evidence.body else { return false };
         let centre = evidence.radar.centre_m();
-        let with = (0..self.scene.frames()).filter(|&frame| {
+        let near = |&frame: &usize| {
             let (doppler, range) = self.place(swing.law, frame);
             body.frames[frame].iter().any(|point: &Point| {
                 let (range_m, velocity) = range_and_velocity(&evidence.radar, point.position_m, point.velocity_mps);
@@ -299,7 +313,10 @@ impl Ground<'_> {
                     && (place.1 - range).abs() < NEAR[1]
                     && (sine - swing.sine).abs() < SAME_DIRECTION
             })
-        });
+        };
+        let shown = |frame: usize| self.gain_at(frame, self.place(swing.law, frame), swing.sine, swing.log_power.exp()).max(0.0);
+        let with: f64 = (0..self.scene.frames()).filter(near).map(shown).sum();
+        let all: f64 = (0..self.scene.frames()).map(shown).sum();
         let ranges: Vec<[f64; 2]> = (0..self.scene.frames())
             .filter_map(|frame| {
                 let (sum, weight) = self.beams.body(frame).iter().fold((0.0, 0.0), |(sum, weight), (point, power)| {
@@ -313,7 +330,7 @@ impl Ground<'_> {
             let mean = ranges.iter().map(values).sum::<f64>() / ranges.len().max(1) as f64;
             ranges.iter().map(|range| (values(range) - mean).powi(2)).sum()
         };
-        2 * with.count() > self.scene.frames() || spread(&|[swing, body]| swing - body) < PARALLEL * spread(&|[swing, _]| *swing)
+        2.0 * with > all || spread(&|[swing, body]| swing - body) < PARALLEL * spread(&|[swing, _]| *swing)
     }
 
     /// Most probable amplitudes, given that they are as strong as fitted.
@@ -329,6 +346,12 @@ impl Ground<'_> {
             })
             .collect()
     }
+}
+
+/// A look that shows far more than expected may show something else: beyond a bound its say grows like a logarithm, so that one
+/// frame beside the body cannot outvote all those within it.
+fn bounded(nats: f64) -> f64 {
+    if nats > MOST_NATS { MOST_NATS + (nats - MOST_NATS).ln_1p() } else { nats }
 }
 
 /// Logarithm of what makes the density of an F law's ratio (so many looks, a heavy tail) one.

@@ -115,13 +115,14 @@ fn judged(evidence: &Evidence, steady: &Steady, unit: Axis) -> Option<Judged> {
     Some(Judged { unit, members: relative.members, series: all, p_value, gain })
 }
 
-/// Of two halves' gains over some frames: one where both change alike.
+/// Of two halves' gains over some frames, without what the noise adds to each: about one where both change alike.
 fn correlation(halves: &[Series; 2], frames: &[usize]) -> f64 {
     let sums = frames.iter().filter(|&&f| halves.iter().all(|h| h.weight[f] > 0.0)).fold([0.0; 3], |sums, &f| {
         let [a, b] = [halves[0].value[f], halves[1].value[f]];
-        [sums[0] + (a * b.conj()).re, sums[1] + a.norm_sqr(), sums[2] + b.norm_sqr()]
+        let own = |half: usize| halves[half].value[f].norm_sqr() - 1.0 / halves[half].weight[f];
+        [sums[0] + (a * b.conj()).re, sums[1] + own(0), sums[2] + own(1)]
     });
-    sums[0] / (sums[1] * sums[2]).sqrt().max(f64::MIN_POSITIVE)
+    if sums[1].min(sums[2]) > 0.0 { sums[0] / (sums[1] * sums[2]).sqrt() } else { 0.0 }
 }
 
 impl Relative {
