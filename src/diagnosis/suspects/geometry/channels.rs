@@ -466,3 +466,30 @@ fn aside_of(evidence: &Evidence, bearing: Mean, range_m: f64, moves: Moves, p_va
         correction: Correction::Body(Arc::new(move |body| moves.apply(body, change))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::suspects::geometry::estimated::walking;
+
+    #[test]
+    fn receivers_that_differ_are_told_by_all_groups_together_and_a_turned_array_is_not() {
+        let mut radar = Radar::small(12);
+        radar.rx_m = (0..4).map(|rx| [0.5 * f64::from(rx) * radar.wavelength_m(), 0.0, 0.0]).collect();
+        let look = |seed: u64, of: &[Complex64; 4]| {
+            let frames = walking(&radar, seed, |rx, _| of[rx]);
+            unlike(&radar, &frames.iter().map(Vec::as_slice).collect::<Vec<_>>()).expect("enough groups")
+        };
+        let differ =
+            [(1.0, 0.0), (0.87, 0.11), (1.06, 0.16), (0.95, 0.04)].map(|(gain, phase)| Complex64::from_polar(gain, phase));
+        let found = look(1, &differ);
+        assert!(found.p_value < 1e-3 && found.gain > 6.0, "{} {}", found.p_value, found.gain);
+        for seed in 2..12 {
+            let turned = [0.0, 0.2, 0.4, 0.6].map(Complex64::cis);
+            for alike in [[Complex64::ONE; 4], turned] {
+                let found = look(seed, &alike);
+                assert!(found.p_value > 0.01, "{} {}", found.p_value, found.gain);
+            }
+        }
+    }
+}

@@ -81,3 +81,47 @@ fn jackknife(without: &[DVector<f64>]) -> DMatrix<f64> {
     }
     covariance
 }
+
+/// Cells of a body that walks across, after the declared steering, by frame and group; `change`: what a receiver makes of what
+/// comes from a sine.
+#[cfg(test)]
+pub fn walking(radar: &crate::radar::Radar, seed: u64, change: impl Fn(usize, f64) -> num_complex::Complex64) -> Vec<Vec<Sums>> {
+    use num_complex::Complex64;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::places::{Moments, neighbours};
+
+    const CELLS: usize = 12;
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let wave = std::f64::consts::TAU / radar.wavelength_m();
+    let pairs = neighbours(radar);
+    let receivers = radar.rx_m.len();
+    let mut group = |middle: f64| {
+        let mut along = vec![Moments::default(); pairs.len()];
+        let mut products = vec![Complex64::ZERO; receivers * receivers];
+        for _ in 0..CELLS {
+            let sine = middle + 0.1 * (random.random::<f64>() - 0.5);
+            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+            let field = Complex64::new(normal(), normal());
+            // Errors of the prediction turn all pairs alike.
+            let aside = 0.05 * normal();
+            let heard: Vec<Complex64> = (0..receivers)
+                .map(|rx| {
+                    let turn = Complex64::cis(-wave * radar.rx_m[rx][0] * aside);
+                    field * turn * change(rx, sine) + Complex64::new(normal(), normal()) * 0.3
+                })
+                .collect();
+            products.iter_mut().enumerate().for_each(|(i, sum)| *sum += heard[i / receivers] * heard[i % receivers].conj());
+            for (along, &[far, near]) in along.iter_mut().zip(&pairs) {
+                let mut cross = heard[far] * heard[near].conj();
+                for moment in along.iter_mut() {
+                    *moment += cross;
+                    cross *= sine;
+                }
+            }
+        }
+        Sums { products, along, cells: CELLS as f64, range_m: 3.0, sine: middle }
+    };
+    (0..12).map(|frame| (0..5).map(|_| group(0.05 * f64::from(frame) - 0.25)).collect()).collect()
+}

@@ -131,12 +131,9 @@ fn candidate(evidence: &Evidence, contrast: &DMatrix<f64>, found: &Estimated, p_
 
 #[cfg(test)]
 mod tests {
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
     use crate::diagnosis::cube::Loaded;
+    use crate::diagnosis::suspects::geometry::estimated::walking;
 
     const RECEIVERS: usize = 4;
 
@@ -148,43 +145,12 @@ mod tests {
         Evidence::new(Loaded::of_samples(radar, samples, [-1.0, 1.0]), None, None)
     }
 
-    /// Cells of a body that walks across, after the declared steering; `offsets_m`: of the receivers.
-    fn frames(radar: &Radar, seed: u64, offsets_m: [f64; RECEIVERS]) -> Vec<Vec<Sums>> {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let wave = TAU / radar.wavelength_m();
-        let pairs = neighbours(radar);
-        let mut group = |middle: f64| {
-            let mut along = vec![Moments::default(); pairs.len()];
-            for _ in 0..12 {
-                let sine = middle + 0.1 * (random.random::<f64>() - 0.5);
-                let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-                let field = Complex64::new(normal(), normal());
-                // Errors of the prediction turn all pairs alike.
-                let aside = 0.05 * normal();
-                let heard: Vec<Complex64> = (0..RECEIVERS)
-                    .map(|rx| {
-                        let phase = -wave * (offsets_m[rx] * sine + radar.rx_m[rx][0] * aside);
-                        field * Complex64::cis(phase) + Complex64::new(normal(), normal()) * 0.3
-                    })
-                    .collect();
-                for (along, &[far, near]) in along.iter_mut().zip(&pairs) {
-                    let mut cross = heard[far] * heard[near].conj();
-                    for moment in along.iter_mut() {
-                        *moment += cross;
-                        cross *= sine;
-                    }
-                }
-            }
-            Sums { products: vec![Complex64::ONE; 16], along, cells: 12.0, range_m: 3.0, sine: middle }
-        };
-        (0..12).map(|frame| (0..5).map(|_| group(0.05 * f64::from(frame) - 0.25)).collect()).collect()
-    }
-
     #[test]
     fn displaced_receivers_are_found_and_a_common_stretch_is_none() {
         let evidence = evidence();
         let look = |seed: u64, offsets_m: [f64; RECEIVERS]| {
-            let frames = frames(&evidence.radar, seed, offsets_m);
+            let wave = TAU / evidence.radar.wavelength_m();
+            let frames = walking(&evidence.radar, seed, |rx, sine| Complex64::cis(-wave * offsets_m[rx] * sine));
             find(&evidence, &frames.iter().map(Vec::as_slice).collect::<Vec<_>>())
         };
         let offsets_m = [0.0, 3e-4, -2e-4, 1e-4];

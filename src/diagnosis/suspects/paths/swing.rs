@@ -7,7 +7,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::bank::{Gains, LEAST_BINS, LEVELS, Swing, Table, around, climb, widths};
+use super::bank::{Gains, LEAST_BINS, LEVELS, Standing, Swing, Table, around, climb, widths};
 use super::beams::{Beams, Look};
 use super::mover::{Mover, WIDEST_SWING_M, middle_s};
 use super::pendulum::{Law, Pendulum, at};
@@ -32,6 +32,9 @@ const STRAY: f64 = 0.05;
 const STRAY_POWER: f64 = 30.0;
 /// Log-likelihood of a look from which on its say is bounded.
 const MOST_NATS: f64 = 12.0;
+/// Logarithm of the power over what is expected, mean over the frames, that the same swing has more at another range: side lobes are
+/// weaker by more.
+const STRONGER: f64 = 1.0;
 /// Cells of the fine grid beside a swing's ranges where what stands still may be taken for it.
 const BESIDE: i64 = 4;
 /// Share of a swing's gain from which on something that stands still explains it.
@@ -103,14 +106,27 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
     ground.beams.prepare(&held_out);
     let table = ground.table(&training);
     let (guesses, tried) = table.bank(scene, length_s);
-    let fits = guesses.iter().map(|guess| ground.fitted(*guess, &training, length_s));
-    let judged = fits.map(|(swing, gain)| (swing, gain, ground.gain(swing, &held_out)));
-    let (mut best, mut gain, again) = judged.max_by(|a, b| (a.1 + a.2).total_cmp(&(b.1 + b.2)))?;
+    let judged = |guess: Swing| {
+        let (swing, gain) = ground.fitted(guess, &training, length_s);
+        (swing, gain, ground.gain(swing, &held_out))
+    };
+    let fits = guesses.iter().map(|guess| judged(*guess));
+    let mut found = fits.max_by(|a, b| (a.1 + a.2).total_cmp(&(b.1 + b.2)))?;
+    // Beside the body the side lobes of what swings within it say more than it says there itself.
+    if let Some(stronger) = ground.stronger_elsewhere(found.0, &training) {
+        found = Some(judged(stronger)).filter(|other| other.2 > 0.0).unwrap_or(found);
+    }
+    let (mut best, mut gain, again) = found;
     // A likelihood ratio is large by chance no more often than its inverse says: that of all frames, one of all that were tried.
     // Where something that stands still is not steady, it must be beaten.
     let ranges = table.places(scene, best.law).into_iter().map(|place| place.1);
     let ranges = ranges.clone().min()? - BESIDE..=ranges.max()? + BESIDE;
-    let standing = table.standing(ranges).map_or((0.0, 0.0), |(standing, tried)| {
+    // Where it stands out from what swings it is no side lobe of that.
+    let outstands = |standing: &Standing| {
+        ground.strength(&training, |_| standing.place, standing.sine)[0] + STRONGER
+            > ground.strength(&training, |frame| ground.place(best.law, frame), best.sine)[0]
+    };
+    let standing = table.standing(ranges).filter(|(standing, _)| outstands(standing)).map_or((0.0, 0.0), |(standing, tried)| {
         let of_frame = |&frame: &usize| ground.gain_at(frame, standing.place, standing.sine, standing.power);
         (standing.gain + held_out.iter().map(of_frame).sum::<f64>(), tried.ln())
     });
@@ -227,6 +243,30 @@ impl Ground<'_> {
 
     fn gain_at(&self, frame: usize, place: (f64, f64), sine: f64, power: f64) -> f64 {
         self.beams.look(frame, place, sine).map_or(0.0, |look| self.gained(look)(power))
+    }
+
+    /// Mean logarithms over some frames of the power over what is expected there, and of the power.
+    fn strength(&self, frames: &[usize], place: impl Fn(usize) -> (f64, f64), sine: f64) -> [f64; 2] {
+        let looks: Vec<Look> = frames.iter().filter_map(|&frame| self.beams.look(frame, place(frame), sine)).collect();
+        let mean = |of: &dyn Fn(&Look) -> f64| looks.iter().map(of).sum::<f64>() / frames.len() as f64;
+        [mean(&|look| (look.power / look.expected).ln_1p()), mean(&|look| look.power.max(1e-9).ln())]
+    }
+
+    /// The same swing at another range, where it is the stronger by far in proportion to what is expected there: none where its
+    /// own range is the best one.
+    fn stronger_elsewhere(&self, swing: Swing, frames: &[usize]) -> Option<Swing> {
+        let strength = |swing: Swing| self.strength(frames, |frame| self.place(swing.law, frame), swing.sine);
+        let step_m = self.scene.range_m(1.0) / 2.0;
+        let at = |step: usize| {
+            let mut moved = swing;
+            moved.law[0] = step as f64 * step_m;
+            let [ratio, log_power] = strength(moved);
+            (ratio, Swing { log_power, ..moved })
+        };
+        let own = strength(swing)[0];
+        let ranges: Vec<(f64, Swing)> = (1..2 * self.scene.samples).into_par_iter().map(at).collect();
+        let best = ranges.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (best.0 > own + STRONGER).then_some(best.1)
     }
 
     /// The best swing near a first guess, and its gain.

@@ -270,3 +270,27 @@ impl Judged {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_that_change_alike_are_told_in_noise_and_others_are_not() {
+        // Signal and noise of both halves are orthogonal to each other; the noise has half of the signal's energy.
+        let half = |signal: [f64; 4], noise: [f64; 4]| Series {
+            value: signal.iter().zip(noise).map(|(signal, noise)| (signal + 0.7 * noise).into()).collect(),
+            weight: vec![1.0 / 0.49; 4],
+            p_value: 0.0,
+        };
+        let (hops, stays) = ([1.0, -1.0, 1.0, -1.0], [1.0; 4]);
+        let noise = [[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, -1.0, 1.0]];
+        let frames = [0, 1, 2, 3];
+        let alike = correlation(&[half(hops, noise[0]), half(hops, noise[1])], &frames);
+        assert!((alike - 1.0).abs() < 1e-9, "{alike}");
+        let unlike = correlation(&[half(hops, noise[0]), half(stays, noise[1])], &frames);
+        assert!(unlike.abs() < 0.5, "{unlike}");
+        // No more than the noise.
+        assert_eq!(correlation(&[half([0.0; 4], noise[0].map(|noise| 0.9 * noise)), half(hops, noise[1])], &frames), 0.0);
+    }
+}
