@@ -41,9 +41,8 @@ pub struct Loaded {
 const FEWEST_FRAMES: usize = 4;
 /// Every so many-th frame is held out.
 const HELD_OUT_EVERY: usize = 4;
-/// Parts of the frames, each of which is foretold by the others, where few held-out ones would say little: every so many-th
-/// frame is in one.
-pub const FOLDS: usize = 4;
+/// Parts of the frames, each of which is foretold by the others.
+const FOLDS: usize = 4;
 /// At most one loop in so many is dropped by cutting into equal blocks.
 const MOST_DROPPED: usize = 20;
 /// Fewest loops in a block.
@@ -91,6 +90,15 @@ pub fn mean_chirp<'a>(chirps: impl Iterator<Item = &'a [Complex64]>, samples: us
     }
     mean.iter_mut().for_each(|value| *value /= count.max(1.0));
     mean
+}
+
+/// Frames of the others and of its own, fold by fold: where few held-out ones would say little, every part is foretold by the rest.
+/// Every so many-th frame is in one.
+pub fn folds(frames: usize) -> impl Iterator<Item = [Vec<usize>; 2]> {
+    (0..FOLDS).map(move |fold| {
+        let (own, others) = (0..frames).partition(|frame| frame % FOLDS == fold);
+        [others, own]
+    })
 }
 
 impl Split {

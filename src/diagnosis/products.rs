@@ -6,7 +6,7 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::cube::{FOLDS, mean_chirp};
+use super::cube::{folds, mean_chirp};
 use super::denoised;
 use super::evidence::{Evidence, spectrum, transform};
 use super::statistics::{chi2_tail, corrected};
@@ -123,14 +123,12 @@ fn judged(product: Product, sums: &[Sums], peak: f64) -> Option<Law> {
     let scatter = jackknife(sums, &whole).max(variance.sqrt());
     let p_value = corrected(chi2_tail(2.0 * kappa.norm_sqr() / (scatter * scatter), 2.0), 2.0);
     // Every frame is foretold by those of the other folds.
-    let of_fold = |fold: usize| {
-        let part =
-            |inside: bool| total((0..sums.len()).filter(|frame| (frame % FOLDS == fold) == inside).map(|frame| &sums[frame]));
-        let [rest, fold] = [part(false), part(true)];
+    let of_fold = |parts: [Vec<usize>; 2]| {
+        let [rest, fold] = parts.map(|frames| total(frames.into_iter().map(|frame| &sums[frame])));
         let kappa = rest.cross / rest.template.max(f64::MIN_POSITIVE);
         (2.0 * (kappa.conj() * fold.cross).re - kappa.norm_sqr() * fold.template) / widening
     };
-    let gain: f64 = (0..FOLDS).map(of_fold).sum();
+    let gain: f64 = folds(sums.len()).map(of_fold).sum();
     // A receiver that expands instead of compressing, or turns phases more than amplitudes, is none.
     let possible = gain > 0.0 && !(product == Product::Cube && kappa.re > 0.0);
     possible.then_some(Law { product, kappa, scatter, p_value, gain, peak })

@@ -3,6 +3,9 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Gamma, Normal};
 use statrs::function::beta::inv_beta_reg;
 
+/// Decibels of a natural logarithm of an amplitude.
+pub const DECIBEL: f64 = 20.0 / std::f64::consts::LN_10;
+
 /// Scale of an exponential distribution from its lower `quantile` (between 0 and 1): large values do not count.
 pub fn exponential_scale(values: &mut [f64], quantile: f64) -> f64 {
     if values.is_empty() {

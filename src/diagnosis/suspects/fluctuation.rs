@@ -8,7 +8,6 @@
 mod hum;
 mod silhouette;
 
-use std::f64::consts::LN_10;
 use std::sync::Arc;
 
 use num_complex::Complex64;
@@ -16,7 +15,7 @@ use rustfft::FftPlanner;
 
 use crate::diagnosis::evidence::{Evidence, Tapered, blackman_harris};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Rung};
-use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::statistics::{DECIBEL, chi2_tail, corrected};
 
 /// Metres around the body's surface that its own slow returns may reach.
 const MARGIN_M: f64 = 0.4;
@@ -294,7 +293,7 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, named: bool, p_va
     let square: f64 = series.change.iter().map(|value| value.norm_sqr()).sum();
     let rms = (square / series.change.len() as f64).sqrt();
     let change = series.change.clone();
-    let decibel: Vec<f64> = change.iter().map(|v| 20.0 / LN_10 * (1.0 + v).norm().max(1e-3).ln()).collect();
+    let decibel: Vec<f64> = change.iter().map(|v| DECIBEL * (1.0 + v).norm().max(1e-3).ln()).collect();
     let [low, high] = decibel.iter().fold([f64::MAX, f64::MIN], |[l, h], &v| [l.min(v), h.max(v)]);
     let why = if named {
         "when the body's silhouette covers it: the body casts a shadow on the room."

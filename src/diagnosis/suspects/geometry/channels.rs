@@ -4,7 +4,7 @@
 //! two receivers belongs to the receivers. A phase that grows in proportion to the receivers' places is a direction, and
 //! might as well be the body's; anything else, and any difference of power, cannot be. Neither depends on amplitudes.
 
-use std::f64::consts::{LN_10, PI, TAU};
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use nalgebra::DVector;
@@ -17,6 +17,7 @@ use super::coupling;
 use super::estimated::Estimated;
 use super::places::{self, Moments, neighbours};
 use crate::diagnosis::power::{PowerModel, part_templates};
+use crate::diagnosis::statistics::DECIBEL;
 use crate::diagnosis::suspects::{paths::still_power, slow};
 use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, Rung, statistics};
 use crate::radar::Radar;
@@ -31,8 +32,6 @@ const STILL_LEFT: f64 = 1e-3;
 /// What the power model's errors do to a phase and to a power between neighbouring receivers (half a wavelength).
 const PHASE_FLOOR_RAD: f64 = 1.5 * PI / 180.0;
 const GAIN_FLOOR_DB: f64 = 0.2;
-/// Decibels of a natural logarithm of an amplitude.
-const DECIBEL: f64 = 20.0 / LN_10;
 /// Chance below which receivers are not alike.
 const UNEVEN: f64 = 0.05;
 /// Of the unevenness (squares), what a coupling may leave: a random one of four receivers lies so near to one that a

@@ -153,13 +153,12 @@ fn log_gains(products: &[Complex64], count: usize) -> Option<Vec<Complex64>> {
 fn candidate(evidence: &Evidence, strength: Complex64, deviation: f64, p_value: f64, gain: f64) -> Candidate {
     let receivers = evidence.radar.rx_m.len();
     let level_db = 20.0 * strength.norm().log10();
-    let decibel = 20.0 / std::f64::consts::LN_10;
     let samples = evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum::<f64>();
     let mean_neighbours = 2.0 * (receivers as f64 - 1.0) / receivers as f64;
     Candidate {
         id: Some("mutual_coupling"),
         behaves_like: "channel gain",
-        estimates: vec![Estimate::normal("level_db", level_db, decibel * deviation / strength.norm())],
+        estimates: vec![Estimate::normal("level_db", level_db, statistics::DECIBEL * deviation / strength.norm())],
         choice: None,
         place: Place::at("antenna"),
         p_value,

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::channels::Sums;
-use crate::diagnosis::cube::FOLDS;
+use crate::diagnosis::cube::folds;
 use crate::diagnosis::statistics::fisher_tail;
 
 /// Groups of cells that are needed for an error, and how many more per number.
@@ -40,12 +40,8 @@ impl Estimated {
     /// How much better each fold of the frames is foretold by the others than by zeros, nats: its own numbers have the same
     /// covariance but for how many groups they are from.
     pub fn foretold(&self, frames: &[&[Sums]], of: impl Fn(&Sums) -> Option<DVector<f64>>) -> Option<f64> {
-        let gain = |fold: usize| {
-            let part = |inside: bool| -> Vec<Sums> {
-                let of_fold = |index: &usize| (index % FOLDS == fold) == inside;
-                (0..frames.len()).filter(of_fold).flat_map(|index| frames[index].to_vec()).collect()
-            };
-            let (rest, held) = (part(false), part(true));
+        let gain = |parts: [Vec<usize>; 2]| {
+            let [rest, held] = parts.map(|part| part.iter().flat_map(|&index| frames[index].to_vec()).collect::<Vec<Sums>>());
             if rest.is_empty() || held.is_empty() {
                 return None;
             }
@@ -53,7 +49,7 @@ impl Estimated {
             let share = held.len() as f64 / self.groups;
             Some(0.5 * share * (self.square(&seen)? - self.square(&(&seen - &expected))?))
         };
-        (0..FOLDS).map(gain).sum()
+        folds(frames.len()).map(gain).sum()
     }
 
     /// Squared length in units of the covariance.

@@ -13,7 +13,7 @@ use super::mover::{Mover, WIDEST_SWING_M, middle_s};
 use super::pendulum::{Law, Pendulum, at};
 use super::scene::Scene;
 use super::track::{Sighting, Track};
-use crate::diagnosis::cube::FOLDS;
+use crate::diagnosis::cube::folds;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::{Candidate, Correction, Point};
 
@@ -283,11 +283,7 @@ impl Ground<'_> {
     fn foretold(&self, best: Swing, start_s: f64) -> f64 {
         let frames = self.scene.frames();
         let length_s = middle_s(self.scene, frames - 1) - start_s;
-        let of_fold = |fold: usize| {
-            let (held, rest): (Vec<usize>, Vec<usize>) = (0..frames).partition(|frame| frame % FOLDS == fold);
-            self.gain(self.fitted(best, &rest, length_s).0, &held)
-        };
-        (0..FOLDS).map(of_fold).sum()
+        folds(frames).map(|[rest, held]| self.gain(self.fitted(best, &rest, length_s).0, &held)).sum()
     }
 
     /// Of mean, swing, rate and direction: half of where the likelihood has fallen to that of a 90 % interval's ends, the
@@ -355,8 +351,9 @@ impl Ground<'_> {
             })
         };
         let shown = |frame: usize| self.gain_at(frame, self.place(swing.law, frame), swing.sine, swing.log_power.exp()).max(0.0);
-        let with: f64 = (0..self.scene.frames()).filter(near).map(shown).sum();
-        let all: f64 = (0..self.scene.frames()).map(shown).sum();
+        let shown: Vec<f64> = (0..self.scene.frames()).map(shown).collect();
+        let with: f64 = (0..self.scene.frames()).filter(near).map(|frame| shown[frame]).sum();
+        let all: f64 = shown.iter().sum();
         let ranges: Vec<[f64; 2]> = (0..self.scene.frames())
             .filter_map(|frame| {
                 let (sum, weight) = self.beams.body(frame).iter().fold((0.0, 0.0), |(sum, weight), (point, power)| {

@@ -12,7 +12,7 @@ use super::harmonic::QUADRATIC;
 use super::support::{beat_hz, ranges_m};
 use crate::diagnosis::evidence::spectrum;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
-use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::statistics::{DECIBEL, chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
 
 /// Power of a parent over the noise.
@@ -71,7 +71,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let scatter = jackknife(&sums, &evidence.split.training).max(variance.sqrt());
     let (gain_db, phase_deg) = imbalance(mu);
-    let db_error = 20.0 / std::f64::consts::LN_10 * 2.0 * scatter / std::f64::consts::SQRT_2;
+    let db_error = DECIBEL * 2.0 * scatter / std::f64::consts::SQRT_2;
     let degree_error = (2.0 * scatter / std::f64::consts::SQRT_2).to_degrees();
     let total: f64 = evidence.cube.samples.iter().map(Complex64::norm_sqr).sum();
     vec![Candidate {

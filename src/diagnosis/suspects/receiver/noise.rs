@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::image::empty_bins;
 use crate::diagnosis::Evidence;
-use crate::diagnosis::cube::FOLDS;
+use crate::diagnosis::cube::folds;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale, median};
 
@@ -261,8 +261,8 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     }
     let of_frames: Vec<Shared> =
         (0..evidence.cube.dims[0]).into_par_iter().map(|frame| Shared::of(evidence, frame, bins)).collect();
-    let sum = |frames: &mut dyn Iterator<Item = usize>| frames.fold(Shared::none(rx), |sum, frame| sum.and(&of_frames[frame]));
-    let training = sum(&mut evidence.split.training.iter().copied());
+    let sum = |frames: &[usize]| frames.iter().fold(Shared::none(rx), |sum, &frame| sum.and(&of_frames[frame]));
+    let training = sum(&evidence.split.training);
     if training.cells < 100.0 {
         return None;
     }
@@ -281,10 +281,9 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
         return None;
     }
     // Few held-out frames say little of so many numbers: every frame is foretold by those of the other folds.
-    let gain: f64 = (0..FOLDS)
-        .map(|fold| {
-            let rest = sum(&mut (0..of_frames.len()).filter(|frame| frame % FOLDS != fold));
-            let fold = sum(&mut (0..of_frames.len()).filter(|frame| frame % FOLDS == fold));
+    let gain: f64 = folds(of_frames.len())
+        .map(|parts| {
+            let [rest, fold] = parts.map(|frames| sum(&frames));
             rest.gain(&fold).unwrap_or(f64::NEG_INFINITY)
         })
         .sum();

@@ -4,7 +4,6 @@
 //! groups of ranges without movers. A gain is the same at all ranges: the nearer and the farther half of the static
 //! returns must each show it, and show the same.
 
-use std::f64::consts::LN_10;
 use std::sync::Arc;
 
 use num_complex::Complex64;
@@ -13,7 +12,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::steady::Steady;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Rung};
-use crate::diagnosis::statistics;
+use crate::diagnosis::statistics::{self, DECIBEL};
 
 /// Fewest receivers or transmitters of which one can be told to be odd.
 const FEWEST: usize = 3;
@@ -24,8 +23,6 @@ const SAME: f64 = 0.8;
 /// Variance of a group's gain over that of independent bins: the window's noise bandwidth.
 const NEIGHBOURS: f64 = 2.0;
 pub const BEHAVES_LIKE: &str = "slow-time gain of one channel";
-/// Decibels of a natural logarithm of an amplitude.
-const DECIBEL: f64 = 20.0 / LN_10;
 
 /// Gains of one receiver or transmitter relative to the others.
 struct Relative {
