@@ -1,13 +1,13 @@
 //! One receiver or transmitter whose gain changes from frame to frame while the others stay.
 //!
 //! The complex gain of the static returns, relative to that of the other channels, is estimated in every frame and in
-//! groups of ranges without movers. A gain is the same at all ranges: the nearer and the farther half of the static
-//! returns must each show it, and show the same.
+//! groups of ranges without movers. A gain is the same at all ranges: each of the nearer and the farther half of the
+//! static returns must show what the other one shows.
 
 use std::sync::Arc;
 
 use num_complex::Complex64;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::steady::Steady;
 use crate::diagnosis::evidence::Evidence;
@@ -16,6 +16,8 @@ use crate::diagnosis::statistics::{self, DECIBEL};
 
 /// Fewest receivers or transmitters of which one can be told to be odd.
 const FEWEST: usize = 3;
+/// Fewest training frames of which a change can be told.
+const FEWEST_FRAMES: usize = 5;
 /// Bins between two groups, across which windowed noise is hardly correlated.
 const GAP: usize = 2;
 /// Correlation that the two halves of the ranges must have.
@@ -39,8 +41,8 @@ struct Series {
     value: Vec<Complex64>,
     /// Inverse variance, by what the groups scatter.
     weight: Vec<f64>,
-    /// Chance that they are equal.
-    p_value: f64,
+    /// Degrees of freedom of that scatter.
+    freedom: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,7 +99,8 @@ fn judged(evidence: &Evidence, steady: &Steady, unit: Axis) -> Option<Judged> {
     if correlation(&halves, training) < SAME {
         return None;
     }
-    let p_value = halves[0].p_value.max(halves[1].p_value);
+    // What but one half has, such as slow parts of the body, the other one has by chance.
+    let p_value = chance(&halves[0], &halves[1], training).max(chance(&halves[1], &halves[0], training));
     // Gains drawn from one law in every frame; its variance comes from the training frames.
     let seen: Vec<usize> = training.iter().copied().filter(|&f| all.weight[f] > 0.0).collect();
     let mean = |of: &dyn Fn(usize) -> f64| seen.iter().map(|&f| of(f)).sum::<f64>() / seen.len() as f64;
@@ -112,12 +115,24 @@ fn judged(evidence: &Evidence, steady: &Steady, unit: Axis) -> Option<Judged> {
     Some(Judged { unit, members: relative.members, series: all, p_value, gain })
 }
 
+/// That one half has so much of the other's pattern: one number, whose error is what its own groups scatter.
+fn chance(half: &Series, pattern: &Series, frames: &[usize]) -> f64 {
+    let [alike, square] = frames.iter().fold([0.0; 2], |[alike, square], &f| {
+        let (own, wanted) = (half.value[f], pattern.value[f]);
+        [alike + half.weight[f] * (own * wanted.conj()).re, square + half.weight[f] * wanted.norm_sqr()]
+    });
+    let law = StudentsT::new(0.0, 1.0, half.freedom);
+    if square > 0.0 { law.map_or(1.0, |law| law.sf(alike / (0.5 * square).sqrt())) } else { 1.0 }
+}
+
 /// Of two halves' gains over some frames, without what the noise adds to each: about one where both change alike.
 fn correlation(halves: &[Series; 2], frames: &[usize]) -> f64 {
     let sums = frames.iter().filter(|&&f| halves.iter().all(|h| h.weight[f] > 0.0)).fold([0.0; 3], |sums, &f| {
-        let [a, b] = [halves[0].value[f], halves[1].value[f]];
-        let own = |half: usize| halves[half].value[f].norm_sqr() - 1.0 / halves[half].weight[f];
-        [sums[0] + (a * b.conj()).re, sums[1] + own(0), sums[2] + own(1)]
+        let ([a, b], noise) = ([halves[0].value[f], halves[1].value[f]], [0, 1].map(|half| 1.0 / halves[half].weight[f]));
+        // As sure as the less sure half is of that frame.
+        let weight = 1.0 / (noise[0] + noise[1]);
+        let found = [(a * b.conj()).re, a.norm_sqr() - noise[0], b.norm_sqr() - noise[1]];
+        std::array::from_fn(|i| sums[i] + weight * found[i])
     });
     if sums[1].min(sums[2]) > 0.0 { sums[0] / (sums[1] * sums[2]).sqrt() } else { 0.0 }
 }
@@ -169,23 +184,15 @@ impl Relative {
         let mut value: Vec<Complex64> = (0..frames)
             .map(|f| cells(f).map(|i| self.value[i] * self.weight[i]).sum::<Complex64>() / weight[f].max(f64::MIN_POSITIVE))
             .collect();
-        let (excess, below) = self.excess(training)?;
+        let (excess, freedom) = self.excess(training)?;
         let total: f64 = training.iter().map(|&f| weight[f]).sum();
         let mean = training.iter().map(|&f| value[f] * weight[f]).sum::<Complex64>() / total.max(f64::MIN_POSITIVE);
-        let (mut between, mut above) = (0.0, -1.0);
-        for &frame in training.iter().filter(|&&f| weight[f] > 0.0) {
-            between += weight[frame] * (value[frame] - mean).norm_sqr();
-            above += 1.0;
-        }
-        if above < 4.0 {
+        if training.iter().filter(|&&f| weight[f] > 0.0).count() < FEWEST_FRAMES {
             return None;
         }
-        let ratio = between / above / excess;
-        let law = FisherSnedecor::new(2.0 * above, 2.0 * below);
-        let p_value = if ratio > 0.0 { law.map_or(1.0, |law| law.sf(ratio)) } else { 1.0 };
         value.iter_mut().for_each(|v| *v -= mean);
         weight.iter_mut().for_each(|w| *w /= excess);
-        Some(Series { value, weight, p_value })
+        Some(Series { value, weight, freedom })
     }
 }
 
@@ -201,7 +208,7 @@ impl Relative {
             within += cells().map(|i| self.weight[i] * (self.value[i] - mean).norm_sqr()).sum::<f64>();
             freedom += (cells().count() as f64 - 1.0).max(0.0);
         }
-        (freedom >= 4.0).then(|| ((within / freedom).max(1.0), freedom))
+        (freedom >= 4.0).then(|| ((within / freedom).max(1.0), 2.0 * freedom))
     }
 }
 
@@ -278,7 +285,7 @@ mod tests {
         let half = |signal: [f64; 4], noise: [f64; 4]| Series {
             value: signal.iter().zip(noise).map(|(signal, noise)| (signal + 0.7 * noise).into()).collect(),
             weight: vec![1.0 / 0.49; 4],
-            p_value: 0.0,
+            freedom: 20.0,
         };
         let (hops, stays) = ([1.0, -1.0, 1.0, -1.0], [1.0; 4]);
         let noise = [[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, -1.0, 1.0]];
@@ -287,6 +294,15 @@ mod tests {
         assert!((alike - 1.0).abs() < 1e-9, "{alike}");
         let unlike = correlation(&[half(hops, noise[0]), half(stays, noise[1])], &frames);
         assert!(unlike.abs() < 0.5, "{unlike}");
+        // Chance has it in the one and not in the other.
+        let series = [half(hops, noise[0]), half(stays, noise[1])];
+        assert!(chance(&series[0], &half(hops, noise[1]), &frames) < 5e-3);
+        assert!((chance(&series[1], &series[0], &frames) - 0.5).abs() < 0.4);
+        // A frame that one half hardly knows says nothing.
+        let mut hardly = half(hops, noise[1]);
+        hardly.weight[3] = 1e-3;
+        let alike = correlation(&[half(hops, noise[0]), hardly], &frames);
+        assert!(alike > 0.5, "{alike}");
         // No more than the noise.
         assert_eq!(correlation(&[half([0.0; 4], noise[0].map(|noise| 0.9 * noise)), half(hops, noise[1])], &frames), 0.0);
     }
