@@ -23,6 +23,9 @@ const FADING: &str = "slow-time gain";
 /// What is cut out where it is plain, and goes on below the noise.
 const BURSTS: [&str; 2] = ["interference", "impulsive_noise"];
 
+/// And what a path that was taken out roughly leaves below the noise looks like the faintest of these.
+const FAINT: &str = "interference";
+
 /// What explains a little of anything that moves near the body: remains of a strong path that was taken out.
 const OF_REMAINS: [&str; 2] = ["body_multibounce", "carried_reflector"];
 
@@ -77,8 +80,9 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let behind = accepted.place.stage == "timing" && of_remains;
     // What bursts leave below the noise of single samples is in all receivers at once.
     let bursts = accepted.id.is_some_and(|id| BURSTS.contains(&id)) && candidate.id == Some("correlated_noise");
+    let faint = accepted.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id == Some(FAINT);
     // Up to which share of what was gained.
-    [(roughly || fades, ROUGHLY), (bursts || behind, 1.0), (shaken, SHAKEN), (by_chirp, SLIGHTLY)]
+    [(roughly || fades, ROUGHLY), (bursts || behind, 1.0), (shaken, SHAKEN), (by_chirp || faint, SLIGHTLY)]
         .into_iter()
         .any(|(holds, share)| holds && candidate.gain < share * accepted.gain)
 }

@@ -27,12 +27,14 @@ pub struct Field {
     pub frames: usize,
     pub loops: usize,
     pub groups: Vec<Group>,
-    /// `[frame, loop, group]`, zero where nothing can be said.
+    /// `[frame, loop, group]`, zero where nothing can be said; its imaginary part is an angle where phases swing far.
     deviation: Vec<Complex64>,
     /// Inverse variance of a complex deviation, `[frame, group]`; zero where nothing can be said.
     weight: Vec<f64>,
     /// Radar time of every loop, `[frame, loop]`: the mean over its transmitters.
     pub times_s: Vec<f64>,
+    /// Radians up to which a phase can be read.
+    pub farthest: f64,
 }
 
 /// Which part of the deviation is looked at.
@@ -57,6 +59,12 @@ pub struct Series {
     pub loops: usize,
 }
 
+/// Root mean square of a phase, in radians, up to which it is read as its sine.
+const SMALL: f64 = 0.2;
+/// Radians up to which a phase can be read as its sine, and as an angle that must not be taken for one beyond half a turn.
+const FARTHEST: [f64; 2] = [1.0, 2.0];
+/// Information (inverse variance) of all groups from which on a chirp's angle is sure.
+const SURE: f64 = 100.0;
 /// Bins between two groups, across which windowed noise is hardly correlated.
 const GAP: usize = 2;
 /// Power over the noise that a cell without a mover may have; its law is narrower than this.
@@ -167,7 +175,8 @@ impl Field {
         let times_s = (0..frames * loops)
             .map(|i| evidence.starts_s[i / loops] + (i % loops) as f64 * radar.loop_period_s() + middle_s)
             .collect();
-        let mut field = Self { frames, loops, groups, deviation, weight, times_s };
+        let mut field = Self { frames, loops, groups, deviation, weight, times_s, farthest: FARTHEST[0] };
+        field.unroll(&evidence.split.training);
         field.calibrate();
         let known = (0..frames).filter(|&f| field.weights(f).iter().filter(|w| **w > 0.0).count() >= 2).count();
         (2 * known > frames).then_some(field)
@@ -190,6 +199,38 @@ impl Field {
 
     pub fn weights(&self, frame: usize) -> &[f64] {
         &self.weight[frame * self.groups.len()..][..self.groups.len()]
+    }
+
+    /// What all groups of a chirp share: their mean gain. None where it is not sure.
+    fn common(&self, frame: usize, index: usize) -> Option<Complex64> {
+        let weights = self.weights(frame);
+        let sure: f64 = weights.iter().sum();
+        let sum: Complex64 = self.deviations(frame, index).iter().zip(weights).map(|(value, weight)| value * weight).sum();
+        (sure > SURE).then(|| Complex64::ONE + sum / sure)
+    }
+
+    /// Where phases swing far, reads them as angles, and gains as they are without that: a mean over time of what turns is
+    /// shorter than it.
+    fn unroll(&mut self, training: &[usize]) {
+        let chirps = training.iter().flat_map(|&frame| (0..self.loops).map(move |index| (frame, index)));
+        let common: Vec<Complex64> = chirps.filter_map(|(frame, index)| self.common(frame, index)).collect();
+        let mean = |of: &dyn Fn(&Complex64) -> f64| common.iter().map(of).sum::<f64>() / common.len() as f64;
+        if common.is_empty() || mean(&|gain| gain.arg().powi(2)).sqrt() < SMALL {
+            return;
+        }
+        self.farthest = FARTHEST[1];
+        let (strength, angle) = (mean(&|gain| gain.norm()), mean(&|gain| gain.arg()));
+        for frame in 0..self.frames {
+            for index in 0..self.loops {
+                let Some(common) = self.common(frame, index) else { continue };
+                let at = (frame * self.loops + index) * self.groups.len();
+                for value in &mut self.deviation[at..at + self.groups.len()] {
+                    // Each group beside what all share is small.
+                    let own = (Complex64::ONE + *value) / common;
+                    *value = Complex64::new(own.re * common.norm() / strength - 1.0, own.im + common.arg() - angle);
+                }
+            }
+        }
     }
 
     /// Scales the variances to what is left after a common gain and a phase in proportion to the delay: the noise need

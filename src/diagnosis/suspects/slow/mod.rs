@@ -78,9 +78,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             continue;
         }
         let series = field.series(part, |_| true);
-        // A radian at the farthest group.
+        // At the farthest group.
         let farthest_s = field.groups.iter().map(|g| g.delay_s).fold(0.0, f64::max);
-        let largest = if part == Part::Delay { 1.0 / farthest_s } else { 1.0 };
+        let largest = match part {
+            Part::Gain => 1.0,
+            Part::Phase | Part::Boresight => field.farthest,
+            Part::Delay => field.farthest / farthest_s,
+        };
         let line = lines::strongest(&field, &series, training, held_out, largest);
         let of_line = |line: &lines::Line| {
             let value = |frame: usize, index: usize| line.value(field.times_s[frame * field.loops + index]);

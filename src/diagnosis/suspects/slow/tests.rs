@@ -97,6 +97,19 @@ fn a_common_phase_is_a_vibration_and_one_in_proportion_to_the_delay_is_none() {
 }
 
 #[test]
+fn a_phase_that_swings_far_is_read_as_an_angle() {
+    let swing = |t: f64| 1.3 * (std::f64::consts::TAU * 83.0 * t).sin();
+    let evidence = evidence(5, |t, _, _, _| Complex64::cis(swing(t)));
+    let metres = evidence.radar.wavelength_m() / (4.0 * std::f64::consts::PI);
+    let found = found_once(evidence);
+    assert_eq!(found.id, Some("radar_vibration"));
+    within(&found, "frequency_hz", 83.0);
+    // Its interval is wide for what returns from where: its middle is known better.
+    let amplitude = found.estimates.iter().find(|estimate| estimate.name == "amplitude_m").unwrap().values[0];
+    assert!((amplitude / (1.3 * metres) - 1.0).abs() < 0.02, "{amplitude}");
+}
+
+#[test]
 fn a_phase_that_grows_towards_the_boresight_is_a_vibration() {
     let room = Room { left_m: Some(1.5), right_m: Some(1.5), floor_m: Some(1.0), ..Room::default() };
     let swing = |t: f64, delay_s: f64| {
