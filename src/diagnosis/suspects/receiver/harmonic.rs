@@ -4,14 +4,9 @@
 
 use std::sync::Arc;
 
-use num_complex::Complex64;
-
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
-use crate::diagnosis::products::{Law, Product};
+use crate::diagnosis::products::{Law, Product, without};
 use crate::diagnosis::{Cube, Evidence, denoised};
-
-/// Steps by which a distortion is undone: each leaves a part of the last in proportion to how strong the distortion is.
-const STEPS: usize = 6;
 
 pub const QUADRATIC: &str = "quadratic in the signal";
 
@@ -30,17 +25,18 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
 }
 
 fn candidate(evidence: &Evidence, law: Law) -> Candidate {
-    let Law { product, kappa, scatter, .. } = law;
-    let level = kappa.norm();
+    let Law { product, scatter, .. } = law;
+    let share = law.share();
+    let level = share.norm();
     let level_db = 20.0 * level.log10();
     let (id, estimate, statement) = if product == Product::Cube {
         (
             "compression",
-            Estimate::normal("level", -kappa.re, (0.71 * scatter).hypot(2.0 * denoised::PEAK_DB / 8.7 * level)),
+            Estimate::normal("level", -share.re, (0.71 * scatter).hypot(2.0 * denoised::PEAK_DB / 8.7 * level)),
             format!(
                 "strong samples come out too small: the receiver compresses, the strongest sample by {:.2} %; its third-order \
                  products lie where neither the room nor the body can be",
-                -100.0 * kappa.re
+                -100.0 * share.re
             ),
         )
     } else {
@@ -74,10 +70,7 @@ fn nameless(evidence: &Evidence, laws: Vec<Law>) -> Candidate {
 /// Without a name.
 fn nonlinear(evidence: &Evidence, behaves_like: &'static str, laws: Vec<Law>, statement: String) -> Candidate {
     let (p_value, gain) = (laws.iter().map(|law| law.p_value).fold(1.0, f64::min), laws.iter().map(|law| law.gain).sum());
-    let distortion = move |value: Complex64| -> Complex64 {
-        laws.iter().map(|law| law.kappa * law.product.scale(law.peak) * law.product.of(value)).sum()
-    };
-    let energy = evidence.cube.samples.iter().map(|value| distortion(*value).norm_sqr()).sum();
+    let energy = evidence.cube.samples.iter().map(|&value| (value - without(&laws, value)).norm_sqr()).sum();
     Candidate {
         id: None,
         behaves_like,
@@ -93,11 +86,7 @@ fn nonlinear(evidence: &Evidence, behaves_like: &'static str, laws: Vec<Law>, st
         energy,
         correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
             cube.each_chirp(|_, chirp| {
-                chirp.iter_mut().for_each(|value| {
-                    let found = *value;
-                    // The distortion of the undistorted signal.
-                    *value = (0..STEPS).fold(found, |value, _| found - distortion(value));
-                });
+                chirp.iter_mut().for_each(|value| *value = without(&laws, *value));
             });
         })),
     }

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::image::empty_bins;
-use crate::diagnosis::evidence::transform;
+use crate::diagnosis::evidence::{hann, spectrum, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::locate::Residual;
 use crate::diagnosis::power::Cells;
@@ -19,6 +19,8 @@ use crate::diagnosis::{Cube, Evidence, denoised};
 const LEFT_OVER: f64 = 0.2;
 /// Standard deviations by which noise may add to that.
 const CHANCE: f64 = 2.0;
+/// Coherence (squared) of what stands still at other ranges with its line there, from which on the line is its sideband.
+const SIDEBAND: f64 = 0.15;
 /// Samples in which its frequencies are looked for.
 const SEARCHED: usize = 1 << 17;
 /// Range bins that a mover must have passed during the recording.
@@ -56,6 +58,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let start = (doppler as f64 / loops as f64, range as f64 / samples as f64);
     let (slow, fast) = refined(evidence, start);
+    if is_sideband(evidence, slow, fast) {
+        return vec![];
+    }
     let amplitudes = amplitudes_of(&evidence.cube, slow, fast);
     let Around { before, after, deviation } = around(evidence, (slow, fast), &amplitudes);
     if after > LEFT_OVER * before + CHANCE * deviation {
@@ -192,6 +197,38 @@ fn around(evidence: &Evidence, (slow, fast): (f64, f64), amplitudes: &[Complex64
     Around { before, after, deviation }
 }
 
+/// Whether what stands still at other ranges has the same line, in proportion to what it is: then everything is modulated.
+fn is_sideband(evidence: &Evidence, slow: f64, fast: f64) -> bool {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let window = hann(loops);
+    let own = fast * samples as f64;
+    let apart = |bin: usize| (bin as f64 - own + 0.5 * samples as f64).rem_euclid(samples as f64) - 0.5 * samples as f64;
+    let elsewhere: Vec<usize> = (0..samples).filter(|&bin| apart(bin).abs() > AROUND as f64).collect();
+    let still: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(spectrum).collect();
+    let line = |frame: usize, channel: usize| {
+        let mut line = vec![Complex64::ZERO; samples];
+        for (chirp, values) in evidence.cube.channel(frame, channel).chunks_exact(samples).enumerate() {
+            let turn = Complex64::cis(-TAU * slow * chirp as f64) * window[chirp];
+            line.iter_mut().zip(values).for_each(|(sum, value)| *sum += value * turn);
+        }
+        spectrum(&line)
+    };
+    // All channels are modulated alike.
+    let coherence = |&frame: &usize| {
+        let (mut shared, mut lines, mut stills) = (Complex64::ZERO, 0.0, 0.0);
+        for (channel, still) in still.iter().enumerate() {
+            let line = line(frame, channel);
+            for &bin in &elsewhere {
+                shared += still[bin].conj() * line[bin];
+                lines += line[bin].norm_sqr();
+                stills += still[bin].norm_sqr();
+            }
+        }
+        shared.norm_sqr() / (lines * stills).max(f64::MIN_POSITIVE)
+    };
+    median(&mut evidence.split.training.par_iter().map(coherence).collect::<Vec<f64>>()) > SIDEBAND
+}
+
 /// Of amplitude 1, at a sample of a chirp of a frame.
 fn tone(slow: f64, fast: f64, chirp: usize, sample: usize) -> Complex64 {
     Complex64::cis(TAU * (slow * chirp as f64 + fast * sample as f64))
@@ -207,8 +244,8 @@ fn amplitudes_of(cube: &Cube, slow: f64, fast: f64) -> Vec<Complex64> {
             let signal = cube.channel(index / channels, index % channels);
             let loops = signal.len() / samples;
             let in_chirp: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(-TAU * fast * n as f64)).collect();
-            let window = crate::diagnosis::evidence::hann(samples);
-            let slow_window = crate::diagnosis::evidence::hann(loops);
+            let window = hann(samples);
+            let slow_window = hann(loops);
             let mut sum = Complex64::ZERO;
             for (chirp, values) in signal.chunks_exact(samples).enumerate() {
                 let of_chirp: Complex64 =
@@ -248,4 +285,23 @@ fn refined(evidence: &Evidence, start: (f64, f64)) -> (f64, f64) {
         step = (0.5 * step.0, 0.5 * step.1);
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::radar::Radar;
+
+    #[test]
+    fn a_line_is_a_sideband_where_what_stands_still_has_it_too() {
+        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 32, ..Radar::small(6) };
+        let still =
+            |n: usize| [9.0, 14.0, 23.0].map(|bin| 30.0 * Complex64::cis(TAU * bin * n as f64 / 64.0)).iter().sum::<Complex64>();
+        let (slow, fast) = (0.5, 23.0 / 64.0);
+        let alternating = |chirp: usize| if chirp.is_multiple_of(2) { 1.02 } else { 0.98 };
+        let modulated = Evidence::in_noise(radar.clone(), 3, |[_, _, chirp, n]| still(n) * alternating(chirp));
+        assert!(is_sideband(&modulated, slow, fast));
+        let spur = Evidence::in_noise(radar, 4, |[_, _, chirp, n]| still(n) + 0.6 * tone(slow, fast, chirp, n));
+        assert!(!is_sideband(&spur, slow, fast));
+    }
 }
