@@ -17,6 +17,9 @@ use crate::person::{JOINT_NAMES, Person};
 use crate::radar::Radar;
 use crate::scatterers::visibility::{DEFAULT_FLIP_EXPONENT, frame_visibility};
 
+/// Frames beyond the last one that are predicted.
+const BEYOND: usize = 6;
+
 /// A visible point of the body in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
@@ -52,6 +55,8 @@ pub struct BodyPrediction {
     pub middle_s: Vec<f64>,
     /// How the points of every frame go on, `[frame]`; may be empty: then they go straight on.
     pub tracks: Vec<Track>,
+    /// The frames that would follow, as far as the motion goes: a recording that lost some shows them.
+    pub beyond: Vec<(Vec<Point>, Track)>,
     /// In which ways it is seen again.
     pub echoes: Vec<Echo>,
 }
@@ -72,9 +77,12 @@ impl BodyPrediction {
         let (parts, of_vertex) = parts(person);
         let duration_s = radar.frame_duration_s();
         let period_s = period(starts_s).unwrap_or(duration_s);
-        let made: Vec<(Vec<Point>, Vec<Centre>, f64, Track)> = starts_s
-            .par_iter()
-            .map(|&start| {
+        let (last_s, end_s) = (starts_s.last().copied().unwrap_or(0.0), body.span_s().1);
+        let following = (1..=BEYOND).map(|step| last_s + step as f64 * period_s).filter(|start| start + duration_s <= end_s);
+        let shown: Vec<f64> = starts_s.iter().copied().chain(following).collect();
+        let mut made: Vec<(Vec<Point>, Vec<Centre>, f64, Track)> = shown
+            .into_par_iter()
+            .map(|start| {
                 let frame = body.frame(&[start, start + duration_s])?;
                 let seen = frame_visibility(&frame.vertices_m, &[], &[], radar.centre_m(), &[], DEFAULT_FLIP_EXPONENT).direct;
                 let vertices: Vec<usize> = (0..frame.position_m.len()).filter(|&vertex| seen[vertex]).collect();
@@ -90,7 +98,9 @@ impl BodyPrediction {
                 Ok((vertices.iter().map(point).collect(), centres, frame.middle_s, track))
             })
             .collect::<Result<_>>()?;
-        let mut prediction = Self { parts, frames: vec![], centres: vec![], middle_s: vec![], tracks: vec![], echoes: vec![] };
+        let beyond = made.split_off(starts_s.len()).into_iter().map(|(points, _, _, track)| (points, track)).collect();
+        let mut prediction =
+            Self { parts, frames: vec![], centres: vec![], middle_s: vec![], tracks: vec![], beyond, echoes: vec![] };
         for (points, centres, middle_s, track) in made {
             prediction.frames.push(points);
             prediction.centres.push(centres);
@@ -107,11 +117,16 @@ impl BodyPrediction {
         points
     }
 
-    /// The points of a frame so much later in the motion, and whether that is known; beyond, they go straight on.
-    /// Visibility and orientation stay those of the frame.
+    /// How the points of a frame go on, of the recording's or beyond them.
+    pub fn track(&self, frame: usize) -> Option<&Track> {
+        self.tracks.get(frame).or_else(|| self.beyond.get(frame.checked_sub(self.frames.len())?).map(|(_, track)| track))
+    }
+
+    /// The points of a frame, of the recording's or beyond them, so much later in the motion, and whether that is known; if not,
+    /// they go straight on. Visibility and orientation stay those of the frame.
     pub fn later(&self, frame: usize, later_s: f64) -> (Vec<Point>, bool) {
-        let points = &self.frames[frame];
-        match self.tracks.get(frame).filter(|track| track.knows(later_s)) {
+        let points = self.frames.get(frame).unwrap_or_else(|| &self.beyond[frame - self.frames.len()].0);
+        match self.track(frame).filter(|track| track.knows(later_s)) {
             Some(track) => {
                 let steps = track.steps(later_s);
                 let moved = |(index, point): (usize, &Point)| {

@@ -9,6 +9,8 @@ use crate::diagnosis::statistics::{corrected, mean_power_tail};
 
 /// Share of false boxes among those that are returned.
 const FALSE_SHARE: f64 = 0.05;
+/// Of the training frames' excess, what others may have.
+const SHARES: [f64; 3] = [1.0, 0.1, 0.01];
 /// Regions that a report can use.
 const MOST: usize = 40;
 
@@ -69,7 +71,13 @@ pub fn strongest(evidence: &Evidence, residual: &Residual) -> Option<Strongest> 
         return None;
     }
     let mean = sum / count;
-    let gain = held_sum * (1.0 - 1.0 / mean) - held_count * mean.ln();
+    // Held-out frames may have less of it, at even odds.
+    let foretold = SHARES.map(|share| {
+        let mean = 1.0 + share * (mean - 1.0);
+        held_sum * (1.0 - 1.0 / mean) - held_count * mean.ln()
+    });
+    let most = foretold.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let gain = most + (foretold.map(|gain| (gain - most).exp()).iter().sum::<f64>() / SHARES.len() as f64).ln();
     let p_value = corrected(mean_power_tail(mean, count.max(0.1)), tried);
     Some(Strongest { region: region(evidence, residual, &Cells::new(&evidence.radar), &found), p_value, gain })
 }

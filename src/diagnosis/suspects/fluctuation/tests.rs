@@ -56,6 +56,7 @@ fn evidence(seed: u64, change: impl Fn(usize, usize) -> Complex64) -> Evidence {
         frames: (0..FRAMES).map(points).collect(),
         middle_s: starts_s,
         tracks: vec![],
+        beyond: vec![],
     };
     let room = Room { front_m: Some(FRONT_M), floor_m: Some(1.2), ..Room::default() };
     let loaded = Loaded::of_samples(radar, samples, [-100.0, 100.0]);

@@ -184,6 +184,7 @@ mod tests {
             centres: vec![],
             middle_s,
             tracks: vec![],
+            beyond: vec![],
             echoes: vec![],
         };
         let room = Room { right_m: Some(2.4), floor_m: Some(1.1), front_m: Some(4.0), ..Room::default() };

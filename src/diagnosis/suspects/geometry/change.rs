@@ -77,7 +77,7 @@ impl Moves {
         let moved = frames.clone().map(|frame| self.points(body, frame, change).0).collect();
         let track = |frame: usize| {
             let (nearest, rest) = nearest(body, frame, self.delay_s(body, frame, change));
-            body.tracks.get(nearest).map(|track| track.from(rest))
+            body.track(nearest).map(|track| track.from(rest))
         };
         let centres = |frame: usize| -> Vec<Centre> {
             let Some(centres) = body.centres.get(frame) else { return vec![] };
@@ -96,13 +96,13 @@ impl Moves {
 /// The frame in which the body was seen nearest to what is shown so much later, and what remains from what that frame
 /// shows now.
 fn nearest(body: &BodyPrediction, frame: usize, delay: f64) -> (usize, f64) {
-    let times = |frame: usize| match body.tracks.get(frame) {
+    let times = |frame: usize| match body.track(frame) {
         Some(track) => track.seen_and_shown_s(),
         None => (body.middle_s[frame], body.middle_s[frame]),
     };
     let time = times(frame).1 + delay;
     let apart = |frame: &usize| (times(*frame).0 - time).abs();
-    let nearest = (0..body.frames.len()).min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(frame);
+    let nearest = (0..body.frames.len() + body.beyond.len()).min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(frame);
     (nearest, time - times(nearest).1)
 }
 
@@ -133,6 +133,7 @@ mod tests {
             Track::new(time, nodes.to_vec(), nodes.iter().map(step).collect())
         };
         BodyPrediction {
+            beyond: vec![],
             echoes: vec![],
             centres: vec![],
             parts: vec!["body".into()],
@@ -162,6 +163,14 @@ mod tests {
         assert_eq!(moves.points(&body, 3, drop).0, body.frames[3]);
         assert!((moves.points(&body, 4, drop).0[0].position_m[1] - body.frames[6][0].position_m[1]).abs() < 1e-9);
         assert!(!moves.points(&body, 7, drop).1);
+        // Unless the motion goes on.
+        let mut longer = body.clone();
+        let end = longer.frames.len() - 2;
+        longer.middle_s.truncate(end);
+        longer.beyond = longer.frames.split_off(end).into_iter().zip(longer.tracks.split_off(end)).collect();
+        let (points, known) = moves.points(&longer, 5, drop);
+        assert!(known && (points[0].position_m[1] - body.frames[7][0].position_m[1]).abs() < 1e-9);
+        assert!(!moves.points(&longer, 5, Change::Drop { at: 4, count: 3 }).1);
         assert!(
             (moves.points(&body, 2, Change::Range(0.1)).0[0].position_m[1] - body.frames[2][0].position_m[1] - 0.1).abs() < 1e-9
         );

@@ -216,8 +216,13 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
         .map(|change| (trial.score(change, training, true).gain_over(null, training), change))
         .max_by(|a, b| a.0.total_cmp(&b.0))?
         .1;
-    let Change::Drop { count, .. } = change else { return None };
-    let score = trial.score(change, &frames, true);
+    let Change::Drop { at, count } = change else { return None };
+    // Held-out frames beside the date say themselves whether they came before or after it.
+    let held_out = |frame: &usize| !training.contains(frame);
+    let earlier = (1..at).rev().take_while(held_out);
+    let later = (at..frames.len() - 1).take_while(held_out).map(|frame| frame + 1);
+    let scores = earlier.chain(later).chain([at]).map(|at| trial.score(Change::Drop { at, count }, &frames, true));
+    let score = scores.max_by(|a, b| a.gain_over(null, &frames).total_cmp(&b.gain_over(null, &frames)))?;
     Some(Fitted { id: "frame_drop", value: count as f64, deviation: 0.0, floor: 0.0, inflation: STEP_INFLATION, score })
 }
 

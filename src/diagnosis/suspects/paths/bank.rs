@@ -89,14 +89,12 @@ impl Table {
 
     /// The best laws, and how many were tried.
     pub fn bank(&self, scene: &Scene, length_s: f64) -> (Vec<Swing>, f64) {
-        let step_hz = 0.1 / length_s;
-        let fastest_hz = FASTEST_HZ.min(1.0 / (FRAMES_PER_TURN * scene.evidence.radar.frame_period_s));
-        let rates: Vec<f64> = (FIRST_STEP..=(fastest_hz / step_hz) as usize).map(|step| step as f64 * step_hz).collect();
+        let rates: Vec<f64> = rates(scene, length_s).collect();
         let of_rate = |&rate_hz: &f64| -> (Vec<(f32, Swing)>, f64) {
             let (mut kept, mut tried): (Vec<(f32, Swing)>, f64) = (vec![], 0.0);
             let mut sums = vec![[0.0; LEVELS.len()]; self.columns as usize];
             let cells = &scene.model.cells;
-            for swing_m in (0..SWINGS.2).map(|step| SWINGS.0 * SWINGS.1.powi(step as i32)) {
+            for swing_m in swings() {
                 let bins = TAU * rate_hz * swing_m * cells.doppler_per_mps;
                 if !(LEAST_BINS..0.5 * scene.loops as f64).contains(&bins) {
                     continue;
@@ -191,6 +189,29 @@ fn strongest_level(sums: &Gains) -> (f32, usize) {
         }
     }
     best
+}
+
+/// Laws of all rates and swings about one range, eight phases each.
+pub fn laws(scene: &Scene, mean_m: f64, length_s: f64) -> Vec<Law> {
+    let of_swing = |rate_hz: f64, swing_m: f64| {
+        let bins = TAU * rate_hz * swing_m * scene.model.cells.doppler_per_mps;
+        let phases = if (LEAST_BINS..0.5 * scene.loops as f64).contains(&bins) { 8 } else { 0 };
+        (0..phases).map(move |phase| {
+            let (sine, cosine) = (TAU * f64::from(phase) / 8.0).sin_cos();
+            [mean_m, swing_m * sine, swing_m * cosine, rate_hz]
+        })
+    };
+    rates(scene, length_s).flat_map(|rate_hz| swings().step_by(2).flat_map(move |swing_m| of_swing(rate_hz, swing_m))).collect()
+}
+
+fn rates(scene: &Scene, length_s: f64) -> impl Iterator<Item = f64> + use<> {
+    let step_hz = 0.1 / length_s;
+    let fastest_hz = FASTEST_HZ.min(1.0 / (FRAMES_PER_TURN * scene.evidence.radar.frame_period_s));
+    (FIRST_STEP..=(fastest_hz / step_hz) as usize).map(move |step| step as f64 * step_hz)
+}
+
+fn swings() -> impl Iterator<Item = f64> {
+    (0..SWINGS.2).map(|step| SWINGS.0 * SWINGS.1.powi(step as i32))
 }
 
 /// First steps of mean, sine, cosine and rate.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::bank::{Gains, LEAST_BINS, LEVELS, Standing, Swing, Table, around, climb, widths};
+use super::bank::{Gains, LEAST_BINS, LEVELS, Standing, Swing, Table, around, climb, laws, widths};
 use super::beams::{Beams, Look};
 use super::mover::{Mover, WIDEST_SWING_M, middle_s};
 use super::pendulum::{Law, Pendulum, at};
@@ -37,6 +37,8 @@ const MOST_NATS: f64 = 12.0;
 const STRONGER: f64 = 1.0;
 /// Cells of the fine grid beside a swing's ranges where what stands still may be taken for it.
 const BESIDE: i64 = 4;
+/// Laws of all rates from which the one that stands out most is sought.
+const SHARPENED: usize = 6;
 /// Share of a swing's gain from which on something that stands still explains it.
 const NEARLY: f64 = 0.6;
 /// A body's point so close in Doppler and range (cells: a clock that is a little off moves a limb by as much) and
@@ -116,7 +118,7 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
     if let Some(stronger) = ground.stronger_elsewhere(found.0, &training) {
         found = Some(judged(stronger)).filter(|other| other.2 > 0.0).unwrap_or(found);
     }
-    let (mut best, mut gain, again) = found;
+    let (mut best, gain, again) = found;
     // A likelihood ratio is large by chance no more often than its inverse says: that of all frames, one of all that were tried.
     // Where something that stands still is not steady, it must be beaten.
     let ranges = table.places(scene, best.law).into_iter().map(|place| place.1);
@@ -138,6 +140,7 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
     {
         return None;
     }
+    best = ground.sharpened(best, &training, length_s);
     // A long recording tells the rate better than a part of it, which must not be off by a turn at once.
     let (every, mut count) = (&split.training, training.len());
     if count < every.len() {
@@ -147,11 +150,11 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
     while count < every.len() {
         count = (2 * count).min(every.len());
         let longer = &every[..count];
-        (best, gain) = ground.fitted(best, longer, middle_s(scene, longer[count - 1]) - start_s);
+        best = ground.closer(best, longer, middle_s(scene, longer[count - 1]) - start_s);
     }
     ground.beams.prepare(&split.held_out);
     let again = split.held_out_share() * ground.foretold(best, start_s);
-    let deviations = ground.deviations(best, gain, &every[..count], middle_s(scene, every[count - 1]) - start_s);
+    let deviations = ground.deviations(best, &every[..count], middle_s(scene, every[count - 1]) - start_s);
     // What may as well not swing at all, or is always in the cell of what stands still, only flickers.
     let swing_m = best.law[1].hypot(best.law[2]);
     let bins = TAU * best.law[3] * swing_m * scene.model.cells.doppler_per_mps;
@@ -191,12 +194,17 @@ struct Ground<'a> {
 }
 
 impl Ground<'_> {
+    /// Independent looks that one amounts to, and degrees of freedom of its tail.
+    fn freedom(&self, look: Look) -> (f64, f64) {
+        let tx = self.scene.evidence.radar.tx_m.len() as f64;
+        let looks = (look.body * look.body + (1.0 - look.body).powi(2) / tx).recip();
+        (looks, (TAIL / (look.body * look.body)).min(LONGEST_TAIL))
+    }
+
     /// Log-likelihood gained in a look by so much energy. Noise is another one for every transmitter and its level is known;
     /// the body's returns are nearly the same, and how strong they are is known less well. The mixture's powers follow an F law.
     fn gained(&self, look: Look) -> impl Fn(f64) -> f64 {
-        let tx = self.scene.evidence.radar.tx_m.len() as f64;
-        let looks = (look.body * look.body + (1.0 - look.body).powi(2) / tx).recip();
-        let tail = (TAIL / (look.body * look.body)).min(LONGEST_TAIL);
+        let (looks, tail) = self.freedom(look);
         let constant = gamma_ratio(tail, looks) + (looks - 1.0) * (look.power / look.expected).max(1e-9).ln();
         let stray = STRAY * look.body;
         let strays = stray / STRAY_POWER * (1.0 + look.power / look.expected / STRAY_POWER).powi(-2);
@@ -279,6 +287,54 @@ impl Ground<'_> {
         (swing(found), gain)
     }
 
+    /// Looks at a swing, one in every frame.
+    fn looks(&self, swing: Swing, frames: &[usize]) -> Vec<Option<Look>> {
+        frames.par_iter().map(|&frame| self.beams.look(frame, self.place(swing.law, frame), swing.sine)).collect()
+    }
+
+    /// How unlikely powers are where those of other looks are expected, whatever the tone's in each frame: where it is strong this
+    /// tells its law, as gains that are bounded do not.
+    fn contrast(&self, looks: &[Option<Look>], others: &[Option<Look>]) -> f64 {
+        let of_frame = |(look, other): (&Option<Look>, &Option<Look>)| match (look, other) {
+            (Some(look), Some(other)) => {
+                let (looks, tail) = self.freedom(*other);
+                (tail + looks) * (looks * (look.power / other.expected) / tail).ln_1p()
+            }
+            _ => 0.0,
+        };
+        looks.iter().zip(others).map(of_frame).sum()
+    }
+
+    /// The swing near another one that stands out most. What is expected is that at the other one: where little is, a tone's side
+    /// lobes stand out more than the tone does where much is.
+    fn closer(&self, near: Swing, frames: &[usize], length_s: f64) -> Swing {
+        let [mean, sine, cosine, rate] = widths(self.scene, near.law, length_s);
+        let there = self.looks(near, frames);
+        let contrast = |now: [f64; 6]| self.contrast(&self.looks(swing(now), frames), &there);
+        let start = numbers(near);
+        let widths = [0.5 * mean, 0.5 * sine, 0.5 * cosine, 0.5 * rate, 0.1, 0.0];
+        swing(climb(start, contrast(start), &widths, contrast, |a, b| a > b).0)
+    }
+
+    /// The swing about the same range that stands out most, of any rate.
+    fn sharpened(&self, best: Swing, frames: &[usize], length_s: f64) -> Swing {
+        let contrast = |swing: Swing| {
+            let looks = self.looks(swing, frames);
+            self.contrast(&looks, &looks)
+        };
+        let laws = laws(self.scene, best.law[0], length_s).into_iter().map(|law| Swing { law, ..best });
+        let mut starts: Vec<(Swing, f64)> = laws.map(|swing| (swing, contrast(swing))).collect();
+        starts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        starts.truncate(SHARPENED);
+        let starts = starts.into_iter().map(|(start, _)| start).chain([best]);
+        let closer = starts.map(|start| self.closer(self.closer(start, frames, length_s), frames, length_s));
+        let found = closer.max_by(|&a, &b| contrast(a).total_cmp(&contrast(b))).unwrap_or(best);
+        // How strong it is in all frames alike.
+        let gain = |now: [f64; 6]| self.gain(swing(now), frames);
+        let (found, gained) = climb(numbers(found), gain(numbers(found)), &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], gain, |a, b| a > b);
+        if gained > NEARLY * self.gain(best, frames) { swing(found) } else { best }
+    }
+
     /// What all frames gain, each foretold by those of the other folds: few held-out ones may all be among the body's returns.
     fn foretold(&self, best: Swing, start_s: f64) -> f64 {
         let frames = self.scene.frames();
@@ -288,7 +344,7 @@ impl Ground<'_> {
 
     /// Of mean, swing, rate and direction: half of where the likelihood has fallen to that of a 90 % interval's ends, the
     /// others fitted again.
-    fn deviations(&self, best: Swing, gain: f64, frames: &[usize], length_s: f64) -> [f64; 4] {
+    fn deviations(&self, best: Swing, frames: &[usize], length_s: f64) -> [f64; 4] {
         let swing_m = best.law[1].hypot(best.law[2]);
         let first = [0.1 * self.scene.range_m(1.0), 0.05 * swing_m, 0.01 / length_s, 0.01];
         let most = [2.0 * self.scene.range_m(1.0), swing_m, 0.5 / length_s, 0.5];
@@ -302,9 +358,11 @@ impl Ground<'_> {
             }
             swing
         };
+        let there = self.looks(best, frames);
+        let most_likely = self.contrast(&there, &there);
         let profile = |axis: usize, step: f64| -> f64 {
             let start = moved(axis, step);
-            let gain = |now: [f64; 6]| {
+            let contrast = |now: [f64; 6]| {
                 let mut free = swing(now);
                 // The one that is asked for stays.
                 match axis {
@@ -316,15 +374,16 @@ impl Ground<'_> {
                     2 => free.law[3] = start.law[3],
                     _ => free.sine = start.sine,
                 }
-                self.gain(free, frames)
+                self.contrast(&self.looks(free, frames), &there)
             };
             let [mean, sine, cosine, rate] = widths(self.scene, best.law, length_s).map(|width| 0.3 * width);
-            climb(numbers(start), gain(numbers(start)), &[mean, sine, cosine, rate, 0.05, 0.3], gain, |a, b| a > b).1
+            let widths = [mean, sine, cosine, rate, 0.05, 0.0];
+            climb(numbers(start), contrast(numbers(start)), &widths, contrast, |a, b| a > b).1
         };
         std::array::from_fn(|axis| {
             let side = |sign: f64| {
                 let mut step = first[axis];
-                while step < most[axis] && profile(axis, sign * step) > gain - DROP {
+                while step < most[axis] && profile(axis, sign * step) > most_likely - DROP {
                     step *= 1.5;
                 }
                 step.min(most[axis])

@@ -96,7 +96,15 @@ fn made(mirror: f64, stranger: f64, centre_m: f64) -> Evidence {
     let (held_out, training) = (0..FRAMES).partition(|frame| frame % 4 == 2);
     let split = Split { training, held_out, block_loops: None };
     let room = Room { left_m: Some(1.3), right_m: Some(RIGHT_M), front_m: Some(4.0), ..Room::default() };
-    let body = BodyPrediction { parts: vec!["body".into()], frames, centres: vec![], middle_s, tracks: vec![], echoes: vec![] };
+    let body = BodyPrediction {
+        parts: vec!["body".into()],
+        frames,
+        centres: vec![],
+        middle_s,
+        tracks: vec![],
+        beyond: vec![],
+        echoes: vec![],
+    };
     Evidence::new(Loaded { cube, radar, split, starts_s, extremes: [-1.0, 1.0] }, Some(room), Some(body))
 }
 
@@ -161,6 +169,7 @@ fn a_swing_among_the_bodys_returns_is_found_by_its_law() {
     let found = swing::strongest(&scene).unwrap().mover;
     let fit = found.pendulum.unwrap();
     assert!((fit.rate_hz - 0.8).abs() < 0.08 && (fit.mean_m - 2.2).abs() < 0.1, "{fit:?}");
+    assert!((fit.swing_m() - 0.12).abs() < 0.012, "{fit:?}");
     assert!(found.gain > 6.0 && found.track.p_value < 1e-3, "{} {}", found.gain, found.track.p_value);
     let alone = evidence(0.0, 0.0);
     let nothing = swing::strongest(&Scene::new(&alone).unwrap());
