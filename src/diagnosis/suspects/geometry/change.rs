@@ -90,6 +90,9 @@ impl Moves {
         let (centres, tracks) = (frames.clone().map(centres).collect(), frames.filter_map(track).collect());
         (body.centres, body.tracks) = (centres, tracks);
         body.frames = moved;
+        for (points, _) in &mut body.beyond {
+            points.iter_mut().for_each(|point| point.position_m = self.moved(point.position_m, change));
+        }
     }
 }
 

@@ -5,6 +5,7 @@ mod beams;
 mod coloured;
 mod echo;
 mod ghost;
+mod ground;
 mod image;
 mod mover;
 mod pendulum;

@@ -5,15 +5,14 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use num_complex::Complex64;
-use rayon::prelude::*;
 
-use super::bank::{Gains, LEAST_BINS, LEVELS, Standing, Swing, Table, around, climb, laws, widths};
-use super::beams::{Beams, Look};
+use super::bank::{LEAST_BINS, Standing, Swing};
+use super::beams::Beams;
+use super::ground::{DEVIATIONS, Ground, NEARLY, STRONGER};
 use super::mover::{Mover, WIDEST_SWING_M, middle_s};
-use super::pendulum::{Law, Pendulum, at};
+use super::pendulum::{Pendulum, at};
 use super::scene::Scene;
 use super::track::{Sighting, Track};
-use crate::diagnosis::cube::folds;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::{Candidate, Correction, Point};
 
@@ -22,25 +21,8 @@ const MOST_SAMPLES: usize = 1 << 21;
 const MOST_FRAMES: usize = 48;
 const LONGEST_S: f64 = 10.0;
 const FEWEST_FRAMES: usize = 8;
-/// Degrees of freedom of the heavy tail of the body's powers about their mean.
-const TAIL: f64 = 8.0;
-/// And at most, where there is but noise.
-const LONGEST_TAIL: f64 = 100.0;
-/// Share of the body's power in a look times this: how likely it is that the look shows something that was not expected at all,
-/// and by how much that exceeds what was.
-const STRAY: f64 = 0.05;
-const STRAY_POWER: f64 = 30.0;
-/// Log-likelihood of a look from which on its say is bounded.
-const MOST_NATS: f64 = 12.0;
-/// Logarithm of the power over what is expected, mean over the frames, that the same swing has more at another range: side lobes are
-/// weaker by more.
-const STRONGER: f64 = 1.0;
 /// Cells of the fine grid beside a swing's ranges where what stands still may be taken for it.
 const BESIDE: i64 = 4;
-/// Laws of all rates from which the one that stands out most is sought.
-const SHARPENED: usize = 6;
-/// Share of a swing's gain from which on something that stands still explains it.
-const NEARLY: f64 = 0.6;
 /// A body's point so close in Doppler and range (cells: a clock that is a little off moves a limb by as much) and
 /// in direction is where the swing is (x over range).
 const NEAR: [f64; 2] = [2.0, 1.5];
@@ -49,10 +31,6 @@ const SAME_DIRECTION: f64 = 0.35;
 const PARALLEL: f64 = 0.3;
 /// What chance does more often is no swing.
 const LEAST_LIKELY: f64 = 1e-2;
-/// Drop of the log-likelihood at the ends of a 90 % interval, and in standard deviations.
-const DROP: f64 = 1.35;
-const DEVIATIONS: f64 = 1.645;
-
 pub struct Found {
     pub mover: Mover,
     tones: Vec<Tone>,
@@ -188,210 +166,7 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
     Some(Found { mover, tones: ground.tones(best) })
 }
 
-struct Ground<'a> {
-    scene: &'a Scene<'a>,
-    beams: Beams<'a>,
-}
-
 impl Ground<'_> {
-    /// Independent looks that one amounts to, and degrees of freedom of its tail.
-    fn freedom(&self, look: Look) -> (f64, f64) {
-        let tx = self.scene.evidence.radar.tx_m.len() as f64;
-        let looks = (look.body * look.body + (1.0 - look.body).powi(2) / tx).recip();
-        (looks, (TAIL / (look.body * look.body)).min(LONGEST_TAIL))
-    }
-
-    /// Log-likelihood gained in a look by so much energy. Noise is another one for every transmitter and its level is known;
-    /// the body's returns are nearly the same, and how strong they are is known less well. The mixture's powers follow an F law.
-    fn gained(&self, look: Look) -> impl Fn(f64) -> f64 {
-        let (looks, tail) = self.freedom(look);
-        let constant = gamma_ratio(tail, looks) + (looks - 1.0) * (look.power / look.expected).max(1e-9).ln();
-        let stray = STRAY * look.body;
-        let strays = stray / STRAY_POWER * (1.0 + look.power / look.expected / STRAY_POWER).powi(-2);
-        // Density of the power over what is expected without any more.
-        let density = move |expected: f64| {
-            let exponent = constant
-                - looks * (expected / look.expected).ln()
-                - (tail + looks) * (looks * (look.power / expected) / tail).ln_1p();
-            (1.0 - stray) * exponent.exp() + strays
-        };
-        let without = density(look.expected).max(1e-300);
-        move |more| bounded((density(look.expected + more) / without).max(1e-300).ln())
-    }
-
-    fn table(&self, frames: &[usize]) -> Table {
-        let (rows, columns) = (self.beams.rows(), self.beams.columns());
-        let of_frame = |&frame: &usize| -> (Vec<Vec<Gains>>, Vec<Vec<Gains>>) {
-            let of_beam = |looks: Vec<Look>| {
-                let gains = |cell: usize| {
-                    let gained = self.gained(looks[cell]);
-                    LEVELS.map(|level| gained(level.into()) as f32)
-                };
-                let cells: Vec<Gains> = (0..rows * columns).map(|cell| gains(cell % columns * rows + cell / columns)).collect();
-                let around = around(&cells, rows);
-                (cells, around)
-            };
-            self.beams.looks(frame).into_iter().map(of_beam).unzip()
-        };
-        let (cells, around) = frames.par_iter().map(of_frame).unzip();
-        let times_s = frames.iter().map(|&frame| middle_s(self.scene, frame)).collect();
-        Table { sines: self.beams.sines.clone(), rows: rows as i64, columns: columns as i64, times_s, cells, around }
-    }
-
-    fn place(&self, law: Law, frame: usize) -> (f64, f64) {
-        let (range_m, velocity) = at(law, middle_s(self.scene, frame));
-        self.scene.model.cells.place(range_m, velocity)
-    }
-
-    fn gain(&self, swing: Swing, frames: &[usize]) -> f64 {
-        let power = swing.log_power.exp();
-        let of_frame = |&frame: &usize| self.gain_at(frame, self.place(swing.law, frame), swing.sine, power);
-        frames.par_iter().map(of_frame).sum()
-    }
-
-    fn gain_at(&self, frame: usize, place: (f64, f64), sine: f64, power: f64) -> f64 {
-        self.beams.look(frame, place, sine).map_or(0.0, |look| self.gained(look)(power))
-    }
-
-    /// Mean logarithms over some frames of the power over what is expected there, and of the power.
-    fn strength(&self, frames: &[usize], place: impl Fn(usize) -> (f64, f64), sine: f64) -> [f64; 2] {
-        let looks: Vec<Look> = frames.iter().filter_map(|&frame| self.beams.look(frame, place(frame), sine)).collect();
-        let mean = |of: &dyn Fn(&Look) -> f64| looks.iter().map(of).sum::<f64>() / frames.len() as f64;
-        [mean(&|look| (look.power / look.expected).ln_1p()), mean(&|look| look.power.max(1e-9).ln())]
-    }
-
-    /// The same swing at another range, where it is the stronger by far in proportion to what is expected there: none where its
-    /// own range is the best one.
-    fn stronger_elsewhere(&self, swing: Swing, frames: &[usize]) -> Option<Swing> {
-        let strength = |swing: Swing| self.strength(frames, |frame| self.place(swing.law, frame), swing.sine);
-        let step_m = self.scene.range_m(1.0) / 2.0;
-        let at = |step: usize| {
-            let mut moved = swing;
-            moved.law[0] = step as f64 * step_m;
-            let [ratio, log_power] = strength(moved);
-            (ratio, Swing { log_power, ..moved })
-        };
-        let own = strength(swing)[0];
-        let ranges: Vec<(f64, Swing)> = (1..2 * self.scene.samples).into_par_iter().map(at).collect();
-        let best = ranges.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-        (best.0 > own + STRONGER).then_some(best.1)
-    }
-
-    /// The best swing near a first guess, and its gain.
-    fn fitted(&self, guess: Swing, frames: &[usize], length_s: f64) -> (Swing, f64) {
-        let [mean, sine, cosine, rate] = widths(self.scene, guess.law, length_s);
-        let widths = [0.5 * mean, 0.5 * sine, 0.5 * cosine, 0.5 * rate, 0.1, 0.5];
-        let gain = |now: [f64; 6]| self.gain(swing(now), frames);
-        let start = numbers(guess);
-        let (found, gain) = climb(start, gain(start), &widths, gain, |a, b| a > b);
-        (swing(found), gain)
-    }
-
-    /// Looks at a swing, one in every frame.
-    fn looks(&self, swing: Swing, frames: &[usize]) -> Vec<Option<Look>> {
-        frames.par_iter().map(|&frame| self.beams.look(frame, self.place(swing.law, frame), swing.sine)).collect()
-    }
-
-    /// How unlikely powers are where those of other looks are expected, whatever the tone's in each frame: where it is strong this
-    /// tells its law, as gains that are bounded do not.
-    fn contrast(&self, looks: &[Option<Look>], others: &[Option<Look>]) -> f64 {
-        let of_frame = |(look, other): (&Option<Look>, &Option<Look>)| match (look, other) {
-            (Some(look), Some(other)) => {
-                let (looks, tail) = self.freedom(*other);
-                (tail + looks) * (looks * (look.power / other.expected) / tail).ln_1p()
-            }
-            _ => 0.0,
-        };
-        looks.iter().zip(others).map(of_frame).sum()
-    }
-
-    /// The swing near another one that stands out most. What is expected is that at the other one: where little is, a tone's side
-    /// lobes stand out more than the tone does where much is.
-    fn closer(&self, near: Swing, frames: &[usize], length_s: f64) -> Swing {
-        let [mean, sine, cosine, rate] = widths(self.scene, near.law, length_s);
-        let there = self.looks(near, frames);
-        let contrast = |now: [f64; 6]| self.contrast(&self.looks(swing(now), frames), &there);
-        let start = numbers(near);
-        let widths = [0.5 * mean, 0.5 * sine, 0.5 * cosine, 0.5 * rate, 0.1, 0.0];
-        swing(climb(start, contrast(start), &widths, contrast, |a, b| a > b).0)
-    }
-
-    /// The swing about the same range that stands out most, of any rate.
-    fn sharpened(&self, best: Swing, frames: &[usize], length_s: f64) -> Swing {
-        let contrast = |swing: Swing| {
-            let looks = self.looks(swing, frames);
-            self.contrast(&looks, &looks)
-        };
-        let laws = laws(self.scene, best.law[0], length_s).into_iter().map(|law| Swing { law, ..best });
-        let mut starts: Vec<(Swing, f64)> = laws.map(|swing| (swing, contrast(swing))).collect();
-        starts.sort_by(|a, b| b.1.total_cmp(&a.1));
-        starts.truncate(SHARPENED);
-        let starts = starts.into_iter().map(|(start, _)| start).chain([best]);
-        let closer = starts.map(|start| self.closer(self.closer(start, frames, length_s), frames, length_s));
-        let found = closer.max_by(|&a, &b| contrast(a).total_cmp(&contrast(b))).unwrap_or(best);
-        // How strong it is in all frames alike.
-        let gain = |now: [f64; 6]| self.gain(swing(now), frames);
-        let (found, gained) = climb(numbers(found), gain(numbers(found)), &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], gain, |a, b| a > b);
-        if gained > NEARLY * self.gain(best, frames) { swing(found) } else { best }
-    }
-
-    /// What all frames gain, each foretold by those of the other folds: few held-out ones may all be among the body's returns.
-    fn foretold(&self, best: Swing, start_s: f64) -> f64 {
-        let frames = self.scene.frames();
-        let length_s = middle_s(self.scene, frames - 1) - start_s;
-        folds(frames).map(|[rest, held]| self.gain(self.fitted(best, &rest, length_s).0, &held)).sum()
-    }
-
-    /// Of mean, swing, rate and direction: half of where the likelihood has fallen to that of a 90 % interval's ends, the
-    /// others fitted again.
-    fn deviations(&self, best: Swing, frames: &[usize], length_s: f64) -> [f64; 4] {
-        let swing_m = best.law[1].hypot(best.law[2]);
-        let first = [0.1 * self.scene.range_m(1.0), 0.05 * swing_m, 0.01 / length_s, 0.01];
-        let most = [2.0 * self.scene.range_m(1.0), swing_m, 0.5 / length_s, 0.5];
-        let moved = |axis: usize, step: f64| -> Swing {
-            let mut swing = best;
-            match axis {
-                0 => swing.law[0] += step,
-                1 => [1, 2].into_iter().for_each(|part| swing.law[part] *= 1.0 + step / swing_m),
-                2 => swing.law[3] += step,
-                _ => swing.sine += step,
-            }
-            swing
-        };
-        let there = self.looks(best, frames);
-        let most_likely = self.contrast(&there, &there);
-        let profile = |axis: usize, step: f64| -> f64 {
-            let start = moved(axis, step);
-            let contrast = |now: [f64; 6]| {
-                let mut free = swing(now);
-                // The one that is asked for stays.
-                match axis {
-                    0 => free.law[0] = start.law[0],
-                    1 => {
-                        let scale = start.law[1].hypot(start.law[2]) / free.law[1].hypot(free.law[2]).max(1e-9);
-                        (free.law[1], free.law[2]) = (free.law[1] * scale, free.law[2] * scale);
-                    }
-                    2 => free.law[3] = start.law[3],
-                    _ => free.sine = start.sine,
-                }
-                self.contrast(&self.looks(free, frames), &there)
-            };
-            let [mean, sine, cosine, rate] = widths(self.scene, best.law, length_s).map(|width| 0.3 * width);
-            let widths = [mean, sine, cosine, rate, 0.05, 0.0];
-            climb(numbers(start), contrast(numbers(start)), &widths, contrast, |a, b| a > b).1
-        };
-        std::array::from_fn(|axis| {
-            let side = |sign: f64| {
-                let mut step = first[axis];
-                while step < most[axis] && profile(axis, sign * step) > most_likely - DROP {
-                    step *= 1.5;
-                }
-                step.min(most[axis])
-            };
-            side(-1.0).max(side(1.0)) / DEVIATIONS
-        })
-    }
-
     /// Whether some point of the body is where the swing is in the frames that show most of it, so that it may be a limb whose
     /// returns are stronger than expected; or the swing goes where the body goes, so that it may be the body seen in another way.
     fn moves_with_the_body(&self, swing: Swing) -> bool {
@@ -442,24 +217,4 @@ impl Ground<'_> {
             })
             .collect()
     }
-}
-
-/// A look that shows far more than expected may show something else: beyond a bound its say grows like a logarithm, so that one
-/// frame beside the body cannot outvote all those within it.
-fn bounded(nats: f64) -> f64 {
-    if nats > MOST_NATS { MOST_NATS + (nats - MOST_NATS).ln_1p() } else { nats }
-}
-
-/// Logarithm of what makes the density of an F law's ratio (so many looks, a heavy tail) one.
-fn gamma_ratio(tail: f64, looks: f64) -> f64 {
-    use statrs::function::gamma::ln_gamma;
-    ln_gamma(tail + looks) - ln_gamma(tail) - ln_gamma(looks) + looks * (looks / tail).ln()
-}
-
-fn numbers(Swing { law: [mean, sine, cosine, rate], sine: direction, log_power }: Swing) -> [f64; 6] {
-    [mean, sine, cosine, rate, direction, log_power]
-}
-
-fn swing([mean, sine, cosine, rate, direction, log_power]: [f64; 6]) -> Swing {
-    Swing { law: [mean, sine, cosine, rate], sine: direction.clamp(-1.0, 1.0), log_power }
 }
