@@ -25,8 +25,6 @@ const MOST_NATS: f64 = 12.0;
 pub const STRONGER: f64 = 1.0;
 /// Laws of all rates from which the one that stands out most is sought.
 const SHARPENED: usize = 6;
-/// Share of a swing's gain from which on something that stands still explains it.
-pub const NEARLY: f64 = 0.6;
 /// Drop of the log-likelihood at the ends of a 90 % interval, and in standard deviations.
 const DROP: f64 = 1.35;
 pub const DEVIATIONS: f64 = 1.645;
@@ -175,8 +173,7 @@ impl Ground<'_> {
         let found = closer.max_by(|&a, &b| contrast(a).total_cmp(&contrast(b))).unwrap_or(best);
         // How strong it is in all frames alike.
         let gain = |now: [f64; 6]| self.gain(swing(now), frames);
-        let (found, gained) = climb(numbers(found), gain(numbers(found)), &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], gain, |a, b| a > b);
-        if gained > NEARLY * self.gain(best, frames) { swing(found) } else { best }
+        swing(climb(numbers(found), gain(numbers(found)), &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], gain, |a, b| a > b).0)
     }
 
     /// What all frames gain, each foretold by those of the other folds: few held-out ones may all be among the body's returns.

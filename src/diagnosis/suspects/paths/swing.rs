@@ -8,7 +8,7 @@ use num_complex::Complex64;
 
 use super::bank::{LEAST_BINS, Standing, Swing};
 use super::beams::Beams;
-use super::ground::{DEVIATIONS, Ground, NEARLY, STRONGER};
+use super::ground::{DEVIATIONS, Ground, STRONGER};
 use super::mover::{Mover, WIDEST_SWING_M, middle_s};
 use super::pendulum::{Pendulum, at};
 use super::scene::Scene;
@@ -21,6 +21,8 @@ const MOST_SAMPLES: usize = 1 << 21;
 const MOST_FRAMES: usize = 48;
 const LONGEST_S: f64 = 10.0;
 const FEWEST_FRAMES: usize = 8;
+/// Share of a swing's gain from which on something that stands still explains it.
+const NEARLY: f64 = 0.6;
 /// Cells of the fine grid beside a swing's ranges where what stands still may be taken for it.
 const BESIDE: i64 = 4;
 /// A body's point so close in Doppler and range (cells: a clock that is a little off moves a limb by as much) and
@@ -96,7 +98,7 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
     if let Some(stronger) = ground.stronger_elsewhere(found.0, &training) {
         found = Some(judged(stronger)).filter(|other| other.2 > 0.0).unwrap_or(found);
     }
-    let (mut best, gain, again) = found;
+    let (best, gain, again) = found;
     // A likelihood ratio is large by chance no more often than its inverse says: that of all frames, one of all that were tried.
     // Where something that stands still is not steady, it must be beaten.
     let ranges = table.places(scene, best.law).into_iter().map(|place| place.1);
@@ -118,7 +120,8 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
     {
         return None;
     }
-    best = ground.sharpened(best, &training, length_s);
+    // Two laws: the one that its bounded gains tell, and the one that stands out most.
+    let mut laws = [best, ground.sharpened(best, &training, length_s)];
     // A long recording tells the rate better than a part of it, which must not be off by a turn at once.
     let (every, mut count) = (&split.training, training.len());
     if count < every.len() {
@@ -127,11 +130,12 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
     }
     while count < every.len() {
         count = (2 * count).min(every.len());
-        let longer = &every[..count];
-        best = ground.closer(best, longer, middle_s(scene, longer[count - 1]) - start_s);
+        let (longer, length_s) = (&every[..count], middle_s(scene, every[count - 1]) - start_s);
+        laws = [ground.fitted(laws[0], longer, length_s).0, ground.closer(laws[1], longer, length_s)];
     }
     ground.beams.prepare(&split.held_out);
-    let again = split.held_out_share() * ground.foretold(best, start_s);
+    let foretold = laws.map(|law| (split.held_out_share() * ground.foretold(law, start_s), law));
+    let (again, best) = foretold.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let deviations = ground.deviations(best, &every[..count], middle_s(scene, every[count - 1]) - start_s);
     // What may as well not swing at all, or is always in the cell of what stands still, only flickers.
     let swing_m = best.law[1].hypot(best.law[2]);
