@@ -76,15 +76,24 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let shaken = vibrates && (turns || is_path(candidate));
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
-    // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it.
-    let behind = accepted.place.stage == "timing" && of_remains;
+    // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it,
+    // and what a part may carry, the last resort, is never sure there.
+    let timed = accepted.place.stage == "timing";
+    let behind = timed && of_remains;
+    let hardly = timed && candidate.id == Some("carried_reflector");
     // What bursts leave below the noise of single samples is in all receivers at once.
     let bursts = accepted.id.is_some_and(|id| BURSTS.contains(&id)) && candidate.id == Some("correlated_noise");
     let faint = accepted.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id == Some(FAINT);
     // Up to which share of what was gained.
-    [(roughly || fades, ROUGHLY), (bursts || behind, 1.0), (shaken, SHAKEN), (by_chirp || faint, SLIGHTLY)]
-        .into_iter()
-        .any(|(holds, share)| holds && candidate.gain < share * accepted.gain)
+    [
+        (roughly || fades, ROUGHLY),
+        (bursts || behind, 1.0),
+        (hardly, f64::INFINITY),
+        (shaken, SHAKEN),
+        (by_chirp || faint, SLIGHTLY),
+    ]
+    .into_iter()
+    .any(|(holds, share)| holds && candidate.gain < share * accepted.gain)
 }
 
 fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> bool {

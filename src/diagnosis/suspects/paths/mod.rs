@@ -77,7 +77,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         found.extend(moving);
         if !elsewhere {
             let remains = LEAVE_REMAINS.iter().any(|id| evidence.accepted.contains(id));
-            let swing = (!remains).then(|| swing::strongest(&scene)).flatten();
+            // Noise that receivers share comes from one direction, as if something were there.
+            let shared = evidence.accepted.contains(&"correlated_noise");
+            let swing = (!remains && !shared).then(|| swing::strongest(&scene)).flatten();
             let swing = swing.filter(|swing| swing.mover.gain > LEAST_GAIN_SWING);
             let over = scene.over_the_body();
             // What single frames show needs no law.

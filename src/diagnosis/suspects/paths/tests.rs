@@ -190,6 +190,15 @@ fn a_swing_too_weak_for_any_single_frame_is_found_by_all_of_them() {
 }
 
 #[test]
+fn no_swing_is_sought_in_noise_that_receivers_share() {
+    let mut weak = made(0.0, 0.044, 1.0);
+    let swings = |evidence: &Evidence| find(evidence).iter().any(|found| found.id == Some("moving_reflector"));
+    assert!(swings(&weak));
+    weak.accepted.push("correlated_noise");
+    assert!(!swings(&weak));
+}
+
+#[test]
 fn away_from_the_body_looks_are_those_of_noise_and_where_it_is_a_tone_must_be_stronger() {
     let alone = evidence(0.0, 0.0);
     let scene = Scene::new(&alone).unwrap();
