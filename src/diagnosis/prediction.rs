@@ -180,7 +180,6 @@ fn track(body: &PosedBody, middle_m: &[[f64; 3]], vertices: &[usize], middle_s: 
     Ok(Track::new(middle_s, times_s, displacement_m))
 }
 
-/// The parts' names, and the part of every vertex: the joint that moves it most.
 /// Means over the vertices of every part; none where no vertex is told to belong to a part.
 fn centres(position_m: &[[f64; 3]], velocity_mps: &[[f64; 3]], of_vertex: &[usize], parts: usize) -> Vec<Centre> {
     if of_vertex.len() != position_m.len() {
@@ -202,6 +201,7 @@ fn centres(position_m: &[[f64; 3]], velocity_mps: &[[f64; 3]], of_vertex: &[usiz
     sums.into_iter().map(mean).collect()
 }
 
+/// The parts' names, and the part of every vertex: the joint that moves it most.
 fn parts(person: &Person) -> (Vec<String>, Vec<usize>) {
     match person {
         Person::Skinned { model, .. } => {
