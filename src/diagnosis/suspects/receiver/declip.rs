@@ -11,7 +11,7 @@ const MOST: f64 = 0.5;
 /// Of the equations' diagonal, so that neighbours at the rail stay solvable.
 const RIDGE: f64 = 1e-3;
 /// Clipping may hide so much and not more, as a factor of the rail.
-const FARTHEST: f64 = 8.0;
+pub const FARTHEST: f64 = 8.0;
 
 /// Restores the chirps of one recording.
 pub struct Declip {

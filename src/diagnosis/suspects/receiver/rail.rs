@@ -5,7 +5,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::declip::Declip;
+use super::declip::{Declip, FARTHEST};
 use super::image::empty_bins;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::corrected;
@@ -64,10 +64,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let declip = Declip::new(&silent_bins(evidence), largest, tolerance).map(Arc::new);
     let (level, ci90) = match &declip {
         Some(declip) => {
-            let level = strongest(evidence, declip, &hit_frames) / largest;
             // The strongest of many restored values is one of the worse restored ones, and the noise is restored with it.
-            let beyond = level - 1.0;
-            (level, [1.0 + 0.5 * beyond, 1.0 + 1.25 * beyond + 0.05])
+            let beyond = strongest(evidence, declip, &hit_frames) / largest - 1.0;
+            // What is below the rail without noise was there for moments, which say nothing of how far they went.
+            let ci90 = if beyond > 0.0 { [1.0 + 0.5 * beyond, 1.0 + 1.25 * beyond + 0.05] } else { [1.0, FARTHEST] };
+            (1.0 + beyond.max(0.0), ci90)
         }
         None => {
             let power = evidence.cube.samples.iter().map(Complex64::norm_sqr).sum::<f64>();
