@@ -17,8 +17,8 @@ use crate::person::{JOINT_NAMES, Person};
 use crate::radar::Radar;
 use crate::scatterers::visibility::{DEFAULT_FLIP_EXPONENT, frame_visibility};
 
-/// Frames beyond the last one that are predicted.
-const BEYOND: usize = 6;
+/// Frames beyond the last one that are predicted: as many as may be lost at once.
+pub const BEYOND: usize = 6;
 
 /// A visible point of the body in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -102,19 +102,12 @@ impl Products {
     /// Nothing of a real recording, or where no cells are empty.
     pub fn new(evidence: &Evidence) -> Self {
         let empty = empty_bins(evidence);
-        let peak = evidence.peak();
-        if evidence.is_real() || !empty.contains(&true) || peak <= 0.0 {
+        if evidence.is_real() || !empty.contains(&true) || evidence.peak() <= 0.0 {
             return Self::default();
         }
-        let found = |products: &[Product], undone: Option<Law>| -> Vec<Option<Law>> {
-            let of_frame = |frame| of_frame(evidence, frame, &empty, peak, products, undone);
-            let sums: Vec<Vec<Sums>> = (0..evidence.cube.dims[0]).into_par_iter().map(of_frame).collect();
-            let of_product = |index: usize| sums.iter().map(|sums| sums[index]).collect::<Vec<Sums>>();
-            products.iter().enumerate().map(|(index, &product)| judged(product, &of_product(index), peak)).collect()
-        };
-        let [square, magnitude, mut cube] = found(&PRODUCTS, None).try_into().unwrap_or_default();
+        let [square, magnitude, mut cube] = found(evidence, &empty, PRODUCTS, None);
         if let Some(law) = cube.filter(|cube| cube.p_value < SURELY) {
-            cube = driven(law, |law| found(&[Product::Cube], Some(law)).pop().flatten());
+            cube = driven(law, |law| found(evidence, &empty, [Product::Cube], Some(law))[0]);
         }
         Self { square, magnitude, cube }
     }
@@ -132,6 +125,17 @@ impl Products {
         let beside = square.is_none_or(|square| magnitude.kappa.norm() > BESIDE * square.kappa.norm());
         beside.then(|| square.into_iter().chain([magnitude]).collect())
     }
+}
+
+/// How much of some products of the signal, without a law's part, is in the recording.
+fn found<const N: usize>(evidence: &Evidence, empty: &[bool], products: [Product; N], undone: Option<Law>) -> [Option<Law>; N] {
+    let peak = evidence.peak();
+    let of_frame = |frame| of_frame(evidence, frame, empty, products, undone);
+    let sums: Vec<[Sums; N]> = (0..evidence.cube.dims[0]).into_par_iter().map(of_frame).collect();
+    std::array::from_fn(|index| {
+        let of_product: Vec<Sums> = sums.iter().map(|sums| sums[index]).collect();
+        judged(products[index], &of_product, peak)
+    })
 }
 
 /// What is compressed makes another product than what drives it: the share of a first law without which the signal shows just that
@@ -178,17 +182,15 @@ fn judged(product: Product, sums: &[Sums], peak: f64) -> Option<Law> {
 }
 
 /// Templates are scaled by the peak sample, so that κ is a share of it.
-/// The products are those of the signal without a law's part.
-fn of_frame(
+fn of_frame<const N: usize>(
     evidence: &Evidence,
     frame: usize,
     empty: &[bool],
-    peak: f64,
-    products: &[Product],
+    products: [Product; N],
     undone: Option<Law>,
-) -> Vec<Sums> {
+) -> [Sums; N] {
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let mut sums = vec![Sums::default(); products.len()];
+    let mut sums = [Sums::default(); N];
     for channel in 0..evidence.cube.channels() {
         let noise = evidence.noise()[channel].max(1e-300);
         let mut clean = denoised::channel(evidence, frame, channel);
@@ -196,8 +198,8 @@ fn of_frame(
             clean.iter_mut().for_each(|value| *value = without(&[law], *value));
         }
         let [found, still] = moving_and_still(evidence.cube.channel(frame, channel).to_vec(), samples);
-        for (product, sums) in products.iter().zip(&mut sums) {
-            let scale = product.scale(peak);
+        for (product, sums) in products.into_iter().zip(&mut sums) {
+            let scale = product.scale(evidence.peak());
             let template = clean.iter().map(|value| product.of(*value) * scale).collect();
             let [expected, mean] = moving_and_still(template, samples);
             for range in (0..samples).filter(|&range| empty[range]) {

@@ -12,6 +12,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::again;
 use super::change::{Change, Moves, frame_period_s};
 use super::trial::{Score, Trial};
+use crate::diagnosis::prediction::BEYOND;
 use crate::diagnosis::suspects::paths::PATH_LIKE;
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
 use crate::effects::slope_error;
@@ -32,8 +33,6 @@ const RANGE_GRID_M: [f64; 11] = [-0.4, -0.3, -0.2, -0.12, -0.06, 0.0, 0.06, 0.12
 const CLOCK_GRID: [f64; 13] = [-3.0, -2.0, -1.0, -0.6, -0.3, -0.15, 0.0, 0.15, 0.3, 0.6, 1.0, 2.0, 3.0];
 /// Rates of clocks looked at first.
 const DRIFT_GRID: [f64; 7] = [-0.1, -0.03, -0.01, 0.0, 0.01, 0.03, 0.1];
-/// Most frames lost at once that are looked for.
-const MOST_LOST: usize = 6;
 /// Standard deviation of a displacement across the line of sight, which ranges do not show.
 const UNSEEN_M: f64 = 0.2;
 /// Kinds of change that can be told apart, for the correction of the p-value.
@@ -247,7 +246,7 @@ fn p_value(fit: &Fitted, null: &Score, training: &[usize]) -> f64 {
 
 /// Most frames lost at once that are looked for among so many.
 fn most_lost(frames: usize) -> usize {
-    MOST_LOST.min(frames / 2)
+    BEYOND.min(frames / 2)
 }
 
 /// A rule of thumb: a ratio of likelihoods of fixed laws would exceed e^x by chance with probability e^-x at most, and the

@@ -93,18 +93,11 @@ impl Table {
         let of_rate = |&rate_hz: &f64| -> (Vec<(f32, Swing)>, f64) {
             let (mut kept, mut tried): (Vec<(f32, Swing)>, f64) = (vec![], 0.0);
             let mut sums = vec![[0.0; LEVELS.len()]; self.columns as usize];
-            let cells = &scene.model.cells;
-            for swing_m in swings() {
-                let bins = TAU * rate_hz * swing_m * cells.doppler_per_mps;
-                if !(LEAST_BINS..0.5 * scene.loops as f64).contains(&bins) {
-                    continue;
-                }
+            for (swing_m, bins) in swings(scene, rate_hz, 1) {
                 // Neighbours are two cells of the fine grid apart.
-                let phases = (0.5 * TAU * FINE as f64 * bins.max(swing_m * cells.bins_per_m)).ceil();
-                let phases = phases.clamp(PHASES.0, PHASES.1) as usize;
-                for phase in 0..phases {
-                    let (sine, cosine) = (TAU * phase as f64 / phases as f64).sin_cos();
-                    let places = self.places(scene, [0.0, swing_m * sine, swing_m * cosine, rate_hz]);
+                let phases = (0.5 * TAU * FINE as f64 * bins.max(swing_m * scene.model.cells.bins_per_m)).ceil();
+                for law in phased([0.0, swing_m, rate_hz], phases.clamp(PHASES.0, PHASES.1) as usize) {
+                    let places = self.places(scene, law);
                     for beam in 0..self.sines.len() {
                         self.along(&places, beam, &mut sums);
                         tried += sums.len() as f64;
@@ -112,7 +105,7 @@ impl Table {
                             let (gain, level) = strongest_level(sums);
                             if kept.len() < KEPT || gain > kept[KEPT - 1].0 {
                                 let mean_m = scene.range_m(range as f64 / FINE as f64);
-                                let law = [mean_m, swing_m * sine, swing_m * cosine, rate_hz];
+                                let law = [mean_m, law[1], law[2], rate_hz];
                                 let found = Swing { law, sine: self.sines[beam], log_power: f64::from(LEVELS[level]).ln() };
                                 let at = kept.partition_point(|other| other.0 >= gain);
                                 kept.insert(at, (gain, found));
@@ -191,17 +184,20 @@ fn strongest_level(sums: &Gains) -> (f32, usize) {
     best
 }
 
-/// Laws of all rates and swings about one range, eight phases each.
+/// Laws of all rates and every second swing about one range, in the fewest phases.
 pub fn laws(scene: &Scene, mean_m: f64, length_s: f64) -> Vec<Law> {
-    let of_swing = |rate_hz: f64, swing_m: f64| {
-        let bins = TAU * rate_hz * swing_m * scene.model.cells.doppler_per_mps;
-        let phases = if (LEAST_BINS..0.5 * scene.loops as f64).contains(&bins) { 8 } else { 0 };
-        (0..phases).map(move |phase| {
-            let (sine, cosine) = (TAU * f64::from(phase) / 8.0).sin_cos();
-            [mean_m, swing_m * sine, swing_m * cosine, rate_hz]
-        })
+    let of_rate = |rate_hz: f64| {
+        swings(scene, rate_hz, 2).flat_map(move |(swing_m, _)| phased([mean_m, swing_m, rate_hz], PHASES.0 as usize))
     };
-    rates(scene, length_s).flat_map(|rate_hz| swings().step_by(2).flat_map(move |swing_m| of_swing(rate_hz, swing_m))).collect()
+    rates(scene, length_s).flat_map(of_rate).collect()
+}
+
+/// Laws of one mean, swing and rate, in so many phases.
+fn phased([mean_m, swing_m, rate_hz]: [f64; 3], phases: usize) -> impl Iterator<Item = Law> {
+    (0..phases).map(move |phase| {
+        let (sine, cosine) = (TAU * phase as f64 / phases as f64).sin_cos();
+        [mean_m, swing_m * sine, swing_m * cosine, rate_hz]
+    })
 }
 
 fn rates(scene: &Scene, length_s: f64) -> impl Iterator<Item = f64> + use<> {
@@ -210,8 +206,15 @@ fn rates(scene: &Scene, length_s: f64) -> impl Iterator<Item = f64> + use<> {
     (FIRST_STEP..=(fastest_hz / step_hz) as usize).map(move |step| step as f64 * step_hz)
 }
 
-fn swings() -> impl Iterator<Item = f64> {
-    (0..SWINGS.2).map(|step| SWINGS.0 * SWINGS.1.powi(step as i32))
+/// Every so many-th swing, with the Doppler bins by which it moves, as far as these can be told.
+fn swings(scene: &Scene, rate_hz: f64, every: usize) -> impl Iterator<Item = (f64, f64)> + use<> {
+    let (per_m, most) = (TAU * rate_hz, 0.5 * scene.loops as f64);
+    let doppler_per_mps = scene.model.cells.doppler_per_mps;
+    (0..SWINGS.2)
+        .step_by(every)
+        .map(|step| SWINGS.0 * SWINGS.1.powi(step as i32))
+        .map(move |swing_m| (swing_m, per_m * swing_m * doppler_per_mps))
+        .filter(move |(_, bins)| (LEAST_BINS..most).contains(bins))
 }
 
 /// First steps of mean, sine, cosine and rate.

@@ -170,7 +170,8 @@ impl Ground<'_> {
         starts.truncate(SHARPENED);
         let starts = starts.into_iter().map(|(start, _)| start).chain([best]);
         let closer = starts.map(|start| self.closer(self.closer(start, frames, length_s), frames, length_s));
-        let found = closer.max_by(|&a, &b| contrast(a).total_cmp(&contrast(b))).unwrap_or(best);
+        let closer = closer.map(|swing| (swing, contrast(swing)));
+        let found = closer.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(best, |found| found.0);
         // How strong it is in all frames alike.
         let gain = |now: [f64; 6]| self.gain(swing(now), frames);
         swing(climb(numbers(found), gain(numbers(found)), &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], gain, |a, b| a > b).0)
