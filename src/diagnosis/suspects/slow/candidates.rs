@@ -13,7 +13,7 @@ use super::settling::Settling;
 use super::undo;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Rung};
 use crate::radar::SPEED_OF_LIGHT;
 
 /// Range at which a phase in proportion to the delay is stated.
@@ -89,7 +89,7 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
     let scale = if part == Part::Gain { 1.0 / (1.0 + line.constant) } else { 1.0 };
     let deviation: Deviation = Arc::new(move |at| scale * (shape.value(time(at)) - shape.constant));
     let amplitude = scale * line.amplitude();
-    let interval = 1.645 * line.frequency_deviation_hz;
+    let interval = NINETY * line.frequency_deviation_hz;
     // As many places as the interval has.
     let places = (2.0 - interval.max(1e-6).log10().floor()).clamp(2.0, 5.0) as usize - 1;
     let hertz = format!("{:.places$} ± {:.places$} Hz", line.frequency_hz, interval);

@@ -11,7 +11,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::steady::Steady;
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, NINETY, Place, Rung};
 use crate::diagnosis::statistics::{self, DECIBEL};
 
 /// Fewest receivers or transmitters of which one can be told to be odd.
@@ -255,7 +255,7 @@ impl Judged {
                 "The gain of {what} {index} changes from frame to frame, over {:.2} ± {:.2} dB{phase}, at all ranges alike, while \
                  the other {others} stay.",
                 span(&decibel),
-                1.645 * DECIBEL * error * std::f64::consts::SQRT_2
+                NINETY * DECIBEL * error * std::f64::consts::SQRT_2
             ),
             curve: Some(Curve {
                 title: format!("Static returns in {what} {index} relative to the other {others}"),

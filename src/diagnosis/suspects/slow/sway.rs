@@ -13,7 +13,7 @@ use super::field::{PATTERN, ahead};
 use super::lines::climb;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, Tapered};
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 
 /// Bins over which the window spreads what is independent.
@@ -364,7 +364,7 @@ fn candidate(
         statement: format!(
             "All static returns swing at {frequency:.2} ± {:.2} Hz, in phase with one another but each with a strength of its own, \
              as returns from several directions do: the radar itself vibrates, by about {:.1} µm along its boresight.",
-            1.645 * frequency_deviation,
+            NINETY * frequency_deviation,
             1e6 * amplitude_m
         ),
         curve: None,

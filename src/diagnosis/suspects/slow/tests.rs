@@ -9,7 +9,7 @@ use super::field::ahead;
 use super::find;
 use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction};
+use crate::diagnosis::finding::{Candidate, Correction, NINETY};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::Room;
 
@@ -65,8 +65,8 @@ fn found_once(mut evidence: Evidence) -> Candidate {
 fn within(candidate: &Candidate, name: &str, truth: f64) {
     let estimate = candidate.estimates.iter().find(|e| e.name == name).unwrap_or_else(|| panic!("no {name}: {candidate:?}"));
     let [low, high] = estimate.ci90[0];
-    // Three deviations instead of 1.645: one draw of the noise must not fail.
-    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * 3.0 / 1.645);
+    // Three deviations instead: one draw of the noise must not fail.
+    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * 3.0 / NINETY);
     assert!((truth - middle).abs() < half, "{name}: {truth} not within {low} … {high}");
     assert!(half < 0.25 * truth.abs(), "{name}: {half} is no measurement of {truth}");
 }
