@@ -15,7 +15,7 @@ const BY_CHIRP: [&str; 2] = ["phase_noise", "chirp_start_jitter"];
 const SLIGHTLY: f64 = 0.01;
 
 /// What a radar that vibrates leaves: turns of what stands still that are not quite undone, and their sidebands, up to this share of
-/// its gain (which counts what is left).
+/// its gain (which counts what is left); so with products.
 const TURNS: [&str; 2] = ["slow-time phase", "delay-proportional phase"];
 const SHAKEN: f64 = 0.5;
 const FADING: &str = "slow-time gain";
@@ -24,10 +24,16 @@ const FADING: &str = "slow-time gain";
 const BURSTS: [&str; 2] = ["interference", "impulsive_noise"];
 
 /// And what a path that was taken out roughly leaves below the noise looks like the faintest of these.
-const FAINT: &str = "interference";
+const FAINT: [&str; 4] = ["interference", "chirp_start_jitter", "phase_noise", "correlated_noise"];
+
+/// Products of the signal with itself, of which either is hardly taken out in full.
+const PRODUCTS: [&str; 2] = ["object_radar_object", "second_harmonic"];
 
 /// What explains a little of anything that moves near the body: remains of a strong path that was taken out.
 const OF_REMAINS: [&str; 2] = ["body_multibounce", "carried_reflector"];
+
+/// The body by way of a boundary.
+const IMAGES: [&str; 2] = ["floor_bounce", "wall_ghost"];
 
 /// Two instances of an effect closer than this are one.
 const NEAR_M: f64 = 0.3;
@@ -76,20 +82,23 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let shaken = vibrates && (turns || is_path(candidate));
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
-    // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it,
-    // and what a part may carry, the last resort, is never sure there.
+    // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it
+    // and among its images, and what a part may carry, the last resort, is never sure there.
     let timed = accepted.place.stage == "timing";
     let behind = timed && of_remains;
+    let image = timed && candidate.id.is_some_and(|id| IMAGES.contains(&id));
+    let is_product = |candidate: &Candidate| candidate.id.is_some_and(|id| PRODUCTS.contains(&id));
+    let products = is_product(accepted) && is_product(candidate);
     let hardly = timed && candidate.id == Some("carried_reflector");
     // What bursts leave below the noise of single samples is in all receivers at once.
     let bursts = accepted.id.is_some_and(|id| BURSTS.contains(&id)) && candidate.id == Some("correlated_noise");
-    let faint = accepted.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id == Some(FAINT);
+    let faint = accepted.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_some_and(|id| FAINT.contains(&id));
     // Up to which share of what was gained.
     [
-        (roughly || fades, ROUGHLY),
+        (roughly || fades || image, ROUGHLY),
         (bursts || behind, 1.0),
         (hardly, f64::INFINITY),
-        (shaken, SHAKEN),
+        (shaken || products, SHAKEN),
         (by_chirp || faint, SLIGHTLY),
     ]
     .into_iter()

@@ -187,8 +187,8 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     Explanation { accepted, evidence, p_value: p_value.unwrap_or(1.0), before, after }
 }
 
-/// What acts on every return makes echoes of the body too, which look like paths of their own: where both are suspected,
-/// the one is accepted that leaves less.
+/// What acts on every return makes echoes of the body too, which look like paths of their own, and of the room beyond its ranges:
+/// where both are suspected, the one is accepted that leaves less.
 fn upstream<'a>(
     original: &Evidence,
     evidence: &Evidence,
@@ -200,9 +200,8 @@ fn upstream<'a>(
         id == "radar_vibration" || (!id.is_empty() && UPSTREAM.contains(&candidate.place.stage.as_str()))
     };
     let others = passing.iter().filter(|(_, candidate)| on_all(candidate));
-    let Some(other) =
-        others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| best.1.behaves_like.starts_with(paths::PATH_LIKE))
-    else {
+    let echoes = best.1.behaves_like.starts_with(paths::PATH_LIKE) || is_rough(&best.1);
+    let Some(other) = others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| echoes) else {
         return best;
     };
     let left = |candidate: &Candidate| Misfit::after(original, &evidence.with(candidate)).loglik_per_sample;

@@ -168,6 +168,16 @@ fn a_drift_is_told_from_slow_parts_of_a_body() {
     within(&found, "db", 20.0 * 1.1f64.log10());
 }
 
+/// Seen ten times a second, what turns slower than the recording lasts looks like something that turns 0.4 times a second faster than
+/// the frames come.
+#[test]
+fn a_slow_turn_is_a_drift_and_no_vibration_at_the_rate_of_the_frames() {
+    let slowly = |frame: usize| Complex64::cis(0.06 * (std::f64::consts::TAU * 0.04 * frame as f64 + 0.5).cos());
+    let found = find(&evidence(26, |_, frame, _, _| slowly(frame)));
+    assert!(found.iter().any(|found| found.behaves_like == "slow-time phase" && found.p_value < 5e-4), "{found:?}");
+    assert!(found.iter().all(|found| found.id != Some("radar_vibration")), "{found:?}");
+}
+
 #[test]
 fn the_first_chirps_of_a_frame_settle() {
     let found = found_once(evidence(6, |_, _, index, _| (1.0 - 0.1 * (-(index as f64) / 5.0).exp()).into()));
