@@ -17,8 +17,7 @@ pub const PEAK_DB: f64 = 0.7;
 pub fn channel(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Complex64> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let still = &evidence.still()[channel * samples..][..samples];
-    let mut moving: Vec<Complex64> =
-        evidence.cube.channel(frame, channel).iter().enumerate().map(|(i, value)| value - still[i % samples]).collect();
+    let mut moving = evidence.moving(frame, channel);
     // Without a window, so that the transform can be taken back; a cell's noise is the sum over the samples.
     let count = (loops * samples) as f64;
     let least = SIGNAL * evidence.noise()[channel] * count;

@@ -157,18 +157,18 @@ impl Evidence {
         *self.peak.get_or_init(|| denoised::peak_beside(self, |_, _| Some(Complex64::ZERO)))
     }
 
+    /// A channel of a frame without what stands still, `[loop · sample]`.
+    pub fn moving(&self, frame: usize, channel: usize) -> Vec<Complex64> {
+        let samples = self.cube.dims[4];
+        let still = &self.still()[channel * samples..][..samples];
+        let chirps = self.cube.channel(frame, channel).chunks_exact(samples);
+        chirps.flat_map(|chirp| chirp.iter().zip(still).map(|(value, mean)| value - mean)).collect()
+    }
+
     /// One frame and channel after the transforms with Hann windows of unit energy (white noise keeps its variance),
     /// what stands still over the training frames removed: `[doppler, range]`, velocities and ranges in FFT order.
     pub fn range_doppler(&self, frame: usize, channel: usize) -> Vec<Complex64> {
-        let samples = self.cube.dims[4];
-        let still = &self.still()[channel * samples..][..samples];
-        let moving: Vec<Complex64> = self
-            .cube
-            .channel(frame, channel)
-            .chunks_exact(samples)
-            .flat_map(|chirp| chirp.iter().zip(still).map(|(value, mean)| value - mean))
-            .collect();
-        transform(&moving, samples)
+        transform(&self.moving(frame, channel), self.cube.dims[4])
     }
 
     /// Power of [`Self::range_doppler`] over the noise's variance, mean over the channels, `[frame, doppler, range]`.

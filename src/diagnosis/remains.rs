@@ -59,7 +59,11 @@ pub fn is_rough(candidate: &Candidate) -> bool {
 }
 
 pub fn is_by_chirp(candidate: &Candidate) -> bool {
-    candidate.id.is_some_and(|id| BY_CHIRP.contains(&id))
+    is_one_of(candidate, &BY_CHIRP)
+}
+
+fn is_one_of(candidate: &Candidate, ids: &[&str]) -> bool {
+    candidate.id.is_some_and(|id| ids.contains(&id))
 }
 
 /// Whether a candidate may be no more than what a rough correction left, or what a moving path left around its range.
@@ -67,7 +71,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let is_path = |candidate: &Candidate| {
         candidate.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_none_or(|id| paths::MANY.contains(&id))
     };
-    let of_remains = candidate.id.is_some_and(|id| OF_REMAINS.contains(&id));
+    let of_remains = is_one_of(candidate, &OF_REMAINS);
     // An image of the body is all over the place: what else is there is something else.
     let beside = is_path(accepted)
         && (is_path(candidate) || of_remains)
@@ -86,13 +90,12 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // and among its images, and what a part may carry, the last resort, is never sure there.
     let timed = accepted.place.stage == "timing";
     let behind = timed && of_remains;
-    let image = timed && candidate.id.is_some_and(|id| IMAGES.contains(&id));
-    let is_product = |candidate: &Candidate| candidate.id.is_some_and(|id| PRODUCTS.contains(&id));
-    let products = is_product(accepted) && is_product(candidate);
+    let image = timed && is_one_of(candidate, &IMAGES);
     let hardly = timed && candidate.id == Some("carried_reflector");
+    let products = is_one_of(accepted, &PRODUCTS) && is_one_of(candidate, &PRODUCTS);
     // What bursts leave below the noise of single samples is in all receivers at once.
-    let bursts = accepted.id.is_some_and(|id| BURSTS.contains(&id)) && candidate.id == Some("correlated_noise");
-    let faint = accepted.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_some_and(|id| FAINT.contains(&id));
+    let bursts = is_one_of(accepted, &BURSTS) && candidate.id == Some("correlated_noise");
+    let faint = accepted.behaves_like.starts_with(paths::PATH_LIKE) && is_one_of(candidate, &FAINT);
     // Up to which share of what was gained.
     [
         (roughly || fades || image, ROUGHLY),

@@ -268,11 +268,11 @@ impl<'a> Chirps<'a> {
             let sign = [-1.0, 1.0][sideband];
             for &frame in &evidence.split.training {
                 for channel in 0..channels {
-                    let still = &evidence.still()[channel * samples..][..samples];
+                    let moving = evidence.moving(frame, channel);
                     let wave = &mut wave[channel * samples..][..samples];
-                    for (chirp, time) in evidence.cube.channel(frame, channel).chunks_exact(samples).zip(&self.loops_s) {
+                    for (chirp, time) in moving.chunks_exact(samples).zip(&self.loops_s) {
                         let turn = turns[frame] * Complex64::cis(sign * TAU * line.frequency_hz * time);
-                        wave.iter_mut().zip(chirp).zip(still).for_each(|((sum, value), still)| *sum += (value - still) * turn);
+                        wave.iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value * turn);
                     }
                 }
             }

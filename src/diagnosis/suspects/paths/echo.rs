@@ -103,9 +103,8 @@ pub fn multibounce(scene: &Scene, tried: f64) -> Option<Candidate> {
     let later = |extra_m: f64| {
         let rate = std::f64::consts::TAU * radar.slope_hz_per_s * 2.0 * extra_m / SPEED_OF_LIGHT / radar.sample_rate_hz;
         matches(scene, |frame, channel| {
-            let still = &scene.evidence.still()[channel * scene.samples..][..scene.samples];
-            let copy: Vec<Complex64> = (scene.evidence.cube.channel(frame, channel).iter().enumerate())
-                .map(|(i, value)| (value - still[i % scene.samples]) * Complex64::cis(rate * (i % scene.samples) as f64))
+            let copy: Vec<Complex64> = (scene.evidence.moving(frame, channel).iter().enumerate())
+                .map(|(i, value)| value * Complex64::cis(rate * (i % scene.samples) as f64))
                 .collect();
             let mut map = transform(&copy, scene.samples);
             for (cell, value) in map.iter_mut().enumerate() {
@@ -210,12 +209,8 @@ fn shifted_matches(scene: &Scene, shifts: usize) -> Vec<Vec<Match>> {
 /// The moving part's map if everything were half a cell farther.
 fn half_cell_later(scene: &Scene, frame: usize, channel: usize) -> Vec<Complex64> {
     let samples = scene.samples;
-    let still = &scene.evidence.still()[channel * samples..][..samples];
-    let copy: Vec<Complex64> = (scene.evidence.cube.channel(frame, channel).iter().enumerate())
-        .map(|(i, value)| {
-            let n = i % samples;
-            (value - still[n]) * Complex64::cis(std::f64::consts::PI * n as f64 / samples as f64)
-        })
+    let copy: Vec<Complex64> = (scene.evidence.moving(frame, channel).iter().enumerate())
+        .map(|(i, value)| value * Complex64::cis(std::f64::consts::PI * (i % samples) as f64 / samples as f64))
         .collect();
     transform(&copy, samples)
 }

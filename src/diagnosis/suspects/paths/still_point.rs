@@ -239,14 +239,12 @@ fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candi
 /// Root mean square of what moves, in a channel's samples, without the noise.
 pub fn body_rms(evidence: &Evidence) -> Option<f64> {
     evidence.body.as_ref()?;
-    let samples = evidence.cube.dims[4];
     let (mut sum, mut noise) = (0.0, 0.0);
     for channel in 0..evidence.cube.channels() {
-        let still = &evidence.still()[channel * samples..][..samples];
         for frame in 0..evidence.cube.dims[0] {
-            let chirps = evidence.cube.channel(frame, channel);
-            sum += chirps.iter().enumerate().map(|(i, value)| (value - still[i % samples]).norm_sqr()).sum::<f64>();
-            noise += evidence.noise()[channel] * chirps.len() as f64;
+            let moving = evidence.moving(frame, channel);
+            sum += moving.iter().map(Complex64::norm_sqr).sum::<f64>();
+            noise += evidence.noise()[channel] * moving.len() as f64;
         }
     }
     let power = (sum - noise) / evidence.cube.samples.len() as f64;

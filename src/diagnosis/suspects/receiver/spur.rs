@@ -38,7 +38,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let training = &evidence.split.training;
     let channels = evidence.cube.channels();
     let line = Line::new(evidence);
-    let places = BETWEEN.map(|between| line.strongest(between));
+    let places = line.strongest();
     let looked_at: usize = places.iter().map(|place| place.1).sum();
     let Some(Strongest { power, at }) = places.into_iter().filter_map(|place| place.0).max_by(|a, b| a.power.total_cmp(&b.power))
     else {
@@ -146,37 +146,48 @@ impl<'a> Line<'a> {
         self.empty[range] || (leaves && self.residual.as_ref().is_some_and(|residual| range < residual.bins))
     }
 
-    /// The strongest line on the cells, or half way to the next ones along the axes marked in `between`, and among how many.
-    fn strongest(&self, between: [usize; 2]) -> (Option<Strongest>, usize) {
+    /// The strongest line on the cells and half way to the next ones, in the order of [`BETWEEN`], and among how many.
+    fn strongest(&self) -> [(Option<Strongest>, usize); BETWEEN.len()] {
         let [_, _, _, loops, samples] = self.evidence.cube.dims;
-        let cells: Vec<[usize; 2]> = (1..loops - between[0])
-            .flat_map(|doppler| (0..samples - between[1]).map(move |range| [doppler, range]))
-            .filter(|&cell| neighbours(cell, between).all(|[doppler, range]| self.is_told(doppler, range)))
-            .collect();
-        let powers: Vec<Vec<f64>> =
-            self.evidence.split.training.par_iter().map(|&frame| self.powers(frame, &cells, between)).collect();
-        // The median over the frames: a mover crosses a cell, a line stays.
-        let of_cell = |index: usize| {
-            let power = median(&mut powers.iter().map(|powers| powers[index]).collect::<Vec<f64>>());
-            let [slow, fast] = [0, 1].map(|axis| cells[index][axis] as f64 + 0.5 * between[axis] as f64);
-            Strongest { power, at: (slow / loops as f64, fast / samples as f64) }
-        };
-        ((0..cells.len()).into_par_iter().map(of_cell).max_by(|a, b| a.power.total_cmp(&b.power)), cells.len())
+        let cells = BETWEEN.map(|between| self.told(between));
+        let frames = &self.evidence.split.training;
+        let powers: Vec<[Vec<f64>; BETWEEN.len()]> = frames.par_iter().map(|&frame| self.powers(frame, &cells)).collect();
+        std::array::from_fn(|place| {
+            // The median over the frames: a mover crosses a cell, a line stays.
+            let of_cell = |index: usize| {
+                let power = median(&mut powers.iter().map(|powers| powers[place][index]).collect::<Vec<f64>>());
+                let [slow, fast] = [0, 1].map(|axis| cells[place][index][axis] as f64 + 0.5 * BETWEEN[place][axis] as f64);
+                Strongest { power, at: (slow / loops as f64, fast / samples as f64) }
+            };
+            let count = cells[place].len();
+            ((0..count).into_par_iter().map(of_cell).max_by(|a, b| a.power.total_cmp(&b.power)), count)
+        })
     }
 
-    /// Mean powers of all channels over what is expected there, or half way to the next cells: over the most of their neighbours.
-    fn powers(&self, frame: usize, cells: &[[usize; 2]], between: [usize; 2]) -> Vec<f64> {
-        if between == [0, 0] {
-            return cells.iter().map(|&at| self.power(frame, at)).collect();
-        }
-        let (own, moved) = (self.unmodelled(frame, [0, 0]), self.unmodelled(frame, between));
+    /// Cells about which a line is told, half way to the next ones along the axes marked in `between`.
+    fn told(&self, between: [usize; 2]) -> Vec<[usize; 2]> {
+        let [_, _, _, loops, samples] = self.evidence.cube.dims;
+        (1..loops - between[0])
+            .flat_map(|doppler| (0..samples - between[1]).map(move |range| [doppler, range]))
+            .filter(|&cell| neighbours(cell, between).all(|[doppler, range]| self.is_told(doppler, range)))
+            .collect()
+    }
+
+    /// Mean powers of all channels over what is expected there; half way to the next cells, over the most of these.
+    fn powers(&self, frame: usize, cells: &[Vec<[usize; 2]>; BETWEEN.len()]) -> [Vec<f64>; BETWEEN.len()] {
+        let own = self.unmodelled(frame, [0, 0]);
         let samples = self.evidence.cube.dims[4];
         let index = |[doppler, range]: [usize; 2]| doppler * samples + range;
         let share = |near: [usize; 2]| self.power(frame, near) / own[index(near)].max(f64::MIN_POSITIVE);
-        cells
-            .iter()
-            .map(|&cell| moved[index(cell)] * neighbours(cell, between).map(share).fold(f64::INFINITY, f64::min))
-            .collect()
+        std::array::from_fn(|place| {
+            let between = BETWEEN[place];
+            if between == [0, 0] {
+                return cells[place].iter().map(|&cell| self.power(frame, cell)).collect();
+            }
+            let moved = self.unmodelled(frame, between);
+            let least = |cell: [usize; 2]| neighbours(cell, between).map(share).fold(f64::INFINITY, f64::min);
+            cells[place].iter().map(|&cell| moved[index(cell)] * least(cell)).collect()
+        })
     }
 
     /// Powers over the noise alone, of the channels' mean, so far along both axes.
@@ -186,12 +197,9 @@ impl<'a> Line<'a> {
         let channels = self.evidence.cube.channels();
         let mut powers = vec![0.0; loops * samples];
         for channel in 0..channels {
-            let still = &self.evidence.still()[channel * samples..][..samples];
-            let moving = |(i, value): (usize, &Complex64)| {
-                (value - still[i % samples]) * tone(slow, fast, i / samples, i % samples).conj()
-            };
-            let signal = self.evidence.cube.channel(frame, channel).iter().enumerate();
-            let map = transform(&signal.map(moving).collect::<Vec<Complex64>>(), samples);
+            let turned = |(i, value): (usize, Complex64)| value * tone(slow, fast, i / samples, i % samples).conj();
+            let moving = self.evidence.moving(frame, channel).into_iter().enumerate();
+            let map = transform(&moving.map(turned).collect::<Vec<Complex64>>(), samples);
             let scale = 1.0 / (channels as f64 * self.evidence.noise()[channel].max(1e-300));
             powers.iter_mut().zip(map).for_each(|(power, value)| *power += scale * value.norm_sqr());
         }
@@ -272,10 +280,9 @@ fn is_sideband(evidence: &Evidence, slow: f64, fast: f64) -> bool {
     let line = |frame: usize, channel: usize| {
         let mut line = vec![Complex64::ZERO; samples];
         // The window's side lobes of what stands still are in proportion to it, too.
-        let mean = &evidence.still()[channel * samples..][..samples];
-        for (chirp, values) in evidence.cube.channel(frame, channel).chunks_exact(samples).enumerate() {
+        for (chirp, values) in evidence.moving(frame, channel).chunks_exact(samples).enumerate() {
             let turn = Complex64::cis(-TAU * slow * chirp as f64) * window[chirp];
-            line.iter_mut().zip(values).zip(mean).for_each(|((sum, value), mean)| *sum += (value - mean) * turn);
+            line.iter_mut().zip(values).for_each(|(sum, value)| *sum += value * turn);
         }
         spectrum(&line)
     };
@@ -364,7 +371,7 @@ mod tests {
         let (slow, fast) = (10.5 / 32.0, 40.5 / 64.0);
         let evidence = Evidence::in_noise(radar, 5, |[_, _, chirp, n]| 0.5 * tone(slow, fast, chirp, n));
         let line = Line { evidence: &evidence, empty: vec![true; 64], residual: None, fast: 0.0 };
-        let [on, half] = [[0, 0], [1, 1]].map(|between| line.strongest(between).0.expect("empty ranges"));
+        let [on, _, _, half] = line.strongest().map(|(found, _)| found.expect("empty ranges"));
         assert_eq!(half.at, (slow, fast));
         // Scalloping of a Hann window: 1.42 dB along each axis.
         let lost_db = 10.0 * ((half.power - 1.0) / (on.power - 1.0)).log10();

@@ -135,12 +135,11 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
         }
         // Of frequencies that only the short frames could tell apart, the lowest is taken, which may be a drift.
         let nearest = (frequency / frame_rate).round();
-        let slowest = (frequency - nearest * frame_rate).abs();
-        if nearest > 0.0 && slowest < lowest && fit(field, series, &frames, slowest, 1).2 > centre - ALIAS_GAIN {
-            return None;
-        }
         let mut aliases: Vec<f64> = (0..=3).map(|k| (frequency - (nearest - f64::from(k)) * frame_rate).abs()).collect();
         aliases.sort_by(f64::total_cmp);
+        if aliases[0] < lowest && fit(field, series, &frames, aliases[0], 1).2 > centre - ALIAS_GAIN {
+            return None;
+        }
         let slower = aliases.into_iter().filter(|alias| *alias > lowest + step && *alias < 0.9 * frequency).map(refined);
         if let Some(found) = slower.into_iter().find(|(_, value)| *value > centre - ALIAS_GAIN) {
             (frequency, centre) = found;
