@@ -35,6 +35,10 @@ const OF_REMAINS: [&str; 2] = ["body_multibounce", "carried_reflector"];
 /// The body by way of a boundary.
 const IMAGES: [&str; 2] = ["floor_bounce", "wall_ghost"];
 
+/// Stage of what differs between receivers. It shows in the little that they do not have in common of the body: so does whatever a
+/// path, a turn or a wrong time left there.
+const OF_RECEIVERS: &str = "antenna";
+
 /// Two instances of an effect closer than this are one.
 const NEAR_M: f64 = 0.3;
 
@@ -60,6 +64,11 @@ pub fn is_rough(candidate: &Candidate) -> bool {
 
 pub fn is_by_chirp(candidate: &Candidate) -> bool {
     is_one_of(candidate, &BY_CHIRP)
+}
+
+/// Whether it differs between receivers: what others leave, or leaves what others are, unless those were there before.
+pub fn is_of_receivers(candidate: &Candidate) -> bool {
+    candidate.place.stage == OF_RECEIVERS
 }
 
 fn is_one_of(candidate: &Candidate, ids: &[&str]) -> bool {
@@ -96,11 +105,15 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // What bursts leave below the noise of single samples is in all receivers at once.
     let bursts = is_one_of(accepted, &BURSTS) && candidate.id == Some("correlated_noise");
     let faint = accepted.behaves_like.starts_with(paths::PATH_LIKE) && is_one_of(candidate, &FAINT);
+    let smeared = vibrates || timed || is_by_chirp(accepted) || accepted.behaves_like.starts_with(paths::PATH_LIKE);
+    let uneven = (smeared || is_one_of(accepted, &OF_REMAINS)) && is_of_receivers(candidate);
+    // To undo what receivers hear of one another mixes their noise.
+    let mixed = is_of_receivers(accepted) && candidate.id == Some("correlated_noise");
     // Up to which share of what was gained.
     [
         (roughly || fades || image, ROUGHLY),
         (bursts || behind, 1.0),
-        (hardly, f64::INFINITY),
+        (hardly || uneven || mixed, f64::INFINITY),
         (shaken || products, SHAKEN),
         (by_chirp || faint, SLIGHTLY),
     ]

@@ -54,19 +54,25 @@ impl Cells {
     /// Adds a point's power to a map `[doppler, range]`; what lies beyond the unambiguous ends wraps around (in
     /// range only with a quadrature receiver).
     pub fn deposit(&self, map: &mut [f32], range_m: f64, velocity_mps: f64, power: f64) {
+        if power.is_finite() {
+            self.each(range_m, velocity_mps, |cell, share| map[cell] += power as f32 * share);
+        }
+    }
+
+    /// The cells that a point reaches, and the share of its power in the peak that it has there.
+    pub fn each(&self, range_m: f64, velocity_mps: f64, mut at: impl FnMut(usize, f32)) {
         let (doppler, range) = self.place(range_m, velocity_mps);
-        if !(doppler.is_finite() && range.is_finite() && power.is_finite()) {
+        if !(doppler.is_finite() && range.is_finite()) {
             return;
         }
         let (doppler, slow) = self.taps(doppler);
         let (range, fast) = self.taps(range);
         for (i, slow) in slow.iter().enumerate() {
             let row = (doppler + i as i64 - REACH).rem_euclid(self.loops as i64) as usize * self.samples;
-            let weight = power as f32 * slow;
             for (j, fast) in fast.iter().enumerate() {
                 let cell = (range + j as i64 - REACH).rem_euclid(self.samples as i64) as usize;
                 if cell < self.bins {
-                    map[row + cell] += weight * fast;
+                    at(row + cell, slow * fast);
                 }
             }
         }

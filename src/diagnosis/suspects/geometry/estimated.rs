@@ -1,123 +1,106 @@
-//! Numbers estimated from groups of cells, with errors that come from leaving out one after the other.
+//! Numbers estimated from the slopes of the likelihood of groups of cells, with errors that come from how the groups disagree.
+
+use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::channels::Sums;
+use super::covariance::Look;
 use crate::diagnosis::cube::folds;
 use crate::diagnosis::statistics::fisher_tail;
 
 /// Groups of cells that are needed for an error, and how many more per number.
-const FEWEST: [usize; 2] = [12, 2];
+const FEWEST: [usize; 2] = [8, 2];
 
+/// Of a few directions among the numbers that an array may differ by.
 pub struct Estimated {
+    /// In the directions that were asked for, as their covariance.
     pub values: DVector<f64>,
-    pub covariance: DMatrix<f64>,
-    pub groups: f64,
+    covariance: DMatrix<f64>,
+    /// Their squared length in units of it.
+    pub square: f64,
+    /// Chance that all are zero.
+    pub p_value: f64,
+    /// How much better each fold of the frames is foretold by the others than by zeros, nats.
+    pub gain: f64,
 }
 
 impl Estimated {
-    /// With the errors that come from leaving out one group after the other, or one frame, whichever is more: what is wrong of a
-    /// frame's body is wrong of all its groups. None from too few.
+    /// None from too few groups, or where nothing shows these numbers.
     ///
-    /// `frames`: groups of cells, by frame; `of`: the numbers; `floors`: what the power model's errors do to each.
-    pub fn new(frames: &[&[Sums]], floors: &[f64], of: impl Fn(&Sums) -> Option<DVector<f64>>) -> Option<Self> {
-        let groups: Vec<Sums> = frames.iter().flat_map(|groups| groups.iter().cloned()).collect();
-        if groups.len() < FEWEST[0] + FEWEST[1] * floors.len() {
+    /// `frames`: looks of groups of cells, by frame, as the numbers are `at`; `directions`: `[number, direction]`,
+    /// orthonormal; `floors`: what errors of the prediction do to each.
+    pub fn new(frames: &[Vec<Look>], at: &DVector<f64>, directions: &DMatrix<f64>, floors: &[f64]) -> Option<Self> {
+        let count = directions.ncols();
+        let along = |look: &Look| Look {
+            score: directions.transpose() * &look.score,
+            information: directions.transpose() * &look.information * directions,
+            place: look.place,
+        };
+        let frames: Vec<Vec<Look>> =
+            frames.iter().map(|looks| looks.iter().map(along).collect::<Vec<Look>>()).filter(|looks| !looks.is_empty()).collect();
+        // What errs together is one group.
+        let by_group = grouped(&frames, count);
+        let groups = by_group.len();
+        if count == 0 || groups < FEWEST[0] + FEWEST[1] * count {
             return None;
         }
-        let all = Sums::together(&groups);
-        let values = of(&all)?;
-        let without = |parts: &[Sums]| parts.iter().map(|part| of(&all.without(part))).collect::<Option<Vec<_>>>();
-        let by_frame: Vec<Sums> =
-            frames.iter().filter(|groups| !groups.is_empty()).map(|groups| Sums::together(groups)).collect();
-        let mut covariance = jackknife(&without(&groups)?);
-        let of_frames = jackknife(&without(&by_frame)?);
-        covariance *= (of_frames.trace() / covariance.trace().max(f64::MIN_POSITIVE)).max(1.0);
-        floors.iter().enumerate().for_each(|(i, floor)| covariance[(i, i)] += floor * floor);
-        Some(Self { values, covariance, groups: groups.len() as f64 })
-    }
-
-    /// How much better each fold of the frames is foretold by the others than by zeros, nats: its own numbers have the same
-    /// covariance but for how many groups they are from.
-    pub fn foretold(&self, frames: &[&[Sums]], of: impl Fn(&Sums) -> Option<DVector<f64>>) -> Option<f64> {
-        let gain = |parts: [Vec<usize>; 2]| {
-            let [rest, held] = parts.map(|part| part.iter().flat_map(|&index| frames[index].to_vec()).collect::<Vec<Sums>>());
-            if rest.is_empty() || held.is_empty() {
-                return None;
-            }
-            let [expected, seen] = [of(&Sums::together(&rest))?, of(&Sums::together(&held))?];
-            let share = held.len() as f64 / self.groups;
-            Some(0.5 * share * (self.square(&seen)? - self.square(&(&seen - &expected))?))
+        let all = together(frames.iter().flatten(), count);
+        let inverse = all.information.clone().cholesky()?.inverse();
+        let step = &inverse * &all.score;
+        let values = at + &step;
+        // What is left of the slopes of each part.
+        let left = |look: &Look| &look.score - &look.information * &step;
+        let scatter = |parts: &[Look], lost: f64| -> DMatrix<f64> {
+            let parts_count = parts.len() as f64;
+            let squares: DMatrix<f64> = parts.iter().map(|look| left(look) * left(look).transpose()).sum();
+            squares * (parts_count / (parts_count - lost).max(1.0))
         };
-        folds(frames.len()).map(gain).sum()
+        let by_frame: Vec<Look> = frames.iter().map(|looks| together(looks.iter(), count)).collect();
+        let spread = scatter(&by_group, count as f64);
+        // What is wrong of a frame's body is wrong of all its groups.
+        let size = |spread: &DMatrix<f64>| (&inverse * spread).trace() / count as f64;
+        let inflation = size(&spread).max(size(&scatter(&by_frame, 1.0)));
+        let mut covariance = &inverse * &spread * &inverse * (inflation / size(&spread).max(f64::MIN_POSITIVE));
+        let square_by = |covariance: &DMatrix<f64>| Some(values.dot(&covariance.clone().cholesky()?.solve(&values)));
+        let without_floors = square_by(&covariance)?;
+        floors.iter().enumerate().for_each(|(i, floor)| covariance[(i, i)] += floor * floor);
+        let square = square_by(&covariance)?;
+        let (groups, freedom) = (groups as f64, count as f64);
+        // Hotelling's law of a mean whose covariance comes from as many groups.
+        let below = groups - freedom;
+        let p_value = fisher_tail(square * below / (freedom * (groups - 1.0)), freedom, below);
+        // The likelihood near the estimate, scaled to what the groups really scatter, by the others' estimate and by zeros.
+        let gain = |[rest, held]: [Vec<usize>; 2]| {
+            let of = |part: &[usize]| together(part.iter().flat_map(|&frame| &frames[frame]), count);
+            let [rest, held] = [of(&rest), of(&held)];
+            let foretold = rest.information.cholesky()?.solve(&rest.score);
+            let likelihood = |from: &DVector<f64>| held.score.dot(from) - 0.5 * from.dot(&(&held.information * from));
+            Some((likelihood(&foretold) - likelihood(&-at)) / inflation.max(1.0))
+        };
+        // What errors of the prediction may be is none.
+        let own = square / without_floors.max(f64::MIN_POSITIVE);
+        let gain = own * folds(frames.len()).map(gain).sum::<Option<f64>>()?;
+        (p_value.is_finite() && gain.is_finite()).then_some(Self { values, covariance, square, p_value, gain })
     }
 
-    /// Squared length in units of the covariance.
-    pub fn square(&self, values: &DVector<f64>) -> Option<f64> {
-        Some(values.dot(&self.covariance.clone().cholesky()?.solve(values)))
-    }
-
-    /// Chance that all are zero: Hotelling's law of a mean whose covariance comes from as many groups.
-    pub fn p_value(&self) -> Option<f64> {
-        let freedom = self.values.len() as f64;
-        let below = self.groups - freedom;
-        let ratio = self.square(&self.values)? * below / (freedom * (self.groups - 1.0));
-        Some(fisher_tail(ratio, freedom, below))
+    /// Deviation of a linear combination of the values.
+    pub fn deviation(&self, weights: &DVector<f64>) -> f64 {
+        weights.dot(&(&self.covariance * weights)).max(0.0).sqrt()
     }
 }
 
-/// Covariance, from the numbers without one part after the other.
-fn jackknife(without: &[DVector<f64>]) -> DMatrix<f64> {
-    let count = without.len() as f64;
-    let mean = without.iter().sum::<DVector<f64>>() / count;
-    let mut covariance = DMatrix::zeros(mean.len(), mean.len());
-    for other in without {
-        let off = other - &mean;
-        covariance += &off * off.transpose() * ((count - 1.0) / count);
-    }
-    covariance
+fn grouped(frames: &[Vec<Look>], count: usize) -> Vec<Look> {
+    let (still, moving): (Vec<&Look>, Vec<&Look>) = frames.iter().flatten().partition(|look| look.place.is_some());
+    let places: BTreeSet<Option<usize>> = still.iter().map(|look| look.place).collect();
+    let of_place = |place| together(still.iter().copied().filter(|look| look.place == place), count);
+    moving.into_iter().cloned().chain(places.into_iter().map(of_place)).collect()
 }
 
-/// Cells of a body that walks across, after the declared steering, by frame and group; `change`: what a receiver makes of what
-/// comes from a sine.
-#[cfg(test)]
-pub fn walking(radar: &crate::radar::Radar, seed: u64, change: impl Fn(usize, f64) -> num_complex::Complex64) -> Vec<Vec<Sums>> {
-    use num_complex::Complex64;
-    use rand::{RngExt, SeedableRng};
-    use rand_distr::{Distribution, StandardNormal};
-
-    use super::places::{Moments, neighbours};
-
-    const CELLS: usize = 12;
-    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    let wave = std::f64::consts::TAU / radar.wavelength_m();
-    let pairs = neighbours(radar);
-    let receivers = radar.rx_m.len();
-    let mut group = |middle: f64| {
-        let mut along = vec![Moments::default(); pairs.len()];
-        let mut products = vec![Complex64::ZERO; receivers * receivers];
-        for _ in 0..CELLS {
-            let sine = middle + 0.1 * (random.random::<f64>() - 0.5);
-            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-            let field = Complex64::new(normal(), normal());
-            // Errors of the prediction turn all pairs alike.
-            let aside = 0.05 * normal();
-            let heard: Vec<Complex64> = (0..receivers)
-                .map(|rx| {
-                    let turn = Complex64::cis(-wave * radar.rx_m[rx][0] * aside);
-                    field * turn * change(rx, sine) + Complex64::new(normal(), normal()) * 0.3
-                })
-                .collect();
-            products.iter_mut().enumerate().for_each(|(i, sum)| *sum += heard[i / receivers] * heard[i % receivers].conj());
-            for (along, &[far, near]) in along.iter_mut().zip(&pairs) {
-                let mut cross = heard[far] * heard[near].conj();
-                for moment in along.iter_mut() {
-                    *moment += cross;
-                    cross *= sine;
-                }
-            }
-        }
-        Sums { products, along, cells: CELLS as f64, range_m: 3.0, sine: middle }
-    };
-    (0..12).map(|frame| (0..5).map(|_| group(0.05 * f64::from(frame) - 0.25)).collect()).collect()
+fn together<'a>(looks: impl Iterator<Item = &'a Look>, count: usize) -> Look {
+    let mut sum = Look { score: DVector::zeros(count), information: DMatrix::zeros(count, count), place: None };
+    for look in looks {
+        sum.score += &look.score;
+        sum.information += &look.information;
+    }
+    sum
 }

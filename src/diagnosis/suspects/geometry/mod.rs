@@ -4,8 +4,10 @@ mod again;
 mod change;
 mod channels;
 mod coupling;
+mod covariance;
 mod displaced;
 mod estimated;
+mod mismatch;
 mod places;
 mod trial;
 
@@ -15,6 +17,9 @@ use trial::Trial;
 use crate::diagnosis::suspects::paths::OVER_THE_BODY;
 use crate::diagnosis::{Candidate, Evidence};
 
+/// Chance below which the body is elsewhere than predicted.
+const DISPLACED: f64 = 1e-3;
+
 /// At most one candidate for a change of the body's place or time or for an echo of it, and one for what differs between receivers.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(model) = evidence.power() else { return vec![] };
@@ -22,7 +27,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // Beside a stranger that outshines the body, the body's place and time cannot be told.
     let outshone = evidence.accepted.contains(&OVER_THE_BODY);
     let mut found = if outshone { vec![] } else { displaced::find(&Trial::new(evidence, model, body)) };
-    found.extend(channels::find(evidence, model, body, Moves::new(evidence.radar.centre_m())));
+    let displaced = found.iter().any(|found| found.p_value < DISPLACED && found.gain > 0.0);
+    found.extend(channels::find(evidence, model, body, Moves::new(evidence.radar.centre_m()), displaced));
     found
 }
 

@@ -1,0 +1,421 @@
+//! What the receivers hear of the body in common, cell by cell, and how an array that is not as declared changes that.
+//!
+//! What a cell of range and Doppler holds of the body is speckle: a Gaussian field over the receivers whose covariance comes
+//! from the directions of the points in that cell, which are predicted, and from a power that is not. Where these points lie
+//! close together the receivers hear nearly the same, and what an array changes shows in the little that they do not have in
+//! common. So every cell counts with the information that its own covariance has (scores and Fisher's information of a
+//! complex Gaussian law), not like any other.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use crate::diagnosis::power::PowerModel;
+use crate::diagnosis::prediction::range_and_velocity;
+use crate::diagnosis::{BodyPrediction, Evidence};
+use crate::radar::Radar;
+
+/// Expected power over the noise, noise included, from which on a cell is used.
+const LEAST_POWER: f32 = 3.0;
+/// Share of what stands still that may be left at low Doppler when it was taken out.
+const STILL_LEFT: f64 = 1e-3;
+/// Fewest cells of a frame.
+const FEWEST_CELLS: usize = 10;
+/// Cells of a group that errors are taken from, at least, and groups of a frame, at most.
+const GROUP_CELLS: usize = 8;
+const MOST_GROUPS: usize = 6;
+/// Ranges that what hardly moves is taken together of.
+const STILL_RANGES: usize = 2;
+/// Share of a cell's power that every receiver hears for itself: what the prediction does not know of the directions.
+const OWN_SHARE: f64 = 0.005;
+/// Levels that a cell's power is sought at, decibels from the expected one, and how much it deviates from it.
+const LEVELS_DB: i32 = 15;
+const LEVEL_DEVIATION_DB: f64 = 5.0;
+
+/// The numbers that an array may differ by, one after the other: logarithmic gains, phases, and displacements along x in radian per
+/// unit of the sine, of every receiver; real and imaginary part of what each hears of the one before it, and of the one after it.
+#[derive(Clone, Copy, Debug)]
+pub struct Numbers {
+    pub receivers: usize,
+}
+
+impl Numbers {
+    pub fn count(self) -> usize {
+        3 * self.receivers + 4
+    }
+
+    pub fn gain(self, rx: usize) -> usize {
+        rx
+    }
+
+    pub fn phase(self, rx: usize) -> usize {
+        self.receivers + rx
+    }
+
+    pub fn place(self, rx: usize) -> usize {
+        2 * self.receivers + rx
+    }
+
+    /// Of the one before, then of the one after; real, then imaginary part.
+    pub fn heard(self, part: usize) -> usize {
+        3 * self.receivers + part
+    }
+
+    /// Changes of these numbers that the body makes as well, or that nothing shows: one gain and one phase of all, another
+    /// direction, and directions wider apart. `[number, change]`
+    pub fn of_the_body(self, radar: &Radar) -> DMatrix<f64> {
+        let mut changes = vec![];
+        let mut change = |of: &dyn Fn(usize) -> (usize, f64)| {
+            let mut column = DVector::zeros(self.count());
+            (0..self.receivers).map(of).for_each(|(number, value)| column[number] = value);
+            if column.norm() > 1e-9 {
+                changes.push(column.normalize());
+            }
+        };
+        change(&|rx| (self.gain(rx), 1.0));
+        change(&|rx| (self.phase(rx), 1.0));
+        for places in centred(radar) {
+            change(&|rx| (self.phase(rx), places[rx]));
+        }
+        change(&|rx| (self.place(rx), 1.0));
+        change(&|rx| (self.place(rx), centred(radar)[0][rx]));
+        DMatrix::from_columns(&changes)
+    }
+}
+
+/// Places of the receivers by axis, from their middle, wavelengths.
+fn centred(radar: &Radar) -> [Vec<f64>; 3] {
+    std::array::from_fn(|axis| {
+        let middle = radar.rx_m.iter().map(|at| at[axis]).sum::<f64>() / radar.rx_m.len() as f64;
+        radar.rx_m.iter().map(|at| (at[axis] - middle) / radar.wavelength_m()).collect()
+    })
+}
+
+/// Some cells' slope and curvature of the likelihood by the [`Numbers`], without what the body makes as well.
+#[derive(Clone, Debug)]
+pub struct Look {
+    pub score: DVector<f64>,
+    pub information: DMatrix<f64>,
+    /// Looks of one such place may err together in all frames.
+    pub place: Option<usize>,
+}
+
+/// Neighbouring cells of a frame.
+#[derive(Clone, Debug)]
+pub struct Group {
+    pub cells: Vec<Cell>,
+    /// Where what hardly moves is the same in all frames: its ranges.
+    pub place: Option<usize>,
+}
+
+/// One cell. Powers are in units of the noise, mean over the channels.
+#[derive(Clone, Debug)]
+pub struct Cell {
+    /// By transmitter, `[rx]`.
+    pub heard: Vec<DVector<Complex64>>,
+    /// What the body is expected to have, `[rx, rx]`, the second one conjugated.
+    pub expected: DMatrix<Complex64>,
+    /// The same, every point weighted with the sine of its direction.
+    pub aslant: DMatrix<Complex64>,
+}
+
+/// The cells that the body fills, by frame and group of neighbours.
+pub struct Cells {
+    pub radar: Radar,
+    pub frames: Vec<Vec<Group>>,
+    /// Of every receiver, in the same units.
+    pub noise: Vec<f64>,
+}
+
+impl Cells {
+    /// `still`: power of what stands still, by range.
+    pub fn new(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &[f64]) -> Self {
+        let radar = &evidence.radar;
+        let noise = evidence.noise();
+        let mean = noise.iter().sum::<f64>() / noise.len() as f64;
+        let receivers = radar.rx_m.len();
+        let of_receiver = |rx: usize| {
+            let own = noise.iter().skip(rx).step_by(receivers).sum::<f64>() / radar.tx_m.len() as f64;
+            (own / mean.max(f64::MIN_POSITIVE)).max(1e-6)
+        };
+        let frames = (0..evidence.cube.dims[0])
+            .into_par_iter()
+            .map(|frame| groups(cells(evidence, model, body, still, frame, mean)))
+            .collect();
+        Self { radar: radar.clone(), frames, noise: (0..receivers).map(of_receiver).collect() }
+    }
+
+    pub fn numbers(&self) -> Numbers {
+        Numbers { receivers: self.radar.rx_m.len() }
+    }
+
+    /// By frame and group, after what the receivers heard was multiplied by a matrix `[rx, rx]`.
+    pub fn looks(&self, undo: &DMatrix<Complex64>) -> Vec<Vec<Look>> {
+        let of_the_body = self.numbers().of_the_body(&self.radar);
+        // What the matrix makes of independent noise has neighbours in common; that is little.
+        let noise: Vec<f64> =
+            undo.row_iter().map(|row| row.iter().zip(&self.noise).map(|(value, noise)| value.norm_sqr() * noise).sum()).collect();
+        self.frames
+            .par_iter()
+            .map(|groups| groups.iter().map(|group| look(group, undo, &noise, &of_the_body)).collect())
+            .collect()
+    }
+}
+
+/// `moving`, `still`: cells that move, and cells that hardly do, with their ranges.
+fn groups([mut moving, mut still]: [Vec<(usize, Cell)>; 2]) -> Vec<Group> {
+    if moving.len() + still.len() < FEWEST_CELLS {
+        return vec![];
+    }
+    let count = (moving.len() / GROUP_CELLS).clamp(1, MOST_GROUPS);
+    let all = moving.len();
+    // From the end, so that what remains keeps its place.
+    let mut groups: Vec<Group> = (0..count)
+        .rev()
+        .map(|group| moving.split_off(group * all / count).into_iter().map(|(_, cell)| cell).collect())
+        .map(|cells| Group { cells, place: None })
+        .collect();
+    still.sort_by_key(|(range, _)| range / STILL_RANGES);
+    groups.extend(still.chunk_by(|a, b| a.0 / STILL_RANGES == b.0 / STILL_RANGES).map(|chunk| Group {
+        cells: chunk.iter().map(|(_, cell)| cell.clone()).collect(),
+        place: Some(chunk[0].0 / STILL_RANGES),
+    }));
+    groups.retain(|group| !group.cells.is_empty());
+    groups
+}
+
+fn cells(
+    evidence: &Evidence,
+    model: &PowerModel,
+    body: &BodyPrediction,
+    still: &[f64],
+    frame: usize,
+    noise: f64,
+) -> [Vec<(usize, Cell)>; 2] {
+    let radar = &evidence.radar;
+    let (receivers, samples) = (radar.rx_m.len(), evidence.cube.dims[4]);
+    let expected = model.expected(frame);
+    let map = &evidence.maps()[frame * model.size()..(frame + 1) * model.size()];
+    // A body that hardly moves is known by what it leaves of itself where what stands still was taken out.
+    let of_the_body = |cell: usize| model.usable()[cell] || f64::from(map[cell]) > STILL_LEFT * still[cell % samples];
+    let used: Vec<usize> = (0..model.size()).filter(|&cell| expected[cell] > LEAST_POWER && of_the_body(cell)).collect();
+    if used.len() < FEWEST_CELLS {
+        return [vec![], vec![]];
+    }
+    let mut slots = vec![usize::MAX; model.size()];
+    used.iter().enumerate().for_each(|(slot, &cell)| slots[cell] = slot);
+    let mut sums = vec![[DMatrix::<Complex64>::zeros(receivers, receivers), DMatrix::zeros(receivers, receivers)]; used.len()];
+    let wave = TAU / radar.wavelength_m();
+    let centre = radar.centre_m();
+    for point in body.with_echoes(radar, body.frames[frame].clone(), None) {
+        let (range_m, velocity_mps) = range_and_velocity(radar, point.position_m, point.velocity_mps);
+        let peak = model.peak(radar, point);
+        let distance = |from: [f64; 3]| (0..3).map(|axis| (point.position_m[axis] - from[axis]).powi(2)).sum::<f64>().sqrt();
+        let sine = (point.position_m[0] - centre[0]) / distance(centre).max(1e-6);
+        let turns: Vec<Complex64> = radar
+            .rx_m
+            .iter()
+            .map(|rx| Complex64::cis(wave * distance(std::array::from_fn(|axis| rx[axis] + radar.position_m[axis]))))
+            .collect();
+        model.cells.each(range_m, velocity_mps, |cell, share| {
+            let power = peak * f64::from(share);
+            if slots[cell] == usize::MAX || power <= 0.0 {
+                return;
+            }
+            let [sum, aslant] = &mut sums[slots[cell]];
+            for column in 0..receivers {
+                let other = turns[column].conj() * power;
+                for row in 0..receivers {
+                    let value = turns[row] * other;
+                    sum[(row, column)] += value;
+                    aslant[(row, column)] += value * sine;
+                }
+            }
+        });
+    }
+    let maps: Vec<_> = (0..evidence.cube.channels()).map(|channel| evidence.range_doppler(frame, channel)).collect();
+    let scale = 1.0 / noise.max(f64::MIN_POSITIVE).sqrt();
+    let heard = |cell: usize| {
+        maps.chunks_exact(receivers).map(|maps| DVector::from_fn(receivers, |rx, _| maps[rx][cell] * scale)).collect()
+    };
+    let mut parts = [vec![], vec![]];
+    for (&cell, [expected, aslant]) in used.iter().zip(sums) {
+        let part = usize::from(!model.usable()[cell]);
+        parts[part].push((cell % samples, Cell { heard: heard(cell), expected, aslant }));
+    }
+    parts
+}
+
+/// Of cells together. `noise`: of every receiver; `of_the_body`: changes of the numbers that do not count.
+fn look(group: &Group, undo: &DMatrix<Complex64>, noise: &[f64], of_the_body: &DMatrix<f64>) -> Look {
+    let numbers = Numbers { receivers: noise.len() };
+    let mut score = DVector::zeros(numbers.count());
+    let mut information = DMatrix::zeros(numbers.count(), numbers.count());
+    for cell in &group.cells {
+        add(cell, undo, noise, numbers, &mut score, &mut information);
+    }
+    // The efficient score: without what the free changes explain of it.
+    let Ok(inverse) = (of_the_body.transpose() * &information * of_the_body).pseudo_inverse(1e-9) else {
+        return Look { score: score * 0.0, information: information * 0.0, place: group.place };
+    };
+    let explained = &information * of_the_body * inverse * of_the_body.transpose();
+    let score = &score - &explained * &score;
+    let information = &information - &explained * &information;
+    Look { score, information, place: group.place }
+}
+
+fn add(
+    cell: &Cell,
+    undo: &DMatrix<Complex64>,
+    noise: &[f64],
+    numbers: Numbers,
+    score: &mut DVector<f64>,
+    information: &mut DMatrix<f64>,
+) {
+    let receivers = numbers.receivers;
+    let white: Vec<f64> = noise.iter().map(|noise| 1.0 / noise.sqrt()).collect();
+    let own = OWN_SHARE * (0..receivers).map(|rx| cell.expected[(rx, rx)].re).sum::<f64>() / receivers as f64;
+    let shape = DMatrix::from_fn(receivers, receivers, |i, j| {
+        let value = cell.expected[(i, j)] * (1.0 - OWN_SHARE) + if i == j { own } else { 0.0 };
+        value * (white[i] * white[j])
+    });
+    let heard: Vec<DVector<Complex64>> = cell
+        .heard
+        .iter()
+        .map(|heard| {
+            let mut heard = undo * heard;
+            heard.iter_mut().zip(&white).for_each(|(value, white)| *value *= *white);
+            heard
+        })
+        .collect();
+    let eigen = shape.symmetric_eigen();
+    let powers: Vec<f64> = eigen.eigenvalues.iter().map(|power| power.max(0.0)).collect();
+    let axes = &eigen.eigenvectors;
+    let mut energies = vec![0.0; receivers];
+    for heard in &heard {
+        (axes.adjoint() * heard).iter().zip(&mut energies).for_each(|(value, energy)| *energy += value.norm_sqr());
+    }
+    let count = heard.len() as f64;
+    let level = level(&powers, &energies, count);
+    let of_powers = |of: &dyn Fn(f64) -> f64| {
+        let diagonal = DVector::from_iterator(receivers, powers.iter().map(|power| Complex64::from(of(level * power))));
+        axes * DMatrix::from_diagonal(&diagonal) * axes.adjoint()
+    };
+    let inverse = of_powers(&|power| 1.0 / (1.0 + power));
+    let body = of_powers(&|power| power);
+    let aslant = DMatrix::from_fn(receivers, receivers, |i, j| cell.aslant[(i, j)] * (level * white[i] * white[j]));
+    let changes = changes(&body, &aslant, &white, numbers);
+    let weighed: Vec<DVector<Complex64>> = heard.iter().map(|heard| &inverse * heard).collect();
+    let relative: Vec<DMatrix<Complex64>> = changes.iter().map(|change| &inverse * change).collect();
+    for (a, change) in changes.iter().enumerate() {
+        let seen: f64 = weighed.iter().map(|weighed| weighed.dotc(&(change * weighed)).re).sum();
+        score[a] += seen - count * relative[a].trace().re;
+        let turned = relative[a].transpose();
+        for (b, other) in relative.iter().enumerate().skip(a) {
+            let value = count * turned.dot(other).re;
+            information[(a, b)] += value;
+            if a != b {
+                information[(b, a)] += value;
+            }
+        }
+    }
+}
+
+/// The power that a cell has, over the expected one.
+fn level(powers: &[f64], energies: &[f64], count: f64) -> f64 {
+    let log_likelihood = |db: i32| {
+        let level = 10f64.powf(f64::from(db) / 10.0);
+        let fit: f64 = powers
+            .iter()
+            .zip(energies)
+            .map(|(power, energy)| -count * (1.0 + level * power).ln() - energy / (1.0 + level * power))
+            .sum();
+        fit - 0.5 * (f64::from(db) / LEVEL_DEVIATION_DB).powi(2)
+    };
+    let best = (-LEVELS_DB..=LEVELS_DB).map(|db| (db, log_likelihood(db))).max_by(|a, b| a.1.total_cmp(&b.1));
+    best.map_or(1.0, |(db, _)| 10f64.powf(f64::from(db) / 10.0))
+}
+
+/// How the covariance changes with every number.
+fn changes(body: &DMatrix<Complex64>, aslant: &DMatrix<Complex64>, white: &[f64], numbers: Numbers) -> Vec<DMatrix<Complex64>> {
+    let receivers = numbers.receivers;
+    // What a matrix of the array makes of it, and the same conjugated.
+    let by = |array: DMatrix<Complex64>| {
+        let one = array * body;
+        let other = one.adjoint();
+        one + other
+    };
+    let alone = |rx: usize, value: Complex64| {
+        let mut array = DMatrix::zeros(receivers, receivers);
+        array[(rx, rx)] = value;
+        by(array)
+    };
+    // A receiver farther along x hears what comes from there earlier.
+    let moved = |rx: usize| {
+        DMatrix::from_fn(receivers, receivers, |i, j| {
+            aslant[(i, j)] * -Complex64::I * (f64::from(u8::from(i == rx)) - f64::from(u8::from(j == rx)))
+        })
+    };
+    let hears = |step: isize, value: Complex64| {
+        by(DMatrix::from_fn(receivers, receivers, |i, j| {
+            if i as isize == j as isize + step { value * (white[i] / white[j]) } else { Complex64::ZERO }
+        }))
+    };
+    (0..receivers)
+        .map(|rx| alone(rx, Complex64::ONE))
+        .chain((0..receivers).map(|rx| alone(rx, Complex64::I)))
+        .chain((0..receivers).map(moved))
+        .chain([1, -1].into_iter().flat_map(|step| [hears(step, Complex64::ONE), hears(step, Complex64::I)]))
+        .collect()
+}
+
+/// A body that walks across in front of four receivers half a wavelength apart, a little beside where it is predicted. What comes
+/// from a sine reaches a receiver `turned`, and the receivers hear `array` times that.
+#[cfg(test)]
+pub fn walking(seed: u64, turned: impl Fn(usize, f64) -> Complex64, array: &DMatrix<Complex64>) -> Cells {
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::{Distribution, StandardNormal};
+
+    const RECEIVERS: usize = 4;
+    let radar = four_receivers();
+    let wave = TAU / radar.wavelength_m();
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let mut cell = |middle: f64, aside: f64| {
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let [mut expected, mut aslant] = [(); 2].map(|()| DMatrix::zeros(RECEIVERS, RECEIVERS));
+        let mut heard = DVector::from_fn(RECEIVERS, |_, _| Complex64::new(normal(), normal()) * 0.5f64.sqrt());
+        let mut field = DVector::zeros(RECEIVERS);
+        for _ in 0..8 {
+            let power = 10.0;
+            let amplitude = Complex64::new(normal(), normal()) * (0.5 * power as f64).sqrt();
+            let sine = middle + 0.05 * normal();
+            let from = |sine: f64| DVector::from_fn(RECEIVERS, |rx, _| Complex64::cis(-wave * radar.rx_m[rx][0] * sine));
+            let predicted = from(sine);
+            expected += &predicted * predicted.adjoint() * Complex64::from(power);
+            aslant += &predicted * predicted.adjoint() * Complex64::from(power * sine);
+            let real = from(sine + aside);
+            field += DVector::from_fn(RECEIVERS, |rx, _| amplitude * real[rx] * turned(rx, sine + aside));
+        }
+        heard += array * field;
+        Cell { heard: vec![heard], expected, aslant }
+    };
+    let mut errors = rand_chacha::ChaCha8Rng::seed_from_u64(seed + 1000);
+    let frames = (0..12)
+        .map(|frame| {
+            let aside = 0.01 * (errors.random::<f64>() - 0.5);
+            let mut group = || (0..12).map(|_| cell(0.05 * f64::from(frame) - 0.25, aside)).collect();
+            (0..5).map(|_| Group { cells: group(), place: None }).collect()
+        })
+        .collect();
+    Cells { radar, frames, noise: vec![1.0; RECEIVERS] }
+}
+
+#[cfg(test)]
+pub fn four_receivers() -> Radar {
+    let mut radar = Radar::small(12);
+    radar.tx_m = vec![[0.0; 3]];
+    radar.rx_m = (0..4).map(|rx| [0.5 * f64::from(rx) * radar.wavelength_m(), 0.0, 0.0]).collect();
+    radar
+}

@@ -1,0 +1,157 @@
+//! Receivers whose gains and phases differ (card C1), told from all that they hear of the body.
+//!
+//! Phases that grow with the receivers' places are a direction, and might as well be the body's; anything else, and any
+//! difference of gain, cannot be.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::channels::{Bearing, LOOKS};
+use super::covariance::Cells;
+use super::estimated::Estimated;
+use crate::diagnosis::statistics::{DECIBEL, corrected};
+use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
+
+/// What errors of the prediction do to a gain and to a phase.
+const GAIN_FLOOR_DB: f64 = 0.03;
+const PHASE_FLOOR_RAD: f64 = 0.1 * PI / 180.0;
+/// How well the direction of the body is known, as a sine.
+const BEARING_FLOOR: f64 = 0.005;
+/// Steps to the most likely gains and phases, at most, and a step that is none.
+const STEPS: usize = 20;
+const CONVERGED: f64 = 1e-4;
+/// Beyond, nothing is told.
+const LARGEST: f64 = 3.0;
+
+/// `undo`: what the receivers heard is multiplied by before, `[rx, rx]`; `steps`: one for receivers that nearly are alike.
+pub fn estimate(cells: &Cells, undo: &DMatrix<Complex64>, steps: usize) -> Option<(Estimated, DMatrix<f64>)> {
+    let directions = directions(cells);
+    let gains = cells.radar.rx_m.len() - 1;
+    let floor = |index: usize| if index < gains { GAIN_FLOOR_DB / DECIBEL } else { PHASE_FLOOR_RAD };
+    let floors: Vec<f64> = (0..directions.ncols()).map(floor).collect();
+    let mut at = DVector::zeros(directions.ncols());
+    let mut found = None;
+    for _ in 0..steps {
+        let inverse = amplitudes(cells, &(&directions * &at)).map(|amplitude| 1.0 / amplitude);
+        let estimated = Estimated::new(&cells.looks(&(undo * DMatrix::from_diagonal(&inverse))), &at, &directions, &floors)?;
+        let step = (&estimated.values - &at).amax();
+        at.clone_from(&estimated.values);
+        if !(at.amax() < LARGEST) {
+            return None;
+        }
+        found = Some(estimated);
+        if step < CONVERGED {
+            break;
+        }
+    }
+    found.map(|found| (found, directions))
+}
+
+/// Gains and phases that no body makes, `[number, direction]`: gains first.
+fn directions(cells: &Cells) -> DMatrix<f64> {
+    let numbers = cells.numbers();
+    let receivers = numbers.receivers;
+    let of_the_body = numbers.of_the_body(&cells.radar);
+    let beside = |first: usize| beside(&of_the_body.rows(first, receivers).into_owned());
+    let (gains, phases) = (beside(numbers.gain(0)), beside(numbers.phase(0)));
+    let mut directions = DMatrix::zeros(numbers.count(), gains.ncols() + phases.ncols());
+    directions.view_mut((numbers.gain(0), 0), gains.shape()).copy_from(&gains);
+    directions.view_mut((numbers.phase(0), gains.ncols()), phases.shape()).copy_from(&phases);
+    directions
+}
+
+/// Orthonormal columns of everything that is no combination of some columns.
+pub fn beside(columns: &DMatrix<f64>) -> DMatrix<f64> {
+    let squares = (columns * columns.transpose()).symmetric_eigen();
+    let free: Vec<_> = squares
+        .eigenvalues
+        .iter()
+        .zip(squares.eigenvectors.column_iter())
+        .filter(|(value, _)| **value < 1e-6)
+        .map(|(_, column)| column.into_owned())
+        .collect();
+    if free.is_empty() { DMatrix::zeros(columns.nrows(), 0) } else { DMatrix::from_columns(&free) }
+}
+
+fn amplitudes(cells: &Cells, values: &DVector<f64>) -> DVector<Complex64> {
+    let numbers = cells.numbers();
+    DVector::from_fn(numbers.receivers, |rx, _| Complex64::from_polar(values[numbers.gain(rx)].exp(), values[numbers.phase(rx)]))
+}
+
+/// `bearing`: how far aside the body is seen.
+pub fn find(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Candidate> {
+    let (found, directions) = estimate(cells, &bearing.turned_back(&cells.radar), STEPS)?;
+    let numbers = cells.numbers();
+    let values = &directions * &found.values;
+    let against_first = |of: &dyn Fn(usize) -> usize| -> Vec<[f64; 2]> {
+        let one = |rx: usize| {
+            let weights: DVector<f64> = (directions.row(of(rx)) - directions.row(of(0))).transpose();
+            [values[of(rx)] - values[of(0)], found.deviation(&weights)]
+        };
+        (0..numbers.receivers).map(one).collect()
+    };
+    let mut phases = against_first(&|rx| numbers.phase(rx));
+    // What grows with the places is either; it is as likely to be the receivers' as they differ otherwise.
+    let places: Vec<f64> =
+        cells.radar.rx_m.iter().map(|at| TAU * (at[0] - cells.radar.rx_m[0][0]) / cells.radar.wavelength_m()).collect();
+    let own = phases.iter().map(|[phase, _]| phase * phase).sum::<f64>() / places.iter().map(|x| x * x).sum::<f64>().max(1e-12);
+    let of_the_body = bearing.deviation.hypot(BEARING_FLOOR).powi(2);
+    let share = own / (own + of_the_body);
+    for ([phase, deviation], x) in phases.iter_mut().zip(places) {
+        *phase -= share * bearing.sine * x;
+        *deviation = deviation.hypot((share * of_the_body).sqrt() * x);
+    }
+    Some(candidate(evidence, &against_first(&|rx| numbers.gain(rx)), &phases, corrected(found.p_value, LOOKS), found.gain))
+}
+
+/// Values and deviations against the first receiver, logarithmic gains and radian.
+fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_value: f64, gain: f64) -> Candidate {
+    let scaled =
+        |of: &[[f64; 2]], unit: f64| -> [Vec<f64>; 2] { [0, 1].map(|part| of.iter().map(|value| value[part] * unit).collect()) };
+    let [gains_db, gain_deviations] = scaled(gains, DECIBEL);
+    let [phases_deg, phase_deviations] = scaled(phases, 180.0 / PI);
+    let text = |values: &[f64], digits: usize| {
+        values.iter().skip(1).map(|value| format!("{value:.digits$}")).collect::<Vec<_>>().join(", ")
+    };
+    let receivers = gains.len();
+    let inverse: Vec<Complex64> =
+        gains.iter().zip(phases).map(|(gain, phase)| Complex64::from_polar((-gain[0]).exp(), -phase[0])).collect();
+    let energy = (0..evidence.cube.dims[0])
+        .flat_map(|frame| (0..evidence.cube.channels()).map(move |channel| (frame, channel)))
+        .map(|(frame, channel)| {
+            let error = (1.0 - inverse[channel % receivers]).norm_sqr();
+            error * evidence.cube.channel(frame, channel).iter().map(|value| value.norm_sqr()).sum::<f64>()
+        })
+        .sum();
+    Candidate {
+        id: Some("channel_mismatch"),
+        behaves_like: "channel gain",
+        statement: format!(
+            "The receivers differ: against the first, the gains of receivers 1 to {} are {} dB and their phases {}°, which no direction \
+             of the body explains.",
+            receivers - 1,
+            text(&gains_db, 2),
+            text(&phases_deg, 1),
+        ),
+        estimates: vec![
+            Estimate::list("gain_db", &gains_db, &gain_deviations),
+            Estimate::list("phase_deg", &phases_deg, &phase_deviations),
+        ],
+        choice: None,
+        place: Place { rx: Some((1..receivers).collect()), ..Place::at("antenna") },
+        p_value,
+        gain,
+        rung: Rung::E,
+        look_alikes: vec![],
+        curve: None,
+        energy,
+        correction: Correction::Samples(Arc::new(move |cube| {
+            cube.each_chirp(|[_, channel, _], samples| {
+                samples.iter_mut().for_each(|value| *value *= inverse[channel % receivers]);
+            });
+        })),
+    }
+}
