@@ -20,16 +20,20 @@ impl DiagnosisConfig {
         self.alarm * SUSPECTS[suspect].share / SUSPECTS.iter().map(|suspect| suspect.share).sum::<f64>()
     }
 
-    /// What has no name may be anything, so it must gain more, unless chance cannot have made it. `untouched`: what was taken
+    /// What has no name may be anything, so it must gain more, half as much more where chance cannot have made it. `untouched`: what was taken
     /// out of a recording leaves remains, which chance has not made either.
     pub(super) fn passes(&self, suspect: usize, candidate: &Candidate, untouched: bool) -> bool {
-        let sure = candidate.id.is_some() || untouched && candidate.p_value < NO_CHANCE;
-        let least = if sure { self.gain } else { self.nameless_gain };
+        let sure = untouched && candidate.p_value < NO_CHANCE;
+        let least = match candidate.id {
+            Some(_) => self.gain,
+            None if sure => 0.5 * (self.gain + self.nameless_gain),
+            None => self.nameless_gain,
+        };
         candidate.p_value <= self.p_value(suspect) && candidate.gain >= least && candidate.gain.is_finite()
     }
 }
 
-/// p-value below which what has no name needs no more than what has one.
+/// p-value below which what has no name needs only half as much more than what has one.
 const NO_CHANCE: f64 = 1e-12;
 
 /// What undoing chirp by chirp leaves at the chirps' edges looks like these; a true one was there before.

@@ -29,7 +29,7 @@ const STILL_LEFT: f64 = 1e-3;
 const PHASE_FLOOR_RAD: f64 = 1.5 * PI / 180.0;
 /// Chance below which receivers may not be alike, and below which they are not.
 pub const UNEVEN: f64 = 0.05;
-const UNLIKELY: f64 = 1e-3;
+const UNLIKELY: f64 = 1e-4;
 /// Cells that one independent draw is spread over by two Hann windows.
 const CELLS_PER_DRAW: f64 = 2.25;
 /// In which ways receivers may differ.
@@ -111,10 +111,10 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     let differ = [
         if alike { mismatch::find(evidence, &cells, &bearing) } else { None },
         if displaced { None } else { places::find(evidence, &cells, &bearing) },
+        if heard { coupling::find(evidence, &cells, &bearing) } else { None },
+        if heard { coupling::one_way(evidence, &cells, &bearing) } else { None },
     ];
-    let coupled = if heard { coupling::find(evidence, &cells, &bearing) } else { None };
-    let one_way = if heard { coupling::one_way(evidence, &cells, &bearing) } else { None };
-    if let Some(candidate) = best(differ.into_iter().flatten().collect(), coupled, one_way) {
+    if let Some(candidate) = best(differ.into_iter().flatten().collect()) {
         return vec![candidate];
     }
     if bearing.p_value < UNEVEN {
@@ -127,20 +127,26 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     vec![]
 }
 
+/// One way in which receivers may differ.
+pub struct Found {
+    pub candidate: Candidate,
+    /// What it gains if errors of the prediction are not counted, nats: by which they are compared.
+    pub likelihood: f64,
+    /// Whether the receivers are alike without it.
+    pub explains_all: bool,
+}
+
 /// Of what is unlikely to be chance, what foretells held-out frames best; what does so nearly as well looks alike. A coupling
-/// comes first where it leaves the receivers alike: few that differ in any other way look like that.
-fn best(mut candidates: Vec<Candidate>, coupled: Option<coupling::Found>, one_way: Option<Candidate>) -> Option<Candidate> {
-    let coupled = coupled.filter(|found| found.candidate.p_value < UNLIKELY && found.candidate.gain > 0.0);
-    let explained = coupled.as_ref().is_some_and(|found| found.explains_all);
-    let least = if explained { coupled.as_ref().map_or(0.0, |found| found.candidate.gain + AS_WELL) } else { 0.0 };
-    candidates.retain(|candidate| candidate.id != Some("channel_mismatch") || !explained);
-    candidates.extend(one_way.filter(|candidate| candidate.gain > least));
-    candidates.extend(coupled.map(|found| found.candidate));
-    candidates.retain(|candidate| candidate.p_value < UNEVEN && candidate.gain > 0.0);
-    let gains: Vec<(Option<&'static str>, f64)> = candidates.iter().map(|candidate| (candidate.id, candidate.gain)).collect();
-    let unlikely = candidates.into_iter().filter(|candidate| candidate.p_value < UNLIKELY);
-    let mut best = unlikely.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
-    let alike = gains.iter().filter(|(id, gain)| *id != best.id && *gain > best.gain - AS_WELL);
+/// comes before any gains and phases where it leaves the receivers alike: few that differ in any other way look like that.
+fn best(mut found: Vec<Found>) -> Option<Candidate> {
+    found.retain(|found| found.candidate.p_value < UNEVEN && found.candidate.gain > 0.0);
+    if found.iter().any(|found| found.explains_all && found.candidate.p_value < UNLIKELY) {
+        found.retain(|found| found.candidate.id != Some("channel_mismatch"));
+    }
+    let each: Vec<_> = found.iter().map(|found| (found.candidate.id, found.likelihood)).collect();
+    let unlikely = found.into_iter().filter(|found| found.candidate.p_value < UNLIKELY);
+    let Found { candidate: mut best, likelihood, .. } = unlikely.max_by(|a, b| a.likelihood.total_cmp(&b.likelihood))?;
+    let alike = each.iter().filter(|(id, other)| *id != best.id && *other > likelihood - AS_WELL);
     best.look_alikes.extend(alike.filter_map(|(id, _)| *id));
     best.look_alikes.sort_unstable();
     best.look_alikes.dedup();
@@ -305,9 +311,8 @@ mod tests {
         let evidence = Evidence::new(Loaded::of_samples(radar, samples, [-1.0, 1.0]), None, None);
         let cells = walking(seed, turned, array);
         let bearing = Bearing { sine: 0.0, deviation: 0.003, p_value: 1.0 };
-        let differ = [mismatch::find, places::find].iter().filter_map(|find| find(&evidence, &cells, &bearing)).collect();
-        let coupled = coupling::find(&evidence, &cells, &bearing);
-        best(differ, coupled, coupling::one_way(&evidence, &cells, &bearing)).into_iter().collect()
+        let differ = [mismatch::find, places::find, coupling::find, coupling::one_way];
+        best(differ.iter().filter_map(|find| find(&evidence, &cells, &bearing)).collect()).into_iter().collect()
     }
 
     fn alike() -> DMatrix<Complex64> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::channels::{Bearing, LOOKS, UNEVEN};
+use super::channels::{Bearing, Found, LOOKS, UNEVEN};
 use super::covariance::Cells;
 use super::estimated::Estimated;
 use super::mismatch;
@@ -13,6 +13,8 @@ use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, R
 
 /// What errors of the prediction may imitate: 0.3° and 0.05 dB.
 const FLOOR: f64 = 0.005;
+/// Chance below which neighbours do not hear one another alike.
+const UNEQUAL: f64 = 1e-3;
 /// Steps to the most likely coupling, at most, and a step that is none.
 const STEPS: usize = 20;
 const CONVERGED: f64 = 1e-4;
@@ -24,12 +26,6 @@ const BY_CHANCE: f64 = 0.1;
 
 /// What a receiver hears of the one before it and of the one after it.
 type Heard = [Complex64; 2];
-
-/// A coupling, and whether the receivers are alike without it.
-pub struct Found {
-    pub candidate: Candidate,
-    pub explains_all: bool,
-}
 
 /// The coupling of all neighbours alike. `bearing`: how far aside the body is seen.
 pub fn find(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Found> {
@@ -44,13 +40,22 @@ pub fn find(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Fou
     if after.as_ref().is_some_and(|after| after.square > BY_CHANCE * before) {
         candidate.look_alikes.push("channel_mismatch");
     }
-    Some(Found { candidate, explains_all: after.is_none_or(|after| after.p_value > UNEVEN) })
+    let explains_all = after.is_none_or(|after| after.p_value > UNEVEN);
+    Some(Found { candidate, likelihood: found.likelihood, explains_all })
 }
 
 /// Neighbours that do not hear one another alike, which no coupling of antennas does: it has no name.
-pub fn one_way(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Candidate> {
+pub fn one_way(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Found> {
     let back = bearing.turned_back(&cells.radar);
     let (found, heard) = estimate(cells, &back, &[&[0], &[1], &[2], &[3]])?;
+    let difference = DMatrix::from_fn(4, 2, |number, part| match number {
+        number if number == part => 1.0,
+        number if number == part + 2 => -1.0,
+        _ => 0.0,
+    });
+    if found.chance(&difference) > UNEQUAL {
+        return None;
+    }
     let level_db = heard.map(|heard| 20.0 * heard.norm().max(1e-9).log10());
     let deviation = |part: usize| {
         let mut along = DVector::zeros(4);
@@ -58,7 +63,7 @@ pub fn one_way(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<
         statistics::DECIBEL * found.deviation(&along) / heard[part].norm_sqr().max(1e-12)
     };
     let neighbours = candidate(evidence, heard[0], &found);
-    Some(Candidate {
+    let candidate = Candidate {
         id: None,
         behaves_like: "receivers that hear their neighbours, not alike",
         estimates: vec![Estimate::list("level_db", &level_db, &[deviation(0), deviation(1)])],
@@ -70,7 +75,8 @@ pub fn one_way(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<
         correction: Correction::Samples(Arc::new(move |cube| undo(cube, heard))),
         look_alikes: vec![],
         ..neighbours
-    })
+    };
+    Some(Found { candidate, likelihood: found.likelihood, explains_all: false })
 }
 
 /// `shared`: for every number that is sought, the parts of [`Numbers::heard`](super::covariance::Numbers::heard) that it is.
@@ -97,7 +103,7 @@ fn estimate(cells: &Cells, back: &DMatrix<Complex64>, shared: &[&[usize]]) -> Op
         let estimated = Estimated::new(&cells.looks(&undo), &at, &directions, &floors)?;
         let step = (&estimated.values - &at).amax();
         at.clone_from(&estimated.values);
-        if !(at.norm() < STRONGEST) {
+        if at.norm() > STRONGEST {
             return None;
         }
         found = Some(estimated);

@@ -290,6 +290,10 @@ fn add(
             heard
         })
         .collect();
+    let finite = |value: &Complex64| value.is_finite();
+    if !(shape.iter().all(finite) && heard.iter().flatten().all(finite)) {
+        return;
+    }
     let eigen = shape.symmetric_eigen();
     let powers: Vec<f64> = eigen.eigenvalues.iter().map(|power| power.max(0.0)).collect();
     let axes = &eigen.eigenvectors;
@@ -388,8 +392,8 @@ pub fn walking(seed: u64, turned: impl Fn(usize, f64) -> Complex64, array: &DMat
         let mut heard = DVector::from_fn(RECEIVERS, |_, _| Complex64::new(normal(), normal()) * 0.5f64.sqrt());
         let mut field = DVector::zeros(RECEIVERS);
         for _ in 0..8 {
-            let power = 10.0;
-            let amplitude = Complex64::new(normal(), normal()) * (0.5 * power as f64).sqrt();
+            let power: f64 = 10.0;
+            let amplitude = Complex64::new(normal(), normal()) * (0.5 * power).sqrt();
             let sine = middle + 0.05 * normal();
             let from = |sine: f64| DVector::from_fn(RECEIVERS, |rx, _| Complex64::cis(-wave * radar.rx_m[rx][0] * sine));
             let predicted = from(sine);

@@ -1,12 +1,12 @@
 //! Numbers estimated from the slopes of the likelihood of groups of cells, with errors that come from how the groups disagree.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
 
 use super::covariance::Look;
 use crate::diagnosis::cube::folds;
-use crate::diagnosis::statistics::fisher_tail;
+use crate::diagnosis::statistics::{chi2_tail, fisher_tail};
 
 /// Groups of cells that are needed for an error, and how many more per number.
 const FEWEST: [usize; 2] = [8, 2];
@@ -20,7 +20,9 @@ pub struct Estimated {
     pub square: f64,
     /// Chance that all are zero.
     pub p_value: f64,
-    /// How much better each fold of the frames is foretold by the others than by zeros, nats.
+    /// How much better each fold of the frames is foretold by the others than by zeros, nats; and the part of it that errors of
+    /// the prediction cannot make.
+    pub likelihood: f64,
     pub gain: f64,
 }
 
@@ -56,10 +58,12 @@ impl Estimated {
             squares * (parts_count / (parts_count - lost).max(1.0))
         };
         let by_frame: Vec<Look> = frames.iter().map(|looks| together(looks.iter(), count)).collect();
+        let by_place = placed(&frames, count);
         let spread = scatter(&by_group, count as f64);
-        // What is wrong of a frame's body is wrong of all its groups.
+        // What is wrong of a frame's body is wrong of all its groups; and one that stays where it is shows the same speckle in all
+        // frames.
         let size = |spread: &DMatrix<f64>| (&inverse * spread).trace() / count as f64;
-        let inflation = size(&spread).max(size(&scatter(&by_frame, 1.0)));
+        let inflation = size(&spread).max(size(&scatter(&by_frame, 1.0))).max(size(&scatter(&by_place, count as f64)));
         let mut covariance = &inverse * &spread * &inverse * (inflation / size(&spread).max(f64::MIN_POSITIVE));
         let square_by = |covariance: &DMatrix<f64>| Some(values.dot(&covariance.clone().cholesky()?.solve(&values)));
         let without_floors = square_by(&covariance)?;
@@ -79,8 +83,17 @@ impl Estimated {
         };
         // What errors of the prediction may be is none.
         let own = square / without_floors.max(f64::MIN_POSITIVE);
-        let gain = own * folds(frames.len()).map(gain).sum::<Option<f64>>()?;
-        (p_value.is_finite() && gain.is_finite()).then_some(Self { values, covariance, square, p_value, gain })
+        let likelihood = folds(frames.len()).map(gain).sum::<Option<f64>>()?;
+        let gain = own * likelihood;
+        (p_value.is_finite() && gain.is_finite()).then_some(Self { values, covariance, square, p_value, likelihood, gain })
+    }
+
+    /// Chance that some combinations of the values, `[value, combination]`, are zero.
+    pub fn chance(&self, combinations: &DMatrix<f64>) -> f64 {
+        let values = combinations.transpose() * &self.values;
+        let covariance = combinations.transpose() * &self.covariance * combinations;
+        let square = covariance.cholesky().map_or(0.0, |factors| values.dot(&factors.solve(&values)));
+        chi2_tail(square, values.len() as f64)
     }
 
     /// Deviation of a linear combination of the values.
@@ -94,6 +107,18 @@ fn grouped(frames: &[Vec<Look>], count: usize) -> Vec<Look> {
     let places: BTreeSet<Option<usize>> = still.iter().map(|look| look.place).collect();
     let of_place = |place| together(still.iter().copied().filter(|look| look.place == place), count);
     moving.into_iter().cloned().chain(places.into_iter().map(of_place)).collect()
+}
+
+/// Groups of all frames that are the same one of their frame's.
+fn placed(frames: &[Vec<Look>], count: usize) -> Vec<Look> {
+    let mut places: BTreeMap<(bool, usize), Look> = BTreeMap::new();
+    for (index, look) in frames.iter().flat_map(|looks| looks.iter().enumerate()) {
+        let place = (look.place.is_some(), look.place.unwrap_or(index));
+        let sum = places.entry(place).or_insert_with(|| together([].into_iter(), count));
+        sum.score += &look.score;
+        sum.information += &look.information;
+    }
+    places.into_values().collect()
 }
 
 fn together<'a>(looks: impl Iterator<Item = &'a Look>, count: usize) -> Look {

@@ -9,15 +9,15 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::channels::{Bearing, LOOKS};
+use super::channels::{Bearing, Found, LOOKS};
 use super::covariance::Cells;
 use super::estimated::Estimated;
 use crate::diagnosis::statistics::{DECIBEL, corrected};
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
 
-/// What errors of the prediction do to a gain and to a phase.
-const GAIN_FLOOR_DB: f64 = 0.03;
-const PHASE_FLOOR_RAD: f64 = 0.1 * PI / 180.0;
+/// What errors of the prediction do to a gain and to a phase: a body that keeps its place shows the same wrong reflectivities in all frames.
+const GAIN_FLOOR_DB: f64 = 0.05;
+const PHASE_FLOOR_RAD: f64 = 0.3 * PI / 180.0;
 /// How well the direction of the body is known, as a sine.
 const BEARING_FLOOR: f64 = 0.005;
 /// Steps to the most likely gains and phases, at most, and a step that is none.
@@ -39,7 +39,7 @@ pub fn estimate(cells: &Cells, undo: &DMatrix<Complex64>, steps: usize) -> Optio
         let estimated = Estimated::new(&cells.looks(&(undo * DMatrix::from_diagonal(&inverse))), &at, &directions, &floors)?;
         let step = (&estimated.values - &at).amax();
         at.clone_from(&estimated.values);
-        if !(at.amax() < LARGEST) {
+        if at.amax() > LARGEST {
             return None;
         }
         found = Some(estimated);
@@ -82,7 +82,7 @@ fn amplitudes(cells: &Cells, values: &DVector<f64>) -> DVector<Complex64> {
 }
 
 /// `bearing`: how far aside the body is seen.
-pub fn find(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Candidate> {
+pub fn find(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Found> {
     let (found, directions) = estimate(cells, &bearing.turned_back(&cells.radar), STEPS)?;
     let numbers = cells.numbers();
     let values = &directions * &found.values;
@@ -104,7 +104,9 @@ pub fn find(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Can
         *phase -= share * bearing.sine * x;
         *deviation = deviation.hypot((share * of_the_body).sqrt() * x);
     }
-    Some(candidate(evidence, &against_first(&|rx| numbers.gain(rx)), &phases, corrected(found.p_value, LOOKS), found.gain))
+    let p_value = corrected(found.p_value, LOOKS);
+    let candidate = candidate(evidence, &against_first(&|rx| numbers.gain(rx)), &phases, p_value, found.gain);
+    Some(Found { candidate, likelihood: found.likelihood, explains_all: false })
 }
 
 /// Values and deviations against the first receiver, logarithmic gains and radian.

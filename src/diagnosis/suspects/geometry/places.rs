@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::channels::{Bearing, LOOKS};
+use super::channels::{Bearing, Found, LOOKS};
 use super::covariance::Cells;
 use super::estimated::Estimated;
 use super::mismatch::beside;
@@ -18,12 +18,13 @@ use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
 const FLOOR: f64 = 0.02;
 
 /// `bearing`: how far aside the body is seen.
-pub fn find(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Candidate> {
+pub fn find(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Found> {
     let directions = directions(cells);
     let floors = vec![FLOOR; directions.ncols()];
     let looks = cells.looks(&bearing.turned_back(&cells.radar));
     let found = Estimated::new(&looks, &DVector::zeros(directions.ncols()), &directions, &floors)?;
-    Some(candidate(evidence, cells, &directions, &found))
+    let candidate = candidate(evidence, cells, &directions, &found);
+    Some(Found { candidate, likelihood: found.likelihood, explains_all: false })
 }
 
 /// `[number, direction]`
