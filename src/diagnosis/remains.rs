@@ -105,14 +105,19 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // What bursts leave below the noise of single samples is in all receivers at once.
     let bursts = is_one_of(accepted, &BURSTS) && candidate.id == Some("correlated_noise");
     let faint = accepted.behaves_like.starts_with(paths::PATH_LIKE) && is_one_of(candidate, &FAINT);
+    // What moves as no single reflector does was taken out along one track; where it stays longest, a line is left.
+    let line = is_path(accepted) && accepted.id.is_none() && candidate.id == Some("spur");
     let smeared = vibrates || timed || is_by_chirp(accepted) || accepted.behaves_like.starts_with(paths::PATH_LIKE);
     let uneven = (smeared || is_one_of(accepted, &OF_REMAINS)) && is_of_receivers(candidate);
-    // To undo what receivers hear of one another mixes their noise.
-    let mixed = is_of_receivers(accepted) && candidate.id == Some("correlated_noise");
+    // To undo what receivers hear of one another mixes their noise, and chirps read between their samples have less of it.
+    let mixed = is_of_receivers(accepted) && candidate.id == Some("correlated_noise")
+        || accepted.id == Some("chirp_nonlinearity") && candidate.id == Some("coloured_noise");
+    // Chirps that start at random differ from their neighbours, and go on doing so a little.
+    let unlike = is_by_chirp(accepted) && is_one_of(candidate, &BURSTS);
     // Up to which share of what was gained.
     [
-        (roughly || fades || image, ROUGHLY),
-        (bursts || behind, 1.0),
+        (roughly || fades || image || unlike, ROUGHLY),
+        (bursts || behind || line, 1.0),
         (hardly || uneven || mixed, f64::INFINITY),
         (shaken || products, SHAKEN),
         (by_chirp || faint, SLIGHTLY),

@@ -352,15 +352,15 @@ const NEVER: [(&[&str], &str); 5] = [
          would tell them apart",
     ),
     (
-        &["breathing", "heartbeat"],
-        "of a body whose motion is known to millimetres: the mesh's own error moves by as much, and as slowly; they are \
-         looked for only where nobody was tracked",
+        &["breathing", "heartbeat", "clothing_delay"],
+        "of a body whose motion is known to millimetres: the mesh's own error moves by as much, and as slowly; breath and heart \
+         are looked for only where nobody was tracked",
     ),
 ];
 
 /// Effects that no recording of this kind can show; `body`: somebody was tracked.
 pub fn never_detectable(body: bool) -> Vec<NotDetectable> {
-    let applies = |id: &&&str| body || !matches!(**id, "breathing" | "heartbeat");
+    let applies = |id: &&&str| body || !matches!(**id, "breathing" | "heartbeat" | "clothing_delay");
     let entry = |id: &&str, reason: &str| NotDetectable { id: (*id).into(), at_most_db: None, reason: reason.into() };
     NEVER.iter().flat_map(|(ids, reason)| ids.iter().filter(applies).map(|id| entry(id, reason))).collect()
 }

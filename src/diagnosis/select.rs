@@ -20,8 +20,8 @@ impl DiagnosisConfig {
         self.alarm * SUSPECTS[suspect].share / SUSPECTS.iter().map(|suspect| suspect.share).sum::<f64>()
     }
 
-    /// What has no name may be anything, so it must gain more, half as much more where chance cannot have made it. `untouched`: what was taken
-    /// out of a recording leaves remains, which chance has not made either.
+    /// What has no name may be anything, so it must gain more, half as much more where chance cannot have made it. `untouched`:
+    /// what was taken out of a recording leaves remains, which chance has not made either.
     pub(super) fn passes(&self, suspect: usize, candidate: &Candidate, untouched: bool) -> bool {
         let sure = untouched && candidate.p_value < NO_CHANCE;
         let least = match candidate.id {
@@ -131,9 +131,13 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
                 && !refused.contains(&id)
                 && accepted.iter().filter(|effect| effect.candidate.id == Some(id)).count() < MOST_ALIKE
         };
+        let late = |candidate: &Candidate| candidate.place.stage == "timing";
+        let clocks_may_be_wrong = accepted.iter().any(|effect| late(&effect.candidate))
+            || found.iter().filter(passes).any(|(_, candidate)| late(candidate));
         let passing: Vec<&(usize, Candidate)> = found
             .iter()
             .filter(passes)
+            .filter(|(suspect, _)| !(clocks_may_be_wrong && SUSPECTS[*suspect].trusts_the_clocks))
             .filter(|(_, candidate)| !known(candidate) && candidate.id.is_none_or(may_be_named))
             .collect();
         if let Some(last) = accepted.last_mut() {

@@ -72,7 +72,7 @@ impl Context<'_> {
 }
 
 /// Legendre polynomial of a degree.
-pub(super) fn legendre(degree: usize, x: f64) -> f64 {
+pub fn legendre(degree: usize, x: f64) -> f64 {
     let (mut before, mut now) = (1.0, x);
     if degree == 0 {
         return 1.0;

@@ -78,7 +78,7 @@ pub mod tdm_phase;
 pub mod tx_leakage;
 pub mod wall_ghost;
 pub use chain::Effects;
-pub use context::Context;
+pub use context::{Context, legendre};
 pub use effect::{Effect, Parameter};
 pub use info::{EffectInfo, ParameterInfo, Stage};
 pub use points::BodyPoints;

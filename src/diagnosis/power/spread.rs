@@ -78,6 +78,17 @@ impl Cells {
         }
     }
 
+    /// The Doppler cells that a velocity reaches, and the share of the power in the peak that it has there.
+    pub fn each_doppler(&self, velocity_mps: f64, mut at: impl FnMut(usize, f32)) {
+        let (doppler, _) = self.place(0.0, velocity_mps);
+        if doppler.is_finite() {
+            let (doppler, slow) = self.taps(doppler);
+            slow.iter().enumerate().for_each(|(i, share)| {
+                at((doppler + i as i64 - REACH).rem_euclid(self.loops as i64) as usize, *share);
+            });
+        }
+    }
+
     fn taps(&self, place: f64) -> (i64, &[f32; 2 * REACH as usize + 1]) {
         let step = (place * STEPS as f64).round() as i64;
         (step.div_euclid(STEPS as i64), &self.spread[step.rem_euclid(STEPS as i64) as usize])

@@ -1,9 +1,8 @@
-//! What differs between the receivers, and bodies that stand to one side: phases and powers between receivers in the body's
-//! cells.
+//! Which of the ways in which receivers may differ it is, and bodies that stand to one side.
 //!
 //! Every cell that the body fills comes from a direction that the prediction knows, so what remains of the phase between
 //! two receivers belongs to the receivers. A phase that grows in proportion to the receivers' places is a direction, and
-//! might as well be the body's; anything else, and any difference of power, cannot be. Neither depends on amplitudes.
+//! might as well be the body's.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -14,8 +13,8 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::change::{Change, Moves};
-use super::covariance::Cells;
-use super::{coupling, mismatch, places};
+use super::covariance::{Array, Cells, used};
+use super::{coupling, mismatch, places, skew};
 use crate::diagnosis::power::{PowerModel, part_templates};
 use crate::diagnosis::suspects::{paths::still_power, slow};
 use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, Rung, statistics};
@@ -23,8 +22,6 @@ use crate::radar::Radar;
 
 /// Expected power over the noise from which on a cell is used.
 const LEAST_POWER: f32 = 10.0;
-/// Share of what stands still that may be left at low Doppler when it was taken out.
-const STILL_LEFT: f64 = 1e-3;
 /// What the power model's errors do to a phase between neighbouring receivers (half a wavelength).
 const PHASE_FLOOR_RAD: f64 = 1.5 * PI / 180.0;
 /// Chance below which receivers may not be alike, and below which they are not.
@@ -39,7 +36,7 @@ const AS_WELL: f64 = 4.6;
 
 /// Sums over the cells of a frame after the predicted steering.
 #[derive(Clone, Debug)]
-struct Sums {
+pub struct Sums {
     /// `[rx, rx]`, the second one conjugated.
     products: Vec<Complex64>,
     cells: f64,
@@ -59,6 +56,15 @@ impl Sums {
     fn own(&self, rx: usize) -> f64 {
         self.products[rx * self.receivers() + rx].re
     }
+
+    /// How far aside the body is seen (as a sine), its range, and how much this frame tells of it.
+    pub fn sine(&self, radar: &Radar) -> [f64; 3] {
+        let (places, wave) = (along(radar), TAU / radar.wavelength_m());
+        let sum = |of: &dyn Fn(usize) -> f64| (1..places.len()).map(|rx| self.cross(rx).norm() * of(rx)).sum::<f64>();
+        let spread = sum(&|rx| places[rx].powi(2));
+        let sine = -sum(&|rx| self.cross(rx).arg() * places[rx]) / (spread * wave).max(f64::MIN_POSITIVE);
+        [sine, self.range_m, spread]
+    }
 }
 
 /// A mean over frames and the standard error of it.
@@ -74,7 +80,7 @@ pub struct Bearing {
     pub sine: f64,
     pub deviation: f64,
     /// Chance that it is none.
-    p_value: f64,
+    pub p_value: f64,
 }
 
 impl Bearing {
@@ -103,16 +109,16 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
         return vec![];
     }
     let bearing = bearing(radar, &training);
-    let cells = Cells::new(evidence, model, body, &still);
+    let array = Array::new(Cells::new(evidence, model, body, &still), bearing);
     // What receivers hear in common says nothing of them where the body is not what they hear; and those that differed were
     // brought to the first one's, a neighbour's part included.
     let alike = !displaced && !accepted("channel_mismatch");
     let heard = alike && !accepted("mutual_coupling");
     let differ = [
-        if alike { mismatch::find(evidence, &cells, &bearing) } else { None },
-        if displaced { None } else { places::find(evidence, &cells, &bearing) },
-        if heard { coupling::find(evidence, &cells, &bearing) } else { None },
-        if heard { coupling::one_way(evidence, &cells, &bearing) } else { None },
+        if alike { mismatch::find(evidence, &array) } else { None },
+        if displaced { None } else { places::find(evidence, &array) },
+        if heard { coupling::find(evidence, &array) } else { None },
+        if heard { coupling::one_way(evidence, &array) } else { None },
     ];
     if let Some(candidate) = best(differ.into_iter().flatten().collect()) {
         return vec![candidate];
@@ -122,6 +128,9 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
         let amplitudes: Vec<Complex64> = along(radar).iter().map(|x| Complex64::cis(-bearing.sine * wave * x)).collect();
         let gain = likelihood_gain(&training, &held_out, &amplitudes);
         let range_m = training.iter().map(|sums| sums.range_m).sum::<f64>() / training.len() as f64;
+        if let Some(skew) = skew::find(evidence, &training, bearing, gain) {
+            return vec![skew];
+        }
         return (gain > 0.0).then(|| aside_of(evidence, bearing, range_m, moves, gain)).into_iter().collect();
     }
     vec![]
@@ -154,7 +163,7 @@ fn best(mut found: Vec<Found>) -> Option<Candidate> {
 }
 
 /// Places of the receivers along x, from the first one.
-fn along(radar: &Radar) -> Vec<f64> {
+pub fn along(radar: &Radar) -> Vec<f64> {
     radar.rx_m.iter().map(|rx| rx[0] - radar.rx_m[0][0]).collect()
 }
 
@@ -185,14 +194,7 @@ fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &
     let radar = &evidence.radar;
     let (receivers, transmitters) = (radar.rx_m.len(), radar.tx_m.len());
     let expected = model.expected(frame);
-    let map = &evidence.maps()[frame * model.size()..(frame + 1) * model.size()];
-    let samples = evidence.cube.dims[4];
-    // A body that hardly moves is known by what it leaves of itself where what stands still was taken out.
-    let of_the_body = |cell: usize| model.usable()[cell] || f64::from(map[cell]) > STILL_LEFT * still[cell % samples];
-    let cells: Vec<usize> = (0..model.size()).filter(|&cell| expected[cell] > LEAST_POWER && of_the_body(cell)).collect();
-    if cells.len() < 10 {
-        return None;
-    }
+    let cells = used(evidence, model, still, frame, LEAST_POWER)?;
     let points = &body.frames[frame];
     let (centre, wave) = (radar.centre_m(), TAU / radar.wavelength_m());
     // Mean direction and range of each cell: templates weighted with them. The centre may lie aside: sines need no care.
@@ -309,10 +311,9 @@ mod tests {
         let radar = four_receivers();
         let samples = vec![Complex64::ONE; radar.dims().iter().product()];
         let evidence = Evidence::new(Loaded::of_samples(radar, samples, [-1.0, 1.0]), None, None);
-        let cells = walking(seed, turned, array);
-        let bearing = Bearing { sine: 0.0, deviation: 0.003, p_value: 1.0 };
+        let array = Array::new(walking(seed, turned, array), Bearing { sine: 0.0, deviation: 0.003, p_value: 1.0 });
         let differ = [mismatch::find, places::find, coupling::find, coupling::one_way];
-        best(differ.iter().filter_map(|find| find(&evidence, &cells, &bearing)).collect()).into_iter().collect()
+        best(differ.iter().filter_map(|find| find(&evidence, &array)).collect()).into_iter().collect()
     }
 
     fn alike() -> DMatrix<Complex64> {

@@ -5,19 +5,16 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::channels::{Bearing, Found, LOOKS, UNEVEN};
-use super::covariance::Cells;
-use super::estimated::Estimated;
+use super::channels::{Found, LOOKS, UNEVEN};
+use super::covariance::Array;
 use super::mismatch;
+use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, Rung, statistics};
 
 /// What errors of the prediction may imitate: 0.3° and 0.05 dB.
 const FLOOR: f64 = 0.005;
 /// Chance below which neighbours do not hear one another alike.
 const UNEQUAL: f64 = 1e-3;
-/// Steps to the most likely coupling, at most, and a step that is none.
-const STEPS: usize = 20;
-const CONVERGED: f64 = 1e-4;
 /// Beyond, it is no weak coupling.
 const STRONGEST: f64 = 0.5;
 /// Of the unevenness of gains and phases (squares), what a coupling may leave: a random one of four receivers lies so near to one
@@ -27,15 +24,12 @@ const BY_CHANCE: f64 = 0.1;
 /// What a receiver hears of the one before it and of the one after it.
 type Heard = [Complex64; 2];
 
-/// The coupling of all neighbours alike. `bearing`: how far aside the body is seen.
-pub fn find(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Found> {
-    let receivers = cells.numbers().receivers;
-    let back = bearing.turned_back(&cells.radar);
-    let (found, heard) = estimate(cells, &back, &[&[0, 2], &[1, 3]])?;
+/// The coupling of all neighbours alike.
+pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
+    let (found, heard) = estimate(array, &[&[0, 2], &[1, 3]])?;
     let mut candidate = candidate(evidence, heard[0], &found);
-    let uneven = |undo: &DMatrix<Complex64>| mismatch::estimate(cells, undo, 1).map(|(left, _)| left);
-    let before = uneven(&back).map_or(0.0, |before| before.square);
-    let after = uneven(&(&back * alone(receivers, heard)?));
+    let before = mismatch::left(array, &array.looks).map_or(0.0, |before| before.square);
+    let after = mismatch::left(array, &array.looks_after(&alone(array.cells.numbers().receivers, heard)?));
     // Any receivers may look like that by chance, if not to the last digit.
     if after.as_ref().is_some_and(|after| after.square > BY_CHANCE * before) {
         candidate.look_alikes.push("channel_mismatch");
@@ -45,9 +39,8 @@ pub fn find(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Fou
 }
 
 /// Neighbours that do not hear one another alike, which no coupling of antennas does: it has no name.
-pub fn one_way(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Found> {
-    let back = bearing.turned_back(&cells.radar);
-    let (found, heard) = estimate(cells, &back, &[&[0], &[1], &[2], &[3]])?;
+pub fn one_way(evidence: &Evidence, array: &Array) -> Option<Found> {
+    let (found, heard) = estimate(array, &[&[0], &[1], &[2], &[3]])?;
     let difference = DMatrix::from_fn(4, 2, |number, part| match number {
         number if number == part => 1.0,
         number if number == part + 2 => -1.0,
@@ -80,8 +73,8 @@ pub fn one_way(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<
 }
 
 /// `shared`: for every number that is sought, the parts of [`Numbers::heard`](super::covariance::Numbers::heard) that it is.
-fn estimate(cells: &Cells, back: &DMatrix<Complex64>, shared: &[&[usize]]) -> Option<(Estimated, Heard)> {
-    let numbers = cells.numbers();
+fn estimate(array: &Array, shared: &[&[usize]]) -> Option<(Estimated, Heard)> {
+    let numbers = array.cells.numbers();
     // Of two receivers, each hears the other.
     if numbers.receivers < 3 {
         return None;
@@ -96,22 +89,11 @@ fn estimate(cells: &Cells, back: &DMatrix<Complex64>, shared: &[&[usize]]) -> Op
     };
     // As much for what all hear alike, however many numbers that is.
     let floors: Vec<f64> = shared.iter().map(|parts| FLOOR * (2.0 / parts.len() as f64).sqrt()).collect();
-    let mut at = DVector::zeros(shared.len());
-    let mut found = None;
-    for _ in 0..STEPS {
-        let undo = back * alone(numbers.receivers, heard(&at))?;
-        let estimated = Estimated::new(&cells.looks(&undo), &at, &directions, &floors)?;
-        let step = (&estimated.values - &at).amax();
-        at.clone_from(&estimated.values);
-        if at.norm() > STRONGEST {
-            return None;
-        }
-        found = Some(estimated);
-        if step < CONVERGED {
-            break;
-        }
-    }
-    Some((found?, heard(&at)))
+    let found = Estimated::converged(&array.looks, &directions, &floors, |at| {
+        if at.norm() > STRONGEST { None } else { Some(array.looks_after(&alone(numbers.receivers, heard(at))?)) }
+    })?;
+    let heard = heard(&found.values);
+    Some((found, heard))
 }
 
 /// What makes of what receivers heard what they would have heard alone. None where that cannot be told.

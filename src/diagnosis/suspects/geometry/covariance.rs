@@ -12,8 +12,10 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::channels::Bearing;
 use crate::diagnosis::power::PowerModel;
 use crate::diagnosis::prediction::range_and_velocity;
+use crate::diagnosis::speckle::Look;
 use crate::diagnosis::{BodyPrediction, Evidence};
 use crate::radar::Radar;
 
@@ -30,9 +32,6 @@ const MOST_GROUPS: usize = 6;
 const STILL_RANGES: usize = 2;
 /// Share of a cell's power that every receiver hears for itself: what the prediction does not know of the directions.
 const OWN_SHARE: f64 = 0.005;
-/// Levels that a cell's power is sought at, decibels from the expected one, and how much it deviates from it.
-const LEVELS_DB: i32 = 15;
-const LEVEL_DEVIATION_DB: f64 = 5.0;
 
 /// The numbers that an array may differ by, one after the other: logarithmic gains, phases, and displacements along x in radian per
 /// unit of the sine, of every receiver; real and imaginary part of what each hears of the one before it, and of the one after it.
@@ -83,6 +82,31 @@ impl Numbers {
         change(&|rx| (self.place(rx), centred(radar)[0][rx]));
         DMatrix::from_columns(&changes)
     }
+
+    /// Orthonormal directions among some kinds of these numbers, each told by its first one, that no such change has a part in.
+    /// `[number, direction]`, one kind after the other.
+    pub fn own(self, radar: &Radar, kinds: &[usize]) -> DMatrix<f64> {
+        let of_the_body = self.of_the_body(radar);
+        let columns: Vec<DVector<f64>> = kinds
+            .iter()
+            .flat_map(|&first| {
+                let free = beside(&of_the_body.rows(first, self.receivers).into_owned());
+                free.into_iter().map(move |direction| {
+                    let mut column = DVector::zeros(self.count());
+                    column.rows_mut(first, self.receivers).copy_from(&direction);
+                    column
+                })
+            })
+            .collect();
+        if columns.is_empty() { DMatrix::zeros(self.count(), 0) } else { DMatrix::from_columns(&columns) }
+    }
+}
+
+/// Orthonormal columns that make up everything that is no combination of some columns.
+fn beside(columns: &DMatrix<f64>) -> Vec<DVector<f64>> {
+    let squares = (columns * columns.transpose()).symmetric_eigen();
+    let each = squares.eigenvalues.iter().zip(squares.eigenvectors.column_iter());
+    each.filter(|(value, _)| **value < 1e-6).map(|(_, column)| column.into_owned()).collect()
 }
 
 /// Places of the receivers by axis, from their middle, wavelengths.
@@ -91,15 +115,6 @@ fn centred(radar: &Radar) -> [Vec<f64>; 3] {
         let middle = radar.rx_m.iter().map(|at| at[axis]).sum::<f64>() / radar.rx_m.len() as f64;
         radar.rx_m.iter().map(|at| (at[axis] - middle) / radar.wavelength_m()).collect()
     })
-}
-
-/// Some cells' slope and curvature of the likelihood by the [`Numbers`], without what the body makes as well.
-#[derive(Clone, Debug)]
-pub struct Look {
-    pub score: DVector<f64>,
-    pub information: DMatrix<f64>,
-    /// Looks of one such place may err together in all frames.
-    pub place: Option<usize>,
 }
 
 /// Neighbouring cells of a frame.
@@ -119,6 +134,29 @@ pub struct Cell {
     pub expected: DMatrix<Complex64>,
     /// The same, every point weighted with the sine of its direction.
     pub aslant: DMatrix<Complex64>,
+}
+
+/// What all ways in which receivers may differ are sought in.
+pub struct Array {
+    pub cells: Cells,
+    pub bearing: Bearing,
+    /// What turns the body back to where it stands, `[rx, rx]`.
+    back: DMatrix<Complex64>,
+    /// After that, and if the receivers were alike.
+    pub looks: Vec<Vec<Look>>,
+}
+
+impl Array {
+    pub fn new(cells: Cells, bearing: Bearing) -> Self {
+        let back = bearing.turned_back(&cells.radar);
+        let looks = cells.looks(&back);
+        Self { cells, bearing, back, looks }
+    }
+
+    /// What undoes a difference between receivers, `[rx, rx]`, applied to what they heard.
+    pub fn looks_after(&self, undo: &DMatrix<Complex64>) -> Vec<Vec<Look>> {
+        self.cells.looks(&(&self.back * undo))
+    }
 }
 
 /// The cells that the body fills, by frame and group of neighbours.
@@ -166,9 +204,6 @@ impl Cells {
 
 /// `moving`, `still`: cells that move, and cells that hardly do, with their ranges.
 fn groups([mut moving, mut still]: [Vec<(usize, Cell)>; 2]) -> Vec<Group> {
-    if moving.len() + still.len() < FEWEST_CELLS {
-        return vec![];
-    }
     let count = (moving.len() / GROUP_CELLS).clamp(1, MOST_GROUPS);
     let all = moving.len();
     // From the end, so that what remains keeps its place.
@@ -186,6 +221,17 @@ fn groups([mut moving, mut still]: [Vec<(usize, Cell)>; 2]) -> Vec<Group> {
     groups
 }
 
+/// Cells of a frame in which the body is expected to be stronger than `least`, noise included, and seen. None where these are too few.
+pub fn used(evidence: &Evidence, model: &PowerModel, still: &[f64], frame: usize, least: f32) -> Option<Vec<usize>> {
+    let expected = model.expected(frame);
+    let map = &evidence.maps()[frame * model.size()..(frame + 1) * model.size()];
+    let samples = evidence.cube.dims[4];
+    // A body that hardly moves is known by what it leaves of itself where what stands still was taken out.
+    let of_the_body = |cell: usize| model.usable()[cell] || f64::from(map[cell]) > STILL_LEFT * still[cell % samples];
+    let used: Vec<usize> = (0..model.size()).filter(|&cell| expected[cell] > least && of_the_body(cell)).collect();
+    (used.len() >= FEWEST_CELLS).then_some(used)
+}
+
 fn cells(
     evidence: &Evidence,
     model: &PowerModel,
@@ -196,14 +242,7 @@ fn cells(
 ) -> [Vec<(usize, Cell)>; 2] {
     let radar = &evidence.radar;
     let (receivers, samples) = (radar.rx_m.len(), evidence.cube.dims[4]);
-    let expected = model.expected(frame);
-    let map = &evidence.maps()[frame * model.size()..(frame + 1) * model.size()];
-    // A body that hardly moves is known by what it leaves of itself where what stands still was taken out.
-    let of_the_body = |cell: usize| model.usable()[cell] || f64::from(map[cell]) > STILL_LEFT * still[cell % samples];
-    let used: Vec<usize> = (0..model.size()).filter(|&cell| expected[cell] > LEAST_POWER && of_the_body(cell)).collect();
-    if used.len() < FEWEST_CELLS {
-        return [vec![], vec![]];
-    }
+    let Some(used) = used(evidence, model, still, frame, LEAST_POWER) else { return [vec![], vec![]] };
     let mut slots = vec![usize::MAX; model.size()];
     used.iter().enumerate().for_each(|(slot, &cell)| slots[cell] = slot);
     let mut sums = vec![[DMatrix::<Complex64>::zeros(receivers, receivers), DMatrix::zeros(receivers, receivers)]; used.len()];
@@ -251,29 +290,14 @@ fn cells(
 /// Of cells together. `noise`: of every receiver; `of_the_body`: changes of the numbers that do not count.
 fn look(group: &Group, undo: &DMatrix<Complex64>, noise: &[f64], of_the_body: &DMatrix<f64>) -> Look {
     let numbers = Numbers { receivers: noise.len() };
-    let mut score = DVector::zeros(numbers.count());
-    let mut information = DMatrix::zeros(numbers.count(), numbers.count());
+    let mut look = Look::new(numbers.count(), group.place);
     for cell in &group.cells {
-        add(cell, undo, noise, numbers, &mut score, &mut information);
+        add(cell, undo, noise, numbers, &mut look);
     }
-    // The efficient score: without what the free changes explain of it.
-    let Ok(inverse) = (of_the_body.transpose() * &information * of_the_body).pseudo_inverse(1e-9) else {
-        return Look { score: score * 0.0, information: information * 0.0, place: group.place };
-    };
-    let explained = &information * of_the_body * inverse * of_the_body.transpose();
-    let score = &score - &explained * &score;
-    let information = &information - &explained * &information;
-    Look { score, information, place: group.place }
+    look.without(of_the_body)
 }
 
-fn add(
-    cell: &Cell,
-    undo: &DMatrix<Complex64>,
-    noise: &[f64],
-    numbers: Numbers,
-    score: &mut DVector<f64>,
-    information: &mut DMatrix<f64>,
-) {
+fn add(cell: &Cell, undo: &DMatrix<Complex64>, noise: &[f64], numbers: Numbers, look: &mut Look) {
     let receivers = numbers.receivers;
     let white: Vec<f64> = noise.iter().map(|noise| 1.0 / noise.sqrt()).collect();
     let own = OWN_SHARE * (0..receivers).map(|rx| cell.expected[(rx, rx)].re).sum::<f64>() / receivers as f64;
@@ -290,56 +314,10 @@ fn add(
             heard
         })
         .collect();
-    let finite = |value: &Complex64| value.is_finite();
-    if !(shape.iter().all(finite) && heard.iter().flatten().all(finite)) {
-        return;
-    }
-    let eigen = shape.symmetric_eigen();
-    let powers: Vec<f64> = eigen.eigenvalues.iter().map(|power| power.max(0.0)).collect();
-    let axes = &eigen.eigenvectors;
-    let mut energies = vec![0.0; receivers];
-    for heard in &heard {
-        (axes.adjoint() * heard).iter().zip(&mut energies).for_each(|(value, energy)| *energy += value.norm_sqr());
-    }
-    let count = heard.len() as f64;
-    let level = level(&powers, &energies, count);
-    let of_powers = |of: &dyn Fn(f64) -> f64| {
-        let diagonal = DVector::from_iterator(receivers, powers.iter().map(|power| Complex64::from(of(level * power))));
-        axes * DMatrix::from_diagonal(&diagonal) * axes.adjoint()
-    };
-    let inverse = of_powers(&|power| 1.0 / (1.0 + power));
-    let body = of_powers(&|power| power);
-    let aslant = DMatrix::from_fn(receivers, receivers, |i, j| cell.aslant[(i, j)] * (level * white[i] * white[j]));
-    let changes = changes(&body, &aslant, &white, numbers);
-    let weighed: Vec<DVector<Complex64>> = heard.iter().map(|heard| &inverse * heard).collect();
-    let relative: Vec<DMatrix<Complex64>> = changes.iter().map(|change| &inverse * change).collect();
-    for (a, change) in changes.iter().enumerate() {
-        let seen: f64 = weighed.iter().map(|weighed| weighed.dotc(&(change * weighed)).re).sum();
-        score[a] += seen - count * relative[a].trace().re;
-        let turned = relative[a].transpose();
-        for (b, other) in relative.iter().enumerate().skip(a) {
-            let value = count * turned.dot(other).re;
-            information[(a, b)] += value;
-            if a != b {
-                information[(b, a)] += value;
-            }
-        }
-    }
-}
-
-/// The power that a cell has, over the expected one.
-fn level(powers: &[f64], energies: &[f64], count: f64) -> f64 {
-    let log_likelihood = |db: i32| {
-        let level = 10f64.powf(f64::from(db) / 10.0);
-        let fit: f64 = powers
-            .iter()
-            .zip(energies)
-            .map(|(power, energy)| -count * (1.0 + level * power).ln() - energy / (1.0 + level * power))
-            .sum();
-        fit - 0.5 * (f64::from(db) / LEVEL_DEVIATION_DB).powi(2)
-    };
-    let best = (-LEVELS_DB..=LEVELS_DB).map(|db| (db, log_likelihood(db))).max_by(|a, b| a.1.total_cmp(&b.1));
-    best.map_or(1.0, |(db, _)| 10f64.powf(f64::from(db) / 10.0))
+    look.add(shape, &heard, |level, body| {
+        let aslant = DMatrix::from_fn(receivers, receivers, |i, j| cell.aslant[(i, j)] * (level * white[i] * white[j]));
+        changes(body, &aslant, &white, numbers)
+    });
 }
 
 /// How the covariance changes with every number.

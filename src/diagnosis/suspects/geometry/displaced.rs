@@ -29,8 +29,9 @@ const CLOCK_ROUGH: f64 = 0.08;
 const ALIKE_NATS: f64 = 4.6;
 /// Ranges looked at first.
 const RANGE_GRID_M: [f64; 11] = [-0.4, -0.3, -0.2, -0.12, -0.06, 0.0, 0.06, 0.12, 0.2, 0.3, 0.4];
-/// Times looked at first, in frame periods.
-const CLOCK_GRID: [f64; 13] = [-3.0, -2.0, -1.0, -0.6, -0.3, -0.15, 0.0, 0.15, 0.3, 0.6, 1.0, 2.0, 3.0];
+/// Times looked at first, in frame periods: a walking body leaves its cells in half of one.
+const CLOCK_GRID: [f64; 19] =
+    [-3.0, -2.6, -2.2, -1.8, -1.4, -1.0, -0.6, -0.3, -0.15, 0.0, 0.15, 0.3, 0.6, 1.0, 1.4, 1.8, 2.2, 2.6, 3.0];
 /// Rates of clocks looked at first.
 const DRIFT_GRID: [f64; 7] = [-0.1, -0.03, -0.01, 0.0, 0.01, 0.03, 0.1];
 /// Standard deviation of a displacement across the line of sight, which ranges do not show.

@@ -9,9 +9,10 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::channels::{Bearing, Found, LOOKS};
-use super::covariance::Cells;
-use super::estimated::Estimated;
+use super::channels::{Found, LOOKS};
+use super::covariance::{Array, Cells};
+use crate::diagnosis::estimated::Estimated;
+use crate::diagnosis::speckle::Look;
 use crate::diagnosis::statistics::{DECIBEL, corrected};
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
 
@@ -20,60 +21,23 @@ const GAIN_FLOOR_DB: f64 = 0.05;
 const PHASE_FLOOR_RAD: f64 = 0.3 * PI / 180.0;
 /// How well the direction of the body is known, as a sine.
 const BEARING_FLOOR: f64 = 0.005;
-/// Steps to the most likely gains and phases, at most, and a step that is none.
-const STEPS: usize = 20;
-const CONVERGED: f64 = 1e-4;
 /// Beyond, nothing is told.
 const LARGEST: f64 = 3.0;
 
-/// `undo`: what the receivers heard is multiplied by before, `[rx, rx]`; `steps`: one for receivers that nearly are alike.
-pub fn estimate(cells: &Cells, undo: &DMatrix<Complex64>, steps: usize) -> Option<(Estimated, DMatrix<f64>)> {
-    let directions = directions(cells);
-    let gains = cells.radar.rx_m.len() - 1;
+/// Gains and phases that no body makes, `[number, direction]`, and what errors of the prediction do to each.
+fn sought(array: &Array) -> (DMatrix<f64>, Vec<f64>) {
+    let numbers = array.cells.numbers();
+    let directions = numbers.own(&array.cells.radar, &[numbers.gain(0), numbers.phase(0)]);
+    let gains = numbers.receivers - 1;
     let floor = |index: usize| if index < gains { GAIN_FLOOR_DB / DECIBEL } else { PHASE_FLOOR_RAD };
-    let floors: Vec<f64> = (0..directions.ncols()).map(floor).collect();
-    let mut at = DVector::zeros(directions.ncols());
-    let mut found = None;
-    for _ in 0..steps {
-        let inverse = amplitudes(cells, &(&directions * &at)).map(|amplitude| 1.0 / amplitude);
-        let estimated = Estimated::new(&cells.looks(&(undo * DMatrix::from_diagonal(&inverse))), &at, &directions, &floors)?;
-        let step = (&estimated.values - &at).amax();
-        at.clone_from(&estimated.values);
-        if at.amax() > LARGEST {
-            return None;
-        }
-        found = Some(estimated);
-        if step < CONVERGED {
-            break;
-        }
-    }
-    found.map(|found| (found, directions))
+    let floors = (0..directions.ncols()).map(floor).collect();
+    (directions, floors)
 }
 
-/// Gains and phases that no body makes, `[number, direction]`: gains first.
-fn directions(cells: &Cells) -> DMatrix<f64> {
-    let numbers = cells.numbers();
-    let receivers = numbers.receivers;
-    let of_the_body = numbers.of_the_body(&cells.radar);
-    let beside = |first: usize| beside(&of_the_body.rows(first, receivers).into_owned());
-    let (gains, phases) = (beside(numbers.gain(0)), beside(numbers.phase(0)));
-    let mut directions = DMatrix::zeros(numbers.count(), gains.ncols() + phases.ncols());
-    directions.view_mut((numbers.gain(0), 0), gains.shape()).copy_from(&gains);
-    directions.view_mut((numbers.phase(0), gains.ncols()), phases.shape()).copy_from(&phases);
-    directions
-}
-
-/// Orthonormal columns of everything that is no combination of some columns.
-pub fn beside(columns: &DMatrix<f64>) -> DMatrix<f64> {
-    let squares = (columns * columns.transpose()).symmetric_eigen();
-    let free: Vec<_> = squares
-        .eigenvalues
-        .iter()
-        .zip(squares.eigenvectors.column_iter())
-        .filter(|(value, _)| **value < 1e-6)
-        .map(|(_, column)| column.into_owned())
-        .collect();
-    if free.is_empty() { DMatrix::zeros(columns.nrows(), 0) } else { DMatrix::from_columns(&free) }
+/// Of receivers that nearly are alike as these looks have them.
+pub fn left(array: &Array, looks: &[Vec<Look>]) -> Option<Estimated> {
+    let (directions, floors) = sought(array);
+    Estimated::new(looks, &DVector::zeros(directions.ncols()), &directions, &floors)
 }
 
 fn amplitudes(cells: &Cells, values: &DVector<f64>) -> DVector<Complex64> {
@@ -81,9 +45,13 @@ fn amplitudes(cells: &Cells, values: &DVector<f64>) -> DVector<Complex64> {
     DVector::from_fn(numbers.receivers, |rx, _| Complex64::from_polar(values[numbers.gain(rx)].exp(), values[numbers.phase(rx)]))
 }
 
-/// `bearing`: how far aside the body is seen.
-pub fn find(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Found> {
-    let (found, directions) = estimate(cells, &bearing.turned_back(&cells.radar), STEPS)?;
+pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
+    let Array { cells, bearing, .. } = array;
+    let (directions, floors) = sought(array);
+    let found = Estimated::converged(&array.looks, &directions, &floors, |at| {
+        let inverse = amplitudes(cells, &(&directions * at)).map(|amplitude| 1.0 / amplitude);
+        (at.amax() <= LARGEST).then(|| array.looks_after(&DMatrix::from_diagonal(&inverse)))
+    })?;
     let numbers = cells.numbers();
     let values = &directions * &found.values;
     let against_first = |of: &dyn Fn(usize) -> usize| -> Vec<[f64; 2]> {

@@ -6,9 +6,9 @@ mod channels;
 mod coupling;
 mod covariance;
 mod displaced;
-mod estimated;
 mod mismatch;
 mod places;
+mod skew;
 mod trial;
 
 use change::Moves;

@@ -7,34 +7,22 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::channels::{Bearing, Found, LOOKS};
-use super::covariance::Cells;
-use super::estimated::Estimated;
-use super::mismatch::beside;
+use super::channels::{Found, LOOKS};
+use super::covariance::{Array, Cells};
+use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
 
 /// What errors of the prediction look like, radian per unit of the sine.
 const FLOOR: f64 = 0.02;
 
-/// `bearing`: how far aside the body is seen.
-pub fn find(evidence: &Evidence, cells: &Cells, bearing: &Bearing) -> Option<Found> {
-    let directions = directions(cells);
+pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
+    let numbers = array.cells.numbers();
+    let directions = numbers.own(&array.cells.radar, &[numbers.place(0)]);
     let floors = vec![FLOOR; directions.ncols()];
-    let looks = cells.looks(&bearing.turned_back(&cells.radar));
-    let found = Estimated::new(&looks, &DVector::zeros(directions.ncols()), &directions, &floors)?;
-    let candidate = candidate(evidence, cells, &directions, &found);
+    let found = Estimated::new(&array.looks, &DVector::zeros(directions.ncols()), &directions, &floors)?;
+    let candidate = candidate(evidence, &array.cells, &directions, &found);
     Some(Found { candidate, likelihood: found.likelihood, explains_all: false })
-}
-
-/// `[number, direction]`
-fn directions(cells: &Cells) -> DMatrix<f64> {
-    let numbers = cells.numbers();
-    let of_the_body = numbers.of_the_body(&cells.radar);
-    let own = beside(&of_the_body.rows(numbers.place(0), numbers.receivers).into_owned());
-    let mut directions = DMatrix::zeros(numbers.count(), own.ncols());
-    directions.view_mut((numbers.place(0), 0), own.shape()).copy_from(&own);
-    directions
 }
 
 fn candidate(evidence: &Evidence, cells: &Cells, directions: &DMatrix<f64>, found: &Estimated) -> Candidate {

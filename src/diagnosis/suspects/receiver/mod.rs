@@ -3,7 +3,6 @@
 pub mod bursts;
 mod crossings;
 pub mod declip;
-pub mod droop;
 pub mod field;
 pub mod harmonic;
 pub mod image;

@@ -29,13 +29,17 @@ type Deviation = Arc<dyn Fn([usize; 3]) -> f64 + Send + Sync>;
 
 fn correction(evidence: &Evidence, part: Part, deviation: Deviation) -> Correction {
     let (radar, room) = (evidence.radar.clone(), evidence.room.clone());
-    Correction::Samples(Arc::new(move |cube: &mut Cube| match part {
-        Part::Gain => undo::gain(cube, |at| (1.0 + deviation(at)).max(0.05).into()),
-        Part::Phase => undo::gain(cube, |at| Complex64::cis(deviation(at))),
-        Part::Delay => undo::delay_phase(cube, &radar, |delay_s| delay_s, |at| deviation(at)),
-        Part::Boresight => {
-            let lever = |delay_s: f64| ahead(room.as_ref(), 0.5 * SPEED_OF_LIGHT * delay_s);
-            undo::delay_phase(cube, &radar, lever, |at| deviation(at));
+    Correction::Samples(Arc::new(move |cube: &mut Cube| {
+        let receivers = cube.dims[2];
+        let of_channel = |[frame, channel, index]: [usize; 3]| deviation([frame, channel / receivers, index]);
+        match part {
+            Part::Gain => undo::gain(cube, |at| (1.0 + deviation(at)).max(0.05).into()),
+            Part::Phase => undo::gain(cube, |at| Complex64::cis(deviation(at))),
+            Part::Delay => undo::delay_phase(cube, &radar, |delay_s| delay_s, of_channel),
+            Part::Boresight => {
+                let lever = |delay_s: f64| ahead(room.as_ref(), 0.5 * SPEED_OF_LIGHT * delay_s);
+                undo::delay_phase(cube, &radar, lever, of_channel);
+            }
         }
     }))
 }

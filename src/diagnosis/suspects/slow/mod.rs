@@ -18,7 +18,7 @@ pub mod steady;
 mod sway;
 #[cfg(test)]
 mod tests;
-mod undo;
+pub mod undo;
 
 use field::{Field, Part};
 use num_complex::Complex64;

@@ -15,17 +15,18 @@ pub fn gain(cube: &mut Cube, gain: impl Fn([usize; 3]) -> Complex64 + Sync) {
     });
 }
 
-/// Undoes a phase in every chirp: each beat frequency is turned by `amount` times the lever that its delay has.
+/// Undoes a phase in every chirp: each beat frequency is turned by `amount` (of frame, channel and loop) times the lever that its delay
+/// has.
 pub fn delay_phase(cube: &mut Cube, radar: &Radar, lever: impl Fn(f64) -> f64, amount: impl Fn([usize; 3]) -> f64 + Sync) {
-    let (rx, count) = (cube.dims[2], cube.dims[4]);
+    let count = cube.dims[4];
     let mut planner = FftPlanner::new();
     let (forward, inverse) = (planner.plan_fft_forward(count), planner.plan_fft_inverse(count));
     let delay_of_bin = radar.sample_rate_hz / (count as f64 * radar.slope_hz_per_s);
     // The last eighth is what leaks below zero frequency.
     let delay = |bin: usize| if bin >= count - count / 8 { bin as f64 - count as f64 } else { bin as f64 };
     let levers: Vec<f64> = (0..count).map(|bin| lever(delay(bin) * delay_of_bin)).collect();
-    cube.each_chirp(|[frame, channel, index], samples| {
-        let amount = amount([frame, channel / rx, index]);
+    cube.each_chirp(|chirp, samples| {
+        let amount = amount(chirp);
         forward.process(samples);
         for (value, lever) in samples.iter_mut().zip(&levers) {
             *value *= Complex64::cis(-amount * lever) / count as f64;

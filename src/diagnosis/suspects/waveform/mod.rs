@@ -1,5 +1,6 @@
 //! Errors of the chirp's frequency within a chirp: they act in proportion to the delay.
 
+pub mod along;
 pub mod ripple;
 
 use crate::diagnosis::evidence::Evidence;

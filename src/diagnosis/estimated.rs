@@ -1,12 +1,12 @@
 //! Numbers estimated from the slopes of the likelihood of groups of cells, with errors that come from how the groups disagree.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::covariance::Look;
-use crate::diagnosis::cube::folds;
-use crate::diagnosis::statistics::{chi2_tail, fisher_tail};
+use super::cube::folds;
+use super::speckle::Look;
+use super::statistics::{chi2_tail, fisher_tail};
 
 /// Groups of cells that are needed for an error, and how many more per number.
 const FEWEST: [usize; 2] = [8, 2];
@@ -26,7 +26,33 @@ pub struct Estimated {
     pub gain: f64,
 }
 
+/// Steps to the most likely numbers, at most, and a step that is none.
+const STEPS: usize = 20;
+const CONVERGED: f64 = 1e-4;
+
 impl Estimated {
+    /// Step by step from zeros, where no straight line tells it. None where the numbers leave what can be undone.
+    ///
+    /// `first`: looks as [`Self::new`] takes them, with all numbers zero; `looks`: the same with the numbers at some values.
+    pub fn converged(
+        first: &[Vec<Look>],
+        directions: &DMatrix<f64>,
+        floors: &[f64],
+        looks: impl Fn(&DVector<f64>) -> Option<Vec<Vec<Look>>>,
+    ) -> Option<Self> {
+        let mut found = Self::new(first, &DVector::zeros(directions.ncols()), directions, floors)?;
+        let mut step = found.values.amax();
+        for _ in 1..STEPS {
+            if step < CONVERGED {
+                break;
+            }
+            let next = Self::new(&looks(&found.values)?, &found.values, directions, floors)?;
+            step = (&next.values - &found.values).amax();
+            found = next;
+        }
+        Some(found)
+    }
+
     /// None from too few groups, or where nothing shows these numbers.
     ///
     /// `frames`: looks of groups of cells, by frame, as the numbers are `at`; `directions`: `[number, direction]`,
@@ -41,7 +67,10 @@ impl Estimated {
         let frames: Vec<Vec<Look>> =
             frames.iter().map(|looks| looks.iter().map(along).collect::<Vec<Look>>()).filter(|looks| !looks.is_empty()).collect();
         // What errs together is one group.
-        let by_group = grouped(&frames, count);
+        let by_group = summed(&frames, |frame, index, look| match look.place {
+            Some(place) => (true, place, 0),
+            None => (false, frame, index),
+        });
         let groups = by_group.len();
         if count == 0 || groups < FEWEST[0] + FEWEST[1] * count {
             return None;
@@ -57,8 +86,9 @@ impl Estimated {
             let squares: DMatrix<f64> = parts.iter().map(|look| left(look) * left(look).transpose()).sum();
             squares * (parts_count / (parts_count - lost).max(1.0))
         };
-        let by_frame: Vec<Look> = frames.iter().map(|looks| together(looks.iter(), count)).collect();
-        let by_place = placed(&frames, count);
+        let by_frame = summed(&frames, |frame, _, _| frame);
+        // Groups of all frames that are the same one of their frame's.
+        let by_place = summed(&frames, |_, index, look| (look.place.is_some(), look.place.unwrap_or(index)));
         let spread = scatter(&by_group, count as f64);
         // What is wrong of a frame's body is wrong of all its groups; and one that stays where it is shows the same speckle in all
         // frames.
@@ -102,27 +132,19 @@ impl Estimated {
     }
 }
 
-fn grouped(frames: &[Vec<Look>], count: usize) -> Vec<Look> {
-    let (still, moving): (Vec<&Look>, Vec<&Look>) = frames.iter().flatten().partition(|look| look.place.is_some());
-    let places: BTreeSet<Option<usize>> = still.iter().map(|look| look.place).collect();
-    let of_place = |place| together(still.iter().copied().filter(|look| look.place == place), count);
-    moving.into_iter().cloned().chain(places.into_iter().map(of_place)).collect()
-}
-
-/// Groups of all frames that are the same one of their frame's.
-fn placed(frames: &[Vec<Look>], count: usize) -> Vec<Look> {
-    let mut places: BTreeMap<(bool, usize), Look> = BTreeMap::new();
-    for (index, look) in frames.iter().flat_map(|looks| looks.iter().enumerate()) {
-        let place = (look.place.is_some(), look.place.unwrap_or(index));
-        let sum = places.entry(place).or_insert_with(|| together([].into_iter(), count));
-        sum.score += &look.score;
-        sum.information += &look.information;
+/// Sums of the looks of one key, in the keys' order. `key`: of the frame, the look's index in it, and the look.
+fn summed<K: Ord>(frames: &[Vec<Look>], key: impl Fn(usize, usize, &Look) -> K) -> Vec<Look> {
+    let mut sums: BTreeMap<K, Vec<&Look>> = BTreeMap::new();
+    for (frame, looks) in frames.iter().enumerate() {
+        for (index, look) in looks.iter().enumerate() {
+            sums.entry(key(frame, index, look)).or_default().push(look);
+        }
     }
-    places.into_values().collect()
+    sums.into_values().map(|looks| together(looks.iter().copied(), looks[0].score.len())).collect()
 }
 
 fn together<'a>(looks: impl Iterator<Item = &'a Look>, count: usize) -> Look {
-    let mut sum = Look { score: DVector::zeros(count), information: DMatrix::zeros(count, count), place: None };
+    let mut sum = Look::new(count, None);
     for look in looks {
         sum.score += &look.score;
         sum.information += &look.information;

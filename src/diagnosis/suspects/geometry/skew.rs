@@ -1,0 +1,94 @@
+//! Receivers that are sampled one after the other.
+//!
+//! A body that is seen aside of its place is seen there by a phase that grows along the row of receivers, and stays what it is, or
+//! shrinks, as the body goes farther. A receiver that is sampled later than its neighbour turns all beats, the more the higher they
+//! are: the same phase, but it grows with the range. No id of FORMATS.md names it.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use super::channels::{Bearing, Sums, along};
+use crate::diagnosis::suspects::slow::undo;
+use crate::diagnosis::{Candidate, Correction, Cube, Evidence, Place, Rung};
+use crate::radar::{Radar, SPEED_OF_LIGHT};
+
+/// How the sine may depend on the range: as of a body that stands aside, of a radar that is turned, and of samples taken later.
+const ASIDE: [f64; 2] = [-1.0, 0.0];
+const LATER: f64 = 1.0;
+/// Log-likelihood by which it must be later samples.
+const MUCH_BETTER: f64 = 4.6;
+
+/// The sine of every frame as a power of the range, fitted: its size at the mean range, and what is left.
+fn fit(frames: &[[f64; 3]], mean_m: f64, power: f64) -> (f64, f64) {
+    let lever = |range_m: f64| (range_m / mean_m).powf(power);
+    let sum = |of: &dyn Fn(&[f64; 3]) -> f64| frames.iter().map(of).sum::<f64>();
+    let size =
+        sum(&|[sine, range, weight]| weight * sine * lever(*range)) / sum(&|[_, range, weight]| weight * lever(*range).powi(2));
+    (size, sum(&|[sine, range, weight]| weight * (sine - size * lever(*range)).powi(2)))
+}
+
+/// The size at the mean range where it grows with the range, and the mean range.
+fn later(frames: &[[f64; 3]]) -> Option<(f64, f64)> {
+    let weights: f64 = frames.iter().map(|frame| frame[2]).sum();
+    let mean_m = frames.iter().map(|[_, range, weight]| range * weight).sum::<f64>() / weights;
+    let (size, left) = fit(frames, mean_m, LATER);
+    let other = ASIDE.map(|power| fit(frames, mean_m, power).1).into_iter().fold(f64::INFINITY, f64::min);
+    let better = 0.5 * frames.len() as f64 * (other / left.max(f64::MIN_POSITIVE)).ln();
+    (size.is_finite() && mean_m.is_finite() && better > MUCH_BETTER).then_some((size, mean_m))
+}
+
+/// Instead of a body that is seen aside: None where the phases do not grow with the range.
+pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, gain: f64) -> Option<Candidate> {
+    let radar = &evidence.radar;
+    let frames: Vec<[f64; 3]> = training.iter().map(|sums| sums.sine(radar)).collect();
+    let (size, mean_m) = later(&frames)?;
+    // Radian of a beat of one hertz, by receiver.
+    let beat_hz = 2.0 * radar.slope_hz_per_s * mean_m / SPEED_OF_LIGHT;
+    let turns: Vec<f64> = along(radar).iter().map(|x| -size * TAU / radar.wavelength_m() * x / beat_hz).collect();
+    let farthest = turns.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+    let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
+    Some(Candidate {
+        id: None,
+        behaves_like: "delay-proportional phase by receiver",
+        estimates: vec![],
+        choice: None,
+        place: Place { rx: Some((1..radar.rx_m.len()).collect()), ..Place::at("receiver") },
+        p_value: bearing.p_value,
+        gain,
+        rung: Rung::D,
+        look_alikes: vec![],
+        statement: format!(
+            "Between the receivers everything is turned in proportion to its range, by {:.2} radian from the first to the last at \
+             {mean_m:.1} m: as if the last one were sampled {:.1} ns later than the first.",
+            farthest * beat_hz,
+            1e9 * farthest / TAU
+        ),
+        curve: None,
+        energy: total * evidence.noise().iter().sum::<f64>() * (farthest * beat_hz).powi(2) / 3.0,
+        correction: Correction::Samples(Arc::new({
+            let radar: Radar = radar.clone();
+            move |cube: &mut Cube| {
+                let receivers = cube.dims[2];
+                let lever = |delay_s: f64| radar.slope_hz_per_s * delay_s;
+                undo::delay_phase(cube, &radar, lever, |[_, channel, _]| turns[channel % receivers]);
+            }
+        })),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_grows_with_the_range_is_sampled_later() {
+        // A body that walks from 2.5 to 3.5 m, known to a fiftieth.
+        let walk = |power: f64| -> Vec<[f64; 3]> {
+            let at = |i: usize| (2.5 + i as f64 / 8.0, if i.is_multiple_of(2) { 0.002 } else { -0.002 });
+            (0..9).map(at).map(|(range, error): (f64, f64)| [0.1 * (range / 3.0).powf(power) + error, range, 1.0]).collect()
+        };
+        let (size, mean_m) = later(&walk(LATER)).unwrap();
+        assert!((size - 0.1).abs() < 0.002 && (mean_m - 3.0).abs() < 1e-9, "{size} at {mean_m}");
+        assert!(ASIDE.iter().all(|&power| later(&walk(power)).is_none()));
+    }
+}

@@ -1,0 +1,396 @@
+//! Gain and frequency that change along the chirp, told by what moves (cards W6 and R9).
+//!
+//! What one Doppler cell holds of the body is speckle along the chirp, too: a Gaussian field over the chirp's parts whose
+//! covariance comes from the ranges of the points in that cell. Parts of the chirp are to ranges what receivers are to
+//! directions: wherever the points lie and however they reflect, their power is level over the chirp on average, and their
+//! phase straight. A power that falls along all chirps is the transmitter's or the receiver's, and a phase that bends is the
+//! chirp's.
+//!
+//! Errors of the predicted ranges change the covariance by the distance of two parts alone. Such a matrix is the same,
+//! conjugated, read from its end: it makes neither gains that are odd about the chirp's middle nor phases that are even. Only these are
+//! asked for.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use rayon::prelude::*;
+use rustfft::FftPlanner;
+
+use crate::diagnosis::estimated::Estimated;
+use crate::diagnosis::evidence::hann;
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Rung};
+use crate::diagnosis::power::PowerModel;
+use crate::diagnosis::prediction::range_and_velocity;
+use crate::diagnosis::speckle::Look;
+use crate::diagnosis::statistics::{DECIBEL, corrected};
+use crate::diagnosis::{BodyPrediction, Cube, Evidence};
+use crate::effects::legendre;
+use crate::radar::{Radar, SPEED_OF_LIGHT};
+
+/// Parts of a chirp, and samples of a part, at least.
+const PARTS: [usize; 2] = [16, 8];
+const LEAST_SAMPLES: usize = 4;
+/// Expected power over the noise in a part from which on a Doppler cell is used.
+const LEAST_POWER: f64 = 3.0;
+/// Groups of a frame's Doppler cells that errors are taken from, at most.
+const MOST_GROUPS: usize = 6;
+/// Share of a cell's power that every part hears for itself: what the prediction does not know of the ranges.
+const OWN_SHARE: f64 = 0.005;
+/// What errors of the prediction look like: logarithm of the gain at the chirp's end, and radian there.
+const TILT_FLOOR: f64 = 0.1 / (2.0 * DECIBEL);
+const BEND_FLOOR: f64 = 0.01;
+/// Log-likelihood that a bend must gain by changing from frame to frame.
+const AS_WELL: f64 = 4.6;
+/// Chance below which a finer shape is there, and its size against the bend's from which on it is another thing.
+const UNLIKELY: f64 = 1e-3;
+const LARGE: f64 = 0.5;
+/// Largest deviation from a straight ramp over its part of second order: of that part alone, and of parabolas with more or less of a
+/// third order.
+const PEAK: [f64; 3] = [1.0, 1.45, 1.55];
+/// A tilt, a bend, and one that changes.
+const LOOKS: f64 = 3.0;
+/// Beyond, nothing is told: nepers or radian at the chirp's end.
+const LARGEST: f64 = 3.0;
+
+/// The numbers. Logarithm of the gain at the chirp's end that is odd about its middle; radian there, at the body's mean delay, of
+/// the phase of second and of fourth order; and of what changes from the first frame to the last. All others are errors of the
+/// prediction.
+const TILT: usize = 0;
+const BEND: usize = 1;
+const FINER: usize = 2;
+const TREND: usize = 3;
+const NUMBERS: usize = 9;
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let Some((model, body)) = evidence.power().zip(evidence.body.as_ref()) else { return vec![] };
+    if evidence.is_real() {
+        return vec![];
+    }
+    let Some(chirps) = Chirps::new(evidence, model, body) else { return vec![] };
+    let mut found = vec![];
+    if !evidence.accepted.contains(&"chirp_droop") {
+        found.extend(chirps.converged(&[TILT]).map(|found| (found.likelihood, chirps.droop(evidence, &found))));
+    }
+    if !evidence.accepted.contains(&"chirp_nonlinearity") {
+        let once = chirps.converged(&[BEND]);
+        let changing = chirps
+            .converged(&[BEND, TREND])
+            .filter(|changing| once.as_ref().is_none_or(|once| changing.likelihood > once.likelihood + AS_WELL));
+        found.extend(changing.or(once).map(|found| (found.likelihood, chirps.bend(evidence, &found))));
+    }
+    found.retain(|(_, candidate)| candidate.p_value < 1e-2 && candidate.gain > 0.0);
+    // Either leaves a little of the other.
+    found.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, candidate)| candidate).into_iter().collect()
+}
+
+/// Some of the numbers alone, `[number, direction]`.
+fn directions(numbers: &[usize]) -> DMatrix<f64> {
+    DMatrix::from_fn(NUMBERS, numbers.len(), |row, column| f64::from(u8::from(row == numbers[column])))
+}
+
+/// A Doppler cell of a frame.
+struct Cell {
+    /// By channel, over the chirp's parts, in units of the noise, turned back by the mean range.
+    heard: Vec<DVector<Complex64>>,
+    /// Covariance that is expected of two parts by their distance.
+    expected: Vec<Complex64>,
+    /// Mean delay over the body's.
+    delay: f64,
+}
+
+/// All chirps' Doppler cells that the body fills.
+struct Chirps {
+    /// `[frame][group][cell]`
+    frames: Vec<Vec<Vec<Cell>>>,
+    parts: usize,
+    /// Mean over the body.
+    delay_s: f64,
+}
+
+impl Chirps {
+    fn new(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction) -> Option<Self> {
+        let [frames, _, _, _, samples] = evidence.cube.dims;
+        let parts = PARTS.into_iter().find(|parts| samples / parts >= LEAST_SAMPLES)?;
+        let mut cells: Vec<Vec<Cell>> =
+            (0..frames).into_par_iter().map(|frame| cells(evidence, model, body, frame, parts)).collect();
+        let delays = || cells.iter().flatten().map(|cell| cell.delay);
+        let delay_s = delays().sum::<f64>() / delays().count().max(1) as f64;
+        if delay_s <= 0.0 {
+            return None;
+        }
+        cells.iter_mut().flatten().for_each(|cell| cell.delay /= delay_s);
+        let frames = cells.into_iter().map(groups).collect();
+        Some(Self { frames, parts, delay_s })
+    }
+
+    /// Place of a part, −1 to 1 over the chirp.
+    fn along(&self, part: usize) -> f64 {
+        (2.0 * part as f64 + 1.0) / self.parts as f64 - 1.0
+    }
+
+    /// Place of a frame, −1 to 1 over the recording.
+    fn during(&self, frame: usize) -> f64 {
+        2.0 * frame as f64 / (self.frames.len() as f64 - 1.0).max(1.0) - 1.0
+    }
+
+    /// With a tilt, and a bend with its trend; by frame and group.
+    fn looks(&self, tilt: f64, bend: [f64; 2]) -> Vec<Vec<Look>> {
+        let free = directions(&(TREND + 1..NUMBERS).collect::<Vec<usize>>());
+        let of = |(frame, groups): (usize, &Vec<Vec<Cell>>)| {
+            let look = |cells: &Vec<Cell>| {
+                let mut look = Look::new(NUMBERS, None);
+                let during = self.during(frame);
+                cells.iter().for_each(|cell| self.add(&mut look, cell, during, tilt, bend[0] + bend[1] * during));
+                look.without(&free)
+            };
+            groups.iter().map(look).collect()
+        };
+        self.frames.par_iter().enumerate().map(of).collect()
+    }
+
+    fn add(&self, look: &mut Look, cell: &Cell, during: f64, tilt: f64, bend: f64) {
+        let own = OWN_SHARE * cell.expected[0].re;
+        let shape = DMatrix::from_fn(self.parts, self.parts, |i, j| {
+            let value = cell.expected[i.abs_diff(j)] * (1.0 - OWN_SHARE);
+            if i == j {
+                value + own
+            } else if i > j {
+                value
+            } else {
+                value.conj()
+            }
+        });
+        let undo = DVector::from_fn(self.parts, |part, _| {
+            let x = self.along(part);
+            Complex64::from_polar((-tilt * x).exp(), -bend * cell.delay * legendre(2, x))
+        });
+        let heard: Vec<DVector<Complex64>> = cell.heard.iter().map(|heard| heard.component_mul(&undo)).collect();
+        look.add(shape, &heard, |_, body| {
+            let by = |degree: usize, size: f64, gain: bool| {
+                let at = |part: usize| size * legendre(degree, self.along(part));
+                DMatrix::from_fn(self.parts, self.parts, |i, j| {
+                    body[(i, j)] * if gain { Complex64::from(at(i) + at(j)) } else { Complex64::I * (at(i) - at(j)) }
+                })
+            };
+            let delay = cell.delay;
+            vec![
+                by(1, 1.0, true),
+                by(2, delay, false),
+                by(4, delay, false),
+                by(2, delay * during, false),
+                by(0, 1.0, true),
+                by(2, 1.0, true),
+                by(1, delay, false),
+                by(3, delay, false),
+                by(5, delay, false),
+            ]
+        });
+    }
+
+    /// Some of the numbers, from the tilt or the bend on.
+    fn converged(&self, numbers: &[usize]) -> Option<Estimated> {
+        let looks = |at: &DVector<f64>| match numbers {
+            [TILT] => self.looks(at[0], [0.0; 2]),
+            _ => self.looks(0.0, [at[0], at.get(1).copied().unwrap_or(0.0)]),
+        };
+        let floors: Vec<f64> = numbers.iter().map(|&number| if number == TILT { TILT_FLOOR } else { BEND_FLOOR }).collect();
+        let first = self.looks(0.0, [0.0; 2]);
+        Estimated::converged(&first, &directions(numbers), &floors, |at| (at.amax() <= LARGEST).then(|| looks(at)))
+    }
+
+    fn droop(&self, evidence: &Evidence, found: &Estimated) -> Candidate {
+        let samples = evidence.cube.dims[4] as f64;
+        // From the first sample to the last.
+        let db = -2.0 * DECIBEL * found.values[0];
+        let deviation = 2.0 * DECIBEL * found.deviation(&DVector::from_element(1, 1.0));
+        let total: f64 = evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum();
+        Candidate {
+            id: Some("chirp_droop"),
+            behaves_like: "fast-time gain",
+            estimates: vec![Estimate::normal("db", db, deviation)],
+            choice: None,
+            place: Place::at("receiver"),
+            p_value: corrected(found.p_value, LOOKS),
+            gain: found.gain,
+            rung: Rung::E,
+            look_alikes: vec![],
+            statement: format!(
+                "the power {} by {:.2} dB from the first to the last sample of every chirp, whatever is seen",
+                if db > 0.0 { "falls" } else { "rises" },
+                db.abs()
+            ),
+            curve: None,
+            energy: total * (db / DECIBEL).powi(2) / 12.0,
+            correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+                cube.each_chirp(|_, chirp| {
+                    chirp.iter_mut().enumerate().for_each(|(n, value)| {
+                        *value *= 10f64.powf(db * (n as f64 / samples - 0.5) / 20.0);
+                    });
+                });
+            })),
+        }
+    }
+
+    fn bend(&self, evidence: &Evidence, found: &Estimated) -> Candidate {
+        let [bend, trend] = [0, 1].map(|index| found.values.get(index).copied().unwrap_or(0.0));
+        // Or a finer shape than one bend.
+        let finer = || {
+            let at = DVector::from_column_slice(&[bend, 0.0]);
+            let both = Estimated::new(&self.looks(0.0, [bend, trend]), &at, &directions(&[BEND, FINER]), &[BEND_FLOOR; 2])?;
+            let chance = both.chance(&DMatrix::from_column_slice(2, 1, &[0.0, 1.0]));
+            Some(chance < UNLIKELY && both.values[1].abs() > LARGE * both.values[0].abs())
+        };
+        let named = found.values.len() == 1 && finer() != Some(true);
+        let of_frequency = 1.0 / (TAU * self.delay_s);
+        let mut first = DVector::zeros(found.values.len());
+        first[0] = 1.0;
+        let (second_hz, deviation_hz) = (bend * of_frequency, found.deviation(&first) * of_frequency);
+        // The curve's form decides how far it leaves the straight ramp.
+        let ends = PEAK.map(|peak| peak * second_hz.abs());
+        let usual = ends[1] * second_hz.signum();
+        let reserve = NINETY * deviation_hz * PEAK[1];
+        let [low, high] = [ends[0] - reserve, ends[2] + reserve].map(|end| end * second_hz.signum());
+        let peak = Estimate { name: "peak_hz", values: vec![usual], ci90: vec![[low.min(high), low.max(high)]] };
+        let total: f64 = evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum();
+        let radar = evidence.radar.clone();
+        let at: Vec<f64> = (0..radar.samples_per_chirp).map(|n| self.place(&radar, n)).collect();
+        let by_frame: Vec<f64> = (0..self.frames.len()).map(|frame| bend + trend * self.during(frame)).collect();
+        let range_m = 0.5 * self.delay_s * SPEED_OF_LIGHT;
+        Candidate {
+            id: named.then_some("chirp_nonlinearity"),
+            behaves_like: "delay-proportional phase",
+            estimates: if named { vec![peak] } else { vec![] },
+            choice: None,
+            place: Place::at("waveform"),
+            p_value: corrected(found.p_value, LOOKS),
+            gain: found.gain,
+            rung: Rung::E,
+            look_alikes: vec![],
+            statement: format!(
+                "The chirp's ramp is not straight: its frequency bends by {:.0} kHz along the chirp, which smears what is at {range_m:.1} m \
+                 by {:.2} radian, and what is farther more.{}",
+                1e-3 * usual.abs(),
+                bend.abs(),
+                match (named, found.values.len()) {
+                    (true, _) => String::new(),
+                    (false, 1) => " But it is no simple bend.".into(),
+                    (false, _) => {
+                        let [first, last] = [bend - trend, bend + trend].map(|value| 1e-3 * PEAK[1] * value * of_frequency);
+                        format!(" It is not the same in all frames: {first:.0} kHz in the first one, {last:.0} in the last.")
+                    }
+                }
+            ),
+            curve: Some(Curve {
+                title: "Deviation of the frequency from a straight ramp".into(),
+                x_label: "sample".into(),
+                y_label: "kHz".into(),
+                series: vec![(
+                    "fitted".into(),
+                    (0..at.len()).map(|n| n as f64).collect(),
+                    at.iter().map(|&x| 1e-3 * second_hz * legendre(2, x)).collect(),
+                )],
+            }),
+            energy: total * (bend * bend + trend * trend / 3.0) / 5.0,
+            correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+                let samples_per_hz = radar.sample_rate_hz / radar.slope_hz_per_s;
+                let shifts: Vec<Vec<f64>> = by_frame
+                    .iter()
+                    .map(|bend| at.iter().map(|&x| bend * of_frequency * samples_per_hz * legendre(2, x)).collect())
+                    .collect();
+                cube.each_chirp(|[frame, ..], chirp| straighten(chirp, &shifts[frame]));
+            })),
+        }
+    }
+
+    /// Place of a sample, −1 to 1 over the chirp.
+    fn place(&self, radar: &Radar, sample: usize) -> f64 {
+        (2.0 * sample as f64 + 1.0) / radar.samples_per_chirp as f64 - 1.0
+    }
+}
+
+/// Neighbouring Doppler cells.
+fn groups(mut cells: Vec<Cell>) -> Vec<Vec<Cell>> {
+    let all = cells.len();
+    let count = all.min(MOST_GROUPS);
+    let mut groups: Vec<Vec<Cell>> = (0..count).rev().map(|group| cells.split_off(group * all / count)).collect();
+    groups.reverse();
+    groups
+}
+
+/// Doppler cells of a frame, in order.
+fn cells(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: usize, parts: usize) -> Vec<Cell> {
+    let radar = &evidence.radar;
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let length = samples / parts;
+    // Doppler cell, beat frequency (bins) and expected power of every point in every cell that it reaches.
+    let mut shares: Vec<Vec<(f64, f64)>> = vec![vec![]; loops];
+    for point in body.with_echoes(radar, body.frames[frame].clone(), None) {
+        let (range_m, velocity_mps) = range_and_velocity(radar, point.position_m, point.velocity_mps);
+        let (_, bins) = model.cells.place(range_m, velocity_mps);
+        // Of a part instead of a whole windowed chirp.
+        let power = model.peak(radar, point) * 1.5 * length as f64 / samples as f64;
+        if power > 0.0 && bins.is_finite() {
+            model.cells.each_doppler(velocity_mps, |doppler, share| shares[doppler].push((bins, power * f64::from(share))));
+        }
+    }
+    let mean = |shares: &[(f64, f64)]| {
+        let power: f64 = shares.iter().map(|(_, power)| power).sum();
+        (power, shares.iter().map(|(bins, power)| bins * power).sum::<f64>() / power.max(f64::MIN_POSITIVE))
+    };
+    let used: Vec<usize> =
+        (0..loops).filter(|&doppler| model.usable()[doppler * samples] && mean(&shares[doppler]).0 > LEAST_POWER).collect();
+    let mut heard: Vec<Vec<DVector<Complex64>>> = vec![vec![]; used.len()];
+    let window = hann(loops);
+    let fft = FftPlanner::new().plan_fft_forward(loops);
+    let middles: Vec<f64> = used.iter().map(|&doppler| mean(&shares[doppler]).1).collect();
+    for channel in 0..evidence.cube.channels() {
+        let moving = evidence.moving(frame, channel);
+        let scale = 1.0 / (evidence.noise()[channel].max(f64::MIN_POSITIVE) * length as f64).sqrt();
+        heard.iter_mut().for_each(|heard| heard.push(DVector::zeros(parts)));
+        for sample in 0..parts * length {
+            let mut slow: Vec<Complex64> = (0..loops).map(|i| moving[i * samples + sample] * (window[i] * scale)).collect();
+            fft.process(&mut slow);
+            for ((heard, &doppler), middle) in heard.iter_mut().zip(&used).zip(&middles) {
+                let back = Complex64::cis(-TAU * middle * sample as f64 / samples as f64);
+                heard[channel][sample / length] += slow[doppler] * back;
+            }
+        }
+    }
+    let bins_to_delay = radar.sample_rate_hz / (samples as f64 * radar.slope_hz_per_s);
+    let of = |((heard, &doppler), middle): ((Vec<DVector<Complex64>>, &usize), &f64)| {
+        let mut expected = vec![Complex64::ZERO; parts];
+        for (bins, power) in &shares[doppler] {
+            // Phase from part to part, and what is left of the sum over a part.
+            let turn = TAU * (bins - middle) * length as f64 / samples as f64;
+            let half = 0.5 * turn;
+            let power = power * if half.abs() < 1e-6 { 1.0 } else { (half.sin() / half).powi(2) };
+            expected.iter_mut().enumerate().for_each(|(apart, sum)| *sum += Complex64::from_polar(power, turn * apart as f64));
+        }
+        Cell { heard, expected, delay: middle * bins_to_delay }
+    };
+    heard.into_iter().zip(&used).zip(&middles).map(of).collect()
+}
+
+/// Reads a chirp earlier by so many samples each: by polynomials through its neighbours, fewer near the ends.
+fn straighten(chirp: &mut [Complex64], earlier: &[f64]) {
+    /// Neighbours on either side.
+    const TAPS: usize = 4;
+    let last = chirp.len() - 1;
+    // Beat frequencies of a quadrature receiver are positive: about zero they are slow.
+    let turn = -0.25 * TAU;
+    let turned: Vec<Complex64> = chirp.iter().enumerate().map(|(n, value)| value * Complex64::cis(turn * n as f64)).collect();
+    for (n, value) in chirp.iter_mut().enumerate() {
+        let at = (n as f64 - earlier[n]).clamp(0.0, last as f64);
+        let before = (at as usize).min(last.saturating_sub(1));
+        let taps = TAPS.min(before + 1).min(last - before);
+        let places: Vec<usize> = (before + 1 - taps..=before + taps).collect();
+        let weight = |i: usize| -> f64 {
+            let others = places.iter().filter(|&&j| j != i);
+            others.map(|&j| (at - j as f64) / (i as f64 - j as f64)).product()
+        };
+        let sum: Complex64 = places.iter().map(|&i| turned[i] * weight(i)).sum();
+        *value = sum * Complex64::cis(-turn * at);
+    }
+}
