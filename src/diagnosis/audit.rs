@@ -203,13 +203,14 @@ fn far_m(evidence: &Evidence) -> Option<f64> {
     evidence.room.as_ref().and_then(|room| room.farthest_m())
 }
 
-/// Energy near the predicted cells of the body, per predicted point; `flip` mirrors the velocity, `scale` the range.
-fn energy_at(evidence: &Evidence, cell: impl Fn(&Point) -> Option<[f64; 2]>) -> f64 {
+/// Energy near cells of the body's points, per cell: those of a point in the frame so many frames `later` in the motion.
+fn energy_at(evidence: &Evidence, later: isize, cell: impl Fn(&Point) -> Option<[f64; 2]>) -> f64 {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let Some(body) = &evidence.body else { return 0.0 };
     let maps = evidence.maps();
     let mut hit = vec![false; maps.len()];
-    for (frame, points) in body.frames.iter().enumerate() {
+    for frame in 0..body.frames.len() {
+        let Some(points) = frame.checked_add_signed(later).and_then(|shown| body.frames.get(shown)) else { continue };
         for [range_m, velocity] in points.iter().filter_map(&cell) {
             let bin = range_m / evidence.radar.range_resolution_m();
             let doppler = velocity / evidence.radar.velocity_resolution_mps();
@@ -239,8 +240,8 @@ pub fn range_and_velocity(point: &Point, radar: &Radar) -> [f64; 2] {
 
 fn doppler_sign(evidence: &Evidence) -> Option<Check> {
     evidence.body.as_ref()?;
-    let as_is = energy_at(evidence, |point| Some(range_and_velocity(point, &evidence.radar)));
-    let flipped = energy_at(evidence, |point| {
+    let as_is = energy_at(evidence, 0, |point| Some(range_and_velocity(point, &evidence.radar)));
+    let flipped = energy_at(evidence, 0, |point| {
         let [range, velocity] = range_and_velocity(point, &evidence.radar);
         Some([range, -velocity])
     });
@@ -282,20 +283,23 @@ fn body_in_room(evidence: &Evidence) -> Option<Check> {
     Some(Check::new("body_in_room", "the body stays in the room", found, ok))
 }
 
+/// Frames by which a clock may be wrong.
+const LATE: isize = 3;
+
 /// Whether the body is where the motion says, or somewhere else, or the motion belongs to other frames.
 fn body_place(evidence: &Evidence) -> Option<Check> {
     let body = evidence.body.as_ref()?;
-    let level = |shift_m: f64| {
-        energy_at(evidence, |point| {
+    let level = |shift_m: f64, later: isize| {
+        energy_at(evidence, later, |point| {
             let [range, velocity] = range_and_velocity(point, &evidence.radar);
             (range + shift_m > 0.2).then_some([range + shift_m, velocity])
         })
     };
-    let here = level(0.0);
+    let here = level(0.0, 0);
     let step = evidence.radar.range_resolution_m().max(0.1);
     let shifts = (-30..=30).map(|i| i as f64 * step);
     let (best_m, best) =
-        shifts.map(|shift| (shift, level(shift))).fold((0.0, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });
+        shifts.map(|shift| (shift, level(shift, 0))).fold((0.0, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });
     let moves = body
         .frames
         .iter()
@@ -306,8 +310,18 @@ fn body_place(evidence: &Evidence) -> Option<Check> {
     }
     // Nearer than that it is a matter of calibration, which has effects of its own.
     let elsewhere = best - here >= CLEARLY_DB && best_m.abs() >= CALIBRATION_M;
-    let ok = !elsewhere && (here >= PRESENT_DB || best - here >= CLEARLY_DB);
-    let found = if ok {
+    // And a clock that is wrong by a few frames has a name.
+    let (late, then) =
+        (-LATE..=LATE).map(|later| (later, level(0.0, later))).fold((0, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });
+    let clock = late != 0 && then >= PRESENT_DB && then - here >= CLEARLY_DB && then >= best;
+    let ok = clock || !elsewhere && (here >= PRESENT_DB || best - here >= CLEARLY_DB);
+    let found = if clock {
+        format!(
+            "{here:.1} dB over the noise there, but {then:.1} dB {} frames {}",
+            late.abs(),
+            if late > 0 { "later" } else { "earlier" }
+        )
+    } else if ok {
         format!("{here:.1} dB over the noise at the predicted ranges and velocities")
     } else if !elsewhere {
         format!("{here:.1} dB over the noise there: no body is heard where the motion puts it, nor at other ranges")

@@ -71,6 +71,11 @@ pub fn is_of_receivers(candidate: &Candidate) -> bool {
     candidate.place.stage == OF_RECEIVERS
 }
 
+/// Whether it explains a little of whatever is near the body.
+pub fn is_of_remains(candidate: &Candidate) -> bool {
+    is_one_of(candidate, &OF_REMAINS)
+}
+
 fn is_one_of(candidate: &Candidate, ids: &[&str]) -> bool {
     candidate.id.is_some_and(|id| ids.contains(&id))
 }
@@ -80,7 +85,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let is_path = |candidate: &Candidate| {
         candidate.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_none_or(|id| paths::MANY.contains(&id))
     };
-    let of_remains = is_one_of(candidate, &OF_REMAINS);
+    let of_remains = is_of_remains(candidate);
     // An image of the body is all over the place: what else is there is something else.
     let beside = is_path(accepted)
         && (is_path(candidate) || of_remains)

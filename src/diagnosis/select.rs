@@ -10,7 +10,7 @@ use super::config::DiagnosisConfig;
 use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
-use super::remains::{ROUGHLY, is_by_chirp, is_left_by, is_of_receivers, is_rough, is_same};
+use super::remains::{ROUGHLY, is_by_chirp, is_left_by, is_of_receivers, is_of_remains, is_rough, is_same};
 use super::suspects::receiver::harmonic;
 use super::suspects::{SUSPECTS, Suspect, excess, paths};
 
@@ -131,13 +131,12 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
                 && !refused.contains(&id)
                 && accepted.iter().filter(|effect| effect.candidate.id == Some(id)).count() < MOST_ALIKE
         };
-        let late = |candidate: &Candidate| candidate.place.stage == "timing";
-        let clocks_may_be_wrong = accepted.iter().any(|effect| late(&effect.candidate))
-            || found.iter().filter(passes).any(|(_, candidate)| late(candidate));
+        let clocks_were_wrong = accepted.iter().any(|effect| effect.candidate.place.stage == "timing");
+        let elsewhere = clocks_were_wrong || found.iter().filter(passes).any(|(_, candidate)| is_displaced(candidate));
         let passing: Vec<&(usize, Candidate)> = found
             .iter()
             .filter(passes)
-            .filter(|(suspect, _)| !(clocks_may_be_wrong && SUSPECTS[*suspect].trusts_the_clocks))
+            .filter(|(suspect, _)| !(elsewhere && SUSPECTS[*suspect].trusts_the_place))
             .filter(|(_, candidate)| !known(candidate) && candidate.id.is_none_or(may_be_named))
             .collect();
         if let Some(last) = accepted.last_mut() {
@@ -197,21 +196,32 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     Explanation { accepted, evidence, p_value: p_value.unwrap_or(1.0), before, after }
 }
 
-/// What acts on every return makes echoes of the body too, which look like paths of their own, and of the room beyond its ranges:
-/// where both are suspected, the one is accepted that leaves less.
+/// Whether the body is elsewhere, or at another time, than predicted.
+fn is_displaced(candidate: &Candidate) -> bool {
+    matches!(candidate.correction, Correction::Body(_)) && candidate.place.stage != "propagation"
+}
+
+/// Whether it acts on every return, or on all of the body.
+fn is_on_all(candidate: &Candidate) -> bool {
+    let id = candidate.id.unwrap_or_default();
+    !id.is_empty() && (id == "radar_vibration" || is_displaced(candidate) || UPSTREAM.contains(&candidate.place.stage.as_str()))
+}
+
+/// Whether it may be something else's echoes of the body.
+fn is_echo(candidate: &Candidate) -> bool {
+    candidate.behaves_like.starts_with(paths::PATH_LIKE) || is_rough(candidate)
+}
+
+/// What acts on every return makes echoes of the body too, which look like paths of their own, and of the room beyond its ranges; and a
+/// body that is elsewhere than predicted looks like another one: where both are suspected, the one is accepted that leaves less.
 fn upstream<'a>(
     original: &Evidence,
     evidence: &Evidence,
     best: &'a (usize, Candidate),
     passing: &[&'a (usize, Candidate)],
 ) -> &'a (usize, Candidate) {
-    let on_all = |candidate: &Candidate| {
-        let id = candidate.id.unwrap_or_default();
-        id == "radar_vibration" || (!id.is_empty() && UPSTREAM.contains(&candidate.place.stage.as_str()))
-    };
-    let others = passing.iter().filter(|(_, candidate)| on_all(candidate));
-    let echoes = best.1.behaves_like.starts_with(paths::PATH_LIKE) || is_rough(&best.1);
-    let Some(other) = others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| echoes) else {
+    let others = passing.iter().filter(|(_, candidate)| is_on_all(candidate));
+    let Some(other) = others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| is_echo(&best.1)) else {
         return best;
     };
     let left = |candidate: &Candidate| Misfit::after(original, &evidence.with(candidate)).loglik_per_sample;
@@ -243,6 +253,10 @@ fn settle_rivals(last: &mut Accepted, pending: &[Candidate], passing: &[&(usize,
     let mut weight = 1.0 + last.candidate.look_alikes.iter().map(|id| prior(id)).sum::<f64>();
     for rival in pending {
         let Some(id) = rival.id else { continue };
+        // Without the body at its place, echoes of it are as strong as the body.
+        if is_displaced(&last.candidate) && (is_echo(rival) || is_of_remains(rival)) {
+            continue;
+        }
         let silent = !passing.iter().any(|(_, candidate)| candidate.id == Some(id));
         if silent && Some(id) != last.candidate.id {
             let behind = last.candidate.gain - rival.gain;

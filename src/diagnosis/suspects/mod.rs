@@ -27,13 +27,13 @@ pub struct Suspect {
     pub last_in_chain: bool,
     /// Is heard only where nobody else has anything to say.
     pub last_resort: bool,
-    /// Trusts that the body is where it was predicted, when it was.
-    pub trusts_the_clocks: bool,
+    /// Trusts that the body is where it was predicted: it waits until that is so.
+    pub trusts_the_place: bool,
 }
 
 impl Suspect {
     const fn new(name: &'static str, find: fn(&Evidence) -> Vec<Candidate>) -> Self {
-        Self { name, share: 1.0, find, last_in_chain: false, last_resort: false, trusts_the_clocks: false }
+        Self { name, share: 1.0, find, last_in_chain: false, last_resort: false, trusts_the_place: false }
     }
 }
 
@@ -48,7 +48,7 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect::new("bursts", receiver::bursts::find),
     Suspect::new("noise", receiver::noise::find),
     // Three questions, which a body's speckle blurs.
-    Suspect { share: 3.0, trusts_the_clocks: true, ..Suspect::new("along the chirp", waveform::along::find) },
+    Suspect { share: 3.0, trusts_the_place: true, ..Suspect::new("along the chirp", waveform::along::find) },
     Suspect::new("slow time", slow::find),
     Suspect::new("one channel", slow::channels::find),
     Suspect::new("single frame", slow::odd_frame::find),

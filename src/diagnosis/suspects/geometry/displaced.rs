@@ -129,11 +129,11 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
     vec![candidate(trial, best_fit, look_alikes, p_value, held_out)]
 }
 
-/// The best of some values on a few frames.
+/// The best of some values on a few frames, with the parts' weights of each: those of a body in the wrong place are far off.
 fn best_of(trial: &Trial, frames: &[usize], values: impl Iterator<Item = f64>, change: impl Fn(f64) -> Change) -> f64 {
-    let none = trial.score(change(0.0), frames, false);
+    let none = trial.score(change(0.0), frames, true);
     values
-        .map(|value| (value, trial.score(change(value), frames, false).gain_over(&none, frames)))
+        .map(|value| (value, trial.score(change(value), frames, true).gain_over(&none, frames)))
         .fold((0.0, 0.0), |best, tried| if tried.1 > best.1 { tried } else { best })
         .0
 }
