@@ -36,9 +36,10 @@ struct Salt {
 
 const STILL: &[&str] = &["still field", "still field, room unknown"];
 const SLOW: &[&str] = &["slow time"];
+const ALONG: &[&str] = &["along the chirp"];
 const PRODUCTS: &[&str] = &["non-linear receiver", "extra paths"];
 
-const SALTS: [Salt; 17] = [
+const SALTS: [Salt; 19] = [
     Salt { id: "object_radar_object", suspects: PRODUCTS, least: 1e-4, most: 1.0, setting: |s, x, _| s.with("coefficient", [x]) },
     Salt {
         id: "chirp_ripple",
@@ -47,6 +48,8 @@ const SALTS: [Salt; 17] = [
         most: 3e6,
         setting: |s, x, _| s.with("deviation_hz", [x]).with("ripple_hz", [4e5]),
     },
+    Salt { id: "chirp_nonlinearity", suspects: ALONG, least: 3e4, most: 1e7, setting: |s, x, _| s.with("peak_hz", [x]) },
+    Salt { id: "chirp_droop", suspects: ALONG, least: 0.1, most: 12.0, setting: |s, x, _| s.with("db", [x]) },
     Salt { id: "phase_noise", suspects: SLOW, least: 1e-4, most: 1.0, setting: |s, x, _| s.with("per_chirp_rad", [x]) },
     Salt { id: "chirp_start_jitter", suspects: SLOW, least: 1e-11, most: 1e-7, setting: |s, x, _| s.with("jitter_s", [x]) },
     Salt {
