@@ -465,7 +465,9 @@ mod tests {
             straighten(&mut chirp, &shifts);
             let error = |n: usize| (chirp[n] - tone(n as f64)).norm();
             let inside = (4..124).map(error).fold(0.0, f64::max);
-            assert!(inside < 0.01 && error(0) < 0.4, "{turns}: {inside} {}", error(0));
+            // At the very end nothing is known beyond: it stays as it was.
+            let before = (tone(shifts[0]) - tone(0.0)).norm();
+            assert!(inside < 0.01 && error(0) < before + 1e-9, "{turns}: {inside} {}", error(0));
         }
     }
 }
