@@ -14,13 +14,14 @@ pub struct Secret {
 }
 
 impl Secret {
-    /// From whatever text the user gave, or from the operating system.
+    /// From whatever text the user gave, or from the operating system; a secret that was published is taken as it is.
     pub fn new(text: Option<&str>) -> Self {
-        let bytes: [u8; 32] = match text {
-            Some(text) => Sha256::digest(text.as_bytes()).into(),
-            None => rand::random(),
-        };
-        Self { seed: hex(&bytes) }
+        let is_secret = |text: &str| text.len() == 64 && text.bytes().all(|digit| matches!(digit, b'0'..=b'9' | b'a'..=b'f'));
+        match text {
+            Some(text) if is_secret(text) => Self { seed: text.into() },
+            Some(text) => Self { seed: hex(&<[u8; 32]>::from(Sha256::digest(text.as_bytes()))) },
+            None => Self { seed: hex(&rand::random::<[u8; 32]>()) },
+        }
     }
 
     fn derived(&self, purpose: &str, index: usize) -> [u8; 32] {
@@ -57,6 +58,8 @@ mod tests {
         assert_eq!(Secret::new(Some("a")), Secret::new(Some("a")));
         assert_ne!(Secret::new(Some("a")), Secret::new(Some("b")));
         assert_ne!(Secret::new(None), Secret::new(None));
+        let drawn = Secret::new(None);
+        assert_eq!(Secret::new(Some(&drawn.seed)), drawn);
         let secret = Secret::new(Some("a"));
         assert_ne!(secret.name(0), secret.name(1));
         assert_eq!((secret.name(0).len(), secret.salt(0).len()), (16, 64));

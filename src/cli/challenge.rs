@@ -41,7 +41,7 @@ struct Seal {
     /// Folder of the challenge
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
-    /// Secret text that everything is drawn from [default: from the operating system]
+    /// Secret text that everything is drawn from; a published secret of 64 digits is taken as it is [default: from the operating system]
     #[arg(long, value_name = "TEXT")]
     seed: Option<String>,
     /// Only part i of n, such as 2/8
