@@ -61,21 +61,19 @@ impl Cells {
 
     /// The cells that a point reaches, and the share of its power in the peak that it has there.
     pub fn each(&self, range_m: f64, velocity_mps: f64, mut at: impl FnMut(usize, f32)) {
-        let (doppler, range) = self.place(range_m, velocity_mps);
-        if !(doppler.is_finite() && range.is_finite()) {
+        let (_, range) = self.place(range_m, velocity_mps);
+        if !range.is_finite() {
             return;
         }
-        let (doppler, slow) = self.taps(doppler);
         let (range, fast) = self.taps(range);
-        for (i, slow) in slow.iter().enumerate() {
-            let row = (doppler + i as i64 - REACH).rem_euclid(self.loops as i64) as usize * self.samples;
+        self.each_doppler(velocity_mps, |doppler, slow| {
             for (j, fast) in fast.iter().enumerate() {
                 let cell = (range + j as i64 - REACH).rem_euclid(self.samples as i64) as usize;
                 if cell < self.bins {
-                    at(row + cell, slow * fast);
+                    at(doppler * self.samples + cell, slow * fast);
                 }
             }
-        }
+        });
     }
 
     /// The Doppler cells that a velocity reaches, and the share of the power in the peak that it has there.

@@ -27,7 +27,7 @@ use crate::diagnosis::speckle::Look;
 use crate::diagnosis::statistics::{DECIBEL, corrected};
 use crate::diagnosis::{BodyPrediction, Cube, Evidence};
 use crate::effects::legendre;
-use crate::radar::{Radar, SPEED_OF_LIGHT};
+use crate::radar::SPEED_OF_LIGHT;
 
 /// Parts of a chirp, and samples of a part, at least.
 const PARTS: [usize; 2] = [16, 8];
@@ -69,14 +69,15 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         return vec![];
     }
     let Some(chirps) = Chirps::new(evidence, model, body) else { return vec![] };
+    let first = chirps.looks(0.0, [0.0; 2]);
     let mut found = vec![];
     if !evidence.accepted.contains(&"chirp_droop") {
-        found.extend(chirps.converged(&[TILT]).map(|found| (found.likelihood, chirps.droop(evidence, &found))));
+        found.extend(chirps.converged(&first, &[TILT]).map(|found| (found.likelihood, chirps.droop(evidence, &found))));
     }
     if !evidence.accepted.contains(&"chirp_nonlinearity") {
-        let once = chirps.converged(&[BEND]);
+        let once = chirps.converged(&first, &[BEND]);
         let changing = chirps
-            .converged(&[BEND, TREND])
+            .converged(&first, &[BEND, TREND])
             .filter(|changing| once.as_ref().is_none_or(|once| changing.likelihood > once.likelihood + AS_WELL));
         found.extend(changing.or(once).map(|found| (found.likelihood, chirps.bend(evidence, &found))));
     }
@@ -125,9 +126,9 @@ impl Chirps {
         Some(Self { frames, parts, delay_s })
     }
 
-    /// Place of a part, −1 to 1 over the chirp.
+    /// Place of a part over the chirp.
     fn along(&self, part: usize) -> f64 {
-        (2.0 * part as f64 + 1.0) / self.parts as f64 - 1.0
+        place(part, self.parts)
     }
 
     /// Place of a frame, −1 to 1 over the recording.
@@ -189,15 +190,14 @@ impl Chirps {
         });
     }
 
-    /// Some of the numbers, from the tilt or the bend on.
-    fn converged(&self, numbers: &[usize]) -> Option<Estimated> {
+    /// Some of the numbers, from the tilt or the bend on. `first`: looks without any.
+    fn converged(&self, first: &[Vec<Look>], numbers: &[usize]) -> Option<Estimated> {
         let looks = |at: &DVector<f64>| match numbers {
             [TILT] => self.looks(at[0], [0.0; 2]),
             _ => self.looks(0.0, [at[0], at.get(1).copied().unwrap_or(0.0)]),
         };
         let floors: Vec<f64> = numbers.iter().map(|&number| if number == TILT { TILT_FLOOR } else { BEND_FLOOR }).collect();
-        let first = self.looks(0.0, [0.0; 2]);
-        Estimated::converged(&first, &directions(numbers), &floors, |at| (at.amax() <= LARGEST).then(|| looks(at)))
+        Estimated::converged(first, &directions(numbers), &floors, |at| (at.amax() <= LARGEST).then(|| looks(at)))
     }
 
     fn droop(&self, evidence: &Evidence, found: &Estimated) -> Candidate {
@@ -255,7 +255,7 @@ impl Chirps {
         let peak = Estimate { name: "peak_hz", values: vec![usual], ci90: vec![[low.min(high), low.max(high)]] };
         let total: f64 = evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum();
         let radar = evidence.radar.clone();
-        let at: Vec<f64> = (0..radar.samples_per_chirp).map(|n| self.place(&radar, n)).collect();
+        let at: Vec<f64> = (0..radar.samples_per_chirp).map(|n| place(n, radar.samples_per_chirp)).collect();
         let by_frame: Vec<f64> = (0..self.frames.len()).map(|frame| bend + trend * self.during(frame)).collect();
         let range_m = 0.5 * self.delay_s * SPEED_OF_LIGHT;
         Candidate {
@@ -303,11 +303,11 @@ impl Chirps {
             })),
         }
     }
+}
 
-    /// Place of a sample, −1 to 1 over the chirp.
-    fn place(&self, radar: &Radar, sample: usize) -> f64 {
-        (2.0 * sample as f64 + 1.0) / radar.samples_per_chirp as f64 - 1.0
-    }
+/// The middle of one of so many equal pieces of a chirp, −1 to 1.
+fn place(piece: usize, of: usize) -> f64 {
+    (2.0 * piece as f64 + 1.0) / of as f64 - 1.0
 }
 
 /// Neighbouring Doppler cells.
@@ -422,9 +422,8 @@ mod tests {
                     // The body is a little beside where it is predicted.
                     field += DVector::from_fn(PARTS, |part, _| amplitude * Complex64::cis((turn + 0.02) * part as f64));
                 }
-                let along = |part: usize| (2.0 * part as f64 + 1.0) / PARTS as f64 - 1.0;
                 let noise = DVector::from_fn(PARTS, |_, _| Complex64::new(normal(), normal()) * f64::sqrt(0.5));
-                let heard = DVector::from_fn(PARTS, |part, _| field[part] * changed(frame, along(part)) + noise[part]);
+                let heard = DVector::from_fn(PARTS, |part, _| field[part] * changed(frame, place(part, PARTS)) + noise[part]);
                 Cell { heard: vec![heard], expected, delay: 1.0 }
             };
             chirps.frames.push((0..5).map(|_| (0..2).map(|_| cell()).collect()).collect());
@@ -432,14 +431,18 @@ mod tests {
         chirps
     }
 
+    fn converged(chirps: &Chirps, numbers: &[usize]) -> Estimated {
+        chirps.converged(&chirps.looks(0.0, [0.0; 2]), numbers).unwrap()
+    }
+
     #[test]
     fn a_bend_a_changing_bend_and_a_tilt_are_told_with_their_sizes() {
-        let bend = chirps(1, |_, x| Complex64::cis(0.2 * legendre(2, x))).converged(&[BEND]).unwrap();
+        let bend = converged(&chirps(1, |_, x| Complex64::cis(0.2 * legendre(2, x))), &[BEND]);
         assert!((bend.values[0] - 0.2).abs() < 0.03 && bend.p_value < 1e-6 && bend.gain > 10.0, "{:?}", bend.values);
         let changing = chirps(2, |frame, x| Complex64::cis(0.2 * (frame as f64 / 5.5 - 1.0) * legendre(2, x)));
-        let changing = changing.converged(&[BEND, TREND]).unwrap();
+        let changing = converged(&changing, &[BEND, TREND]);
         assert!((changing.values[1] - 0.2).abs() < 0.04 && changing.values[0].abs() < 0.03, "{:?}", changing.values);
-        let tilt = chirps(3, |_, x| Complex64::from(f64::exp(-0.3 * x))).converged(&[TILT]).unwrap();
+        let tilt = converged(&chirps(3, |_, x| Complex64::from(f64::exp(-0.3 * x))), &[TILT]);
         assert!((tilt.values[0] + 0.3).abs() < 0.08 && tilt.p_value < 1e-3, "{:?}", tilt.values);
     }
 
@@ -448,7 +451,7 @@ mod tests {
         let chances: Vec<f64> = (10..40)
             .flat_map(|seed| {
                 let none = chirps(seed, |_, _| Complex64::ONE);
-                [[TILT], [BEND]].map(|number| none.converged(&number).unwrap().p_value)
+                [[TILT], [BEND]].map(|number| converged(&none, &number).p_value)
             })
             .collect();
         // Uniform or larger.
@@ -458,7 +461,7 @@ mod tests {
 
     #[test]
     fn a_warped_tone_is_straight_again() {
-        let shifts: Vec<f64> = (0..128).map(|n| 0.2 * legendre(2, (2.0 * f64::from(n) + 1.0) / 128.0 - 1.0)).collect();
+        let shifts: Vec<f64> = (0..128).map(|n| 0.2 * legendre(2, place(n, 128))).collect();
         for turns in [0.02, 0.2, 0.35] {
             let tone = |at: f64| Complex64::cis(TAU * turns * at);
             let mut chirp: Vec<Complex64> = shifts.iter().enumerate().map(|(n, shift)| tone(n as f64 + shift)).collect();
