@@ -2,7 +2,7 @@
 
 use super::finding::Candidate;
 use super::suspects::receiver::harmonic;
-use super::suspects::{excess, paths};
+use super::suspects::{excess, fluctuation, paths};
 
 /// What has no name is modelled roughly, and these are modelled most roughly of all: what they leave, up to this share of
 /// their gain, takes any shape; and they come after whatever gains more than it.
@@ -97,7 +97,9 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // turns change how much is received.
     let vibrates = accepted.id == Some("radar_vibration");
     let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
-    let shaken = vibrates && (turns || is_path(candidate));
+    // So of one return that swings.
+    let hums = accepted.behaves_like == fluctuation::HUMS && !apart(accepted.place.range_m, candidate.place.range_m);
+    let shaken = vibrates && (turns || is_path(candidate)) || hums && is_path(candidate);
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it

@@ -83,6 +83,14 @@ impl Look {
     }
 }
 
+/// Neighbours in groups of nearly equal numbers, in their order.
+pub fn groups<T>(mut all: Vec<T>, count: usize) -> Vec<Vec<T>> {
+    let length = all.len();
+    let mut groups: Vec<Vec<T>> = (0..count).rev().map(|group| all.split_off(group * length / count)).collect();
+    groups.reverse();
+    groups
+}
+
 /// The power that a cell has, over the expected one.
 fn level(powers: &[f64], energies: &[f64], count: f64) -> f64 {
     let log_likelihood = |db: i32| {

@@ -5,8 +5,10 @@
 
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
+use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 use rayon::prelude::*;
 use rustfft::FftPlanner;
@@ -26,6 +28,9 @@ const COARSE: f64 = 8.0;
 const ALIKE: f64 = 0.3;
 /// Bins to either side that a return reaches under the taper.
 const REACH: usize = 3;
+/// Ranges to either side that may swing with it, and how much plainer than by chance they must.
+const WIDEST: usize = 16;
+const PLAIN: f64 = 20.0;
 /// Share of its depth that all other static returns swing by at most: else it is the receiver's hum.
 const OTHERS: f64 = 0.3;
 const FEWEST_FRAMES: usize = 5;
@@ -71,7 +76,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let chirps = Chirps::new(evidence)?;
     let duration_s = chirps.middles_s[training[training.len() - 1]] - chirps.middles_s[training[0]];
     let frame_s = chirps.loops_s.len() as f64 * evidence.radar.loop_period_s();
-    let highest_hz = HIGHEST_HZ.min(0.4 / evidence.radar.loop_period_s());
+    let highest_hz = highest_hz(evidence);
     if duration_s * LOWEST_HZ < FEWEST_FRAMES as f64 || highest_hz <= LOWEST_HZ {
         return None;
     }
@@ -95,7 +100,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     }
     let swings = chirps.swings(line.frequency_hz);
     let gain = chirps.gain(&line, &swings);
-    (gain > 0.0 && chirps.others_stay(&line, &swings)).then(|| candidate(&chirps, &line, p_value, gain))
+    if gain > 0.0 && chirps.others_stay(&line, &swings) { candidate(&chirps, &chirps.settled(line), p_value, gain) } else { None }
 }
 
 impl<'a> Chirps<'a> {
@@ -255,55 +260,142 @@ impl<'a> Chirps<'a> {
         swings.iter().all(|values| depth(values, &|bin| !near(bin)) < OTHERS * depth(values, &near))
     }
 
-    /// What swings at plus and minus a frequency within a few bins of a range, `[sideband][channel · sample]`.
-    fn waves(&self, line: &Line) -> [Vec<Complex64>; 2] {
+    /// Of the frequencies that the frames' rate does not tell apart, the one whose swing explains most within the frames.
+    fn settled(&self, line: Line) -> Line {
+        let rate_hz = 1.0 / self.evidence.radar.frame_period_s;
+        let highest_hz = highest_hz(self.evidence);
+        let tooth = |k: i32| line.frequency_hz + f64::from(k) * rate_hz;
+        let reach = ((highest_hz - LOWEST_HZ) / rate_hz) as i32;
+        let teeth = (-reach..=reach).map(tooth).filter(|frequency| (LOWEST_HZ..highest_hz).contains(frequency));
+        let explained = |frequency_hz: f64| Some((frequency_hz, self.explained(&Swings::new(self, frequency_hz)?, line.bin)[0]));
+        let best = teeth.filter_map(explained).max_by(|a, b| a.1.total_cmp(&b.1));
+        Line { frequency_hz: best.map_or(line.frequency_hz, |best| best.0), ..line }
+    }
+
+    /// Energy that a swing takes from a range beyond what is constant, and what it leaves.
+    fn explained(&self, swings: &Swings, bin: usize) -> [f64; 2] {
+        let channels = self.evidence.cube.channels();
+        let of_channel = |channel: usize| {
+            let value = |frame: usize, index: usize| self.spectra[frame][(index * channels + channel) * self.bins + bin];
+            let sums = swings.sums(value);
+            let fitted = swings.fitted(sums);
+            let all: f64 = (0..3).map(|part| (fitted[part].conj() * sums[part]).re).sum();
+            let indices = || 0..self.loops_s.len();
+            let energy: f64 =
+                swings.training.iter().flat_map(|&frame| indices().map(move |index| value(frame, index).norm_sqr())).sum();
+            [all - sums[0].norm_sqr() / swings.normal[(0, 0)], energy - all]
+        };
+        (0..channels).map(of_channel).fold([0.0; 2], |sum, one| [sum[0] + one[0], sum[1] + one[1]])
+    }
+
+    /// The ranges around one that swing with it.
+    fn patch(&self, swings: &Swings, line: &Line) -> RangeInclusive<usize> {
+        let swings_too = |bin: usize| {
+            let [explained, left] = self.explained(swings, bin);
+            explained * swings.basis.len() as f64 > PLAIN * 2.0 * left
+        };
+        let first = (0..line.bin).rev().take(WIDEST).take_while(|&bin| swings_too(bin)).last().unwrap_or(line.bin);
+        let last = (line.bin + 1..self.bins).take(WIDEST).take_while(|&bin| swings_too(bin)).last().unwrap_or(line.bin);
+        first.min(line.bin.saturating_sub(REACH))..=last.max(line.bin + REACH)
+    }
+
+    /// What swings with the cosine and with the sine in some ranges, `[cosine, sine][channel · sample]`.
+    fn waves(&self, swings: &Swings, patch: &RangeInclusive<usize>) -> [Vec<Complex64>; 2] {
         let evidence = self.evidence;
         let [_, _, _, loops, samples] = evidence.cube.dims;
         let channels = evidence.cube.channels();
         let mut planner = FftPlanner::new();
         let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
-        [0, 1].map(|sideband| {
-            let mut wave = vec![Complex64::ZERO; channels * samples];
-            let turns = self.turns(line.frequency_hz, sideband);
-            let sign = [-1.0, 1.0][sideband];
-            for &frame in &evidence.split.training {
-                for channel in 0..channels {
-                    let moving = evidence.moving(frame, channel);
-                    let wave = &mut wave[channel * samples..][..samples];
-                    for (chirp, time) in moving.chunks_exact(samples).zip(&self.loops_s) {
-                        let turn = turns[frame] * Complex64::cis(sign * TAU * line.frequency_hz * time);
-                        wave.iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value * turn);
+        let mut waves = [vec![], vec![]];
+        for channel in 0..channels {
+            let mut sums = vec![[Complex64::ZERO; 3]; samples];
+            for (&frame, basis) in evidence.split.training.iter().zip(swings.basis.chunks_exact(loops)) {
+                for (chirp, basis) in evidence.moving(frame, channel).chunks_exact(samples).zip(basis) {
+                    for (sums, value) in sums.iter_mut().zip(chirp) {
+                        sums.iter_mut().zip(basis).for_each(|(sum, basis)| *sum += value * basis);
                     }
                 }
             }
-            forward.process(&mut wave);
-            let count = (evidence.split.training.len() * loops * samples) as f64;
-            for (i, value) in wave.iter_mut().enumerate() {
-                let far = (i % samples).abs_diff(line.bin);
-                *value *= if far.min(samples - far) <= REACH { 1.0 / count } else { 0.0 };
+            let fitted: Vec<[Complex64; 3]> = sums.into_iter().map(|sums| swings.fitted(sums)).collect();
+            for (part, waves) in waves.iter_mut().enumerate() {
+                let mut wave: Vec<Complex64> = fitted.iter().map(|fitted| fitted[part + 1]).collect();
+                forward.process(&mut wave);
+                for (bin, value) in wave.iter_mut().enumerate() {
+                    *value *= if patch.contains(&bin) { 1.0 / samples as f64 } else { 0.0 };
+                }
+                inverse.process(&mut wave);
+                waves.extend(wave);
             }
-            inverse.process(&mut wave);
-            wave
-        })
+        }
+        waves
     }
 }
 
-fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Candidate {
+/// What is constant, the cosine and the sine of a frequency in the chirps of the training frames: short frames see so little of a turn
+/// that these are not orthogonal.
+struct Swings<'a> {
+    training: &'a [usize],
+    /// `[frame · loop]`
+    basis: Vec<[f64; 3]>,
+    normal: Matrix3<f64>,
+    inverse: Matrix3<f64>,
+}
+
+impl<'a> Swings<'a> {
+    /// None where they cannot be told apart.
+    fn new(chirps: &'a Chirps, frequency_hz: f64) -> Option<Self> {
+        let training = &chirps.evidence.split.training;
+        let times = training.iter().flat_map(|&frame| chirps.loops_s.iter().map(move |time| chirps.middles_s[frame] + time));
+        let turns = times.map(|time| (TAU * frequency_hz * time).sin_cos());
+        let basis: Vec<[f64; 3]> = turns.map(|(sine, cosine)| [1.0, cosine, sine]).collect();
+        let mut normal = Matrix3::zeros();
+        basis.iter().map(|basis| Vector3::from(*basis)).for_each(|basis| normal += basis * basis.transpose());
+        Some(Self { training, basis, normal, inverse: normal.try_inverse()? })
+    }
+
+    /// Of what is given by frame and loop, with each of the three.
+    fn sums(&self, value: impl Fn(usize, usize) -> Complex64) -> [Complex64; 3] {
+        let loops = self.basis.len() / self.training.len();
+        let mut sums = [Complex64::ZERO; 3];
+        for (&frame, basis) in self.training.iter().zip(self.basis.chunks_exact(loops)) {
+            for (index, basis) in basis.iter().enumerate() {
+                let value = value(frame, index);
+                sums.iter_mut().zip(basis).for_each(|(sum, basis)| *sum += value * basis);
+            }
+        }
+        sums
+    }
+
+    /// Least squares.
+    fn fitted(&self, sums: [Complex64; 3]) -> [Complex64; 3] {
+        std::array::from_fn(|row| (0..3).map(|column| sums[column] * self.inverse[(row, column)]).sum())
+    }
+}
+
+fn highest_hz(evidence: &Evidence) -> f64 {
+    HIGHEST_HZ.min(0.4 / evidence.radar.loop_period_s())
+}
+
+fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Candidate> {
     let evidence = chirps.evidence;
     let samples = evidence.cube.dims[4];
     let bin_m = evidence.radar.range_resolution_m();
     let range_m = line.bin as f64 * bin_m;
-    let waves = chirps.waves(line);
+    let swings = Swings::new(chirps, line.frequency_hz)?;
+    let patch = chirps.patch(&swings, line);
+    // A return between two bins reaches far, if weakly.
+    let waves = chirps.waves(&swings, &(patch.start().saturating_sub(WIDEST)..=patch.end() + WIDEST));
+    let [near_m, far_m] = [patch.start(), patch.end()].map(|bin| *bin as f64 * bin_m);
     let chirp_count = (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
-    let energy = waves.iter().flatten().map(|value| value.norm_sqr()).sum::<f64>() * chirp_count;
+    let energy = waves.iter().flatten().map(|value| value.norm_sqr()).sum::<f64>() * 0.5 * chirp_count;
     let (starts_s, loop_s, frequency_hz) = (evidence.starts_s.clone(), evidence.radar.loop_period_s(), line.frequency_hz);
     let frame_rate_hz = 1.0 / evidence.radar.frame_period_s;
-    Candidate {
+    Some(Candidate {
         id: None,
         behaves_like: BEHAVES_LIKE,
         estimates: vec![],
         choice: None,
-        place: Place { range_m: Some([range_m - 1.5 * bin_m, range_m + 1.5 * bin_m]), ..Place::at("scene") },
+        place: Place { range_m: Some([near_m, far_m]), ..Place::at("scene") },
         p_value: p_value.max(f64::MIN_POSITIVE),
         gain,
         rung: Rung::F,
@@ -316,14 +408,14 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Candidate
         energy,
         correction: Correction::Samples(Arc::new(move |cube| {
             cube.each_chirp(|[frame, channel, index], chirp| {
-                let turn = Complex64::cis(TAU * frequency_hz * (starts_s[frame] + index as f64 * loop_s));
-                let [upper, lower] = [0, 1].map(|sideband| &waves[sideband][channel * samples..][..samples]);
-                for ((value, upper), lower) in chirp.iter_mut().zip(upper).zip(lower) {
-                    *value -= upper * turn + lower * turn.conj();
+                let (sine, cosine) = (TAU * frequency_hz * (starts_s[frame] + index as f64 * loop_s)).sin_cos();
+                let [with_cosine, with_sine] = [0, 1].map(|part| &waves[part][channel * samples..][..samples]);
+                for ((value, a), b) in chirp.iter_mut().zip(with_cosine).zip(with_sine) {
+                    *value -= a * cosine + b * sine;
                 }
             });
         })),
-    }
+    })
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::channels::Bearing;
 use crate::diagnosis::power::PowerModel;
 use crate::diagnosis::prediction::range_and_velocity;
-use crate::diagnosis::speckle::Look;
+use crate::diagnosis::speckle::{self, Look};
 use crate::diagnosis::{BodyPrediction, Evidence};
 use crate::radar::Radar;
 
@@ -203,14 +203,13 @@ impl Cells {
 }
 
 /// `moving`, `still`: cells that move, and cells that hardly do, with their ranges.
-fn groups([mut moving, mut still]: [Vec<(usize, Cell)>; 2]) -> Vec<Group> {
+fn groups([moving, mut still]: [Vec<(usize, Cell)>; 2]) -> Vec<Group> {
     let count = (moving.len() / GROUP_CELLS).clamp(1, MOST_GROUPS);
-    let all = moving.len();
-    // From the end, so that what remains keeps its place.
-    let mut groups: Vec<Group> = (0..count)
+    // The last ones first.
+    let mut groups: Vec<Group> = speckle::groups(moving, count)
+        .into_iter()
         .rev()
-        .map(|group| moving.split_off(group * all / count).into_iter().map(|(_, cell)| cell).collect())
-        .map(|cells| Group { cells, place: None })
+        .map(|cells| Group { cells: cells.into_iter().map(|(_, cell)| cell).collect(), place: None })
         .collect();
     still.sort_by_key(|(range, _)| range / STILL_RANGES);
     groups.extend(still.chunk_by(|a, b| a.0 / STILL_RANGES == b.0 / STILL_RANGES).map(|chunk| Group {

@@ -23,7 +23,7 @@ use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Rung};
 use crate::diagnosis::power::PowerModel;
 use crate::diagnosis::prediction::range_and_velocity;
-use crate::diagnosis::speckle::Look;
+use crate::diagnosis::speckle::{Look, groups};
 use crate::diagnosis::statistics::{DECIBEL, corrected};
 use crate::diagnosis::{BodyPrediction, Cube, Evidence};
 use crate::effects::legendre;
@@ -122,7 +122,13 @@ impl Chirps {
             return None;
         }
         cells.iter_mut().flatten().for_each(|cell| cell.delay /= delay_s);
-        let frames = cells.into_iter().map(groups).collect();
+        let frames = cells
+            .into_iter()
+            .map(|cells| {
+                let count = cells.len().min(MOST_GROUPS);
+                groups(cells, count)
+            })
+            .collect();
         Some(Self { frames, parts, delay_s })
     }
 
@@ -308,15 +314,6 @@ impl Chirps {
 /// The middle of one of so many equal pieces of a chirp, −1 to 1.
 fn place(piece: usize, of: usize) -> f64 {
     (2.0 * piece as f64 + 1.0) / of as f64 - 1.0
-}
-
-/// Neighbouring Doppler cells.
-fn groups(mut cells: Vec<Cell>) -> Vec<Vec<Cell>> {
-    let all = cells.len();
-    let count = all.min(MOST_GROUPS);
-    let mut groups: Vec<Vec<Cell>> = (0..count).rev().map(|group| cells.split_off(group * all / count)).collect();
-    groups.reverse();
-    groups
 }
 
 /// Doppler cells of a frame, in order.
