@@ -97,9 +97,11 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // turns change how much is received.
     let vibrates = accepted.id == Some("radar_vibration");
     let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
-    // So of one return that swings.
-    let hums = accepted.behaves_like == fluctuation::HUMS && !apart(accepted.place.range_m, candidate.place.range_m);
-    let shaken = vibrates && (turns || is_path(candidate)) || hums && is_path(candidate);
+    // So of one return that swings, which reaches a little beyond its ranges.
+    let around = accepted.place.range_m.map(|[near, far]| [near - NEAR_M, far + NEAR_M]);
+    let hums = accepted.behaves_like == fluctuation::HUMS && !apart(around, candidate.place.range_m);
+    let stirs = candidate.behaves_like == fluctuation::STIRS;
+    let shaken = vibrates && (turns || stirs || is_path(candidate)) || hums && is_path(candidate);
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it

@@ -10,6 +10,7 @@ mod hum;
 mod returns;
 mod silhouette;
 mod stirring;
+mod swings;
 
 use std::sync::Arc;
 
@@ -33,6 +34,7 @@ const FEWEST_STRONG: usize = 5;
 const LEAST_LIKELY: f64 = 0.01;
 pub const ID: &str = "soft_occlusion";
 pub use hum::BEHAVES_LIKE as HUMS;
+pub use stirring::BEHAVES_LIKE as STIRS;
 
 /// What stands still where the body never is.
 struct Free {
@@ -76,7 +78,7 @@ impl Free {
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let known = [stirring::BEHAVES_LIKE, ID].iter().any(|id| evidence.accepted.contains(id));
+    let known = [STIRS, ID].iter().any(|id| evidence.accepted.contains(id));
     let by_frame = if known {
         None
     } else {

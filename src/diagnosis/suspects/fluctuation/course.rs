@@ -55,14 +55,15 @@ impl Course {
         Self { law, training, foretold: frames.foretold(law, data) - frames.foretold(NONE, data) }
     }
 
-    /// Weights by which the training frames foretell every frame's deviation from their mean, `[frame, training frame]`.
+    /// Weights by which the training frames foretell every frame, `[frame, training frame]`.
     pub fn weights(&self, frames: Frames, data: &Data) -> DMatrix<f64> {
         let (count, known) = (frames.times_s.len(), frames.training.len());
         let Some(inverse) = frames.covariance(self.law, data, frames.training).and_then(Cholesky::new) else {
             return DMatrix::zeros(count, known);
         };
         let scale = frames.scale(data);
-        let shared = DMatrix::from_fn(known, count, |row, frame| scale * frames.alike(self.law, frames.training[row], frame));
+        let shared =
+            DMatrix::from_fn(known, count, |row, frame| scale * (CONSTANT + frames.alike(self.law, frames.training[row], frame)));
         inverse.solve(&shared).transpose()
     }
 }

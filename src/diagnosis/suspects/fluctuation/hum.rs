@@ -8,11 +8,11 @@ use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 use rayon::prelude::*;
 use rustfft::FftPlanner;
 
+use super::swings::Swings;
 use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
 use crate::diagnosis::statistics::corrected;
@@ -267,9 +267,13 @@ impl<'a> Chirps<'a> {
         let tooth = |k: i32| line.frequency_hz + f64::from(k) * rate_hz;
         let reach = ((highest_hz - LOWEST_HZ) / rate_hz) as i32;
         let teeth = (-reach..=reach).map(tooth).filter(|frequency| (LOWEST_HZ..highest_hz).contains(frequency));
-        let explained = |frequency_hz: f64| Some((frequency_hz, self.explained(&Swings::new(self, frequency_hz)?, line.bin)[0]));
+        let explained = |frequency_hz: f64| Some((frequency_hz, self.explained(&self.swings_at(frequency_hz)?, line.bin)[0]));
         let best = teeth.filter_map(explained).max_by(|a, b| a.1.total_cmp(&b.1));
         Line { frequency_hz: best.map_or(line.frequency_hz, |best| best.0), ..line }
+    }
+
+    fn swings_at(&self, frequency_hz: f64) -> Option<Swings<'_>> {
+        Swings::new(&self.evidence.split.training, &self.middles_s, &self.loops_s, frequency_hz)
     }
 
     /// Energy that a swing takes from a range beyond what is constant, and what it leaves.
@@ -331,47 +335,6 @@ impl<'a> Chirps<'a> {
     }
 }
 
-/// What is constant, the cosine and the sine of a frequency in the chirps of the training frames: short frames see so little of a turn
-/// that these are not orthogonal.
-struct Swings<'a> {
-    training: &'a [usize],
-    /// `[frame · loop]`
-    basis: Vec<[f64; 3]>,
-    normal: Matrix3<f64>,
-    inverse: Matrix3<f64>,
-}
-
-impl<'a> Swings<'a> {
-    /// None where they cannot be told apart.
-    fn new(chirps: &'a Chirps, frequency_hz: f64) -> Option<Self> {
-        let training = &chirps.evidence.split.training;
-        let times = training.iter().flat_map(|&frame| chirps.loops_s.iter().map(move |time| chirps.middles_s[frame] + time));
-        let turns = times.map(|time| (TAU * frequency_hz * time).sin_cos());
-        let basis: Vec<[f64; 3]> = turns.map(|(sine, cosine)| [1.0, cosine, sine]).collect();
-        let mut normal = Matrix3::zeros();
-        basis.iter().map(|basis| Vector3::from(*basis)).for_each(|basis| normal += basis * basis.transpose());
-        Some(Self { training, basis, normal, inverse: normal.try_inverse()? })
-    }
-
-    /// Of what is given by frame and loop, with each of the three.
-    fn sums(&self, value: impl Fn(usize, usize) -> Complex64) -> [Complex64; 3] {
-        let loops = self.basis.len() / self.training.len();
-        let mut sums = [Complex64::ZERO; 3];
-        for (&frame, basis) in self.training.iter().zip(self.basis.chunks_exact(loops)) {
-            for (index, basis) in basis.iter().enumerate() {
-                let value = value(frame, index);
-                sums.iter_mut().zip(basis).for_each(|(sum, basis)| *sum += value * basis);
-            }
-        }
-        sums
-    }
-
-    /// Least squares.
-    fn fitted(&self, sums: [Complex64; 3]) -> [Complex64; 3] {
-        std::array::from_fn(|row| (0..3).map(|column| sums[column] * self.inverse[(row, column)]).sum())
-    }
-}
-
 fn highest_hz(evidence: &Evidence) -> f64 {
     HIGHEST_HZ.min(0.4 / evidence.radar.loop_period_s())
 }
@@ -381,10 +344,9 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Ca
     let samples = evidence.cube.dims[4];
     let bin_m = evidence.radar.range_resolution_m();
     let range_m = line.bin as f64 * bin_m;
-    let swings = Swings::new(chirps, line.frequency_hz)?;
-    let patch = chirps.patch(&swings, line);
-    // A return between two bins reaches far, if weakly.
-    let waves = chirps.waves(&swings, &(patch.start().saturating_sub(WIDEST)..=patch.end() + WIDEST));
+    let swings = chirps.swings_at(line.frequency_hz)?;
+    let (patch, means) = (chirps.patch(&swings, line), swings.means);
+    let waves = chirps.waves(&swings, &patch);
     let [near_m, far_m] = [patch.start(), patch.end()].map(|bin| *bin as f64 * bin_m);
     let chirp_count = (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
     let energy = waves.iter().flatten().map(|value| value.norm_sqr()).sum::<f64>() * 0.5 * chirp_count;
@@ -411,7 +373,7 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Ca
                 let (sine, cosine) = (TAU * frequency_hz * (starts_s[frame] + index as f64 * loop_s)).sin_cos();
                 let [with_cosine, with_sine] = [0, 1].map(|part| &waves[part][channel * samples..][..samples]);
                 for ((value, a), b) in chirp.iter_mut().zip(with_cosine).zip(with_sine) {
-                    *value -= a * cosine + b * sine;
+                    *value -= a * (cosine - means[0]) + b * (sine - means[1]);
                 }
             });
         })),
@@ -451,7 +413,13 @@ mod tests {
         let after = before.with(&found);
         let energy = |evidence: &Evidence| evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum::<f64>();
         let removed = energy(&before) - energy(&after);
-        let planted = 0.5 * (8.0f64 * 0.3).powi(2) * before.cube.samples.len() as f64;
+        // Every frame sees the same third of a turn: its mean stands still.
+        let radar = &before.radar;
+        let times = (0..8).flat_map(|frame| (0..16).map(move |slow| radar.chirp_time_s(frame, 0, slow)));
+        let swings: Vec<f64> = times.map(|time| 8.0 * 0.3 * (TAU * HUM_HZ * time).cos()).collect();
+        let mean = swings.iter().sum::<f64>() / swings.len() as f64;
+        let variance = swings.iter().map(|swing| (swing - mean).powi(2)).sum::<f64>() / swings.len() as f64;
+        let planted = variance * before.cube.samples.len() as f64;
         assert!((removed / planted - 1.0).abs() < 0.2, "{removed} of {planted}");
     }
 

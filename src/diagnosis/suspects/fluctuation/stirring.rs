@@ -54,9 +54,12 @@ pub fn find(evidence: &Evidence, free: &Free) -> Option<Candidate> {
     let patch = patch(&looks, best.bin);
     let all = judged.iter().filter(|change| patch.contains(&change.bin)).map(|change| change.gain).sum::<f64>() / BINS_PER_VALUE;
     let gain = evidence.split.held_out_share() * best.gain.max(all);
-    let others = strong.iter().filter(|bin| !patch.contains(bin) && bin.abs_diff(best.bin) >= SPACING);
-    let of = |bin: usize| looks.iter().find(|look| look.0 == bin).map_or(0.0, |look| look.2.max(0.0));
-    let [changed, power] = others.fold([0.0, 0.0], |[changed, power], &bin| [changed + of(bin), power + returns.power(bin)]);
+    // What stirs must not count among what the others are compared with.
+    let others: Vec<usize> =
+        strong.iter().copied().filter(|bin| !patch.contains(bin) && bin.abs_diff(best.bin) >= SPACING).collect();
+    let of = |bin: usize| significance(returns, bin, &others, frames).map_or(0.0, |(_, excess)| excess.max(0.0));
+    let [changed, power] =
+        others.iter().fold([0.0, 0.0], |[changed, power], &bin| [changed + of(bin), power + returns.power(bin)]);
     let alone = best.excess * power > ALONE * changed * returns.power(best.bin);
     alone.then(|| candidate(evidence, best, gain, [patch.start(), patch.end()].map(|bin| *bin as f64 * bin_m), *bin_m, patch))
 }
