@@ -16,7 +16,7 @@ const SLIGHTLY: f64 = 0.01;
 
 /// What a radar that vibrates leaves: turns of what stands still that are not quite undone, and their sidebands, up to this share of
 /// its gain (which counts what is left); so with products.
-const TURNS: [&str; 2] = ["slow-time phase", "delay-proportional phase"];
+const TURNS: [&str; 3] = ["slow-time phase", "delay-proportional phase", fluctuation::STIRS];
 const SHAKEN: f64 = 0.5;
 const FADING: &str = "slow-time gain";
 
@@ -100,8 +100,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // So of one return that swings, which reaches a little beyond its ranges.
     let around = accepted.place.range_m.map(|[near, far]| [near - NEAR_M, far + NEAR_M]);
     let hums = accepted.behaves_like == fluctuation::HUMS && !apart(around, candidate.place.range_m);
-    let stirs = candidate.behaves_like == fluctuation::STIRS;
-    let shaken = vibrates && (turns || stirs || is_path(candidate)) || hums && is_path(candidate);
+    let shaken = vibrates && (turns || is_path(candidate)) || hums && is_path(candidate);
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it

@@ -306,21 +306,15 @@ impl<'a> Chirps<'a> {
     /// What swings with the cosine and with the sine in some ranges, `[cosine, sine][channel · sample]`.
     fn waves(&self, swings: &Swings, patch: &RangeInclusive<usize>) -> [Vec<Complex64>; 2] {
         let evidence = self.evidence;
-        let [_, _, _, loops, samples] = evidence.cube.dims;
+        let [frames, .., samples] = evidence.cube.dims;
         let channels = evidence.cube.channels();
         let mut planner = FftPlanner::new();
         let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
         let mut waves = [vec![], vec![]];
         for channel in 0..channels {
-            let mut sums = vec![[Complex64::ZERO; 3]; samples];
-            for (&frame, basis) in evidence.split.training.iter().zip(swings.basis.chunks_exact(loops)) {
-                for (chirp, basis) in evidence.moving(frame, channel).chunks_exact(samples).zip(basis) {
-                    for (sums, value) in sums.iter_mut().zip(chirp) {
-                        sums.iter_mut().zip(basis).for_each(|(sum, basis)| *sum += value * basis);
-                    }
-                }
-            }
-            let fitted: Vec<[Complex64; 3]> = sums.into_iter().map(|sums| swings.fitted(sums)).collect();
+            let moving: Vec<Vec<Complex64>> = (0..frames).map(|frame| evidence.moving(frame, channel)).collect();
+            let of_sample = |n: usize| swings.fitted(swings.sums(|frame, index| moving[frame][index * samples + n]));
+            let fitted: Vec<[Complex64; 3]> = (0..samples).map(of_sample).collect();
             for (part, waves) in waves.iter_mut().enumerate() {
                 let mut wave: Vec<Complex64> = fitted.iter().map(|fitted| fitted[part + 1]).collect();
                 forward.process(&mut wave);

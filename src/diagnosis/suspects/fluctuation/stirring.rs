@@ -12,6 +12,7 @@ use num_complex::Complex64;
 use super::course::{Course, Data, Frames};
 use super::returns::{Returns, SPACING};
 use super::{Free, LEAST_LIKELY, around};
+use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::evidence::{Evidence, blackman_harris};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
@@ -187,10 +188,7 @@ fn deviations(evidence: &Evidence, patch: RangeInclusive<usize>) -> Vec<Vec<Comp
     let training = &evidence.split.training;
     let mut deviations: Vec<Vec<Complex64>> =
         training.iter().map(|&frame| around(mean_chirps(frame), samples, patch.clone())).collect();
-    let mut mean = vec![Complex64::ZERO; deviations[0].len()];
-    for deviation in &deviations {
-        mean.iter_mut().zip(deviation).for_each(|(mean, value)| *mean += value / training.len() as f64);
-    }
+    let mean = mean_chirp(deviations.iter().map(Vec::as_slice), deviations[0].len());
     for deviation in &mut deviations {
         deviation.iter_mut().zip(&mean).for_each(|(value, mean)| *value -= mean);
     }
