@@ -29,9 +29,15 @@ impl DiagnosisConfig {
             None if sure => 0.5 * (self.gain + self.nameless_gain),
             None => self.nameless_gain,
         };
-        candidate.p_value <= self.p_value(suspect) && candidate.gain >= least && candidate.gain.is_finite()
+        // What foretells held-out frames better than it must is as much less likely to be chance: the likelihood's ratio on data that
+        // were not fitted exceeds e^gain by chance with a probability of e^-gain at most.
+        let surplus = if untouched { (candidate.gain - least).exp().clamp(1.0, MOST_SURPLUS) } else { 1.0 };
+        candidate.p_value <= self.p_value(suspect) * surplus && candidate.gain >= least && candidate.gain.is_finite()
     }
 }
+
+/// By how much a gain beyond the least may raise the limit of a p-value.
+const MOST_SURPLUS: f64 = 10.0;
 
 /// p-value below which what has no name needs only half as much more than what has one.
 const NO_CHANCE: f64 = 1e-12;
@@ -220,6 +226,13 @@ fn upstream<'a>(
     best: &'a (usize, Candidate),
     passing: &[&'a (usize, Candidate)],
 ) -> &'a (usize, Candidate) {
+    if best.1.id == Some("tx_leakage") {
+        // What the chirp makes of the room's returns never changes either, and a leakage is free in every channel: it is none where
+        // nothing is left of it.
+        let left = |evidence: &Evidence| (SUSPECTS[best.0].find)(evidence).iter().any(|candidate| candidate.id == best.1.id);
+        let mut of_the_chirp = passing.iter().filter(|(_, candidate)| candidate.place.stage == "waveform");
+        return of_the_chirp.find(|(_, candidate)| !left(&evidence.with(candidate))).unwrap_or(&best);
+    }
     let others = passing.iter().filter(|(_, candidate)| is_on_all(candidate));
     let Some(other) = others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| is_echo(&best.1)) else {
         return best;

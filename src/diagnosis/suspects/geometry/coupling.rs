@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::channels::{Found, LOOKS, UNEVEN};
+use super::channels::{AS_WELL, Found, LOOKS, UNEVEN};
 use super::covariance::Array;
 use super::mismatch;
 use crate::diagnosis::estimated::Estimated;
@@ -13,8 +13,6 @@ use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, R
 
 /// What errors of the prediction may imitate: 0.3° and 0.05 dB.
 const FLOOR: f64 = 0.005;
-/// Chance below which neighbours do not hear one another alike.
-const UNEQUAL: f64 = 1e-3;
 /// Beyond, it is no weak coupling.
 const STRONGEST: f64 = 0.5;
 /// Of the unevenness of gains and phases (squares), what a coupling may leave: a random one of four receivers lies so near to one
@@ -38,33 +36,39 @@ pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
     Some(Found { candidate, likelihood: found.likelihood, explains_all })
 }
 
-/// Neighbours that do not hear one another alike, which no coupling of antennas does: it has no name.
-pub fn one_way(evidence: &Evidence, array: &Array) -> Option<Found> {
-    let (found, heard) = estimate(array, &[&[0], &[1], &[2], &[3]])?;
+/// Receivers that hear only the neighbour on one side, which no coupling of antennas does: it has no name. None where neighbours
+/// that hear one another `alike` foretell held-out frames nearly as well, where the two sides may not differ, or where the receivers
+/// are not alike without it.
+pub fn one_way(evidence: &Evidence, array: &Array, alike: Option<&Found>) -> Option<Found> {
+    let either = [("before", &[&[0][..], &[1]]), ("after", &[&[2], &[3]])].map(|(side, parts)| {
+        let (found, heard) = estimate(array, parts)?;
+        Some((side, found, heard))
+    });
+    let (side, found, heard) = either.into_iter().flatten().max_by(|a, b| a.1.likelihood.total_cmp(&b.1.likelihood))?;
+    if alike.is_some_and(|alike| alike.likelihood > found.likelihood - AS_WELL) {
+        return None;
+    }
+    let (both, _) = estimate(array, &[&[0], &[1], &[2], &[3]])?;
     let difference = DMatrix::from_fn(4, 2, |number, part| match number {
         number if number == part => 1.0,
         number if number == part + 2 => -1.0,
         _ => 0.0,
     });
-    if found.chance(&difference) > UNEQUAL {
+    let after = mismatch::left(array, &array.looks_after(&alone(array.cells.numbers().receivers, heard)?));
+    if both.chance(&difference) > UNEVEN || after.is_some_and(|after| after.p_value < UNEVEN) {
         return None;
     }
-    let level_db = heard.map(|heard| 20.0 * heard.norm().max(1e-9).log10());
-    let deviation = |part: usize| {
-        let mut along = DVector::zeros(4);
-        (along[2 * part], along[2 * part + 1]) = (heard[part].re, heard[part].im);
-        statistics::DECIBEL * found.deviation(&along) / heard[part].norm_sqr().max(1e-12)
-    };
-    let neighbours = candidate(evidence, heard[0], &found);
+    let strength = heard[usize::from(side == "after")];
+    let neighbours = candidate(evidence, strength, &found);
     let candidate = Candidate {
         id: None,
-        behaves_like: "receivers that hear their neighbours, not alike",
-        estimates: vec![Estimate::list("level_db", &level_db, &[deviation(0), deviation(1)])],
+        behaves_like: "receivers that hear the neighbour on one side",
         statement: format!(
-            "Each receiver also hears the one before it, {:.1} dB below, and the one after it, {:.1} dB below: neighbours that couple \
+            "Each receiver also hears the one {side} it, {:.1} dB below, and not the one on its other side: neighbours that couple \
              would hear one another alike.",
-            -level_db[0], -level_db[1]
+            -20.0 * strength.norm().log10()
         ),
+        energy: 0.5 * neighbours.energy,
         correction: Correction::Samples(Arc::new(move |cube| undo(cube, heard))),
         look_alikes: vec![],
         ..neighbours
