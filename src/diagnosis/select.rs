@@ -231,7 +231,7 @@ fn upstream<'a>(
         // nothing is left of it.
         let left = |evidence: &Evidence| (SUSPECTS[best.0].find)(evidence).iter().any(|candidate| candidate.id == best.1.id);
         let mut of_the_chirp = passing.iter().filter(|(_, candidate)| candidate.place.stage == "waveform");
-        return of_the_chirp.find(|(_, candidate)| !left(&evidence.with(candidate))).unwrap_or(&best);
+        return of_the_chirp.find(|(_, candidate)| !left(&evidence.with(candidate))).copied().unwrap_or(best);
     }
     let others = passing.iter().filter(|(_, candidate)| is_on_all(candidate));
     let Some(other) = others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| is_echo(&best.1)) else {
