@@ -110,18 +110,7 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     }
     let bearing = bearing(radar, &training);
     let array = Array::new(Cells::new(evidence, model, body, &still), bearing);
-    // What receivers hear in common says nothing of them where the body is not what they hear; and those that differed were
-    // brought to the first one's, a neighbour's part included.
-    let alike = !displaced && !accepted("channel_mismatch");
-    let heard = alike && !accepted("mutual_coupling");
-    let coupled = if heard { coupling::find(evidence, &array) } else { None };
-    let differ = [
-        if alike { mismatch::find(evidence, &array) } else { None },
-        if displaced { None } else { places::find(evidence, &array) },
-        if heard { coupling::one_way(evidence, &array, coupled.as_ref()) } else { None },
-        coupled,
-    ];
-    if let Some(candidate) = best(differ.into_iter().flatten().collect()) {
+    if let Some(candidate) = differ(evidence, &array, displaced) {
         return vec![candidate];
     }
     if bearing.p_value < UNEVEN {
@@ -135,6 +124,23 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
         return (gain > 0.0).then(|| aside_of(evidence, bearing, range_m, moves, gain)).into_iter().collect();
     }
     vec![]
+}
+
+/// The way in which the receivers differ, if they do.
+fn differ(evidence: &Evidence, array: &Array, displaced: bool) -> Option<Candidate> {
+    let accepted = |id: &str| evidence.accepted.contains(&id);
+    // What receivers hear in common says nothing of them where the body is not what they hear; and those that differed were
+    // brought to the first one's, a neighbour's part included.
+    let alike = !displaced && !accepted("channel_mismatch");
+    let heard = alike && !accepted("mutual_coupling");
+    let coupled = if heard { coupling::find(evidence, array) } else { None };
+    let differ = [
+        if alike { mismatch::find(evidence, array) } else { None },
+        if displaced { None } else { places::find(evidence, array) },
+        if heard { coupling::one_way(evidence, array, coupled.as_ref()) } else { None },
+        coupled,
+    ];
+    best(differ.into_iter().flatten().collect())
 }
 
 /// One way in which receivers may differ.
@@ -313,10 +319,7 @@ mod tests {
         let samples = vec![Complex64::ONE; radar.dims().iter().product()];
         let evidence = Evidence::new(Loaded::of_samples(radar, samples, [-1.0, 1.0]), None, None);
         let array = Array::new(walking(seed, turned, array), Bearing { sine: 0.0, deviation: 0.003, p_value: 1.0 });
-        let coupled = coupling::find(&evidence, &array);
-        let one_way = coupling::one_way(&evidence, &array, coupled.as_ref());
-        let differ = [mismatch::find(&evidence, &array), places::find(&evidence, &array), one_way, coupled];
-        best(differ.into_iter().flatten().collect()).into_iter().collect()
+        differ(&evidence, &array, false).into_iter().collect()
     }
 
     fn alike() -> DMatrix<Complex64> {

@@ -9,6 +9,7 @@ use super::channels::{AS_WELL, Found, LOOKS, UNEVEN};
 use super::covariance::Array;
 use super::mismatch;
 use crate::diagnosis::estimated::Estimated;
+use crate::diagnosis::speckle::Look;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, Rung, statistics};
 
 /// What errors of the prediction may imitate: 0.3° and 0.05 dB.
@@ -27,7 +28,7 @@ pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
     let (found, heard) = estimate(array, &[&[0, 2], &[1, 3]])?;
     let mut candidate = candidate(evidence, heard[0], &found);
     let before = mismatch::left(array, &array.looks).map_or(0.0, |before| before.square);
-    let after = mismatch::left(array, &array.looks_after(&alone(array.cells.numbers().receivers, heard)?));
+    let after = mismatch::left(array, &looks_alone(array, heard)?);
     // Any receivers may look like that by chance, if not to the last digit.
     if after.as_ref().is_some_and(|after| after.square > BY_CHANCE * before) {
         candidate.look_alikes.push("channel_mismatch");
@@ -40,11 +41,11 @@ pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
 /// that hear one another `alike` foretell held-out frames nearly as well, where the two sides may not differ, or where the receivers
 /// are not alike without it.
 pub fn one_way(evidence: &Evidence, array: &Array, alike: Option<&Found>) -> Option<Found> {
-    let either = [("before", &[&[0][..], &[1]]), ("after", &[&[2], &[3]])].map(|(side, parts)| {
-        let (found, heard) = estimate(array, parts)?;
-        Some((side, found, heard))
+    let either = ["before", "after"].into_iter().enumerate().filter_map(|(index, side)| {
+        let (found, heard) = estimate(array, &[&[2 * index], &[2 * index + 1]])?;
+        Some((side, heard[index], found, heard))
     });
-    let (side, found, heard) = either.into_iter().flatten().max_by(|a, b| a.1.likelihood.total_cmp(&b.1.likelihood))?;
+    let (side, strength, found, heard) = either.max_by(|a, b| a.2.likelihood.total_cmp(&b.2.likelihood))?;
     if alike.is_some_and(|alike| alike.likelihood > found.likelihood - AS_WELL) {
         return None;
     }
@@ -54,11 +55,10 @@ pub fn one_way(evidence: &Evidence, array: &Array, alike: Option<&Found>) -> Opt
         number if number == part + 2 => -1.0,
         _ => 0.0,
     });
-    let after = mismatch::left(array, &array.looks_after(&alone(array.cells.numbers().receivers, heard)?));
+    let after = mismatch::left(array, &looks_alone(array, heard)?);
     if both.chance(&difference) > UNEVEN || after.is_some_and(|after| after.p_value < UNEVEN) {
         return None;
     }
-    let strength = heard[usize::from(side == "after")];
     let neighbours = candidate(evidence, strength, &found);
     let candidate = Candidate {
         id: None,
@@ -94,10 +94,15 @@ fn estimate(array: &Array, shared: &[&[usize]]) -> Option<(Estimated, Heard)> {
     // As much for what all hear alike, however many numbers that is.
     let floors: Vec<f64> = shared.iter().map(|parts| FLOOR * (2.0 / parts.len() as f64).sqrt()).collect();
     let found = Estimated::converged(&array.looks, &directions, &floors, |at| {
-        if at.norm() > STRONGEST { None } else { Some(array.looks_after(&alone(numbers.receivers, heard(at))?)) }
+        if at.norm() > STRONGEST { None } else { looks_alone(array, heard(at)) }
     })?;
     let heard = heard(&found.values);
     Some((found, heard))
+}
+
+/// What is left of the receivers' looks without what they heard of one another. None where that cannot be told.
+fn looks_alone(array: &Array, heard: Heard) -> Option<Vec<Vec<Look>>> {
+    Some(array.looks_after(&alone(array.cells.numbers().receivers, heard)?))
 }
 
 /// What makes of what receivers heard what they would have heard alone. None where that cannot be told.
