@@ -73,6 +73,11 @@ pub fn is_convention(check: &Check) -> bool {
         .contains(&check.check.as_str())
 }
 
+/// Whether a body was expected and is heard nowhere.
+pub fn is_silent(check: &Check) -> bool {
+    check.check == "body_place" && check.found.contains(SILENT)
+}
+
 /// Why nothing can be said about a recording, if so.
 pub fn undecidable(evidence: &Evidence, checks: &[Check]) -> Option<String> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
@@ -283,11 +288,12 @@ fn body_in_room(evidence: &Evidence) -> Option<Check> {
     Some(Check::new("body_in_room", "the body stays in the room", found, ok))
 }
 
+const SILENT: &str = "no body is heard where the motion puts it, nor at other ranges";
 /// Frames by which a clock may be wrong.
 const LATE: isize = 3;
 
 /// Whether the body is where the motion says, or somewhere else, or the motion belongs to other frames.
-fn body_place(evidence: &Evidence) -> Option<Check> {
+pub fn body_place(evidence: &Evidence) -> Option<Check> {
     let body = evidence.body.as_ref()?;
     let level = |shift_m: f64, later: isize| {
         energy_at(evidence, later, |point| {
@@ -324,7 +330,7 @@ fn body_place(evidence: &Evidence) -> Option<Check> {
     } else if ok {
         format!("{here:.1} dB over the noise at the predicted ranges and velocities")
     } else if !elsewhere {
-        format!("{here:.1} dB over the noise there: no body is heard where the motion puts it, nor at other ranges")
+        format!("{here:.1} dB over the noise there: {SILENT}")
     } else {
         format!(
             "{here:.1} dB there, but {best:.1} dB {:.2} m {}: the body is in the wrong place, or the motion belongs to other frames",

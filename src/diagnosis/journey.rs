@@ -1,6 +1,6 @@
 //! From a recording to a diagnosis: read, audit, explain in rounds, report.
 
-use super::audit;
+use super::audit::{self, Check};
 use super::config::DiagnosisConfig;
 use super::cube::Loaded;
 use super::evidence::Evidence;
@@ -87,6 +87,7 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         report.reason = reason;
         return Ok(Diagnosis { report, radar, original, explanation: None });
     }
+    heard_again(&original, config, &mut report.audit, progress);
     if let Some(wrong) = report.audit.iter().find(|check| !check.ok && audit::is_convention(check)) {
         // Physics fitted under a wrong convention would only imitate it.
         report.reason =
@@ -116,6 +117,24 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     };
     report.fit = Fit { before: explanation.before, after: explanation.after };
     Ok(Diagnosis { report, radar, original, explanation: Some(explanation) })
+}
+
+/// A body that is not heard may be drowned by what needs no body to be found (a phase noise spreads the room over all velocities): where
+/// it is heard once that is undone, nothing is wrong with the scene.
+fn heard_again(original: &Evidence, config: &DiagnosisConfig, checks: &mut [Check], progress: &mut dyn FnMut(&str)) {
+    let Some(silent) = checks.iter_mut().find(|check| audit::is_silent(check)) else { return };
+    progress("no body is heard: looking for what drowns it");
+    let mut alone = original.clone();
+    alone.body = None;
+    let explained = explain(alone.changed(), config, &mut |_| {});
+    if explained.accepted.is_empty() {
+        return;
+    }
+    let mut restored = explained.evidence;
+    restored.body = original.body.clone();
+    if let Some(check) = audit::body_place(&restored.changed()).filter(|check| check.ok) {
+        *silent = Check { found: format!("{}; but {} once what drowns it is undone", silent.found, check.found), ..check };
+    }
 }
 
 fn prediction(recording: &Recording, person: &Person, loaded: &Loaded) -> Result<BodyPrediction> {

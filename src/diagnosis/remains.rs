@@ -1,6 +1,6 @@
 //! What an accepted effect leaves behind: itself, where it could not be removed in full, and what a rough correction makes.
 
-use super::finding::Candidate;
+use super::finding::{Candidate, Correction};
 use super::suspects::receiver::harmonic;
 use super::suspects::{excess, fluctuation, paths};
 
@@ -122,11 +122,15 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
         || accepted.id == Some("chirp_nonlinearity") && candidate.id == Some("coloured_noise");
     // Chirps that start at random differ from their neighbours, and go on doing so a little.
     let unlike = is_by_chirp(accepted) && is_one_of(candidate, &BURSTS);
+    // A signal that is cut and cannot be restored has products of all returns along every chirp, and other ones in every receiver.
+    let cut = accepted.id == Some("adc_saturation")
+        && matches!(accepted.correction, Correction::None)
+        && (is_of_receivers(candidate) || candidate.place.stage == "waveform");
     // Up to which share of what was gained.
     [
         (roughly || fades || image || unlike, ROUGHLY),
         (bursts || behind || line, 1.0),
-        (hardly || uneven || mixed, f64::INFINITY),
+        (hardly || uneven || mixed || cut, f64::INFINITY),
         (shaken || products, SHAKEN),
         (by_chirp || faint, SLIGHTLY),
     ]

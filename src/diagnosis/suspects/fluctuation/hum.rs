@@ -1,7 +1,8 @@
 //! A static return that swings at one frequency while the others stay: a lamp, a motor, a screen.
 //!
 //! Its two sidebands are alike and go on from frame to frame. What moves there has other phases in every frame, so the
-//! frames' own scatter is what a line must stand out of.
+//! frames' own scatter is what a line must stand out of. A lamp shines on all that is around it, so ranges are looked at
+//! together, too.
 
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
@@ -15,10 +16,12 @@ use rustfft::FftPlanner;
 use super::swings::Swings;
 use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
-use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::statistics::{corrected, fisher_tail};
 
 /// Slower swings belong to people, faster ones to electronics.
 const LOWEST_HZ: f64 = 20.0;
+/// Part of a turn that a frame must see: less of it is a slope, which a slow body has, too.
+const OF_TURN: f64 = 0.5;
 const HIGHEST_HZ: f64 = 500.0;
 /// Frequencies per resolution cell of the recording.
 const FINE: f64 = 4.0;
@@ -26,6 +29,11 @@ const FINE: f64 = 4.0;
 const COARSE: f64 = 8.0;
 /// Share of one sideband's power that the other has at least.
 const ALIKE: f64 = 0.3;
+/// Neighbouring ranges that are looked at together, and how many of them one return fills under the taper.
+const TOGETHER: [usize; 3] = [1, 6, 20];
+const OF_ONE: f64 = 2.0;
+/// Least power over the scatter that is looked at.
+const LEAST_RATIO: f64 = 1.5;
 /// Bins to either side that a return reaches under the taper.
 const REACH: usize = 3;
 /// Ranges to either side that may swing with it, and how much plainer than by chance they must.
@@ -37,7 +45,7 @@ const FEWEST_FRAMES: usize = 5;
 const REFINEMENTS: usize = 16;
 pub const BEHAVES_LIKE: &str = "a static return that hums";
 
-/// Chirps without what stands still, by range, and when they were.
+/// Chirps without what stands still during a frame, by range, and when they were: what changes from frame to frame does not hum.
 struct Chirps<'a> {
     evidence: &'a Evidence,
     bins: usize,
@@ -57,14 +65,26 @@ type Sidebands = [Vec<Complex64>; 2];
 #[derive(Clone, Copy)]
 struct Line {
     frequency_hz: f64,
-    bin: usize,
+    /// The ranges looked at together.
+    first: usize,
+    last: usize,
     /// Power of the training frames' mean over what their scatter makes of it.
     ratio: f64,
+    /// How often chance makes it there and at that frequency.
+    chance: f64,
 }
 
 impl Line {
     fn weaker(&self, other: &Self) -> Ordering {
-        self.ratio.total_cmp(&other.ratio)
+        other.chance.total_cmp(&self.chance).then(self.ratio.total_cmp(&other.ratio))
+    }
+
+    fn bins(&self) -> RangeInclusive<usize> {
+        self.first..=self.last
+    }
+
+    fn middle(&self) -> f64 {
+        0.5 * (self.first + self.last) as f64
     }
 }
 
@@ -76,25 +96,23 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let chirps = Chirps::new(evidence)?;
     let duration_s = chirps.middles_s[training[training.len() - 1]] - chirps.middles_s[training[0]];
     let frame_s = chirps.loops_s.len() as f64 * evidence.radar.loop_period_s();
-    let highest_hz = highest_hz(evidence);
-    if duration_s * LOWEST_HZ < FEWEST_FRAMES as f64 || highest_hz <= LOWEST_HZ {
+    let [lowest_hz, highest_hz] = chirps.band_hz();
+    if duration_s * lowest_hz < FEWEST_FRAMES as f64 || highest_hz <= lowest_hz {
         return None;
     }
     let coarse = 1.0 / (COARSE * frame_s);
     let fine = 1.0 / (FINE * duration_s);
-    let cells = ((highest_hz - LOWEST_HZ) / coarse).ceil() as usize;
+    let cells = ((highest_hz - lowest_hz) / coarse).ceil() as usize;
     let strongest = |cell: usize| {
-        let start = LOWEST_HZ + cell as f64 * coarse;
+        let start = lowest_hz + cell as f64 * coarse;
         let sidebands = chirps.sidebands(start + 0.5 * coarse);
         let count = (coarse / fine).ceil() as usize;
         (0..count).filter_map(|i| chirps.strongest(&sidebands, start + i as f64 * fine)).max_by(Line::weaker)
     };
     let line = (0..cells).into_par_iter().filter_map(strongest).max_by(Line::weaker)?;
     let line = chirps.refined(line, 0.5 * fine);
-    // As if all channels were one: what moves is alike in all of them.
-    let freedom = training.len() as f64 - 1.0;
-    let tried = (highest_hz - LOWEST_HZ) * duration_s * (chirps.bins / 2) as f64;
-    let p_value = corrected((1.0 + line.ratio / freedom).powf(-freedom), tried);
+    let tried = (highest_hz - lowest_hz) * duration_s * (chirps.bins / 2 * TOGETHER.len()) as f64;
+    let p_value = corrected(line.chance, tried);
     if p_value >= 0.01 {
         return None;
     }
@@ -116,9 +134,11 @@ impl<'a> Chirps<'a> {
             let mut spectra = vec![Complex64::ZERO; loops * channels * bins];
             for channel in 0..channels {
                 let chirps = tapered.spectra(evidence.cube.channel(frame, channel), 1.0);
-                for (index, chirp) in chirps.chunks_exact(samples).enumerate() {
-                    for bin in 0..bins {
-                        spectra[(index * channels + channel) * bins + bin] = chirp[bin] - still[channel * samples + bin];
+                for bin in 0..bins {
+                    let chirp = |index: usize| chirps[index * samples + bin];
+                    let mean = (0..loops).map(chirp).sum::<Complex64>() / loops as f64;
+                    for index in 0..loops {
+                        spectra[(index * channels + channel) * bins + bin] = chirp(index) - mean;
                     }
                 }
             }
@@ -134,6 +154,13 @@ impl<'a> Chirps<'a> {
             loops_s: (0..loops).map(|index| (index as f64 - middle) * loop_s).collect(),
             middles_s: evidence.starts_s.iter().map(|start| start + middle * loop_s).collect(),
         })
+    }
+
+    /// Lowest and highest frequency that is looked at.
+    fn band_hz(&self) -> [f64; 2] {
+        let loop_s = self.evidence.radar.loop_period_s();
+        let frame_s = self.loops_s.len() as f64 * loop_s;
+        [LOWEST_HZ.max(OF_TURN / frame_s), HIGHEST_HZ.min(0.4 / loop_s)]
     }
 
     /// At plus and minus a frequency, with the phases of the frames' middles.
@@ -173,36 +200,55 @@ impl<'a> Chirps<'a> {
         swings
     }
 
-    /// The range at which a frequency stands out most.
+    /// The ranges at which a frequency stands out most.
     fn strongest(&self, sidebands: &Sidebands, frequency_hz: f64) -> Option<Line> {
         let training = &self.evidence.split.training;
         let (channels, bins, count) = (self.evidence.cube.channels(), self.bins, training.len() as f64);
-        let mut scatter = vec![0.0; bins];
-        let power = [0, 1].map(|sideband| {
+        // Sums over the bins before: power of the training frames' mean by sideband, and what scatters around it.
+        let mut before = vec![[0.0; 3]; bins + 1];
+        for (sideband, values) in sidebands.iter().enumerate() {
             let turns = self.turns(frequency_hz, sideband);
-            let mut power = vec![0.0; bins];
             for channel in 0..channels {
                 for bin in 0..bins {
                     let (mut sum, mut squares) = (Complex64::ZERO, 0.0);
                     for &frame in training {
-                        let value = sidebands[sideband][(frame * channels + channel) * bins + bin];
+                        let value = values[(frame * channels + channel) * bins + bin];
                         sum += value * turns[frame];
                         squares += value.norm_sqr();
                     }
                     let of_mean = sum.norm_sqr() / count;
-                    power[bin] += of_mean;
-                    scatter[bin] += (squares - of_mean).max(0.0);
+                    before[bin + 1][sideband] += of_mean;
+                    before[bin + 1][2] += (squares - of_mean).max(0.0);
                 }
             }
-            power
-        });
-        let ratio = |bin: usize| {
-            let [upper, lower] = [power[0][bin], power[1][bin]];
-            let alike = upper.min(lower) >= ALIKE * upper.max(lower) && scatter[bin] > 0.0;
-            if alike { (upper + lower) / (scatter[bin] / (count - 1.0)) } else { 0.0 }
+        }
+        for bin in 0..bins {
+            let sum = before[bin];
+            before[bin + 1].iter_mut().zip(sum).for_each(|(value, sum)| *value += sum);
+        }
+        let line = |first: usize, width: usize| {
+            let last = first + width - 1;
+            let [upper, lower, scatter] = std::array::from_fn(|part| before[last + 1][part] - before[first][part]);
+            let ratio = (upper + lower) / (scatter / (count - 1.0)).max(f64::MIN_POSITIVE);
+            let plain = upper.min(lower) >= ALIKE * upper.max(lower) && scatter > 0.0 && ratio > LEAST_RATIO;
+            plain.then(|| {
+                let freedom = 2.0 * self.independent(width, scatter / (2.0 * (width * channels) as f64 * (count - 1.0)));
+                Line { frequency_hz, first, last, ratio, chance: fisher_tail(ratio, freedom, freedom * (count - 1.0)) }
+            })
         };
-        let bin = (0..bins).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
-        (ratio(bin) > 0.0).then(|| Line { frequency_hz, bin, ratio: ratio(bin) })
+        let places =
+            |width: usize| (0..(bins + 1).saturating_sub(width)).step_by(width.div_ceil(2)).map(move |first| (first, width));
+        TOGETHER.into_iter().flat_map(places).filter_map(|(first, width)| line(first, width)).max_by(Line::weaker)
+    }
+
+    /// How many of some ranges' values scatter independently, of each sideband. Where frames scatter by more than the noise, something
+    /// moves, which is alike in all channels: they count as one. `variance`: of one value.
+    fn independent(&self, width: usize, variance: f64) -> f64 {
+        let channels = self.evidence.cube.channels();
+        // The taper's energy is one.
+        let noise = self.evidence.noise().iter().sum::<f64>() / (channels * self.loops_s.len()) as f64;
+        let all = channels as f64 * (1.0 + (width - 1) as f64 / OF_ONE);
+        1.0 + (all - 1.0) * (noise / variance.max(f64::MIN_POSITIVE)).min(1.0)
     }
 
     /// A line beside its true frequency has a scatter of its own.
@@ -210,7 +256,7 @@ impl<'a> Chirps<'a> {
         let sidebands = self.sidebands(line.frequency_hz);
         for _ in 0..REFINEMENTS {
             let beside = [-step_hz, step_hz].map(|step| self.strongest(&sidebands, line.frequency_hz + step));
-            match beside.into_iter().flatten().find(|beside| beside.ratio > line.ratio) {
+            match beside.into_iter().flatten().find(|beside| line.weaker(beside).is_lt()) {
                 Some(better) => line = better,
                 None => step_hz *= 0.5,
             }
@@ -218,26 +264,23 @@ impl<'a> Chirps<'a> {
         line
     }
 
-    /// What the training frames' mean gains on the held-out ones, nats. Where the frames scatter by more than the noise,
-    /// something moves, which all channels share: they count as one.
+    /// What the training frames' mean gains on the held-out ones, nats.
     fn gain(&self, line: &Line, swings: &Sidebands) -> f64 {
         let (training, held_out) = (&self.evidence.split.training, &self.evidence.split.held_out);
         let channels = self.evidence.cube.channels();
         let (mut gained, mut scatter) = (0.0, 0.0);
         for values in swings {
-            for channel in 0..channels {
-                let value = |frame: usize| values[(frame * channels + channel) * self.bins + line.bin];
+            for (channel, bin) in (0..channels).flat_map(|channel| line.bins().map(move |bin| (channel, bin))) {
+                let value = |frame: usize| values[(frame * channels + channel) * self.bins + bin];
                 let mean = training.iter().map(|&frame| value(frame)).sum::<Complex64>() / training.len() as f64;
                 scatter += training.iter().map(|&frame| (value(frame) - mean).norm_sqr()).sum::<f64>();
                 gained += held_out.iter().map(|&frame| value(frame).norm_sqr() - (value(frame) - mean).norm_sqr()).sum::<f64>();
             }
         }
-        let numbers = (swings.len() * channels) as f64;
+        let width = line.bins().count();
+        let numbers = (swings.len() * channels * width) as f64;
         let variance = (scatter / (numbers * (training.len() - 1) as f64)).max(f64::MIN_POSITIVE);
-        // The taper's energy is one.
-        let noise = self.evidence.noise().iter().sum::<f64>() / (channels * self.loops_s.len()) as f64;
-        let independent = 1.0 + (channels - 1) as f64 * (noise / variance).min(1.0);
-        gained / variance * independent / channels as f64
+        gained / variance * self.independent(width, variance) / (channels * width) as f64
     }
 
     /// Whether the other static returns, together, swing by much less of their own.
@@ -256,18 +299,21 @@ impl<'a> Chirps<'a> {
             }
             dot.norm() / own.max(f64::MIN_POSITIVE)
         };
-        let near = |bin: usize| bin.abs_diff(line.bin) <= REACH;
+        let near = |bin: usize| (line.first.saturating_sub(REACH)..=line.last + REACH).contains(&bin);
         swings.iter().all(|values| depth(values, &|bin| !near(bin)) < OTHERS * depth(values, &near))
     }
 
     /// Of the frequencies that the frames' rate does not tell apart, the one whose swing explains most within the frames.
     fn settled(&self, line: Line) -> Line {
         let rate_hz = 1.0 / self.evidence.radar.frame_period_s;
-        let highest_hz = highest_hz(self.evidence);
+        let [lowest_hz, highest_hz] = self.band_hz();
         let tooth = |k: i32| line.frequency_hz + f64::from(k) * rate_hz;
-        let reach = ((highest_hz - LOWEST_HZ) / rate_hz) as i32;
-        let teeth = (-reach..=reach).map(tooth).filter(|frequency| (LOWEST_HZ..highest_hz).contains(frequency));
-        let explained = |frequency_hz: f64| Some((frequency_hz, self.explained(&self.swings_at(frequency_hz)?, line.bin)[0]));
+        let reach = ((highest_hz - lowest_hz) / rate_hz) as i32;
+        let teeth = (-reach..=reach).map(tooth).filter(|frequency| (lowest_hz..highest_hz).contains(frequency));
+        let explained = |frequency_hz: f64| {
+            let swings = self.swings_at(frequency_hz)?;
+            Some((frequency_hz, line.bins().map(|bin| self.explained(&swings, bin)[0]).sum::<f64>()))
+        };
         let best = teeth.filter_map(explained).max_by(|a, b| a.1.total_cmp(&b.1));
         Line { frequency_hz: best.map_or(line.frequency_hz, |best| best.0), ..line }
     }
@@ -283,11 +329,11 @@ impl<'a> Chirps<'a> {
             let value = |frame: usize, index: usize| self.spectra[frame][(index * channels + channel) * self.bins + bin];
             let sums = swings.sums(value);
             let fitted = swings.fitted(sums);
-            let all: f64 = (0..3).map(|part| (fitted[part].conj() * sums[part]).re).sum();
+            let all: f64 = (0..2).map(|part| (fitted[part].conj() * sums[part]).re).sum();
             let indices = || 0..self.loops_s.len();
             let energy: f64 =
                 swings.training.iter().flat_map(|&frame| indices().map(move |index| value(frame, index).norm_sqr())).sum();
-            [all - sums[0].norm_sqr() / swings.normal[(0, 0)], energy - all]
+            [all, energy - all]
         };
         (0..channels).map(of_channel).fold([0.0; 2], |sum, one| [sum[0] + one[0], sum[1] + one[1]])
     }
@@ -298,9 +344,9 @@ impl<'a> Chirps<'a> {
             let [explained, left] = self.explained(swings, bin);
             explained * swings.basis.len() as f64 > PLAIN * 2.0 * left
         };
-        let first = (0..line.bin).rev().take(WIDEST).take_while(|&bin| swings_too(bin)).last().unwrap_or(line.bin);
-        let last = (line.bin + 1..self.bins).take(WIDEST).take_while(|&bin| swings_too(bin)).last().unwrap_or(line.bin);
-        first.min(line.bin.saturating_sub(REACH))..=last.max(line.bin + REACH)
+        let first = (0..line.first).rev().take(WIDEST).take_while(|&bin| swings_too(bin)).last().unwrap_or(line.first);
+        let last = (line.last + 1..self.bins).take(WIDEST).take_while(|&bin| swings_too(bin)).last().unwrap_or(line.last);
+        first.min(line.first.saturating_sub(REACH))..=last.max(line.last + REACH)
     }
 
     /// What swings with the cosine and with the sine in some ranges, `[cosine, sine][channel · sample]`.
@@ -314,9 +360,9 @@ impl<'a> Chirps<'a> {
         for channel in 0..channels {
             let moving: Vec<Vec<Complex64>> = (0..frames).map(|frame| evidence.moving(frame, channel)).collect();
             let of_sample = |n: usize| swings.fitted(swings.sums(|frame, index| moving[frame][index * samples + n]));
-            let fitted: Vec<[Complex64; 3]> = (0..samples).map(of_sample).collect();
+            let fitted: Vec<[Complex64; 2]> = (0..samples).map(of_sample).collect();
             for (part, waves) in waves.iter_mut().enumerate() {
-                let mut wave: Vec<Complex64> = fitted.iter().map(|fitted| fitted[part + 1]).collect();
+                let mut wave: Vec<Complex64> = fitted.iter().map(|fitted| fitted[part]).collect();
                 forward.process(&mut wave);
                 for (bin, value) in wave.iter_mut().enumerate() {
                     *value *= if patch.contains(&bin) { 1.0 / samples as f64 } else { 0.0 };
@@ -329,15 +375,11 @@ impl<'a> Chirps<'a> {
     }
 }
 
-fn highest_hz(evidence: &Evidence) -> f64 {
-    HIGHEST_HZ.min(0.4 / evidence.radar.loop_period_s())
-}
-
 fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Candidate> {
     let evidence = chirps.evidence;
     let samples = evidence.cube.dims[4];
     let bin_m = evidence.radar.range_resolution_m();
-    let range_m = line.bin as f64 * bin_m;
+    let range_m = line.middle() * bin_m;
     let swings = chirps.swings_at(line.frequency_hz)?;
     let (patch, means) = (chirps.patch(&swings, line), swings.means);
     let waves = chirps.waves(&swings, &patch);
