@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::Template;
 
 /// From nothing, more steps change nothing that matters.
-const STEPS: usize = 60;
+const STEPS: usize = 180;
 
 /// One frame's measured powers where its templates reach, and the templates there.
 pub struct Reach {

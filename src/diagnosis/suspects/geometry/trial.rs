@@ -9,8 +9,9 @@ use crate::diagnosis::{BodyPrediction, Evidence};
 /// Degrees of freedom of the heavy tail: the expected power itself is uncertain.
 const TAIL: f32 = 2.0;
 
-/// Steps from the unchanged body's weights.
-const STEPS: usize = 12;
+/// Steps from the unchanged body's weights. Far from where it is, other parts are bright: with a few steps only, every change seems
+/// smaller than it is.
+const STEPS: usize = 120;
 
 /// Judges changes on one recording.
 pub struct Trial<'a> {

@@ -72,7 +72,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let first = chirps.looks(0.0, [0.0; 2]);
     let mut found = vec![];
     if !evidence.accepted.contains(&"chirp_droop") {
-        found.extend(chirps.converged(&first, &[TILT]).map(|found| (found.likelihood, chirps.droop(evidence, &found))));
+        // What transmits tires; nothing gains power along a chirp.
+        let falls = |found: &Estimated| found.values[0] < 0.0;
+        found.extend(
+            chirps.converged(&first, &[TILT]).filter(falls).map(|found| (found.likelihood, chirps.droop(evidence, &found))),
+        );
     }
     if !evidence.accepted.contains(&"chirp_nonlinearity") {
         let once = chirps.converged(&first, &[BEND]);
@@ -223,9 +227,7 @@ impl Chirps {
             rung: Rung::E,
             look_alikes: vec![],
             statement: format!(
-                "the power {} by {:.2} dB from the first to the last sample of every chirp, whatever is seen",
-                if db > 0.0 { "falls" } else { "rises" },
-                db.abs()
+                "the power falls by {db:.2} dB from the first to the last sample of every chirp, whatever is seen",
             ),
             curve: None,
             energy: total * (db / DECIBEL).powi(2) / 12.0,
