@@ -421,7 +421,7 @@ mod tests {
     use super::*;
     use crate::radar::Radar;
 
-    const HUM_HZ: f64 = 100.0;
+    const HUM_HZ: f64 = 160.0;
 
     /// Two static returns, of which one swings, or both, and somebody who moves, in noise.
     fn evidence(depth: f64, both: bool) -> Evidence {
@@ -449,7 +449,7 @@ mod tests {
         let after = before.with(&found);
         let energy = |evidence: &Evidence| evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum::<f64>();
         let removed = energy(&before) - energy(&after);
-        // Every frame sees the same third of a turn: its mean stands still.
+        // Every frame sees the same half of a turn: its mean stands still.
         let radar = &before.radar;
         let times = (0..8).flat_map(|frame| (0..16).map(move |slow| radar.chirp_time_s(frame, 0, slow)));
         let swings: Vec<f64> = times.map(|time| 8.0 * 0.3 * (TAU * HUM_HZ * time).cos()).collect();
