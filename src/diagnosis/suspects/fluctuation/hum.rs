@@ -20,9 +20,9 @@ use crate::diagnosis::statistics::{corrected, fisher_tail};
 
 /// Slower swings belong to people, faster ones to electronics.
 const LOWEST_HZ: f64 = 20.0;
+const HIGHEST_HZ: f64 = 500.0;
 /// Part of a turn that a frame must see: less of it is a slope, which a slow body has, too.
 const OF_TURN: f64 = 0.5;
-const HIGHEST_HZ: f64 = 500.0;
 /// Frequencies per resolution cell of the recording.
 const FINE: f64 = 4.0;
 /// Frequencies per resolution cell of a frame at which its amplitude is worked out.
@@ -41,6 +41,8 @@ const WIDEST: usize = 16;
 const PLAIN: f64 = 20.0;
 /// Share of its depth that all other static returns swing by at most: else it is the receiver's hum.
 const OTHERS: f64 = 0.3;
+/// Share of what stands still that lies elsewhere at least: without it, noise would say whether it is the receiver's.
+const ELSEWHERE: f64 = 0.01;
 const FEWEST_FRAMES: usize = 5;
 const REFINEMENTS: usize = 16;
 pub const BEHAVES_LIKE: &str = "a static return that hums";
@@ -53,6 +55,8 @@ struct Chirps<'a> {
     still: Vec<Complex64>,
     /// `[frame][loop · channel · bin]`
     spectra: Vec<Vec<Complex64>>,
+    /// First and last of ranges that are looked at together.
+    windows: Vec<[usize; 2]>,
     /// Of the loops relative to their frame's middle.
     loops_s: Vec<f64>,
     /// Of the frames' middles.
@@ -95,12 +99,11 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     }
     let chirps = Chirps::new(evidence)?;
     let duration_s = chirps.middles_s[training[training.len() - 1]] - chirps.middles_s[training[0]];
-    let frame_s = chirps.loops_s.len() as f64 * evidence.radar.loop_period_s();
     let [lowest_hz, highest_hz] = chirps.band_hz();
     if duration_s * lowest_hz < FEWEST_FRAMES as f64 || highest_hz <= lowest_hz {
         return None;
     }
-    let coarse = 1.0 / (COARSE * frame_s);
+    let coarse = 1.0 / (COARSE * chirps.frame_s());
     let fine = 1.0 / (FINE * duration_s);
     let cells = ((highest_hz - lowest_hz) / coarse).ceil() as usize;
     let strongest = |cell: usize| {
@@ -146,11 +149,13 @@ impl<'a> Chirps<'a> {
         });
         let loop_s = evidence.radar.loop_period_s();
         let middle = 0.5 * (loops - 1) as f64;
+        let still: Vec<Complex64> = (0..channels * bins).map(|i| still[i / bins * samples + i % bins]).collect();
         Some(Self {
             evidence,
             bins,
-            still: (0..channels * bins).map(|i| still[i / bins * samples + i % bins]).collect(),
+            windows: windows(&still, bins),
             spectra: spectra.collect(),
+            still,
             loops_s: (0..loops).map(|index| (index as f64 - middle) * loop_s).collect(),
             middles_s: evidence.starts_s.iter().map(|start| start + middle * loop_s).collect(),
         })
@@ -158,9 +163,11 @@ impl<'a> Chirps<'a> {
 
     /// Lowest and highest frequency that is looked at.
     fn band_hz(&self) -> [f64; 2] {
-        let loop_s = self.evidence.radar.loop_period_s();
-        let frame_s = self.loops_s.len() as f64 * loop_s;
-        [LOWEST_HZ.max(OF_TURN / frame_s), HIGHEST_HZ.min(0.4 / loop_s)]
+        [LOWEST_HZ.max(OF_TURN / self.frame_s()), HIGHEST_HZ.min(0.4 / self.evidence.radar.loop_period_s())]
+    }
+
+    fn frame_s(&self) -> f64 {
+        self.loops_s.len() as f64 * self.evidence.radar.loop_period_s()
     }
 
     /// At plus and minus a frequency, with the phases of the frames' middles.
@@ -226,8 +233,8 @@ impl<'a> Chirps<'a> {
             let sum = before[bin];
             before[bin + 1].iter_mut().zip(sum).for_each(|(value, sum)| *value += sum);
         }
-        let line = |first: usize, width: usize| {
-            let last = first + width - 1;
+        let line = |&[first, last]: &[usize; 2]| {
+            let width = last + 1 - first;
             let [upper, lower, scatter] = std::array::from_fn(|part| before[last + 1][part] - before[first][part]);
             let ratio = (upper + lower) / (scatter / (count - 1.0)).max(f64::MIN_POSITIVE);
             let plain = upper.min(lower) >= ALIKE * upper.max(lower) && scatter > 0.0 && ratio > LEAST_RATIO;
@@ -236,9 +243,7 @@ impl<'a> Chirps<'a> {
                 Line { frequency_hz, first, last, ratio, chance: fisher_tail(ratio, freedom, freedom * (count - 1.0)) }
             })
         };
-        let places =
-            |width: usize| (0..(bins + 1).saturating_sub(width)).step_by(width.div_ceil(2)).map(move |first| (first, width));
-        TOGETHER.into_iter().flat_map(places).filter_map(|(first, width)| line(first, width)).max_by(Line::weaker)
+        self.windows.iter().filter_map(line).max_by(Line::weaker)
     }
 
     /// How many of some ranges' values scatter independently, of each sideband. Where frames scatter by more than the noise, something
@@ -299,7 +304,8 @@ impl<'a> Chirps<'a> {
             }
             dot.norm() / own.max(f64::MIN_POSITIVE)
         };
-        let near = |bin: usize| (line.first.saturating_sub(REACH)..=line.last + REACH).contains(&bin);
+        let reached = reached(line.first, line.last);
+        let near = |bin: usize| reached.contains(&bin);
         swings.iter().all(|values| depth(values, &|bin| !near(bin)) < OTHERS * depth(values, &near))
     }
 
@@ -346,7 +352,8 @@ impl<'a> Chirps<'a> {
         };
         let first = (0..line.first).rev().take(WIDEST).take_while(|&bin| swings_too(bin)).last().unwrap_or(line.first);
         let last = (line.last + 1..self.bins).take(WIDEST).take_while(|&bin| swings_too(bin)).last().unwrap_or(line.last);
-        first.min(line.first.saturating_sub(REACH))..=last.max(line.last + REACH)
+        let reached = reached(line.first, line.last);
+        first.min(*reached.start())..=last.max(*reached.end())
     }
 
     /// What swings with the cosine and with the sine in some ranges, `[cosine, sine][channel · sample]`.
@@ -373,6 +380,27 @@ impl<'a> Chirps<'a> {
         }
         waves
     }
+}
+
+/// Ranges that are reached from some.
+fn reached(first: usize, last: usize) -> RangeInclusive<usize> {
+    first.saturating_sub(REACH)..=last + REACH
+}
+
+/// First and last of ranges to look at together, beside which something stands still. `still`: `[channel · bin]`.
+fn windows(still: &[Complex64], bins: usize) -> Vec<[usize; 2]> {
+    let mut powers = vec![0.0; bins];
+    still.iter().enumerate().for_each(|(i, value)| powers[i % bins] += value.norm_sqr());
+    let all: f64 = powers.iter().sum();
+    let of_width = |width: usize| {
+        (0..(bins + 1).saturating_sub(width)).step_by(width.div_ceil(2)).map(move |first| [first, first + width - 1])
+    };
+    let beside = |&[first, last]: &[usize; 2]| {
+        let reached = reached(first, last);
+        let elsewhere: f64 = (0..bins).filter(|bin| !reached.contains(bin)).map(|bin| powers[bin]).sum();
+        elsewhere >= ELSEWHERE * all
+    };
+    TOGETHER.into_iter().flat_map(of_width).filter(beside).collect()
 }
 
 fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Candidate> {
