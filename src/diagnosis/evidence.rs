@@ -10,6 +10,7 @@ use rustfft::{Fft, FftDirection, FftPlanner};
 use super::codes::{self, Component};
 use super::cube::{Cube, Loaded, Split};
 use super::denoised;
+use super::finding::{Undo, Volume};
 use super::power::PowerModel;
 use super::prediction::BodyPrediction;
 use super::products::Products;
@@ -38,6 +39,8 @@ pub struct Evidence {
     pub body: Option<BodyPrediction>,
     /// Ids that were accepted, oldest first.
     pub accepted: Vec<&'static str>,
+    /// What of it undid a fixed law of the samples, oldest first.
+    pub(super) inverses: Vec<(Undo, Volume)>,
     pub extremes: [f64; 2],
     /// Of the raw samples; none where they are no whole numbers.
     pub codes: Option<Arc<Vec<Component>>>,
@@ -61,6 +64,7 @@ impl Evidence {
             starts_s,
             body,
             accepted: vec![],
+            inverses: vec![],
             extremes,
             codes,
             noise: OnceLock::new(),

@@ -87,11 +87,38 @@ pub enum Rung {
     F,
 }
 
+/// What changes the samples of all frames.
+pub type Undo = Arc<dyn Fn(&mut Cube) + Send + Sync>;
+
+/// What inverting a law does to the density of what was measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Volume {
+    /// Whether every sample is changed for itself, whatever the others are: how it is stretched follows from the change.
+    pub by_sample: bool,
+    /// Logarithm by which volumes are stretched besides, or the density is spread, per sample.
+    pub alike: f64,
+}
+
+impl Volume {
+    /// It only turns and delays.
+    pub const KEPT: Self = Self { by_sample: false, alike: 0.0 };
+    pub const BY_SAMPLE: Self = Self { by_sample: true, alike: 0.0 };
+
+    /// Of a law with a number that every chirp or frame of so many samples has for itself: what its distribution loses by being
+    /// learned from these, nats each (Laplace's approximation).
+    pub fn spent(self, nats: f64, samples: usize) -> Self {
+        Self { alike: self.alike - nats / samples.max(1) as f64, ..self }
+    }
+}
+
 /// How an accepted effect is taken into account.
 #[derive(Clone)]
 pub enum Correction {
-    /// Undone in the samples, of all frames: subtracted or inverted.
-    Samples(Arc<dyn Fn(&mut Cube) + Send + Sync>),
+    /// Undone in the samples, of all frames, by what the frames themselves hold: subtracted, for the most part.
+    Samples(Undo),
+    /// Undone in the samples by a law with numbers that the training frames gave, or with a prior for those that they did not: what is
+    /// held out is foretold by it as it is.
+    Inverse(Undo, Volume),
     /// Changes what is predicted of the body.
     Body(Arc<dyn Fn(&mut BodyPrediction) + Send + Sync>),
     /// Explains power where it was not expected: (frame, doppler, range) masks are kept by whoever needs them.

@@ -4,7 +4,9 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Evidence, transform};
+use super::cube::Cube;
+use super::evidence::{Evidence, hann, transform};
+use super::finding::Undo;
 use super::support::Support;
 
 /// Of the held-out frames, in the samples as they were recorded.
@@ -22,6 +24,11 @@ pub struct Misfit {
 const FLOOR: f64 = 0.1;
 /// Training frames that say how strong is on average what was taken out.
 const MOST_TRAINING: usize = 16;
+
+/// Share of the root mean square by which samples are moved for a derivative.
+const STEP: f64 = 1e-4;
+/// Below this a determinant is no inverse's.
+const SINGULAR: f64 = 1e-6;
 
 /// Sums over cells.
 #[derive(Clone, Copy, Default)]
@@ -58,34 +65,43 @@ impl Misfit {
     pub fn after(recording: &Evidence, explained: &Evidence) -> Self {
         let [_, _, _, loops, samples] = recording.cube.dims;
         let channels = recording.cube.channels();
-        let quieter = recording.noise().iter().zip(explained.noise()).map(|(a, b)| a.min(*b));
-        let removed = Removed::new(recording, explained, quieter.collect());
         let support = Support::new(&recording.radar, recording.room.as_ref());
         let nothing = vec![Complex64::ZERO; channels * samples];
         let before = Baseline::new(recording, &support, &nothing, recording.noise());
-        let after = removed.as_ref().map(|removed| Baseline::new(explained, &support, &removed.still, &removed.noise));
-        let after = after.as_ref().or((!std::ptr::eq(recording, explained)).then_some(&before));
+        let after = (!std::ptr::eq(recording, explained)).then(|| Explained::new(recording, explained, &support));
+        let inverted = Inverted::new(recording, explained);
+        let from_inverted = inverted.as_ref().map(|inverted| Explained::new(&inverted.evidence, explained, &support));
         let bins = recording.range_bins();
         let cells: Vec<usize> = (0..loops).flat_map(|doppler| (0..bins).map(move |range| doppler * samples + range)).collect();
         let of_frame = |&frame: &usize| {
-            let here: Option<Vec<Vec<f32>>> = removed.as_ref().map(|removed| removed.powers(frame));
             let expected = [recording.expected(frame), explained.expected(frame)];
+            let [here, here_inverted] = [&after, &from_inverted].map(|after| after.as_ref().map(|after| after.powers(frame)));
             let of_channel = |channel: usize| {
                 let measured = transform(recording.cube.channel(frame, channel), samples);
-                let more = removed.iter().zip(&here).flat_map(|(removed, here)| removed.laws(here, channel));
+                let unexplained = before.law(channel, &expected[0], None);
+                let density = |law: &Law, measured: &[Complex64]| -> f64 {
+                    cells.iter().map(|&cell| law.log_density(cell, measured[cell])).sum()
+                };
+                let more = after.iter().zip(&here).flat_map(|(after, here)| after.more(here, channel));
                 let more: Vec<Vec<f32>> = more.collect();
-                let mut laws = vec![before.law(channel, &expected[0], None)];
-                if let Some(after) = after {
-                    laws.push(after.law(channel, &expected[1], None));
-                    laws.extend(more.iter().map(|more| after.law(channel, &expected[1], Some(more))));
+                let mut laws = vec![unexplained];
+                if let Some(after) = &after {
+                    laws.extend(after.laws(channel, &expected[1], &more));
                 }
-                let likelihood = |law: &Law| -> f64 { cells.iter().map(|&cell| law.log_density(cell, measured[cell])).sum() };
-                let each: Vec<f64> = laws.iter().map(likelihood).collect();
+                let mut each: Vec<f64> = laws.iter().map(|law| density(law, &measured)).collect();
                 let most = each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
                 let weights: Vec<f64> = each.iter().map(|value| (value - most).exp()).collect();
-                let total: f64 = weights.iter().sum();
+                let of_laws: f64 = weights.iter().sum();
+                if let (Some(inverted), Some(after), Some(here)) = (&inverted, &from_inverted, &here_inverted) {
+                    let became = transform(inverted.evidence.cube.channel(frame, channel), samples);
+                    let stretched = inverted.volume[frame * channels + channel] * bins as f64 / samples as f64;
+                    let more = after.more(here, channel);
+                    each.extend(after.laws(channel, &expected[1], &more).map(|law| density(&law, &became) + stretched));
+                }
+                let highest = each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                let total: f64 = each.iter().map(|value| (value - highest).exp()).sum();
                 let mut sums = Sums {
-                    likelihood: most + (total / laws.len() as f64).ln(),
+                    likelihood: highest + (total / each.len() as f64).ln(),
                     cells: cells.len(),
                     peak: 1.0,
                     ..Sums::default()
@@ -93,7 +109,7 @@ impl Misfit {
                 let unit = before.variance[channel];
                 for &cell in &cells {
                     let wanted: f64 =
-                        laws.iter().zip(&weights).map(|(law, weight)| weight / total * law.power(cell)).sum::<f64>();
+                        laws.iter().zip(&weights).map(|(law, weight)| weight / of_laws * law.power(cell)).sum::<f64>();
                     let (seen, wanted) = (measured[cell].norm_sqr() / unit, wanted / unit);
                     sums.squares += (10.0 * (seen.max(FLOOR) / wanted.max(FLOOR)).log10()).powi(2);
                     sums.peak = sums.peak.max(seen);
@@ -165,6 +181,92 @@ impl Law<'_> {
     }
 }
 
+/// What frames are expected to be once they are explained.
+struct Explained<'a> {
+    baseline: Baseline,
+    /// None where nothing was taken out.
+    removed: Option<Removed<'a>>,
+}
+
+impl<'a> Explained<'a> {
+    /// `recording`: as it was recorded, or with what is invertible inverted.
+    fn new(recording: &'a Evidence, explained: &'a Evidence, support: &Support) -> Self {
+        let quieter = recording.noise().iter().zip(explained.noise()).map(|(a, b)| a.min(*b));
+        let removed = Removed::new(recording, explained, quieter.collect());
+        let baseline = match &removed {
+            Some(removed) => Baseline::new(explained, support, &removed.still, &removed.noise),
+            None => Baseline::new(explained, support, &vec![Complex64::ZERO; explained.still().len()], explained.noise()),
+        };
+        Self { baseline, removed }
+    }
+
+    /// Of all channels of a frame, as far as something was taken out.
+    fn powers(&self, frame: usize) -> Vec<Vec<f32>> {
+        self.removed.iter().flat_map(|removed| removed.powers(frame)).collect()
+    }
+
+    /// Of what was taken out of a channel.
+    fn more(&self, here: &[Vec<f32>], channel: usize) -> Vec<Vec<f32>> {
+        self.removed.iter().flat_map(|removed| removed.laws(here, channel)).collect()
+    }
+
+    fn laws<'b>(&'b self, channel: usize, moving: &'b [f32], more: &'b [Vec<f32>]) -> impl Iterator<Item = Law<'b>> {
+        let alone = self.baseline.law(channel, moving, None);
+        std::iter::once(alone).chain(more.iter().map(move |more| self.baseline.law(channel, moving, Some(more))))
+    }
+}
+
+/// The recording after the inverses of fixed laws, and nothing else.
+struct Inverted {
+    evidence: Evidence,
+    /// Logarithm of how volumes are stretched, `[frame · channel]`.
+    volume: Vec<f64>,
+}
+
+impl Inverted {
+    /// None where no law was inverted.
+    fn new(recording: &Evidence, explained: &Evidence) -> Option<Self> {
+        if explained.inverses.is_empty() {
+            return None;
+        }
+        let mut evidence = recording.clone().changed();
+        let [frames, .., loops, samples] = recording.cube.dims;
+        let size = loops * samples;
+        let mut volume = vec![0.0; frames * recording.cube.channels()];
+        for (undo, kind) in &explained.inverses {
+            if kind.by_sample {
+                volume.iter_mut().zip(stretched(&evidence.cube, undo)).for_each(|(sum, more)| *sum += more);
+            }
+            volume.iter_mut().for_each(|sum| *sum += kind.alike * size as f64);
+            undo(&mut evidence.cube);
+        }
+        Some(Self { evidence, volume })
+    }
+}
+
+/// Of a change of every sample for itself: logarithm of its derivative's determinant, summed over the samples of `[frame · channel]` as
+/// much as the windows let each of them through.
+fn stretched(cube: &Cube, undo: &Undo) -> Vec<f64> {
+    let [.., loops, samples] = cube.dims;
+    let size = loops * samples;
+    let (slow, fast) = (hann(loops), hann(samples));
+    let rms = (cube.samples.iter().map(Complex64::norm_sqr).sum::<f64>() / cube.samples.len().max(1) as f64).sqrt();
+    let step = (STEP * rms).max(f64::MIN_POSITIVE.sqrt());
+    let moved = |by: Complex64| {
+        let mut moved = cube.clone();
+        moved.samples.iter_mut().for_each(|value| *value += by);
+        undo(&mut moved);
+        moved.samples
+    };
+    let [origin, right, up] = [Complex64::ZERO, Complex64::from(step), Complex64::new(0.0, step)].map(moved);
+    let determinant = |index: usize| {
+        let [a, b] = [&right, &up].map(|moved| (moved[index] - origin[index]) / step);
+        let through = slow[index % size / samples] * fast[index % samples];
+        (a.re * b.im - a.im * b.re).abs().max(SINGULAR).ln() * through.powi(2) * size as f64
+    };
+    (0..origin.len() / size).into_par_iter().map(|of| (of * size..(of + 1) * size).map(determinant).sum()).collect()
+}
+
 /// What the effects took out of the samples.
 struct Removed<'a> {
     recording: &'a Evidence,
@@ -224,5 +326,72 @@ impl<'a> Removed<'a> {
             laws.push((0..here[channel].len()).map(mean).collect());
         }
         laws
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::diagnosis::{Candidate, Correction, Place, Rung, Volume};
+    use crate::radar::Radar;
+
+    /// A return that stands still, whose samples have an image where nothing can stand.
+    fn still(image: Complex64) -> Evidence {
+        let mut radar = Radar::small(12);
+        (radar.loops_per_frame, radar.samples_per_chirp) = (16, 64);
+        let mut evidence = Evidence::in_noise(radar, 3, |[.., n]| Complex64::cis(0.8 * n as f64) * 30.0);
+        evidence.cube.each_chirp(|_, chirp| chirp.iter_mut().for_each(|value| *value += image * value.conj()));
+        evidence.changed()
+    }
+
+    fn without(image: Complex64) -> Candidate {
+        let undo = move |cube: &mut Cube| {
+            let scale = (1.0 - image.norm_sqr()).recip();
+            cube.each_chirp(|_, chirp| chirp.iter_mut().for_each(|value| *value = (*value - image * value.conj()) * scale));
+        };
+        Candidate {
+            id: None,
+            behaves_like: "image",
+            estimates: vec![],
+            choice: None,
+            place: Place::at("receiver"),
+            p_value: 0.0,
+            gain: 0.0,
+            rung: Rung::F,
+            look_alikes: vec![],
+            statement: String::new(),
+            curve: None,
+            energy: 0.0,
+            correction: Correction::Inverse(Arc::new(undo), Volume::BY_SAMPLE),
+        }
+    }
+
+    #[test]
+    fn a_law_that_is_inverted_leaves_what_there_was_without_it() {
+        let image = Complex64::new(0.06, -0.08);
+        let (with, clean) = (still(image), Misfit::of(&still(Complex64::ZERO)));
+        let before = Misfit::of(&with);
+        let after = |image: Complex64| Misfit::after(&with, &with.with(&without(image))).loglik_per_sample;
+        // As a density of what was recorded: its volumes were shrunk by 1 − |μ|².
+        let wanted = clean.loglik_per_sample - (1.0 - image.norm_sqr()).ln();
+        let recovered = (after(image) - before.loglik_per_sample) / (wanted - before.loglik_per_sample);
+        assert!((recovered - 1.0).abs() < 0.02, "{recovered} of {}", wanted - before.loglik_per_sample);
+        // A wrong one gains nothing.
+        assert!(after(-image) < before.loglik_per_sample + 0.02 * (wanted - before.loglik_per_sample));
+    }
+
+    #[test]
+    fn a_stretch_changes_no_likelihood_but_by_its_volume() {
+        let with = still(Complex64::ZERO);
+        let twice = |cube: &mut Cube| cube.samples.iter_mut().for_each(|value| *value *= 2.0);
+        for volume in [Volume::BY_SAMPLE, Volume { alike: 2.0 * 2f64.ln(), ..Volume::KEPT }] {
+            let candidate = Candidate { correction: Correction::Inverse(Arc::new(twice), volume), ..without(Complex64::ZERO) };
+            let stretched = Misfit::after(&with, &with.with(&candidate));
+            let law = stretched.loglik_per_sample - Misfit::of(&with).loglik_per_sample;
+            // Nothing is gained; of several laws that all say the same, some say something else.
+            assert!((-0.01..1e-6).contains(&law), "{volume:?} {law}");
+        }
     }
 }

@@ -33,6 +33,6 @@ pub mod suspects;
 pub use config::DiagnosisConfig;
 pub use cube::{Cube, Split};
 pub use evidence::Evidence;
-pub use finding::{Candidate, Correction, Estimate, Place, Rung};
+pub use finding::{Candidate, Correction, Estimate, Place, Rung, Volume};
 pub use journey::{Diagnosis, diagnose};
 pub use prediction::{BodyPrediction, Point};

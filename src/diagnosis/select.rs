@@ -352,6 +352,10 @@ impl Evidence {
         }
         match &candidate.correction {
             Correction::Samples(undo) => undo(&mut next.cube),
+            Correction::Inverse(undo, volume) => {
+                undo(&mut next.cube);
+                next.inverses.push((undo.clone(), *volume));
+            }
             Correction::Body(change) => {
                 if let Some(body) = &mut next.body {
                     change(body);

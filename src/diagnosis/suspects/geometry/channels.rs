@@ -22,8 +22,9 @@ use crate::radar::Radar;
 
 /// Expected power over the noise from which on a cell is used.
 const LEAST_POWER: f32 = 10.0;
-/// What the power model's errors do to a phase between neighbouring receivers (half a wavelength).
-const PHASE_FLOOR_RAD: f64 = 1.5 * PI / 180.0;
+/// What the power model's errors, and other effects that were not taken out, do to a phase between neighbouring receivers (half a
+/// wavelength).
+const PHASE_FLOOR_RAD: f64 = 3.0 * PI / 180.0;
 /// Chance below which receivers may not be alike, and below which they are not.
 pub const UNEVEN: f64 = 0.05;
 const UNLIKELY: f64 = 1e-4;

@@ -10,7 +10,7 @@ use super::covariance::Array;
 use super::mismatch;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;
-use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, Rung, statistics};
+use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, Rung, Volume, statistics};
 
 /// What errors of the prediction may imitate: 0.3° and 0.05 dB.
 const FLOOR: f64 = 0.005;
@@ -69,7 +69,7 @@ pub fn one_way(evidence: &Evidence, array: &Array, alike: Option<&Found>) -> Opt
             -20.0 * strength.norm().log10()
         ),
         energy: 0.5 * neighbours.energy,
-        correction: Correction::Samples(Arc::new(move |cube| undo(cube, heard))),
+        correction: uncoupled(evidence.radar.rx_m.len(), heard),
         look_alikes: vec![],
         ..neighbours
     };
@@ -141,8 +141,14 @@ fn candidate(evidence: &Evidence, strength: Complex64, found: &Estimated) -> Can
         ),
         curve: None,
         energy: samples * strength.norm_sqr() * mean_neighbours,
-        correction: Correction::Samples(Arc::new(move |cube| undo(cube, [strength; 2]))),
+        correction: uncoupled(receivers, [strength; 2]),
     }
+}
+
+fn uncoupled(receivers: usize, heard: Heard) -> Correction {
+    // Of the real and the imaginary part.
+    let stretched = alone(receivers, heard).map_or(0.0, |inverse| 2.0 * inverse.determinant().norm().ln() / receivers as f64);
+    Correction::Inverse(Arc::new(move |cube| undo(cube, heard)), Volume { alike: stretched, ..Volume::KEPT })
 }
 
 /// Solves for what the receivers would have heard alone.

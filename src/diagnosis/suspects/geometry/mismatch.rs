@@ -14,7 +14,7 @@ use super::covariance::{Array, Cells};
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;
 use crate::diagnosis::statistics::{DECIBEL, corrected};
-use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
+use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung, Volume};
 
 /// What errors of the prediction do to a gain and to a phase: a body that keeps its place shows the same wrong reflectivities in all frames.
 const GAIN_FLOOR_DB: f64 = 0.05;
@@ -118,10 +118,13 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
         look_alikes: vec![],
         curve: None,
         energy,
-        correction: Correction::Samples(Arc::new(move |cube| {
-            cube.each_chirp(|[_, channel, _], samples| {
-                samples.iter_mut().for_each(|value| *value *= inverse[channel % receivers]);
-            });
-        })),
+        correction: Correction::Inverse(
+            Arc::new(move |cube| {
+                cube.each_chirp(|[_, channel, _], samples| {
+                    samples.iter_mut().for_each(|value| *value *= inverse[channel % receivers]);
+                });
+            }),
+            Volume::BY_SAMPLE,
+        ),
     }
 }

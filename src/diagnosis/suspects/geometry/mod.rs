@@ -9,6 +9,7 @@ mod displaced;
 mod mismatch;
 mod places;
 mod skew;
+mod standing;
 mod trial;
 
 use change::Moves;

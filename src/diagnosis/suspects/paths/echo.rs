@@ -11,7 +11,7 @@ use crate::diagnosis::evidence::transform;
 use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::receiver::harmonic;
-use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Rung};
+use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Rung, Volume};
 use crate::radar::SPEED_OF_LIGHT;
 
 /// Delays that are tried, half cells of range.
@@ -159,17 +159,20 @@ pub fn multibounce(scene: &Scene, tried: f64) -> Option<Candidate> {
         ),
         curve: None,
         energy: factor.norm_sqr() * super::mover::energy(scene, body / 2.25),
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-            let still = still.clone();
-            cube.each_chirp(|[_, channel, _], chirp| {
-                let still = &still[channel * samples..][..samples];
-                for (n, value) in chirp.iter_mut().enumerate() {
-                    // The measured signal holds the copy, too: undo 1 + κ D, to third order.
-                    let copy = factor * Complex64::cis(rate * n as f64);
-                    *value -= (*value - still[n]) * copy * (1.0 - copy + copy * copy);
-                }
-            });
-        })),
+        correction: Correction::Inverse(
+            Arc::new(move |cube: &mut Cube| {
+                let still = still.clone();
+                cube.each_chirp(|[_, channel, _], chirp| {
+                    let still = &still[channel * samples..][..samples];
+                    for (n, value) in chirp.iter_mut().enumerate() {
+                        // The measured signal holds the copy, too: undo 1 + κ D, to third order.
+                        let copy = factor * Complex64::cis(rate * n as f64);
+                        *value -= (*value - still[n]) * copy * (1.0 - copy + copy * copy);
+                    }
+                });
+            }),
+            Volume::BY_SAMPLE,
+        ),
     })
 }
 

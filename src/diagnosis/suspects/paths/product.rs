@@ -14,7 +14,7 @@ use crate::diagnosis::denoised;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::receiver::harmonic;
-use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Rung};
+use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Rung, Volume};
 
 /// Log-likelihood within which two explanations are not told apart.
 const CLOSE: f64 = 4.6;
@@ -123,7 +123,11 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
         statement,
         curve: None,
         energy: *energy,
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| remove(cube, kind, factor))),
+        correction: Correction::Inverse(
+            Arc::new(move |cube: &mut Cube| remove(cube, kind, factor)),
+            // A product with what other receivers heard turns with them, and stretches nothing on average.
+            if kind == Kind::Harmonic { Volume::BY_SAMPLE } else { Volume::KEPT },
+        ),
     })
 }
 

@@ -114,7 +114,7 @@ fn believed(evidence: &Evidence) -> Vec<Candidate> {
 }
 
 fn corrected(mut evidence: Evidence, found: &Candidate) -> Evidence {
-    if let Correction::Samples(correct) = &found.correction {
+    if let Correction::Samples(correct) | Correction::Inverse(correct, _) = &found.correction {
         correct(&mut evidence.cube);
     }
     evidence.accepted.extend(found.id);

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung, Volume};
 use crate::diagnosis::products::{Law, Product, without};
 use crate::diagnosis::{Cube, Evidence, denoised};
 
@@ -84,10 +84,13 @@ fn nonlinear(evidence: &Evidence, behaves_like: &'static str, laws: Vec<Law>, st
         statement,
         curve: None,
         energy,
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-            cube.each_chirp(|_, chirp| {
-                chirp.iter_mut().for_each(|value| *value = without(&laws, *value));
-            });
-        })),
+        correction: Correction::Inverse(
+            Arc::new(move |cube: &mut Cube| {
+                cube.each_chirp(|_, chirp| {
+                    chirp.iter_mut().for_each(|value| *value = without(&laws, *value));
+                });
+            }),
+            Volume::BY_SAMPLE,
+        ),
     }
 }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::harmonic::QUADRATIC;
 use super::support::{beat_hz, ranges_m};
 use crate::diagnosis::evidence::spectrum;
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung, Volume};
 use crate::diagnosis::statistics::{DECIBEL, chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
 
@@ -196,8 +196,9 @@ fn imbalance(mu: Complex64) -> (f64, f64) {
 
 /// s = (y − μ y*) / (1 − |μ|²).
 fn undo(mu: Complex64) -> Correction {
-    Correction::Samples(Arc::new(move |cube: &mut Cube| {
+    let undo = move |cube: &mut Cube| {
         let scale = (1.0 - mu.norm_sqr()).recip();
         cube.each_chirp(|_, chirp| chirp.iter_mut().for_each(|value| *value = (*value - mu * value.conj()) * scale));
-    }))
+    };
+    Correction::Inverse(Arc::new(undo), Volume::BY_SAMPLE)
 }

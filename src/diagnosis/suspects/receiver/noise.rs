@@ -5,6 +5,7 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::image::empty_bins;
 use crate::diagnosis::Evidence;
@@ -19,6 +20,13 @@ const STRANGER: f64 = 8.0;
 
 /// How well a real noise follows the law, as a logarithm's deviation.
 const LAW: f64 = 0.05;
+
+/// Cells of a map under two Hann windows per independent product of two receivers' noise: neighbours are correlated by 2/3 and 1/6
+/// along either axis, and their products by the square of that.
+const PER_PRODUCT: f64 = (35.0 / 18.0) * (35.0 / 18.0);
+
+/// Least correlation: far below a hundredth it is nobody's business, and strangers' tails begin to count.
+const LEAST_RHO: f64 = 0.005;
 
 /// Share of the correlation that the middle one of all Doppler rows, of all beat frequencies, and of all frames must have:
 /// what a stranger's side lobes or some bursts share lies in a few of them.
@@ -187,7 +195,7 @@ fn cells(evidence: &Evidence, frame: usize, bins: &[usize]) -> Cells {
 /// Whether most Doppler rows, most beat frequencies and most frames share a correlation between the receivers.
 fn is_everywhere(evidence: &Evidence, bins: &[usize], found: &DMatrix<Complex64>) -> bool {
     let (rx, loops, samples) = (evidence.cube.dims[2], evidence.cube.dims[3], evidence.cube.dims[4]);
-    let pairs: Vec<(usize, usize)> = (0..rx).flat_map(|a| (0..a).map(move |b| (a, b))).collect();
+    let pairs: Vec<(usize, usize)> = pairs_of(rx).collect();
     let whole: f64 = pairs.iter().map(|&pair| found[pair].norm_sqr()).sum();
     let (mut by_bin, mut by_row) = (vec![(0.0, 0.0); samples], vec![(0.0, 0.0); loops]);
     let mut by_frame = vec![(0.0, 0.0); evidence.cube.dims[0]];
@@ -229,9 +237,8 @@ impl Shared {
         Self { products: self.products + &other.products, cells: self.cells + other.cells }
     }
 
-    /// Windows share 2.25 cells.
     fn independent(&self) -> f64 {
-        self.cells / 2.25
+        self.cells / PER_PRODUCT
     }
 
     /// Root mean square of every receiver.
@@ -244,14 +251,30 @@ impl Shared {
         DMatrix::from_fn(receivers, receivers, |a, b| self.products[(a, b)] / (self.cells.max(1.0) * scales[a] * scales[b]))
     }
 
-    /// Log-likelihood that other cells gain by these correlations, beside these powers alone.
-    fn gain(&self, others: &Self) -> Option<f64> {
+    /// Log-likelihood that other cells gain by correlations, beside these powers alone; `alike`: the same one in all pairs.
+    fn gain(&self, others: &Self, alike: bool) -> Option<f64> {
         let scales = self.scales();
-        let (expected, seen) = (self.correlations(&scales), others.correlations(&scales));
+        let (own, seen) = (self.correlations(&scales), others.correlations(&scales));
+        let expected = if alike { equal(own.nrows(), mean_correlation(&own)) } else { own };
         let determinant = expected.determinant().re;
         let inverse = expected.try_inverse()?;
         (determinant > 0.0).then(|| others.independent() * (seen.trace().re - (inverse * seen).trace().re - determinant.ln()))
     }
+}
+
+fn pairs_of(receivers: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..receivers).flat_map(|a| (0..a).map(move |b| (a, b)))
+}
+
+/// Mean over pairs of receivers; what all of them hear alike is real.
+fn mean_correlation(correlations: &DMatrix<Complex64>) -> f64 {
+    let receivers = correlations.nrows();
+    pairs_of(receivers).map(|pair| correlations[pair].re).sum::<f64>() / pairs_of(receivers).count().max(1) as f64
+}
+
+/// One and the same correlation between any two.
+fn equal(receivers: usize, rho: f64) -> DMatrix<Complex64> {
+    DMatrix::from_fn(receivers, receivers, |a, b| Complex64::from(if a == b { 1.0 } else { rho }))
 }
 
 fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
@@ -269,25 +292,30 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     let found = training.correlations(&training.scales());
     let independent = training.independent();
     let pairs = (rx * (rx - 1) / 2) as f64;
-    let total: f64 = (0..rx).flat_map(|a| (0..a).map(move |b| (a, b))).map(|(a, b)| found[(a, b)].norm_sqr()).sum();
-    let p_value = chi2_tail(2.0 * independent * total, 2.0 * pairs);
+    let total: f64 = pairs_of(rx).map(|pair| found[pair].norm_sqr()).sum();
+    let mean = mean_correlation(&found);
+    // Any correlation of any two; and that of noise from one place, such as a supply, which all receivers hear alike: one number.
+    let chances =
+        [chi2_tail(2.0 * independent * total, 2.0 * pairs), Normal::standard().sf(mean * (2.0 * independent * pairs).sqrt())];
+    let alike = chances[1] < chances[0];
+    let p_value = corrected(chances[0].min(chances[1]), 2.0);
     // Of what is found, chance has its share.
-    let rho = (total / pairs - 1.0 / independent).max(0.0).sqrt();
-    // Far below a hundredth it is nobody's business, and strangers' tails begin to count.
-    if p_value > 1e-3 || rho < 0.005 {
+    let rho = if alike { mean } else { (total / pairs - 1.0 / independent).max(0.0).sqrt() };
+    if p_value > 1e-3 || rho < LEAST_RHO {
         return None;
     }
-    if !is_everywhere(evidence, bins, &found) {
+    if !is_everywhere(evidence, bins, &if alike { equal(rx, rho) } else { found }) {
         return None;
     }
     // Few held-out frames say little of so many numbers: every frame is foretold by those of the other folds.
     let gain: f64 = folds(of_frames.len())
         .map(|parts| {
             let [rest, fold] = parts.map(|frames| sum(&frames));
-            rest.gain(&fold).unwrap_or(f64::NEG_INFINITY)
+            rest.gain(&fold, alike).unwrap_or(f64::NEG_INFINITY)
         })
         .sum();
     let error = (2.0 * independent * pairs).sqrt().recip() + 0.02 * rho;
+    let over = if alike { "mean" } else { "root mean square" };
     let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
     Some(Candidate {
         id: Some("correlated_noise"),
@@ -300,7 +328,7 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
         rung: Rung::F,
         look_alikes: vec![],
         statement: format!(
-            "the receivers' noise is not independent: where nothing is, they agree with a correlation of {rho:.3} (root mean square \
+            "the receivers' noise is not independent: where nothing is, they agree with a correlation of {rho:.3} ({over} \
              over pairs), like a target in one fixed direction in every cell"
         ),
         curve: None,

@@ -15,7 +15,7 @@ use rustfft::FftPlanner;
 use super::field::{Field, add, orthonormal};
 use super::support::{beat_hz, dot, tone};
 use crate::diagnosis::evidence::hann;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung, Volume};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
 
@@ -372,13 +372,17 @@ fn undo(response: &[Complex64], fitted: Vec<Vec<Complex64>>, still: Vec<Vec<Comp
     // Where hardly anything comes through, the inverse would raise nothing but noise: it falls off instead.
     let inverse: Vec<Complex64> = response.iter().map(|h| h.conj() / h.norm_sqr().max(LEAST_POWER)).collect();
     let filter = Filter::new(&inverse);
-    Correction::Samples(Arc::new(move |cube: &mut Cube| {
-        cube.each_chirp(|[_, channel, _], chirp| {
-            chirp.iter_mut().zip(&fitted[channel]).for_each(|(value, fitted)| *value -= fitted);
-            filter.apply(chirp);
-            chirp.iter_mut().zip(&still[channel]).for_each(|(value, still)| *value += still);
-        });
-    }))
+    let stretched = inverse.iter().map(|h| h.norm_sqr().max(f64::MIN_POSITIVE).ln()).sum::<f64>() / inverse.len().max(1) as f64;
+    Correction::Inverse(
+        Arc::new(move |cube: &mut Cube| {
+            cube.each_chirp(|[_, channel, _], chirp| {
+                chirp.iter_mut().zip(&fitted[channel]).for_each(|(value, fitted)| *value -= fitted);
+                filter.apply(chirp);
+                chirp.iter_mut().zip(&still[channel]).for_each(|(value, still)| *value += still);
+            });
+        }),
+        Volume { alike: stretched, ..Volume::KEPT },
+    )
 }
 
 /// A multiplication of a chirp's DFT.

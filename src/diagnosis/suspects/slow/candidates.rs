@@ -13,7 +13,7 @@ use super::settling::Settling;
 use super::undo;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Rung, Volume};
 use crate::radar::SPEED_OF_LIGHT;
 
 /// Range at which a phase in proportion to the delay is stated.
@@ -27,9 +27,10 @@ fn stated_delay_s() -> f64 {
 /// Frame, transmitter and loop to the deviation of that chirp.
 type Deviation = Arc<dyn Fn([usize; 3]) -> f64 + Send + Sync>;
 
-fn correction(evidence: &Evidence, part: Part, deviation: Deviation) -> Correction {
+/// `spent`: nats per chirp on deviations that no law foretells.
+fn correction(evidence: &Evidence, part: Part, deviation: Deviation, spent: f64) -> Correction {
     let (radar, room) = (evidence.radar.clone(), evidence.room.clone());
-    Correction::Samples(Arc::new(move |cube: &mut Cube| {
+    let undo = move |cube: &mut Cube| {
         let receivers = cube.dims[2];
         let of_channel = |[frame, channel, index]: [usize; 3]| deviation([frame, channel / receivers, index]);
         match part {
@@ -41,7 +42,10 @@ fn correction(evidence: &Evidence, part: Part, deviation: Deviation) -> Correcti
                 undo::delay_phase(cube, &radar, lever, of_channel);
             }
         }
-    }))
+    };
+    let volume = if part == Part::Gain { Volume::BY_SAMPLE } else { Volume::KEPT };
+    let samples = evidence.cube.dims[4] * evidence.cube.dims[2];
+    Correction::Inverse(Arc::new(undo), volume.spent(spent, samples))
 }
 
 /// Energy that a deviation adds to what stands still.
@@ -156,7 +160,7 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
         statement,
         curve: None,
         energy: energy(evidence, field, part, &*deviation),
-        correction: correction(evidence, part, deviation),
+        correction: correction(evidence, part, deviation, 0.0),
     }
 }
 
@@ -230,7 +234,7 @@ pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -
         statement,
         curve: Some(curve),
         energy: energy(evidence, field, part, &*deviation),
-        correction: correction(evidence, part, deviation),
+        correction: correction(evidence, part, deviation, 0.0),
     }
 }
 
@@ -304,7 +308,10 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
         statement,
         curve: Some(curve),
         energy,
-        correction: Correction::Samples(Arc::new(move |cube| undo::gain(cube, |[_, _, index]| 1.0 + deviation(index)))),
+        correction: Correction::Inverse(
+            Arc::new(move |cube| undo::gain(cube, |[_, _, index]| 1.0 + deviation(index))),
+            Volume::BY_SAMPLE,
+        ),
     }
 }
 
@@ -323,6 +330,8 @@ pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random
         })
         .collect();
     let loops = series.loops;
+    let of_chirp = |i: usize| 0.5 * (variance * series.weight[i / loops]).ln_1p();
+    let spent = (0..values.len()).map(of_chirp).sum::<f64>() / values.len().max(1) as f64;
     let deviation: Deviation = Arc::new(move |[frame, _, index]| values[frame * loops + index]);
     let at_stated = random.deviation * stated_delay_s();
     let error = random.deviation_error * stated_delay_s();
@@ -384,6 +393,6 @@ pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random
         statement,
         curve: None,
         energy: energy(evidence, field, part, &*deviation),
-        correction: correction(evidence, part, deviation),
+        correction: correction(evidence, part, deviation, spent),
     }
 }

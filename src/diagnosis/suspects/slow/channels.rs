@@ -10,8 +10,9 @@ use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::steady::Steady;
+use crate::diagnosis::cube::folds;
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, NINETY, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, NINETY, Place, Rung, Volume};
 use crate::diagnosis::statistics::{self, DECIBEL};
 
 /// Fewest receivers or transmitters of which one can be told to be odd.
@@ -79,10 +80,12 @@ struct Judged {
     series: Series,
     p_value: f64,
     gain: f64,
+    /// Of the gains.
+    variance: f64,
 }
 
 fn judged(evidence: &Evidence, steady: &Steady, unit: Axis) -> Option<Judged> {
-    let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
+    let training = &evidence.split.training;
     let relative = Relative::new(steady, evidence.cube.dims[2], unit);
     let all = relative.series(training, |_| true)?;
     // The nearer and the farther half of what the groups know.
@@ -100,25 +103,57 @@ fn judged(evidence: &Evidence, steady: &Steady, unit: Axis) -> Option<Judged> {
         return None;
     }
     // What but one half has, such as slow parts of the body, the other one has by chance.
-    let p_value = chance(&halves[0], &halves[1], training).max(chance(&halves[1], &halves[0], training));
-    // Gains drawn from one law in every frame; its variance comes from the training frames.
-    let seen: Vec<usize> = training.iter().copied().filter(|&f| all.weight[f] > 0.0).collect();
-    let mean = |of: &dyn Fn(usize) -> f64| seen.iter().map(|&f| of(f)).sum::<f64>() / seen.len() as f64;
-    let variance = (mean(&|f| all.value[f].norm_sqr()) - mean(&|f| 1.0 / all.weight[f])).max(0.0);
-    let gain = held_out
-        .iter()
-        .map(|&f| {
-            let ratio = 1.0 + variance * all.weight[f];
-            all.value[f].norm_sqr() * all.weight[f] * (1.0 - 1.0 / ratio) - ratio.ln()
-        })
-        .sum();
-    Some(Judged { unit, members: relative.members, series: all, p_value, gain })
+    let patterns = halves.each_ref().map(|half| half.likely(training));
+    let p_value = chance(&halves[0], &patterns[1], training).max(chance(&halves[1], &patterns[0], training));
+    // Gains drawn from one law in every frame. Few held-out frames may all have the same one: every frame is foretold by those of the
+    // other folds.
+    let seen = |frames: &[usize]| frames.iter().copied().filter(|&f| all.weight[f] > 0.0).collect::<Vec<usize>>();
+    let gain = folds(evidence.cube.dims[0]).map(|[rest, fold]| Law::of(&all, &seen(&rest)).gain(&all, &seen(&fold))).sum();
+    let variance = Law::of(&all, &seen(training)).variance;
+    Some(Judged { unit, members: relative.members, series: all, p_value, gain, variance })
+}
+
+/// Of gains: where they are, and how much they vary.
+struct Law {
+    mean: Complex64,
+    variance: f64,
+}
+
+impl Law {
+    fn of(series: &Series, frames: &[usize]) -> Self {
+        let count = frames.len().max(1) as f64;
+        let mean = frames.iter().map(|&f| series.value[f]).sum::<Complex64>() / count;
+        let square = frames.iter().map(|&f| (series.value[f] - mean).norm_sqr() - 1.0 / series.weight[f]).sum::<f64>() / count;
+        Self { mean, variance: square.max(0.0) }
+    }
+
+    /// Log-likelihood that frames gain over gains that stay as they are.
+    fn gain(&self, series: &Series, frames: &[usize]) -> f64 {
+        let of_frame = |&f: &usize| {
+            let ratio = 1.0 + self.variance * series.weight[f];
+            (series.value[f] - self.mean).norm_sqr() * series.weight[f] * (1.0 - 1.0 / ratio) - ratio.ln()
+        };
+        frames.iter().map(of_frame).sum()
+    }
+}
+
+impl Series {
+    /// What the gains most probably are, given their noise and the variance that they show: a frame that is hardly known says little of
+    /// the pattern.
+    fn likely(&self, frames: &[usize]) -> Vec<Complex64> {
+        let known = || frames.iter().copied().filter(|&f| self.weight[f] > 0.0);
+        let sum = |of: &dyn Fn(usize) -> f64| known().map(of).sum::<f64>();
+        let (square, total) = (sum(&|f| self.weight[f] * self.value[f].norm_sqr()), sum(&|f| self.weight[f]));
+        let variance = ((square - known().count() as f64) / total.max(f64::MIN_POSITIVE)).max(0.0);
+        let shrunk = |(value, weight): (&Complex64, &f64)| value * (variance * weight / (1.0 + variance * weight));
+        self.value.iter().zip(&self.weight).map(shrunk).collect()
+    }
 }
 
 /// That one half has so much of the other's pattern: one number, whose error is what its own groups scatter.
-fn chance(half: &Series, pattern: &Series, frames: &[usize]) -> f64 {
+fn chance(half: &Series, pattern: &[Complex64], frames: &[usize]) -> f64 {
     let [alike, square] = frames.iter().fold([0.0; 2], |[alike, square], &f| {
-        let (own, wanted) = (half.value[f], pattern.value[f]);
+        let (own, wanted) = (half.value[f], pattern[f]);
         [alike + half.weight[f] * (own * wanted.conj()).re, square + half.weight[f] * wanted.norm_sqr()]
     });
     let law = StudentsT::new(0.0, 1.0, half.freedom);
@@ -237,6 +272,10 @@ impl Judged {
         let square: f64 = known.iter().map(|&f| self.series.value[f].norm_sqr()).sum();
         let times: Vec<f64> = known.iter().map(|&f| evidence.starts_s[f]).collect();
         let members = self.members.clone();
+        // Of every frame, for all channels: the gain of one of them.
+        let spent =
+            known.iter().map(|&f| (self.variance * self.series.weight[f]).ln_1p()).sum::<f64>() / known.len().max(1) as f64;
+        let size = loops * samples * evidence.cube.channels();
         Candidate {
             id: None,
             behaves_like: BEHAVES_LIKE,
@@ -264,13 +303,16 @@ impl Judged {
                 series: vec![("measured".into(), times, decibel)],
             }),
             energy: own * square * loops as f64,
-            correction: Correction::Samples(Arc::new(move |cube| {
-                cube.each_chirp(|[frame, channel, _], chirp| {
-                    if let Some(gain) = gains[frame].filter(|_| members.contains(&channel)) {
-                        chirp.iter_mut().for_each(|value| *value /= gain);
-                    }
-                });
-            })),
+            correction: Correction::Inverse(
+                Arc::new(move |cube| {
+                    cube.each_chirp(|[frame, channel, _], chirp| {
+                        if let Some(gain) = gains[frame].filter(|_| members.contains(&channel)) {
+                            chirp.iter_mut().for_each(|value| *value /= gain);
+                        }
+                    });
+                }),
+                Volume::BY_SAMPLE.spent(spent, size),
+            ),
         }
     }
 }
@@ -296,8 +338,12 @@ mod tests {
         assert!(unlike.abs() < 0.5, "{unlike}");
         // Chance has it in the one and not in the other.
         let series = [half(hops, noise[0]), half(stays, noise[1])];
-        assert!(chance(&series[0], &half(hops, noise[1]), &frames) < 5e-3);
-        assert!((chance(&series[1], &series[0], &frames) - 0.5).abs() < 0.4);
+        assert!(chance(&series[0], &half(hops, noise[1]).likely(&frames), &frames) < 5e-3);
+        assert!((chance(&series[1], &series[0].likely(&frames), &frames) - 0.5).abs() < 0.4);
+        // A frame of which the pattern knows next to nothing, and what it knows is wrong, does no harm.
+        let (mut own, mut rough) = (half(hops, noise[0]), half(hops, noise[1]));
+        (rough.value[3], rough.weight[3], own.weight[3]) = (Complex64::from(10.0), 1e-3, 10.0);
+        assert!(chance(&own, &rough.value, &frames) > 0.1 && chance(&own, &rough.likely(&frames), &frames) < 1e-2);
         // A frame that one half hardly knows says nothing.
         let mut hardly = half(hops, noise[1]);
         hardly.weight[3] = 1e-3;

@@ -13,7 +13,7 @@ use super::field::{PATTERN, ahead};
 use super::lines::climb;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, Tapered};
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place, Rung, Volume};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 
 /// Bins over which the window spreads what is independent.
@@ -369,20 +369,23 @@ fn candidate(
         ),
         curve: None,
         energy,
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-            cube.each_chirp(|[frame, channel, index], chirp| {
-                let turn = at(frame, channel, index);
-                let back = Complex64::cis(-radians * turn.cos());
-                for (n, value) in chirp.iter_mut().enumerate() {
-                    let place = channel * samples + n;
-                    let swing: Complex64 =
-                        (1..=HARMONICS).map(|order| patterns[order][place] * (order as f64 * turn).cos()).sum();
-                    // What moves lies ahead.
-                    let still = patterns[0][place];
-                    *value = still + (*value - swing - still) * back;
-                }
-            });
-        })),
+        correction: Correction::Inverse(
+            Arc::new(move |cube: &mut Cube| {
+                cube.each_chirp(|[frame, channel, index], chirp| {
+                    let turn = at(frame, channel, index);
+                    let back = Complex64::cis(-radians * turn.cos());
+                    for (n, value) in chirp.iter_mut().enumerate() {
+                        let place = channel * samples + n;
+                        let swing: Complex64 =
+                            (1..=HARMONICS).map(|order| patterns[order][place] * (order as f64 * turn).cos()).sum();
+                        // What moves lies ahead.
+                        let still = patterns[0][place];
+                        *value = still + (*value - swing - still) * back;
+                    }
+                });
+            }),
+            Volume::KEPT,
+        ),
     }
 }
 
@@ -474,7 +477,7 @@ mod tests {
         // Without a room all returns count as if they lay ahead.
         let ahead = 0.3 * evidence.radar.wavelength_m() / (2.0 * TAU);
         assert!((0.7..1.1).contains(&(of("amplitude_m") / ahead)), "{} of {ahead}", of("amplitude_m"));
-        let Correction::Samples(undo) = &found.correction else { panic!() };
+        let Correction::Inverse(undo, _) = &found.correction else { panic!() };
         undo(&mut evidence.cube);
         let again = find(&evidence.changed());
         assert!(again.as_ref().is_none_or(|again| again.gain < 0.01 * found.gain), "{again:?}");

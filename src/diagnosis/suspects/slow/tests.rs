@@ -55,7 +55,9 @@ fn best(evidence: &Evidence) -> Option<Candidate> {
 /// Found and undone, nothing is left to find.
 fn found_once(mut evidence: Evidence) -> Candidate {
     let candidate = best(&evidence).expect("nothing found");
-    let Correction::Samples(undo) = &candidate.correction else { panic!("no correction of samples") };
+    let (Correction::Samples(undo) | Correction::Inverse(undo, _)) = &candidate.correction else {
+        panic!("no correction of samples")
+    };
     undo(&mut evidence.cube);
     let again = best(&evidence.changed());
     assert!(again.is_none(), "after {candidate:?} still {again:?}");
@@ -219,7 +221,7 @@ fn one_receiver_that_hops_is_told_from_all_that_drift() {
     let found = super::channels::find(&evidence_hopping);
     assert!(found.len() == 1 && found[0].p_value < 1e-6 && found[0].gain > 10.0, "{found:?}");
     assert_eq!(found[0].place.rx, Some(vec![2]));
-    let Correction::Samples(undo) = &found[0].correction else { panic!("no correction of samples") };
+    let Correction::Inverse(undo, _) = &found[0].correction else { panic!("no correction of samples") };
     undo(&mut evidence_hopping.cube);
     let again = super::channels::find(&evidence_hopping.changed());
     assert!(again.iter().all(|c| c.p_value > 5e-4), "{again:?}");

@@ -20,7 +20,7 @@ use rustfft::FftPlanner;
 
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::evidence::hann;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Rung, Volume};
 use crate::diagnosis::power::PowerModel;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::speckle::{Look, groups};
@@ -231,13 +231,16 @@ impl Chirps {
             ),
             curve: None,
             energy: total * (db / DECIBEL).powi(2) / 12.0,
-            correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-                cube.each_chirp(|_, chirp| {
-                    chirp.iter_mut().enumerate().for_each(|(n, value)| {
-                        *value *= 10f64.powf(db * (n as f64 / samples - 0.5) / 20.0);
+            correction: Correction::Inverse(
+                Arc::new(move |cube: &mut Cube| {
+                    cube.each_chirp(|_, chirp| {
+                        chirp.iter_mut().enumerate().for_each(|(n, value)| {
+                            *value *= 10f64.powf(db * (n as f64 / samples - 0.5) / 20.0);
+                        });
                     });
-                });
-            })),
+                }),
+                Volume::BY_SAMPLE,
+            ),
         }
     }
 
