@@ -60,7 +60,7 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, gain: f64)
         let off = |range_m: f64, rx: usize| -size * (range_m / mean_m).powf(power) * wave * places[rx];
         walls.as_ref().map_or(0.0, |walls| walls.log_likelihood(off))
     };
-    let (size, mean_m) = later(&frames, &standing)?;
+    let (size, mean_m) = later(&frames, standing)?;
     // The ratio of the walls' likelihoods, whose numbers the body gave, is one on average by chance, so that a p-value may be divided by it.
     let walls_gain = ROUGHLY * (standing(size, mean_m, LATER) - standing(0.0, mean_m, LATER));
     // Radian of a beat of one hertz, by receiver.
