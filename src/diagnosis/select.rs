@@ -31,8 +31,8 @@ impl DiagnosisConfig {
         };
         // What foretells held-out frames better than it must is as much less likely to be chance: the likelihood's ratio on data that
         // were not fitted exceeds e^gain by chance with a probability of e^-gain at most. Not where the body's prediction has a part:
-        // what errs in it errs in held-out frames alike.
-        let surplus = untouched && candidate.rung == Rung::F;
+        // what errs in it errs in held-out frames alike; nor where the frames that foretell are those of the p-value.
+        let surplus = untouched && candidate.rung == Rung::F && !SUSPECTS[suspect].foretells_all_frames;
         let surplus = if surplus { (candidate.gain - least).exp().clamp(1.0, MOST_SURPLUS) } else { 1.0 };
         candidate.p_value <= self.p_value(suspect) * surplus && candidate.gain >= least && candidate.gain.is_finite()
     }
