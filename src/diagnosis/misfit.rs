@@ -66,8 +66,7 @@ impl Misfit {
         let [_, _, _, loops, samples] = recording.cube.dims;
         let channels = recording.cube.channels();
         let support = Support::new(&recording.radar, recording.room.as_ref());
-        let nothing = vec![Complex64::ZERO; channels * samples];
-        let before = Baseline::new(recording, &support, &nothing, recording.noise());
+        let before = Baseline::new(recording, &support, None, recording.noise());
         let after = (!std::ptr::eq(recording, explained)).then(|| Explained::new(recording, explained, &support));
         let inverted = Inverted::new(recording, explained);
         let from_inverted = inverted.as_ref().map(|inverted| Explained::new(&inverted.evidence, explained, &support));
@@ -89,27 +88,23 @@ impl Misfit {
                     laws.extend(after.laws(channel, &expected[1], &more));
                 }
                 let mut each: Vec<f64> = laws.iter().map(|law| density(law, &measured)).collect();
-                let most = each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                let weights: Vec<f64> = each.iter().map(|value| (value - most).exp()).collect();
-                let of_laws: f64 = weights.iter().sum();
+                let of_laws = log_sum(&each);
+                let weights: Vec<f64> = each.iter().map(|value| (value - of_laws).exp()).collect();
                 if let (Some(inverted), Some(after), Some(here)) = (&inverted, &from_inverted, &here_inverted) {
                     let became = transform(inverted.evidence.cube.channel(frame, channel), samples);
                     let stretched = inverted.volume[frame * channels + channel] * bins as f64 / samples as f64;
                     let more = after.more(here, channel);
                     each.extend(after.laws(channel, &expected[1], &more).map(|law| density(&law, &became) + stretched));
                 }
-                let highest = each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                let total: f64 = each.iter().map(|value| (value - highest).exp()).sum();
                 let mut sums = Sums {
-                    likelihood: highest + (total / each.len() as f64).ln(),
+                    likelihood: log_sum(&each) - (each.len() as f64).ln(),
                     cells: cells.len(),
                     peak: 1.0,
                     ..Sums::default()
                 };
                 let unit = before.variance[channel];
                 for &cell in &cells {
-                    let wanted: f64 =
-                        laws.iter().zip(&weights).map(|(law, weight)| weight / of_laws * law.power(cell)).sum::<f64>();
+                    let wanted: f64 = laws.iter().zip(&weights).map(|(law, weight)| weight * law.power(cell)).sum::<f64>();
                     let (seen, wanted) = (measured[cell].norm_sqr() / unit, wanted / unit);
                     sums.squares += (10.0 * (seen.max(FLOOR) / wanted.max(FLOOR)).log10()).powi(2);
                     sums.peak = sums.peak.max(seen);
@@ -129,6 +124,12 @@ impl Misfit {
     }
 }
 
+/// Logarithm of a sum of exponentials.
+fn log_sum(values: &[f64]) -> f64 {
+    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    most + values.iter().map(|value| (value - most).exp()).sum::<f64>().ln()
+}
+
 /// What stands still, and the noise.
 struct Baseline {
     /// `[channel][doppler · range]`
@@ -139,12 +140,14 @@ struct Baseline {
 
 impl Baseline {
     /// `more`: stands still besides what can come from the room, `[channel · sample]`.
-    fn new(evidence: &Evidence, support: &Support, more: &[Complex64], noise: &[f64]) -> Self {
+    fn new(evidence: &Evidence, support: &Support, more: Option<&[Complex64]>, noise: &[f64]) -> Self {
         let [_, _, _, loops, samples] = evidence.cube.dims;
         let of_channel = |channel: usize| {
             let of = channel * samples..(channel + 1) * samples;
-            let room = support.project(&evidence.still()[of.clone()]);
-            let chirp: Vec<Complex64> = room.iter().zip(&more[of]).map(|(room, more)| room + more).collect();
+            let mut chirp = support.project(&evidence.still()[of.clone()]);
+            if let Some(more) = more {
+                chirp.iter_mut().zip(&more[of]).for_each(|(room, more)| *room += more);
+            }
             transform(&chirp.repeat(loops), samples)
         };
         let variance = noise.iter().map(|noise| noise.max(f64::MIN_POSITIVE)).collect();
@@ -194,8 +197,8 @@ impl<'a> Explained<'a> {
         let quieter = recording.noise().iter().zip(explained.noise()).map(|(a, b)| a.min(*b));
         let removed = Removed::new(recording, explained, quieter.collect());
         let baseline = match &removed {
-            Some(removed) => Baseline::new(explained, support, &removed.still, &removed.noise),
-            None => Baseline::new(explained, support, &vec![Complex64::ZERO; explained.still().len()], explained.noise()),
+            Some(removed) => Baseline::new(explained, support, Some(&removed.still), &removed.noise),
+            None => Baseline::new(explained, support, None, explained.noise()),
         };
         Self { baseline, removed }
     }
@@ -234,19 +237,21 @@ impl Inverted {
         let size = loops * samples;
         let mut volume = vec![0.0; frames * recording.cube.channels()];
         for (undo, kind) in &explained.inverses {
-            if kind.by_sample {
-                volume.iter_mut().zip(stretched(&evidence.cube, undo)).for_each(|(sum, more)| *sum += more);
+            let before = kind.by_sample.then(|| evidence.cube.clone());
+            undo(&mut evidence.cube);
+            if let Some(before) = before {
+                let more = stretched(&before, &evidence.cube, undo);
+                volume.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
             }
             volume.iter_mut().for_each(|sum| *sum += kind.alike * size as f64);
-            undo(&mut evidence.cube);
         }
         Some(Self { evidence, volume })
     }
 }
 
-/// Of a change of every sample for itself: logarithm of its derivative's determinant, summed over the samples of `[frame · channel]` as
+/// Of a change of every sample for itself, from one cube to the other: logarithm of its derivative's determinant, summed over the samples of `[frame · channel]` as
 /// much as the windows let each of them through.
-fn stretched(cube: &Cube, undo: &Undo) -> Vec<f64> {
+fn stretched(cube: &Cube, undone: &Cube, undo: &Undo) -> Vec<f64> {
     let [.., loops, samples] = cube.dims;
     let size = loops * samples;
     let (slow, fast) = (hann(loops), hann(samples));
@@ -258,7 +263,7 @@ fn stretched(cube: &Cube, undo: &Undo) -> Vec<f64> {
         undo(&mut moved);
         moved.samples
     };
-    let [origin, right, up] = [Complex64::ZERO, Complex64::from(step), Complex64::new(0.0, step)].map(moved);
+    let (origin, [right, up]) = (&undone.samples, [Complex64::from(step), Complex64::new(0.0, step)].map(moved));
     let determinant = |index: usize| {
         let [a, b] = [&right, &up].map(|moved| (moved[index] - origin[index]) / step);
         let through = slow[index % size / samples] * fast[index % samples];

@@ -47,6 +47,17 @@ pub fn corrected(p: f64, tried: f64) -> f64 {
     (-(tried * (-p.clamp(0.0, 1.0)).ln_1p()).exp_m1()).clamp(0.0, 1.0)
 }
 
+/// Share of a measured number that is kept where its prior has so many times the variance of its noise.
+pub fn kept(prior: f64) -> f64 {
+    prior / (1.0 + prior)
+}
+
+/// What is learned of such a number, nats: mean over some of them.
+pub fn learned(priors: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = priors.len().max(1) as f64;
+    priors.map(|prior| 0.5 * prior.ln_1p()).sum::<f64>() / count
+}
+
 /// Exact (Clopper–Pearson) interval of a share.
 pub fn binomial_interval(hits: usize, of: usize, confidence: f64) -> [f64; 2] {
     if of == 0 {

@@ -32,22 +32,22 @@ fn fit(frames: &[[f64; 3]], mean_m: f64, power: f64) -> (f64, f64) {
     (size, -0.5 * frames.len() as f64 * left.max(f64::MIN_POSITIVE).ln())
 }
 
-/// The size at the mean range where it grows with the range, and the mean range. `standing`: log-likelihood of what stands still, by the
+/// The size at the mean range where it grows with the range, the mean range, and what the walls gain by it. `standing`: log-likelihood of what stands still, by the
 /// size at the mean range, that range, and the power of the range with which the sine of everything grows.
-fn later(frames: &[[f64; 3]], standing: impl Fn(f64, f64, f64) -> f64) -> Option<(f64, f64)> {
+fn later(frames: &[[f64; 3]], standing: impl Fn(f64, f64, f64) -> f64) -> Option<(f64, f64, f64)> {
     let weights: f64 = frames.iter().map(|frame| frame[2]).sum();
     let mean_m = frames.iter().map(|[_, range, weight]| range * weight).sum::<f64>() / weights;
     let (size, likelihood) = fit(frames, mean_m, LATER);
-    let later = likelihood + ROUGHLY * standing(size, mean_m, LATER);
+    // The body alone; or everything, where the radar is turned.
+    let alone = standing(0.0, mean_m, ASIDE[0]);
     let other = ASIDE.map(|power| {
         let (size, likelihood) = fit(frames, mean_m, power);
-        // The body alone; or everything, where the radar is turned.
-        let alone = standing(0.0, mean_m, power);
-        let all = if power == 0.0 { standing(size, mean_m, power) } else { alone };
-        likelihood + ROUGHLY * alone.max(all)
+        let walls = if power == 0.0 { standing(size, mean_m, power).max(alone) } else { alone };
+        likelihood + ROUGHLY * walls
     });
-    let better = later - other.into_iter().fold(f64::NEG_INFINITY, f64::max);
-    (size.is_finite() && mean_m.is_finite() && better > MUCH_BETTER).then_some((size, mean_m))
+    let walls = standing(size, mean_m, LATER);
+    let better = likelihood + ROUGHLY * walls - other.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    (size.is_finite() && mean_m.is_finite() && better > MUCH_BETTER).then_some((size, mean_m, ROUGHLY * (walls - alone)))
 }
 
 /// Instead of a body that is seen aside: None where the phases do not grow with the range.
@@ -60,9 +60,7 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, gain: f64)
         let off = |range_m: f64, rx: usize| -size * (range_m / mean_m).powf(power) * wave * places[rx];
         walls.as_ref().map_or(0.0, |walls| walls.log_likelihood(off))
     };
-    let (size, mean_m) = later(&frames, standing)?;
-    // The ratio of the walls' likelihoods, whose numbers the body gave, is one on average by chance, so that a p-value may be divided by it.
-    let walls_gain = ROUGHLY * (standing(size, mean_m, LATER) - standing(0.0, mean_m, LATER));
+    let (size, mean_m, walls_gain) = later(&frames, standing)?;
     // Radian of a beat of one hertz, by receiver.
     let beat_hz = 2.0 * radar.slope_hz_per_s * mean_m / SPEED_OF_LIGHT;
     let turns: Vec<f64> = places.iter().map(|x| -size * wave * x / beat_hz).collect();
@@ -74,6 +72,7 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, gain: f64)
         estimates: vec![],
         choice: None,
         place: Place { rx: Some((1..radar.rx_m.len()).collect()), ..Place::at("receiver") },
+        // The ratio of the walls' likelihoods, whose numbers the body gave, is one on average by chance: a p-value may be divided by it.
         p_value: (bearing.p_value * (-walls_gain).exp()).clamp(f64::MIN_POSITIVE, 1.0),
         gain,
         rung: Rung::D,
@@ -122,7 +121,7 @@ mod tests {
             (0..9).map(at).map(|(range, error): (f64, f64)| [0.1 * (range / 3.0).powf(power) + error, range, 1.0]).collect()
         };
         let nothing = |_: f64, _: f64, _: f64| 0.0;
-        let (size, mean_m) = later(&walk(LATER), nothing).unwrap();
+        let (size, mean_m, _) = later(&walk(LATER), nothing).unwrap();
         assert!((size - 0.1).abs() < 0.002 && (mean_m - 3.0).abs() < 1e-9, "{size} at {mean_m}");
         assert!(ASIDE.iter().all(|&power| later(&walk(power), nothing).is_none()));
         // Walls that are seen where they are say that it is the body; walls that are turned as they should be say what the body hides.

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 
 use crate::diagnosis::Evidence;
 use crate::diagnosis::evidence::spectrum;
-use crate::radar::SPEED_OF_LIGHT;
+use crate::paths::distance;
 use crate::scatterers::room_patches::RoomPatchesConfig;
 
 /// Cross-section of rough walls by area, and power that a smooth one mirrors: what is ordinary.
@@ -44,12 +44,12 @@ impl Standing {
         let room = evidence.room.as_ref().filter(|room| !room.boundaries().is_empty())?;
         let patches = RoomPatchesConfig::default().init(room).ok()?;
         let (centre, wave) = (radar.centre_m(), TAU / radar.wavelength_m());
-        let bins_per_m = 2.0 / SPEED_OF_LIGHT * radar.slope_hz_per_s / radar.sample_rate_hz * samples as f64;
-        let distance = |a: [f64; 3], b: [f64; 3]| (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt();
-        // Range, cross-section over the fourth power of it, and phases between receivers.
-        let source = |at_m: [f64; 3], section: f64, range_m: f64| -> (f64, f64, Vec<Complex64>) {
-            let ways = radar.rx_m.iter().map(|&rx| distance(at_m, rx) - distance(at_m, radar.rx_m[0]));
-            (range_m * bins_per_m, section / range_m.powi(4), ways.map(|way| Complex64::cis(wave * way)).collect())
+        let bin_m = radar.range_resolution_m();
+        // Range in bins, cross-section over the fourth power of the range, and phases between receivers.
+        let source = |at_m: [f64; 3], section: f64, range_m: f64| -> (f64, f64, DVector<Complex64>) {
+            let way = |rx: usize| distance(at_m, radar.rx_m[rx]) - distance(at_m, radar.rx_m[0]);
+            let phases = DVector::from_fn(receivers, |rx, _| Complex64::cis(wave * way(rx)));
+            (range_m / bin_m, section / range_m.powi(4), phases)
         };
         let rough = patches.position_m.iter().zip(&patches.normal).zip(&patches.area_m2).map(|((&at, normal), area)| {
             let range_m = distance(at, centre).max(1e-3);
@@ -70,12 +70,7 @@ impl Standing {
         let cell = |bin: usize| -> Option<Cell> {
             let mut expected = DMatrix::<Complex64>::zeros(receivers, receivers);
             for (at, power, phases) in sources.iter().filter(|source| (source.0 - bin as f64).abs() < REACH) {
-                let weight = power * leaked(at - bin as f64);
-                for row in 0..receivers {
-                    for column in 0..receivers {
-                        expected[(row, column)] += phases[row] * phases[column].conj() * weight;
-                    }
-                }
+                expected += phases * phases.adjoint() * Complex64::from(power * leaked(at - bin as f64));
             }
             let power = expected.trace().re / receivers as f64;
             let heard: Vec<DVector<Complex64>> =
@@ -87,7 +82,7 @@ impl Standing {
             let inverse = (expected / Complex64::from(power)
                 + DMatrix::identity(receivers, receivers) * Complex64::from(ELSEWHERE))
             .try_inverse()?;
-            Some(Cell { range_m: bin as f64 / bins_per_m, heard, inverse })
+            Some(Cell { range_m: bin as f64 * bin_m, heard, inverse })
         };
         Some(Self {
             cells: (STEP..evidence.range_bins().min(samples / 2 + samples / 4)).step_by(STEP).filter_map(cell).collect(),

@@ -161,7 +161,6 @@ pub fn multibounce(scene: &Scene, tried: f64) -> Option<Candidate> {
         energy: factor.norm_sqr() * super::mover::energy(scene, body / 2.25),
         correction: Correction::Inverse(
             Arc::new(move |cube: &mut Cube| {
-                let still = still.clone();
                 cube.each_chirp(|[_, channel, _], chirp| {
                     let still = &still[channel * samples..][..samples];
                     for (n, value) in chirp.iter_mut().enumerate() {

@@ -14,6 +14,7 @@ use super::undo;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Rung, Volume};
+use crate::diagnosis::statistics;
 use crate::radar::SPEED_OF_LIGHT;
 
 /// Range at which a phase in proportion to the delay is stated.
@@ -153,7 +154,7 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
         estimates,
         choice: None,
         place: Place::at(stage),
-        p_value: crate::diagnosis::statistics::corrected((-line.training_gain).exp(), line.tried),
+        p_value: statistics::corrected((-line.training_gain).exp(), line.tried),
         gain: line.held_out_gain,
         rung: Rung::F,
         look_alikes: vec![],
@@ -324,14 +325,10 @@ pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random
         .value
         .iter()
         .enumerate()
-        .map(|(i, value)| {
-            let weight = series.weight[i / series.loops];
-            value * variance * weight / (1.0 + variance * weight)
-        })
+        .map(|(i, value)| value * statistics::kept(variance * series.weight[i / series.loops]))
         .collect();
     let loops = series.loops;
-    let of_chirp = |i: usize| 0.5 * (variance * series.weight[i / loops]).ln_1p();
-    let spent = (0..values.len()).map(of_chirp).sum::<f64>() / values.len().max(1) as f64;
+    let spent = statistics::learned((0..values.len()).map(|i| variance * series.weight[i / loops]));
     let deviation: Deviation = Arc::new(move |[frame, _, index]| values[frame * loops + index]);
     let at_stated = random.deviation * stated_delay_s();
     let error = random.deviation_error * stated_delay_s();

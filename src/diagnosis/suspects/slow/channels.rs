@@ -145,7 +145,7 @@ impl Series {
         let sum = |of: &dyn Fn(usize) -> f64| known().map(of).sum::<f64>();
         let (square, total) = (sum(&|f| self.weight[f] * self.value[f].norm_sqr()), sum(&|f| self.weight[f]));
         let variance = ((square - known().count() as f64) / total.max(f64::MIN_POSITIVE)).max(0.0);
-        let shrunk = |(value, weight): (&Complex64, &f64)| value * (variance * weight / (1.0 + variance * weight));
+        let shrunk = |(value, weight): (&Complex64, &f64)| value * statistics::kept(variance * weight);
         self.value.iter().zip(&self.weight).map(shrunk).collect()
     }
 }
@@ -272,9 +272,8 @@ impl Judged {
         let square: f64 = known.iter().map(|&f| self.series.value[f].norm_sqr()).sum();
         let times: Vec<f64> = known.iter().map(|&f| evidence.starts_s[f]).collect();
         let members = self.members.clone();
-        // Of every frame, for all channels: the gain of one of them.
-        let spent =
-            known.iter().map(|&f| (self.variance * self.series.weight[f]).ln_1p()).sum::<f64>() / known.len().max(1) as f64;
+        // Of every frame, for all channels: the complex gain of one of them.
+        let spent = 2.0 * statistics::learned(known.iter().map(|&f| self.variance * self.series.weight[f]));
         let size = loops * samples * evidence.cube.channels();
         Candidate {
             id: None,
