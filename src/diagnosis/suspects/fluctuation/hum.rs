@@ -39,8 +39,11 @@ const REACH: usize = 3;
 /// Ranges to either side that may swing with it, and how much plainer than by chance they must.
 const WIDEST: usize = 16;
 const PLAIN: f64 = 20.0;
-/// Share of its depth that all other static returns swing by at most: else it is the receiver's hum.
+/// Share of its depth that all other static returns swing by at most, but for so many standard deviations: else it is the receiver's
+/// hum. And how much less likely (nats) it must be that they swing by as much.
 const OTHERS: f64 = 0.3;
+const CHANCE: f64 = 2.0;
+const SURELY: f64 = 12.0;
 /// Share of what stands still that lies elsewhere at least: without it, noise would say whether it is the receiver's.
 const ELSEWHERE: f64 = 0.01;
 const FEWEST_FRAMES: usize = 5;
@@ -76,6 +79,12 @@ struct Line {
     ratio: f64,
     /// How often chance makes it there and at that frequency.
     chance: f64,
+}
+
+/// A complex depth with its variance.
+struct Depth {
+    mean: Complex64,
+    variance: f64,
 }
 
 impl Line {
@@ -288,25 +297,43 @@ impl<'a> Chirps<'a> {
         gained / variance * self.independent(width, variance) / (channels * width) as f64
     }
 
-    /// Whether the other static returns, together, swing by much less of their own.
+    /// Whether the other static returns, together, surely do not swing by as much of their own: a receiver's hum is in all of them.
     fn others_stay(&self, line: &Line, swings: &Sidebands) -> bool {
-        let training = &self.evidence.split.training;
-        let channels = self.evidence.cube.channels();
-        let depth = |values: &[Complex64], wanted: &dyn Fn(usize) -> bool| -> f64 {
-            let (mut dot, mut own) = (Complex64::ZERO, 0.0);
-            for channel in 0..channels {
-                for bin in (0..self.bins).filter(|&bin| wanted(bin)) {
-                    let still = self.still[channel * self.bins + bin];
-                    let swing = |&frame: &usize| values[(frame * channels + channel) * self.bins + bin];
-                    dot += still.conj() * training.iter().map(swing).sum::<Complex64>() / training.len() as f64;
-                    own += still.norm_sqr();
-                }
-            }
-            dot.norm() / own.max(f64::MIN_POSITIVE)
-        };
         let reached = reached(line.first, line.last);
         let near = |bin: usize| reached.contains(&bin);
-        swings.iter().all(|values| depth(values, &|bin| !near(bin)) < OTHERS * depth(values, &near))
+        swings.iter().all(|values| {
+            let (own, others) = (self.depth(values, &near), self.depth(values, &|bin| !near(bin)));
+            let [stays, hums] = [Complex64::ZERO, own.mean].map(|depth| (others.mean - depth).norm_sqr() / others.variance);
+            others.mean.norm() < OTHERS * own.mean.norm() + CHANCE * others.variance.sqrt() && hums > stays + SURELY
+        })
+    }
+
+    /// By how much of themselves some static returns swing, mean of the training frames; ranges count the less the more their frames
+    /// scatter.
+    fn depth(&self, values: &[Complex64], wanted: &dyn Fn(usize) -> bool) -> Depth {
+        let training = &self.evidence.split.training;
+        let (channels, count) = (self.evidence.cube.channels(), training.len() as f64);
+        let mut depths = vec![Complex64::ZERO; training.len()];
+        let mut all = 0.0;
+        for bin in (0..self.bins).filter(|&bin| wanted(bin)) {
+            let mut scatter = 0.0;
+            for channel in 0..channels {
+                let swing = |&frame: &usize| values[(frame * channels + channel) * self.bins + bin];
+                let mean = training.iter().map(swing).sum::<Complex64>() / count;
+                scatter += training.iter().map(|frame| (swing(frame) - mean).norm_sqr()).sum::<f64>();
+            }
+            let weight = 1.0 / scatter.max(f64::MIN_POSITIVE);
+            for channel in 0..channels {
+                let still = self.still[channel * self.bins + bin];
+                let swing = |&frame: &usize| values[(frame * channels + channel) * self.bins + bin];
+                depths.iter_mut().zip(training).for_each(|(depth, frame)| *depth += still.conj() * swing(frame) * weight);
+                all += still.norm_sqr() * weight;
+            }
+        }
+        depths.iter_mut().for_each(|depth| *depth /= all.max(f64::MIN_POSITIVE));
+        let mean = depths.iter().sum::<Complex64>() / count;
+        let variance = depths.iter().map(|depth| (depth - mean).norm_sqr()).sum::<f64>() / (count * (count - 1.0));
+        Depth { mean, variance: variance.max(f64::MIN_POSITIVE) }
     }
 
     /// Of the frequencies that the frames' rate does not tell apart, the one whose swing explains most within the frames.
@@ -452,13 +479,13 @@ mod tests {
     const HUM_HZ: f64 = 160.0;
 
     /// Two static returns, of which one swings, or both, and somebody who moves, in noise.
-    fn evidence(depth: f64, both: bool) -> Evidence {
+    fn evidence(depth: f64, both: bool, walker: f64) -> Evidence {
         let mut radar = Radar::small(8);
         (radar.loops_per_frame, radar.samples_per_chirp) = (16, 64);
         let clock = radar.clone();
         Evidence::in_noise(radar, 4, |[frame, rx, slow, n]| {
             let (time, n) = (clock.chirp_time_s(frame, 0, slow), n as f64);
-            let mover = Complex64::cis(0.6 * n + 0.4 * slow as f64 + 1.9 * (frame * frame) as f64) * 4.0;
+            let mover = Complex64::cis(0.6 * n + 0.4 * slow as f64 + 1.9 * (frame * frame) as f64) * walker;
             let swing = 1.0 + depth * (TAU * HUM_HZ * time).cos();
             let lamp = Complex64::cis(1.8 * n - 0.2 * rx as f64) * 8.0 * swing;
             let wall = Complex64::cis(0.9 * n + 0.4 * rx as f64) * 30.0 * if both { swing } else { 1.0 };
@@ -468,7 +495,7 @@ mod tests {
 
     #[test]
     fn a_humming_return_is_found_at_its_range_and_is_gone_once_it_is_explained() {
-        let before = evidence(0.3, false);
+        let before = evidence(0.3, false, 4.0);
         let found = find(&before).expect("it hums");
         let [near, far] = found.place.range_m.unwrap();
         let wanted = 1.8 / TAU * 64.0 * before.radar.range_resolution_m();
@@ -489,7 +516,15 @@ mod tests {
 
     #[test]
     fn what_stands_or_moves_does_not_hum_and_the_receivers_hum_is_no_lamp() {
-        assert!(find(&evidence(0.0, false)).is_none());
-        assert!(find(&evidence(0.3, true)).is_none());
+        assert!(find(&evidence(0.0, false, 4.0)).is_none());
+        assert!(find(&evidence(0.3, true, 4.0)).is_none());
+    }
+
+    #[test]
+    fn somebody_who_outshines_the_lamp_elsewhere_does_not_make_it_the_receivers() {
+        let found = find(&evidence(0.5, false, 40.0)).expect("it hums");
+        let wanted = 1.8 / TAU * 64.0 * Radar::small(8).range_resolution_m();
+        assert!(found.p_value < 1e-4 && found.place.range_m.is_some_and(|[near, far]| (near..far).contains(&wanted)));
+        assert!(find(&evidence(0.5, true, 40.0)).is_none());
     }
 }

@@ -93,24 +93,43 @@ impl Bearing {
     }
 }
 
+/// What receivers hear of the body.
+pub struct Heard {
+    training: Vec<Sums>,
+    held_out: Vec<Sums>,
+    pub array: Array,
+}
+
+impl Heard {
+    /// None for a single receiver, and where the body fills too few cells.
+    pub fn new(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction) -> Option<Self> {
+        if evidence.radar.rx_m.len() < 2 {
+            return None;
+        }
+        let still = still_power(evidence);
+        let sums: Vec<Option<Sums>> =
+            (0..evidence.cube.dims[0]).into_par_iter().map(|frame| sums(evidence, model, body, &still, frame)).collect();
+        let of = |frames: &[usize]| frames.iter().filter_map(|&frame| sums[frame].clone()).collect::<Vec<Sums>>();
+        let (training, held_out) = (of(&evidence.split.training), of(&evidence.split.held_out));
+        if training.len() < 6 || held_out.is_empty() {
+            return None;
+        }
+        let bearing = bearing(&evidence.radar, &training);
+        let array = Array::new(Cells::new(evidence, model, body, &still), bearing);
+        Some(Self { training, held_out, array })
+    }
+}
+
 /// `displaced`: the body is elsewhere than predicted, or at another time.
 pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, moves: Moves, displaced: bool) -> Vec<Candidate> {
     let radar = &evidence.radar;
     let accepted = |id: &str| evidence.accepted.contains(&id);
     // One channel whose gain hopped was brought to its own mean, which need not be that of the others.
-    if radar.rx_m.len() < 2 || accepted(slow::channels::BEHAVES_LIKE) || accepted("antenna_position") {
+    if accepted(slow::channels::BEHAVES_LIKE) || accepted("antenna_position") {
         return vec![];
     }
-    let still = still_power(evidence);
-    let sums: Vec<Option<Sums>> =
-        (0..evidence.cube.dims[0]).into_par_iter().map(|frame| sums(evidence, model, body, &still, frame)).collect();
-    let of = |frames: &[usize]| frames.iter().filter_map(|&frame| sums[frame].clone()).collect::<Vec<Sums>>();
-    let (training, held_out) = (of(&evidence.split.training), of(&evidence.split.held_out));
-    if training.len() < 6 || held_out.is_empty() {
-        return vec![];
-    }
-    let bearing = bearing(radar, &training);
-    let array = Array::new(Cells::new(evidence, model, body, &still), bearing);
+    let Some(Heard { training, held_out, array }) = Heard::new(evidence, model, body) else { return vec![] };
+    let bearing = array.bearing;
     if let Some(candidate) = differ(evidence, &array, displaced) {
         return vec![candidate];
     }

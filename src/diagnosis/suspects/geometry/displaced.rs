@@ -113,7 +113,7 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
     let Some(best) = (0..fitted.len()).max_by(|&a, &b| gain(&fitted[a]).total_cmp(&gain(&fitted[b]))) else { return vec![] };
     let best_fit = &fitted[best];
     let p_value = p_value(best_fit, &null, training);
-    let held_out = best_fit.score.gain_over(&null, &evidence.split.held_out) / best_fit.inflation;
+    let held_out = foretold(trial, best_fit, &null) / best_fit.inflation;
     // What may be nothing by its own interval is nothing.
     let nothing = best_fit.value.abs() < 1.645 * deviation(trial, best_fit);
     if p_value > 0.05 || held_out <= 0.0 || nothing {
@@ -188,6 +188,9 @@ pub fn refine(
     None
 }
 
+/// Frames that a step must be followed by: one alone may have been bad.
+const FEWEST_AFTER: usize = 2;
+
 /// The step in time that explains most: from one frame on, a few frames later.
 fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
     let frames: Vec<usize> = (0..trial.evidence.cube.dims[0]).collect();
@@ -197,7 +200,7 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
     for count in 1..=most_lost {
         // All frames later by so many: what follows the step, whenever it is.
         let later = trial.score(Change::Drop { at: 0, count }, training, false);
-        for at in 2..frames.len().saturating_sub(count + 1) {
+        for at in 2..frames.len().saturating_sub(FEWEST_AFTER - 1) {
             let after: Vec<usize> = training.iter().copied().filter(|&frame| frame >= at).collect();
             let gain = later.gain_over(null, &after);
             if best.is_none_or(|(most, _)| gain > most) {
@@ -224,6 +227,23 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
     let scores = earlier.chain(later).chain([at]).map(|at| trial.score(Change::Drop { at, count }, &frames, true));
     let score = scores.max_by(|a, b| a.gain_over(null, &frames).total_cmp(&b.gain_over(null, &frames)))?;
     Some(Fitted { id: "frame_drop", value: count as f64, deviation: 0.0, floor: 0.0, inflation: STEP_INFLATION, score })
+}
+
+/// What frames gain that did not tell the change: the held-out ones. Where the motion is known in none of these after a step, the
+/// training frames with the weights of the body as it was.
+fn foretold(trial: &Trial, fit: &Fitted, null: &Score) -> f64 {
+    let held_out = &trial.evidence.split.held_out;
+    let Change::Drop { at, .. } = fit.score.change else { return fit.score.gain_over(null, held_out) };
+    let known = |frames: &[usize]| -> Vec<usize> {
+        frames.iter().copied().filter(|&frame| frame < at || fit.score.known[frame]).collect()
+    };
+    let after = |frames: &[usize]| frames.iter().any(|&frame| frame >= at);
+    let told = known(held_out);
+    if after(&told) || !after(held_out) {
+        return fit.score.gain_over(null, &told);
+    }
+    let training = known(&trial.evidence.split.training);
+    trial.score(fit.score.change, &training, false).gain_over(null, &training)
 }
 
 /// Under the null: a value beyond its floor by so many deviations; for a step, so much gained.

@@ -13,8 +13,10 @@ mod standing;
 mod trial;
 
 use change::Moves;
+use channels::Heard;
 use trial::Trial;
 
+use crate::diagnosis::speckle::Look;
 use crate::diagnosis::suspects::paths::OVER_THE_BODY;
 use crate::diagnosis::{Candidate, Evidence};
 
@@ -31,6 +33,20 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let displaced = found.iter().any(|found| found.p_value < DISPLACED && found.gain > 0.0);
     found.extend(channels::find(evidence, model, body, Moves::new(evidence.radar.centre_m()), displaced));
     found
+}
+
+/// What the moving body's cells say of one receiver's logarithmic gain against the others, `[rx][frame][group]`: values and their
+/// inverse variances. None without a body that is heard.
+pub fn gains(evidence: &Evidence) -> Option<Vec<Vec<Vec<[f64; 2]>>>> {
+    let Heard { array, .. } = Heard::new(evidence, evidence.power()?, evidence.body.as_ref()?)?;
+    let numbers = array.cells.numbers();
+    let gain = |look: &Look, number: usize| {
+        let information = look.information[(number, number)];
+        (look.place.is_none() && information > 0.0).then(|| [look.score[number] / information, information])
+    };
+    let of_frame = |looks: &Vec<Look>, number: usize| looks.iter().filter_map(|look| gain(look, number)).collect();
+    let of_receiver = |rx: usize| array.looks.iter().map(|looks| of_frame(looks, numbers.gain(rx))).collect();
+    Some((0..numbers.receivers).map(of_receiver).collect())
 }
 
 #[cfg(test)]

@@ -384,7 +384,7 @@ pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random
         choice: None,
         place: place(part),
         p_value: random.p_value,
-        gain,
+        gain: gain.min(random.gain_within),
         rung: Rung::F,
         look_alikes,
         statement,

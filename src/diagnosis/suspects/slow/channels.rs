@@ -1,8 +1,8 @@
 //! One receiver or transmitter whose gain changes from frame to frame while the others stay.
 //!
 //! The complex gain of the static returns, relative to that of the other channels, is estimated in every frame and in
-//! groups of ranges without movers. A gain is the same at all ranges: each of the nearer and the farther half of the
-//! static returns must show what the other one shows.
+//! groups of ranges without movers; and so is the gain of what a receiver hears of the body against what the others hear. A gain is
+//! the same at all ranges: each of two halves of all that is heard must show what the other one shows.
 
 use std::sync::Arc;
 
@@ -14,11 +14,14 @@ use crate::diagnosis::cube::folds;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, NINETY, Place, Rung, Volume};
 use crate::diagnosis::statistics::{self, DECIBEL};
+use crate::diagnosis::suspects::geometry;
 
 /// Fewest receivers or transmitters of which one can be told to be odd.
 const FEWEST: usize = 3;
 /// Fewest training frames of which a change can be told.
 const FEWEST_FRAMES: usize = 5;
+/// Fewest degrees of freedom of what groups scatter.
+const LEAST_FREEDOM: f64 = 8.0;
 /// Bins between two groups, across which windowed noise is hardly correlated.
 const GAP: usize = 2;
 /// Correlation that the two halves of the ranges must have.
@@ -34,6 +37,8 @@ struct Relative {
     value: Vec<Complex64>,
     weight: Vec<f64>,
     groups: usize,
+    /// Degrees of freedom of the groups' scatter, by which they are weighed.
+    freedom: f64,
 }
 
 /// One gain per frame, from some groups.
@@ -66,9 +71,10 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let Some(steady) = Steady::new(evidence) else { return vec![] };
     let tried = units.len() as f64;
+    let of_body = geometry::gains(evidence);
     let best = units
         .iter()
-        .filter_map(|&unit| judged(evidence, &steady, unit))
+        .filter_map(|&unit| judged(evidence, &steady, of_body.as_deref(), unit))
         .filter(|judged| judged.p_value < 0.01)
         .max_by(|a, b| a.gain.total_cmp(&b.gain));
     best.map(|judged| judged.candidate(evidence, tried)).into_iter().collect()
@@ -84,9 +90,13 @@ struct Judged {
     variance: f64,
 }
 
-fn judged(evidence: &Evidence, steady: &Steady, unit: Axis) -> Option<Judged> {
+/// `of_body`: gains of what is heard of the body, `[rx][frame][group]`, with inverse variances.
+fn judged(evidence: &Evidence, steady: &Steady, of_body: Option<&[Vec<Vec<[f64; 2]>>]>, unit: Axis) -> Option<Judged> {
     let training = &evidence.split.training;
-    let relative = Relative::new(steady, evidence.cube.dims[2], unit);
+    let mut relative = Relative::new(steady, evidence.cube.dims[2], unit).weighed(training);
+    if let (Axis::Receiver(rx), Some(of_body)) = (unit, of_body) {
+        relative.hear(&of_body[rx], training);
+    }
     let all = relative.series(training, |_| true)?;
     // The nearer and the farther half of what the groups know.
     let known = |g: usize| training.iter().map(|&f| relative.weight[f * relative.groups + g]).sum::<f64>();
@@ -206,7 +216,42 @@ impl Relative {
                 weight.push(if known { 1.0 / (NEIGHBOURS * (1.0 / my_own + 1.0 / their_own)) } else { 0.0 });
             }
         }
-        Self { members, value, weight, groups }
+        Self { members, value, weight, groups, freedom: 0.0 }
+    }
+
+    /// Adds groups of what is heard of the body, `[frame][group]`: logarithmic gains, which may all be off by the same, with their
+    /// inverse variances, which are smaller where groups of a frame scatter by more.
+    fn hear(&mut self, of_body: &[Vec<[f64; 2]>], training: &[usize]) {
+        let groups = of_body.iter().map(Vec::len).max().unwrap_or(0);
+        let mean = |gains: &mut dyn Iterator<Item = &[f64; 2]>| {
+            let (sum, all) = gains.fold((0.0, 0.0), |(sum, all), [gain, weight]| (sum + gain * weight, all + weight));
+            sum / f64::max(all, f64::MIN_POSITIVE)
+        };
+        let middle = mean(&mut training.iter().flat_map(|&frame| &of_body[frame]));
+        let (mut scatter, mut freedom) = (0.0, 0.0);
+        for gains in training.iter().map(|&frame| &of_body[frame]) {
+            let own = mean(&mut gains.iter());
+            scatter += gains.iter().map(|[gain, weight]| weight * (gain - own).powi(2)).sum::<f64>();
+            freedom += (gains.len() as f64 - 1.0).max(0.0);
+        }
+        if freedom < FEWEST_FRAMES as f64 {
+            return;
+        }
+        let excess = (scatter / freedom).max(1.0);
+        self.freedom += freedom;
+        let (mut value, mut weight) = (vec![], vec![]);
+        for (frame, gains) in of_body.iter().enumerate() {
+            let known = frame * self.groups..(frame + 1) * self.groups;
+            value.extend_from_slice(&self.value[known.clone()]);
+            weight.extend_from_slice(&self.weight[known]);
+            for group in 0..groups {
+                // Half of a complex number's variance is its real part's.
+                let [gain, own] = gains.get(group).map_or([0.0; 2], |[gain, own]| [gain - middle, 0.5 * own / excess]);
+                value.push(gain.into());
+                weight.push(own);
+            }
+        }
+        (self.value, self.weight, self.groups) = (value, weight, self.groups + groups);
     }
 
     /// None where too few frames or groups are known.
@@ -215,26 +260,24 @@ impl Relative {
             (0..self.groups).filter(|&g| wanted(g)).map(move |g| frame * self.groups + g).filter(|&i| self.weight[i] > 0.0)
         };
         let frames = self.value.len() / self.groups;
-        let mut weight: Vec<f64> = (0..frames).map(|f| cells(f).map(|i| self.weight[i]).sum()).collect();
+        let weight: Vec<f64> = (0..frames).map(|f| cells(f).map(|i| self.weight[i]).sum()).collect();
         let mut value: Vec<Complex64> = (0..frames)
             .map(|f| cells(f).map(|i| self.value[i] * self.weight[i]).sum::<Complex64>() / weight[f].max(f64::MIN_POSITIVE))
             .collect();
-        let (excess, freedom) = self.excess(training)?;
+        if self.freedom < LEAST_FREEDOM {
+            return None;
+        }
         let total: f64 = training.iter().map(|&f| weight[f]).sum();
         let mean = training.iter().map(|&f| value[f] * weight[f]).sum::<Complex64>() / total.max(f64::MIN_POSITIVE);
         if training.iter().filter(|&&f| weight[f] > 0.0).count() < FEWEST_FRAMES {
             return None;
         }
         value.iter_mut().for_each(|v| *v -= mean);
-        weight.iter_mut().for_each(|w| *w /= excess);
-        Some(Series { value, weight, freedom })
+        Some(Series { value, weight, freedom: self.freedom })
     }
-}
 
-impl Relative {
-    /// Variance of the groups about their frame's mean over that of the noise, and its degrees of freedom: ranges that
-    /// scatter by more than the noise (the body's slow parts) make everything less sure.
-    fn excess(&self, training: &[usize]) -> Option<(f64, f64)> {
+    /// Ranges that scatter about their frame's mean by more than the noise (the body's slow parts) make everything less sure.
+    fn weighed(mut self, training: &[usize]) -> Self {
         let (mut within, mut freedom) = (0.0, 0.0);
         for &frame in training {
             let cells = || (frame * self.groups..(frame + 1) * self.groups).filter(|&i| self.weight[i] > 0.0);
@@ -243,7 +286,10 @@ impl Relative {
             within += cells().map(|i| self.weight[i] * (self.value[i] - mean).norm_sqr()).sum::<f64>();
             freedom += (cells().count() as f64 - 1.0).max(0.0);
         }
-        (freedom >= 4.0).then(|| ((within / freedom).max(1.0), 2.0 * freedom))
+        let excess = (within / f64::max(freedom, 1.0)).max(1.0);
+        self.weight.iter_mut().for_each(|weight| *weight /= excess);
+        self.freedom = 2.0 * freedom;
+        self
     }
 }
 
@@ -350,5 +396,29 @@ mod tests {
         assert!(alike > 0.5, "{alike}");
         // No more than the noise.
         assert_eq!(correlation(&[half([0.0; 4], noise[0].map(|noise| 0.9 * noise)), half(hops, noise[1])], &frames), 0.0);
+    }
+
+    #[test]
+    fn the_body_says_of_a_receivers_gain_what_the_still_ranges_say_and_groups_that_differ_say_less() {
+        let relative = || Relative {
+            members: vec![0],
+            value: [0.1, -0.1, 0.1, -0.1, 0.1, -0.1].map(Complex64::from).to_vec(),
+            weight: vec![100.0; 6],
+            groups: 1,
+            freedom: 10.0,
+        };
+        let (training, hops) = ([0, 1, 2, 3, 4, 5], [0.1, -0.1, 0.1, -0.1, 0.1, -0.1]);
+        // Off by the same in all frames; groups of a frame scatter as they must, and ten times as much.
+        let body = |apart: f64| -> Vec<Vec<[f64; 2]>> {
+            hops.map(|hop| vec![[0.7 + hop + apart, 200.0], [0.7 + hop - apart, 200.0]]).to_vec()
+        };
+        for (apart, weight) in [(0.05, 100.0), (0.5, 1.0)] {
+            let mut relative = relative();
+            relative.hear(&body(apart), &training);
+            assert_eq!((relative.groups, relative.freedom), (3, 16.0));
+            assert!((relative.weight[1] - weight).abs() < 1e-9, "{}", relative.weight[1]);
+            let heard = relative.series(&training, |group| group > 0).expect("six frames");
+            assert!(heard.value.iter().zip(hops).all(|(value, hop)| (value - hop).norm() < 1e-9), "{:?}", heard.value);
+        }
     }
 }

@@ -34,6 +34,8 @@ const LOOKS: f64 = 11.0;
 const LEAST_GAIN: f64 = 3.0;
 /// Share of the gain that what is simpler, or has a name, needs.
 const NEARLY: f64 = 0.8;
+/// The same for what a sure name explains over the noise, where what has no name leaves more than noise itself.
+const HALF: f64 = 0.5;
 /// Difference of gains (nats) that decides nothing.
 const UNDECIDED: f64 = 4.6;
 /// Turns of a line in a frame that tell it from a drift.
@@ -48,8 +50,9 @@ struct Found {
     candidate: Candidate,
     /// Of a line on a background that is hardly known: its degrees of freedom, and the p-value that this leaves.
     unsure: Option<(f64, f64)>,
-    /// Gain over the noise alone, where that is sure.
+    /// Gain over the noise alone, where that is sure, and whether or not it is.
     explained: f64,
+    over_noise: f64,
     /// Of a line with more than noise beside it.
     loud: bool,
     /// Whether a frame sees so much of a line's turn that it cannot be taken for a drift from frame to frame.
@@ -58,7 +61,7 @@ struct Found {
 
 impl From<Candidate> for Found {
     fn from(candidate: Candidate) -> Self {
-        Self { explained: candidate.gain, candidate, unsure: None, loud: false, within_frames: true }
+        Self { explained: candidate.gain, over_noise: candidate.gain, candidate, unsure: None, loud: false, within_frames: true }
     }
 }
 
@@ -97,8 +100,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             let unsure = line.freedom.map(unsure);
             let sure = unsure.is_none_or(|(_, p_value)| p_value < SURE);
             let within_frames = line.frequency_hz * frame_s > TELLING_TURNS;
-            let explained = if sure && within_frames { line.background * candidate.gain } else { candidate.gain };
-            found.push(Found { explained, candidate, unsure, loud: line.background > lines::LOUD, within_frames });
+            let over_noise = line.background * candidate.gain;
+            let explained = if sure && within_frames { over_noise } else { candidate.gain };
+            found.push(Found { explained, over_noise, candidate, unsure, loud: line.background > lines::LOUD, within_frames });
         }
         if part == Part::Boresight {
             continue;
@@ -139,7 +143,10 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // A law without a name must fit to the noise where one with a name explains nearly as much: how strong static returns turn
     // when the radar itself moves depends on where they are, which is known roughly.
     let explained = names.iter().map(|name| name.1).fold(0.0, f64::max);
-    found.retain(|found| found.candidate.id.is_some() || !found.loud || explained < NEARLY * found.explained);
+    let named_surely = |found: &&Found| found.candidate.id.is_some() && found.unsure.is_none_or(|(_, p_value)| p_value < SURE);
+    let over_noise = found.iter().filter(named_surely).map(|found| found.over_noise).fold(0.0, f64::max);
+    let fits_better = |found: &Found| explained < NEARLY * found.explained && over_noise < HALF * found.over_noise;
+    found.retain(|found| found.candidate.id.is_some() || !found.loud || fits_better(found));
     let taken = |other: &Found| {
         let like_it = |like: &str, gain: f64| like == other.candidate.behaves_like && gain > NEARLY * other.explained;
         // Where it leaves much itself it must explain clearly more.

@@ -14,6 +14,9 @@ pub struct Random {
     pub deviation_error: f64,
     pub p_value: f64,
     pub held_out_gain: f64,
+    /// Of that, what chirps show beside a straight line through their frame: what is random from chirp to chirp loses nothing by it, and
+    /// what swings slowly nearly all.
+    pub gain_within: f64,
     /// Two values instead of a bell: their distance, its error, the share of the upper one, and the held-out gain.
     pub two: Option<Two>,
 }
@@ -28,12 +31,13 @@ pub struct Two {
 
 pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -> Option<Random> {
     let series = field.series(part, |_| true);
+    let within = within_frames(&series);
     let training: Vec<usize> = training.iter().copied().filter(|&f| series.weight[f] > 0.0).collect();
     if training.len() * series.loops < 64 {
         return None;
     }
     let p_value = common_to_halves(field, part, &training)?;
-    let all = |variance: f64, frames: &[usize]| -> f64 {
+    let all = |series: &Series, variance: f64, frames: &[usize]| -> f64 {
         frames
             .iter()
             .map(|&f| series.weight[f])
@@ -43,7 +47,7 @@ pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -
                     return 0.0;
                 }
                 let ratio = 1.0 + variance * w;
-                chirps(&series, f).iter().map(|s| 0.5 * (s * s * w * (1.0 - 1.0 / ratio) - ratio.ln())).sum::<f64>()
+                chirps(series, f).iter().map(|s| 0.5 * (s * s * w * (1.0 - 1.0 / ratio) - ratio.ln())).sum::<f64>()
             })
             .sum()
     };
@@ -52,7 +56,7 @@ pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -
     let [mut low, mut high] = [(1e-4 * noise).ln(), (1e6 * noise).ln()];
     for _ in 0..80 {
         let (a, b) = (high - 0.618_034 * (high - low), low + 0.618_034 * (high - low));
-        if all(a.exp(), &training) > all(b.exp(), &training) { high = b } else { low = a }
+        if all(&series, a.exp(), &training) > all(&series, b.exp(), &training) { high = b } else { low = a }
     }
     let variance = (0.5 * (low + high)).exp();
     let information: f64 =
@@ -62,9 +66,24 @@ pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -
         deviation,
         deviation_error: 0.5 / (information.sqrt() * deviation),
         p_value,
-        held_out_gain: all(variance, held_out),
+        held_out_gain: all(&series, variance, held_out),
+        gain_within: all(&within, variance, held_out),
         two: two_valued(&series, &training, held_out, deviation),
     })
+}
+
+/// Without the straight line through every frame, and as large as before where chirps are independent.
+fn within_frames(series: &Series) -> Series {
+    let loops = series.loops;
+    let middle = 0.5 * (loops - 1) as f64;
+    let square: f64 = (0..loops).map(|i| (i as f64 - middle).powi(2)).sum();
+    let scale = (loops as f64 / (loops as f64 - 2.0).max(1.0)).sqrt();
+    let value = series.value.chunks_exact(loops).flat_map(|chirps| {
+        let mean = chirps.iter().sum::<f64>() / loops as f64;
+        let slope = chirps.iter().enumerate().map(|(i, value)| (i as f64 - middle) * value).sum::<f64>() / square.max(1.0);
+        chirps.iter().enumerate().map(move |(i, value)| scale * (value - mean - slope * (i as f64 - middle)))
+    });
+    Series { value: value.collect(), weight: series.weight.clone(), loops }
 }
 
 fn chirps(series: &Series, frame: usize) -> &[f64] {
@@ -170,4 +189,27 @@ fn two_valued(series: &Series, training: &[usize], held_out: &[usize], deviation
         share,
         held_out_gain: gain(distance, share, held_out),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    #[test]
+    fn what_is_random_from_chirp_to_chirp_keeps_its_power_beside_a_line_and_what_swings_slowly_does_not() {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let mut left = |swing: f64, noise: f64| {
+            let chirp = |i: usize| (0.03 * i as f64).sin() * swing + noise * normal();
+            let series = Series { value: (0..64 * 32).map(chirp).collect(), weight: vec![1.0; 64], loops: 32 };
+            let power = |series: &Series| series.value.iter().map(|value| value * value).sum::<f64>();
+            power(&within_frames(&series)) / power(&series)
+        };
+        assert!((left(0.0, 1.0) - 1.0).abs() < 0.05);
+        assert!(left(1.0, 0.0) < 0.01);
+    }
 }
