@@ -306,8 +306,12 @@ pub fn spectrum(chirp: &[Complex64]) -> Vec<Complex64> {
 
 /// Range-Doppler transform of `[loop, sample]` with Hann windows of unit energy: `[doppler, range]` in FFT order.
 pub fn transform(signal: &[Complex64], samples: usize) -> Vec<Complex64> {
-    let loops = signal.len() / samples;
-    let (slow, fast) = (hann(loops), hann(samples));
+    transform_under(signal, &hann(signal.len() / samples), &hann(samples))
+}
+
+/// The same with windows over the loops and over the samples.
+pub fn transform_under(signal: &[Complex64], slow: &[f64], fast: &[f64]) -> Vec<Complex64> {
+    let samples = fast.len();
     let mut map: Vec<Complex64> =
         signal.iter().enumerate().map(|(i, value)| value * (slow[i / samples] * fast[i % samples])).collect();
     fft_2d(&mut map, samples, FftDirection::Forward);

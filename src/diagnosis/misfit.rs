@@ -249,8 +249,8 @@ impl Inverted {
     }
 }
 
-/// Of a change of every sample for itself, from one cube to the other: logarithm of its derivative's determinant, summed over the samples of `[frame · channel]` as
-/// much as the windows let each of them through.
+/// Of a change of every sample for itself, from one cube to the other: logarithm of its derivative's determinant, summed over the
+/// samples of `[frame · channel]` as much as the windows let each of them through.
 fn stretched(cube: &Cube, undone: &Cube, undo: &Undo) -> Vec<f64> {
     let [.., loops, samples] = cube.dims;
     let size = loops * samples;

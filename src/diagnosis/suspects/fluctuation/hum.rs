@@ -286,8 +286,8 @@ impl<'a> Chirps<'a> {
         for values in swings {
             for (channel, bin) in (0..channels).flat_map(|channel| line.bins().map(move |bin| (channel, bin))) {
                 let value = |frame: usize| values[(frame * channels + channel) * self.bins + bin];
-                let mean = training.iter().map(|&frame| value(frame)).sum::<Complex64>() / training.len() as f64;
-                scatter += training.iter().map(|&frame| (value(frame) - mean).norm_sqr()).sum::<f64>();
+                let (mean, own) = self.spread(value);
+                scatter += own;
                 gained += held_out.iter().map(|&frame| value(frame).norm_sqr() - (value(frame) - mean).norm_sqr()).sum::<f64>();
             }
         }
@@ -295,6 +295,13 @@ impl<'a> Chirps<'a> {
         let numbers = (swings.len() * channels * width) as f64;
         let variance = (scatter / (numbers * (training.len() - 1) as f64)).max(f64::MIN_POSITIVE);
         gained / variance * self.independent(width, variance) / (channels * width) as f64
+    }
+
+    /// Mean of a value over the training frames, and the sum of what scatters around it.
+    fn spread(&self, value: impl Fn(usize) -> Complex64) -> (Complex64, f64) {
+        let training = &self.evidence.split.training;
+        let mean = training.iter().map(|&frame| value(frame)).sum::<Complex64>() / training.len() as f64;
+        (mean, training.iter().map(|&frame| (value(frame) - mean).norm_sqr()).sum())
     }
 
     /// Whether the other static returns, together, surely do not swing by as much of their own: a receiver's hum is in all of them.
@@ -316,17 +323,13 @@ impl<'a> Chirps<'a> {
         let mut depths = vec![Complex64::ZERO; training.len()];
         let mut all = 0.0;
         for bin in (0..self.bins).filter(|&bin| wanted(bin)) {
-            let mut scatter = 0.0;
-            for channel in 0..channels {
-                let swing = |&frame: &usize| values[(frame * channels + channel) * self.bins + bin];
-                let mean = training.iter().map(swing).sum::<Complex64>() / count;
-                scatter += training.iter().map(|frame| (swing(frame) - mean).norm_sqr()).sum::<f64>();
-            }
+            let swing = |channel: usize, frame: usize| values[(frame * channels + channel) * self.bins + bin];
+            let scatter: f64 = (0..channels).map(|channel| self.spread(|frame| swing(channel, frame)).1).sum();
             let weight = 1.0 / scatter.max(f64::MIN_POSITIVE);
             for channel in 0..channels {
                 let still = self.still[channel * self.bins + bin];
-                let swing = |&frame: &usize| values[(frame * channels + channel) * self.bins + bin];
-                depths.iter_mut().zip(training).for_each(|(depth, frame)| *depth += still.conj() * swing(frame) * weight);
+                let own = training.iter().map(|&frame| still.conj() * swing(channel, frame) * weight);
+                depths.iter_mut().zip(own).for_each(|(depth, own)| *depth += own);
                 all += still.norm_sqr() * weight;
             }
         }

@@ -38,6 +38,8 @@ const DRIFT_GRID: [f64; 7] = [-0.1, -0.03, -0.01, 0.0, 0.01, 0.03, 0.1];
 const UNSEEN_M: f64 = 0.2;
 /// Kinds of change that can be told apart, for the correction of the p-value.
 const KINDS: f64 = 3.0;
+/// Frames that a step must be followed by: one alone may have been bad.
+const FEWEST_AFTER: usize = 2;
 /// How overconfident the likelihood of a step is: cells are not independent, and the power model is rough.
 const STEP_INFLATION: f64 = 3.0;
 
@@ -187,9 +189,6 @@ pub fn refine(
     }
     None
 }
-
-/// Frames that a step must be followed by: one alone may have been bad.
-const FEWEST_AFTER: usize = 2;
 
 /// The step in time that explains most: from one frame on, a few frames later.
 fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {

@@ -32,8 +32,8 @@ fn fit(frames: &[[f64; 3]], mean_m: f64, power: f64) -> (f64, f64) {
     (size, -0.5 * frames.len() as f64 * left.max(f64::MIN_POSITIVE).ln())
 }
 
-/// The size at the mean range where it grows with the range, the mean range, and what the walls gain by it. `standing`: log-likelihood of what stands still, by the
-/// size at the mean range, that range, and the power of the range with which the sine of everything grows.
+/// The size at the mean range where it grows with the range, the mean range, and what the walls gain by it. `standing`: log-likelihood of
+/// what stands still, by the size at the mean range, that range, and the power of the range with which the sine of everything grows.
 fn later(frames: &[[f64; 3]], standing: impl Fn(f64, f64, f64) -> f64) -> Option<(f64, f64, f64)> {
     let weights: f64 = frames.iter().map(|frame| frame[2]).sum();
     let mean_m = frames.iter().map(|[_, range, weight]| range * weight).sum::<f64>() / weights;

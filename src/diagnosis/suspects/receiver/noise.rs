@@ -5,13 +5,12 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::FftDirection;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::image::empty_bins;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::cube::folds;
-use crate::diagnosis::evidence::{fft_2d, hann};
+use crate::diagnosis::evidence::{hann, transform_under};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
 use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale, median};
 
@@ -176,21 +175,13 @@ fn climb(likelihood: impl Fn([f64; 2]) -> f64, first: [f64; 2]) -> Top {
     Top { at, height, deviations: [deviation(bb), deviation(aa)] }
 }
 
-/// Range-Doppler transform of `[loop, sample]` with a Hann window over the samples only, white noise keeping its variance: where nothing
-/// is, nothing leaks over Doppler, and all chirps count alike.
-fn unwindowed(signal: &[Complex64], samples: usize) -> Vec<Complex64> {
-    let loops = signal.len() / samples;
-    let window = hann(samples);
-    let scale = 1.0 / (loops as f64).sqrt();
-    let mut map: Vec<Complex64> = signal.iter().enumerate().map(|(i, value)| value * (window[i % samples] * scale)).collect();
-    fft_2d(&mut map, samples, FftDirection::Forward);
-    map
-}
-
 /// Whitened by each channel's own power; cells with a stranger in any channel are left out.
 fn cells(evidence: &Evidence, frame: usize, bins: &[usize]) -> Cells {
     let [_, _, rx, loops, samples] = evidence.cube.dims;
-    let maps: Vec<Vec<Complex64>> = (0..rx).map(|channel| unwindowed(&evidence.moving(frame, channel), samples)).collect();
+    // Where nothing is, nothing leaks over Doppler: all chirps count alike.
+    let (slow, fast) = (vec![1.0 / (loops as f64).sqrt(); loops], hann(samples));
+    let maps: Vec<Vec<Complex64>> =
+        (0..rx).map(|channel| transform_under(&evidence.moving(frame, channel), &slow, &fast)).collect();
     let mut cells = Cells { values: vec![vec![]; rx], places: vec![] };
     for &bin in bins {
         for doppler in 3..loops - 2 {

@@ -4,6 +4,7 @@
 //! groups of ranges without movers; and so is the gain of what a receiver hears of the body against what the others hear. A gain is
 //! the same at all ranges: each of two halves of all that is heard must show what the other one shows.
 
+use std::iter::repeat;
 use std::sync::Arc;
 
 use num_complex::Complex64;
@@ -71,7 +72,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let Some(steady) = Steady::new(evidence) else { return vec![] };
     let tried = units.len() as f64;
-    let of_body = geometry::gains(evidence);
+    // They tell of receivers only.
+    let of_body = if receivers >= FEWEST { geometry::gains(evidence) } else { None };
     let best = units
         .iter()
         .filter_map(|&unit| judged(evidence, &steady, of_body.as_deref(), unit))
@@ -93,7 +95,7 @@ struct Judged {
 /// `of_body`: gains of what is heard of the body, `[rx][frame][group]`, with inverse variances.
 fn judged(evidence: &Evidence, steady: &Steady, of_body: Option<&[Vec<Vec<[f64; 2]>>]>, unit: Axis) -> Option<Judged> {
     let training = &evidence.split.training;
-    let mut relative = Relative::new(steady, evidence.cube.dims[2], unit).weighed(training);
+    let mut relative = Relative::new(steady, evidence.cube.dims[2], unit, training);
     if let (Axis::Receiver(rx), Some(of_body)) = (unit, of_body) {
         relative.hear(&of_body[rx], training);
     }
@@ -183,7 +185,7 @@ fn correlation(halves: &[Series; 2], frames: &[usize]) -> f64 {
 }
 
 impl Relative {
-    fn new(steady: &Steady, receivers: usize, unit: Axis) -> Self {
+    fn new(steady: &Steady, receivers: usize, unit: Axis, training: &[usize]) -> Self {
         let belongs = |channel: usize| match unit {
             Axis::Receiver(rx) => channel % receivers == rx,
             Axis::Transmitter(tx) => channel / receivers == tx,
@@ -216,46 +218,41 @@ impl Relative {
                 weight.push(if known { 1.0 / (NEIGHBOURS * (1.0 / my_own + 1.0 / their_own)) } else { 0.0 });
             }
         }
-        Self { members, value, weight, groups, freedom: 0.0 }
+        Self { members, value, weight, groups, freedom: 0.0 }.weighed(training)
     }
 
     /// Adds groups of what is heard of the body, `[frame][group]`: logarithmic gains, which may all be off by the same, with their
-    /// inverse variances, which are smaller where groups of a frame scatter by more.
+    /// inverse variances.
     fn hear(&mut self, of_body: &[Vec<[f64; 2]>], training: &[usize]) {
         let groups = of_body.iter().map(Vec::len).max().unwrap_or(0);
-        let mean = |gains: &mut dyn Iterator<Item = &[f64; 2]>| {
-            let (sum, all) = gains.fold((0.0, 0.0), |(sum, all), [gain, weight]| (sum + gain * weight, all + weight));
-            sum / f64::max(all, f64::MIN_POSITIVE)
-        };
-        let middle = mean(&mut training.iter().flat_map(|&frame| &of_body[frame]));
-        let (mut scatter, mut freedom) = (0.0, 0.0);
-        for gains in training.iter().map(|&frame| &of_body[frame]) {
-            let own = mean(&mut gains.iter());
-            scatter += gains.iter().map(|[gain, weight]| weight * (gain - own).powi(2)).sum::<f64>();
-            freedom += (gains.len() as f64 - 1.0).max(0.0);
-        }
+        let of_frame = |gains: &Vec<[f64; 2]>| gains.iter().copied().chain(repeat([0.0; 2])).take(groups).collect::<Vec<_>>();
+        let (value, weight) = of_body.iter().flat_map(of_frame).map(|[gain, weight]| (Complex64::from(gain), weight)).unzip();
+        let body = Self { members: vec![], value, weight, groups, freedom: 0.0 }.weighed(training);
+        // Real numbers have half of the freedom of complex ones, and their whole variance in half of it.
+        let freedom = 0.5 * body.freedom;
         if freedom < FEWEST_FRAMES as f64 {
             return;
         }
-        let excess = (scatter / freedom).max(1.0);
-        self.freedom += freedom;
+        let cells = || training.iter().flat_map(|frame| frame * groups..(frame + 1) * groups);
+        let all: f64 = cells().map(|i| body.weight[i]).sum();
+        let middle = cells().map(|i| body.value[i] * body.weight[i]).sum::<Complex64>() / all.max(f64::MIN_POSITIVE);
         let (mut value, mut weight) = (vec![], vec![]);
-        for (frame, gains) in of_body.iter().enumerate() {
-            let known = frame * self.groups..(frame + 1) * self.groups;
-            value.extend_from_slice(&self.value[known.clone()]);
-            weight.extend_from_slice(&self.weight[known]);
-            for group in 0..groups {
-                // Half of a complex number's variance is its real part's.
-                let [gain, own] = gains.get(group).map_or([0.0; 2], |[gain, own]| [gain - middle, 0.5 * own / excess]);
-                value.push(gain.into());
-                weight.push(own);
-            }
+        for frame in 0..of_body.len() {
+            let (still, moving) = (frame * self.groups..(frame + 1) * self.groups, frame * groups..(frame + 1) * groups);
+            value.extend_from_slice(&self.value[still.clone()]);
+            value.extend(body.value[moving.clone()].iter().map(|gain| gain - middle));
+            weight.extend_from_slice(&self.weight[still]);
+            weight.extend(body.weight[moving].iter().map(|weight| 0.5 * weight));
         }
         (self.value, self.weight, self.groups) = (value, weight, self.groups + groups);
+        self.freedom += freedom;
     }
 
     /// None where too few frames or groups are known.
     fn series(&self, training: &[usize], wanted: impl Fn(usize) -> bool) -> Option<Series> {
+        if self.freedom < LEAST_FREEDOM {
+            return None;
+        }
         let cells = |frame: usize| {
             (0..self.groups).filter(|&g| wanted(g)).map(move |g| frame * self.groups + g).filter(|&i| self.weight[i] > 0.0)
         };
@@ -264,9 +261,6 @@ impl Relative {
         let mut value: Vec<Complex64> = (0..frames)
             .map(|f| cells(f).map(|i| self.value[i] * self.weight[i]).sum::<Complex64>() / weight[f].max(f64::MIN_POSITIVE))
             .collect();
-        if self.freedom < LEAST_FREEDOM {
-            return None;
-        }
         let total: f64 = training.iter().map(|&f| weight[f]).sum();
         let mean = training.iter().map(|&f| value[f] * weight[f]).sum::<Complex64>() / total.max(f64::MIN_POSITIVE);
         if training.iter().filter(|&&f| weight[f] > 0.0).count() < FEWEST_FRAMES {

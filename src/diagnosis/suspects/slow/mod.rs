@@ -50,9 +50,10 @@ struct Found {
     candidate: Candidate,
     /// Of a line on a background that is hardly known: its degrees of freedom, and the p-value that this leaves.
     unsure: Option<(f64, f64)>,
-    /// Gain over the noise alone, where that is sure, and whether or not it is.
-    explained: f64,
+    /// Gain over the noise alone.
     over_noise: f64,
+    /// The same where it is sure; else the candidate's own.
+    explained: f64,
     /// Of a line with more than noise beside it.
     loud: bool,
     /// Whether a frame sees so much of a line's turn that it cannot be taken for a drift from frame to frame.

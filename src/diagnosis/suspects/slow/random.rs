@@ -31,7 +31,6 @@ pub struct Two {
 
 pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -> Option<Random> {
     let series = field.series(part, |_| true);
-    let within = within_frames(&series);
     let training: Vec<usize> = training.iter().copied().filter(|&f| series.weight[f] > 0.0).collect();
     if training.len() * series.loops < 64 {
         return None;
@@ -67,7 +66,7 @@ pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -
         deviation_error: 0.5 / (information.sqrt() * deviation),
         p_value,
         held_out_gain: all(&series, variance, held_out),
-        gain_within: all(&within, variance, held_out),
+        gain_within: all(&within_frames(&series), variance, held_out),
         two: two_valued(&series, &training, held_out, deviation),
     })
 }
