@@ -91,18 +91,28 @@ pub enum Rung {
 pub type Undo = Arc<dyn Fn(&mut Cube) + Send + Sync>;
 
 /// What inverting a law does to the density of what was measured.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Volume {
     /// Whether every sample is changed for itself, whatever the others are: how it is stretched follows from the change.
     pub by_sample: bool,
     /// Logarithm by which volumes are stretched besides, or the density is spread, per sample.
     pub alike: f64,
+    /// And of single samples of the cube.
+    pub of_samples: Option<Arc<Vec<OfSample>>>,
+}
+
+/// Logarithm by which the density of one sample is spread.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OfSample {
+    /// Its place in the cube.
+    pub index: usize,
+    pub nats: f64,
 }
 
 impl Volume {
     /// It only turns and delays.
-    pub const KEPT: Self = Self { by_sample: false, alike: 0.0 };
-    pub const BY_SAMPLE: Self = Self { by_sample: true, alike: 0.0 };
+    pub const KEPT: Self = Self { by_sample: false, alike: 0.0, of_samples: None };
+    pub const BY_SAMPLE: Self = Self { by_sample: true, alike: 0.0, of_samples: None };
 
     /// Of a law with a number that every chirp or frame of so many samples has for itself: what its distribution loses by being
     /// learned from these, nats each (Laplace's approximation).

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cube::Cube;
 use super::evidence::{Evidence, hann, transform};
-use super::finding::Undo;
+use super::finding::{OfSample, Undo};
 use super::support::Support;
 
 /// Of the held-out frames, in the samples as they were recorded.
@@ -244,6 +244,12 @@ impl Inverted {
                 volume.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
             }
             volume.iter_mut().for_each(|sum| *sum += kind.alike * size as f64);
+            let (slow, fast) = (hann(loops), hann(samples));
+            for &OfSample { index, nats } in kind.of_samples.iter().flat_map(|of| of.iter()) {
+                // As much as the windows let it through.
+                let through = slow[index % size / samples] * fast[index % samples];
+                volume[index / size] += nats * through.powi(2) * size as f64;
+            }
         }
         Some(Self { evidence, volume })
     }
@@ -392,7 +398,8 @@ mod tests {
         let with = still(Complex64::ZERO);
         let twice = |cube: &mut Cube| cube.samples.iter_mut().for_each(|value| *value *= 2.0);
         for volume in [Volume::BY_SAMPLE, Volume { alike: 2.0 * 2f64.ln(), ..Volume::KEPT }] {
-            let candidate = Candidate { correction: Correction::Inverse(Arc::new(twice), volume), ..without(Complex64::ZERO) };
+            let candidate =
+                Candidate { correction: Correction::Inverse(Arc::new(twice), volume.clone()), ..without(Complex64::ZERO) };
             let stretched = Misfit::after(&with, &with.with(&candidate));
             let law = stretched.loglik_per_sample - Misfit::of(&with).loglik_per_sample;
             // Nothing is gained; of several laws that all say the same, some say something else.

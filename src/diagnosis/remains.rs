@@ -23,8 +23,8 @@ const FADING: &str = "slow-time gain";
 /// What is cut out where it is plain, and goes on below the noise.
 const BURSTS: [&str; 2] = ["interference", "impulsive_noise"];
 
-/// And what a path that was taken out roughly leaves below the noise looks like the faintest of these.
-const FAINT: [&str; 4] = ["interference", "chirp_start_jitter", "phase_noise", "correlated_noise"];
+/// And what a path that was taken out roughly leaves below the noise looks like the faintest of these, or like a faint path anywhere.
+const FAINT: [&str; 5] = ["interference", "chirp_start_jitter", "phase_noise", "correlated_noise", "spur"];
 
 /// Products of the signal with itself, of which either is hardly taken out in full.
 const PRODUCTS: [&str; 2] = ["object_radar_object", "second_harmonic"];
@@ -112,10 +112,14 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let products = is_one_of(accepted, &PRODUCTS) && is_one_of(candidate, &PRODUCTS);
     // What bursts leave below the noise of single samples is in all receivers at once.
     let bursts = is_one_of(accepted, &BURSTS) && candidate.id == Some("correlated_noise");
-    let faint = accepted.behaves_like.starts_with(paths::PATH_LIKE) && is_one_of(candidate, &FAINT);
-    // What moves as no single reflector does was taken out along one track; where it stays longest, a line is left.
-    let line = is_path(accepted) && accepted.id.is_none() && candidate.id == Some("spur");
-    let smeared = vibrates || timed || is_by_chirp(accepted) || accepted.behaves_like.starts_with(paths::PATH_LIKE);
+    let path_like = accepted.behaves_like.starts_with(paths::PATH_LIKE);
+    let faint = path_like && (is_one_of(candidate, &FAINT) || is_path(candidate));
+    // What moves as no single reflector does was taken out along one track: what else of it moves with the body is left, and a line
+    // where it stays longest.
+    let no_single = is_path(accepted) && accepted.id.is_none();
+    let line = no_single && candidate.id == Some("spur");
+    let rest = no_single && is_path(candidate);
+    let smeared = vibrates || timed || is_by_chirp(accepted) || path_like;
     let uneven = (smeared || is_one_of(accepted, &OF_REMAINS)) && is_of_receivers(candidate);
     // To undo what receivers hear of one another mixes their noise, and chirps read between their samples have less of it.
     let mixed = is_of_receivers(accepted) && candidate.id == Some("correlated_noise")
@@ -131,7 +135,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
         (roughly || fades || image || unlike, ROUGHLY),
         (bursts || behind || line, 1.0),
         (hardly || uneven || mixed || cut, f64::INFINITY),
-        (shaken || products, SHAKEN),
+        (shaken || products || rest, SHAKEN),
         (by_chirp || faint, SLIGHTLY),
     ]
     .into_iter()
@@ -140,4 +144,48 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
 
 fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> bool {
     matches!((a, b), (Some(a), Some(b)) if a[1] < b[0] || b[1] < a[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::{Place, Rung};
+
+    fn of(id: Option<&'static str>, behaves_like: &'static str, gain: f64) -> Candidate {
+        Candidate {
+            id,
+            behaves_like,
+            estimates: vec![],
+            choice: None,
+            place: Place::at("scene"),
+            p_value: 0.0,
+            gain,
+            rung: Rung::F,
+            look_alikes: vec![],
+            statement: String::new(),
+            curve: None,
+            energy: 0.0,
+            correction: Correction::None,
+        }
+    }
+
+    #[test]
+    fn a_path_leaves_faint_tones_and_paths_and_one_without_a_law_leaves_more_of_itself() {
+        let path = |id: Option<&'static str>, gain: f64| of(id, paths::PATH_LIKE, gain);
+        let spur = |gain: f64| of(Some("spur"), "tone", gain);
+        let image = path(Some("wall_ghost"), 1e4);
+        assert!(is_left_by(&image, &spur(90.0)) && !is_left_by(&image, &spur(110.0)));
+        // At another place: a second path may be there.
+        let elsewhere = |id: Option<&'static str>, gain: f64| {
+            let mut path = path(id, gain);
+            path.place.range_m = Some([3.0, 4.0]);
+            path
+        };
+        let mut mover = path(Some("moving_reflector"), 1e4);
+        mover.place.range_m = Some([1.0, 2.0]);
+        let ghost = |gain: f64| elsewhere(Some("wall_ghost"), gain);
+        assert!(is_left_by(&mover, &ghost(90.0)) && !is_left_by(&mover, &ghost(110.0)));
+        let no_law = Candidate { id: None, ..mover };
+        assert!(is_left_by(&no_law, &ghost(4e3)) && !is_left_by(&no_law, &ghost(6e3)));
+    }
 }

@@ -122,11 +122,12 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         let named = || found.iter().filter(passes).filter_map(|(_, candidate)| Some((candidate.id?, candidate.gain))).collect();
         let at_first: &Vec<(&'static str, f64)> = at_first.get_or_insert_with(named);
         // What a radar that vibrates leaves, or paths of what differs between receivers, or that of their noise, is less than there
-        // was before.
+        // was before; and a tone that was there before is no remains.
         let was_there = |effect: &Accepted, candidate: &Candidate| {
             let as_much = |&(id, gain): &(&str, f64)| candidate.id == Some(id) && candidate.gain > NEARLY * gain;
             let vibrates = effect.candidate.id == Some("radar_vibration");
-            (vibrates || is_of_receivers(candidate) || is_of_receivers(&effect.candidate)) && at_first.iter().any(as_much)
+            let of_receivers = is_of_receivers(candidate) || is_of_receivers(&effect.candidate);
+            (vibrates || of_receivers || candidate.id == Some("spur")) && at_first.iter().any(as_much)
         };
         let left = |effect: &Accepted, candidate: &Candidate| {
             is_same(&effect.candidate, candidate) || is_left_by(&effect.candidate, candidate) && !was_there(effect, candidate)
@@ -236,9 +237,20 @@ fn upstream<'a>(
         return of_the_chirp.find(|(_, candidate)| !left(&evidence.with(candidate))).copied().unwrap_or(best);
     }
     let others = passing.iter().filter(|(_, candidate)| is_on_all(candidate));
-    let Some(other) = others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| is_echo(&best.1)) else {
+    let Some(other) = others.clone().max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| is_echo(&best.1)) else {
         return best;
     };
+    // Seen from a wrong place, an echo of the body has no name: where the body is elsewhere with and without the echo, it is put right
+    // first.
+    let stands = |other: &Candidate| {
+        let next = evidence.with(&best.1);
+        let mut found =
+            others.clone().filter(|(_, candidate)| candidate.id == other.id).flat_map(|other| (SUSPECTS[other.0].find)(&next));
+        found.any(|found| found.id == other.id && found.gain > NEARLY * other.gain)
+    };
+    if best.1.id.is_none() && is_displaced(&other.1) && stands(&other.1) {
+        return other;
+    }
     let left = |candidate: &Candidate| Misfit::after(original, &evidence.with(candidate)).loglik_per_sample;
     if left(&other.1) > left(&best.1) { other } else { best }
 }
@@ -354,7 +366,7 @@ impl Evidence {
             Correction::Samples(undo) => undo(&mut next.cube),
             Correction::Inverse(undo, volume) => {
                 undo(&mut next.cube);
-                next.inverses.push((undo.clone(), *volume));
+                next.inverses.push((undo.clone(), volume.clone()));
             }
             Correction::Body(change) => {
                 if let Some(body) = &mut next.body {

@@ -9,8 +9,8 @@ use super::coloured::FINE;
 use super::pendulum::{Law, at};
 use super::scene::Scene;
 
-/// Energies of the swing in a frame over the noise that are tried.
-pub const LEVELS: [f32; 4] = [3.0, 12.0, 60.0, 600.0];
+/// Energies of the swing in a frame over the noise that are tried: up to those of a body that is near.
+pub const LEVELS: [f32; 6] = [3.0, 12.0, 60.0, 600.0, 6e3, 6e4];
 /// Rates are tried up to this, as far as every turn has so many frames (with fewer, a swing is but a few places that come again
 /// and again), and from so many steps on.
 const FASTEST_HZ: f64 = 4.0;

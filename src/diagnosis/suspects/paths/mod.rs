@@ -33,8 +33,10 @@ const AGREEING: f64 = 0.6;
 const LEAST_GAIN: f64 = 6.0;
 /// Of a track that follows the law of a thing that moves: faint products of two paths come near it.
 const LEAST_GAIN_TRACK: f64 = 12.0;
-/// Of a swing that no single frame shows: where the body is not quite where it should be, something near it comes close to one.
+/// Of a swing that no single frame shows: where the body is not quite where it should be, something near it comes close to one, and
+/// faint images do. What is strong among the body's returns, and comes from aside, is neither.
 const LEAST_GAIN_SWING: f64 = 8.0;
+const STRONG: f64 = 100.0;
 /// Of a track that follows no law of motion: remains of a strong path that was taken out look like that.
 const LEAST_GAIN_UNNAMED: f64 = 25.0;
 /// Of a second path: it must be no remains of the first.
@@ -80,7 +82,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             // Noise that receivers share comes from one direction, as if something were there.
             let shared = evidence.accepted.contains(&"correlated_noise");
             let swing = (!remains && !shared).then(|| swing::strongest(&scene)).flatten();
-            let swing = swing.filter(|swing| swing.mover.gain > LEAST_GAIN_SWING);
+            let least = |mover: &mover::Mover| {
+                let told = mover.power > STRONG && mover::aside(&scene, &mover.track.sightings);
+                if told { LEAST_GAIN } else { LEAST_GAIN_SWING }
+            };
+            let swing = swing.filter(|swing| swing.mover.gain > least(&swing.mover));
             let over = scene.over_the_body();
             // What single frames show needs no law.
             found.extend(over_the_body(&over).or_else(|| swing.map(|swing| swinging(&swing, &over))));

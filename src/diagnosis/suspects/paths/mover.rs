@@ -191,7 +191,7 @@ impl Mover {
 }
 
 /// Whether most sightings come from a direction that the body does not fill.
-fn aside(scene: &Scene, sightings: &[Sighting]) -> bool {
+pub fn aside(scene: &Scene, sightings: &[Sighting]) -> bool {
     const APART: f64 = 0.25;
     let Some(body) = &scene.evidence.body else { return false };
     let centre = scene.evidence.radar.centre_m();

@@ -10,6 +10,7 @@ pub mod noise;
 pub mod open;
 pub mod rail;
 pub mod response;
+mod slow_spur;
 pub mod spur;
 pub mod still;
 pub mod support;

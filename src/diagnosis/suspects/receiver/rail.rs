@@ -10,7 +10,7 @@ use super::image::empty_bins;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::paths::still_power;
-use crate::diagnosis::{Cube, Evidence, denoised};
+use crate::diagnosis::{Cube, Evidence, Volume, denoised};
 
 /// Fewest components at the rail.
 const FEWEST: usize = 8;
@@ -78,7 +78,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         }
     };
     let correction = match declip {
-        Some(declip) => Correction::Samples(Arc::new(move |cube: &mut Cube| cube.each_chirp(|_, chirp| declip.restore(chirp)))),
+        // That a sample lies beyond the rail is likelier than any one value there: the density of what is restored is a bound.
+        Some(declip) => {
+            let restore = move |cube: &mut Cube| cube.each_chirp(|_, chirp| declip.restore(chirp));
+            Correction::Inverse(Arc::new(restore), Volume::KEPT)
+        }
         None => Correction::None,
     };
     let frames: Vec<usize> = (0..hit_frames.len()).filter(|&frame| hit_frames[frame] > 0).collect();

@@ -8,6 +8,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::image::empty_bins;
+use super::slow_spur::{self, SlowSpur};
 use crate::diagnosis::evidence::{hann, spectrum, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
 use crate::diagnosis::locate::Residual;
@@ -30,35 +31,40 @@ const BETWEEN: [[usize; 2]; 4] = [[0, 0], [0, 1], [1, 0], [1, 1]];
 /// Cells around the tone to each side, in both axes.
 const AROUND: i64 = 4;
 
+/// Chance above which nothing is said.
+const UNLIKELY: f64 = 1e-4;
+
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let [frames, _, _, loops, samples] = evidence.cube.dims;
     if evidence.accepted.iter().filter(|id| **id == "spur").count() > 2 {
         return vec![];
     }
+    aside(evidence).or_else(|| among_the_slow(evidence)).into_iter().collect()
+}
+
+/// A line where nothing of the room or the body can stay.
+fn aside(evidence: &Evidence) -> Option<Candidate> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
     let training = &evidence.split.training;
     let channels = evidence.cube.channels();
     let line = Line::new(evidence);
     let places = line.strongest();
     let looked_at: usize = places.iter().map(|place| place.1).sum();
-    let Some(Strongest { power, at }) = places.into_iter().filter_map(|place| place.0).max_by(|a, b| a.power.total_cmp(&b.power))
-    else {
-        return vec![];
-    };
+    let Strongest { power, at } = places.into_iter().filter_map(|place| place.0).max_by(|a, b| a.power.total_cmp(&b.power))?;
     // The median exceeds a bound only if half of the frames do.
     let each = mean_power_tail(power, channels as f64).max(1e-300);
     let half = 0.5 * training.len() as f64;
     let p_value = corrected((half * (each.ln() + 2.0 * std::f64::consts::LN_2)).exp().min(1.0), looked_at as f64);
-    if p_value > 1e-4 || power < 3.0 {
-        return vec![];
+    if p_value > UNLIKELY || power < 3.0 {
+        return None;
     }
     let (slow, fast) = refined(evidence, at);
     if is_sideband(evidence, slow, fast) {
-        return vec![];
+        return None;
     }
     let amplitudes = amplitudes_of(&evidence.cube, slow, fast);
     let Around { before, after, deviation } = around(evidence, (slow, fast), &amplitudes);
     if after > LEFT_OVER * before + CHANCE * deviation {
-        return vec![];
+        return None;
     }
     let noise = evidence.noise();
     let count = (loops * samples) as f64;
@@ -73,13 +79,63 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         })
         .sum();
     let strength = (amplitudes.iter().map(Complex64::norm_sqr).sum::<f64>() / amplitudes.len() as f64).sqrt();
+    let correction = Correction::Samples(Arc::new(move |cube: &mut Cube| {
+        let channels = cube.channels();
+        let amplitudes = amplitudes_of(cube, slow, fast);
+        cube.each_chirp(|[frame, channel, chirp], values| {
+            let amplitude = amplitudes[frame * channels + channel];
+            values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(slow, fast, chirp, n));
+        });
+    }));
+    let how = "where nothing of the room or the body can stay";
+    Some(candidate(evidence, Tone { slow, fast, strength, p_value, gain, how, correction }))
+}
+
+/// One that hardly turns from chirp to chirp, and goes on from frame to frame.
+fn among_the_slow(evidence: &Evidence) -> Option<Candidate> {
+    let SlowSpur { turns, fast, p_value, gain } = slow_spur::find(evidence)?;
+    let slow = turns.per_loop.rem_euclid(1.0);
+    if p_value > UNLIKELY || is_sideband(evidence, slow, fast) {
+        return None;
+    }
+    let starts = slow_spur::starts(evidence);
+    let amplitudes = slow_spur::amplitudes(&evidence.cube, &starts, turns, fast);
+    let strength = (amplitudes.iter().map(Complex64::norm_sqr).sum::<f64>() / amplitudes.len() as f64).sqrt();
+    let correction = Correction::Samples(Arc::new(move |cube: &mut Cube| {
+        let amplitudes = slow_spur::amplitudes(cube, &starts, turns, fast);
+        cube.each_chirp(|[frame, channel, chirp], values| {
+            let start = Complex64::cis(TAU * turns.per_frame * starts[frame]) * amplitudes[channel];
+            values.iter_mut().enumerate().for_each(|(n, value)| *value -= start * tone(slow, fast, chirp, n));
+        });
+    }));
+    let how =
+        "in step from frame to frame, at one beat frequency, where whatever turns like that and moves would have left its range";
+    Some(candidate(evidence, Tone { slow, fast, strength, p_value, gain, how, correction }))
+}
+
+/// A tone that was found.
+struct Tone {
+    /// Turns per chirp and per sample.
+    slow: f64,
+    fast: f64,
+    /// Root mean square over the channels.
+    strength: f64,
+    p_value: f64,
+    gain: f64,
+    how: &'static str,
+    correction: Correction,
+}
+
+fn candidate(evidence: &Evidence, tone: Tone) -> Candidate {
+    let Tone { slow, fast, strength, p_value, gain, how, correction } = tone;
+    let [frames, _, _, loops, samples] = evidence.cube.dims;
     let peak = evidence.peak();
     let level_db = 20.0 * (strength / (peak - strength).max(1e-300)).log10();
     let rate = evidence.radar.sample_rate_hz;
     let wrapped = if fast > 0.5 { fast - 1.0 } else { fast };
     // The frequency nearest to zero that samples so.
     let frequency_hz = wrapped * rate;
-    Some(Candidate {
+    Candidate {
         id: Some("spur"),
         behaves_like: "tone",
         estimates: vec![
@@ -94,24 +150,15 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         look_alikes: vec![],
         statement: format!(
             "a continuous tone at {:.4} MHz (or {:.4} MHz, as sampled), {level_db:.1} dB relative to the peak sample, runs through all frames \
-             where nothing of the room or the body can stay; its phase advances by {:.3} turns per chirp",
+             {how}; its phase advances by {:.3} turns per chirp",
             frequency_hz * 1e-6,
             (wrapped - wrapped.signum()) * rate * 1e-6,
             slow
         ),
         curve: None,
-        energy: strength * strength * (frames * channels) as f64 * count,
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-            let channels = cube.channels();
-            let amplitudes = amplitudes_of(cube, slow, fast);
-            cube.each_chirp(|[frame, channel, chirp], values| {
-                let amplitude = amplitudes[frame * channels + channel];
-                values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(slow, fast, chirp, n));
-            });
-        })),
-    })
-    .into_iter()
-    .collect()
+        energy: strength * strength * (frames * evidence.cube.channels() * loops * samples) as f64,
+        correction,
+    }
 }
 
 /// Of a frequency, from the tone's energy over the noise in the held-out frames, which are fewer than those it is sought in: Cramér and

@@ -256,28 +256,47 @@ fn candidate(
     fitted: &Fitted,
     index: usize,
 ) -> Option<Candidate> {
-    let element = &elements[index];
-    let mut others = elements.to_vec();
-    others.remove(index);
+    // Paths over the board that one chirp does not tell apart are one leakage: each of them is little beside the others.
+    let together = |other: &Element| match (&elements[index], other) {
+        (Element::Leakage(a), Element::Leakage(b)) => (a - b).abs() * (evidence.cube.dims[4] as f64) < 1.0,
+        (element, other) => element == other,
+    };
+    let (group, others): (Vec<usize>, Vec<usize>) = (0..elements.len()).partition(|&other| together(&elements[other]));
+    if group[0] != index {
+        return None;
+    }
+    let others: Vec<Element> = others.into_iter().map(|other| elements[other].clone()).collect();
     let without = field.fit(&templates(&others, images));
+    let beside = |element: Element| field.fit(&templates(&[others.as_slice(), &[element]].concat(), images)).likelihood;
+    let element = &match elements[index] {
+        Element::Leakage(turns) if group.len() > 1 => {
+            let step = beat_hz(evidence, BOARD_M) / evidence.radar.sample_rate_hz;
+            Element::Leakage(refine(turns, step, |turns| beside(Element::Leakage(turns))))
+        }
+        ref alone => alone.clone(),
+    };
     let channels = field.channels();
-    let freedom = 2.0 * unknowns(element, channels);
+    let freedom: f64 = group.iter().map(|&index| 2.0 * unknowns(&elements[index], channels)).sum();
     let p_value = corrected(chi2_tail(2.0 * (fitted.likelihood - without.likelihood).max(0.0), freedom), 200.0);
     let gain = field.gain(Some(&without.predicted), &fitted.predicted);
-    let first: usize = elements[..index].iter().map(|element| columns(element, 1 + 2 * LONGEST_EDGE).len()).sum();
+    let first_of =
+        |index: usize| -> usize { elements[..index].iter().map(|element| columns(element, 1 + 2 * LONGEST_EDGE).len()).sum() };
+    let first = first_of(index);
     let samples = evidence.cube.dims[4];
-    let own = columns(element, samples);
-    if own.is_empty() {
+    if columns(element, samples).is_empty() {
         return None;
     }
     let term: Vec<Vec<Complex64>> = (0..channels)
         .map(|channel| {
             let mut sum = vec![Complex64::ZERO; samples];
-            own.iter().enumerate().for_each(|(i, column)| add(&mut sum, column, fitted.own[channel][first + i]));
+            for &index in &group {
+                let own = columns(&elements[index], samples);
+                own.iter().enumerate().for_each(|(i, column)| add(&mut sum, column, fitted.own[channel][first_of(index) + i]));
+            }
             sum
         })
         .collect();
-    let amplitudes: Vec<f64> = (0..channels).map(|channel| fitted.own[channel][first].norm()).collect();
+    let amplitudes: Vec<f64> = term.iter().map(|chirp| energy(chirp).sqrt()).collect();
     let skipped = match *element {
         Element::Start(count) => 0..count,
         Element::End(count) => samples - count..samples,
@@ -325,12 +344,8 @@ fn candidate(
             let rate = evidence.radar.sample_rate_hz;
             let range = range_m(evidence, turns * rate);
             let step = beat_hz(evidence, 0.002) / rate;
-            let at = |turns: f64| {
-                let mut moved = elements.to_vec();
-                moved[index] = Element::Leakage(turns);
-                field.fit(&templates(&moved, images)).likelihood
-            };
-            let curvature = (2.0 * fitted.likelihood - at(turns + step) - at(turns - step)) / (0.002f64 * 0.002);
+            let at = |turns: f64| beside(Element::Leakage(turns));
+            let curvature = (2.0 * at(turns) - at(turns + step) - at(turns - step)) / (0.002f64 * 0.002);
             let error = if curvature > 0.0 { curvature.recip().sqrt() } else { 0.05 }.max(5e-4);
             // A board has more than one path, within its own size.
             let reach = (1.645 * error).max(BOARD_M);
@@ -443,4 +458,33 @@ pub fn subtract(term: Vec<Vec<Complex64>>) -> Correction {
 /// A number with three significant digits.
 fn digits(value: f64) -> String {
     if value >= 100.0 { format!("{value:.0}") } else { format!("{value:.2}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::radar::Radar;
+    use crate::room::Room;
+
+    #[test]
+    fn a_leakage_that_no_single_tone_describes_is_one_and_is_taken_out_in_full() {
+        let radar = Radar { samples_per_chirp: 128, loops_per_frame: 16, ..Radar::small(12) };
+        let turns = |range_m: f64| 2.0 * range_m * radar.slope_hz_per_s / crate::radar::SPEED_OF_LIGHT / radar.sample_rate_hz;
+        let (wall, leak) = (turns(3.0), turns(0.08));
+        let mut evidence = Evidence::in_noise(radar.clone(), 7, |[_, rx, _, n]| {
+            let tone = |turns: f64| Complex64::cis(std::f64::consts::TAU * turns * n as f64 + rx as f64);
+            // It falls by 2.8 dB along the chirp.
+            tone(wall) * 30.0 + tone(leak) * 100.0 * (-0.32 * n as f64 / 128.0).exp()
+        });
+        let walls = Room { left_m: Some(2.0), right_m: Some(2.0), floor_m: Some(1.0), ceiling_m: Some(1.5), ..Room::default() };
+        evidence.room = Some(Room { front_m: Some(4.0), back_m: Some(1.0), ..walls });
+        let likelihood = |evidence: &Evidence| Field::new(evidence).expect("a field").free_likelihood();
+        let found = find(&evidence);
+        let leaks: Vec<&Candidate> = found.iter().filter(|found| found.id == Some("tx_leakage")).collect();
+        assert_eq!(leaks.len(), 1, "{found:?}");
+        let [low, high] = leaks[0].place.range_m.expect("a range");
+        assert!(low < 0.08 && 0.08 < high, "{low} to {high}");
+        let (before, after) = (likelihood(&evidence), likelihood(&evidence.with(leaks[0])));
+        assert!(after < 1e-3 * before, "{after} of {before}");
+    }
 }
