@@ -15,7 +15,7 @@ const BY_CHIRP: [&str; 2] = ["phase_noise", "chirp_start_jitter"];
 const SLIGHTLY: f64 = 0.01;
 
 /// What a radar that vibrates leaves: turns of what stands still that are not quite undone, and their sidebands, up to this share of
-/// its gain (which counts what is left); so with products.
+/// its gain (which counts what is left).
 const TURNS: [&str; 3] = ["slow-time phase", "delay-proportional phase", fluctuation::STIRS];
 const SHAKEN: f64 = 0.5;
 const FADING: &str = "slow-time gain";
@@ -26,7 +26,7 @@ const BURSTS: [&str; 2] = ["interference", "impulsive_noise"];
 /// And what a path that was taken out roughly leaves below the noise looks like the faintest of these, or like a faint path anywhere.
 const FAINT: [&str; 5] = ["interference", "chirp_start_jitter", "phase_noise", "correlated_noise", "spur"];
 
-/// Products of the signal with itself, of which either is hardly taken out in full.
+/// Products of the signal with itself, of which either is hardly taken out in full: one that was never there makes the other.
 const PRODUCTS: [&str; 2] = ["object_radar_object", "second_harmonic"];
 
 /// What explains a little of anything that moves near the body: remains of a strong path that was taken out.
@@ -76,6 +76,11 @@ pub fn is_of_remains(candidate: &Candidate) -> bool {
     is_one_of(candidate, &OF_REMAINS)
 }
 
+/// Whether it is a product of the signal with itself.
+pub fn is_product(candidate: &Candidate) -> bool {
+    is_one_of(candidate, &PRODUCTS)
+}
+
 fn is_one_of(candidate: &Candidate, ids: &[&str]) -> bool {
     candidate.id.is_some_and(|id| ids.contains(&id))
 }
@@ -109,7 +114,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let behind = timed && of_remains;
     let image = timed && is_one_of(candidate, &IMAGES);
     let hardly = timed && candidate.id == Some("carried_reflector");
-    let products = is_one_of(accepted, &PRODUCTS) && is_one_of(candidate, &PRODUCTS);
+    let products = is_product(accepted) && is_product(candidate);
     // What bursts leave below the noise of single samples is in all receivers at once.
     let bursts = is_one_of(accepted, &BURSTS) && candidate.id == Some("correlated_noise");
     let path_like = accepted.behaves_like.starts_with(paths::PATH_LIKE);
@@ -134,8 +139,8 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     [
         (roughly || fades || image || unlike, ROUGHLY),
         (bursts || behind || line, 1.0),
-        (hardly || uneven || mixed || cut, f64::INFINITY),
-        (shaken || products || rest, SHAKEN),
+        (hardly || uneven || mixed || cut || products, f64::INFINITY),
+        (shaken || rest, SHAKEN),
         (by_chirp || faint, SLIGHTLY),
     ]
     .into_iter()

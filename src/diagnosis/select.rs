@@ -10,7 +10,7 @@ use super::config::DiagnosisConfig;
 use super::evidence::Evidence;
 use super::finding::{Candidate, Correction, Rung};
 use super::misfit::Misfit;
-use super::remains::{ROUGHLY, is_by_chirp, is_left_by, is_of_receivers, is_of_remains, is_rough, is_same};
+use super::remains::{ROUGHLY, is_by_chirp, is_left_by, is_of_receivers, is_of_remains, is_product, is_rough, is_same};
 use super::suspects::receiver::harmonic;
 use super::suspects::{SUSPECTS, Suspect, excess, paths};
 
@@ -122,12 +122,12 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         let named = || found.iter().filter(passes).filter_map(|(_, candidate)| Some((candidate.id?, candidate.gain))).collect();
         let at_first: &Vec<(&'static str, f64)> = at_first.get_or_insert_with(named);
         // What a radar that vibrates leaves, or paths of what differs between receivers, or that of their noise, is less than there
-        // was before; and a tone that was there before is no remains.
+        // was before; and a tone or a product that was there before is no remains.
         let was_there = |effect: &Accepted, candidate: &Candidate| {
             let as_much = |&(id, gain): &(&str, f64)| candidate.id == Some(id) && candidate.gain > NEARLY * gain;
             let vibrates = effect.candidate.id == Some("radar_vibration");
             let of_receivers = is_of_receivers(candidate) || is_of_receivers(&effect.candidate);
-            (vibrates || of_receivers || candidate.id == Some("spur")) && at_first.iter().any(as_much)
+            (vibrates || of_receivers || candidate.id == Some("spur") || is_product(candidate)) && at_first.iter().any(as_much)
         };
         let left = |effect: &Accepted, candidate: &Candidate| {
             is_same(&effect.candidate, candidate) || is_left_by(&effect.candidate, candidate) && !was_there(effect, candidate)
