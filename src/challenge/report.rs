@@ -12,6 +12,9 @@ use crate::error::Result;
 #[derive(Clone, Debug, Deserialize)]
 pub struct Report {
     pub verdict: String,
+    /// That something is missing, over all that was looked at.
+    #[serde(default)]
+    pub p_value: Option<f64>,
     pub effects: Vec<Effect>,
     pub unexplained: Vec<Unexplained>,
     #[serde(default)]

@@ -73,6 +73,7 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         verdict: Verdict::Undecided,
         reason: String::new(),
         probability_nothing_missing: 0.5,
+        p_value: None,
         audit: checks,
         effects: vec![],
         unexplained: vec![],
@@ -115,6 +116,7 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         Verdict::NoMismatch => 1.0 - 0.5 * (1.0 - probability_of_nothing(explanation.p_value)),
         _ => probability_of_nothing(explanation.p_value),
     };
+    report.p_value = Some(explanation.p_value);
     report.fit = Fit { before: explanation.before, after: explanation.after };
     Ok(Diagnosis { report, radar, original, explanation: Some(explanation) })
 }

@@ -155,6 +155,10 @@ pub struct Report {
     pub verdict: Verdict,
     pub reason: String,
     pub probability_nothing_missing: f64,
+    /// Chance that the strongest suspicion would be as strong where nothing is missing, over all suspects: a bound (Bonferroni's over
+    /// suspects, each of which counts what it looked at). None where nothing was suspected.
+    #[serde(default)]
+    pub p_value: Option<f64>,
     pub audit: Vec<Check>,
     pub effects: Vec<Effect>,
     pub unexplained: Vec<Unexplained>,
