@@ -236,6 +236,7 @@ impl Inverted {
         let [frames, .., loops, samples] = recording.cube.dims;
         let size = loops * samples;
         let mut volume = vec![0.0; frames * recording.cube.channels()];
+        let through = through(&recording.cube);
         for (undo, kind) in &explained.inverses {
             let before = kind.by_sample.then(|| evidence.cube.clone());
             undo(&mut evidence.cube);
@@ -244,15 +245,20 @@ impl Inverted {
                 volume.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
             }
             volume.iter_mut().for_each(|sum| *sum += kind.alike * size as f64);
-            let (slow, fast) = (hann(loops), hann(samples));
             for &OfSample { index, nats } in kind.of_samples.iter().flat_map(|of| of.iter()) {
-                // As much as the windows let it through.
-                let through = slow[index % size / samples] * fast[index % samples];
-                volume[index / size] += nats * through.powi(2) * size as f64;
+                volume[index / size] += nats * through(index);
             }
         }
         Some(Self { evidence, volume })
     }
+}
+
+/// How much the windows let through of the power of every sample of a cube, one on average.
+fn through(cube: &Cube) -> impl Fn(usize) -> f64 + use<> {
+    let [.., loops, samples] = cube.dims;
+    let size = loops * samples;
+    let (slow, fast) = (hann(loops), hann(samples));
+    move |index| (slow[index % size / samples] * fast[index % samples]).powi(2) * size as f64
 }
 
 /// Of a change of every sample for itself, from one cube to the other: logarithm of its derivative's determinant, summed over the
@@ -260,7 +266,7 @@ impl Inverted {
 fn stretched(cube: &Cube, undone: &Cube, undo: &Undo) -> Vec<f64> {
     let [.., loops, samples] = cube.dims;
     let size = loops * samples;
-    let (slow, fast) = (hann(loops), hann(samples));
+    let through = through(cube);
     let rms = (cube.samples.iter().map(Complex64::norm_sqr).sum::<f64>() / cube.samples.len().max(1) as f64).sqrt();
     let step = (STEP * rms).max(f64::MIN_POSITIVE.sqrt());
     let moved = |by: Complex64| {
@@ -272,8 +278,7 @@ fn stretched(cube: &Cube, undone: &Cube, undo: &Undo) -> Vec<f64> {
     let (origin, [right, up]) = (&undone.samples, [Complex64::from(step), Complex64::new(0.0, step)].map(moved));
     let determinant = |index: usize| {
         let [a, b] = [&right, &up].map(|moved| (moved[index] - origin[index]) / step);
-        let through = slow[index % size / samples] * fast[index % samples];
-        (a.re * b.im - a.im * b.re).abs().max(SINGULAR).ln() * through.powi(2) * size as f64
+        (a.re * b.im - a.im * b.re).abs().max(SINGULAR).ln() * through(index)
     };
     (0..origin.len() / size).into_par_iter().map(|of| (of * size..(of + 1) * size).map(determinant).sum()).collect()
 }

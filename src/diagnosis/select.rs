@@ -237,18 +237,16 @@ fn upstream<'a>(
         return of_the_chirp.find(|(_, candidate)| !left(&evidence.with(candidate))).copied().unwrap_or(best);
     }
     let others = passing.iter().filter(|(_, candidate)| is_on_all(candidate));
-    let Some(other) = others.clone().max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| is_echo(&best.1)) else {
+    let Some(other) = others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| is_echo(&best.1)) else {
         return best;
     };
     // Seen from a wrong place, an echo of the body has no name: where the body is elsewhere with and without the echo, it is put right
     // first.
-    let stands = |other: &Candidate| {
-        let next = evidence.with(&best.1);
-        let mut found =
-            others.clone().filter(|(_, candidate)| candidate.id == other.id).flat_map(|other| (SUSPECTS[other.0].find)(&next));
-        found.any(|found| found.id == other.id && found.gain > NEARLY * other.gain)
+    let stands = |(suspect, other): &(usize, Candidate)| {
+        let again = (SUSPECTS[*suspect].find)(&evidence.with(&best.1));
+        again.iter().any(|found| found.id == other.id && found.gain > NEARLY * other.gain)
     };
-    if best.1.id.is_none() && is_displaced(&other.1) && stands(&other.1) {
+    if best.1.id.is_none() && is_displaced(&other.1) && stands(other) {
         return other;
     }
     let left = |candidate: &Candidate| Misfit::after(original, &evidence.with(candidate)).loglik_per_sample;

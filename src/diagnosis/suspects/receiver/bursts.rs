@@ -72,14 +72,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let seen_by_all = rx > 1 && together > 0.5 * rx as f64;
     let alone = corrected((-HIGH * strong as f64).exp(), total);
     let p_value = crossings.as_ref().map_or(alone, |crossings| alone.min(crossings.p_value));
+    let powers: Vec<Vec<f64>> = bursts.iter().map(|burst| powers(&evidence.cube, burst)).collect();
     let (mut gain, mut removed) = (0.0, 0.0);
-    for burst in &bursts {
-        let repaired = repair(&evidence.cube, burst);
-        let chirp = chirp_of(&evidence.cube, burst);
-        let energy: f64 = repaired.iter().zip(&chirp[burst.first..]).map(|(a, b)| (a - b).norm_sqr()).sum();
+    for (burst, powers) in bursts.iter().zip(&powers) {
+        let energy: f64 = powers.iter().sum();
         removed += energy;
         let unforeseen = stencil_noise(burst.chirp, loops);
-        gain += energy / (unforeseen * evidence.noise()[burst.channel]).max(1e-300) - repaired.len() as f64;
+        gain += energy / (unforeseen * evidence.noise()[burst.channel]).max(1e-300) - powers.len() as f64;
     }
     // Few bursts may all be in training frames. Each is judged by what its neighbours foretell, in whatever frame it is: the
     // gain is what held-out frames would show in the mean over which of them are held out.
@@ -87,7 +86,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if gain <= 0.0 {
         return vec![];
     }
-    let volume = Volume { of_samples: Some(Arc::new(spread(evidence, &bursts))), ..Volume::KEPT };
+    let volume = Volume { of_samples: Some(Arc::new(spread(evidence, &bursts, &powers))), ..Volume::KEPT };
     let list = |values: BTreeSet<usize>| Some(values.into_iter().collect::<Vec<_>>());
     let place = Place {
         frames: list(bursts.iter().map(|burst| burst.frame).collect()),
@@ -133,29 +132,24 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
 
 /// How unlikely it is that a sample is hit, and by so much, where another would have had noise: each burst's samples are measured
 /// in its own frame, and foretold by the training frames' rate and mean power only.
-fn spread(evidence: &Evidence, bursts: &[Burst]) -> Vec<OfSample> {
+fn spread(evidence: &Evidence, bursts: &[Burst], powers: &[Vec<f64>]) -> Vec<OfSample> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let of_burst = |burst: &Burst| -> Vec<(usize, f64)> {
-        let values = &chirp_of(&evidence.cube, burst)[burst.first..=burst.last];
-        let start = start_of(&evidence.cube, burst);
-        let powers = repair(&evidence.cube, burst).into_iter().zip(values).map(|(usual, value)| (value - usual).norm_sqr());
-        powers.enumerate().map(|(n, power)| (start + n, power)).collect()
-    };
-    let hits: Vec<(&Burst, Vec<(usize, f64)>)> = bursts.iter().map(|burst| (burst, of_burst(burst))).collect();
-    let known = hits.iter().filter(|(burst, _)| evidence.split.training.contains(&burst.frame));
-    let powers: Vec<f64> = known.flat_map(|(_, hits)| hits.iter().map(|(_, power)| *power)).collect();
+    let hits = || bursts.iter().zip(powers);
+    let known: Vec<f64> = hits()
+        .filter(|(burst, _)| evidence.split.training.contains(&burst.frame))
+        .flat_map(|(_, powers)| powers.iter().copied())
+        .collect();
     let total = evidence.split.training.len() * evidence.cube.channels() * loops * samples;
     // One more than there are, as strong as the signal: training frames may have none.
-    let rate = (powers.len() + 1) as f64 / (total + 1) as f64;
-    let mean = (powers.iter().sum::<f64>() + evidence.peak().powi(2)) / (powers.len() + 1) as f64;
-    let nats = |burst: &Burst, power: f64| {
+    let rate = (known.len() + 1) as f64 / (total + 1) as f64;
+    let mean = (known.iter().sum::<f64>() + evidence.peak().powi(2)) / (known.len() + 1) as f64;
+    let of_burst = |(burst, powers): (&Burst, &Vec<f64>)| {
         let noise = evidence.noise()[burst.channel].max(f64::MIN_POSITIVE);
-        let mean = mean.max(noise);
-        (rate * noise / mean).ln() - power / mean
+        let (mean, start) = (mean.max(noise), start_of(&evidence.cube, burst));
+        let nats = |power: &f64| (rate * noise / mean).ln() - power / mean;
+        powers.iter().enumerate().map(|(n, power)| OfSample { index: start + n, nats: nats(power) }).collect::<Vec<_>>()
     };
-    hits.iter()
-        .flat_map(|(burst, hits)| hits.iter().map(|&(index, power)| OfSample { index, nats: nats(burst, power) }))
-        .collect()
+    hits().flat_map(of_burst).collect()
 }
 
 /// How many there are: beside those that hardly stand out, and where things move too fast to look, are others.
@@ -165,11 +159,6 @@ fn bursts_in_all(count: f64, crossings: Option<&Crossings>) -> Estimate {
     let error = 1.645 * (0.1 * count + 0.6);
     let most = value * (1.0 + UNSEEN * faint) + error;
     Estimate { name: "bursts", values: vec![value], ci90: vec![[count - error, most]] }
-}
-
-fn chirp_of<'a>(cube: &'a Cube, burst: &Burst) -> &'a [Complex64] {
-    let samples = cube.dims[4];
-    &cube.channel(burst.frame, burst.channel)[burst.chirp * samples..][..samples]
 }
 
 /// The chirps before and after, or the two on the side that there is.
@@ -257,6 +246,12 @@ fn repair_all(cube: &mut Cube, bursts: &[Burst]) {
         let start = start_of(cube, burst);
         cube.samples[start..start + values.len()].copy_from_slice(&values);
     }
+}
+
+/// Of what a burst adds to each of its samples.
+fn powers(cube: &Cube, burst: &Burst) -> Vec<f64> {
+    let (usual, start) = (repair(cube, burst), start_of(cube, burst));
+    usual.iter().zip(&cube.samples[start..]).map(|(usual, value)| (value - usual).norm_sqr()).collect()
 }
 
 /// What the neighbours let expect of the hit samples.

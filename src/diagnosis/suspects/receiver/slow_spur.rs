@@ -8,8 +8,9 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
+use rustfft::FftPlanner;
 
-use crate::diagnosis::evidence::{hann, spectrum};
+use crate::diagnosis::evidence::hann;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::slow::lines::climb;
 use crate::diagnosis::{Cube, Evidence};
@@ -57,35 +58,43 @@ pub struct SlowSpur {
     pub turns: Turns,
     /// Turns per sample.
     pub fast: f64,
+    /// When each frame begins, in frame periods.
+    pub starts: Vec<f64>,
+    /// By channel.
+    pub amplitudes: Vec<Complex64>,
     pub p_value: f64,
     pub gain: f64,
 }
 
-/// What of a tone each frame of a channel holds, `[channel][frame]`, training frames first.
+/// What of a tone each frame of a channel holds, `[channel][frame]`.
 type Held = Vec<Vec<Complex64>>;
 
 /// Spectra over the samples of all chirps of some frames, without what stands still.
 struct Spectra<'a> {
     evidence: &'a Evidence,
-    training: Vec<usize>,
-    held_out: Vec<usize>,
-    /// `[frame][channel][loop · sample]`; empty for frames that are not looked at.
-    frames: Vec<Vec<Vec<Complex64>>>,
-    /// When each frame begins, in frame periods.
+    /// That are looked at, those to train on first, and how many these are.
+    frames: Vec<usize>,
+    training: usize,
+    /// `[frame that is looked at][channel][loop · sample]`
+    values: Vec<Vec<Vec<Complex64>>>,
+    /// When each frame of the recording begins, in frame periods.
     starts: Vec<f64>,
-    /// Over a frame's loops, of sum one.
+    /// Over a frame's loops.
     window: Vec<f64>,
 }
 
-/// When each frame begins, in frame periods.
-pub fn starts(evidence: &Evidence) -> Vec<f64> {
-    evidence.starts_s.iter().map(|start_s| start_s / evidence.radar.frame_period_s).collect()
-}
-
 pub fn find(evidence: &Evidence) -> Option<SlowSpur> {
-    let spectra = Spectra::new(evidence)?;
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let cells: Vec<[usize; 2]> = (2..evidence.range_bins()).filter_map(|bin| spectra.steadiest(bin)).collect();
+    let first = |frames: &[usize]| frames.iter().copied().take(MOST_FRAMES).collect::<Vec<usize>>();
+    let (training, held_out) = (first(&evidence.split.training), first(&evidence.split.held_out));
+    if training.len() < FEWEST_FRAMES || held_out.is_empty() || loops < 8 {
+        return None;
+    }
+    let cells: Vec<[usize; 2]> = (2..evidence.range_bins()).filter_map(|bin| steadiest(evidence, &training, bin)).collect();
+    if cells.is_empty() {
+        return None;
+    }
+    let spectra = Spectra::new(evidence, &training, &held_out);
     let found: Vec<Tone> = cells.par_iter().map(|&cell| spectra.tone(cell)).collect();
     let Tone { bin, turns, coherence } = found.into_iter().max_by(|a, b| a.coherence.total_cmp(&b.coherence))?;
     let walk = spectra.walk_bins(turns);
@@ -93,25 +102,22 @@ pub fn find(evidence: &Evidence) -> Option<SlowSpur> {
         return None;
     }
     // Half of the recording is half of the way.
-    let halves = spectra.training.split_at(spectra.training.len() / 2);
+    let halves = training.split_at(training.len() / 2);
     let [early, late] = [halves.0, halves.1].map(|frames| spectra.beat(frames, turns, bin));
     if (late - early).abs() > STAYS * 0.5 * walk {
         return None;
     }
-    let fast = spectra.beat(&spectra.training, turns, bin) / samples as f64;
-    let goes_on = |turns: Turns| {
-        let held = spectra.held(turns.per_loop, bin);
-        spectra.coherence(&held, turns.per_frame) * energy(&held, spectra.training.len())
-    };
+    let fast = spectra.beat(&training, turns, bin) / samples as f64;
+    let goes_on = |turns: Turns| spectra.goes_on(&spectra.held(turns.per_loop, bin), turns.per_frame);
     if goes_on(turns.opposite()) > OPPOSITE * OPPOSITE * goes_on(turns) {
         return None;
     }
     let tried = (cells.len() * STEPS * FINE * evidence.cube.dims[0]) as f64;
-    let p_value = corrected((1.0 - coherence).max(1e-16).powi(spectra.training.len() as i32 - 1), tried);
+    let p_value = corrected((1.0 - coherence).max(1e-16).powi(training.len() as i32 - 1), tried);
     let amplitudes = amplitudes(&evidence.cube, &spectra.starts, turns, fast);
-    let count = (loops * samples * spectra.held_out.len()) as f64;
+    let count = (loops * samples * held_out.len()) as f64;
     let gain = amplitudes.iter().zip(evidence.noise()).map(|(a, noise)| a.norm_sqr() * count / noise.max(1e-300) - 1.0).sum();
-    Some(SlowSpur { turns, fast, p_value, gain })
+    Some(SlowSpur { turns, fast, starts: spectra.starts, amplitudes, p_value, gain })
 }
 
 /// At a range, what goes on from frame to frame most.
@@ -122,59 +128,56 @@ struct Tone {
     coherence: f64,
 }
 
-/// Of the first frames.
-fn energy(held: &Held, frames: usize) -> f64 {
-    held.iter().flat_map(|channel| &channel[..frames]).map(Complex64::norm_sqr).sum()
+/// The Doppler frequency at which a range is strong in most frames.
+fn steadiest(evidence: &Evidence, training: &[usize], bin: usize) -> Option<[usize; 2]> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let maps = evidence.maps();
+    let quartile = |doppler: usize| {
+        let of_frame = |&frame: &usize| maps[(frame * loops + doppler) * samples + bin];
+        let mut powers: Vec<f32> = training.iter().map(of_frame).collect();
+        powers.sort_by(f32::total_cmp);
+        powers[powers.len() / 4]
+    };
+    let (doppler, power) = (0..loops).map(|doppler| (doppler, quartile(doppler))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (power > LEAST_POWER).then_some([doppler, bin])
 }
 
 impl<'a> Spectra<'a> {
-    fn new(evidence: &'a Evidence) -> Option<Self> {
-        let [frames, _, _, loops, samples] = evidence.cube.dims;
-        let first = |frames: &[usize]| frames.iter().copied().take(MOST_FRAMES).collect::<Vec<usize>>();
-        let (training, held_out) = (first(&evidence.split.training), first(&evidence.split.held_out));
-        if training.len() < FEWEST_FRAMES || held_out.is_empty() || loops < 8 {
-            return None;
-        }
-        let of_channel = |frame: usize, channel: usize| -> Vec<Complex64> {
-            evidence.moving(frame, channel).chunks_exact(samples).flat_map(spectrum).collect()
+    fn new(evidence: &'a Evidence, training: &[usize], held_out: &[usize]) -> Self {
+        let [_, _, _, loops, samples] = evidence.cube.dims;
+        let (window, fft) = (hann(samples), FftPlanner::new().plan_fft_forward(samples));
+        let of_channel = |frame: usize, channel: usize| {
+            let mut chirps = evidence.moving(frame, channel);
+            chirps.iter_mut().zip(window.iter().cycle()).for_each(|(value, weight)| *value *= weight);
+            fft.process(&mut chirps);
+            chirps
         };
-        let of_frame = |frame: usize| {
-            let looked_at = training.contains(&frame) || held_out.contains(&frame);
-            let channels = if looked_at { evidence.cube.channels() } else { 0 };
-            (0..channels).map(|channel| of_channel(frame, channel)).collect()
-        };
-        let frames = (0..frames).into_par_iter().map(of_frame).collect();
-        let window = hann(loops);
-        let sum: f64 = window.iter().sum();
-        let window = window.into_iter().map(|weight| weight / sum).collect();
-        Some(Self { evidence, training, held_out, frames, starts: starts(evidence), window })
+        let frames = [training, held_out].concat();
+        let values = frames
+            .par_iter()
+            .map(|&frame| (0..evidence.cube.channels()).map(|channel| of_channel(frame, channel)).collect())
+            .collect();
+        let starts = evidence.starts_s.iter().map(|start_s| start_s / evidence.radar.frame_period_s).collect();
+        Self { evidence, frames, training: training.len(), values, starts, window: hann(loops) }
     }
 
-    /// The Doppler frequency at which a range is strong in most frames.
-    fn steadiest(&self, bin: usize) -> Option<[usize; 2]> {
-        let [_, _, _, loops, samples] = self.evidence.cube.dims;
-        let maps = self.evidence.maps();
-        let quartile = |doppler: usize| {
-            let of_frame = |&frame: &usize| maps[(frame * loops + doppler) * samples + bin];
-            let mut powers: Vec<f32> = self.training.iter().map(of_frame).collect();
-            powers.sort_by(f32::total_cmp);
-            powers[powers.len() / 4]
-        };
-        let (doppler, power) = (0..loops).map(|doppler| (doppler, quartile(doppler))).max_by(|a, b| a.1.total_cmp(&b.1))?;
-        (power > LEAST_POWER).then_some([doppler, bin])
+    /// Power of the frames to train on.
+    fn energy(&self, held: &Held) -> f64 {
+        held.iter().flat_map(|channel| &channel[..self.training]).map(Complex64::norm_sqr).sum()
     }
 
     /// Near a Doppler cell: the turns from loop to loop that hold most, and those from frame to frame that go on best.
     fn tone(&self, [doppler, bin]: [usize; 2]) -> Tone {
         let loops = self.evidence.cube.dims[3] as f64;
-        let power = |per_loop: f64| energy(&self.held(per_loop, bin), self.training.len());
+        let power = |per_loop: f64| self.energy(&self.held(per_loop, bin));
         let step = 2.0 * BESIDE / (STEPS as f64 * loops);
         let centre = wrapped(doppler as f64 / loops);
         let first = (0..=STEPS).map(|index| centre - BESIDE / loops + index as f64 * step);
         let first = first.max_by(|a, b| power(*a).total_cmp(&power(*b))).unwrap_or(centre);
         let per_loop = climb(power, first, 0.5 * step, 1e-3 * step).0;
         let held = self.held(per_loop, bin);
-        let coherence = |per_frame: f64| self.coherence(&held, per_frame);
+        let energy = self.energy(&held).max(f64::MIN_POSITIVE);
+        let coherence = |per_frame: f64| self.goes_on(&held, per_frame) / energy;
         let count = FINE * self.evidence.cube.dims[0];
         let best = (0..count).map(|index| index as f64 / count as f64).max_by(|a, b| coherence(*a).total_cmp(&coherence(*b)));
         let (per_frame, coherence) = climb(coherence, best.unwrap_or(0.0), 0.5 / count as f64, 1e-3 / count as f64);
@@ -186,34 +189,32 @@ impl<'a> Spectra<'a> {
         let samples = self.evidence.cube.dims[4];
         let turns: Vec<Complex64> =
             self.window.iter().enumerate().map(|(i, weight)| Complex64::cis(-TAU * per_loop * i as f64) * weight).collect();
-        let of = |frame: usize, channel: usize| -> Complex64 {
-            self.frames[frame][channel].iter().skip(bin).step_by(samples).zip(&turns).map(|(value, turn)| value * turn).sum()
+        let of = |values: &Vec<Complex64>| -> Complex64 {
+            values.iter().skip(bin).step_by(samples).zip(&turns).map(|(value, turn)| value * turn).sum()
         };
-        let of_channel = |channel: usize| self.training.iter().chain(&self.held_out).map(|&frame| of(frame, channel)).collect();
+        let of_channel = |channel: usize| self.values.iter().map(|frame| of(&frame[channel])).collect();
         (0..self.evidence.cube.channels()).map(of_channel).collect()
     }
 
     /// Turned back to the recording's beginning, by channel.
     fn turned_back(&self, held: &Held, per_frame: f64) -> Held {
-        let frames: Vec<Complex64> = (self.training.iter().chain(&self.held_out))
-            .map(|&frame| Complex64::cis(-TAU * per_frame * self.starts[frame]))
-            .collect();
+        let turn = |&frame: &usize| Complex64::cis(-TAU * per_frame * self.starts[frame]);
+        let frames: Vec<Complex64> = self.frames.iter().map(turn).collect();
         held.iter().map(|channel| channel.iter().zip(&frames).map(|(value, turn)| value * turn).collect()).collect()
     }
 
-    /// Share of the training frames' power that is their mean's.
-    fn coherence(&self, held: &Held, per_frame: f64) -> f64 {
-        let count = self.training.len();
-        let mean = |channel: &Vec<Complex64>| channel[..count].iter().sum::<Complex64>().norm_sqr() / count as f64;
-        let means: f64 = self.turned_back(held, per_frame).iter().map(mean).sum();
-        means / energy(held, count).max(f64::MIN_POSITIVE)
+    /// Power of the frames to train on that is their mean's.
+    fn goes_on(&self, held: &Held, per_frame: f64) -> f64 {
+        let mean =
+            |channel: &Vec<Complex64>| channel[..self.training].iter().sum::<Complex64>().norm_sqr() / self.training as f64;
+        self.turned_back(held, per_frame).iter().map(mean).sum()
     }
 
     /// Share of the held-out frames' power that the training frames' mean foretells.
     fn foretold(&self, turns: Turns, bin: usize) -> f64 {
         let (mut left, mut all) = (0.0, 0.0);
         for channel in self.turned_back(&self.held(turns.per_loop, bin), turns.per_frame) {
-            let (training, held_out) = channel.split_at(self.training.len());
+            let (training, held_out) = channel.split_at(self.training);
             let mean = training.iter().sum::<Complex64>() / training.len() as f64;
             left += held_out.iter().map(|value| (value - mean).norm_sqr()).sum::<f64>();
             all += held_out.iter().map(Complex64::norm_sqr).sum::<f64>();
@@ -224,8 +225,8 @@ impl<'a> Spectra<'a> {
     /// Range bins that something with that Doppler frequency passes during the recording.
     fn walk_bins(&self, turns: Turns) -> f64 {
         let radar = &self.evidence.radar;
-        let duration_s =
-            self.evidence.starts_s[self.training[self.training.len() - 1]] - self.evidence.starts_s[self.training[0]];
+        let [first, last] = [0, self.training - 1].map(|index| self.evidence.starts_s[self.frames[index]]);
+        let duration_s = last - first;
         let velocity_mps = 0.5 * radar.wavelength_m() * turns.per_loop.abs() / radar.loop_period_s();
         velocity_mps * duration_s / radar.range_resolution_m()
     }

@@ -78,7 +78,6 @@ fn aside(evidence: &Evidence) -> Option<Candidate> {
             of_frame.iter().zip(noise).map(|(a, noise)| a.norm_sqr() * count / noise.max(1e-300) - 1.0).sum::<f64>()
         })
         .sum();
-    let strength = (amplitudes.iter().map(Complex64::norm_sqr).sum::<f64>() / amplitudes.len() as f64).sqrt();
     let correction = Correction::Samples(Arc::new(move |cube: &mut Cube| {
         let channels = cube.channels();
         let amplitudes = amplitudes_of(cube, slow, fast);
@@ -88,19 +87,16 @@ fn aside(evidence: &Evidence) -> Option<Candidate> {
         });
     }));
     let how = "where nothing of the room or the body can stay";
-    Some(candidate(evidence, Tone { slow, fast, strength, p_value, gain, how, correction }))
+    Some(candidate(evidence, Tone { slow, fast, amplitudes, p_value, gain, how, correction }))
 }
 
 /// One that hardly turns from chirp to chirp, and goes on from frame to frame.
 fn among_the_slow(evidence: &Evidence) -> Option<Candidate> {
-    let SlowSpur { turns, fast, p_value, gain } = slow_spur::find(evidence)?;
+    let SlowSpur { turns, fast, starts, amplitudes, p_value, gain } = slow_spur::find(evidence)?;
     let slow = turns.per_loop.rem_euclid(1.0);
     if p_value > UNLIKELY || is_sideband(evidence, slow, fast) {
         return None;
     }
-    let starts = slow_spur::starts(evidence);
-    let amplitudes = slow_spur::amplitudes(&evidence.cube, &starts, turns, fast);
-    let strength = (amplitudes.iter().map(Complex64::norm_sqr).sum::<f64>() / amplitudes.len() as f64).sqrt();
     let correction = Correction::Samples(Arc::new(move |cube: &mut Cube| {
         let amplitudes = slow_spur::amplitudes(cube, &starts, turns, fast);
         cube.each_chirp(|[frame, channel, chirp], values| {
@@ -110,7 +106,7 @@ fn among_the_slow(evidence: &Evidence) -> Option<Candidate> {
     }));
     let how =
         "in step from frame to frame, at one beat frequency, where whatever turns like that and moves would have left its range";
-    Some(candidate(evidence, Tone { slow, fast, strength, p_value, gain, how, correction }))
+    Some(candidate(evidence, Tone { slow, fast, amplitudes, p_value, gain, how, correction }))
 }
 
 /// A tone that was found.
@@ -118,8 +114,8 @@ struct Tone {
     /// Turns per chirp and per sample.
     slow: f64,
     fast: f64,
-    /// Root mean square over the channels.
-    strength: f64,
+    /// By channel, or by frame and channel.
+    amplitudes: Vec<Complex64>,
     p_value: f64,
     gain: f64,
     how: &'static str,
@@ -127,8 +123,9 @@ struct Tone {
 }
 
 fn candidate(evidence: &Evidence, tone: Tone) -> Candidate {
-    let Tone { slow, fast, strength, p_value, gain, how, correction } = tone;
+    let Tone { slow, fast, amplitudes, p_value, gain, how, correction } = tone;
     let [frames, _, _, loops, samples] = evidence.cube.dims;
+    let strength = (amplitudes.iter().map(Complex64::norm_sqr).sum::<f64>() / amplitudes.len() as f64).sqrt();
     let peak = evidence.peak();
     let level_db = 20.0 * (strength / (peak - strength).max(1e-300)).log10();
     let rate = evidence.radar.sample_rate_hz;

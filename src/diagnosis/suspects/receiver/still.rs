@@ -279,20 +279,19 @@ fn candidate(
     let freedom: f64 = group.iter().map(|&index| 2.0 * unknowns(&elements[index], channels)).sum();
     let p_value = corrected(chi2_tail(2.0 * (fitted.likelihood - without.likelihood).max(0.0), freedom), 200.0);
     let gain = field.gain(Some(&without.predicted), &fitted.predicted);
-    let first_of =
-        |index: usize| -> usize { elements[..index].iter().map(|element| columns(element, 1 + 2 * LONGEST_EDGE).len()).sum() };
-    let first = first_of(index);
     let samples = evidence.cube.dims[4];
-    if columns(element, samples).is_empty() {
-        return None;
-    }
+    // Each with the place of its amplitude.
+    let all = elements.iter().enumerate().flat_map(|(index, element)| {
+        let own = columns(element, samples);
+        own.into_iter().map(move |column| (index, column))
+    });
+    let own: Vec<(usize, Vec<Complex64>)> =
+        all.enumerate().filter(|(_, (index, _))| group.contains(index)).map(|(at, (_, column))| (at, column)).collect();
+    let &(first, _) = own.first()?;
     let term: Vec<Vec<Complex64>> = (0..channels)
         .map(|channel| {
             let mut sum = vec![Complex64::ZERO; samples];
-            for &index in &group {
-                let own = columns(&elements[index], samples);
-                own.iter().enumerate().for_each(|(i, column)| add(&mut sum, column, fitted.own[channel][first_of(index) + i]));
-            }
+            own.iter().for_each(|(at, column)| add(&mut sum, column, fitted.own[channel][*at]));
             sum
         })
         .collect();
