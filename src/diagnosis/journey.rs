@@ -6,6 +6,7 @@ use super::cube::Loaded;
 use super::evidence::Evidence;
 use super::limits::limits;
 use super::misfit::Misfit;
+use super::null::Null;
 use super::prediction::BodyPrediction;
 use super::report::{
     Effect, FORMAT, Findings, Fit, HeldOut, Location, NotDetectable, Report, Verdict, moving_energy, never_detectable,
@@ -74,6 +75,7 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         reason: String::new(),
         probability_nothing_missing: 0.5,
         p_value: None,
+        null: Null::default(),
         audit: checks,
         effects: vec![],
         unexplained: vec![],
@@ -97,6 +99,8 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     }
     progress("locating the residual");
     report.located = Location::of(&original);
+    progress("asking whether anything is missing at all");
+    report.null = Null::of(&original, config.seed);
     progress("looking for what was left out");
     let explanation = explain(original.clone(), config, progress);
     let findings = Findings::of(&explanation, moving_energy(&original));
@@ -112,11 +116,13 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         report.not_detectable.extend(limits.into_iter().map(NotDetectable::at_most));
     }
     report.not_detectable.retain(|limit| report.effects.iter().all(|effect| effect.id != limit.id));
+    report.null.suspicion = Some(explanation.suspicion);
+    report.p_value = report.null.p_value();
+    let nothing = probability_of_nothing(report.p_value.unwrap_or(1.0));
     report.probability_nothing_missing = match report.verdict {
-        Verdict::NoMismatch => 1.0 - 0.5 * (1.0 - probability_of_nothing(explanation.p_value)),
-        _ => probability_of_nothing(explanation.p_value),
+        Verdict::NoMismatch => 1.0 - 0.5 * (1.0 - nothing),
+        _ => nothing,
     };
-    report.p_value = Some(explanation.p_value);
     report.fit = Fit { before: explanation.before, after: explanation.after };
     Ok(Diagnosis { report, radar, original, explanation: Some(explanation) })
 }

@@ -10,6 +10,7 @@ use super::finding::{Place, Rung};
 use super::limits::Limit;
 use super::locate;
 use super::misfit::Misfit;
+use super::null::Null;
 use super::select::{Accepted, Explanation};
 use crate::effects;
 
@@ -155,10 +156,12 @@ pub struct Report {
     pub verdict: Verdict,
     pub reason: String,
     pub probability_nothing_missing: f64,
-    /// Chance that the strongest suspicion would be as strong where nothing is missing, over all suspects: a bound (Bonferroni's over
-    /// suspects, each of which counts what it looked at). None where nothing was suspected.
+    /// Chance that a recording with nothing missing looks as odd: uniform where nothing is missing. None where it was not asked.
     #[serde(default)]
     pub p_value: Option<f64>,
+    /// What that is made of.
+    #[serde(default)]
+    pub null: Null,
     pub audit: Vec<Check>,
     pub effects: Vec<Effect>,
     pub unexplained: Vec<Unexplained>,

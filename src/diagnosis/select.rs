@@ -83,8 +83,8 @@ pub struct Explanation {
     pub accepted: Vec<Accepted>,
     /// The recording with everything taken into account.
     pub evidence: Evidence,
-    /// Smallest p-value of all suspects on the untouched recording, corrected for their number.
-    pub p_value: f64,
+    /// Smallest p-value of all suspects on the untouched recording, corrected for their number: a bound.
+    pub suspicion: f64,
     pub before: Misfit,
     pub after: Misfit,
 }
@@ -95,7 +95,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     let original = evidence;
     let mut current: Option<Evidence> = None;
     let mut accepted: Vec<Accepted> = vec![];
-    let mut p_value = None;
+    let mut suspicion = None;
     // Candidates of the round before that could still turn out to be the same thing as what was accepted in it.
     let mut pending: Vec<Candidate> = vec![];
     let mut misfit = before;
@@ -108,7 +108,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     for _ in 0..=thresholds.most {
         let evidence = current.as_ref().unwrap_or(&original);
         let found = heard.take().unwrap_or_else(|| suspicions(evidence));
-        p_value.get_or_insert_with(|| {
+        suspicion.get_or_insert_with(|| {
             // The limit of the whole at which the strongest suspicion would just pass.
             let shares: f64 = SUSPECTS.iter().map(|suspect| suspect.share).sum();
             let weighted = |(suspect, candidate): &(usize, Candidate)| candidate.p_value * shares / SUSPECTS[*suspect].share;
@@ -202,7 +202,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     let held_out = original.split.held_out.len() * original.cube.channels() * original.cube.dims[3] * original.range_bins();
     let unseen = accepted.iter().filter(|effect| matches!(effect.candidate.correction, Correction::None));
     after.loglik_per_sample += unseen.map(|effect| effect.candidate.gain).sum::<f64>() / held_out.max(1) as f64;
-    Explanation { accepted, evidence, p_value: p_value.unwrap_or(1.0), before, after }
+    Explanation { accepted, evidence, suspicion: suspicion.unwrap_or(1.0), before, after }
 }
 
 /// Whether the body is elsewhere, or at another time, than predicted.

@@ -47,6 +47,21 @@ pub fn corrected(p: f64, tried: f64) -> f64 {
     (-(tried * (-p.clamp(0.0, 1.0)).ln_1p()).exp_m1()).clamp(0.0, 1.0)
 }
 
+/// Chance that a value of the Gumbel law through some draws exceeds one; the law has their first two L-moments (Hosking 1990).
+pub fn gumbel_tail(value: f64, mut drawn: Vec<f64>) -> f64 {
+    const EULER: f64 = 0.577_215_664_901_532_9;
+    drawn.sort_by(f64::total_cmp);
+    let count = drawn.len() as f64;
+    let mean = drawn.iter().sum::<f64>() / count;
+    let apart = drawn.iter().enumerate().map(|(rank, drawn)| drawn * (2.0 * rank as f64 + 1.0 - count)).sum::<f64>();
+    let scale = apart / (count * (count - 1.0)) / std::f64::consts::LN_2;
+    // No draw, one, or all alike.
+    if scale.is_nan() || scale <= 0.0 {
+        return 1.0;
+    }
+    -(-(-(value - mean) / scale - EULER).exp()).exp_m1()
+}
+
 /// Share of a measured number that is kept where its prior has so many times the variance of its noise.
 pub fn kept(prior: f64) -> f64 {
     prior / (1.0 + prior)
@@ -89,6 +104,10 @@ mod tests {
         assert!((poisson_tail(1, 0.1) - (1.0 - (-0.1f64).exp())).abs() < 1e-9);
         assert!((poisson_tail(2, 0.1) - (1.0 - 1.1 * (-0.1f64).exp())).abs() < 1e-9);
         assert!((corrected(1e-12, 10.0) - 1e-11).abs() < 1e-16);
+        // Quantiles of the standard law.
+        let gumbel = (0..999).map(|i| -(-((f64::from(i) + 0.5) / 999.0).ln()).ln()).collect::<Vec<f64>>();
+        assert!((gumbel_tail(3.0, gumbel.clone()) - 0.0486).abs() < 1e-3 && (gumbel_tail(-0.5, gumbel) - 0.8077).abs() < 2e-3);
+        assert!(gumbel_tail(3.0, vec![1.0; 9]) == 1.0 && gumbel_tail(3.0, vec![]) == 1.0);
         let [low, high] = binomial_interval(0, 300, 0.95);
         assert!(low == 0.0 && (high - 0.01222).abs() < 1e-4, "{high}");
         let mut values: Vec<f64> = (1..=1000).map(|i| -(1.0 - (i as f64 - 0.5) / 1000.0f64).ln() * 3.0).collect();

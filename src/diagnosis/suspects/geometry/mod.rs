@@ -16,6 +16,9 @@ use change::Moves;
 use channels::Heard;
 use trial::Trial;
 
+use nalgebra::DVector;
+
+use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;
 use crate::diagnosis::suspects::paths::OVER_THE_BODY;
 use crate::diagnosis::{Candidate, Evidence};
@@ -33,6 +36,14 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let displaced = found.iter().any(|found| found.p_value < DISPLACED && found.gain > 0.0);
     found.extend(channels::find(evidence, model, body, Moves::new(evidence.radar.centre_m()), displaced));
     found
+}
+
+/// Chance that phases between receivers that are alike, beside directions, look as uneven. None without a body that is heard well enough.
+pub fn chance(evidence: &Evidence) -> Option<f64> {
+    let Heard { array, .. } = Heard::new(evidence, evidence.power()?, evidence.body.as_ref()?)?;
+    let directions = array.cells.numbers().own(&evidence.radar, &[array.cells.numbers().phase(0)]);
+    let (none, floors) = (DVector::zeros(directions.ncols()), vec![0.0; directions.ncols()]);
+    Some(Estimated::new(&array.looks, &none, &directions, &floors)?.p_value)
 }
 
 /// What the moving body's cells say of one receiver's logarithmic gain against the others, `[rx][frame][group]`: values and their

@@ -90,6 +90,17 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     found.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, candidate)| candidate).into_iter().collect()
 }
 
+/// Chance that a body whose gain and phase nothing changes along the chirp looks as uneven. None without a body that is heard well enough.
+pub fn chance(evidence: &Evidence) -> Option<f64> {
+    if evidence.is_real() {
+        return None;
+    }
+    let chirps = Chirps::new(evidence, evidence.power()?, evidence.body.as_ref()?)?;
+    let (numbers, floors) = ([TILT, BEND], [TILT_FLOOR, BEND_FLOOR]);
+    let looks = chirps.looks(0.0, [0.0; 2]);
+    Some(Estimated::new(&looks, &DVector::zeros(numbers.len()), &directions(&numbers), &floors)?.p_value)
+}
+
 /// Some of the numbers alone, `[number, direction]`.
 fn directions(numbers: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(NUMBERS, numbers.len(), |row, column| f64::from(u8::from(row == numbers[column])))

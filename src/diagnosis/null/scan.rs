@@ -1,0 +1,291 @@
+//! Is there anything beside body and room? Power beyond the noise's, wherever it is and of whatever extent.
+//!
+//! Where neither is, a recording with nothing missing holds thermal noise: complex Gaussian, independent between channels, with a level
+//! of its own in every channel and at every beat frequency. Whitened cells are scanned in boxes of all sizes along frame, Doppler and
+//! range, for the mean of the channels and for each of the orthogonal beams that their DFT makes; the largest log-likelihood ratio of an
+//! excess counts. It has no law in closed form (boxes overlap, windows correlate neighbours, levels are estimated), so its law is drawn:
+//! a parametric bootstrap with refit, in which noise of the same extent goes through the same levels, beams and boxes, the body's cells
+//! left out alike. A Gumbel law through the draws, to which maxima of exponential tails tend, gives chances between and beyond them.
+
+use num_complex::Complex32;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use rustfft::FftPlanner;
+
+use crate::diagnosis::Evidence;
+use crate::diagnosis::statistics::{exponential_scale, gumbel_tail, median};
+
+/// Draws of the null.
+const DRAWS: u64 = 99;
+/// Doppler bins on either side of zero that hold remains of what stands still.
+const STILL_BINS: usize = 2;
+/// Quantile that the noise's level is taken from: large values do not count.
+const QUANTILE: f64 = 0.35;
+/// Neighbouring range bins that share a level.
+const NEIGHBOURS: usize = 5;
+/// Complex values that are looked at, at most: whole frames, evenly spread.
+const MOST_VALUES: usize = 8_000_000;
+/// Squared correlation of cells under a Hann window that are one and two apart.
+const CORRELATIONS: [f64; 2] = [4.0 / 9.0, 1.0 / 36.0];
+
+/// Chances of an excess as strong as the strongest in noise alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chances {
+    /// In all frames.
+    pub all: f64,
+    /// In the training frames, which the noise's levels come from, and in those held out, which nothing was fitted to.
+    pub training: f64,
+    pub held_out: f64,
+}
+
+/// None where body and room leave no cell, or where there is no noise at all.
+pub fn scan(evidence: &Evidence, seed: u64) -> Option<Chances> {
+    let (cells, spectra) = Cells::of(evidence)?;
+    let found = cells.strongest(&spectra)?;
+    // Draws of their own for every recording, so that what they do not tell of the law errs independently.
+    let seed = seed ^ found[0].to_bits();
+    let drawn: Vec<[f64; 3]> = (0..DRAWS).into_par_iter().filter_map(|draw| cells.strongest(&cells.noise(seed, draw))).collect();
+    let chance = |which: usize| gumbel_tail(found[which], drawn.iter().map(|drawn| drawn[which]).collect());
+    Some(Chances { all: chance(0), training: chance(1), held_out: chance(2) })
+}
+
+/// Which cells are looked at, and what is expected there.
+struct Cells {
+    /// Frames, loops and beat frequencies.
+    dims: [usize; 3],
+    channels: usize,
+    /// Expected power over the noise's, `[frame, doppler, range]`; zero for cells that are not looked at.
+    expected: Vec<f32>,
+    /// All frames, those that the levels are taken from, and those held out: indices along the first axis.
+    parts: [Vec<usize>; 3],
+}
+
+impl Cells {
+    /// With the spectra, `[frame, channel, doppler, range]`.
+    fn of(evidence: &Evidence) -> Option<(Self, Vec<Complex32>)> {
+        let [_, _, _, loops, samples] = evidence.cube.dims;
+        let (channels, bins) = (evidence.cube.channels(), evidence.range_bins());
+        let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
+        let values = (training.len() + held_out.len()) * channels * loops * bins;
+        let step = values.div_ceil(MOST_VALUES).max(1);
+        let mut frames: Vec<usize> = training.iter().copied().step_by(step).collect();
+        let first_held_out = frames.len();
+        frames.extend(held_out.iter().step_by(step));
+        let rows = |&frame: &usize| (0..loops).map(move |doppler| (frame, doppler));
+        let expected: Vec<f32> = frames
+            .iter()
+            .flat_map(rows)
+            .flat_map(|(frame, doppler)| (0..bins).map(move |range| (frame, doppler, range)))
+            .map(|(frame, doppler, range)| expected(evidence, frame, doppler, doppler * samples + range))
+            .collect();
+        let of_frame = |&frame: &usize| {
+            let maps = (0..channels).flat_map(move |channel| {
+                let map = evidence.range_doppler(frame, channel);
+                (0..loops * bins).map(move |i| map[i / bins * samples + i % bins])
+            });
+            maps.map(|value| Complex32::new(value.re as f32, value.im as f32))
+        };
+        let spectra: Vec<Complex32> = frames.par_iter().flat_map_iter(of_frame).collect();
+        let parts = [(0..frames.len()).collect(), (0..first_held_out).collect(), (first_held_out..frames.len()).collect()];
+        let usable = expected.iter().any(|power| *power > 0.0) && spectra.iter().all(|value| value.is_finite());
+        usable.then_some((Self { dims: [frames.len(), loops, bins], channels, expected, parts }, spectra))
+    }
+
+    /// White noise under Hann windows, `[frame, channel, doppler, range]`.
+    fn noise(&self, seed: u64, stream: u64) -> Vec<Complex32> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(stream);
+        let [frames, loops, bins] = self.dims;
+        // White noise has a white transform, in which a Hann window is a difference of neighbours.
+        let window = |before: Complex32, here: Complex32, after: Complex32| (here * 2.0 - before - after) * 6f32.sqrt().recip();
+        let mut white = vec![Complex32::ZERO; loops * bins];
+        let mut along = white.clone();
+        let mut values = vec![Complex32::ZERO; frames * self.channels * loops * bins];
+        for map in values.chunks_exact_mut(loops * bins) {
+            white.fill_with(|| Complex32::new(StandardNormal.sample(&mut random), StandardNormal.sample(&mut random)));
+            for (along, white) in along.chunks_exact_mut(bins).zip(white.chunks_exact(bins)) {
+                for (range, value) in along.iter_mut().enumerate() {
+                    *value = window(white[(range + bins - 1) % bins], white[range], white[(range + 1) % bins]);
+                }
+            }
+            for (doppler, row) in map.chunks_exact_mut(bins).enumerate() {
+                let [before, after] = [doppler + loops - 1, doppler + 1].map(|doppler| &along[doppler % loops * bins..][..bins]);
+                for (range, value) in row.iter_mut().enumerate() {
+                    *value = window(before[range], along[doppler * bins + range], after[range]);
+                }
+            }
+        }
+        values
+    }
+
+    /// Largest log-likelihood ratios in all frames and in both parts of them.
+    fn strongest(&self, spectra: &[Complex32]) -> Option<[f64; 3]> {
+        let beams = self.beams(spectra, &self.levels(spectra)?);
+        Some(std::array::from_fn(|part| self.largest(&beams, &self.parts[part])))
+    }
+
+    /// Of the noise's power in the training frames, `[channel, range]`. None where a channel has none.
+    fn levels(&self, spectra: &[Complex32]) -> Option<Vec<f64>> {
+        let [_, loops, bins] = self.dims;
+        let mut levels = Vec::with_capacity(self.channels * bins);
+        for channel in 0..self.channels {
+            let mut powers: Vec<Vec<f64>> = vec![vec![]; bins];
+            for row in self.parts[1].iter().flat_map(|frame| (0..loops).map(move |doppler| (frame, doppler))) {
+                let (frame, doppler) = row;
+                let expected = &self.expected[(frame * loops + doppler) * bins..][..bins];
+                let spectrum = &spectra[((frame * self.channels + channel) * loops + doppler) * bins..][..bins];
+                for ((powers, &expected), value) in powers.iter_mut().zip(expected).zip(spectrum) {
+                    if expected > 0.0 {
+                        powers.push(f64::from(value.norm_sqr() / expected));
+                    }
+                }
+            }
+            let level = |range: usize| {
+                let near = (0..NEIGHBOURS.min(bins)).map(|i| (range + bins + i - NEIGHBOURS.min(bins) / 2) % bins);
+                exponential_scale(&mut near.flat_map(|range| powers[range].iter().copied()).collect::<Vec<f64>>(), QUANTILE)
+            };
+            let own: Vec<f64> = (0..bins).map(level).collect();
+            // Where the body always is, nothing tells the level; nothing is asked there in these frames either.
+            let middle = median(&mut own.iter().copied().filter(|level| *level > 0.0).collect::<Vec<f64>>());
+            if middle <= 0.0 {
+                return None;
+            }
+            levels.extend(own.into_iter().map(|level| if level > 0.0 { level } else { middle }));
+        }
+        Some(levels)
+    }
+
+    /// Whitened power in every beam, and the mean of all last: `[beam][frame, doppler, range]`.
+    fn beams(&self, spectra: &[Complex32], levels: &[f64]) -> Vec<Vec<f32>> {
+        let [_, loops, bins] = self.dims;
+        let (channels, size) = (self.channels, loops * bins);
+        let scales: Vec<f32> = levels.iter().map(|level| (level * channels as f64).sqrt().recip() as f32).collect();
+        let fft = FftPlanner::new().plan_fft_forward(channels);
+        let mut scratch = vec![Complex32::ZERO; fft.get_inplace_scratch_len()];
+        let mut column = vec![Complex32::ZERO; channels];
+        let mut beams = vec![vec![0.0; self.expected.len()]; channels + 1];
+        for (cell, &expected) in self.expected.iter().enumerate().filter(|(_, expected)| **expected > 0.0) {
+            let (frame, place) = (cell / size, cell % size);
+            for (channel, value) in column.iter_mut().enumerate() {
+                *value = spectra[(frame * channels + channel) * size + place] * scales[channel * bins + place % bins];
+            }
+            fft.process_with_scratch(&mut column, &mut scratch);
+            for (beam, value) in beams.iter_mut().zip(&column) {
+                beam[cell] = value.norm_sqr() / expected;
+            }
+            beams[channels][cell] = column.iter().map(|value| value.norm_sqr()).sum::<f32>() / (expected * channels as f32);
+        }
+        beams
+    }
+
+    /// Of all boxes of some frames, in all beams.
+    fn largest(&self, beams: &[Vec<f32>], frames: &[usize]) -> f64 {
+        let [_, loops, bins] = self.dims;
+        let dims = [frames.len(), loops, bins];
+        let counts = Table::new(dims, frames, |cell| f64::from(u8::from(self.expected[cell] > 0.0)));
+        let [in_frames, in_doppler, in_range] = dims.map(intervals);
+        let mut largest = 0.0f64;
+        for (beam, powers) in beams.iter().enumerate() {
+            let together = if beam == self.channels { self.channels as f64 } else { 1.0 };
+            let sums = Table::new(dims, frames, |cell| f64::from(powers[cell]));
+            for frames in &in_frames {
+                for doppler in &in_doppler {
+                    for range in &in_range {
+                        let (low, high) = ([frames.low, doppler.low, range.low], [frames.high, doppler.high, range.high]);
+                        let (count, sum) = (counts.inside(low, high), sums.inside(low, high));
+                        if sum <= count || count < 0.5 {
+                            continue;
+                        }
+                        let share = count / (frames.cells() * doppler.cells() * range.cells());
+                        let independent = together * share * frames.cells() * doppler.independent * range.independent;
+                        let excess = sum / count - 1.0;
+                        // x − ln(1 + x) is less than x²/2: most boxes need no logarithm.
+                        if 0.5 * independent * excess * excess > largest {
+                            largest = largest.max(independent * (excess - excess.ln_1p()));
+                        }
+                    }
+                }
+            }
+        }
+        largest
+    }
+}
+
+/// Expected power over the noise's; zero where body or room is.
+fn expected(evidence: &Evidence, frame: usize, doppler: usize, cell: usize) -> f32 {
+    let loops = evidence.cube.dims[3];
+    let still = loops >= 8 && doppler.min(loops - doppler) <= STILL_BINS;
+    match evidence.power() {
+        _ if still => 0.0,
+        Some(model) if model.support(frame)[cell] => 0.0,
+        Some(model) => model.expected(frame)[cell],
+        None => 1.0,
+    }
+}
+
+/// Sums over everything before, `[frame + 1, doppler + 1, range + 1]`.
+struct Table {
+    dims: [usize; 3],
+    sums: Vec<f64>,
+}
+
+impl Table {
+    fn new(dims: [usize; 3], frames: &[usize], of: impl Fn(usize) -> f64) -> Self {
+        let [count, loops, bins] = dims;
+        let (wide, deep) = (bins + 1, (loops + 1) * (bins + 1));
+        let mut sums = vec![0.0; (count + 1) * deep];
+        for (i, &frame) in frames.iter().enumerate() {
+            for doppler in 0..loops {
+                let mut row = 0.0;
+                for range in 0..bins {
+                    row += of((frame * loops + doppler) * bins + range);
+                    let at = (i + 1) * deep + (doppler + 1) * wide + range + 1;
+                    sums[at] = row + sums[at - wide] + sums[at - deep] - sums[at - deep - wide];
+                }
+            }
+        }
+        Self { dims, sums }
+    }
+
+    fn inside(&self, low: [usize; 3], high: [usize; 3]) -> f64 {
+        let (wide, deep) = (self.dims[2] + 1, (self.dims[1] + 1) * (self.dims[2] + 1));
+        let before = |frame: usize| {
+            let at = |doppler: usize, range: usize| self.sums[frame * deep + doppler * wide + range];
+            at(high[1], high[2]) - at(low[1], high[2]) - at(high[1], low[2]) + at(low[1], low[2])
+        };
+        before(high[0]) - before(low[0])
+    }
+}
+
+/// Half open.
+struct Interval {
+    low: usize,
+    high: usize,
+    /// Independent cells of a Hann window in it.
+    independent: f64,
+}
+
+impl Interval {
+    fn cells(&self) -> f64 {
+        (self.high - self.low) as f64
+    }
+}
+
+/// Of length 1, 4, 16 ... and the whole.
+fn intervals(length: usize) -> Vec<Interval> {
+    let mut all = vec![];
+    let mut step = 1;
+    while step < length {
+        all.extend((0..length.div_ceil(step)).map(|i| (i * step, ((i + 1) * step).min(length))));
+        step *= 4;
+    }
+    all.push((0, length));
+    let independent = |low: usize, high: usize| {
+        let cells = (high - low) as f64;
+        let pairs = CORRELATIONS.iter().zip([1.0, 2.0]).map(|(square, apart)| 2.0 * square * (cells - apart).max(0.0));
+        cells / (1.0 + pairs.sum::<f64>() / cells)
+    };
+    all.into_iter().map(|(low, high)| Interval { low, high, independent: independent(low, high) }).collect()
+}
