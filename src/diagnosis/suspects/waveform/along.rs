@@ -41,6 +41,8 @@ const OWN_SHARE: f64 = 0.005;
 /// What errors of the prediction look like: logarithm of the gain at the chirp's end, and radian there.
 const TILT_FLOOR: f64 = 0.1 / (2.0 * DECIBEL);
 const BEND_FLOOR: f64 = 0.01;
+/// The same for a test of whether anything is there, which must be uniform where nothing is.
+const FLOORS: [f64; 2] = [2.0 * TILT_FLOOR, 0.5 * BEND_FLOOR];
 /// Log-likelihood that a bend must gain by changing from frame to frame.
 const AS_WELL: f64 = 4.6;
 /// Chance below which a finer shape is there, and its size against the bend's from which on it is another thing.
@@ -96,9 +98,8 @@ pub fn chance(evidence: &Evidence) -> Option<f64> {
         return None;
     }
     let chirps = Chirps::new(evidence, evidence.power()?, evidence.body.as_ref()?)?;
-    let (numbers, floors) = ([TILT, BEND], [TILT_FLOOR, BEND_FLOOR]);
     let looks = chirps.looks(0.0, [0.0; 2]);
-    Some(Estimated::new(&looks, &DVector::zeros(numbers.len()), &directions(&numbers), &floors)?.p_value)
+    Some(Estimated::new(&looks, &DVector::zeros(2), &directions(&[TILT, BEND]), &FLOORS)?.p_value)
 }
 
 /// Some of the numbers alone, `[number, direction]`.
