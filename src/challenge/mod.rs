@@ -12,6 +12,7 @@
 
 pub mod answer;
 pub mod baselines;
+mod calibration;
 pub mod commitment;
 pub mod config;
 pub mod judge;

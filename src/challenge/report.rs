@@ -12,9 +12,11 @@ use crate::error::Result;
 #[derive(Clone, Debug, Deserialize)]
 pub struct Report {
     pub verdict: String,
-    /// That something is missing, over all that was looked at.
+    /// Of nothing being missing, and of the tests that it is made of.
     #[serde(default)]
     pub p_value: Option<f64>,
+    #[serde(default)]
+    pub null: BTreeMap<String, Option<f64>>,
     pub effects: Vec<Effect>,
     pub unexplained: Vec<Unexplained>,
     #[serde(default)]

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::answer::Answers;
 use super::baselines::{self, Statistics, TEMPLATES, quantile};
+use super::calibration;
 use super::commitment::{Commitment, joint_root, read_json, sha256};
 use super::config::Stratum;
 use super::judge::{Judgement, Truth, judge};
@@ -25,14 +26,11 @@ use crate::error::{Error, Result};
 
 /// A misfit per sample below this, nats, is nothing that could be removed.
 const LEAST_REMOVABLE: f64 = 2.0e-3;
-/// Levels that a valid p-value is below on nulls no more often than so.
-const CALIBRATION: [f64; 3] = [0.01, 0.1, 0.5];
 
 /// A case with everything that was found out about it.
 struct Case {
     judgement: Judgement,
-    /// That something is missing, as the report says.
-    p_value: Option<f64>,
+    report: Option<Report>,
     before: Measures,
     after: Measures,
     /// Of the twin.
@@ -143,7 +141,7 @@ fn one(challenge: &Path, folder: &Path, twins: Option<&Path>, answers: &Answers,
     let (usual, before, after) = fit;
     Case {
         judgement: judge(name, truth, &report),
-        p_value: report.as_ref().ok().and_then(|report| report.p_value),
+        report: report.ok(),
         before: Measures { loglik_per_sample: before.loglik_per_sample, ..usual },
         after: Measures { ..after },
         oracle,
@@ -251,10 +249,7 @@ fn rows(cases: &[Case], psychometric: Option<Logistic>) -> Vec<Row> {
             Aim::AtLeast(0.95),
         ),
     ];
-    for level in CALIBRATION {
-        let below = nulls.iter().filter_map(|case| case.p_value).map(|p_value| p_value < level);
-        rows.push(share(format!("nulls whose p-value is below {level}"), below, Aim::None));
-    }
+    rows.extend(calibration::rows(nulls.iter().filter_map(|case| case.report.as_ref())));
     for (low, high, aim) in [(2.0, 8.0, Aim::None), (8.0, 30.0, Aim::AtLeast(0.8)), (30.0, f64::INFINITY, Aim::AtLeast(0.95))] {
         let within = singles.iter().filter(|case| (low..high).contains(&case.d_prime()));
         let name = if high.is_finite() {

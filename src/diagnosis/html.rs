@@ -41,6 +41,7 @@ pub fn html(diagnosis: &Diagnosis, simulated: Option<&Simulated>) -> Result<Stri
         name = escape(&report.recording),
         lead = escape(&lead(report)),
     );
+    anything(&mut page, report);
     for (index, effect) in report.effects.iter().enumerate() {
         section(&mut page, index + 1, effect, pictures.curve(effect.id.as_str()));
     }
@@ -85,6 +86,27 @@ pub fn lead(report: &Report) -> String {
             format!("Something is missing that the library has no name for: {}", first(&report.unexplained[0].statement))
         }
     }
+}
+
+/// How odd the recording is as a whole.
+fn anything(page: &mut String, report: &Report) {
+    let Some(p_value) = report.p_value else { return };
+    let null = &report.null;
+    let parts: Vec<String> = [
+        ("beside body and room", null.beside),
+        ("the body along the chirp", null.along_chirp),
+        ("the body between receivers", null.between_receivers),
+        ("the strongest suspicion, at most", null.suspicion),
+    ]
+    .into_iter()
+    .filter_map(|(what, chance)| Some(format!("{what} {}", probability(chance?))))
+    .collect();
+    let _ = write!(
+        page,
+        "<p>Is anything missing at all? A recording with nothing missing looks as odd as this one with a chance of {} (p-value; {}).</p>",
+        probability(p_value),
+        parts.join("; ")
+    );
 }
 
 fn count(number: usize, what: &str) -> String {

@@ -62,6 +62,22 @@ pub fn gumbel_tail(value: f64, mut drawn: Vec<f64>) -> f64 {
     -(-(-(value - mean) / scale - EULER).exp()).exp_m1()
 }
 
+/// Chance that uniform numbers lie as far from their law as some: Kolmogorov and Smirnov's, with Stephens' correction for few numbers
+/// (Journal of the American Statistical Association 69, 1974). 1 of none.
+pub fn uniform_chance(values: &[f64]) -> f64 {
+    let mut values = values.to_vec();
+    values.sort_by(f64::total_cmp);
+    let count = values.len() as f64;
+    let apart = |(rank, value): (usize, &f64)| ((rank + 1) as f64 / count - value).max(value - rank as f64 / count);
+    let distance = values.iter().enumerate().map(apart).fold(0.0, f64::max);
+    let scaled = (count.sqrt() + 0.12 + 0.11 / count.sqrt()) * distance;
+    if values.is_empty() || scaled < 0.2 {
+        return 1.0;
+    }
+    let term = |k: i32| 2.0 * f64::from(1 - 2 * ((k + 1) % 2)) * (-2.0 * f64::from(k * k) * scaled * scaled).exp();
+    (1..=20).map(term).sum::<f64>().clamp(0.0, 1.0)
+}
+
 /// Share of a measured number that is kept where its prior has so many times the variance of its noise.
 pub fn kept(prior: f64) -> f64 {
     prior / (1.0 + prior)
@@ -104,6 +120,10 @@ mod tests {
         assert!((poisson_tail(1, 0.1) - (1.0 - (-0.1f64).exp())).abs() < 1e-9);
         assert!((poisson_tail(2, 0.1) - (1.0 - 1.1 * (-0.1f64).exp())).abs() < 1e-9);
         assert!((corrected(1e-12, 10.0) - 1e-11).abs() < 1e-16);
+        // Critical distances of Stephens' table for ten numbers: 0.409 at 5 %, 0.489 at 1 %.
+        let shifted = |distance: f64| (0..10).map(|i| f64::from(i) / 10.0 + distance).collect::<Vec<f64>>();
+        assert!((uniform_chance(&shifted(0.409)) - 0.05).abs() < 3e-3 && (uniform_chance(&shifted(0.489)) - 0.01).abs() < 1e-3);
+        assert!(uniform_chance(&shifted(0.05)) == 1.0 && uniform_chance(&[]) == 1.0 && uniform_chance(&[0.5; 300]) < 1e-9);
         // Quantiles of the standard law.
         let gumbel = (0..999).map(|i| -(-((f64::from(i) + 0.5) / 999.0).ln()).ln()).collect::<Vec<f64>>();
         assert!((gumbel_tail(3.0, gumbel.clone()) - 0.0486).abs() < 1e-3 && (gumbel_tail(-0.5, gumbel) - 0.8077).abs() < 2e-3);

@@ -281,8 +281,22 @@ impl Field {
     /// Whether most of the ranges that could contradict a deviation share it: one that is far stronger than the others (a
     /// body that stands still for a while) must not speak for all. `predicted` gives it for frame, loop and group.
     pub fn shared(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> bool {
-        let (mut agree, mut asked) = (0, 0);
-        for (g, group) in self.groups.iter().enumerate() {
+        let told = self.told(predicted);
+        2 * told.iter().filter(|[gain, _]| *gain > 0.0).count() > told.len() || told.is_empty()
+    }
+
+    /// The same of a deviation that was read from these ranges chirp by chirp, in which the strongest one finds itself: most of the
+    /// others must have most of it.
+    pub fn shared_by_others(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> bool {
+        let mut told = self.told(predicted);
+        let strongest = told.iter().enumerate().max_by(|(_, a), (_, b)| a[1].total_cmp(&b[1])).map(|(index, _)| index);
+        strongest.map(|index| told.swap_remove(index));
+        2 * told.iter().filter(|[gain, most]| *gain > 0.5 * most).count() > told.len() || told.is_empty()
+    }
+
+    /// What ranges gain by a deviation, and what they would if all of it were theirs (nats): those that tell anything of it.
+    fn told(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> Vec<[f64; 2]> {
+        let of_group = |(g, group): (usize, &Group)| {
             let (mut gain, mut most) = (0.0, 0.0);
             for frame in 0..self.frames {
                 let weight = self.weights(frame)[g];
@@ -292,12 +306,9 @@ impl Field {
                     most += weight * model.norm_sqr();
                 }
             }
-            if most > TELLING_GAIN {
-                asked += 1;
-                agree += usize::from(gain > 0.0);
-            }
-        }
-        2 * agree > asked || asked == 0
+            [gain, most]
+        };
+        self.groups.iter().enumerate().map(of_group).filter(|[_, most]| *most > TELLING_GAIN).collect()
     }
 
     fn moments(&self, weights: &[f64]) -> [f64; 3] {

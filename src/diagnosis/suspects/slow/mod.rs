@@ -112,7 +112,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         if let Some(drift) = drift::best(&field, part, &series, training, held_out).filter(of_drift) {
             found.push(candidates::of_drift(evidence, &field, part, &drift).into());
         }
-        if let Some(random) = random::best(&field, part, training, held_out) {
+        let of_random = |random: &random::Random| {
+            let value = |frame, index| random.value(&series, frame, index);
+            field.shared_by_others(|frame, index, group| part.deviation(value(frame, index), group))
+        };
+        if let Some(random) = random::best(&field, part, training, held_out).filter(of_random) {
             free.push(candidates::of_random(evidence, &field, part, &random).into());
         }
     }

@@ -21,6 +21,13 @@ pub struct Random {
     pub two: Option<Two>,
 }
 
+impl Random {
+    /// What a chirp's value says of it: as much less than it shows as it may be noise.
+    pub fn value(&self, series: &Series, frame: usize, index: usize) -> f64 {
+        statistics::kept(self.deviation.powi(2) * series.weight[frame]) * chirps(series, frame)[index]
+    }
+}
+
 #[derive(Clone, Debug)]
 pub struct Two {
     pub distance: f64,

@@ -338,6 +338,9 @@ fn cells(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: 
     let radar = &evidence.radar;
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let length = samples / parts;
+    // The same velocity is another Doppler frequency at the chirp's end than at its start.
+    let ends = [-0.5, 0.5].map(|end| 1.0 + end * radar.bandwidth_hz() * radar.wavelength_m() / SPEED_OF_LIGHT);
+    let mut at_ends = vec![[0.0; 2]; loops];
     // Doppler cell, beat frequency (bins) and expected power of every point in every cell that it reaches.
     let mut shares: Vec<Vec<(f64, f64)>> = vec![vec![]; loops];
     for point in body.with_echoes(radar, body.frames[frame].clone(), None) {
@@ -347,6 +350,11 @@ fn cells(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: 
         let power = model.peak(radar, point) * 1.5 * length as f64 / samples as f64;
         if power > 0.0 && bins.is_finite() {
             model.cells.each_doppler(velocity_mps, |doppler, share| shares[doppler].push((bins, power * f64::from(share))));
+            for (end, scale) in ends.into_iter().enumerate() {
+                model
+                    .cells
+                    .each_doppler(velocity_mps * scale, |doppler, share| at_ends[doppler][end] += power * f64::from(share));
+            }
         }
     }
     let mean = |shares: &[(f64, f64)]| {
@@ -359,6 +367,9 @@ fn cells(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: 
     let window = hann(loops);
     let fft = FftPlanner::new().plan_fft_forward(loops);
     let middles: Vec<f64> = used.iter().map(|&doppler| mean(&shares[doppler]).1).collect();
+    // By the noise, too, which stays.
+    let tilts: Vec<f64> =
+        used.iter().map(|&doppler| 0.25 * ((1.0 + at_ends[doppler][1]) / (1.0 + at_ends[doppler][0])).ln()).collect();
     for channel in 0..evidence.cube.channels() {
         let moving = evidence.moving(frame, channel);
         let scale = 1.0 / (evidence.noise()[channel].max(f64::MIN_POSITIVE) * length as f64).sqrt();
@@ -366,8 +377,9 @@ fn cells(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: 
         for sample in 0..parts * length {
             let mut slow: Vec<Complex64> = (0..loops).map(|i| moving[i * samples + sample] * (window[i] * scale)).collect();
             fft.process(&mut slow);
-            for ((heard, &doppler), middle) in heard.iter_mut().zip(&used).zip(&middles) {
-                let back = Complex64::cis(-TAU * middle * sample as f64 / samples as f64);
+            let part = place(sample / length, parts);
+            for (((heard, &doppler), middle), tilt) in heard.iter_mut().zip(&used).zip(&middles).zip(&tilts) {
+                let back = Complex64::from_polar((-tilt * part).exp(), -TAU * middle * sample as f64 / samples as f64);
                 heard[channel][sample / length] += slow[doppler] * back;
             }
         }
