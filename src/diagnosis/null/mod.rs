@@ -3,7 +3,7 @@
 //! Suspects give bounds: each counts whatever it looked at, says nothing where nothing is worth a word, and many say the same. Their
 //! smallest corrected bound is far from uniform. Three tests always have something to say, on disjoint parts of the recording, and none
 //! of them asks for one effect of the library:
-//! - beside body and room, for power beyond the noise's ([`scan`]);
+//! - beside body and room, for power beyond the noise's (`scan.rs`);
 //! - of the body along the chirp, for a gain or a phase that no ranges make;
 //! - of the body between receivers, for phases that no directions make.
 //!
