@@ -19,7 +19,7 @@ use super::prediction::{Point, range_and_velocity};
 use crate::radar::Radar;
 
 /// Doppler bins on either side of zero that hold remains of what stands still.
-const STILL_BINS: usize = 2;
+pub const STILL_BINS: usize = 2;
 /// Expected power of a part, over the noise, from which on it counts as support.
 const SUPPORT_LEVEL: f32 = 0.1;
 /// Cells by which the support is widened: accelerations, errors of the mesh, speckle above its mean.

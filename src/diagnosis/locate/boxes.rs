@@ -2,6 +2,7 @@
 
 use super::Region;
 use super::residual::Residual;
+use super::sums::{Table, intervals};
 use crate::diagnosis::Evidence;
 use crate::diagnosis::finding::Place;
 use crate::diagnosis::power::Cells;
@@ -90,14 +91,19 @@ fn rank(found: &Box3) -> f64 {
 
 /// Dyadic boxes whose halves are merged axis by axis, with their sums.
 fn all(residual: &Residual) -> Vec<Box3> {
-    let scales: Vec<Vec<Vec<(usize, usize)>>> = residual.dims.iter().map(|&length| dyadic(length)).collect();
-    let table = summed(residual);
+    let [_, loops, samples] = residual.dims;
+    let count = |[frame, doppler, range]: [usize; 3]| f64::from(residual.count[(frame * loops + doppler) * samples + range]);
+    let sum = |at @ [frame, doppler, range]: [usize; 3]| {
+        f64::from(residual.ratio[(frame * loops + doppler) * samples + range]) * count(at)
+    };
+    let (sums, counts) = (Table::new(residual.dims, sum), Table::new(residual.dims, count));
+    let scales = residual.dims.map(intervals);
     let mut boxes = vec![];
-    for frames in scales[0].iter().flatten() {
-        for dopplers in scales[1].iter().flatten() {
-            for ranges in scales[2].iter().flatten().filter(|range| range.0 < residual.bins) {
+    for frames in &scales[0] {
+        for dopplers in &scales[1] {
+            for ranges in scales[2].iter().filter(|range| range.0 < residual.bins) {
                 let (low, high) = ([frames.0, dopplers.0, ranges.0], [frames.1, dopplers.1, ranges.1.min(residual.bins)]);
-                let [sum, count] = inside(&table, residual.dims, low, high);
+                let (sum, count) = (sums.inside(low, high), counts.inside(low, high));
                 if count <= 0.05 {
                     continue;
                 }
@@ -109,56 +115,6 @@ fn all(residual: &Residual) -> Vec<Box3> {
         }
     }
     boxes
-}
-
-/// Intervals of length 1, 2, 4 ... and the whole.
-fn dyadic(length: usize) -> Vec<Vec<(usize, usize)>> {
-    let mut scales = vec![];
-    let mut step = 1;
-    while step < length {
-        scales.push((0..length.div_ceil(step)).map(|i| (i * step, ((i + 1) * step).min(length))).collect());
-        // Fine scales cost most and show little: a cell of a Hann window is four wide.
-        step *= 4;
-    }
-    scales.push(vec![(0, length)]);
-    scales
-}
-
-/// Sums of ratio · count and of count over everything before, `[frame + 1, doppler + 1, range + 1]`.
-fn summed(residual: &Residual) -> Vec<[f64; 2]> {
-    let [frames, loops, samples] = residual.dims;
-    let (wide, deep) = (samples + 1, (loops + 1) * (samples + 1));
-    let mut table = vec![[0.0; 2]; (frames + 1) * deep];
-    for frame in 1..=frames {
-        for doppler in 1..=loops {
-            for range in 1..=samples {
-                let cell = ((frame - 1) * loops + doppler - 1) * samples + range - 1;
-                let count = f64::from(residual.count[cell]);
-                let own = [f64::from(residual.ratio[cell]) * count, count];
-                let at = frame * deep + doppler * wide + range;
-                for k in 0..2 {
-                    table[at][k] = own[k] + table[at - 1][k] + table[at - wide][k] + table[at - deep][k]
-                        - table[at - 1 - wide][k]
-                        - table[at - 1 - deep][k]
-                        - table[at - wide - deep][k]
-                        + table[at - 1 - wide - deep][k];
-                }
-            }
-        }
-    }
-    table
-}
-
-fn inside(table: &[[f64; 2]], dims: [usize; 3], low: [usize; 3], high: [usize; 3]) -> [f64; 2] {
-    let (wide, deep) = (dims[2] + 1, (dims[1] + 1) * (dims[2] + 1));
-    let mut sums = [0.0; 2];
-    for corner in 0..8 {
-        let pick = |axis: usize| if corner >> axis & 1 == 1 { low[axis] } else { high[axis] };
-        let sign = if u32::count_ones(corner) % 2 == 1 { -1.0 } else { 1.0 };
-        let at = pick(0) * deep + pick(1) * wide + pick(2);
-        (0..2).for_each(|k| sums[k] += sign * table[at][k]);
-    }
-    sums
 }
 
 /// Benjamini-Yekutieli.

@@ -10,11 +10,13 @@ mod boxes;
 mod parts;
 mod profile;
 mod residual;
+mod sums;
 
 pub use boxes::{Strongest, strongest};
 pub use parts::{Seen, by_part, by_wall};
 pub use profile::{Profile, profiles};
 pub use residual::{BODY_FACTOR, CELLS_PER_VALUE, Residual};
+pub use sums::{Table, intervals};
 
 use super::Evidence;
 use super::finding::Place;

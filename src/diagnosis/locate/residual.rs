@@ -1,9 +1,8 @@
 //! Measured over expected power, cell by cell.
 
 use crate::diagnosis::Evidence;
+use crate::diagnosis::power::STILL_BINS;
 
-/// Doppler bins around zero that hold remains of what stands still.
-const STILL_BINS: usize = 2;
 /// Σ |correlation|² of neighbouring cells of two Hann windows.
 pub const CELLS_PER_VALUE: f64 = 3.78;
 

@@ -15,13 +15,13 @@ use rayon::prelude::*;
 use rustfft::FftPlanner;
 
 use crate::diagnosis::Evidence;
+use crate::diagnosis::locate::{Table, intervals};
+use crate::diagnosis::power::STILL_BINS;
 use crate::diagnosis::statistics::{exponential_scale, gumbel_tail, median};
 
 /// Draws of the null.
 const DRAWS: u64 = 99;
-/// Doppler bins on either side of zero that hold remains of what stands still.
-const STILL_BINS: usize = 2;
-/// Loops without which no velocity is free of that.
+/// Loops without which no velocity is free of what stands still.
 const FEWEST_LOOPS: usize = 8;
 /// Quantile that the noise's level is taken from: large values do not count.
 const QUANTILE: f64 = 0.35;
@@ -60,8 +60,17 @@ struct Cells {
     channels: usize,
     /// Expected power over the noise's, `[frame, doppler, range]`; zero for cells that are not looked at.
     expected: Vec<f32>,
-    /// All frames, those that the levels are taken from, and those held out: indices along the first axis.
-    parts: [Vec<usize>; 3],
+    /// All frames, those that the levels are taken from, and those held out.
+    parts: [Part; 3],
+}
+
+/// Some frames, and what all spectra share in them.
+struct Part {
+    /// Indices along the first axis.
+    frames: Vec<usize>,
+    /// Cells that are looked at.
+    counts: Table,
+    boxes: [Vec<Interval>; 3],
 }
 
 impl Cells {
@@ -90,7 +99,15 @@ impl Cells {
             maps.map(|value| Complex32::new(value.re as f32, value.im as f32))
         };
         let spectra: Vec<Complex32> = frames.par_iter().flat_map_iter(of_frame).collect();
-        let parts = [(0..frames.len()).collect(), (0..first_held_out).collect(), (first_held_out..frames.len()).collect()];
+        let parts = [0..frames.len(), 0..first_held_out, first_held_out..frames.len()].map(|part| {
+            let dims = [part.len(), loops, bins];
+            let looked_at = |[frame, doppler, range]: [usize; 3]| {
+                f64::from(u8::from(expected[((part.start + frame) * loops + doppler) * bins + range] > 0.0))
+            };
+            let counts = Table::new(dims, looked_at);
+            let boxes = dims.map(|length| intervals(length).into_iter().map(Interval::from).collect());
+            Part { frames: part.collect(), counts, boxes }
+        });
         let usable = expected.iter().any(|power| *power > 0.0) && spectra.iter().all(|value| value.is_finite());
         usable.then_some((Self { dims: [frames.len(), loops, bins], channels, expected, parts }, spectra))
     }
@@ -125,7 +142,7 @@ impl Cells {
     /// Largest log-likelihood ratios in all frames and in both parts of them.
     fn strongest(&self, spectra: &[Complex32]) -> Option<[f64; 3]> {
         let beams = self.beams(spectra, &self.levels(spectra)?);
-        Some(std::array::from_fn(|part| self.largest(&beams, &self.parts[part])))
+        Some(self.parts.each_ref().map(|part| self.largest(&beams, part)))
     }
 
     /// Of the noise's power in the training frames, `[channel, range]`. None where a channel has none.
@@ -134,7 +151,7 @@ impl Cells {
         let mut levels = Vec::with_capacity(self.channels * bins);
         for channel in 0..self.channels {
             let mut powers: Vec<Vec<f64>> = vec![vec![]; bins];
-            for row in self.parts[1].iter().flat_map(|frame| (0..loops).map(move |doppler| (frame, doppler))) {
+            for row in self.parts[1].frames.iter().flat_map(|frame| (0..loops).map(move |doppler| (frame, doppler))) {
                 let (frame, doppler) = row;
                 let expected = &self.expected[(frame * loops + doppler) * bins..][..bins];
                 let spectrum = &spectra[((frame * self.channels + channel) * loops + doppler) * bins..][..bins];
@@ -183,25 +200,24 @@ impl Cells {
     }
 
     /// Of all boxes of some frames, in all beams.
-    fn largest(&self, beams: &[Vec<f32>], frames: &[usize]) -> f64 {
+    fn largest(&self, beams: &[Vec<f32>], part: &Part) -> f64 {
         let [_, loops, bins] = self.dims;
-        let dims = [frames.len(), loops, bins];
-        let counts = Table::new(dims, frames, |cell| f64::from(u8::from(self.expected[cell] > 0.0)));
-        let [in_frames, in_doppler, in_range] = dims.map(intervals);
+        let [in_frames, in_doppler, in_range] = &part.boxes;
         let mut largest = 0.0f64;
         for (beam, powers) in beams.iter().enumerate() {
             let together = if beam == self.channels { self.channels as f64 } else { 1.0 };
-            let sums = Table::new(dims, frames, |cell| f64::from(powers[cell]));
-            for frames in &in_frames {
-                for doppler in &in_doppler {
-                    for range in &in_range {
+            let power =
+                |[frame, doppler, range]: [usize; 3]| f64::from(powers[(part.frames[frame] * loops + doppler) * bins + range]);
+            let sums = Table::new([part.frames.len(), loops, bins], power);
+            for frames in in_frames {
+                for doppler in in_doppler {
+                    for range in in_range {
                         let (low, high) = ([frames.low, doppler.low, range.low], [frames.high, doppler.high, range.high]);
-                        let (count, sum) = (counts.inside(low, high), sums.inside(low, high));
+                        let (count, sum) = (part.counts.inside(low, high), sums.inside(low, high));
                         if sum <= count || count < 0.5 {
                             continue;
                         }
-                        let share = count / (frames.cells() * doppler.cells() * range.cells());
-                        let independent = together * share * frames.cells() * doppler.independent * range.independent;
+                        let independent = together * count * doppler.independent * range.independent;
                         let excess = sum / count - 1.0;
                         // x − ln(1 + x) is less than x²/2: most boxes need no logarithm.
                         if 0.5 * independent * excess * excess > largest {
@@ -227,69 +243,20 @@ fn expected(evidence: &Evidence, frame: usize, doppler: usize, cell: usize) -> f
     }
 }
 
-/// Sums over everything before, `[frame + 1, doppler + 1, range + 1]`.
-struct Table {
-    dims: [usize; 3],
-    sums: Vec<f64>,
-}
-
-impl Table {
-    fn new(dims: [usize; 3], frames: &[usize], of: impl Fn(usize) -> f64) -> Self {
-        let [count, loops, bins] = dims;
-        let (wide, deep) = (bins + 1, (loops + 1) * (bins + 1));
-        let mut sums = vec![0.0; (count + 1) * deep];
-        for (i, &frame) in frames.iter().enumerate() {
-            for doppler in 0..loops {
-                let mut row = 0.0;
-                for range in 0..bins {
-                    row += of((frame * loops + doppler) * bins + range);
-                    let at = (i + 1) * deep + (doppler + 1) * wide + range + 1;
-                    sums[at] = row + sums[at - wide] + sums[at - deep] - sums[at - deep - wide];
-                }
-            }
-        }
-        Self { dims, sums }
-    }
-
-    fn inside(&self, low: [usize; 3], high: [usize; 3]) -> f64 {
-        let (wide, deep) = (self.dims[2] + 1, (self.dims[1] + 1) * (self.dims[2] + 1));
-        let before = |frame: usize| {
-            let at = |doppler: usize, range: usize| self.sums[frame * deep + doppler * wide + range];
-            at(high[1], high[2]) - at(low[1], high[2]) - at(high[1], low[2]) + at(low[1], low[2])
-        };
-        before(high[0]) - before(low[0])
-    }
-}
-
 /// Half open.
 struct Interval {
     low: usize,
     high: usize,
-    /// Independent cells of a Hann window in it.
+    /// Share of its cells that is independent under a Hann window.
     independent: f64,
 }
 
-impl Interval {
-    fn cells(&self) -> f64 {
-        (self.high - self.low) as f64
-    }
-}
-
-/// Of length 1, 4, 16 ... and the whole.
-fn intervals(length: usize) -> Vec<Interval> {
-    let mut all = vec![];
-    let mut step = 1;
-    while step < length {
-        all.extend((0..length.div_ceil(step)).map(|i| (i * step, ((i + 1) * step).min(length))));
-        step *= 4;
-    }
-    all.push((0, length));
-    let independent = |low: usize, high: usize| {
+impl From<(usize, usize)> for Interval {
+    fn from((low, high): (usize, usize)) -> Self {
         let cells = (high - low) as f64;
         let pairs = CORRELATIONS.iter().zip([1.0, 2.0]).map(|(square, apart)| 2.0 * square * (cells - apart).max(0.0));
-        cells / (1.0 + pairs.sum::<f64>() / cells)
-    };
-    all.into_iter().map(|(low, high)| Interval { low, high, independent: independent(low, high) }).collect()
+        Self { low, high, independent: 1.0 / (1.0 + pairs.sum::<f64>() / cells) }
+    }
 }
 
 #[cfg(test)]

@@ -126,6 +126,11 @@ pub fn ahead(room: Option<&Room>, range_m: f64) -> f64 {
     if all > 0.0 { sum / all } else { 1.0 }
 }
 
+/// Whether most ranges, as [`Field::told`] has them, gain more than a share of what they could; nothing contradicts where none tells.
+fn most_have(told: &[[f64; 2]], share: f64) -> bool {
+    2 * told.iter().filter(|[gain, most]| *gain > share * most).count() > told.len() || told.is_empty()
+}
+
 impl Field {
     /// None where too little of the recording stands still.
     pub fn new(evidence: &Evidence) -> Option<Self> {
@@ -281,8 +286,7 @@ impl Field {
     /// Whether most of the ranges that could contradict a deviation share it: one that is far stronger than the others (a
     /// body that stands still for a while) must not speak for all. `predicted` gives it for frame, loop and group.
     pub fn shared(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> bool {
-        let told = self.told(predicted);
-        2 * told.iter().filter(|[gain, _]| *gain > 0.0).count() > told.len() || told.is_empty()
+        most_have(&self.told(predicted), 0.0)
     }
 
     /// The same of a deviation that was read from these ranges chirp by chirp, in which the strongest one finds itself: most of the
@@ -291,7 +295,7 @@ impl Field {
         let mut told = self.told(predicted);
         let strongest = told.iter().enumerate().max_by(|(_, a), (_, b)| a[1].total_cmp(&b[1])).map(|(index, _)| index);
         strongest.map(|index| told.swap_remove(index));
-        2 * told.iter().filter(|[gain, most]| *gain > 0.5 * most).count() > told.len() || told.is_empty()
+        most_have(&told, 0.5)
     }
 
     /// What ranges gain by a deviation, and what they would if all of it were theirs (nats): those that tell anything of it.
