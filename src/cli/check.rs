@@ -80,7 +80,13 @@ const MOST_DRAWN: usize = 600;
 
 fn show_recording(folder: &Path) -> Result<Recording> {
     let recording = Recording::open(folder)?;
-    say!("recording: {}", folder.display());
+    show(&recording)?;
+    Ok(recording)
+}
+
+/// What a recording is, and that all of its samples can be read.
+pub(crate) fn show(recording: &Recording) -> Result<()> {
+    say!("recording: {}", recording.folder.display());
     show_radar(&recording.radar, recording.room.as_ref());
     match recording.person() {
         Some(person) => {
@@ -103,7 +109,7 @@ fn show_recording(folder: &Path) -> Result<Recording> {
         recording.frame(frame)?;
     }
     say!("  samples            all {} frames can be read", recording.radar.frames);
-    Ok(recording)
+    Ok(())
 }
 
 fn show_radar(radar: &Radar, room: Option<&Room>) {

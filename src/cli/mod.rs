@@ -16,6 +16,7 @@ mod device;
 mod diagnose;
 mod effects;
 mod evaluate;
+mod import;
 mod infer;
 mod progress;
 mod recognize;
@@ -76,6 +77,12 @@ enum Command {
     /// Shows what follows from the radar's settings (resolutions, limits), holds its rules against the room, and says
     /// which parts are missing. With --out, draws the heatmaps of a recording.
     Check(check::Arguments),
+    /// Turn a capture of a radar board into a recording
+    ///
+    /// Reads adc_data.bin of a DCA1000 with its .mmwave.json or .cfg, recording folders of the Infineon SDK, and NumPy
+    /// arrays whose axes --layout names. Writes a recording folder that every other verb reads, and says what it assumed.
+    /// --set radar.KEY=VALUE corrects what the files say.
+    Import(import::Arguments),
     /// Make a recording of a person in a room, in a world that shares nothing with the simulator
     ///
     /// Writes a recording folder (recording.toml, if.npy, body.npz, motion.npz, truth.json) from the [record] section
@@ -157,6 +164,7 @@ pub fn main() -> ExitCode {
     };
     let result = refuse_idle_settings(&cli).and_then(|()| match &cli.command {
         Command::Check(arguments) => check::run(arguments, &cli.common),
+        Command::Import(arguments) => import::run(arguments, &cli.common),
         Command::Record(arguments) => record::run(arguments, &cli.common),
         Command::Recognize(arguments) => recognize::run(arguments, &cli.common),
         Command::Site(arguments) => site::run(arguments, &cli.common),

@@ -1,6 +1,7 @@
-//! Motions of other programs, turned into what the simulator knows.
+//! Motions and captures of other programs, turned into what the simulator knows.
 
 pub mod bvh;
+pub mod capture;
 mod joints;
 pub mod retarget;
 

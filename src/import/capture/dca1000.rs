@@ -1,0 +1,154 @@
+//! `adc_data.bin` of a DCA1000 capture card behind a TI radar.
+
+use std::path::{Path, PathBuf};
+
+use super::schedule::{Selection, TiRadar};
+use super::stream::Words;
+use super::{Capture, Stated, lanes::Lanes, ti_cfg, ti_json};
+use crate::data::settings::settings_from_table;
+use crate::data::{IfFrame, IfLayout};
+use crate::error::{Error, Result};
+use crate::radar::{Radar, Sampling};
+
+/// Understands the files of one capture.
+///
+/// The radar is that of `--config`; without one, of the only `.mmwave.json` or `.cfg` beside the samples. Files are
+/// joined in the order in which they are named.
+pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
+    let mut notes = Vec::new();
+    let (configs, setup) = descriptions(&sources[0], stated, &mut notes)?;
+    let mut stated = stated.clone();
+    if stated.board.is_none()
+        && let Some(device) = &setup.device
+    {
+        notes.push(format!("the set-up names the device {device}; --board NAME says which board carries it"));
+    }
+    let words = Words::open(sources)?;
+    let radar = match configs.as_slice() {
+        [config] => read(config)?,
+        _ => unreachable!("descriptions gives one"),
+    };
+    let Selection { radar: found, words_per_frame, starts, inverted_rx, notes: more } = radar.select(&stated, &words)?;
+    notes.extend(more);
+    notes.extend(log_beside(&sources[0]));
+    let shaped = apply(found, &std::mem::take(&mut stated.sets))?;
+    let lanes = radar.lanes;
+    let [_, n_tx, n_rx, loops, samples] = shaped.dims();
+    let frame = move |index: usize| {
+        let words = words.read(index as u64 * words_per_frame, words_per_frame as usize)?;
+        Ok(arrange(&words, &starts, lanes, [n_tx, n_rx, loops, samples], &inverted_rx))
+    };
+    let layout = if lanes.sampling == Sampling::Complex { IfLayout::Codes } else { IfLayout::RealCodes };
+    Ok(Capture { radar: shaped, layout, notes, frame: Box::new(frame) })
+}
+
+/// Opens the files that a `.setup.json` of mmWave Studio names.
+pub fn open_setup(path: &Path, stated: &Stated) -> Result<Capture> {
+    let setup = ti_json::read_setup(path)?;
+    if setup.files.is_empty() {
+        return Err(Error::field(path, "capturedFiles.files", "none", "the files of the capture")
+            .with_hint("name the .bin files themselves, with --config for the .mmwave.json"));
+    }
+    let mut stated = stated.clone();
+    if stated.configs.is_empty() {
+        stated.configs.extend(setup.config.clone());
+    }
+    stated.configs.push(path.into());
+    open(&setup.files, &stated)
+}
+
+fn read(config: &Path) -> Result<TiRadar> {
+    match config.extension().and_then(|extension| extension.to_str()) {
+        Some("json") => ti_json::read_radar(config),
+        _ => ti_cfg::read_radar(config),
+    }
+}
+
+/// The one file that describes the radar, and the set-up where there is one.
+fn descriptions(source: &Path, stated: &Stated, notes: &mut Vec<String>) -> Result<(Vec<PathBuf>, ti_json::Setup)> {
+    let is = |path: &Path, end: &str| path.to_string_lossy().to_lowercase().ends_with(end);
+    let mut given = stated.configs.clone();
+    if given.is_empty() {
+        let folder = source.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let entries = std::fs::read_dir(folder).map_err(|error| Error::read(folder, error))?;
+        let mut beside: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+        beside.retain(|path| is(path, ".mmwave.json") || is(path, ".setup.json") || is(path, ".cfg"));
+        beside.sort();
+        given = beside;
+        for path in &given {
+            notes.push(format!("the radar is that of {}, which lies beside the samples", path.display()));
+        }
+    }
+    let (setups, radars): (Vec<_>, Vec<_>) = given.into_iter().partition(|path| is(path, ".setup.json"));
+    let setup = setups.first().map(|path| ti_json::read_setup(path)).transpose()?.unwrap_or_default();
+    match radars.len() {
+        1 => Ok((radars, setup)),
+        0 => Err(Error::Usage {
+            message: format!("{}: nothing describes the radar", source.display()),
+            hint: Some("give --config FILE: the .mmwave.json of mmWave Studio, or the .cfg that was sent to the radar".into()),
+        }),
+        count => Err(Error::Usage {
+            message: format!(
+                "{count} files describe the radar: {}",
+                radars.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
+            ),
+            hint: Some("name the one of this capture with --config".into()),
+        }),
+    }
+}
+
+/// `--set radar.KEY=VALUE` over what was read.
+pub fn apply(radar: Radar, sets: &[String]) -> Result<Radar> {
+    #[derive(serde::Serialize, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Settings {
+        radar: Radar,
+    }
+    let table = toml::Table::try_from(Settings { radar }).expect("a radar is plain data");
+    let settings: Settings = settings_from_table(table, "--set", sets)?;
+    settings.radar.check("radar")?;
+    Ok(settings.radar)
+}
+
+/// The words of a frame as `[tx, rx, loop, sample]`.
+fn arrange(words: &[i16], starts: &[Vec<u64>], lanes: Lanes, dims: [usize; 4], inverted_rx: &[usize]) -> IfFrame {
+    let [n_tx, n_rx, loops, samples] = dims;
+    let count = n_tx * n_rx * loops * samples;
+    let (mut re, mut im) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    for tx in 0..n_tx {
+        for rx in 0..n_rx {
+            let sign = if inverted_rx.contains(&rx) { -1.0 } else { 1.0 };
+            for chirp in starts.iter().take(loops).map(|starts| starts[tx] as usize) {
+                for sample in 0..samples {
+                    let (i, q) = lanes.place(rx, n_rx, sample, samples);
+                    re.push(sign * f32::from(words[chirp + i]));
+                    if lanes.sampling == Sampling::Complex {
+                        im.push(sign * f32::from(words[chirp + q]));
+                    }
+                }
+            }
+        }
+    }
+    IfFrame::new(dims, re, (lanes.sampling == Sampling::Complex).then_some(im))
+}
+
+/// What the capture card's log says was lost.
+fn log_beside(source: &Path) -> Option<String> {
+    let stem = source.file_stem()?.to_string_lossy().into_owned();
+    let stem =
+        stem.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '_').trim_end_matches("_Raw").to_string();
+    let folder = source.parent()?;
+    let log =
+        ["_LogFile.csv", "_Raw_LogFile.csv"].iter().map(|end| folder.join(format!("{stem}{end}"))).find(|path| path.is_file())?;
+    let text = std::fs::read_to_string(&log).ok()?;
+    let number = |key: &str| {
+        text.lines()
+            .find_map(|line| line.trim().strip_prefix(key)?.trim_start_matches([' ', '-', ',']).trim().parse::<u64>().ok())
+    };
+    let (zeros, order) = (number("Number of zero filled bytes")?, number("Out of sequence count").unwrap_or(0));
+    Some(if zeros == 0 && order == 0 {
+        format!("{}: no packet was lost", log.display())
+    } else {
+        format!("{}: {zeros} bytes were lost and filled with zeros, {order} packets came out of order", log.display())
+    })
+}

@@ -1,0 +1,108 @@
+//! The order of an array's axes, as people write it: `frame loop rx sample iq`.
+
+use std::str::FromStr;
+
+use crate::error::{Error, Result};
+
+/// An axis of an array of samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    Frame,
+    Tx,
+    Rx,
+    Loop,
+    /// Chirps in the order in which they were sent: loops × transmitters.
+    Chirp,
+    Sample,
+    /// I and Q.
+    Iq,
+}
+
+const NAMES: [(&str, Axis); 7] = [
+    ("frame", Axis::Frame),
+    ("tx", Axis::Tx),
+    ("rx", Axis::Rx),
+    ("loop", Axis::Loop),
+    ("chirp", Axis::Chirp),
+    ("sample", Axis::Sample),
+    ("iq", Axis::Iq),
+];
+
+/// Axes, outer to inner.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layout(pub Vec<Axis>);
+
+impl Layout {
+    /// # Errors
+    /// A word that is no axis, an axis named twice, no samples, or chirps beside loops or transmitters.
+    pub fn parse(text: &str) -> Result<Self> {
+        let known = NAMES.map(|(name, _)| name).join(", ");
+        let refuse = |message: String| Error::Usage {
+            message: format!("--layout \"{text}\": {message}"),
+            hint: Some(format!(
+                "write the axes from the outermost to the innermost, such as \"frame loop rx sample\"; known are {known}"
+            )),
+        };
+        let mut axes = Vec::new();
+        for word in text.split([' ', ',']).filter(|word| !word.is_empty()) {
+            let singular = word.to_lowercase();
+            let singular = singular.strip_suffix('s').filter(|_| singular != "s").unwrap_or(&singular);
+            let (_, axis) =
+                NAMES.iter().find(|(name, _)| *name == singular).ok_or_else(|| refuse(format!("`{word}` is no axis")))?;
+            if axes.contains(axis) {
+                return Err(refuse(format!("`{word}` stands twice")));
+            }
+            axes.push(*axis);
+        }
+        if !axes.contains(&Axis::Sample) {
+            return Err(refuse("no axis of samples".into()));
+        }
+        if axes.contains(&Axis::Chirp) && (axes.contains(&Axis::Loop) || axes.contains(&Axis::Tx)) {
+            return Err(refuse("`chirp` is loops and transmitters together".into()));
+        }
+        Ok(Self(axes))
+    }
+
+    /// `frame loop rx sample`
+    pub fn describe(&self) -> String {
+        let name = |axis: &Axis| NAMES.iter().find(|(_, other)| other == axis).map_or("", |(name, _)| name);
+        self.0.iter().map(name).collect::<Vec<_>>().join(" ")
+    }
+
+    /// The place of an axis.
+    pub fn place(&self, axis: Axis) -> Option<usize> {
+        self.0.iter().position(|other| *other == axis)
+    }
+}
+
+impl FromStr for Layout {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        Self::parse(text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_are_read_in_their_order() {
+        let layout = Layout::parse("frames, chirps rx samples").unwrap();
+        assert_eq!(layout.0, [Axis::Frame, Axis::Chirp, Axis::Rx, Axis::Sample]);
+        assert_eq!(layout.describe(), "frame chirp rx sample");
+    }
+
+    #[test]
+    fn what_is_no_layout_is_refused() {
+        for (text, part) in [
+            ("frame antenna sample", "`antenna` is no axis"),
+            ("frame rx rx sample", "stands twice"),
+            ("frame rx", "no axis of samples"),
+            ("chirp tx sample", "together"),
+        ] {
+            assert!(Layout::parse(text).unwrap_err().to_string().contains(part), "{text}");
+        }
+    }
+}

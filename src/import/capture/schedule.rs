@@ -1,0 +1,311 @@
+//! What a TI radar does within a frame, and which of its chirps make a recording.
+//!
+//! A recording has transmitters in time division at even steps: transmitter i of n sends i chirp periods after the
+//! first. Whatever part of a frame is so can be taken: one profile of several, one subframe, one transmitter.
+
+use std::path::{Path, PathBuf};
+
+use super::boards::Board;
+use super::lanes::Lanes;
+use super::{Stated, stream::Words};
+use crate::error::{Error, Result};
+use crate::radar::{Radar, Sampling};
+
+/// A chirp's shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Profile {
+    pub id: usize,
+    pub start_frequency_hz: f64,
+    pub slope_hz_per_s: f64,
+    pub sample_rate_hz: f64,
+    pub samples: usize,
+    pub idle_s: f64,
+    pub adc_start_s: f64,
+    pub ramp_end_s: f64,
+}
+
+/// One chirp of a loop: its profile, who sends, and how much longer it idles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chirp {
+    pub profile: usize,
+    pub tx_mask: usize,
+    pub extra_idle_s: f64,
+}
+
+/// Chirps that are repeated: a frame, or one subframe of an advanced frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Burst {
+    pub chirps: Vec<Chirp>,
+    pub loops: usize,
+}
+
+/// All that a description says of a TI radar.
+#[derive(Clone, Debug)]
+pub struct TiRadar {
+    /// The file that says so.
+    pub file: PathBuf,
+    pub profiles: Vec<Profile>,
+    pub bursts: Vec<Burst>,
+    pub frame_period_s: f64,
+    /// `None`: until it is stopped.
+    pub frames: Option<usize>,
+    pub rx_mask: usize,
+    pub lanes: Lanes,
+    pub notes: Vec<String>,
+}
+
+/// The chirps that were chosen, and where their words begin within a frame.
+pub struct Selection {
+    pub radar: Radar,
+    pub words_per_frame: u64,
+    /// `[loop][tx]`.
+    pub starts: Vec<Vec<u64>>,
+    pub inverted_rx: Vec<usize>,
+    pub notes: Vec<String>,
+}
+
+impl TiRadar {
+    fn profile(&self, id: usize) -> Result<&Profile> {
+        self.profiles.iter().find(|profile| profile.id == id).ok_or_else(|| {
+            let known: Vec<_> = self.profiles.iter().map(|profile| profile.id.to_string()).collect();
+            Error::field(&self.file, "profile", format!("{id}, which nothing describes"), format!("one of {}", known.join(", ")))
+        })
+    }
+
+    fn receivers(&self) -> Vec<usize> {
+        (0..16).filter(|rx| self.rx_mask >> rx & 1 == 1).collect()
+    }
+
+    /// Words of one whole frame, all profiles and subframes.
+    fn words_per_frame(&self) -> Result<u64> {
+        let n_rx = self.receivers().len();
+        let mut words = 0;
+        for burst in &self.bursts {
+            for chirp in &burst.chirps {
+                words += (burst.loops * self.lanes.words_per_chirp(n_rx, self.profile(chirp.profile)?.samples)) as u64;
+            }
+        }
+        Ok(words)
+    }
+
+    /// Chooses the chirps that make a recording.
+    ///
+    /// # Errors
+    /// Several subframes or profiles and none chosen; chirps at uneven steps; a transmitter that never sends.
+    pub fn select(&self, stated: &Stated, words: &Words) -> Result<Selection> {
+        let burst_index = self.chosen_burst(stated)?;
+        let burst = &self.bursts[burst_index];
+        let profile = self.profile(self.chosen_profile(burst, stated)?)?;
+        let n_rx = self.receivers().len();
+        let mut before = 0;
+        for burst in &self.bursts[..burst_index] {
+            for chirp in &burst.chirps {
+                before += burst.loops * self.lanes.words_per_chirp(n_rx, self.profile(chirp.profile)?.samples);
+            }
+        }
+        // (start in time, start in words, transmitters) of the chirps that are kept, and the loop's length.
+        let (mut time_s, mut offset, mut kept) = (0.0, 0, Vec::new());
+        for chirp in &burst.chirps {
+            let shape = self.profile(chirp.profile)?;
+            let wanted = stated.tx.is_none_or(|tx| chirp.tx_mask == 1 << tx);
+            if chirp.profile == profile.id && wanted {
+                kept.push((time_s, offset, chirp.tx_mask));
+            }
+            time_s += shape.idle_s + chirp.extra_idle_s + shape.ramp_end_s;
+            offset += self.lanes.words_per_chirp(n_rx, shape.samples);
+        }
+        if kept.is_empty() {
+            let found = format!("none of the {} chirps of a loop", burst.chirps.len());
+            return Err(Error::field(&self.file, "chirps", found, "at least one chirp that was asked for")
+                .with_hint("leave out --tx or --profile, or name another"));
+        }
+        self.even(&kept, time_s)?;
+        let masks: Vec<usize> = kept.iter().map(|&(_, _, mask)| mask).collect();
+        // A loop that repeats itself (128 chirps of one transmitter) is as many loops.
+        let period = (1..=masks.len())
+            .find(|&period| masks.len() % period == 0 && (period..masks.len()).all(|index| masks[index] == masks[index - period]))
+            .expect("the whole loop repeats itself");
+        let starts = (0..burst.loops)
+            .flat_map(|index| kept.chunks(period).map(move |chirps| (index, chirps)))
+            .map(|(index, chirps)| chirps.iter().map(|&(_, words, _)| (before + index * offset + words) as u64).collect())
+            .collect::<Vec<Vec<u64>>>();
+        let words_per_frame = self.words_per_frame()?;
+        let mut notes = self.notes.clone();
+        let frames = self.frames_present(words, words_per_frame, &mut notes)?;
+        let (tx_m, rx_m, inverted_rx) = self.antennas(&masks[..period], stated, profile, &mut notes)?;
+        let radar = Radar {
+            start_frequency_hz: profile.start_frequency_hz,
+            slope_hz_per_s: profile.slope_hz_per_s,
+            sample_rate_hz: profile.sample_rate_hz,
+            sampling: self.lanes.sampling,
+            samples_per_chirp: profile.samples,
+            loops_per_frame: starts.len(),
+            adc_start_s: profile.adc_start_s,
+            chirp_period_s: time_s / kept.len() as f64,
+            frame_period_s: self.frame_period_s,
+            frames,
+            position_m: [0.0; 3],
+            tx_m,
+            rx_m,
+            full_scale_codes: Some(f64::from(i16::MAX)),
+        };
+        Ok(Selection { radar, words_per_frame, starts, inverted_rx, notes })
+    }
+
+    fn chosen_burst(&self, stated: &Stated) -> Result<usize> {
+        match (stated.subframe, self.bursts.len()) {
+            (None, 1) => Ok(0),
+            (Some(index), count) if index < count => Ok(index),
+            (found, count) => Err(Error::Usage {
+                message: match found {
+                    Some(index) => format!("--subframe {index}, but {} has {count}", self.file.display()),
+                    None => format!("{}: {count} subframes in a frame, expected one", self.file.display()),
+                },
+                hint: Some(format!("choose one with --subframe 0 to {}; import each by itself", count - 1)),
+            }),
+        }
+    }
+
+    fn chosen_profile(&self, burst: &Burst, stated: &Stated) -> Result<usize> {
+        let mut used: Vec<usize> = burst.chirps.iter().map(|chirp| chirp.profile).collect();
+        used.sort_unstable();
+        used.dedup();
+        match (stated.profile, &used[..]) {
+            (None, &[only]) => Ok(only),
+            (Some(id), _) if used.contains(&id) => Ok(id),
+            (found, _) => Err(Error::Usage {
+                message: match found {
+                    Some(id) => format!("--profile {id}: no chirp of the frame has it"),
+                    None => format!("{}: {} profiles in a frame, expected one", self.file.display(), used.len()),
+                },
+                hint: Some(format!("choose one with --profile, of {used:?}; import each by itself")),
+            }),
+        }
+    }
+
+    /// Refuses chirps that a recording's even steps cannot tell.
+    fn even(&self, kept: &[(f64, usize, usize)], loop_s: f64) -> Result<()> {
+        let step_s = loop_s / kept.len() as f64;
+        let uneven = kept.iter().enumerate().find(|(index, chirp)| {
+            // A nanosecond: a hundredth of a turn of a 5 kHz Doppler shift takes two thousand.
+            (chirp.0 - kept[0].0 - *index as f64 * step_s).abs() > 1e-9
+        });
+        let Some((index, chirp)) = uneven else { return Ok(()) };
+        let found = format!("chirp {index} {:.3} us after the first", (chirp.0 - kept[0].0) * 1e6);
+        Err(Error::field(
+            &self.file,
+            "chirps",
+            found,
+            format!("{:.3} us: even steps through the loop", index as f64 * step_s * 1e6),
+        )
+        .with_hint("import each transmitter by itself with --tx 0, --tx 1, …: the chirps of one are evenly spaced"))
+    }
+
+    /// Whole frames in the files, which may be fewer than were ordered.
+    fn frames_present(&self, words: &Words, words_per_frame: u64, notes: &mut Vec<String>) -> Result<usize> {
+        let (frames, rest) = (words.len() / words_per_frame, words.len() % words_per_frame);
+        if frames == 0 {
+            let found = format!("{} bytes", 2 * words.len());
+            let expected = format!("at least {} bytes, one frame of {}", 2 * words_per_frame, self.file.display());
+            return Err(Error::field(words.first(), "samples", found, expected)
+                .with_hint("the description belongs to another capture, or the capture was cut off"));
+        }
+        if rest > 0 {
+            notes.push(format!(
+                "{} bytes after the last whole frame are left out: {} frames of {} bytes each",
+                2 * rest,
+                frames,
+                2 * words_per_frame
+            ));
+        }
+        match self.frames {
+            Some(ordered) if (ordered as u64) > frames => {
+                notes.push(format!("{ordered} frames were ordered, {frames} are there"));
+            }
+            Some(ordered) if (ordered as u64) < frames => {
+                notes.push(format!(
+                    "{ordered} frames were ordered, {frames} fit into the files: is the description this capture's?"
+                ));
+            }
+            _ => {}
+        }
+        Ok(frames as usize)
+    }
+
+    /// Positions of the transmitters in firing order and of the receivers that are on.
+    #[allow(clippy::type_complexity)]
+    fn antennas(
+        &self,
+        masks: &[usize],
+        stated: &Stated,
+        profile: &Profile,
+        notes: &mut Vec<String>,
+    ) -> Result<(Vec<[f64; 3]>, Vec<[f64; 3]>, Vec<usize>)> {
+        let receivers = self.receivers();
+        if receivers.is_empty() {
+            return Err(Error::field(&self.file, "receivers", "none is on", "at least one receiver"));
+        }
+        let sent = |mask: usize| (0..16).filter(move |tx| mask >> tx & 1 == 1).collect::<Vec<usize>>();
+        if masks.iter().any(|&mask| mask == 0) {
+            return Err(Error::field(&self.file, "transmitters", "a chirp that nobody sends", "a transmitter for every chirp"));
+        }
+        if masks.iter().any(|mask| mask.count_ones() > 1) {
+            notes.push("several transmitters send together: they are taken as one in their middle".into());
+        }
+        let Some(name) = &stated.board else {
+            // A line of half wavelengths is no board's array, but ranges and velocities need no array.
+            let half = crate::radar::SPEED_OF_LIGHT / profile.start_frequency_hz / 2.0;
+            notes.push(
+                "no board was named: antennas are assumed on a line, half a wavelength apart; angles mean nothing until \
+                 --board NAME, or --set radar.tx_m and radar.rx_m, says where they are"
+                    .into(),
+            );
+            let line = |index: usize, step: f64| [index as f64 * step * half, 0.0, 0.0];
+            let tx = (0..masks.len()).map(|index| line(index, receivers.len() as f64)).collect();
+            return Ok((tx, (0..receivers.len()).map(|index| line(index, 1.0)).collect(), Vec::new()));
+        };
+        let board = Board::named(name)?;
+        let missing = |what: &str, index: usize| {
+            Error::field(&self.file, what, format!("number {index} is on"), format!("those of the {}", board.name))
+                .with_hint("the capture is of another board: name it with --board")
+        };
+        let middle = |mask: usize| -> Result<[f64; 3]> {
+            let places = sent(mask).into_iter().map(|tx| board.tx_m(tx).ok_or_else(|| missing("transmitters", tx)));
+            let places = places.collect::<Result<Vec<_>>>()?;
+            Ok(std::array::from_fn(|axis| places.iter().map(|place| place[axis]).sum::<f64>() / places.len() as f64))
+        };
+        let tx_m = masks.iter().map(|&mask| middle(mask)).collect::<Result<Vec<_>>>()?;
+        let rx_m =
+            receivers.iter().map(|&rx| board.rx_m(rx).ok_or_else(|| missing("receivers", rx))).collect::<Result<Vec<_>>>()?;
+        let inverted: Vec<usize> =
+            receivers.iter().enumerate().filter(|(_, rx)| board.inverted_rx.contains(rx)).map(|(at, _)| at).collect();
+        notes.push(format!("antennas of the {} ({})", board.name, board.source));
+        if !inverted.is_empty() {
+            notes.push(format!("receivers {inverted:?} are fed from the opposite side: their samples are negated"));
+        }
+        Ok((tx_m, rx_m, inverted))
+    }
+}
+
+/// The sampled part of a ramp must lie on it.
+pub fn check_ramp(file: &Path, profile: &Profile) -> Option<String> {
+    let end_s = profile.adc_start_s + profile.samples as f64 / profile.sample_rate_hz;
+    (end_s > profile.ramp_end_s * (1.0 + 1e-9)).then(|| {
+        format!(
+            "{}: profile {} samples until {:.2} us, but its ramp ends at {:.2} us: the last samples are not of the ramp",
+            file.display(),
+            profile.id,
+            end_s * 1e6,
+            profile.ramp_end_s * 1e6
+        )
+    })
+}
+
+/// Complex or real samples from TI's output formats: 0 real, 1 complex 1x, 2 complex 2x, 3 pseudo real.
+pub fn sampling_of(format: usize) -> Option<Sampling> {
+    match format {
+        0 | 3 => Some(Sampling::Real),
+        1 | 2 => Some(Sampling::Complex),
+        _ => None,
+    }
+}

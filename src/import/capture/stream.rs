@@ -1,0 +1,66 @@
+//! Several files that are one stream of 16-bit words.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// The files of one capture, end to end. Words are little-endian; a frame may begin in one file and end in the next.
+pub struct Words {
+    files: Vec<(PathBuf, u64)>,
+}
+
+impl Words {
+    /// Holds every file's length. A file with half a word at its end is refused.
+    pub fn open(paths: &[PathBuf]) -> Result<Self> {
+        let files = paths.iter().map(|path| {
+            let metadata = std::fs::metadata(path).map_err(|source| Error::read(path, source))?;
+            if !metadata.is_file() {
+                return Err(Error::read(path, std::io::ErrorKind::InvalidInput.into()));
+            }
+            match metadata.len() {
+                0 => Err(Error::field(path, "samples", "an empty file", "16-bit samples")
+                    .with_hint("the capture did not start; record it again")),
+                odd if odd % 2 == 1 => Err(Error::field(path, "samples", format!("{odd} bytes"), "whole 16-bit samples")
+                    .with_hint("the file is cut off; copy it again")),
+                length => Ok((path.clone(), length / 2)),
+            }
+        });
+        Ok(Self { files: files.collect::<Result<_>>()? })
+    }
+
+    pub fn first(&self) -> &Path {
+        &self.files[0].0
+    }
+
+    /// Words in all files together.
+    pub fn len(&self) -> u64 {
+        self.files.iter().map(|(_, words)| words).sum()
+    }
+
+    /// `count` words from `start` on. Panics beyond the end: callers ask for whole frames only.
+    pub fn read(&self, start: u64, count: usize) -> Result<Vec<i16>> {
+        assert!(start + count as u64 <= self.len(), "words {start} to {} of {}", start + count as u64, self.len());
+        let mut bytes = vec![0; 2 * count];
+        let (mut skip, mut filled) = (start, 0);
+        for (path, words) in &self.files {
+            if skip >= *words {
+                skip -= words;
+                continue;
+            }
+            let part = bytes.len().min(filled + 2 * (words - skip) as usize);
+            let mut read = || {
+                let mut file = File::open(path)?;
+                file.seek(SeekFrom::Start(2 * skip))?;
+                file.read_exact(&mut bytes[filled..part])
+            };
+            read().map_err(|source| Error::read(path, source))?;
+            (skip, filled) = (0, part);
+            if filled == bytes.len() {
+                break;
+            }
+        }
+        Ok(bytes.as_chunks().0.iter().map(|&word| i16::from_le_bytes(word)).collect())
+    }
+}

@@ -1,0 +1,187 @@
+//! The `.cfg` of the mmWave SDK: commands for the radar's serial port, one a line.
+//!
+//! Source: TI, "mmWave SDK user guide", section "Configuration (.cfg) file format". Read are channelCfg, adcCfg,
+//! adcbufCfg, profileCfg, chirpCfg, frameCfg, advFrameCfg, subFrameCfg and lvdsStreamCfg; other lines say nothing of
+//! the samples.
+
+use std::path::Path;
+
+use super::lanes::Lanes;
+use super::schedule::{Burst, Chirp, Profile, TiRadar, check_ramp, sampling_of};
+use crate::error::{Error, Result};
+use crate::radar::Sampling;
+
+/// One line: its number, its command, its arguments.
+struct Line<'a> {
+    file: &'a Path,
+    number: usize,
+    command: &'a str,
+    arguments: Vec<&'a str>,
+}
+
+impl Line<'_> {
+    fn wrong(&self, found: impl Into<String>, expected: &str) -> Error {
+        Error::field(self.file, format!("line {}: {}", self.number, self.command), found, expected)
+    }
+
+    fn number_at(&self, index: usize) -> Result<f64> {
+        let text = self
+            .arguments
+            .get(index)
+            .ok_or_else(|| self.wrong(format!("{} arguments", self.arguments.len()), &format!("at least {}", index + 1)))?;
+        text.parse()
+            .ok()
+            .filter(|number: &f64| number.is_finite())
+            .ok_or_else(|| self.wrong(format!("`{text}` at place {}", index + 1), "a number"))
+    }
+
+    fn count_at(&self, index: usize) -> Result<usize> {
+        let number = self.number_at(index)?;
+        if number >= 0.0 && number.fract() == 0.0 && number < 1e9 {
+            return Ok(number as usize);
+        }
+        Err(self.wrong(format!("{number} at place {}", index + 1), "a whole number"))
+    }
+}
+
+/// Reads the radar. A later line of the same command and number takes the earlier one's place, as on the radar.
+pub fn read_radar(file: &Path) -> Result<TiRadar> {
+    let text = std::fs::read_to_string(file).map_err(|source| Error::read(file, source))?;
+    let lines: Vec<Line> = text
+        .lines()
+        .enumerate()
+        .filter_map(|(index, line)| {
+            let mut words = line.split(['%', '#']).next()?.split_whitespace();
+            Some(Line { file, number: index + 1, command: words.next()?, arguments: words.collect() })
+        })
+        .collect();
+    let all = |command: &str| lines.iter().filter(|line| line.command == command).collect::<Vec<_>>();
+    let last = |command: &str| {
+        all(command).pop().ok_or_else(|| {
+            Error::field(file, command, "missing", "a line of that command")
+                .with_hint("is this the .cfg that was sent to the radar?")
+        })
+    };
+    let mut profiles: Vec<Profile> = Vec::new();
+    for line in all("profileCfg") {
+        let profile = profile(line)?;
+        profiles.retain(|other| other.id != profile.id);
+        profiles.push(profile);
+    }
+    let chirps = chirps(&all("chirpCfg"))?;
+    let (bursts, frame_period_s, frames) = match all("advFrameCfg").pop() {
+        Some(advanced) => advanced_frame(advanced, &all("subFrameCfg"), &chirps)?,
+        None => frame(last("frameCfg")?, &chirps)?,
+    };
+    let mut notes: Vec<String> = profiles.iter().filter_map(|profile| check_ramp(file, profile)).collect();
+    let lanes = lanes(last("adcCfg")?, last("adcbufCfg")?, &mut notes)?;
+    if let Some(stream) = all("lvdsStreamCfg").pop() {
+        // lvdsStreamCfg <subframe> <header> <format> <software>
+        if stream.count_at(1)? == 1 {
+            return Err(stream.wrong("a header before the samples", "0: headers between the samples are not read"));
+        }
+        if stream.count_at(2)? != 1 {
+            return Err(stream.wrong(format!("data format {}", stream.count_at(2)?), "1: samples only"));
+        }
+    }
+    Ok(TiRadar {
+        file: file.into(),
+        profiles,
+        bursts,
+        frame_period_s,
+        frames,
+        rx_mask: last("channelCfg")?.count_at(0)?,
+        lanes,
+        notes,
+    })
+}
+
+/// profileCfg id start_GHz idle_us adc_start_us ramp_end_us power phase slope_MHz/us tx_start samples rate_ksps …
+fn profile(line: &Line) -> Result<Profile> {
+    Ok(Profile {
+        id: line.count_at(0)?,
+        start_frequency_hz: line.number_at(1)? * 1e9,
+        idle_s: line.number_at(2)? * 1e-6,
+        adc_start_s: line.number_at(3)? * 1e-6,
+        ramp_end_s: line.number_at(4)? * 1e-6,
+        slope_hz_per_s: line.number_at(7)? * 1e12,
+        samples: line.count_at(9)?,
+        sample_rate_hz: line.number_at(10)? * 1e3,
+    })
+}
+
+/// chirpCfg first last profile start_Hz slope_kHz/us idle_us adc_us tx_mask
+fn chirps(lines: &[&Line]) -> Result<Vec<(usize, Chirp)>> {
+    let mut all: Vec<(usize, Chirp)> = Vec::new();
+    for line in lines {
+        for (place, what) in [(3, "another start frequency"), (4, "another slope"), (6, "another ADC start")] {
+            if line.number_at(place)? != 0.0 {
+                return Err(line.wrong(what, "the profile's: chirps that differ from their profile are not read"));
+            }
+        }
+        let chirp = Chirp { profile: line.count_at(2)?, tx_mask: line.count_at(7)?, extra_idle_s: line.number_at(5)? * 1e-6 };
+        for index in line.count_at(0)?..=line.count_at(1)?.min(511) {
+            all.retain(|(other, _)| *other != index);
+            all.push((index, chirp.clone()));
+        }
+    }
+    Ok(all)
+}
+
+fn burst(line: &Line, chirps: &[(usize, Chirp)], first: usize, count: usize, loops: usize) -> Result<Burst> {
+    let chirp = |index| chirps.iter().find(|(own, _)| *own == index).map(|(_, chirp)| chirp.clone());
+    let chosen = (first..first + count)
+        .map(|index| chirp(index).ok_or_else(|| line.wrong(format!("chirp {index}"), "a chirp of a chirpCfg line")));
+    Ok(Burst { chirps: chosen.collect::<Result<_>>()?, loops })
+}
+
+/// frameCfg first last loops frames period_ms …
+fn frame(line: &Line, chirps: &[(usize, Chirp)]) -> Result<(Vec<Burst>, f64, Option<usize>)> {
+    let (first, last) = (line.count_at(0)?, line.count_at(1)?);
+    let count =
+        (last + 1).checked_sub(first).ok_or_else(|| line.wrong(format!("chirps {first} to {last}"), "an ascending range"))?;
+    let frames = line.count_at(3)?;
+    Ok((vec![burst(line, chirps, first, count, line.count_at(2)?)?], line.number_at(4)? * 1e-3, (frames > 0).then_some(frames)))
+}
+
+/// advFrameCfg subframes profile frames …; subFrameCfg index profile first chirps loops burst_ms offset bursts burst_loops period_ms
+fn advanced_frame(line: &Line, subframes: &[&Line], chirps: &[(usize, Chirp)]) -> Result<(Vec<Burst>, f64, Option<usize>)> {
+    let count = line.count_at(0)?;
+    let (mut bursts, mut period_s) = (Vec::new(), 0.0);
+    for index in 0..count {
+        let subframe = subframes
+            .iter()
+            .rev()
+            .find(|subframe| subframe.count_at(0).ok() == Some(index))
+            .ok_or_else(|| line.wrong(format!("{count} subframes"), &format!("a subFrameCfg line for subframe {index}")))?;
+        if subframe.count_at(7)? > 1 {
+            return Err(subframe.wrong("several bursts", "one burst a subframe"));
+        }
+        let loops = subframe.count_at(4)? * subframe.count_at(8)?.max(1);
+        bursts.push(burst(subframe, chirps, subframe.count_at(2)?, subframe.count_at(3)?, loops)?);
+        period_s += subframe.number_at(9)? * 1e-3;
+    }
+    let frames = line.count_at(2)?;
+    Ok((bursts, period_s, (frames > 0).then_some(frames)))
+}
+
+/// adcCfg bits format; adcbufCfg [subframe] format swap interleave threshold (without the subframe in SDK 1)
+fn lanes(adc: &Line, buffer: &Line, notes: &mut Vec<String>) -> Result<Lanes> {
+    if adc.count_at(0)? != 2 {
+        return Err(adc.wrong(format!("{} for the bits", adc.count_at(0)?), "2 (16 bits)"));
+    }
+    let sampling = sampling_of(adc.count_at(1)?).ok_or_else(|| adc.wrong("an unknown output format", "0 to 3"))?;
+    let shift = usize::from(buffer.arguments.len() >= 5);
+    let real = buffer.count_at(shift)? == 1;
+    if real != (sampling == Sampling::Real) {
+        return Err(buffer.wrong("another output format than adcCfg's", "the same: complex (0) or real (1)"));
+    }
+    // SampleSwap: 0 puts I into the lower half word, 1 puts Q there; the lower half word goes out first.
+    let (q_first, interleaved) = (buffer.count_at(shift + 1)? == 1, buffer.count_at(shift + 2)? == 0);
+    let count = if interleaved { 4 } else { 2 };
+    notes.push(format!(
+        "a .cfg does not say how many LVDS lanes there are: {count}, as for channels that are {}interleaved",
+        if interleaved { "" } else { "not " }
+    ));
+    Ok(Lanes { count, interleaved, q_first, sampling })
+}

@@ -1,0 +1,162 @@
+//! `.mmwave.json` and `.setup.json` of mmWave Studio.
+//!
+//! Source: TI, "mmWave Studio JSON configuration" as shipped with mmWave Studio; key names carry their units.
+
+use std::path::{Path, PathBuf};
+
+use super::json::Json;
+use super::lanes::Lanes;
+use super::schedule::{Burst, Chirp, Profile, TiRadar, check_ramp, sampling_of};
+use crate::error::{Error, Result};
+
+/// What `.setup.json` adds: the device, and which files hold the samples.
+#[derive(Debug, Default)]
+pub struct Setup {
+    pub device: Option<String>,
+    pub files: Vec<PathBuf>,
+    /// The `.mmwave.json` of the capture.
+    pub config: Option<PathBuf>,
+}
+
+pub fn read_setup(path: &Path) -> Result<Setup> {
+    let json = Json::read(path)?;
+    let device = json.find("mmWaveDevice").map(|device| device.text().map(str::to_string)).transpose()?;
+    // The paths are of the machine that recorded; the file names are what travels.
+    let beside = |name: &str| path.with_file_name(name.rsplit(['/', '\\']).next().unwrap_or_default());
+    let config = json.find("configUsed").map(|name| name.text().map(beside)).transpose()?;
+    let mut files = Vec::new();
+    if let Some(captured) = json.find("capturedFiles").and_then(|captured| captured.find("files")) {
+        for file in captured.items()? {
+            let names = ["processedFileName", "rawFileName"].into_iter().filter_map(|key| file.find(key));
+            let names = names.map(|name| name.text().map(str::to_string)).collect::<Result<Vec<_>>>()?;
+            files.extend(names.iter().find(|name| !name.is_empty()).map(|name| beside(name)));
+        }
+    }
+    Ok(Setup { device, files, config })
+}
+
+/// Reads the radar of one device.
+pub fn read_radar(path: &Path) -> Result<TiRadar> {
+    let json = Json::read(path)?;
+    let devices = json.get("mmWaveDevices")?.items()?;
+    let [device] = &devices[..] else {
+        let found = format!("{} devices", devices.len());
+        return Err(Error::field(path, "mmWaveDevices", found, "one device")
+            .with_hint("cascades of several devices are not read yet; convert to .npy and import with --layout"));
+    };
+    let rf = device.get("rfConfig")?;
+    let profiles = profiles(&rf)?;
+    let (bursts, frame_period_s, frames) = frame(&rf)?;
+    let raw = device.get("rawDataCaptureConfig")?;
+    let lanes = lanes(&rf, &raw)?;
+    let rx_mask = rf.get("rlChanCfg_t")?.get("rxChannelEn")?.count()?;
+    let notes = profiles.iter().filter_map(|profile| check_ramp(path, profile)).collect();
+    Ok(TiRadar { file: path.into(), profiles, bursts, frame_period_s, frames, rx_mask, lanes, notes })
+}
+
+fn profiles(rf: &Json) -> Result<Vec<Profile>> {
+    let read = |profile: &Json| {
+        let profile = profile.get("rlProfileCfg_t")?;
+        let scaled = |key: &str, scale: f64| Ok::<_, Error>(profile.get(key)?.number()? * scale);
+        Ok(Profile {
+            id: profile.get("profileId")?.count()?,
+            // The tool stores what its register holds: 60 GHz comes out as 60.0000000044704.
+            start_frequency_hz: (scaled("startFreqConst_GHz", 1e9)? / 100.0).round() * 100.0,
+            slope_hz_per_s: (scaled("freqSlopeConst_MHz_usec", 1e12)? / 1e6).round() * 1e6,
+            sample_rate_hz: scaled("digOutSampleRate", 1e3)?,
+            samples: profile.get("numAdcSamples")?.count()?,
+            idle_s: scaled("idleTimeConst_usec", 1e-6)?,
+            adc_start_s: scaled("adcStartTimeConst_usec", 1e-6)?,
+            ramp_end_s: scaled("rampEndTime_usec", 1e-6)?,
+        })
+    };
+    rf.get("rlProfiles")?.items()?.iter().map(read).collect()
+}
+
+/// Every chirp by its index.
+fn chirps(rf: &Json) -> Result<Vec<(usize, Chirp)>> {
+    let mut all = Vec::new();
+    for entry in rf.get("rlChirps")?.items()? {
+        let chirp = entry.get("rlChirpCfg_t")?;
+        for key in ["startFreqVar_MHz", "freqSlopeVar_KHz_usec", "adcStartTimeVar_usec"] {
+            if let Some(change) = chirp.find(key)
+                && change.number()? != 0.0
+            {
+                return Err(change.wrong("0: chirps that differ from their profile are not read"));
+            }
+        }
+        let extra_idle_s = chirp.find("idleTimeVar_usec").map(|extra| extra.number()).transpose()?.unwrap_or(0.0) * 1e-6;
+        let content = Chirp { profile: chirp.get("profileId")?.count()?, tx_mask: chirp.get("txEnable")?.count()?, extra_idle_s };
+        for index in chirp.get("chirpStartIdx")?.count()?..=chirp.get("chirpEndIdx")?.count()?.min(511) {
+            all.push((index, content.clone()));
+        }
+    }
+    Ok(all)
+}
+
+fn burst(all: &[(usize, Chirp)], first: usize, last: usize, loops: usize, at: &Json) -> Result<Burst> {
+    let chirp = |index| all.iter().find(|(own, _)| *own == index).map(|(_, chirp)| chirp.clone());
+    let chirps =
+        (first..=last).map(|index| chirp(index).ok_or_else(|| at.wrong(&format!("chirps that are described; {index} is not"))));
+    Ok(Burst { chirps: chirps.collect::<Result<_>>()?, loops })
+}
+
+fn frame(rf: &Json) -> Result<(Vec<Burst>, f64, Option<usize>)> {
+    let all = chirps(rf)?;
+    let waveform = rf.find("waveformType").map(|kind| kind.text().map(str::to_string)).transpose()?;
+    if waveform.as_deref() == Some("advancedFrameChirp") {
+        return advanced_frame(rf, &all);
+    }
+    let frame = rf.get("rlFrameCfg_t")?;
+    let count = |key: &str| frame.get(key)?.count();
+    let bursts = vec![burst(&all, count("chirpStartIdx")?, count("chirpEndIdx")?, count("numLoops")?, &frame)?];
+    let frames = count("numFrames")?;
+    Ok((bursts, frame.get("framePeriodicity_msec")?.number()? * 1e-3, (frames > 0).then_some(frames)))
+}
+
+fn advanced_frame(rf: &Json, all: &[(usize, Chirp)]) -> Result<(Vec<Burst>, f64, Option<usize>)> {
+    let frame = rf.get("rlAdvFrameCfg_t")?;
+    let sequence = frame.get("frameSeq")?;
+    let (mut bursts, mut period_s) = (Vec::new(), 0.0);
+    for entry in sequence.get("subFrameCfg")?.items()?.iter().take(sequence.get("numOfSubFrames")?.count()?) {
+        let subframe = entry.find("rlSubFrameCfg_t").unwrap_or_else(|| entry.clone());
+        let count = |key: &str| subframe.get(key)?.count();
+        let first = count("chirpStartIdx")?;
+        let of_one = |key: &str| Ok::<_, Error>(subframe.find(key).map(|value| value.count()).transpose()?.unwrap_or(1).max(1));
+        if of_one("numOfBurst")? > 1 {
+            return Err(subframe.wrong("one burst a subframe: several bursts are not read"));
+        }
+        let last = (first + count("numOfChirps")?).checked_sub(1).ok_or_else(|| subframe.wrong("at least one chirp"))?;
+        bursts.push(burst(all, first, last, count("numLoops")? * of_one("numOfBurstLoops")?, &subframe)?);
+        period_s += subframe.get("subFramePeriodicity_msec")?.number()? * 1e-3;
+    }
+    let frames = sequence.get("numFrames")?.count()?;
+    Ok((bursts, period_s, (frames > 0).then_some(frames)))
+}
+
+fn lanes(rf: &Json, raw: &Json) -> Result<Lanes> {
+    let format = rf.get("rlAdcOutCfg_t")?.get("fmt")?;
+    let bits = format.get("b2AdcBits")?;
+    if bits.count()? != 2 {
+        return Err(bits.wrong("2 (16 bits): samples of 12 and 14 bits are not read"));
+    }
+    let kind = format.get("b2AdcOutFmt")?;
+    let sampling = sampling_of(kind.count()?).ok_or_else(|| kind.wrong("0 to 3"))?;
+    if let Some(packet) = raw.find("rlDevDataPathCfg_t").and_then(|path| path.find("transferFmtPkt0"))
+        && packet.count()? != 1
+    {
+        return Err(packet.wrong("0x1 (samples only): chirp parameters and quality words between the samples are not read"));
+    }
+    let layout = raw.get("rlDevDataFmtCfg_t")?;
+    let mask = raw.get("rlDevLaneEnable_t")?.get("laneEn")?;
+    let count = mask.count()?.count_ones() as usize;
+    if count == 0 {
+        return Err(mask.wrong("at least one lane"));
+    }
+    Ok(Lanes {
+        count,
+        interleaved: layout.get("chInterleave")?.count()? == 0,
+        q_first: layout.get("iqSwapSel")?.count()? == 1,
+        sampling,
+    })
+}
