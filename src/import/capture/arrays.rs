@@ -76,7 +76,8 @@ impl Cube {
     pub fn stored_as(&self) -> IfLayout {
         let codes = match self.header.stored.kind {
             Kind::Int => self.header.stored.bytes <= 2,
-            Kind::Unsigned => self.header.stored.bytes == 1 || self.header.stored.bytes == 2,
+            // Unsigned words of 16 bits do not fit signed ones: they stay numbers.
+            Kind::Unsigned => self.header.stored.bytes == 1 || self.wrapped,
             _ => self.wrapped,
         };
         match (self.sampling(), codes) {

@@ -123,7 +123,9 @@ impl TiRadar {
         let masks: Vec<usize> = kept.iter().map(|&(_, _, mask)| mask).collect();
         // A loop that repeats itself (128 chirps of one transmitter) is as many loops.
         let period = (1..=masks.len())
-            .find(|&period| masks.len() % period == 0 && (period..masks.len()).all(|index| masks[index] == masks[index - period]))
+            .find(|&period| {
+                masks.len().is_multiple_of(period) && (period..masks.len()).all(|index| masks[index] == masks[index - period])
+            })
             .expect("the whole loop repeats itself");
         let starts = (0..burst.loops)
             .flat_map(|index| kept.chunks(period).map(move |chirps| (index, chirps)))
@@ -246,7 +248,7 @@ impl TiRadar {
             return Err(Error::field(&self.file, "receivers", "none is on", "at least one receiver"));
         }
         let sent = |mask: usize| (0..16).filter(move |tx| mask >> tx & 1 == 1).collect::<Vec<usize>>();
-        if masks.iter().any(|&mask| mask == 0) {
+        if masks.contains(&0) {
             return Err(Error::field(&self.file, "transmitters", "a chirp that nobody sends", "a transmitter for every chirp"));
         }
         if masks.iter().any(|mask| mask.count_ones() > 1) {
