@@ -62,6 +62,16 @@ impl Error {
         Self::Setting { key: key.into(), found: found.to_string(), expected: expected.into(), hint: None }
     }
 
+    /// The error of a setting as that of a field of the file that holds it; others stay as they are.
+    pub fn in_file(self, path: impl AsRef<Path>) -> Self {
+        match self {
+            Self::Setting { key, found, expected, hint } => {
+                Self::Field { path: path.as_ref().into(), field: key, found, expected, hint }
+            }
+            other => other,
+        }
+    }
+
     /// The same error with a hint, where its variant carries one.
     pub fn with_hint(mut self, text: impl Into<String>) -> Self {
         match &mut self {

@@ -12,6 +12,8 @@ pub mod room;
 // 2: the files it comes in
 pub mod data;
 pub mod import;
+// whether it can be
+pub mod plausibility;
 // the independent world that makes recordings: shares settings, errors and files with the simulator, never physics
 pub mod recorder;
 // many recordings of one room and one board

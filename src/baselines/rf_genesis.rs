@@ -123,6 +123,7 @@ impl RfGenesis {
     /// Settings that cannot work, or a person who cannot be posed or has no faces to hit.
     pub fn new(radar: &Radar, person: &Person, config: &RfGenesisConfig, device: &Device) -> Result<Self> {
         config.check()?;
+        radar.refuse_falling("radar", "the baselines make no falling ones")?;
         if person.faces().is_empty() {
             return Err(Error::Usage {
                 message: "the person has no faces: there is nothing for rays to hit".into(),

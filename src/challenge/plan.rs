@@ -238,6 +238,20 @@ mod tests {
         assert_eq!(rooms.len(), 400);
     }
 
+    /// A diagnosis refuses what cannot be: no case may be that.
+    #[test]
+    fn no_scene_is_implausible() {
+        use crate::plausibility::{Facts, Kind, findings};
+        use crate::recorder::body::MovingBody;
+        for plan in plans(&config(24), &Secret::new(Some("p"))) {
+            let world = plan.scene.world(std::path::Path::new("")).unwrap();
+            let body = MovingBody::new(world.person.as_ref().unwrap(), world.interpolation).unwrap();
+            let facts = Facts::new(Some(&world.radar), Some(&world.room), world.person.as_ref(), &|pose| body.pose(pose));
+            let refused: Vec<_> = findings(&facts).into_iter().filter(|finding| finding.kind == Kind::Refuse).collect();
+            assert!(refused.is_empty(), "{refused:?}");
+        }
+    }
+
     #[test]
     fn every_effect_comes_once_beside_nulls() {
         let config = ChallengeConfig { every: Some(0.7), ..config(120) };

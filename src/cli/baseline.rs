@@ -11,7 +11,7 @@ use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value, json};
 
 use super::{
-    Common, Out, device,
+    Common, Out, device, plausible,
     progress::Progress,
     report,
     simulated::{self, Sequence},
@@ -83,13 +83,13 @@ enum Method {
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let device = device(&common.device)?;
     let maker = Maker::new(arguments, common, device)?;
-    let recording = open(&arguments.recording)?;
+    let recording = open(&arguments.recording, common)?;
     let baseline = maker.make(&arguments.recording, &recording)?;
     let gain = gain(arguments, common, &maker, &recording)?;
 
     let out = arguments.out.out.clone().unwrap_or_else(|| "runs/baseline".into());
     let folder = AtomicFolder::create(&out)?;
-    let noise = noise(arguments, &recording)?;
+    let noise = noise(arguments, common, &recording)?;
     let rendering = Rendering { baseline: &*baseline, gain, noise };
     let mut seconds = 0.0;
     let sequence = Sequence {
@@ -129,8 +129,9 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     Ok(())
 }
 
-fn open(folder: &Path) -> Result<Recording> {
+fn open(folder: &Path, common: &Common) -> Result<Recording> {
     let recording = Recording::open(folder)?;
+    plausible::recording(&recording, common)?;
     for note in &recording.notes {
         eprintln!("note: {}: {note}", folder.display());
     }
@@ -225,7 +226,7 @@ fn gain(arguments: &Arguments, common: &Common, maker: &Maker, simulated: &Recor
     let progress = Progress::new("calibrating", arguments.calibrate.len(), common.quiet);
     let mut calibration = Calibration::default();
     for (done, folder) in arguments.calibrate.iter().enumerate() {
-        let recording = of_same_radar(folder, arguments, simulated)?;
+        let recording = of_same_radar(folder, arguments, common, simulated)?;
         calibration.add(&recording, &*maker.make(folder, &recording)?, arguments.calibration_frames)?;
         progress.set(done + 1);
     }
@@ -233,8 +234,8 @@ fn gain(arguments: &Arguments, common: &Common, maker: &Maker, simulated: &Recor
     calibration.gain()
 }
 
-fn of_same_radar(folder: &Path, arguments: &Arguments, simulated: &Recording) -> Result<Recording> {
-    let recording = open(folder)?;
+fn of_same_radar(folder: &Path, arguments: &Arguments, common: &Common, simulated: &Recording) -> Result<Recording> {
+    let recording = open(folder, common)?;
     if !recording.radar.is_same_board(&simulated.radar) {
         let expected = format!("that of {}", arguments.recording.display());
         return Err(Error::field(folder.join("recording.toml"), "radar", "another radar", expected)
@@ -243,7 +244,7 @@ fn of_same_radar(folder: &Path, arguments: &Arguments, simulated: &Recording) ->
     Ok(recording)
 }
 
-fn noise(arguments: &Arguments, simulated: &Recording) -> Result<BaselineNoise> {
+fn noise(arguments: &Arguments, common: &Common, simulated: &Recording) -> Result<BaselineNoise> {
     let seed = arguments.seed;
     if arguments.clean {
         return Ok(BaselineNoise::None);
@@ -251,7 +252,10 @@ fn noise(arguments: &Arguments, simulated: &Recording) -> Result<BaselineNoise> 
     if arguments.receiver_noise.is_empty() {
         return Ok(BaselineNoise::Rate { seed });
     }
-    let recordings: Vec<Recording> =
-        arguments.receiver_noise.iter().map(|folder| of_same_radar(folder, arguments, simulated)).collect::<Result<_>>()?;
+    let recordings: Vec<Recording> = arguments
+        .receiver_noise
+        .iter()
+        .map(|folder| of_same_radar(folder, arguments, common, simulated))
+        .collect::<Result<_>>()?;
     Ok(BaselineNoise::Level { seed, deviation: noise_level(&recordings, arguments.calibration_frames)? })
 }

@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use burn::tensor::Device;
 use clap::Args;
 
-use super::{Common, Out, report};
+use super::{Common, Out, describe, plausible, report};
 use crate::{
     config::Config,
     data::{Recording, atomic::AtomicFolder},
     error::Result,
     evaluation,
     heatmap::HeatmapConfig,
+    plausibility::Sources,
     radar::{self, Radar},
     room::Room,
     training::checkpoint,
@@ -19,7 +20,7 @@ use crate::{
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// A config file, a recording folder or a checkpoint folder
+    /// A config file, a recording folder, a checkpoint folder, a body (.npz) or a motion (.npz, .bvh)
     path: PathBuf,
     #[command(flatten)]
     out: Out,
@@ -45,20 +46,24 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         return Ok(());
     }
     if path.is_dir() {
-        let recording = show_recording(path)?;
+        let recording = show_recording(path, common)?;
         if let Some(out) = &arguments.out.out {
             draw(&recording, out)?;
         }
         return Ok(());
     }
+    if describe::knows(path) {
+        return describe::run(path, common);
+    }
     let config = Config::read(path, &common.set)?;
     for recording in &config.data.recordings {
-        show_recording(recording)?;
+        show_recording(recording, common)?;
     }
     if let Some(record) = &config.record {
         let world = record.world(path.parent().unwrap_or(Path::new("")))?;
         say!("a recording to be made:");
         show_radar(&world.radar, Some(&world.room));
+        plausible::scene(Some(&world.radar), Some(&world.room), world.person.as_ref(), &Sources::one(path), common)?;
     }
     say!("resolved configuration:\n\n{}", config.to_toml());
     Ok(())
@@ -78,14 +83,14 @@ fn draw(recording: &Recording, out: &Path) -> Result<()> {
 /// Frames that pictures over time show at most: they are held in memory together.
 const MOST_DRAWN: usize = 600;
 
-fn show_recording(folder: &Path) -> Result<Recording> {
+fn show_recording(folder: &Path, common: &Common) -> Result<Recording> {
     let recording = Recording::open(folder)?;
-    show(&recording)?;
+    show(&recording, common)?;
     Ok(recording)
 }
 
 /// What a recording is, and that all of its samples can be read.
-pub(crate) fn show(recording: &Recording) -> Result<()> {
+pub(crate) fn show(recording: &Recording, common: &Common) -> Result<()> {
     say!("recording: {}", recording.folder.display());
     show_radar(&recording.radar, recording.room.as_ref());
     match recording.person() {
@@ -104,11 +109,12 @@ pub(crate) fn show(recording: &Recording) -> Result<()> {
     for note in &recording.notes {
         eprintln!("note: {note}");
     }
+    plausible::recording(recording, common)?;
     // Every frame is read once, so that a truncated or lying file shows here.
     for frame in 0..recording.radar.frames {
         recording.frame(frame)?;
     }
-    say!("  samples            all {} frames can be read", recording.radar.frames);
+    say!("  samples            {}, all {} frames can be read", recording.number_type(), recording.radar.frames);
     Ok(())
 }
 
@@ -116,9 +122,16 @@ fn show_radar(radar: &Radar, room: Option<&Room>) {
     let [frames, tx, rx, loops, samples] = radar.dims();
     say!("  frames x tx x rx x loops x samples   {frames} x {tx} x {rx} x {loops} x {samples}");
     say!("  carrier            {:.3} GHz, wavelength {:.3} mm", radar.carrier_hz() / 1e9, radar.wavelength_m() * 1e3);
-    say!("  bandwidth          {:.3} GHz", radar.bandwidth_hz() / 1e9);
+    let falling = if radar.slope_hz_per_s < 0.0 { ", falling" } else { "" };
+    say!("  bandwidth          {:.3} GHz{falling}", radar.bandwidth_hz().abs() / 1e9);
     say!("  range              {:.3} m resolution, up to {:.2} m", radar.range_resolution_m(), radar.max_range_m());
-    say!("  velocity           {:.3} m/s resolution, up to {:.2} m/s", radar.velocity_resolution_mps(), radar.max_velocity_mps());
+    if loops > 1 {
+        let (resolution, most) = (radar.velocity_resolution_mps(), radar.max_velocity_mps());
+        say!("  velocity           {resolution:.3} m/s resolution, up to {most:.2} m/s");
+    } else {
+        let most = radar.max_tracked_velocity_mps();
+        say!("  velocity           one chirp a frame measures none; from frame to frame up to {most:.4} m/s without ambiguity");
+    }
     match room {
         Some(room) => say!(
             "  room               {}",

@@ -8,7 +8,7 @@ use std::{
 use burn::tensor::Device;
 use clap::Args;
 
-use super::{Common, device, progress::Progress};
+use super::{Common, device, plausible, progress::Progress};
 use crate::{
     config::Config,
     data::{Recording, atomic},
@@ -51,6 +51,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         }
     }
     let recording = Recording::open(&arguments.recording)?;
+    plausible::recording(&recording, common)?;
     let progress = Progress::new("diagnosing", config.diagnosis.most + 2 * config.diagnosis.epochs, common.quiet);
     let mut steps = 0;
     let mut tell = |text: &str| {

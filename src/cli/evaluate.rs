@@ -7,6 +7,7 @@ use clap::Args;
 use super::{
     Common, Out, device,
     effects::WithoutEffects,
+    plausible,
     progress::Progress,
     report,
     scores::{self, LpipsArguments},
@@ -55,6 +56,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let metrics = MetricsConfig::default();
     let mut evaluations = Vec::new();
     for folder in &arguments.recordings {
+        plausible::folder(folder, common)?;
         let recording = LoadedRecording::open(folder, &state.simulator, false)?;
         report::same_radar(folder, &recording.scene.radar, &state.site.radar)?;
         report::tell_notes(&recording);

@@ -61,5 +61,5 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let labels = labels.collect::<Result<BTreeMap<_, _>>>()?;
     let capture = capture::open(&arguments.sources, &stated)?;
     let recording = capture::import(capture, &arguments.out, labels)?;
-    check::show(&recording)
+    check::show(&recording, common)
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use super::{
     Common, Out, device,
     effects::WithoutEffects,
-    report,
+    plausible, report,
     simulated::{self, Sequence},
 };
 use crate::{
@@ -20,6 +20,7 @@ use crate::{
         actions::{self, Action, StyleConfig},
         procedural::{self, PersonConfig},
     },
+    plausibility::Sources,
     radar::Radar,
     simulator::Scene,
     training::{
@@ -89,6 +90,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 
     let measured = match &arguments.recording {
         Some(recording) => {
+            plausible::folder(recording, common)?;
             let recording = LoadedRecording::open(recording, &state.simulator, false)?;
             report::same_radar(&recording.folder, &recording.scene.radar, &state.site.radar)?;
             report::tell_notes(&recording);
@@ -103,6 +105,15 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         None => (state.site.radar.clone(), state.site.room.clone(), Some(new_person(arguments, &state)?)),
     };
     radar.frames = frames(arguments, &radar, person.as_ref(), measured.is_some())?;
+    if measured.is_none() {
+        let file = |file: &Option<PathBuf>| file.clone().unwrap_or_else(|| arguments.checkpoint.clone());
+        let sources = Sources {
+            body: file(&arguments.body),
+            motion: file(&arguments.motion),
+            ..Sources::one(arguments.checkpoint.join("checkpoint.toml"))
+        };
+        plausible::scene(Some(&radar), room.as_ref(), person.as_ref(), &sources, common)?;
+    }
     let own_scene;
     let scene = match &measured {
         Some(recording) => &recording.scene,

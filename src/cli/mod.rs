@@ -12,12 +12,14 @@ mod baseline;
 mod challenge;
 mod check;
 mod compare;
+mod describe;
 mod device;
 mod diagnose;
 mod effects;
 mod evaluate;
 mod import;
 mod infer;
+mod plausible;
 mod progress;
 mod recognize;
 mod record;
@@ -65,6 +67,9 @@ pub(crate) struct Common {
     /// flex, ndarray, wgpu, wgpu-cpu, cuda:0 or auto (a real GPU if there is one, else flex)
     #[arg(long, global = true, value_name = "NAME", default_value = "auto")]
     pub device: String,
+    /// Take radar, body, motion and place as they are stated, however implausible
+    #[arg(long, global = true)]
+    pub as_stated: bool,
     /// Print results and errors only
     #[arg(short, long, global = true)]
     pub quiet: bool,
@@ -72,10 +77,11 @@ pub(crate) struct Common {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Read a config, a recording or a checkpoint, and show what it describes
+    /// Read a config, a recording, a checkpoint, a body or a motion, and show what it describes
     ///
     /// Shows what follows from the radar's settings (resolutions, limits), holds its rules against the room, and says
-    /// which parts are missing. With --out, draws the heatmaps of a recording.
+    /// which parts are missing and what cannot be: units, speeds, places. A body (.npz) or a motion (.npz, .bvh) may be
+    /// given by itself. With --out, draws the heatmaps of a recording.
     Check(check::Arguments),
     /// Turn a capture of a radar board into a recording
     ///

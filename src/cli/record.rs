@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use sha2::{Digest, Sha256};
 
-use super::{Common, Out, progress::Progress};
+use super::{Common, Out, plausible, progress::Progress};
 use crate::{
     config::Config,
     data::hex,
     error::Result,
+    plausibility::Sources,
     recorder::{self, RecorderConfig},
 };
 
@@ -26,10 +27,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let record = config.record(&arguments.config)?;
     let folder = match &arguments.out.out {
         Some(out) => {
-            make(record, &arguments.config, out, common.quiet)?;
+            make(record, &arguments.config, out, common)?;
             out.clone()
         }
-        None => recorded(record, &arguments.config, common.quiet)?,
+        None => recorded(record, &arguments.config, common)?,
     };
     say!("recording: {}", folder.display());
     Ok(())
@@ -37,20 +38,21 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 
 /// The recording of these settings, made if it is not there yet: its folder in `runs/recordings` is named after
 /// their hash. `config_path`: where the settings were read, which relative paths start from.
-pub(crate) fn recorded(config: &RecorderConfig, config_path: &Path, quiet: bool) -> Result<PathBuf> {
+pub(crate) fn recorded(config: &RecorderConfig, config_path: &Path, common: &Common) -> Result<PathBuf> {
     let text = toml::to_string(config).expect("settings are plain data");
     let digest = Sha256::digest(format!("{} {text}", env!("CARGO_PKG_VERSION")));
     let folder = Path::new("runs/recordings").join(hex(&digest[..6]));
     if !folder.is_dir() {
-        make(config, config_path, &folder, quiet)?;
+        make(config, config_path, &folder, common)?;
     }
     Ok(folder)
 }
 
-fn make(config: &RecorderConfig, config_path: &Path, folder: &Path, quiet: bool) -> Result<()> {
+fn make(config: &RecorderConfig, config_path: &Path, folder: &Path, common: &Common) -> Result<()> {
     let settings_folder = config_path.parent().unwrap_or(Path::new(""));
-    let frames = config.world(settings_folder)?.radar.frames;
-    let progress = Progress::new("recording", frames, quiet);
+    let world = config.world(settings_folder)?;
+    plausible::scene(Some(&world.radar), Some(&world.room), world.person.as_ref(), &Sources::one(config_path), common)?;
+    let progress = Progress::new("recording", world.radar.frames, common.quiet);
     recorder::record_to(config, settings_folder, folder, &mut |done, _| progress.set(done))?;
     progress.finish();
     Ok(())

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Common, progress::Progress};
+use super::{Common, plausible, progress::Progress};
 use crate::{
     data::Shard,
     error::Result,
+    plausibility::{Sources, Verdict},
     site::{self, SiteConfig},
 };
 
@@ -26,6 +27,10 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let config = SiteConfig::read(&arguments.config, &common.set)?;
     let settings_folder = arguments.config.parent().unwrap_or(Path::new(""));
+    for (name, findings) in site::implausible(&config, settings_folder, common.as_stated)? {
+        let sources = Sources::one(format!("{} ({name})", arguments.config.display()));
+        plausible::tell_findings(Verdict::new(findings, &sources, common.as_stated))?;
+    }
     let mut shown = None;
     let mut show = |done: usize, of: usize, name: &str| {
         let progress = shown.get_or_insert_with(|| Progress::new("recording", of, common.quiet));

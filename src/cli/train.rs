@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{
-    Common, Out, devices,
+    Common, Out, devices, plausible,
     progress::TrainingProgress,
     record,
     report::{self, RunReport},
@@ -59,11 +59,14 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         });
     }
     if config.data.recordings.is_empty() {
-        let recorded = record::recorded(config.record(&config_path)?, &config_path, common.quiet)?;
+        let recorded = record::recorded(config.record(&config_path)?, &config_path, common)?;
         config.data.recordings = vec![recorded];
     }
     absolute(&mut config.data.recordings)?;
     absolute(config.training.start_from.as_mut_slice())?;
+    for recording in &config.data.recordings {
+        plausible::folder(recording, common)?;
+    }
     let config_toml = config.to_toml();
     std::fs::create_dir_all(&run_folder).map_err(|error| Error::write(&run_folder, error))?;
     atomic::write_text(run_folder.join("config.toml"), &config_toml)?;

@@ -51,6 +51,8 @@ impl Diagnosis {
 /// # Errors
 /// A recording that cannot be read, is too short to hold anything out, or whose motion does not cover its frames.
 pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut dyn FnMut(&str)) -> Result<Diagnosis> {
+    let settings = recording.folder.join("recording.toml");
+    recording.radar.refuse_falling("radar", "the diagnosis knows no falling ones").map_err(|error| error.in_file(settings))?;
     let per_frame: usize = recording.radar.dims()[1..].iter().product();
     let most_frames = MOST_FRAMES.min((MOST_SAMPLES / per_frame.max(1)).max(1));
     let mut notes = recording.notes.clone();

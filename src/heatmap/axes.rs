@@ -13,7 +13,7 @@ pub fn range_bins(samples: usize, sampling: Sampling) -> usize {
 
 /// Range of every bin, metres, from 0.
 pub fn range_axis(radar: &Radar) -> Axis {
-    let bin_m = radar.sample_rate_hz * SPEED_OF_LIGHT / (2.0 * radar.slope_hz_per_s * radar.samples_per_chirp as f64);
+    let bin_m = radar.sample_rate_hz * SPEED_OF_LIGHT / (2.0 * radar.slope_hz_per_s.abs() * radar.samples_per_chirp as f64);
     let bins = range_bins(radar.samples_per_chirp, radar.sampling);
     Axis::new("range", "m", (0..bins).map(|bin| bin as f64 * bin_m).collect())
 }

@@ -125,7 +125,12 @@ impl Analysis {
                 *slot = if self.radar.sampling == Sampling::Real { value.re.into() } else { value };
             }
             self.range_fft.process(&mut buffer);
-            profiles.extend_from_slice(&buffer[..bins]);
+            if self.radar.slope_hz_per_s > 0.0 {
+                profiles.extend_from_slice(&buffer[..bins]);
+            } else {
+                // The beat frequency of a falling chirp is negative.
+                profiles.extend((0..bins).map(|bin| buffer[(samples - bin) % samples]));
+            }
         }
         profiles
     }
@@ -206,6 +211,31 @@ mod tests {
             let map = Analysis::new(&radar, &HeatmapConfig::default()).range_doppler(&signal);
             let found = map.rows.values[map.peak()[0]];
             assert!((found - velocity).abs() <= 0.5 * step + 1e-3, "found {found}, wanted {velocity}, bins of {step}");
+        }
+    }
+
+    #[test]
+    fn a_falling_chirp_shows_the_range_velocity_and_side_of_a_rising_one() {
+        for sampling in [Sampling::Complex, Sampling::Real] {
+            let rising = Radar { sampling, ..synthetic::radar() };
+            let falling = Radar { slope_hz_per_s: -rising.slope_hz_per_s, ..rising.clone() };
+            let peaks: Vec<(f64, f64, f64)> = [rising, falling]
+                .iter()
+                .map(|radar| {
+                    let signal = synthetic::point(radar, |time| [1.0, 3.0 + 1.3 * time, 0.0]);
+                    let analysis = Analysis::new(radar, &HeatmapConfig::default());
+                    let map = analysis.range_doppler(&signal);
+                    let [row, column] = map.peak();
+                    let maps = analysis.range_doppler_complex(&signal);
+                    let (cells, cell) = (map.rows.len() * map.columns.len(), row * map.columns.len() + column);
+                    let between = maps[cells + cell] * maps[cell].conj();
+                    (map.columns.values[column], map.rows.values[row], between.arg())
+                })
+                .collect();
+            let step = synthetic::radar().velocity_resolution_mps();
+            assert!((peaks[0].0 - peaks[1].0).abs() < 0.06, "{sampling:?}: {peaks:?}");
+            assert!((peaks[0].1 - peaks[1].1).abs() < 1.01 * step && peaks[1].1 > 0.0, "{sampling:?}: {peaks:?}");
+            assert!((peaks[0].2 - peaks[1].2).abs() < 0.1 && peaks[0].2.abs() > 0.3, "{sampling:?}: {peaks:?}");
         }
     }
 

@@ -61,7 +61,6 @@ impl Radar {
     pub fn check(&self, key: &str) -> Result<()> {
         let positive = [
             ("start_frequency_hz", self.start_frequency_hz),
-            ("slope_hz_per_s", self.slope_hz_per_s),
             ("sample_rate_hz", self.sample_rate_hz),
             ("chirp_period_s", self.chirp_period_s),
             ("frame_period_s", self.frame_period_s),
@@ -73,6 +72,10 @@ impl Radar {
             if !(value.is_finite() && value > 0.0) {
                 return Err(Error::setting(format!("{key}.{field}"), value, "a positive number"));
             }
+        }
+        if !(self.slope_hz_per_s.is_finite() && self.slope_hz_per_s != 0.0) {
+            let expected = "a positive number, or a negative one for a falling chirp";
+            return Err(Error::setting(format!("{key}.slope_hz_per_s"), self.slope_hz_per_s, expected));
         }
         if !(self.adc_start_s.is_finite() && self.adc_start_s >= 0.0) {
             return Err(Error::setting(format!("{key}.adc_start_s"), self.adc_start_s, "zero or a positive number"));
@@ -86,6 +89,19 @@ impl Radar {
             }
         }
         Ok(())
+    }
+
+    /// Refuses a falling chirp where `what` knows rising ones only.
+    pub fn refuse_falling(&self, key: &str, what: &str) -> Result<()> {
+        if self.slope_hz_per_s > 0.0 {
+            return Ok(());
+        }
+        Err(Error::setting(format!("{key}.slope_hz_per_s"), self.slope_hz_per_s, format!("a rising chirp (above zero): {what}"))
+            .with_hint(
+                "check, compare and recognize read falling chirps; with the samples of every chirp in reverse order, the slope \
+                 positive and the start at the last sample's frequency, the recording is that of a rising chirp, but for what \
+                 moves within a chirp",
+            ))
     }
 }
 
@@ -106,6 +122,32 @@ mod tests {
         let broken: Vec<_> = checks(&radar, Some(12.0), None).into_iter().filter(|check| check.passed == Some(false)).collect();
         assert_eq!(broken.len(), 1);
         assert_eq!(broken[0].rule, "farthest range <= max range");
+    }
+
+    #[test]
+    fn a_falling_chirp_is_a_radar_with_the_limits_of_a_rising_one_and_refused_where_it_is_not_known() {
+        let rising = Radar::mmmesh(1);
+        let falling = Radar { slope_hz_per_s: -rising.slope_hz_per_s, ..rising.clone() };
+        falling.check("radar").unwrap();
+        assert_eq!(falling.max_range_m(), rising.max_range_m());
+        assert_eq!(falling.range_resolution_m(), rising.range_resolution_m());
+        rising.refuse_falling("radar", "nothing").unwrap();
+        let error = falling.refuse_falling("radar", "the simulator knows no other").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "`radar.slope_hz_per_s` is -60012000000000, expected a rising chirp (above zero): the simulator knows no other"
+        );
+        for slope in [0.0, f64::NAN, f64::INFINITY] {
+            assert!(Radar { slope_hz_per_s: slope, ..rising.clone() }.check("radar").is_err(), "{slope}");
+        }
+    }
+
+    #[test]
+    fn chirps_that_are_alone_in_their_frame_measure_slow_velocities_only() {
+        let many = Radar::mmmesh(10);
+        assert_eq!(many.max_tracked_velocity_mps(), many.max_velocity_mps());
+        let one = Radar { loops_per_frame: 1, ..many };
+        assert!((one.max_tracked_velocity_mps() - one.wavelength_m() / 0.4).abs() < 1e-12);
     }
 
     #[test]

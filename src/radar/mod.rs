@@ -28,7 +28,7 @@ pub enum Sampling {
 pub struct Radar {
     /// Frequency at the start of the ramp (f₀).
     pub start_frequency_hz: f64,
-    /// Chirp slope (S).
+    /// Chirp slope (S); negative for a falling chirp.
     pub slope_hz_per_s: f64,
     pub sample_rate_hz: f64,
     #[serde(default)]
@@ -64,13 +64,13 @@ impl Radar {
         SPEED_OF_LIGHT / (self.carrier_hz() + 0.5 * self.bandwidth_hz())
     }
 
-    /// Swept while sampling.
+    /// Swept while sampling; negative for a falling chirp.
     pub fn bandwidth_hz(&self) -> f64 {
         self.slope_hz_per_s * self.samples_per_chirp as f64 / self.sample_rate_hz
     }
 
     pub fn range_resolution_m(&self) -> f64 {
-        SPEED_OF_LIGHT / (2.0 * self.bandwidth_hz())
+        SPEED_OF_LIGHT / (2.0 * self.bandwidth_hz().abs())
     }
 
     /// Farthest range without ambiguity: all of ±f_s/2 belongs to positive ranges only with a quadrature receiver.
@@ -79,7 +79,7 @@ impl Radar {
             Sampling::Complex => self.sample_rate_hz,
             Sampling::Real => 0.5 * self.sample_rate_hz,
         };
-        highest_beat_hz * SPEED_OF_LIGHT / (2.0 * self.slope_hz_per_s)
+        highest_beat_hz * SPEED_OF_LIGHT / (2.0 * self.slope_hz_per_s.abs())
     }
 
     /// Whether two recordings are of one radar with the same settings: the number of frames and the rail may differ.
@@ -99,6 +99,12 @@ impl Radar {
     /// Fastest radial velocity without ambiguity, either way.
     pub fn max_velocity_mps(&self) -> f64 {
         self.wavelength_m() / (4.0 * self.loop_period_s())
+    }
+
+    /// Fastest radial velocity without ambiguity over all chirps, either way. Chirps that are alone in their frame follow
+    /// each other at the frame period.
+    pub fn max_tracked_velocity_mps(&self) -> f64 {
+        if self.loops_per_frame > 1 { self.max_velocity_mps() } else { self.wavelength_m() / (4.0 * self.frame_period_s) }
     }
 
     /// Ramp start of a chirp: frame k, loop i, transmitter j starts at k·T_frame + (i·n_tx + j)·T_chirp.

@@ -185,6 +185,7 @@ impl World {
 
     pub fn check(&self) -> Result<()> {
         self.radar.check("radar")?;
+        self.radar.refuse_falling("radar", "the recorder makes no falling ones")?;
         self.room.check("room")?;
         self.surface.check("surface")?;
         self.receiver.check("receiver")?;

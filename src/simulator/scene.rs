@@ -69,8 +69,9 @@ fn joint_names(body: &PosedBody) -> Vec<&'static str> {
 
 impl Scene {
     /// # Errors
-    /// A body whose mesh or motion cannot be sampled.
+    /// A body whose mesh or motion cannot be sampled; a falling chirp.
     pub fn new(radar: &Radar, room: Option<&Room>, person: Option<&Person>, config: &SimulatorConfig) -> Result<Self> {
+        radar.refuse_falling("radar", "the simulator makes no falling ones")?;
         let patches = room.map(|room| config.room.init(room)).transpose()?.unwrap_or_default();
         let proxies = room.map(|room| config.room.proxies(room)).unwrap_or_default();
         let body = person.map(|person| PosedBody::new(person, &config.surface, config.interpolation)).transpose()?;

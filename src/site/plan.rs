@@ -12,6 +12,7 @@ use super::config::SiteConfig;
 use crate::error::{Error, Result};
 use crate::person::Placement;
 use crate::person::actions::{self, Action, StyleConfig};
+use crate::plausibility::{Facts, Finding, findings};
 use crate::recorder::{Recorder, RecorderConfig, World, body::MovingBody};
 use crate::room::Boundary;
 
@@ -42,13 +43,7 @@ pub struct Sequence {
 /// # Errors
 /// Settings that cannot be a site, a body that comes nearer to a boundary than `margin_m`, what the recorder refuses.
 pub fn sequences(config: &SiteConfig, settings_folder: &Path) -> Result<Vec<Sequence>> {
-    config.check()?;
-    let mut all = Vec::new();
-    for subject in &config.subjects {
-        for &action in &config.actions {
-            all.extend((1..=config.repetitions).map(|repetition| sequence(config, subject, action, repetition)));
-        }
-    }
+    let mut all = drawn(config)?;
     all.par_iter().try_for_each(|sequence| {
         let world = sequence.recorder.world(settings_folder)?;
         stays_inside(&world, config.margin_m, &sequence.name)
@@ -58,6 +53,33 @@ pub fn sequences(config: &SiteConfig, settings_folder: &Path) -> Result<Vec<Sequ
         let first = RecorderConfig { redraw: 0, ..all[0].recorder.clone() };
         let level = Recorder::new(&first.world(settings_folder)?)?.level();
         all.iter_mut().for_each(|sequence| sequence.recorder.receiver.level = Some(level));
+    }
+    Ok(all)
+}
+
+/// What is implausible about each sequence, by its name; nothing is recorded for it.
+///
+/// # Errors
+/// Settings that cannot be a site, what the recorder refuses.
+pub fn implausible(config: &SiteConfig, settings_folder: &Path, as_stated: bool) -> Result<Vec<(String, Vec<Finding>)>> {
+    let look = |sequence: &Sequence| -> Result<(String, Vec<Finding>)> {
+        let world = sequence.recorder.world(settings_folder)?;
+        let body = world.person.as_ref().map(|person| MovingBody::new(person, world.interpolation)).transpose()?;
+        let pose = |pose| body.as_ref().map_or_else(Vec::new, |body| body.pose(pose));
+        let facts = Facts { as_stated, ..Facts::new(Some(&world.radar), Some(&world.room), world.person.as_ref(), &pose) };
+        Ok((sequence.name.clone(), findings(&facts)))
+    };
+    drawn(config)?.par_iter().map(look).collect()
+}
+
+/// All sequences as they are drawn, not looked at yet.
+fn drawn(config: &SiteConfig) -> Result<Vec<Sequence>> {
+    config.check()?;
+    let mut all = Vec::new();
+    for subject in &config.subjects {
+        for &action in &config.actions {
+            all.extend((1..=config.repetitions).map(|repetition| sequence(config, subject, action, repetition)));
+        }
     }
     Ok(all)
 }

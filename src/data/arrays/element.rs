@@ -35,7 +35,7 @@ impl Stored {
     fn is_real(self) -> bool {
         match self.kind {
             Kind::Int | Kind::Unsigned => true,
-            Kind::Float => matches!(self.bytes, 4 | 8),
+            Kind::Float => matches!(self.bytes, 2 | 4 | 8),
             Kind::Bool | Kind::Complex => false,
         }
     }
@@ -86,6 +86,7 @@ macro_rules! decode_as {
             (Kind::Unsigned, 2) => each(bytes, |b| u16::from_le_bytes(b) as $target),
             (Kind::Unsigned, 4) => each(bytes, |b| u32::from_le_bytes(b) as $target),
             (Kind::Unsigned, _) => each(bytes, |b| u64::from_le_bytes(b) as $target),
+            (_, 2) => each(bytes, |b| half::f16::from_le_bytes(b).to_f64() as $target),
             (_, 4) => each(bytes, |b| f32::from_le_bytes(b) as $target),
             _ => each(bytes, |b| f64::from_le_bytes(b) as $target),
         }

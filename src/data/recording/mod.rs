@@ -36,6 +36,8 @@ pub struct Recording {
     pub labels: BTreeMap<String, String>,
     /// What had to be fitted or could not be used, for people to read.
     pub notes: Vec<String>,
+    /// Which files hold what, relative to the folder.
+    pub files: Files,
     person: Option<Person>,
     samples: IfFile,
 }
@@ -58,6 +60,7 @@ impl Recording {
             room: settings.room,
             labels: settings.labels,
             notes,
+            files: settings.files,
             person,
             samples,
         })
@@ -71,6 +74,11 @@ impl Recording {
     /// How the samples are stored.
     pub fn layout(&self) -> IfLayout {
         self.samples.layout()
+    }
+
+    /// NumPy's name of the stored numbers, such as `int16`.
+    pub fn number_type(&self) -> String {
+        self.samples.number_type()
     }
 
     pub fn frames(&self) -> usize {

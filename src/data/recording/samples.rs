@@ -13,7 +13,11 @@ use crate::radar::{Radar, Sampling};
 
 const AXES: [&str; 5] = ["frame", "tx", "rx", "loop", "sample"];
 
-/// How the samples lie in `if.npy`; the axes before are always `[frame, tx, rx, loop, sample]`.
+/// Bytes that are decoded at a time, so that a frame is not held as bytes and as numbers both.
+const BLOCK: usize = 1 << 20;
+
+/// What the samples in `if.npy` are; the axes before are always `[frame, tx, rx, loop, sample]`. The types are those that
+/// are written; any whole, real or complex NumPy type of the same meaning is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IfLayout {
@@ -51,21 +55,24 @@ impl IfLayout {
         shape
     }
 
-    fn axes(self, dims: [usize; 5]) -> Vec<(&'static str, Option<usize>)> {
-        let mut axes: Vec<_> = AXES.into_iter().zip(dims.map(Some)).collect();
-        axes.extend((self == Self::Codes).then_some(("iq", Some(2))));
-        axes
-    }
-
     fn of(sampling: Sampling, stored: Stored) -> Option<Self> {
-        match (sampling, stored.kind, stored.bytes) {
-            (Sampling::Complex, Kind::Int, 2) => Some(Self::Codes),
-            (Sampling::Complex, Kind::Complex, 8) => Some(Self::Complex),
-            (Sampling::Real, Kind::Int, 2) => Some(Self::RealCodes),
-            (Sampling::Real, Kind::Float, 4) => Some(Self::Real),
+        let is_complex = Complex::<f32>::accepts(stored);
+        match (sampling, stored.kind) {
+            (Sampling::Complex, _) if is_complex => Some(Self::Complex),
+            (Sampling::Complex, Kind::Int | Kind::Unsigned) => Some(Self::Codes),
+            (Sampling::Complex, Kind::Float) if f32::accepts(stored) => Some(Self::Complex),
+            (Sampling::Real, Kind::Int | Kind::Unsigned) => Some(Self::RealCodes),
+            (Sampling::Real, Kind::Float) if f32::accepts(stored) => Some(Self::Real),
             _ => None,
         }
     }
+}
+
+/// The axes of a file; `iq`: the two parts of a sample lie side by side as real numbers.
+fn axes(dims: [usize; 5], iq: bool) -> Vec<(&'static str, Option<usize>)> {
+    let mut axes: Vec<_> = AXES.into_iter().zip(dims.map(Some)).collect();
+    axes.extend(iq.then_some(("iq", Some(2))));
+    axes
 }
 
 /// The IF samples of one frame, in the units of the file: ADC codes, or whatever its floats are.
@@ -131,7 +138,8 @@ impl IfFile {
         let dims = radar.dims();
         let checked = Header::read(&mut reader, size).and_then(|header| {
             let layout = IfLayout::of(radar.sampling, header.stored).ok_or_else(|| other_kind(&header, radar))?;
-            let axes = layout.axes(dims);
+            let iq = layout.sampling() == Sampling::Complex && header.stored.kind != Kind::Complex;
+            let axes = axes(dims, iq);
             let expected = || format!("{} {}", header.stored.name(), describe(&axes));
             header.check_shape(&axes, expected).map_err(|problem| match sampling_hint(&header, radar) {
                 Some(hint) => problem.with_hint(hint),
@@ -148,46 +156,57 @@ impl IfFile {
         self.layout
     }
 
+    /// NumPy's name of the stored numbers, such as `int16`.
+    pub fn number_type(&self) -> String {
+        self.header.stored.name()
+    }
+
     pub fn frame(&self, index: usize) -> Result<IfFrame> {
         let [frames, tx, rx, loops, samples] = self.dims;
         assert!(index < frames, "frame {index} of a recording of {frames}");
-        let mut bytes = self.frame_bytes(index).map_err(|source| Error::read(&self.path, source))?;
-        let stored = self.header.stored;
-        let (re, im) = match self.layout {
-            IfLayout::RealCodes | IfLayout::Real => (self.ordered(f32::decode(stored, &mut bytes)), None),
-            IfLayout::Codes => {
-                let values = self.ordered(f32::decode(stored, &mut bytes));
-                let (re, im) = values.as_chunks().0.iter().map(|&[re, im]| (re, im)).unzip();
-                (re, Some(im))
-            }
-            IfLayout::Complex => {
-                let values = self.ordered(Complex::<f32>::decode(stored, &mut bytes));
-                let (re, im) = values.iter().map(|value| (value.re, value.im)).unzip();
-                (re, Some(im))
-            }
-        };
-        let frame = IfFrame::new([tx, rx, loops, samples], re, im);
+        let count = tx * rx * loops * samples;
+        let part = || Vec::with_capacity(count);
+        let mut parts = Parts { re: part(), im: (self.layout.sampling() == Sampling::Complex).then(part) };
+        let read = if self.header.fortran { self.read_strided(index, &mut parts) } else { self.read_block(index, &mut parts) };
+        read.map_err(|source| Error::read(&self.path, source))?;
+        let frame = IfFrame::new([tx, rx, loops, samples], parts.re, parts.im);
         match frame.first_non_finite() {
             None => Ok(frame),
             Some(place) => Err(not_finite(&self.path, index, &place)),
         }
     }
 
-    /// The bytes of one frame, in the order of the file.
-    fn frame_bytes(&self, index: usize) -> std::io::Result<Vec<u8>> {
-        let (frames, width) = (self.dims[0], self.header.stored.bytes);
-        let length = self.header.data_bytes() as usize / frames;
+    /// Bytes of one frame.
+    fn frame_bytes(&self) -> usize {
+        self.header.data_bytes() as usize / self.dims[0]
+    }
+
+    /// A frame in C order: a piece of the file, decoded block by block.
+    fn read_block(&self, index: usize, parts: &mut Parts) -> std::io::Result<()> {
+        let (stored, mut left) = (self.header.stored, self.frame_bytes());
         let mut file = File::open(&self.path)?;
-        if !self.header.fortran {
-            file.seek(SeekFrom::Start(self.header.data_start + (index * length) as u64))?;
-            let mut bytes = vec![0; length];
-            file.read_exact(&mut bytes)?;
-            return Ok(bytes);
+        file.seek(SeekFrom::Start(self.header.data_start + (index * left) as u64))?;
+        let mut block = vec![0; left.min(BLOCK)];
+        while left > 0 {
+            let length = left.min(block.len());
+            file.read_exact(&mut block[..length])?;
+            match stored.kind {
+                Kind::Complex => parts.push_complex(&Complex::decode(stored, &mut block[..length])),
+                _ => parts.push(&f32::decode(stored, &mut block[..length])),
+            }
+            left -= length;
         }
-        // The frames lie interleaved: the whole file goes by, and every so-manieth number is kept.
+        Ok(())
+    }
+
+    /// A frame in Fortran order: the whole file goes by, and every so-manieth number is kept.
+    fn read_strided(&self, index: usize, parts: &mut Parts) -> std::io::Result<()> {
+        let (frames, stored, length) = (self.dims[0], self.header.stored, self.frame_bytes());
+        let (width, shape) = (stored.bytes, &self.header.shape[1..]);
+        let mut file = File::open(&self.path)?;
         file.seek(SeekFrom::Start(self.header.data_start))?;
         let mut bytes = Vec::with_capacity(length);
-        let mut block = vec![0; width * frames * (1usize << 20).div_ceil(width * frames)];
+        let mut block = vec![0; width * frames * BLOCK.div_ceil(width * frames)];
         let mut left = length * frames;
         while left > 0 {
             let part = left.min(block.len());
@@ -195,20 +214,45 @@ impl IfFile {
             block[..part].chunks(width * frames).for_each(|row| bytes.extend(&row[index * width..(index + 1) * width]));
             left -= part;
         }
-        Ok(bytes)
-    }
-
-    fn ordered<T: Copy>(&self, values: Vec<T>) -> Vec<T> {
-        if self.header.fortran { to_c_order(values, &self.header.shape[1..]) } else { values }
+        match stored.kind {
+            Kind::Complex => parts.push_complex(&to_c_order(Complex::decode(stored, &mut bytes), shape)),
+            _ => parts.push(&to_c_order(f32::decode(stored, &mut bytes), shape)),
+        }
+        Ok(())
     }
 }
 
-/// No layout of the contract has such numbers for this sampling.
+/// The samples of a frame, as far as they are read.
+struct Parts {
+    re: Vec<f32>,
+    im: Option<Vec<f32>>,
+}
+
+impl Parts {
+    /// Real numbers: samples, or the two parts of each in turn. A block holds whole pairs: its length is a power of two.
+    fn push(&mut self, values: &[f32]) {
+        match &mut self.im {
+            None => self.re.extend_from_slice(values),
+            Some(im) => {
+                let pairs: &[[f32; 2]] = values.as_chunks().0;
+                self.re.extend(pairs.iter().map(|pair| pair[0]));
+                im.extend(pairs.iter().map(|pair| pair[1]));
+            }
+        }
+    }
+
+    fn push_complex(&mut self, values: &[Complex<f32>]) {
+        self.re.extend(values.iter().map(|value| value.re));
+        self.im.iter_mut().for_each(|im| im.extend(values.iter().map(|value| value.im)));
+    }
+}
+
+/// Numbers that cannot be samples of this receiver.
 fn other_kind(header: &Header, radar: &Radar) -> Problem {
-    let of = |layout: IfLayout| describe(&layout.axes(radar.dims()) as Axes);
+    let of = |iq: bool| describe(&axes(radar.dims(), iq) as Axes);
     let expected = match radar.sampling {
-        Sampling::Complex => format!("int16 {} or complex64 {}", of(IfLayout::Codes), of(IfLayout::Complex)),
-        Sampling::Real => format!("int16 or float32 {}", of(IfLayout::Real)),
+        Sampling::Complex => format!("real numbers {} or complex numbers {}", of(true), of(false)),
+        Sampling::Real => format!("real numbers {}", of(false)),
     };
     let problem = Problem::new(header.describe(), expected);
     match sampling_hint(header, radar) {

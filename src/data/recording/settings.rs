@@ -58,22 +58,14 @@ impl RecordingSettings {
                 .with_hint("the recording was written for another version of this program"));
         }
         let settings: Self = read_toml(path)?;
-        settings.radar.check("radar").map_err(|error| in_file(path, error))?;
+        settings.radar.check("radar").map_err(|error| error.in_file(path))?;
         if let Some(room) = &settings.room {
-            room.check("room").map_err(|error| in_file(path, error))?;
+            room.check("room").map_err(|error| error.in_file(path))?;
         }
         if let Some(placement) = &settings.motion {
             check_placement(path, placement)?;
         }
         Ok(settings)
-    }
-}
-
-/// The error of a setting, with the file that holds it.
-fn in_file(path: &Path, error: Error) -> Error {
-    match error {
-        Error::Setting { key, found, expected, hint } => Error::Field { path: path.into(), field: key, found, expected, hint },
-        other => other,
     }
 }
 

@@ -187,9 +187,86 @@ fn a_receiver_of_the_other_kind_is_suspected() {
     write_npy(folder.join("if.npy"), &[2, 1, 2, 3, 4], Values::F64(&[0.0; 48])).unwrap();
     assert_eq!(
         refused(&folder),
-        "if.npy: `if` is float64 [2, 1, 2, 3, 4], expected int16 [frame = 2, tx = 1, rx = 2, loop = 3, sample = 4, iq = 2] \
-         or complex64 [frame = 2, tx = 1, rx = 2, loop = 3, sample = 4]"
+        "if.npy: `if` is float64 [2, 1, 2, 3, 4], expected float64 [frame = 2, tx = 1, rx = 2, loop = 3, sample = 4, iq = 2]"
     );
+}
+
+/// An `if.npy` with this type and these bytes.
+fn write_raw(folder: &Path, descr: &str, shape: &[usize], bytes: &[u8]) {
+    let mut file = crate::data::arrays::header_bytes(descr, shape);
+    file.extend_from_slice(bytes);
+    fs::write(folder.join("if.npy"), file).unwrap();
+}
+
+fn bytes_of<const N: usize>(values: &[f64], number: impl Fn(f64) -> [u8; N]) -> Vec<u8> {
+    values.iter().flat_map(|&value| number(value)).collect()
+}
+
+#[test]
+fn samples_of_every_real_and_complex_type_are_read() {
+    let radar = small_radar(Sampling::Real);
+    let (_parent, folder) = written(&contents(&radar, IfLayout::Real));
+    let whole: Vec<f64> = (0..48).map(f64::from).collect();
+    let half = |value: f64| half::f16::from_f64(value).to_le_bytes();
+    let types: [(&str, Vec<u8>); 12] = [
+        ("|i1", bytes_of(&whole, |value| (value as i8).to_le_bytes())),
+        ("<i2", bytes_of(&whole, |value| (value as i16).to_le_bytes())),
+        (">i2", bytes_of(&whole, |value| (value as i16).to_be_bytes())),
+        ("<i4", bytes_of(&whole, |value| (value as i32).to_le_bytes())),
+        ("<i8", bytes_of(&whole, |value| (value as i64).to_le_bytes())),
+        ("|u1", bytes_of(&whole, |value| (value as u8).to_le_bytes())),
+        ("<u2", bytes_of(&whole, |value| (value as u16).to_le_bytes())),
+        ("<u4", bytes_of(&whole, |value| (value as u32).to_le_bytes())),
+        ("<u8", bytes_of(&whole, |value| (value as u64).to_le_bytes())),
+        ("<f2", bytes_of(&whole, half)),
+        ("<f4", bytes_of(&whole, |value| (value as f32).to_le_bytes())),
+        ("<f8", bytes_of(&whole, f64::to_le_bytes)),
+    ];
+    for (descr, bytes) in &types {
+        write_raw(&folder, descr, &[2, 1, 2, 3, 4], bytes);
+        let recording = Recording::open(&folder).unwrap_or_else(|error| panic!("{descr}: {error}"));
+        let wanted = if descr.contains('f') { IfLayout::Real } else { IfLayout::RealCodes };
+        assert_eq!(recording.layout(), wanted, "{descr}");
+        assert_eq!(recording.frame(1).unwrap().re, (24..48).map(|value| value as f32).collect::<Vec<_>>(), "{descr}");
+    }
+    let radar = small_radar(Sampling::Complex);
+    let (_parent, folder) = written(&contents(&radar, IfLayout::Codes));
+    let pairs: Vec<f64> = (0..96).map(f64::from).collect();
+    let pair_types =
+        [("<c8", 5, bytes_of(&pairs, |value| (value as f32).to_le_bytes())), ("<c16", 5, bytes_of(&pairs, f64::to_le_bytes))];
+    let interleaved = [
+        ("<u2", 6, bytes_of(&pairs, |value| (value as u16).to_le_bytes())),
+        ("<f2", 6, bytes_of(&pairs, half)),
+        ("<f8", 6, bytes_of(&pairs, f64::to_le_bytes)),
+    ];
+    for (descr, axes, bytes) in pair_types.iter().chain(&interleaved) {
+        write_raw(&folder, descr, &[2, 1, 2, 3, 4, 2][..*axes], bytes);
+        let frame = Recording::open(&folder).unwrap_or_else(|error| panic!("{descr}: {error}")).frame(1).unwrap();
+        assert_eq!((frame.sample(0, 0, 0, 1).re, frame.sample(0, 0, 0, 1).im), (50.0, 51.0), "{descr}");
+    }
+}
+
+#[test]
+fn what_cannot_be_a_sample_is_refused_with_what_can() {
+    let radar = small_radar(Sampling::Real);
+    let (_parent, folder) = written(&contents(&radar, IfLayout::Real));
+    write_raw(&folder, "|b1", &[2, 1, 2, 3, 4], &[0; 48]);
+    assert_eq!(
+        refused(&folder),
+        "if.npy: `if` is bool [2, 1, 2, 3, 4], expected real numbers [frame = 2, tx = 1, rx = 2, loop = 3, sample = 4]"
+    );
+    write_raw(&folder, "<c16", &[2, 1, 2, 3, 4], &[0; 48 * 16]);
+    assert!(refused(&folder).contains("is complex128 [2, 1, 2, 3, 4], expected real numbers"));
+    assert!(Recording::open(&folder).unwrap_err().hint().unwrap().contains("radar.sampling = \"complex\""));
+}
+
+/// A frame that is longer than a block is put together whole.
+#[test]
+fn a_frame_of_several_blocks_comes_back() {
+    let radar = Radar { samples_per_chirp: 1000, loops_per_frame: 301, ..small_radar(Sampling::Complex) };
+    let (_parent, folder) = written(&contents(&radar, IfLayout::Complex));
+    let recording = Recording::open(&folder).unwrap();
+    assert_eq!(recording.frame(1).unwrap(), frame_of(&radar, 1));
 }
 
 #[test]

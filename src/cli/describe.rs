@@ -1,0 +1,123 @@
+//! `hybridsim check` of a body or a motion by itself: what the file says it is.
+
+use std::path::Path;
+
+use super::{Common, plausible};
+use crate::{
+    data::{arrays::Npz, read_body},
+    error::{Error, Result},
+    import::{self, Bvh, BvhConfig},
+    person::{
+        BodyModel, Motion, Person, Placement,
+        procedural::{self, PersonConfig},
+    },
+    plausibility::{BodyFacts, Facts, Sources},
+};
+
+/// Whether a file is described by itself, by its name.
+pub(super) fn knows(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| ["npz", "bvh"].contains(&extension.to_string_lossy().to_lowercase().as_str()))
+}
+
+/// Describes a body or a motion.
+///
+/// # Errors
+/// A file that is neither, or cannot be read, or cannot be meant.
+pub(super) fn run(path: &Path, common: &Common) -> Result<()> {
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("bvh")) {
+        return describe_bvh(path, common);
+    }
+    let archive = Npz::open(path)?;
+    if archive.has("v_template") {
+        return describe_body(path, common);
+    }
+    if archive.has("poses") || archive.has("pose_body") || archive.has("global_orient") || archive.has("root_orient") {
+        say!("motion: {}", path.display());
+        say!("  arrays             {}", archive.names().join(", "));
+        return describe_motion(path, common);
+    }
+    let found = archive.names().join(", ");
+    Err(Error::field(path, "arrays", found, "a body (v_template, weights, …) or a motion (poses, trans, …)"))
+}
+
+fn describe_body(path: &Path, common: &Common) -> Result<()> {
+    let model = read_body(path)?;
+    say!("body: {}", path.display());
+    say!("  vertices x faces   {} x {}", model.template.len(), model.faces.len());
+    let blend = if model.pose_directions.is_empty() { "none" } else { "yes" };
+    say!(
+        "  joints             {}, {} shape parameters, pose blend shapes: {blend}",
+        model.parents.len(),
+        model.shape_directions.len()
+    );
+    show_extent("rest pose", &model.template);
+    let facts = BodyFacts::of_mesh(&model.template, &model.faces);
+    let surface = facts.open.as_ref().map_or("closed".to_string(), |why| format!("open: {why}"));
+    say!("  surface            {surface}, volume {:.4} m3", facts.volume_m3);
+    plausible::tell(Facts { body: Some(facts), ..Facts::default() }, &Sources::one(path), common)
+}
+
+/// The box around points, and the axis that it is longest along.
+fn show_extent(what: &str, points: &[[f64; 3]]) {
+    let size: [f64; 3] = std::array::from_fn(|axis| {
+        let along = || points.iter().map(|point| point[axis]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    });
+    say!("  {what:<18} {:.3} x {:.3} x {:.3} m (x, y, z)", size[0], size[1], size[2]);
+}
+
+fn describe_bvh(path: &Path, common: &Common) -> Result<()> {
+    let bvh = Bvh::read(path)?;
+    say!("motion: {}", path.display());
+    let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
+    say!("  joints             {}: {}", names.len(), names.join(", "));
+    say!("  frame time         {} s ({:.3} Hz)", bvh.frame_time_s, 1.0 / bvh.frame_time_s);
+    describe_motion(path, common)
+}
+
+/// What becomes of the motion on the embedded person.
+fn describe_motion(path: &Path, common: &Common) -> Result<()> {
+    let model = procedural::person(&PersonConfig::default())?;
+    let (motion, notes) = import::read_motion(path, &model, &BvhConfig::default())?;
+    for note in notes {
+        eprintln!("note: {note}");
+    }
+    show_motion(&motion, &model);
+    let placement = Placement::default();
+    let person = Person::Skinned { model, motion, placement };
+    let facts = plausible::facts(None, None, Some(&person))?;
+    show_course(&facts);
+    plausible::tell(facts, &Sources::one(path), common)
+}
+
+fn show_motion(motion: &Motion, model: &BodyModel) {
+    let count = motion.poses.len();
+    say!("  poses              {count} at {:.3} Hz, {:.2} s", motion.rate_hz, (count.max(1) - 1) as f64 / motion.rate_hz);
+    say!("  read as            a motion of the embedded person's {} joints, y up", model.parents.len());
+    show_extent("path of the root", &motion.translations);
+}
+
+/// Speeds and what is up, of all poses.
+fn show_course(facts: &Facts) {
+    let looks = facts.course.iter().flat_map(|course| &course.looks);
+    let fastest = looks.clone().filter_map(|look| look.speed_mps).fold(0.0, |fastest, [speed, _]| f64::max(fastest, speed));
+    if let Some(root) = &facts.root {
+        let steps: Vec<f64> = root
+            .positions_m
+            .windows(2)
+            .zip(root.times_s.windows(2))
+            .map(|(place, time)| {
+                (0..3).map(|axis| (place[1][axis] - place[0][axis]).powi(2)).sum::<f64>().sqrt() / (time[1] - time[0])
+            })
+            .collect();
+        let mean = steps.iter().sum::<f64>() / steps.len().max(1) as f64;
+        let most = steps.iter().copied().fold(0.0, f64::max);
+        say!("  speed              root {mean:.2} m/s in the mean, {most:.2} m/s at most; fastest part {fastest:.2} m/s");
+    }
+    let mut angles: Vec<f64> =
+        looks.filter_map(|look| look.upright).map(|cosine| cosine.clamp(-1.0, 1.0).acos().to_degrees()).collect();
+    angles.sort_by(f64::total_cmp);
+    if let Some(angle) = angles.get(angles.len() / 2) {
+        say!("  trunk              {angle:.0} deg from y in the median pose");
+    }
+}
