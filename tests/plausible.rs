@@ -45,13 +45,15 @@ fn recorded(from: &str, to: &str) -> tempfile::TempDir {
     folder
 }
 
-/// The arguments of every verb that is given a recording, with more after them.
-fn verbs_of_a_recording() -> Vec<Vec<String>> {
+/// The arguments of every verb that is given `recording` in a folder.
+fn verbs_of_a_recording(folder: &Path) -> Vec<Vec<String>> {
     let text = |words: &[&str]| words.iter().map(ToString::to_string).collect::<Vec<String>>();
     let model = root("models/quickstart");
+    // The paths of a config start from its folder.
+    let learnt = format!("data.recordings=[{:?}]", folder.join("recording").display().to_string());
     vec![
         text(&["check", "recording"]),
-        text(&["train", &root("configs/test.toml"), "--set", "data.recordings=['recording']", "--out", "run"]),
+        text(&["train", &root("configs/test.toml"), "--set", &learnt, "--out", "run"]),
         text(&["baseline", "mmgpe", "recording", "--device", "flex"]),
         text(&["diagnose", "recording", "--device", "flex"]),
         text(&["evaluate", "--checkpoint", &model, "recording", "--device", "flex"]),
@@ -74,7 +76,7 @@ fn assert_all_say(folder: &Path, verbs: &[Vec<String>], sentence: &str, hint: &s
 fn every_verb_refuses_a_radar_in_other_units_with_the_same_words() {
     let folder = recorded("slope_hz_per_s", "slope_hz_per_s = 60.012");
     let slope = "record.radar.slope_hz_per_s=60.012".to_string();
-    let mut verbs = verbs_of_a_recording();
+    let mut verbs = verbs_of_a_recording(folder.path());
     // A site's and an experiment's own settings.
     verbs.push(vec!["record".into(), root("configs/test.toml"), "--set".into(), slope.clone(), "--out".into(), "made".into()]);
     verbs.push(vec!["site".into(), root("configs/site_smoke.toml"), "--set".into(), slope, "--out".into(), "site".into()]);
@@ -86,7 +88,7 @@ fn every_verb_refuses_a_radar_in_other_units_with_the_same_words() {
 #[test]
 fn every_verb_refuses_a_person_behind_the_wall_and_a_user_can_keep_his_word() {
     let folder = recorded("origin_m", "origin_m = [0.0, 8.0, -1.0]");
-    let mut verbs = verbs_of_a_recording();
+    let mut verbs = verbs_of_a_recording(folder.path());
     let far = |verb: &[&str]| verb.iter().map(ToString::to_string).collect::<Vec<String>>();
     verbs.push(far(&["record", &root("configs/test.toml"), "--set", "record.person.distance_m=8.0", "--out", "made"]));
     verbs.push(far(&["site", &root("configs/site_smoke.toml"), "--set", "style.distance_m=[8.0, 8.0]", "--out", "site"]));
@@ -149,7 +151,7 @@ fn check_says_what_a_body_or_a_motion_is() {
     model.template.iter_mut().flatten().for_each(|x| *x *= 1000.0);
     write_body(&body, &model).unwrap();
     let text = err(&hybridsim(&["check", "body.npz"], folder.path()));
-    assert!(text.contains("`v_template` is a body 17") && text.contains("in millimetres it would be 1."), "{text}");
+    assert!(text.contains("error: body.npz: `v_template` is a body 1") && text.contains("in millimetres it would be 1."), "{text}");
 
     let made = recorded("origin_m", "origin_m = [0.0, 3.0, -1.0]");
     let output = hybridsim(&["check", "recording/motion.npz"], made.path());

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{Common, plausible};
 use crate::{
     data::{arrays::Npz, read_body},
-    error::{Error, Result},
+    error::Result,
     import::{self, Bvh, BvhConfig},
     person::{
         BodyModel, Motion, Person, Placement,
@@ -31,13 +31,9 @@ pub(super) fn run(path: &Path, common: &Common) -> Result<()> {
     if archive.has("v_template") {
         return describe_body(path, common);
     }
-    if archive.has("poses") || archive.has("pose_body") || archive.has("global_orient") || archive.has("root_orient") {
-        say!("motion: {}", path.display());
-        say!("  arrays             {}", archive.names().join(", "));
-        return describe_motion(path, common);
-    }
-    let found = archive.names().join(", ");
-    Err(Error::field(path, "arrays", found, "a body (v_template, weights, …) or a motion (poses, trans, …)"))
+    say!("motion: {}", path.display());
+    say!("  arrays             {}", archive.names().join(", "));
+    describe_motion(path, common)
 }
 
 fn describe_body(path: &Path, common: &Common) -> Result<()> {

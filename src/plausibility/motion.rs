@@ -30,7 +30,8 @@ pub fn angles(facts: &Facts) -> Vec<Finding> {
     let joints = motion.poses.iter().enumerate().flat_map(|(pose, joints)| {
         joints.iter().enumerate().skip(1).map(move |(joint, &rotation)| (norm(rotation), pose, joint))
     });
-    let Some((largest, pose, joint)) = joints.max_by(|a, b| a.0.total_cmp(&b.0)) else { return vec![] };
+    let finite = joints.filter(|(angle, ..)| angle.is_finite());
+    let Some((largest, pose, joint)) = finite.max_by(|a, b| a.0.total_cmp(&b.0)) else { return vec![] };
     // Rounding of a whole turn.
     if largest <= TAU * 1.001 {
         return vec![];

@@ -4,9 +4,12 @@ use super::units::{LENGTHS, likely};
 use super::{Facts, Finding, Kind, Look, Part};
 use crate::room::Boundary;
 
-/// How far a tracked body may seem to be in a wall: the error of a vertex of bodies that are estimated from video (99 mm on
-/// 3DPW; Kocabas et al., VIBE, CVPR 2020, table 1).
+/// How far a tracked body may seem to be in a wall without a word: the error of a vertex of bodies that are estimated from
+/// video (99 mm on 3DPW; Kocabas et al., VIBE, CVPR 2020, table 1).
 const TRACKING_ERROR_M: f64 = 0.1;
+/// Height of a knee, of its person's (Winter, Biomechanics and Motor Control of Human Movement, 4th edition, figure 4.1):
+/// nobody stands deeper than that in a floor.
+const KNEE: f64 = 0.285;
 /// Somebody who is farther than this above the floor the whole time neither stands on it nor sits on a chair, whose seat is 0.4
 /// to 0.51 m high (EN 1335-1).
 const FLOATS_M: f64 = 0.51;
@@ -74,27 +77,36 @@ pub fn in_front(facts: &Facts) -> Vec<Finding> {
     vec![finding(facts, Kind::Note, found, "a body before the radar, which looks along +y")]
 }
 
-/// No part of a body is in a wall, in the floor or in the ceiling by more than tracking is wrong.
+/// The middle of a body is in the room, and its feet are on the floor. A part that is beyond a boundary is noted: the room may
+/// be measured, and the body tracked, less well than that.
 pub fn in_the_room(facts: &Facts) -> Vec<Finding> {
     let Some(room) = &facts.room else { return vec![] };
-    let mut found = Vec::new();
-    for boundary in room.boundaries() {
-        let (axis, sign) = boundary.axis();
-        let distance = room.distance_m(boundary).unwrap_or(f64::INFINITY);
-        let beyond = |look: &Look| f64::max(sign * look.low_m[axis], sign * look.high_m[axis]) - distance;
-        let Some((most, look)) = worst(facts, beyond).filter(|(most, _)| *most > TRACKING_ERROR_M) else { continue };
-        let name = boundary.name();
-        let what = format!("the body {most:.2} m beyond the {name} boundary at {:.2} s", look.time_s);
-        let expected = format!("a body in the room, whose {name} boundary is {distance} m away (room.{name}_m)");
-        let hint = match boundary {
-            Boundary::Floor => format!(
-                "a motion's origin is on the floor, motion.origin_m[2] = -room.floor_m; raised by {most:.2} m it would stand on it"
-            ),
-            _ => format!("{MOVE}, or correct room.{name}_m"),
-        };
-        found.push(finding(facts, Kind::Refuse, what, expected).with_hint(hint));
-    }
-    found
+    room.boundaries().into_iter().filter_map(|boundary| beyond(facts, boundary, room.distance_m(boundary)?)).collect()
+}
+
+fn beyond(facts: &Facts, boundary: Boundary, distance_m: f64) -> Option<Finding> {
+    let (axis, sign) = boundary.axis();
+    let part = |look: &Look| f64::max(sign * look.low_m[axis], sign * look.high_m[axis]) - distance_m;
+    let middle = |look: &Look| sign * 0.5 * (look.low_m[axis] + look.high_m[axis]) - distance_m;
+    let (most, look) = worst(facts, part).filter(|(most, _)| *most > TRACKING_ERROR_M)?;
+    let (farthest, there) = worst(facts, middle)?;
+    let knee_m = facts.body.as_ref().map_or(f64::INFINITY, |body| KNEE * body.length_m[0]);
+    let sunk = boundary == Boundary::Floor && most > knee_m;
+    let (kind, what, most, look) = match (farthest > 0.0, sunk) {
+        (true, _) => (Kind::Refuse, "the body", part(there), there),
+        (false, true) => (Kind::Refuse, "the body", most, look),
+        (false, false) => (Kind::Note, "a part of the body", most, look),
+    };
+    let name = boundary.name();
+    let found = format!("{what} {most:.2} m beyond the {name} boundary at {:.2} s", look.time_s);
+    let expected = format!("a body in the room, whose {name} boundary is {distance_m} m away (room.{name}_m)");
+    let hint = match boundary {
+        Boundary::Floor => format!(
+            "a motion's origin is on the floor, motion.origin_m[2] = -room.floor_m; raised by {most:.2} m it would stand on it"
+        ),
+        _ => format!("{MOVE}, or correct room.{name}_m"),
+    };
+    Some(finding(facts, kind, found, expected).with_hint(hint))
 }
 
 /// Whoever never comes near the floor floats.
@@ -169,7 +181,7 @@ mod tests {
         told(in_the_room, [-2.2, 2.0, -1.0], "0.30 m beyond the left boundary");
         told(in_the_room, [2.2, 2.0, -1.0], "0.30 m beyond the right boundary");
         told(in_the_room, [0.0, 2.0, -1.5], "0.50 m beyond the floor boundary");
-        told(in_the_room, [0.0, 2.0, 0.3], "0.30 m beyond the ceiling boundary");
+        told(in_the_room, [0.0, 2.0, 1.0], "1.00 m beyond the ceiling boundary");
         told(in_the_room, [0.0, -0.9, -1.0], "0.30 m beyond the back boundary");
         let hint = unambiguous_range(&at([0.0, 300.0, -1.0]))[0].hint.clone().unwrap();
         assert!(hint.contains("in centimetres it would be 3.00 m"), "{hint}");
@@ -181,6 +193,9 @@ mod tests {
         assert_eq!(kinds(in_front(&at([0.3, -0.1, -1.0]))), [Kind::Note]);
         assert_eq!(kinds(on_the_floor(&at([0.0, 2.0, -0.2]))), [Kind::Note]);
         assert!(in_the_room(&at([0.0, 2.0, -1.05])).is_empty(), "soles that tracking has in the floor");
+        assert_eq!(kinds(in_the_room(&at([0.0, 2.0, -1.3]))), [Kind::Note]);
+        let arm = in_the_room(&at([-2.1, 2.0, -1.0]));
+        assert!(arm[0].kind == Kind::Note && arm[0].found.starts_with("a part of the body 0.20 m beyond the left"), "{arm:?}");
     }
 
     #[test]
