@@ -151,7 +151,10 @@ fn check_says_what_a_body_or_a_motion_is() {
     model.template.iter_mut().flatten().for_each(|x| *x *= 1000.0);
     write_body(&body, &model).unwrap();
     let text = err(&hybridsim(&["check", "body.npz"], folder.path()));
-    assert!(text.contains("error: body.npz: `v_template` is a body 1") && text.contains("in millimetres it would be 1."), "{text}");
+    assert!(
+        text.contains("error: body.npz: `v_template` is a body 1") && text.contains("in millimetres it would be 1."),
+        "{text}"
+    );
 
     let made = recorded("origin_m", "origin_m = [0.0, 3.0, -1.0]");
     let output = hybridsim(&["check", "recording/motion.npz"], made.path());
