@@ -12,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from golden_equations import equations
+
 FOLDER = Path(__file__).resolve().parent.parent / "tests" / "golden"
 C = 299792458.0
 
@@ -441,7 +443,7 @@ def skinning():
     }
 
 
-TOPICS = [heatmap, metrics, direct, indirect, fresnel, microfacet, triplane, encoding, harmonics, skinning]
+TOPICS = [heatmap, metrics, direct, indirect, fresnel, microfacet, triplane, encoding, harmonics, skinning, equations]
 
 
 def main():

@@ -89,6 +89,21 @@ pub(super) fn build(body: &PosedBody, middle_s: f64, basis: Basis, middle: &Basi
     }
 }
 
+impl BodyFrame {
+    /// The mesh at one of the frame's chirps, `[vertex, xyz]`, metres.
+    pub fn vertices_at(&self, chirp: usize) -> Vec<[f64; 3]> {
+        let weights = self.basis.row(chirp);
+        self.vertices_m
+            .iter()
+            .zip(self.change_m.chunks_exact(weights.len()))
+            .map(|(middle, changes)| {
+                let change = |axis: usize| changes.iter().zip(weights).map(|(change, weight)| weight * change[axis]).sum::<f64>();
+                std::array::from_fn(|axis| middle[axis] + change(axis))
+            })
+            .collect()
+    }
+}
+
 impl PosedBody {
     /// Displacement of chosen points from their reference positions, `[point, chirp]`, metres.
     ///

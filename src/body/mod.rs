@@ -10,6 +10,7 @@ pub mod skinning;
 pub mod surface;
 pub mod tensors;
 
+mod attitude;
 mod frame;
 #[cfg(test)]
 mod golden;

@@ -33,9 +33,37 @@ pub enum Response {
     Field,
 }
 
-/// Cosines are rounded off below this (0.6° from grazing): f_r ends at a large finite value, and the response fades out
-/// over a few of it when the surface turns away, instead of jumping.
-const GRAZING: f64 = 0.01;
+/// What happens where a surface is seen on edge, and from behind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Grazing {
+    /// Cosines are rounded off below 0.01 (0.6° from grazing): f_r ends at a large finite value, and the response fades out
+    /// over a few of it when the surface turns away, instead of jumping.
+    #[default]
+    Smooth,
+    /// The formula to the end: f_r as long as both sides see the front, nothing after. No gradient tells of that edge.
+    Paper,
+}
+
+/// Which form of the model is the amplitude.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Law {
+    pub response: Response,
+    pub grazing: Grazing,
+}
+
+impl From<Response> for Law {
+    /// Rounded off at grazing.
+    fn from(response: Response) -> Self {
+        Self { response, ..Self::default() }
+    }
+}
+
+/// Where [`Grazing::Smooth`] rounds cosines off.
+const ROUNDED_BELOW: f64 = 0.01;
+
+/// Cosines below this are not told from zero in f32; [`Grazing::Paper`] divides by no smaller one.
+const LEAST_COSINE: f64 = 1e-6;
 
 /// Added to squared lengths and to α² (whose smallest useful value is 4e-4).
 const TINY: f64 = 1e-10;
@@ -49,19 +77,20 @@ const TINY: f64 = 1e-10;
 /// - result: `[point, knot]`, not negative, without unit
 ///
 /// # Gradient
-/// Flows to all inputs; smooth and finite everywhere, also at grazing, from behind, with opposite directions and for
-/// α → 0. Symmetric in `incident` and `outgoing`.
+/// Flows to all inputs; finite everywhere, also at grazing, from behind, with opposite directions and for α → 0; smooth
+/// unless the law ends at an edge ([`Grazing::Paper`]). Symmetric in `incident` and `outgoing`.
 pub fn amplitude(
     material: &Material,
     normal: Tensor<3>,
     incident: Tensor<3>,
     outgoing: Tensor<3>,
-    response: Response,
+    law: impl Into<Law>,
 ) -> Tensor<2> {
+    let Law { response, grazing } = law.into();
     let alpha_squared = column(material.roughness.clone()).powi_scalar(2) + TINY;
     let half = Half::between(&normal, incident.clone(), outgoing.clone());
-    let incident = Side::of(dot(normal.clone(), incident));
-    let outgoing = Side::of(dot(normal, outgoing));
+    let incident = Side::of(dot(normal.clone(), incident), grazing);
+    let outgoing = Side::of(dot(normal, outgoing), grazing);
 
     let reflected = fresnel::reflectance(
         half.deviation_cosine_squared.clone(),
@@ -112,16 +141,25 @@ impl Half {
 /// One direction, as seen from the surface; each `[point, knot]`.
 struct Side {
     cosine: Tensor<2>,
-    /// |cos| rounded off to at least `GRAZING`.
+    /// |cos|, at least `ROUNDED_BELOW` or `LEAST_COSINE`.
     rounded: Tensor<2>,
-    /// 1 in front, 0 behind, ½ at grazing.
+    /// 1 in front, 0 behind, ½ on edge.
     front: Tensor<2>,
 }
 
 impl Side {
-    fn of(cosine: Tensor<2>) -> Self {
-        let rounded = (cosine.clone().powi_scalar(2) + GRAZING * GRAZING).sqrt();
-        Self { front: (cosine.clone() / rounded.clone() + 1.0) * 0.5, cosine, rounded }
+    fn of(cosine: Tensor<2>, grazing: Grazing) -> Self {
+        match grazing {
+            Grazing::Smooth => {
+                let rounded = (cosine.clone().powi_scalar(2) + ROUNDED_BELOW * ROUNDED_BELOW).sqrt();
+                Self { front: (cosine.clone() / rounded.clone() + 1.0) * 0.5, cosine, rounded }
+            }
+            Grazing::Paper => Self {
+                front: (cosine.clone().detach().sign() + 1.0) * 0.5,
+                rounded: cosine.clone().abs().clamp_min(LEAST_COSINE),
+                cosine,
+            },
+        }
     }
 
     /// max(cos, 0), rounded off.

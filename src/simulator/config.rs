@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::equations::EquationsConfig;
 use crate::{
     body::{Interpolation, Sampling, SurfaceConfig},
     effects::EffectSetting,
@@ -59,6 +60,8 @@ pub struct SimulatorConfig {
     pub decoders: DecodersConfig,
     /// What of the microfacet model is the amplitude.
     pub response: Response,
+    /// Where amplitudes are the paper's and where ours.
+    pub equations: EquationsConfig,
     pub noise: NoiseConfig,
     /// Physics beyond the plain model; the values are where learning starts.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -80,6 +83,7 @@ impl Default for SimulatorConfig {
             graph: GcnConfig::default(),
             decoders: DecodersConfig::default(),
             response: Response::default(),
+            equations: EquationsConfig::default(),
             noise: NoiseConfig::default(),
             effects: Vec::new(),
         }
@@ -96,6 +100,7 @@ impl SimulatorConfig {
         self.graph.check("simulator.graph")?;
         self.decoders.check("simulator.decoders")?;
         self.noise.check("simulator.noise")?;
+        self.equations.check("simulator.equations", self.surface.sampling)?;
         for (index, effect) in self.effects.iter().enumerate() {
             effect.check(&format!("simulator.effects.{index}"))?;
         }

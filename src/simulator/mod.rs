@@ -3,16 +3,20 @@
 //! Features of the body (tri-plane) and of the room (encoded coordinates) are decoded into materials and Gaussian
 //! patches; the scene says where they are and who is seen; paths and the coherent sum make IF samples of them.
 //!
-//! Amplitudes are evaluated once per frame, at its middle and between the antennas' centres; phases at every chirp
-//! and antenna. A body part that turns at 5 rad/s turns by 8° within a 27 ms frame.
+//! Phases are those of every chirp and antenna. Amplitudes are evaluated once per frame, at its middle and between the
+//! antennas' centres (a body part that turns at 5 rad/s turns by 8° within a 27 ms frame), or like phases
+//! ([`Amplitudes::Paper`]).
 
 mod config;
+mod equations;
 mod points;
 mod scattering;
 mod scene;
+mod sight;
 mod surfaces;
 
 pub use config::{PathModel, SimulatorConfig};
+pub use equations::{Amplitudes, EquationsConfig, Gains, Weights};
 pub use scene::{FrameView, Scene, Seen};
 pub use surfaces::{SceneConstants, Surface, Surfaces};
 

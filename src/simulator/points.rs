@@ -14,14 +14,20 @@ use crate::{
 
 impl Simulator {
     /// Where a group's points are for the chirps of a transmitter, and how strong, with the effects that act on them one
-    /// by one.
-    pub(super) fn as_seen(&self, group: &Group<'_>, tx: usize, device: &Device) -> (Displacement, Tensor<2>) {
+    /// by one. `amplitude` finds the strength of displaced points.
+    pub(super) fn as_seen(
+        &self,
+        group: &Group<'_>,
+        tx: usize,
+        device: &Device,
+        amplitude: impl Fn(&Displacement) -> Tensor<2>,
+    ) -> (Displacement, Tensor<2>) {
         let displacement = group.displacement(tx, device);
-        let amplitude = group.response.amplitude.clone();
         let visible = &group.visible;
         let (true, Kind::Body, Some(body), Some(frame)) =
             (self.effects.acts_on_points(), visible.kind, &visible.scene.body, &visible.view.body)
         else {
+            let amplitude = amplitude(&displacement);
             return (displacement, amplitude);
         };
         let scene = visible.scene;
@@ -40,7 +46,9 @@ impl Simulator {
             centre_m: std::array::from_fn(|axis| 0.5 * (extent_m[0][axis] + extent_m[1][axis])),
             radar_m: scene.radar.centre_m(),
         };
-        (self.effects.displace(displacement, &points), self.effects.weigh(amplitude, &points))
+        let displacement = self.effects.displace(displacement, &points);
+        let amplitude = self.effects.weigh(amplitude(&displacement), &points);
+        (displacement, amplitude)
     }
 
     /// Echoes of objects that are not in the scene, `[tx, rx, loop, sample]`: those on their own as of this frame, those

@@ -3,15 +3,21 @@
 use burn::tensor::{DType, Device, Tensor};
 
 use super::{
-    FrameView, PathModel, Scene, Seen, Simulator, Surface, Surfaces,
-    surfaces::{column, rows, towards, vectors},
+    Amplitudes, FrameView, Gains, PathModel, Scene, Seen, Simulator, Surface, Surfaces, Weights,
+    sight::{Attitude, Sight},
+    surfaces::{column, rows},
 };
 use crate::{
     body::Displacement,
     complex::Complex,
     if_signal::indirect_signal,
     paths::{Amplitude, Points},
-    scatterers::{microfacet, patches, tangent::Frame},
+    radar::Radar,
+    scatterers::{
+        microfacet::{self, Law},
+        patches,
+        tangent::Frame,
+    },
 };
 
 /// Scatterers of body or room that a viewpoint sees.
@@ -23,18 +29,23 @@ pub(super) struct Visible<'a> {
     pub reference_m: Vec<[f64; 3]>,
 }
 
-/// What scatterers return in one direction.
-pub(super) struct Response {
-    /// `[point, 1]`
-    pub amplitude: Tensor<2>,
-    /// `[point, xyz]`, of the Gaussian patches from their surface.
-    offset_m: Option<Tensor<2>>,
-}
-
 /// Scatterers that move together, with what they return.
 pub(super) struct Group<'a> {
     pub visible: Visible<'a>,
-    pub response: Response,
+    pub scattering: Scattering,
+    /// Decoded, of the visible points.
+    surface: Surface,
+    /// What amplitudes are multiplied by, `[point, 1]`; none: nothing.
+    weight: Option<Tensor<2>>,
+}
+
+/// What scatterers are taken for.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Scattering {
+    /// L_p
+    Microfacets,
+    /// SH_{p,k}, from the patches' offset positions.
+    Patches,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -46,54 +57,95 @@ pub(super) enum Kind {
 impl Simulator {
     /// Eq. 2 for all transmitters: `[tx, rx, loop, sample]`.
     pub(super) fn direct_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
-        let centre = scene.radar.centre_m();
-        let groups = self.groups(scene, view, surfaces, &view.direct, |visible, surface| match self.config.paths {
-            PathModel::Coupled => self.patch_response(visible, surface, centre),
-            _ => self.microfacet_response(visible, surface),
-        });
-        self.transmitters(scene, |tx, device| {
-            let radar = &scene.radar;
-            let parts = groups.iter().map(|group| {
-                let (displacement, weighed) = self.as_seen(group, tx, device);
-                let amplitude = group.amplitude(weighed, &displacement, tx);
-                let points =
-                    Points { reference_m: &group.visible.reference_m, displacement: &displacement, amplitude: &amplitude };
-                let (dechirp, form) = (self.config.dechirp, self.config.sum);
-                let direct = self.effects.direct_signal(points, radar, tx, dechirp, form);
-                let further = match group.visible.kind {
-                    Kind::Body => self.effects.further_paths(points, &direct, scene.room.as_ref(), radar, tx, (dechirp, form)),
-                    Kind::Room => None,
-                };
-                match further {
-                    Some(further) => direct.add(further),
-                    None => direct,
-                }
+        let [_, receivers_m] = scene.radar.antenna_centres_m();
+        let (scattering, place) = match self.config.paths {
+            PathModel::Coupled => (Scattering::Patches, scene.radar.centre_m()),
+            _ => (Scattering::Microfacets, receivers_m),
+        };
+        let groups = self.groups(scene, view, surfaces, &view.direct, scattering);
+        match self.config.equations.amplitudes {
+            Amplitudes::Frame => {
+                let answers: Vec<_> = groups.iter().map(|group| (group, self.of_frame(group, place))).collect();
+                self.transmitters(scene, |tx, device| {
+                    let parts = answers.iter().map(|(group, amplitude)| {
+                        let seen = self.as_seen(group, tx, device, |_| amplitude.clone());
+                        self.direct_of(group, seen, tx, &scene.radar)
+                    });
+                    parts.reduce(Complex::add)
+                })
+            }
+            Amplitudes::Paper => self.transmitters(scene, |tx, device| {
+                let parts = groups.iter().map(|group| self.direct_by_receiver(group, tx, device));
+                parts.reduce(Complex::add)
+            }),
+        }
+    }
+
+    /// One transmitter's direct signal of a group, `[rx, chirp, sample]`, with amplitudes of its own for every receiver.
+    fn direct_by_receiver(&self, group: &Group<'_>, tx: usize, device: &Device) -> Complex<3> {
+        let radar = &group.visible.scene.radar;
+        let attitude = group.attitude_at(tx, device);
+        let receivers = (0..radar.rx_m.len()).map(|rx| {
+            let place = radar.rx_position_m(rx);
+            let seen = self.as_seen(group, tx, device, |displacement| {
+                self.answer(group, &attitude, group.sight_at(displacement, tx, place))
             });
-            parts.reduce(Complex::add)
-        })
+            if self.effects.is_empty() {
+                return self.direct_of(group, seen, tx, &Radar { rx_m: vec![radar.rx_m[rx]], ..radar.clone() });
+            }
+            // Effects know receivers by their place in the array.
+            let all = self.direct_of(group, seen, tx, radar);
+            Complex::new(all.re.narrow(0, rx, 1), all.im.narrow(0, rx, 1))
+        });
+        Complex::cat(receivers.collect(), 0)
+    }
+
+    /// One transmitter's direct signal of a group, `[rx, chirp, sample]`, from where its points are and how strong.
+    fn direct_of(&self, group: &Group<'_>, seen: (Displacement, Tensor<2>), tx: usize, radar: &Radar) -> Complex<3> {
+        let (displacement, weighed) = seen;
+        let amplitude = group.amplitude(weighed, &displacement, tx);
+        let Visible { scene, kind, reference_m, .. } = &group.visible;
+        let points = Points { reference_m, displacement: &displacement, amplitude: &amplitude };
+        let (dechirp, form) = (self.config.dechirp, self.config.sum);
+        let direct = self.effects.direct_signal(points, radar, tx, dechirp, form);
+        let further = match kind {
+            Kind::Body => self.effects.further_paths(points, &direct, scene.room.as_ref(), radar, tx, (dechirp, form)),
+            Kind::Room => None,
+        };
+        match further {
+            Some(further) => direct.add(further),
+            None => direct,
+        }
     }
 
     /// Eq. 3 for all transmitters and walls: `[tx, rx, loop, sample]`.
     pub(super) fn indirect_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
-        let walls: Vec<(usize, Vec<Group<'_>>)> = (0..scene.proxies.len())
-            .map(|wall| {
-                let place = scene.proxies[wall].position_m;
-                let groups = self.groups(scene, view, surfaces, &view.proxies[wall], |visible, surface| {
-                    self.patch_response(visible, surface, place)
-                });
-                (wall, groups)
+        let frame = self.config.equations.amplitudes == Amplitudes::Frame;
+        let walls: Vec<(usize, Group<'_>, Option<Tensor<2>>)> = (0..scene.proxies.len())
+            .flat_map(|wall| {
+                let groups = self.groups(scene, view, surfaces, &view.proxies[wall], Scattering::Patches);
+                groups.into_iter().map(move |group| (wall, group))
+            })
+            .map(|(wall, group)| {
+                let amplitude = frame.then(|| self.of_frame(&group, scene.proxies[wall].position_m));
+                (wall, group, amplitude)
             })
             .collect();
         self.transmitters(scene, |tx, device| {
-            let parts =
-                walls.iter().flat_map(|(wall, groups)| groups.iter().map(move |group| (wall, group))).map(|(wall, group)| {
-                    let (displacement, weighed) = self.as_seen(group, tx, device);
-                    let amplitude = Amplitude::real(weighed);
-                    let points =
-                        Points { reference_m: &group.visible.reference_m, displacement: &displacement, amplitude: &amplitude };
-                    let place = scene.proxies[*wall].position_m;
-                    indirect_signal(points, place, &scene.radar, tx, self.config.dechirp, self.config.sum)
+            let parts = walls.iter().map(|(wall, group, amplitude)| {
+                let place = scene.proxies[*wall].position_m;
+                let (displacement, weighed) = self.as_seen(group, tx, device, |displacement| match amplitude {
+                    Some(amplitude) => amplitude.clone(),
+                    None => {
+                        let attitude = group.attitude_at(tx, device);
+                        self.answer(group, &attitude, group.sight_at(displacement, tx, place))
+                    }
                 });
+                let amplitude = Amplitude::real(weighed);
+                let points =
+                    Points { reference_m: &group.visible.reference_m, displacement: &displacement, amplitude: &amplitude };
+                indirect_signal(points, place, &scene.radar, tx, self.config.dechirp, self.config.sum)
+            });
             parts.reduce(Complex::add)
         })
     }
@@ -111,15 +163,14 @@ impl Simulator {
         Complex::cat(parts.collect(), 0)
     }
 
-    /// The visible scatterers of body and room, each with the response that `respond` finds for it, weighted by area
-    /// and gain.
+    /// The visible scatterers of body and room, with their decoded surface.
     fn groups<'a>(
         &self,
         scene: &'a Scene,
         view: &'a FrameView,
         surfaces: &Surfaces,
         seen: &'a Seen,
-        respond: impl Fn(&Visible<'a>, &Surface) -> Response,
+        scattering: Scattering,
     ) -> Vec<Group<'a>> {
         let device = self.device();
         let sides = [(Kind::Body, &seen.body, &surfaces.body), (Kind::Room, &seen.room, &surfaces.room)];
@@ -134,51 +185,57 @@ impl Simulator {
             let visible = Visible { scene, view, kind, points, reference_m };
             let picked = rows(points, all.len(), &device);
             let surface = Surface { material: surface.material.pick(&picked), patch: surface.patch.pick(&picked) };
-            let mut response = respond(&visible, &surface);
-            let gain = match kind {
-                Kind::Body => &self.decoders.body_gain,
-                Kind::Room => &self.decoders.room_gain,
-            };
-            let weight = column(visible.areas_m2().into_iter(), &device) * gain.factor().reshape([1, 1]);
-            response.amplitude = response.amplitude * weight;
-            groups.push(Group { visible, response });
+            let weight = self.weight(&visible);
+            groups.push(Group { visible, scattering, surface, weight });
         }
         groups
     }
 
-    /// L_p of the direct path.
-    fn microfacet_response(&self, visible: &Visible<'_>, surface: &Surface) -> Response {
-        let radar = &visible.scene.radar;
-        let (normal, incident) = self.illumination(visible);
-        let [_, receivers_m] = radar.antenna_centres_m();
-        let outgoing = self.towards(visible, receivers_m);
-        let amplitude = microfacet::amplitude(&surface.material, normal, incident, outgoing, self.config.response);
-        Response { amplitude, offset_m: None }
+    /// Area times gain, `[point, 1]`, as far as amplitudes are weighted by either.
+    fn weight(&self, visible: &Visible<'_>) -> Option<Tensor<2>> {
+        let equations = &self.config.equations;
+        let area = (equations.weights == Weights::Area).then(|| column(visible.areas_m2().into_iter(), &self.device()));
+        let gain = (equations.gains == Gains::Learned).then(|| {
+            let gain = match visible.kind {
+                Kind::Body => &self.decoders.body_gain,
+                Kind::Room => &self.decoders.room_gain,
+            };
+            gain.factor().reshape([1, 1])
+        });
+        match (area, gain) {
+            (Some(area), Some(gain)) => Some(area * gain),
+            (area, gain) => area.or(gain),
+        }
     }
 
-    /// SH_{p,k} towards a place, from the patches' offset positions.
-    fn patch_response(&self, visible: &Visible<'_>, surface: &Surface, place: [f64; 3]) -> Response {
-        let (normal, incident) = self.illumination(visible);
-        let outgoing = self.towards(visible, place);
-        let frame = match visible.tangents() {
-            Some(tangents) => Frame::along(normal, vectors(tangents.into_iter(), &self.device())),
-            None => Frame::from_normal(normal),
+    /// What a group returns towards a place, once for a frame, `[point, 1]`.
+    fn of_frame(&self, group: &Group<'_>, place: [f64; 3]) -> Tensor<2> {
+        let device = self.device();
+        self.answer(group, &group.visible.attitude(&device), group.visible.sight(place, &device))
+    }
+
+    /// Weighted L_p or SH_{p,k}, `[point, chirp]` or `[point, 1]`.
+    fn answer(&self, group: &Group<'_>, attitude: &Attitude, sight: Sight) -> Tensor<2> {
+        let normal = attitude.normal.clone();
+        let Sight { incident, outgoing } = sight;
+        let amplitude = match group.scattering {
+            Scattering::Microfacets => {
+                let law = Law { response: self.config.response, grazing: self.config.equations.grazing };
+                microfacet::amplitude(&group.surface.material, normal, incident, outgoing, law)
+            }
+            Scattering::Patches => {
+                let frame = match &attitude.tangent {
+                    Some(tangent) => Frame::along(normal, tangent.clone()),
+                    None => Frame::from_normal(normal),
+                };
+                let wavenumber = std::f64::consts::TAU / group.visible.scene.radar.wavelength_m();
+                patches::amplitude(&group.surface.patch, &frame, incident, outgoing, wavenumber)
+            }
         };
-        let wavenumber = std::f64::consts::TAU / visible.scene.radar.wavelength_m();
-        let amplitude = patches::amplitude(&surface.patch, &frame, incident, outgoing, wavenumber);
-        Response { amplitude, offset_m: Some(surface.patch.offset_m.clone()) }
-    }
-
-    /// Normals, and directions towards the transmitters' centre; each `[point, 1, xyz]`.
-    fn illumination(&self, visible: &Visible<'_>) -> (Tensor<3>, Tensor<3>) {
-        let radar = &visible.scene.radar;
-        let normal = vectors(visible.normals().into_iter(), &self.device());
-        let [transmitters_m, _] = radar.antenna_centres_m();
-        (normal, self.towards(visible, transmitters_m))
-    }
-
-    fn towards(&self, visible: &Visible<'_>, place: [f64; 3]) -> Tensor<3> {
-        towards(visible.reference_m.iter().copied(), place, &self.device())
+        match &group.weight {
+            Some(weight) => amplitude * weight.clone(),
+            None => amplitude,
+        }
     }
 }
 
@@ -199,7 +256,7 @@ impl Visible<'_> {
     }
 
     /// Tangents that turn with the body; a room needs none.
-    fn tangents(&self) -> Option<Vec<[f64; 3]>> {
+    pub fn tangents(&self) -> Option<Vec<[f64; 3]>> {
         (self.kind == Kind::Body).then(|| self.points.iter().map(|&point| self.view.tangent[point]).collect())
     }
 
@@ -214,7 +271,7 @@ impl Group<'_> {
     pub fn displacement(&self, tx: usize, device: &Device) -> Displacement {
         let Visible { scene, view, kind, points, .. } = &self.visible;
         let loops = scene.radar.loops_per_frame;
-        let offset_m = self.response.offset_m.clone();
+        let offset_m = (self.scattering == Scattering::Patches).then(|| self.surface.patch.offset_m.clone());
         match (kind, &scene.body, &view.body, offset_m) {
             (Kind::Body, Some(body), Some(frame), offset_m) => {
                 body.displacement(frame, points, tx * loops..(tx + 1) * loops, offset_m, device)

@@ -31,6 +31,7 @@ pub struct Seen {
 }
 
 /// One frame of a scene.
+#[derive(Clone)]
 pub struct FrameView {
     pub frame: usize,
     pub body: Option<BodyFrame>,
@@ -55,7 +56,7 @@ pub struct Scene {
     pub(super) joints: Vec<&'static str>,
     flip_exponent: f64,
     /// `[point]` of the body: the canonical axis that lies flattest on its surface.
-    flattest: Vec<usize>,
+    pub(super) flattest: Vec<usize>,
     /// Visibility does not learn, so a frame is looked at once and kept; the oldest go first.
     views: Mutex<VecDeque<Arc<FrameView>>>,
 }

@@ -17,7 +17,7 @@ use crate::{
     error::{Error, Result},
     heatmap::{HeatmapConfig, RangeDoppler, remove_loop_mean},
     radar::Sampling,
-    simulator::{Mode, Simulator, Surfaces},
+    simulator::{Gains, Mode, Simulator, Surfaces},
 };
 
 /// Frames that are looked at.
@@ -80,9 +80,12 @@ pub fn fit_levels(
     let body = ratio(levels.measured_moving, levels.simulated_moving);
     let room = ratio(levels.measured_still, levels.simulated_still);
     // Where one of them cannot be told apart, the other's level is the best guess.
+    let gains = simulator.config().equations.gains;
     let decoders = &mut simulator.decoders;
     let any = (measured / levels.simulated).sqrt();
-    if known_body {
+    if gains == Gains::Paper {
+        // None is applied: the materials must reach the level by themselves.
+    } else if known_body {
         decoders.room_gain = decoders.room_gain.clone().scale(room.unwrap_or(1.0));
     } else {
         decoders.body_gain = decoders.body_gain.clone().scale(body.or(room).unwrap_or(any));

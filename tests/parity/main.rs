@@ -1,6 +1,7 @@
 //! The crate agrees with NumPy: golden arrays written by `scripts/golden.py` from the formulas alone.
 
 mod body;
+mod equations;
 mod golden;
 mod heatmaps;
 mod learned;

@@ -1,0 +1,86 @@
+//! Between which directions scatterers are seen, and how their surface is turned.
+
+use burn::tensor::{DType, Device, Tensor};
+
+use super::{
+    scattering::{Group, Kind, Scattering, Visible},
+    surfaces::{column, towards, vectors},
+};
+use crate::body::Displacement;
+
+/// How surfaces are turned; `[point, chirp, xyz]`, or one chirp for all.
+pub(super) struct Attitude {
+    pub normal: Tensor<3>,
+    /// A direction on the surface that turns with the body; a room needs none.
+    pub tangent: Option<Tensor<3>>,
+}
+
+/// Unit vectors from the scatterers towards the transmitter and towards the receiver; `[point, chirp, xyz]`, or one chirp
+/// for all.
+pub(super) struct Sight {
+    pub incident: Tensor<3>,
+    pub outgoing: Tensor<3>,
+}
+
+impl Visible<'_> {
+    /// In the middle of the frame.
+    pub fn attitude(&self, device: &Device) -> Attitude {
+        Attitude {
+            normal: vectors(self.normals().into_iter(), device),
+            tangent: self.tangents().map(|tangents| vectors(tangents.into_iter(), device)),
+        }
+    }
+
+    /// In the middle of the frame, from the transmitters' centre to a place.
+    pub fn sight(&self, place: [f64; 3], device: &Device) -> Sight {
+        let [transmitters_m, _] = self.scene.radar.antenna_centres_m();
+        let towards = |place| towards(self.reference_m.iter().copied(), place, device);
+        Sight { incident: towards(transmitters_m), outgoing: towards(place) }
+    }
+}
+
+impl Group<'_> {
+    /// At the chirps of a transmitter; tangents only for patches.
+    pub fn attitude_at(&self, tx: usize, device: &Device) -> Attitude {
+        let Visible { scene, view, kind, points, .. } = &self.visible;
+        let (Kind::Body, Some(body), Some(frame)) = (kind, &scene.body, &view.body) else {
+            return self.visible.attitude(device);
+        };
+        let loops = scene.radar.loops_per_frame;
+        let chirps = tx * loops..(tx + 1) * loops;
+        let on_device = |directions: Vec<[f64; 3]>| vectors(directions.into_iter(), device).reshape([points.len(), loops, 3]);
+        let tangents = || {
+            let axes: Vec<usize> = points.iter().map(|&point| scene.flattest[point]).collect();
+            on_device(body.axes_at(frame, points, &axes, chirps.clone()))
+        };
+        Attitude {
+            normal: on_device(body.normals_at(frame, points, chirps.clone())),
+            tangent: (self.scattering == Scattering::Patches).then(tangents),
+        }
+    }
+
+    /// At the chirps of a transmitter, from it to a place. Gradient flows to the displacement.
+    pub fn sight_at(&self, displacement: &Displacement, tx: usize, place: [f64; 3]) -> Sight {
+        let reference_m = &self.visible.reference_m;
+        Sight {
+            incident: towards_moved(reference_m, displacement, self.visible.scene.radar.tx_position_m(tx)),
+            outgoing: towards_moved(reference_m, displacement, place),
+        }
+    }
+}
+
+/// Added to squared lengths, m²: a point at the place itself has a finite gradient.
+const TINY_M2: f64 = 1e-12;
+
+/// Unit vectors from displaced points to a place, `[point, chirp, xyz]`.
+fn towards_moved(reference_m: &[[f64; 3]], displacement: &Displacement, place: [f64; 3]) -> Tensor<3> {
+    let Displacement { x, y, z } = displacement;
+    let way = [x, y, z].into_iter().enumerate().map(|(axis, u)| {
+        let still = column(reference_m.iter().map(|point| place[axis] - point[axis]), &u.device());
+        debug_assert_eq!(u.dtype(), DType::F32);
+        still - u.clone()
+    });
+    let way: Tensor<3> = Tensor::stack(way.collect(), 2);
+    let length = ((way.clone() * way.clone()).sum_dim(2) + TINY_M2).sqrt();
+    way / length
+}
