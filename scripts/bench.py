@@ -85,10 +85,11 @@ def main():
     with open(ROOT / "target" / "bench.jsonl", "w") as out:
         out.writelines(json.dumps(line) + "\n" for line in ours + theirs)
     table(ours, theirs)
-    print("\na whole training step of the paper's model, and a frame's inference; seconds\n")
+    print("\na whole training step with the graph convolution drawn, and a frame's inference; seconds\n")
     for line in lines(["cargo", "bench", "--features", "wgpu", "--bench", "training_step"]):
         print(
-            f"  {line['paths']:10} {line['vertices']} vertices, {line['room_points']} room points, {line['walls']} walls: "
+            f"  {line['paths']:10} {line['vertices']} vertices, {line['room_points']} room points, {line['walls']} walls, "
+            f"{line['transmitters']} TX x {line['receivers']} RX: "
             f"step {line['step_s']:.3f}, inference {line['inference_s']:.3f}, visibility {line['visibility_s']:.3f}, "
             f"peak {line['peak_mb']:.0f} MB"
         )

@@ -1,4 +1,4 @@
-//! The receiver's noise (paper, section 3.4 and its supplement on fixed noise).
+//! The receiver's noise (paper, section 3.4 and S12).
 
 use burn::module::{Module, Param};
 use burn::tensor::{DType, Device, Tensor, TensorData, activation::softplus};

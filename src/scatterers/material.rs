@@ -66,8 +66,8 @@ fn logit(fraction: f64) -> f64 {
     (fraction / (1.0 - fraction)).ln()
 }
 
-/// Ranges of the material's parameters; the defaults start at dry skin at 77 GHz (Gabriel: ε ≈ 6.6 − 8.6j, thus
-/// ñ = 3.0 + 1.5j).
+/// Ranges of the material's parameters; the defaults start at dry skin at 77 GHz (Gabriel et al. 1996: ε = 6.57 − 8.92j, thus
+/// ñ = 2.97 − 1.50j; the law is in `docs/paper.md`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MaterialConfig {
@@ -88,8 +88,8 @@ impl Default for MaterialConfig {
         Self {
             roughness: Range::new(0.02, 1.0, 0.4),
             metallic: Range::new(0.0, 1.0, 0.05),
-            refraction: Range::new(1.05, 8.0, 3.0),
-            extinction: Range::new(0.0, 6.0, 1.5),
+            refraction: Range::new(1.05, 8.0, 2.97),
+            extinction: Range::new(0.0, 6.0, 1.50),
             polarisation: Range::new(0.0, 1.0, 0.5),
         }
     }
@@ -196,7 +196,7 @@ mod tests {
         let raw = tensor(&material.raw_initial(), [1, 5], &Device::flex());
         let skin = material.real(raw);
         let found = [&skin.roughness, &skin.metallic, &skin.refraction, &skin.extinction, &skin.polarisation];
-        assert_close("skin", &found.map(|q| values(q)[0]), &[0.4, 0.05, 3.0, 1.5, 0.5], 1e-12);
+        assert_close("skin", &found.map(|q| values(q)[0]), &[0.4, 0.05, 2.97, 1.5, 0.5], 1e-12);
     }
 
     #[test]

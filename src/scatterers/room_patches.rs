@@ -9,7 +9,8 @@ use crate::room::{Boundary, Room};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RoomPatchesConfig {
-    /// Distance between neighbouring patches, metres. 0.15 gives about the paper's 5,000 patches in an ordinary room.
+    /// Distance between neighbouring patches, metres. 0.15 gives about 5,000 patches in an ordinary room, as many as
+    /// mmMesh's public code has.
     pub patch_spacing_m: f64,
     /// The number of patches to aim for instead; it then chooses the spacing.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -183,3 +183,56 @@ fn each_setting_of_ours_is_another_formula() {
         assert!(direct > least_direct && indirect > least_indirect, "{name}: direct {direct:.1} dB, indirect {indirect:.1} dB");
     }
 }
+
+/// Along one direction in every input at once: Σ|X|², whose gradient the paper's settings must pass on.
+#[test]
+fn gradients_of_the_papers_equations_agree_with_differences() {
+    let config = SimulatorConfig { sum: SumForm::Exact, ..paper() };
+    let device = Device::flex().autodiff();
+    let scene = scene(&config);
+    let view = view(&scene);
+    let extent = Extent::around(scene.body.as_ref().unwrap().canonical_vertices(), 0.05);
+    let simulator = config.init(extent, 1, &device);
+    let (bodies, patches) = (view.body.as_ref().unwrap().position_m.len(), scene.patches.position_m.len());
+    let plain = [surface(0, bodies, &device), surface(bodies, patches, &device)];
+    // What is moved, and by how much along its direction.
+    type Part = (&'static str, f64, fn(Surface, Tensor<1>) -> Surface);
+    fn roughness(mut surface: Surface, step: Tensor<1>) -> Surface {
+        surface.material.roughness = surface.material.roughness * (step + 1.0);
+        surface
+    }
+    fn extinction(mut surface: Surface, step: Tensor<1>) -> Surface {
+        surface.material.extinction = surface.material.extinction * (step + 1.0);
+        surface
+    }
+    fn offset(mut surface: Surface, step: Tensor<1>) -> Surface {
+        surface.patch.offset_m = surface.patch.offset_m + step.unsqueeze_dim::<2>(1);
+        surface
+    }
+    fn rotation(mut surface: Surface, step: Tensor<1>) -> Surface {
+        surface.patch.rotation_rad = surface.patch.rotation_rad + step;
+        surface
+    }
+    let parts: [Part; 4] = [
+        ("roughness", 1e-2, roughness),
+        ("extinction", 1e-2, extinction),
+        ("offset", 1e-5, offset),
+        ("rotation", 1e-2, rotation),
+    ];
+    for (name, step, change) in parts {
+        let loss = |at: Tensor<1>| {
+            let [body, room] = plain.clone().map(|plain| {
+                let [points] = plain.material.roughness.dims();
+                change(plain, at.clone().expand([points]))
+            });
+            let signal = simulator.clean_signal(&scene, &view, &Surfaces { body: Some(body), room: Some(room) });
+            signal.power().sum()
+        };
+        let at = |value: f64| Tensor::<1>::from_data([value as f32], &device);
+        let zero = at(0.0).require_grad();
+        let found: f32 = zero.grad(&loss(zero.clone()).backward()).expect("the gradient flows").into_scalar();
+        let ends = [step, -step].map(|step| f64::from(loss(at(step)).into_scalar::<f32>()));
+        let wanted = (ends[0] - ends[1]) / (2.0 * step);
+        assert!((f64::from(found) / wanted - 1.0).abs() < 0.02, "{name}: gradient {found}, by differences {wanted}");
+    }
+}
