@@ -63,6 +63,9 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         let world = record.world(path.parent().unwrap_or(Path::new("")))?;
         say!("a recording to be made:");
         show_radar(&world.radar, Some(&world.room));
+        for note in record.motion_notes(path.parent().unwrap_or(Path::new("")))? {
+            eprintln!("note: {note}");
+        }
         plausible::scene(Some(&world.radar), Some(&world.room), world.person.as_ref(), &Sources::one(path), common)?;
     }
     say!("resolved configuration:\n\n{}", config.to_toml());

@@ -14,7 +14,7 @@ use crate::{
     data::{atomic::AtomicFolder, read_body, settings::read_settings},
     error::{Error, Result},
     evaluation::Simulation,
-    import::{self, BvhConfig},
+    import::{self, BvhConfig, UpAxis},
     person::{
         BodyModel, Person, Placement,
         actions::{self, Action, StyleConfig},
@@ -47,12 +47,12 @@ pub(crate) struct Arguments {
     /// The body that moves, npz in SMPL layout; the embedded person by default
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
-    /// How to read a BVH file: a TOML file with its joint map, units and up axis
+    /// How to read the motion: a TOML file with joint map, units, up axis and frame rate, as docs/motion.md has them
     #[arg(long, value_name = "FILE", requires = "motion")]
     motion_config: Option<PathBuf>,
-    /// Up axis of an npz motion: y as in SMPL, or z as AMASS has it
-    #[arg(long, value_enum, default_value_t = Up::Y, requires = "motion")]
-    up: Up,
+    /// Up axis of the motion's file: x, y, z, -x, -y or -z; recognised from how the person stands by default
+    #[arg(long, value_name = "AXIS", value_parser = parse_up, allow_hyphen_values = true, requires = "motion")]
+    up: Option<UpAxis>,
     /// Distance of the motion's origin in front of the radar; the training person's place by default
     #[arg(long, value_name = "METRES")]
     distance: Option<f64>,
@@ -68,10 +68,9 @@ pub(crate) struct Arguments {
     out: Out,
 }
 
-#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-enum Up {
-    Y,
-    Z,
+fn parse_up(name: &str) -> std::result::Result<UpAxis, String> {
+    let names = UpAxis::ALL.map(UpAxis::name).join(", ");
+    UpAxis::ALL.into_iter().find(|axis| axis.name() == name).ok_or_else(|| format!("expected one of {names}"))
 }
 
 fn parse_action(name: &str) -> std::result::Result<Action, String> {
@@ -153,10 +152,11 @@ fn new_person(arguments: &Arguments, state: &CheckpointState) -> Result<Person> 
     };
     let motion = match (&arguments.motion, arguments.action) {
         (Some(path), _) => {
-            let config: BvhConfig = match &arguments.motion_config {
+            let mut config: BvhConfig = match &arguments.motion_config {
                 Some(config) => read_settings(config, &[])?,
                 None => BvhConfig::default(),
             };
+            config.up = arguments.up.or(config.up);
             let (motion, notes) = import::read_motion(path, &model, &config)?;
             for note in notes {
                 eprintln!("note: {note}");
@@ -178,10 +178,6 @@ fn new_person(arguments: &Arguments, state: &CheckpointState) -> Result<Person> 
     placement.start_s = 0.0;
     if let Some(distance) = arguments.distance {
         placement.origin_m[1] = distance;
-    }
-    if arguments.up == Up::Z {
-        // The body of a z-up motion that faces -y faces the radar.
-        placement.radar_from_motion = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     }
     // A captured motion starts wherever its recorder's floor had its origin: its path is centred instead, with the
     // feet's height left as captured.

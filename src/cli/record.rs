@@ -25,6 +25,9 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let config = Config::read(&arguments.config, &common.set)?;
     let record = config.record(&arguments.config)?;
+    for note in record.motion_notes(arguments.config.parent().unwrap_or(Path::new("")))? {
+        eprintln!("note: {note}");
+    }
     let folder = match &arguments.out.out {
         Some(out) => {
             make(record, &arguments.config, out, common)?;

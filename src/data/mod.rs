@@ -14,7 +14,7 @@ mod shard;
 
 pub use bodies::{read_body, write_body};
 pub use hex::hex;
-pub use motions::{read_motion, write_motion};
+pub use motions::{Figure, MotionOptions, RotationUnit, UpAxis, find_up, read_motion, read_motion_upright, write_motion};
 pub use recording::{IfFrame, IfLayout, Recording, RecordingContents, write_recording};
 pub use settings::{read_settings, read_toml};
 pub use shard::Shard;

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::error::{Error, Result};
 
@@ -37,12 +37,14 @@ pub struct Bvh {
     pub source: PathBuf,
     pub joints: Vec<BvhJoint>,
     pub frame_time_s: f64,
+    /// The frame time as it was written is rounded to this, seconds.
+    pub frame_time_step_s: f64,
     pub frames: Vec<Vec<f64>>,
 }
 
 /// Where the joints are in one frame, in the file's axes and unit.
 pub struct BvhPose {
-    pub turns: Vec<Rotation3<f64>>,
+    pub turns: Vec<UnitQuaternion<f64>>,
     pub places: Vec<Vector3<f64>>,
 }
 
@@ -58,8 +60,8 @@ impl Bvh {
     pub fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut lines = Lines::new(text);
         let joints = hierarchy(&mut lines)?;
-        let (frame_time_s, frames) = table(&mut lines, &joints)?;
-        Ok(Self { source: PathBuf::new(), joints, frame_time_s, frames })
+        let ((frame_time_s, frame_time_step_s), frames) = table(&mut lines, &joints)?;
+        Ok(Self { source: PathBuf::new(), joints, frame_time_s, frame_time_step_s, frames })
     }
 
     pub fn joint(&self, name: &str) -> Option<usize> {
@@ -71,14 +73,14 @@ impl Bvh {
         let mut values = self.frames[frame].iter();
         let mut pose = BvhPose { turns: Vec::new(), places: Vec::new() };
         for joint in &self.joints {
-            let (mut turn, mut offset) = (Rotation3::identity(), Vector3::from(joint.offset));
+            let (mut turn, mut offset) = (UnitQuaternion::identity(), Vector3::from(joint.offset));
             for (channel, &value) in joint.channels.iter().zip(&mut values) {
                 match *channel {
                     Channel::Position(axis) => offset[axis] = value,
                     Channel::Rotation(axis) => {
                         let mut vector = Vector3::zeros();
                         vector[axis] = value.to_radians();
-                        turn *= Rotation3::new(vector);
+                        turn *= UnitQuaternion::new(vector);
                     }
                 }
             }
@@ -216,7 +218,17 @@ fn hierarchy(lines: &mut Lines) -> std::result::Result<Vec<BvhJoint>, String> {
     }
 }
 
-fn table(lines: &mut Lines, joints: &[BvhJoint]) -> std::result::Result<(f64, Vec<Vec<f64>>), String> {
+/// The frame time and its rounding, and the frames.
+type Frames = ((f64, f64), Vec<Vec<f64>>);
+
+/// What a decimal number was rounded to when it was written: one in its last digit.
+fn last_digit(text: &str) -> f64 {
+    let (digits, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
+    let decimals = digits.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    10_f64.powi(exponent.parse::<i32>().unwrap_or(0).saturating_sub(decimals.min(99) as i32))
+}
+
+fn table(lines: &mut Lines, joints: &[BvhJoint]) -> std::result::Result<Frames, String> {
     let (number, rest) = lines.after("MOTION")?;
     if !rest.is_empty() {
         return Err(format!("line {number}: found `{}` after `MOTION`, expected a new line", shortened(rest)));
@@ -229,7 +241,7 @@ fn table(lines: &mut Lines, joints: &[BvhJoint]) -> std::result::Result<(f64, Ve
     }
     let (number, text) = lines.after("Frame Time:")?;
     let frame_time_s = match text.parse::<f64>() {
-        Ok(time) if time.is_finite() && time > 0.0 => time,
+        Ok(time) if time.is_finite() && time > 0.0 => (time, last_digit(text)),
         _ => return Err(format!("line {number}: `Frame Time:` is `{}`, expected seconds above zero", shortened(text))),
     };
 

@@ -3,10 +3,13 @@
 pub mod bvh;
 pub mod capture;
 mod joints;
+mod neutral;
 pub mod retarget;
 
 pub use bvh::Bvh;
-pub use retarget::{BvhConfig, UpAxis, read_bvh_motion, retarget};
+pub use retarget::{BvhConfig, read_bvh_motion, retarget};
+
+pub use crate::data::UpAxis;
 
 use std::path::Path;
 
@@ -16,15 +19,27 @@ use crate::{
     person::{BodyModel, Motion},
 };
 
-/// Reads a motion for a body: BVH, or npz in AMASS layout. The notes say what had to be fitted to the body.
-pub fn read_motion(path: &Path, model: &BodyModel, bvh: &BvhConfig) -> Result<(Motion, Vec<String>)> {
+/// Reads a motion for a body: BVH, or npz in AMASS layout or another that people's tools write. The notes say, a line each,
+/// what was assumed and what had to be fitted to the body.
+///
+/// The motion stands on y, in metres and radians.
+pub fn read_motion(path: &Path, model: &BodyModel, config: &BvhConfig) -> Result<(Motion, Vec<String>)> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
-        Some("bvh") => Ok((read_bvh_motion(path, model, bvh)?, Vec::new())),
-        Some("npz") => data::read_motion(path, model.parents.len(), model.shape_directions.len()),
+        Some("bvh") => {
+            let (motion, notes) = read_bvh_motion(path, model, config)?;
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            Ok((motion, notes.into_iter().map(|note| format!("{name}: {note}")).collect()))
+        }
+        Some("npz") => data::read_motion_upright(path, model, &config.options()),
         other => Err(Error::Usage {
             message: format!("{}: a motion of type `{}`", path.display(), other.unwrap_or("none")),
             hint: Some("expected .bvh, or .npz in AMASS layout (poses, trans, betas, mocap_framerate)".into()),
         }),
     }
 }
+
+#[cfg(test)]
+mod tried_tests;
+#[cfg(test)]
+mod written;

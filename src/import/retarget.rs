@@ -1,50 +1,50 @@
 //! From the skeleton of a BVH file to poses of a body in SMPL layout.
 //!
-//! What is carried over is the orientation of every bone in space. The two rest poses differ (the file's legs may be
-//! spread, say), so each limb first turns by the shortest way from the body's rest direction to the file's.
+//! What is carried over is the orientation of every bone in space. How the axes of the file's joints lie in a person who
+//! stands is found once ([`super::neutral`]); all rotations are unit quaternions, exact at no turn and at half a turn.
 
 use std::{collections::BTreeMap, path::Path};
 
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{
     bvh::{Bvh, BvhPose},
     joints,
+    neutral::{self, Neutral, Skeleton, arc},
 };
+use crate::data::{Figure, MotionOptions, RotationUnit, UpAxis, find_up};
 use crate::error::{Error, Result};
 use crate::person::{BodyModel, JOINT_NAMES, Motion};
 
 type Point = Vector3<f64>;
 
-/// The axis of a file that points up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum UpAxis {
-    Y,
-    Z,
-}
-
-/// What a BVH file does not say about itself.
+/// What a motion file does not say about itself: the TOML file that `--motion-config` names.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BvhConfig {
-    /// Metres per unit of the file, exactly; absent: recognised from the length of the legs.
+    /// Metres per unit of the file, exactly; absent: of a BVH file recognised from the length of the legs, of npz metres
+    /// unless nobody could be as high or as fast.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale_m: Option<f64>,
-    /// Absent: the direction from hips to neck in the rest pose.
+    /// Absent: recognised from how the person stands in the poses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub up: Option<UpAxis>,
-    /// Names of the body's joints → names in the file, where the file uses others than the known dialects.
+    /// Names of the body's joints → names in the BVH file, where it uses others than the known dialects:
+    /// `joint_map = { left_knee = "Unterschenkel_L" }`. The names on the left are [`JOINT_NAMES`]; what is not mapped is
+    /// still found by its dialect.
     pub joint_map: BTreeMap<String, String>,
-    /// Instead of the file's frame time.
+    /// Instead of the frame time or rate of the file, or where it has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame_rate_hz: Option<f64>,
     /// Frames to leave out at the beginning, such as a T-pose.
     pub skip_frames: usize,
-    /// Without `scale_m`: scales the path by the ratio of the legs, so that the feet of a taller body do not slide.
+    /// BVH without `scale_m`: scales the path by the ratio of the legs, so that the feet of a taller body do not slide.
     pub fit_legs: bool,
-    /// Shape of the body.
+    /// Unit of the angles of npz; absent: radians, unless joints would turn as none can.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angles: Option<RotationUnit>,
+    /// Shape of the body of a BVH motion.
     pub betas: Vec<f64>,
 }
 
@@ -57,166 +57,231 @@ impl Default for BvhConfig {
             frame_rate_hz: None,
             skip_frames: 0,
             fit_legs: true,
+            angles: None,
             betas: Vec::new(),
         }
     }
 }
 
+impl BvhConfig {
+    /// The settings that npz files have in common with BVH.
+    pub fn options(&self) -> MotionOptions {
+        MotionOptions {
+            up: self.up,
+            angles: self.angles,
+            rate_hz: self.frame_rate_hz,
+            scale_m: self.scale_m,
+            skip_poses: self.skip_frames,
+        }
+    }
+}
+
 /// Units that BVH files come in: metres, centimetres, millimetres, inches, and CMU's (inches / 0.45).
-const UNITS_M: [f64; 5] = [1.0, 0.01, 0.001, 0.0254, 0.0254 / 0.45];
+const UNITS_M: [(f64, &str); 5] = [
+    (1.0, "metres"),
+    (0.01, "centimetres"),
+    (0.001, "millimetres"),
+    (0.0254, "inches"),
+    (0.0254 / 0.45, "CMU units (inches / 0.45)"),
+];
 /// Hip to ankle of anyone from a child of ten to a giant.
 const LEGS_M: std::ops::RangeInclusive<f64> = 0.6..=1.15;
 
-/// Limbs whose rest direction is aligned: joint, and the joint at the limb's end. Spine, collar bones, feet and hands
-/// differ between skeletons by anatomy, not by pose, and follow their parents.
-const LIMBS: [(usize, usize); 8] = [(1, 4), (2, 5), (4, 7), (5, 8), (16, 18), (17, 19), (18, 20), (19, 21)];
+/// Frames that up, front and twist are found from: evenly spread over the file.
+const LOOKED_AT: usize = 1000;
 
-/// Chains that a file may divide further (two necks, a twisting forearm): start and end.
-const CHAINS: [(usize, usize); 13] =
-    [(1, 4), (2, 5), (4, 7), (5, 8), (16, 18), (17, 19), (18, 20), (19, 21), (3, 6), (6, 9), (9, 12), (12, 15), (0, 3)];
+/// Rates that cameras and motion capture run at; a rounded frame time means one of them.
+const RATES_HZ: [f64; 13] = [24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 72.0, 90.0, 100.0, 120.0, 200.0, 240.0, 250.0];
 
-/// Reads a BVH file as a motion of `model`.
-pub fn read_bvh_motion(path: &Path, model: &BodyModel, config: &BvhConfig) -> Result<Motion> {
+/// Reads a BVH file as a motion of `model`, and notes of what was assumed.
+pub fn read_bvh_motion(path: &Path, model: &BodyModel, config: &BvhConfig) -> Result<(Motion, Vec<String>)> {
     retarget(&Bvh::read(path)?, model, config)
 }
 
-/// The motion of `bvh` on `model`: y up, metres, at the file's frame rate.
-pub fn retarget(bvh: &Bvh, model: &BodyModel, config: &BvhConfig) -> Result<Motion> {
-    if model.joint_regressor.len() != JOINT_NAMES.len() {
-        let found = format!("{} joints", model.joint_regressor.len());
-        return Err(Error::setting("body", found, format!("the {} joints of SMPL for a BVH motion", JOINT_NAMES.len())));
+/// The motion of `bvh` on `model`: y up, metres, at the file's frame rate; and what was assumed, a line each.
+///
+/// The body has the joints of SMPL, SMPL-H or SMPL-X; what it has beyond SMPL's first 22 (fingers, jaw, eyes) rests.
+pub fn retarget(bvh: &Bvh, model: &BodyModel, config: &BvhConfig) -> Result<(Motion, Vec<String>)> {
+    check(bvh, model, config)?;
+    let mut notes = Vec::new();
+    let rate_hz = rate(bvh, config, &mut notes)?;
+    let assigned = joints::assign(bvh, config)?;
+    notes.push(assigned.note);
+    let skeleton = Skeleton { bvh, joints: &assigned.joints, rest: bvh.rest() };
+    let mut body: Vec<Point> = model.rest_joints(&config.betas).into_iter().map(Point::from).collect();
+    // Beyond these, SMPL has hands, SMPL-H fingers and SMPL-X a jaw.
+    body.truncate(if body.len() == JOINT_NAMES.len() { body.len() } else { 22 });
+
+    let frames = bvh.frames.len() - config.skip_frames;
+    let looked_at = (config.skip_frames..bvh.frames.len()).step_by(frames.div_ceil(LOOKED_AT));
+    let poses: Vec<BvhPose> = looked_at.map(|frame| bvh.pose(frame)).collect();
+    let up = up_axis(&skeleton, &poses, config, &mut notes);
+    let neutral = neutral::find(&skeleton, &body, model, &poses, up.direction())?;
+    notes.extend(neutral.note.clone());
+    let scale = scale(&skeleton, &poses, config, &body)?;
+
+    let middle = (body[1] + body[2]) * 0.5 - body[0];
+    let (mut placed, mut translations) = (Vec::new(), Vec::new());
+    for frame in config.skip_frames..bvh.frames.len() {
+        let pose = bvh.pose(frame);
+        let turns = turns(&skeleton, &neutral, &pose, model, up.to_y());
+        // The hips carry the path: pelvis joints sit differently in different skeletons.
+        let hips = [1, 2].map(|joint| skeleton.place(joint, &pose).unwrap_or_default());
+        let pelvis = up.to_y() * (hips[0] + hips[1]) * (0.5 * scale.path_m) - turns[0] * middle;
+        let local = |joint: usize| -> [f64; 3] {
+            let above = model.parents[joint].map_or(UnitQuaternion::identity(), |parent| turns[parent]);
+            (above.inverse() * turns[joint]).scaled_axis().into()
+        };
+        let mut pose: Vec<[f64; 3]> = (0..body.len()).map(local).collect();
+        pose.resize(model.parents.len(), [0.0; 3]);
+        placed.push(pose);
+        translations.push((pelvis - body[0]).into());
+    }
+    let motion = Motion { poses: placed, translations, betas: config.betas.clone(), rate_hz };
+    notes.extend(scale.notes(&motion));
+    finite(&motion)?;
+    Ok((motion, notes))
+}
+
+fn check(bvh: &Bvh, model: &BodyModel, config: &BvhConfig) -> Result<()> {
+    if ![24, 52, 55].contains(&model.parents.len()) {
+        let found = format!("{} joints", model.parents.len());
+        return Err(Error::setting("body", found, "the joints of SMPL (24), SMPL-H (52) or SMPL-X (55) for a BVH motion"));
     }
     if config.skip_frames >= bvh.frames.len() {
         let expected = format!("fewer than the {} frames of the file", bvh.frames.len());
         return Err(Error::setting("skip_frames", config.skip_frames, expected));
     }
-    let rate_hz = rate(bvh, config)?;
-    let assigned = joints::assign(bvh, config)?;
-    let body: Vec<Point> = model.rest_joints(&config.betas).into_iter().map(Point::from).collect();
-    let rest = bvh.rest();
-    let file = |joint: usize| assigned[joint].map_or(Point::zeros(), |found| rest[found]);
-
-    let file_from_body = alignment(&file, bvh)?;
-    let y_up = match config.up.unwrap_or(if file_from_body[(2, 1)].abs() > 0.5 { UpAxis::Z } else { UpAxis::Y }) {
-        UpAxis::Y => Rotation3::identity(),
-        UpAxis::Z => Rotation3::from_axis_angle(&Vector3::x_axis(), -std::f64::consts::FRAC_PI_2),
-    };
-    let corrections = corrections(&body, &file, file_from_body, model);
-    let scale = scale(bvh, config, &body, &file)?;
-    let middle = (body[1] + body[2]) * 0.5 - body[0];
-
-    // A joint's turn, and the turn of what lies between it and the end of its chain.
-    let chain_turn = |joint: usize, found: usize, pose: &BvhPose| {
-        let turn = pose.turns[found];
-        let end = CHAINS.iter().find(|(start, _)| *start == joint).and_then(|&(_, end)| assigned[end]);
-        end.map_or(turn, |end| arc(turn * (rest[end] - rest[found]), pose.places[end] - pose.places[found]) * turn)
-    };
-
-    let (mut poses, mut translations) = (Vec::new(), Vec::new());
-    for frame in config.skip_frames..bvh.frames.len() {
-        let pose = bvh.pose(frame);
-        let mut turns: Vec<Rotation3<f64>> = Vec::new();
-        let mut local = Vec::new();
-        for joint in 0..body.len() {
-            let parent = model.parents[joint].map_or(Rotation3::identity(), |parent| turns[parent]);
-            let turn = assigned[joint].map_or(parent, |found| y_up * chain_turn(joint, found, &pose) * corrections[joint]);
-            local.push((parent.inverse() * turn).scaled_axis().into());
-            turns.push(turn);
-        }
-        // The hips carry the path: pelvis joints sit differently in different skeletons.
-        let hips = [1, 2].map(|joint| assigned[joint].map_or(Point::zeros(), |found| pose.places[found]));
-        let pelvis = y_up * (hips[0] + hips[1]) * (0.5 * scale) - turns[0] * middle;
-        poses.push(local);
-        translations.push((pelvis - body[0]).into());
-    }
-    Ok(Motion { poses, translations, betas: config.betas.clone(), rate_hz })
+    Ok(())
 }
 
-fn rate(bvh: &Bvh, config: &BvhConfig) -> Result<f64> {
+/// What comes out of finite numbers is finite; if not, it is a mistake here and not in the file.
+fn finite(motion: &Motion) -> Result<()> {
+    let finite = |pose: &Vec<[f64; 3]>| pose.iter().flatten().all(|value| value.is_finite());
+    match motion.poses.iter().position(|pose| !finite(pose)) {
+        Some(step) => Err(Error::NonFinite { stage: "retargeting".into(), step }),
+        None => Ok(()),
+    }
+}
+
+/// The turn of every joint in space, y up.
+fn turns(
+    skeleton: &Skeleton,
+    neutral: &Neutral,
+    pose: &BvhPose,
+    model: &BodyModel,
+    y_up: UnitQuaternion<f64>,
+) -> Vec<UnitQuaternion<f64>> {
+    let mut turns: Vec<UnitQuaternion<f64>> = Vec::new();
+    for joint in 0..neutral.turns.len() {
+        let above = model.parents[joint].map_or(UnitQuaternion::identity(), |parent| turns[parent]);
+        // A joint's turn, and the turn of what lies between it and the end of its chain.
+        let turn = |found: usize| {
+            let turn = pose.turns[found];
+            let end = neutral::CHAINS.iter().find(|(start, _)| *start == joint).and_then(|&(_, end)| skeleton.place(end, pose));
+            let along = neutral.bones[joint].zip(end);
+            along.map_or(turn, |(bone, end)| arc(turn * bone, end - pose.places[found]) * turn)
+        };
+        turns.push(skeleton.joints[joint].map_or(above, |found| y_up * turn(found) * neutral.turns[joint]));
+    }
+    turns
+}
+
+fn up_axis(skeleton: &Skeleton, poses: &[BvhPose], config: &BvhConfig, notes: &mut Vec<String>) -> UpAxis {
+    if let Some(up) = config.up {
+        return up;
+    }
+    let figure = |pose: &BvhPose| {
+        let place = |joint: usize| skeleton.place(joint, pose).unwrap_or_default();
+        let joints = skeleton.joints.iter().flatten().map(|&found| pose.places[found]).collect();
+        Figure { head: place(12), feet: (place(7) + place(8)) * 0.5, joints }
+    };
+    let figures: Vec<Figure> = poses.iter().map(figure).collect();
+    let expected = skeleton.standing().map_or(UpAxis::Y, |turn| UpAxis::nearest(turn * Point::y()));
+    let (up, why) = find_up(&figures, expected);
+    notes.push(format!("up axis: {up} ({why}); `up` names another"));
+    up
+}
+
+/// The frame rate, and what is likely where the frame time is rounded.
+fn rate(bvh: &Bvh, config: &BvhConfig, notes: &mut Vec<String>) -> Result<f64> {
     match config.frame_rate_hz {
-        Some(rate) if rate.is_finite() && rate > 0.0 => Ok(rate),
-        Some(rate) => Err(Error::setting("frame_rate_hz", rate, "frames per second above zero")),
-        None => {
-            // Frame times are written with few digits: 0.00833333 means 120 Hz.
-            let rate = 1.0 / bvh.frame_time_s;
-            Ok(if (rate / rate.round() - 1.0).abs() < 1e-4 { rate.round() } else { rate })
+        Some(rate) if rate.is_finite() && rate > 0.0 => return Ok(rate),
+        Some(rate) => return Err(Error::setting("frame_rate_hz", rate, "frames per second above zero")),
+        None => {}
+    }
+    let (time, half_digit) = (bvh.frame_time_s, 0.5 * bvh.frame_time_step_s);
+    // Frame times are written with few digits: 0.00833333 means 120 Hz.
+    let rate = 1.0 / time;
+    let rate = if (rate / rate.round() - 1.0).abs() < 1e-4 { rate.round() } else { rate };
+    let means = |likely: &f64| (1.0 / likely - time).abs() <= half_digit && (likely / rate - 1.0).abs() > 1e-4;
+    let nearest = RATES_HZ.into_iter().filter(means).min_by(|a, b| (a - rate).abs().total_cmp(&(b - rate).abs()));
+    let rounded = nearest.map_or(String::new(), |likely| {
+        format!(", a rounded number: {likely} Hz is likely, `frame_rate_hz = {likely:.1}` says so")
+    });
+    notes.push(format!("frame rate: {} Hz (frame time {time} s{rounded})", (rate * 1e3).round() / 1e3));
+    Ok(rate)
+}
+
+/// How far the body goes for a unit of the file.
+struct Scale {
+    /// Metres on the body's path per unit of the file.
+    path_m: f64,
+    /// Metres per unit of the file, as it is meant.
+    unit_m: f64,
+    note: String,
+    file_leg_m: f64,
+    body_leg_m: f64,
+}
+
+impl Scale {
+    fn notes(&self, motion: &Motion) -> Vec<String> {
+        let mut notes = vec![self.note.clone()];
+        let ratio = self.path_m / self.unit_m;
+        if (ratio - 1.0).abs() > 1e-3 {
+            let speed = mean_speed_mps(motion);
+            notes.push(format!(
+                "path: legs of {:.3} m in the file and {:.3} m in the body, so fit_legs makes the path {ratio:.3} times as \
+                 long: a mean speed of {:.2} m/s becomes {speed:.2} m/s; `fit_legs = false` keeps it",
+                self.file_leg_m,
+                self.body_leg_m,
+                speed / ratio
+            ));
         }
+        notes
     }
 }
 
-/// Metres on the body's path per unit of the file.
-fn scale(bvh: &Bvh, config: &BvhConfig, body: &[Point], file: &impl Fn(usize) -> Point) -> Result<f64> {
+/// Along the path of the pelvis, metres per second.
+fn mean_speed_mps(motion: &Motion) -> f64 {
+    let steps = motion.translations.windows(2).map(|pair| (Point::from(pair[1]) - Point::from(pair[0])).norm());
+    let count = motion.translations.len().saturating_sub(1).max(1) as f64;
+    steps.sum::<f64>() * motion.rate_hz / count
+}
+
+fn scale(skeleton: &Skeleton, poses: &[BvhPose], config: &BvhConfig, body: &[Point]) -> Result<Scale> {
     let leg = |place: &dyn Fn(usize) -> Point| (place(1) - place(4)).norm() + (place(4) - place(7)).norm();
-    let (file_leg, body_leg) = (leg(&file), leg(&|joint| body[joint]));
+    // Of the poses: in some files the offsets say nothing and position channels everything.
+    let in_pose = |pose: &BvhPose| leg(&|joint| skeleton.place(joint, pose).unwrap_or_default());
+    let file_leg = poses.iter().map(in_pose).sum::<f64>() / poses.len() as f64;
+    let body_leg_m = leg(&|joint| body[joint]);
     match config.scale_m {
-        Some(scale) if scale.is_finite() && scale > 0.0 => return Ok(scale),
+        Some(scale) if scale.is_finite() && scale > 0.0 => {
+            let note = format!("units: {scale} m, by scale_m");
+            return Ok(Scale { path_m: scale, unit_m: scale, note, file_leg_m: scale * file_leg, body_leg_m });
+        }
         Some(scale) => return Err(Error::setting("scale_m", scale, "metres per unit of the file, above zero")),
         None => {}
     }
-    let unit = UNITS_M.into_iter().find(|unit| LEGS_M.contains(&(unit * file_leg))).ok_or_else(|| {
+    let (unit_m, name) = UNITS_M.into_iter().find(|(unit, _)| LEGS_M.contains(&(unit * file_leg))).ok_or_else(|| {
         let expected = "a person's in metres, centimetres, millimetres, inches or CMU units";
-        Error::field(&bvh.source, "length of the legs", format!("{file_leg:.4} units"), expected)
+        Error::field(&skeleton.bvh.source, "length of the legs", format!("{file_leg:.4} units"), expected)
             .with_hint("set scale_m, the metres per unit of the file")
     })?;
-    Ok(if config.fit_legs { body_leg / file_leg } else { unit })
-}
-
-/// The turn from the body's axes (left, up, front) at rest to the file's.
-fn alignment(file: &impl Fn(usize) -> Point, bvh: &Bvh) -> Result<Rotation3<f64>> {
-    let (left, hips, neck) = (file(1) - file(2), (file(1) + file(2)) * 0.5, file(12));
-    let (left, up) = (left.try_normalize(1e-9), (neck - hips).try_normalize(1e-9));
-    let front = left.zip(up).and_then(|(left, up)| left.cross(&up).try_normalize(0.3));
-    let (Some(left), Some(front)) = (left, front) else {
-        return Err(Error::field(
-            &bvh.source,
-            "rest pose",
-            "without a left and an up",
-            "hips side by side and a neck above them",
-        ));
-    };
-    let up = front.cross(&left);
-    // Skeletons are built along the axes, only their anatomy is not: a leaning neck is no leaning person.
-    let axis = |direction: Point| {
-        let axis = direction.iamax();
-        Point::from_fn(|row, _| if row == axis { direction[axis].signum() } else { 0.0 })
-    };
-    let matrix = |left: Point, up: Point| Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[left, up, left.cross(&up)]));
-    let (exact, snapped) = (matrix(left, up), (axis(left), axis(up)));
-    if snapped.0.dot(&snapped.1).abs() < 0.5 {
-        let snapped = matrix(snapped.0, snapped.1);
-        if snapped.angle_to(&exact).to_degrees() < 30.0 {
-            return Ok(snapped);
-        }
-    }
-    Ok(exact)
-}
-
-/// The shortest turn from one direction to another; none where there is no shortest one. (The one of nalgebra takes the
-/// arc cosine of a rounded 1.)
-fn arc(from: Point, to: Point) -> Rotation3<f64> {
-    let axis = from.cross(&to);
-    match axis.try_normalize(1e-12 * from.norm() * to.norm()) {
-        Some(unit) => Rotation3::new(unit * axis.norm().atan2(from.dot(&to))),
-        None => Rotation3::identity(),
-    }
-}
-
-/// `[joint]`: the turn from the body's bone at rest to the file's.
-fn corrections(
-    body: &[Point],
-    file: &impl Fn(usize) -> Point,
-    file_from_body: Rotation3<f64>,
-    model: &BodyModel,
-) -> Vec<Rotation3<f64>> {
-    let mut corrections: Vec<Rotation3<f64>> = Vec::new();
-    for joint in 0..body.len() {
-        let inherited = model.parents[joint].map_or(file_from_body, |parent| corrections[parent]);
-        let limb = LIMBS.iter().find(|(start, _)| *start == joint);
-        let aligned =
-            limb.map(|&(start, end)| arc(file_from_body * (body[end] - body[start]), file(end) - file(start)) * file_from_body);
-        corrections.push(aligned.unwrap_or(inherited));
-    }
-    corrections
+    let file_leg_m = unit_m * file_leg;
+    let note = format!("units: {name} (legs of {file_leg:.4} units are {file_leg_m:.3} m); `scale_m` names another");
+    let path_m = if config.fit_legs { body_leg_m / file_leg } else { unit_m };
+    Ok(Scale { path_m, unit_m, note, file_leg_m, body_leg_m })
 }
 
 #[cfg(test)]

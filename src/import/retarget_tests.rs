@@ -1,5 +1,8 @@
 use std::collections::BTreeMap;
 
+use nalgebra::Rotation3;
+
+use super::neutral::LIMBS;
 use super::*;
 use crate::person::procedural;
 use crate::support::shared;
@@ -59,8 +62,8 @@ fn every_limb_points_where_the_file_says_on_any_body() {
         let Some(path) = shared(&format!("motions/{name}.bvh")) else { return };
         let bvh = Bvh::read(&path).unwrap();
         let config = BvhConfig::default();
-        let assigned = joints::assign(&bvh, &config).unwrap();
-        let found = joints(&model, &retarget(&bvh, &model, &config).unwrap());
+        let assigned = joints::assign(&bvh, &config).unwrap().joints;
+        let found = joints(&model, &retarget(&bvh, &model, &config).unwrap().0);
         let place = |frame: usize| -> Vec<Point> {
             let pose = bvh.pose(frame);
             assigned.iter().map(|found| found.map_or(Point::zeros(), |found| pose.places[found])).collect()
@@ -93,7 +96,7 @@ fn retargeting_agrees_with_twins_that_others_made() {
             return;
         };
         let model = smpl(&body);
-        let motion = read_bvh_motion(&bvh, &model, &BvhConfig::default()).unwrap();
+        let motion = read_bvh_motion(&bvh, &model, &BvhConfig::default()).unwrap().0;
         let twin = twin(&npz);
         let step = motion.rate_hz / twin.rate_hz;
         assert_eq!(step, if cmu { 2.0 } else { 1.0 });
@@ -162,7 +165,7 @@ const NAMES: [&str; 4] = ["Hips", "UpLeg", "Leg", "ForeArm"];
 #[test]
 fn axes_units_and_namespaces_make_no_difference() {
     let model = person();
-    let read = |text: &str, config: &BvhConfig| retarget(&Bvh::parse(text).unwrap(), &model, config).unwrap();
+    let read = |text: &str, config: &BvhConfig| retarget(&Bvh::parse(text).unwrap(), &model, config).unwrap().0;
     let plain = read(&skeleton(false, 1.0, NAMES), &BvhConfig::default());
     assert_eq!(plain.rate_hz, 50.0);
     let placed = joints(&model, &plain);
@@ -175,7 +178,7 @@ fn axes_units_and_namespaces_make_no_difference() {
         }
     };
     close(&read(&skeleton(true, 1.0, NAMES), &BvhConfig::default()));
-    for unit in UNITS_M {
+    for (unit, _) in UNITS_M {
         close(&read(&skeleton(false, unit, NAMES), &BvhConfig::default()));
         let kept = read(&skeleton(true, unit, NAMES), &BvhConfig { fit_legs: false, ..Default::default() });
         let step = Point::from(kept.translations[1]) - Point::from(kept.translations[0]);
@@ -204,8 +207,8 @@ fn other_names_come_through_a_map() {
         let joint_map: BTreeMap<String, String> = pairs.iter().map(|(to, from)| (to.to_string(), from.to_string())).collect();
         BvhConfig { joint_map, ..Default::default() }
     };
-    let plain = retarget(&Bvh::parse(&skeleton(false, 1.0, NAMES)).unwrap(), &model, &BvhConfig::default()).unwrap();
-    assert_eq!(retarget(&foreign, &model, &map(&pairs)).unwrap(), plain);
+    let plain = retarget(&Bvh::parse(&skeleton(false, 1.0, NAMES)).unwrap(), &model, &BvhConfig::default()).unwrap().0;
+    assert_eq!(retarget(&foreign, &model, &map(&pairs)).unwrap().0, plain);
 
     let (found, hint) = message(retarget(&foreign, &model, &map(&[("left_elbow", "LeftEle")])).unwrap_err());
     assert_eq!(found, ": `joint_map.left_elbow` is `LeftEle`, expected the name of a joint in this file");
@@ -237,7 +240,7 @@ fn settings_that_cannot_work_are_refused() {
         retarget(&odd, &model, &plain()).unwrap_err().to_string(),
         ": `length of the legs` is 4.3500 units, expected a person's in metres, centimetres, millimetres, inches or CMU units"
     );
-    let scaled = retarget(&odd, &model, &BvhConfig { scale_m: Some(0.2), ..plain() }).unwrap();
+    let scaled = retarget(&odd, &model, &BvhConfig { scale_m: Some(0.2), ..plain() }).unwrap().0;
     assert!((scaled.translations[1][2] - scaled.translations[0][2] - 0.5).abs() < 1e-9);
     let flat = Bvh::parse(
         &skeleton(false, 1.0, NAMES).replace("OFFSET 0.1 0 0", "OFFSET 0 0 0").replace("OFFSET -0.1 0 0", "OFFSET 0 0 0"),
@@ -257,7 +260,7 @@ fn a_person_turned_aside_at_rest_still_faces_ahead_of_the_body() {
     let turned = turned.replace("OFFSET 0.2 0.5 0", "OFFSET 0 0.5 -0.2").replace("OFFSET -0.2 0.5 0", "OFFSET 0 0.5 0.2");
     let turned = turned.replace("OFFSET 0.3 0 0", "OFFSET 0 0 -0.3").replace("OFFSET -0.3 0 0", "OFFSET 0 0 0.3");
     let turned = turned.replace("OFFSET 0.25 0 0", "OFFSET 0 0 -0.25").replace("OFFSET -0.25 0 0", "OFFSET 0 0 0.25");
-    let motion = retarget(&Bvh::parse(&turned).unwrap(), &model, &BvhConfig::default()).unwrap();
+    let motion = retarget(&Bvh::parse(&turned).unwrap(), &model, &BvhConfig::default()).unwrap().0;
     let facing = Rotation3::new(Point::from(motion.poses[0][0])) * Point::z();
     assert!((facing - Point::x()).norm() < 1e-9, "{facing}");
     // The legs of this skeleton are straight, the body's spread a little; nothing else turns.

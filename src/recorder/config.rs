@@ -12,7 +12,7 @@ use super::receiver::ReceiverConfig;
 use super::surface::SurfaceConfig;
 use super::timeline::Interpolation;
 use super::world::{Reflector, WallsConfig, World};
-use crate::data::{read_body, read_motion};
+use crate::data::{MotionOptions, read_body, read_motion, read_motion_upright};
 use crate::error::{Error, Result};
 use crate::person::actions::{self, Action, StyleConfig};
 use crate::person::{BodyModel, Motion, Person, Placement, procedural};
@@ -205,6 +205,14 @@ impl RecorderConfig {
         Ok(world)
     }
 
+    /// What is assumed of the motion file, a line each; empty without one.
+    pub fn motion_notes(&self, folder: &Path) -> Result<Vec<String>> {
+        match &self.person.motion {
+            Some(path) if !self.empty => Ok(self.person.read(&folder.join(path), &self.person.model(folder)?)?.1),
+            _ => Ok(Vec::new()),
+        }
+    }
+
     /// Name of what is done, for the recording's labels.
     pub fn action(&self) -> Option<&str> {
         (!self.empty && self.person.motion.is_none()).then(|| self.person.action.name())
@@ -219,16 +227,13 @@ impl RecorderConfig {
 impl ActorConfig {
     fn person(&self, folder: &Path, radar: &Radar, room: &Room, clock: &Clock) -> Result<Person> {
         let (first_s, last_s) = clock.motion_span_s(radar);
-        let model = match &self.body {
-            Some(path) => read_body(folder.join(path))?,
-            None => embedded(&self.subject)?,
-        };
+        let model = self.model(folder)?;
         let placement = self.placement.clone().unwrap_or_else(|| {
             // Without a floor the radar is on a table.
             Placement { start_s: first_s, ..actions::placement(room.floor_m.unwrap_or(1.0), self.distance_m) }
         });
         let motion: Motion = match &self.motion {
-            Some(path) => read_motion(folder.join(path), model.parents.len(), model.shape_directions.len())?.0,
+            Some(path) => self.read(&folder.join(path), &model)?.0,
             None => {
                 let duration_s = (last_s - placement.start_s).max(1.0 / self.rate_hz);
                 // All of the body's parameters are written, so that no reader has to guess the rest.
@@ -238,6 +243,24 @@ impl ActorConfig {
             }
         };
         Ok(Person::Skinned { model, motion, placement })
+    }
+}
+
+impl ActorConfig {
+    /// The motion file, and what was assumed of it. With a `placement`, that says how the file's axes lie; without, the
+    /// person is made to stand.
+    fn read(&self, path: &Path, model: &BodyModel) -> Result<(Motion, Vec<String>)> {
+        match self.placement {
+            Some(_) => read_motion(path, model.parents.len(), model.shape_directions.len()),
+            None => read_motion_upright(path, model, &MotionOptions::default()),
+        }
+    }
+
+    fn model(&self, folder: &Path) -> Result<BodyModel> {
+        match &self.body {
+            Some(path) => read_body(folder.join(path)),
+            None => embedded(&self.subject),
+        }
     }
 }
 

@@ -77,6 +77,11 @@ impl Npz {
         self.member(name, Some(axes))
     }
 
+    /// Reads an array of any shape; NaN and infinity pass.
+    pub fn read_any<T: Element>(&mut self, name: &str) -> Result<Array<T>> {
+        self.member(name, None)
+    }
+
     /// A single number, stored with any number of axes of length 1.
     pub fn scalar(&mut self, name: &str) -> Result<f64> {
         let array: Array<f64> = self.member(name, None)?;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use nalgebra::{Matrix3, Rotation3, Vector3, vector};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3, vector};
 
 use super::plan::{ArmPlan, FootPlan, Plan, ahead, ease};
 use crate::person::BodyModel;
@@ -78,7 +78,8 @@ impl Figure {
         for (side, arm) in plan.arms.iter().enumerate() {
             bend_arm(side, arm, &mut local);
         }
-        let poses = local.iter().map(|rotation| rotation.scaled_axis().into()).collect();
+        // Through quaternions: the arc cosine of a matrix's trace is inexact, or no number, near no turn.
+        let poses = local.iter().map(|turn| UnitQuaternion::from_rotation_matrix(turn).scaled_axis().into()).collect();
         (poses, (place - self.joints[0]).into())
     }
 
