@@ -214,8 +214,10 @@ fn rate(bvh: &Bvh, config: &BvhConfig, notes: &mut Vec<String>) -> Result<f64> {
     // Frame times are written with few digits: 0.00833333 means 120 Hz.
     let rate = 1.0 / time;
     let rate = if (rate / rate.round() - 1.0).abs() < 1e-4 { rate.round() } else { rate };
-    let means = |likely: &f64| (1.0 / likely - time).abs() <= half_digit && (likely / rate - 1.0).abs() > 1e-4;
+    let is = |known: &f64| (known / rate - 1.0).abs() <= 1e-4;
+    let means = |likely: &f64| (1.0 / likely - time).abs() <= half_digit;
     let nearest = RATES_HZ.into_iter().filter(means).min_by(|a, b| (a - rate).abs().total_cmp(&(b - rate).abs()));
+    let nearest = nearest.filter(|nearest| !is(nearest));
     let rounded = nearest.map_or(String::new(), |likely| {
         format!(", a rounded number: {likely} Hz is likely, `frame_rate_hz = {likely:.1}` says so")
     });
