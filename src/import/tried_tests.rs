@@ -104,9 +104,9 @@ fn the_axes_of_bones_make_no_difference() {
         ),
         ("camera", Style { world: about_x(180.0), ..Style::default() }, 1e-4, 1e-4, "up axis: -y"),
         ("Xsens", Style { name: &xsens, positions: true, unit_m: 0.0254, ..Style::default() }, 1e-4, 1e-4, "units: inches"),
-        ("feet down", Style { axes: plantar, ..Style::default() }, 8.0, 16.0, "left_ankle, right_ankle"),
-        ("along bones", Style { axes: bones.clone(), ..Style::default() }, 8.0, 16.0, "nobody stands in it"),
-        ("along bones, z up", Style { axes: bones, world: about_x(90.0), ..Style::default() }, 8.0, 16.0, "nobody stands in it"),
+        ("feet down", Style { axes: plantar, ..Style::default() }, 2.5, 2.5, "left_ankle, right_ankle"),
+        ("along bones", Style { axes: bones.clone(), ..Style::default() }, 8.0, 11.0, "nobody stands in it"),
+        ("along bones, z up", Style { axes: bones, world: about_x(90.0), ..Style::default() }, 8.0, 11.0, "nobody stands in it"),
     ];
     for (kind, style, bone, turn, wanted) in kinds {
         let text = written::bvh(&model, &walk, &style);
@@ -489,7 +489,8 @@ fn every_tried_file_comes_out_right() {
             assert!(most < 1.0, "{name}: {} is off by {most}", JOINT_NAMES[joint]);
         }
     }
-    // Walks of their own, whose joints swing about a T-pose: limbs point as in the file, and on average all are at rest.
+    // Walks of their own, whose joints swing about a T-pose: limbs point as in the file, and without a T-pose in the file
+    // all are on average at rest.
     for name in ["05-xsens-names-allpos-zup", "06-lafan-local-x", "07-lafan-local-x-names-smpl"] {
         let path = folder.join(format!("bvh/{name}.bvh"));
         let (bvh, config) = (Bvh::read(&path).unwrap(), BvhConfig::default());
@@ -507,7 +508,8 @@ fn every_tried_file_comes_out_right() {
                 assert!(angle < 1.0, "{name}: {} is off by {angle} degrees in frame {frame}", JOINT_NAMES[joint]);
             }
         }
-        for joint in 1..JOINTS {
+        // 05 has a T-pose, from which nothing is averaged.
+        for joint in (1..JOINTS).filter(|_| !name.starts_with("05")) {
             let parent = model.parents[joint].unwrap();
             let local = |turns: &Vec<Turn>| (turns[parent].inverse() * turns[joint]).scaled_axis();
             let mean = found.iter().map(local).sum::<Point>() / found.len() as f64;
