@@ -30,8 +30,9 @@ const ANATOMY: [(usize, usize); 5] = [(7, 10), (8, 11), (12, 15), (13, 16), (14,
 pub const CHAINS: [(usize, usize); 13] =
     [(1, 4), (2, 5), (4, 7), (5, 8), (16, 18), (17, 19), (18, 20), (19, 21), (3, 6), (6, 9), (9, 12), (12, 15), (0, 3)];
 
-/// A bone of anatomy that is farther from the body's own than this is a rest pose, not another anatomy: of the skeletons
-/// of CMU, Mixamo, SMPL and LaFAN1 the farthest are collar bones, 40° apart; a foot that points straight down is 72° off.
+/// A bone of anatomy that is farther from the body's own than this is a rest pose, not another anatomy: of CMU's skeletons
+/// and three bodies in SMPL layout the farthest are collar bones, 33° apart (the test of the tried files reads them); a foot
+/// that points straight down is 72° off.
 const ANATOMY_DEG: f64 = 60.0;
 
 const ANKLES: [usize; 2] = [7, 8];

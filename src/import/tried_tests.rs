@@ -522,6 +522,13 @@ fn every_tried_file_comes_out_right() {
         }
     }
 
+    // Captured and made by others, with rest poses in which somebody stands.
+    for name in ["cmu/01_01", "cmu/02_01", "cmu/02_10", "procedural/arm_swing_s1", "procedural/walk_back_forth_armswing_s1"] {
+        let (_, notes) = read(&format!("../../motions/{name}.bvh")).unwrap();
+        noted(name, &notes, &["up axis: y (from the feet to the head)", "frame rate"]);
+        assert!(!notes.iter().any(|note| note.contains("rest pose")), "{name}: {notes:#?}");
+    }
+
     let (walk, _) = read("motions/31-betas-1x10.npz").unwrap();
     let cases: [(&str, &[&str]); 13] = [
         ("20-smplh-hands", &["52 of SMPL-H"]),
