@@ -27,9 +27,9 @@ fn walk(model: &BodyModel) -> Motion {
 fn turns(model: &BodyModel, motion: &Motion) -> Vec<Vec<Turn>> {
     let pose = |pose: &Vec<[f64; 3]>| {
         let mut turns: Vec<Turn> = Vec::new();
-        for joint in 0..JOINTS {
-            let own = UnitQuaternion::new(Point::from(pose[joint]));
-            turns.push(model.parents[joint].map_or(own, |parent| turns[parent] * own));
+        for (parent, turn) in model.parents.iter().zip(pose).take(JOINTS) {
+            let own = UnitQuaternion::new(Point::from(*turn));
+            turns.push(parent.map_or(own, |parent| turns[parent] * own));
         }
         turns
     };

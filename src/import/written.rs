@@ -67,9 +67,9 @@ pub fn bvh(model: &BodyModel, motion: &Motion, style: &Style) -> String {
     text += &format!("MOTION\nFrames: {}\nFrame Time: {}\n", motion.poses.len(), style.frame_time);
     for (pose, translation) in motion.poses.iter().zip(&motion.translations) {
         let mut turns: Vec<Turn> = Vec::new();
-        for joint in 0..JOINTS {
-            let own = UnitQuaternion::new(Point::from(pose[joint]));
-            turns.push(model.parents[joint].map_or(own, |parent| turns[parent] * own));
+        for (parent, turn) in model.parents.iter().zip(pose).take(JOINTS) {
+            let own = UnitQuaternion::new(Point::from(*turn));
+            turns.push(parent.map_or(own, |parent| turns[parent] * own));
         }
         let axes = |joint: usize| style.world * turns[joint] * style.axes[joint];
         let mut numbers = Vec::new();
