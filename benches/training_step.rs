@@ -10,9 +10,10 @@ use std::time::Instant;
 use burn::{
     module::Module,
     optim::{AdamConfig, GradientsParams, ModuleOptimizer},
-    tensor::Device,
+    tensor::{Device, Tensor},
 };
 use hybridsim::{
+    body::{PoseCorrection, PoseTensors, Posing},
     features::Extent,
     heatmap::{HeatmapConfig, RangeDoppler, power_db},
     person::{
@@ -35,12 +36,22 @@ fn main() {
     let device = hybridsim::cli::device(&device).expect("a device of this build");
     for transmitters in [1, 3] {
         for paths in [PathModel::Decoupled, PathModel::Direct] {
-            measure(paths, transmitters, &device);
+            for pose in [Pose::Host, Pose::Tensor, Pose::Learning] {
+                measure(paths, transmitters, pose, &device);
+            }
         }
     }
 }
 
-fn measure(paths: PathModel, transmitters: usize, device: &Device) {
+/// Where the body is posed, and whether its pose learns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Pose {
+    Host,
+    Tensor,
+    Learning,
+}
+
+fn measure(paths: PathModel, transmitters: usize, pose: Pose, device: &Device) {
     let board = Radar::mmmesh(2);
     // The loops last as long as with all transmitters.
     let chirp_period_s = board.loop_period_s() / transmitters as f64;
@@ -54,7 +65,12 @@ fn measure(paths: PathModel, transmitters: usize, device: &Device) {
     let mut config = SimulatorConfig { paths, ..Default::default() };
     config.room.patches = Some(5000);
     config.graph.used = 1.0;
+    config.surface.posing = if pose == Pose::Host { Posing::Host } else { Posing::Tensor };
+    let Person::Skinned { motion, .. } = &person else { unreachable!() };
+    let joints = motion.poses[0].len();
     let scene = Scene::new(&radar, Some(&room), Some(&person), &config).expect("a scene");
+    let knots = PoseCorrection { knots_s: vec![0.0, 1.0], ..Default::default() };
+    let scene = scene.corrected(&person, knots).expect("a scene");
 
     let started = Instant::now();
     let view = scene.view(0).expect("a frame");
@@ -72,11 +88,22 @@ fn measure(paths: PathModel, transmitters: usize, device: &Device) {
     let autodiff = device.clone().autodiff();
     let transform = RangeDoppler::new(128, 256, radar.sampling, &HeatmapConfig::default(), &autodiff);
     let mut simulator: Option<Simulator> = Some(config.init(extent, 1, &autodiff));
+    let leaf = |shape: usize| Tensor::<1>::zeros([shape], &autodiff).require_grad();
+    let pose_tensors = || PoseTensors {
+        clock_s: Some(leaf(1)),
+        heading_rad: Some(leaf(1)),
+        shift_m: Some(leaf(3)),
+        betas: None,
+        turns_rad: Some(leaf(2 * joints * 3).reshape([2, joints, 3])),
+        shifts_m: Some(leaf(6).reshape([2, 3])),
+    };
     let mut optimizer = ModuleOptimizer::from(AdamConfig::new().build());
     let step_s = median(|| {
         let current = simulator.take().expect("put back below");
         let surfaces = current.surfaces(&constants, Mode::Training { seed: 3 });
-        let signal = current.with_noise(&scene.radar, current.clean_signal(&scene, &view, &surfaces), 1);
+        let learning = (pose == Pose::Learning).then(pose_tensors);
+        let clean = current.signal_of_pose(&scene, &view, &surfaces, learning.as_ref());
+        let signal = current.with_noise(&scene.radar, clean, 1);
         let loss = power_db(transform.map(signal).power(), 1e-6).powi_scalar(2).mean();
         let mut gradients = loss.backward();
         let gradients = GradientsParams::from_module(&mut gradients, &current);
@@ -85,7 +112,7 @@ fn measure(paths: PathModel, transmitters: usize, device: &Device) {
     println!(
         "{}",
         serde_json::json!({
-            "bench": "training_step", "paths": paths, "device": format!("{device:?}"), "vertices": vertices,
+            "bench": "training_step", "paths": paths, "pose": format!("{pose:?}").to_lowercase(), "device": format!("{device:?}"), "vertices": vertices,
             "room_points": scene.patches.position_m.len(), "walls": scene.proxies.len(),
             "transmitters": transmitters, "receivers": scene.radar.rx_m.len(), "graph_used": config.graph.used, "visible_body": view.direct.body.len(),
             "parameters": plain.num_params(), "step_s": step_s, "inference_s": inference_s, "visibility_s": visibility_s,

@@ -72,6 +72,13 @@ const STAGES: &[(&str, &str, Calculus, &str, &str)] = &[
     ),
     ("skinning", "pose, shape, translation", Smooth, "body/tensors.rs", "gradients_reach_pose_shape_and_translation"),
     (
+        "posed frame: positions, facets, normals, areas",
+        "clock, heading, shift, shape, turns and shifts between knots",
+        Broken("a facet or vertex without area has a fixed normal; who is seen is constant"),
+        "body/posing/tests.rs",
+        "gradients_of_positions_normals_and_areas_agree_with_central_differences_for_every_kind_of_parameter",
+    ),
+    (
         "canonical offset through skinning",
         "offset",
         Smooth,

@@ -124,7 +124,8 @@ impl Baseline for MmGpe {
         let loops = self.radar().loops_per_frame;
         Ok(transmitters(self.radar(), |tx| {
             let displacement = body.displacement(posed, &vertices, tx * loops..(tx + 1) * loops, None, &self.device);
-            let amplitude = self.scene.body_amplitude(posed, &vertices, (&reference_m, &displacement), tx, response.clone());
+            let amplitude =
+                self.scene.body_amplitude((posed, None), &vertices, (&reference_m, &displacement), tx, response.clone());
             let points = Points { reference_m: &reference_m, displacement: &displacement, amplitude: &amplitude };
             direct_signal(points, self.radar(), tx, Dechirp::Paper, SumForm::Auto)
         }))

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use burn::tensor::{Int, Tensor, TensorCreationOptions, TensorData};
+use burn::tensor::{Tensor, TensorCreationOptions, TensorData};
 use rayon::prelude::*;
 
 use super::facets::FacetEdges;
@@ -29,14 +29,16 @@ pub struct BodyFrame {
     pub vertices_m: Vec<[f64; 3]>,
     /// Weights of the poses around the frame, `[chirp, pose]`.
     pub basis: Basis,
+    /// The same for the one time in the middle, of the same poses.
+    pub(super) middle: Basis,
     /// `[vertex, pose]`: position at each pose minus that in the middle, metres; the difference is taken in f64.
-    change_m: Vec<[f64; 3]>,
-    rotations: Rotations,
+    pub(super) change_m: Vec<[f64; 3]>,
+    pub(super) rotations: Rotations,
 }
 
 /// What turns a canonical offset into the radar frame.
 #[derive(Clone, Debug)]
-enum Rotations {
+pub(super) enum Rotations {
     /// The joints', blended by the skinning weights.
     Joints(Poses),
     /// `[vertex, pose]`, from the mesh itself.
@@ -83,6 +85,7 @@ pub(super) fn build(body: &PosedBody, middle_s: f64, basis: Basis, middle: &Basi
         normal: surface.normals(&vertices_m),
         area_m2: surface.areas_m2(&vertices_m),
         vertices_m,
+        middle: Basis { poses: window, weights: weight, rates: rate },
         basis,
         change_m,
         rotations,
@@ -182,48 +185,6 @@ impl PosedBody {
             Displacement { x, y, z }
         };
         FacetEdges { second: edge(1), third: edge(2) }
-    }
-
-    /// The same displacement from vertices that a model moved on the device ([`super::tensors::BodyTensors`]).
-    ///
-    /// # Shapes
-    /// - `change`: one tensor per pose of the frame's window (`frame.basis.poses`), each `[vertex, xyz]`: metres from
-    ///   `frame.vertices_m`, radar frame
-    /// - result: `[point, chirp]`, metres
-    ///
-    /// # Gradient
-    /// Flows to every `change`; linear.
-    pub fn displacement_of(
-        &self,
-        frame: &BodyFrame,
-        points: &[usize],
-        chirps: Range<usize>,
-        change: &[Tensor<2>],
-    ) -> Displacement {
-        let count = frame.basis.poses.len();
-        assert_eq!(change.len(), count, "body: {} changes, the frame's window has {count} poses", change.len());
-        let options = TensorCreationOptions::new(change[0].device()).with_dtype(change[0].dtype());
-        let weights = basis_tensor(&frame.basis.weights, count, &chirps, &options);
-        let mut window: [Option<Tensor<2>>; 3] = [None, None, None];
-        // [vertex, xyz, pose]
-        let all: Tensor<3> = Tensor::stack(change.to_vec(), 2);
-        let corners = if self.surface.is_vertices() { 1 } else { 3 };
-        for corner in 0..corners {
-            let ids: Vec<i64> = points.iter().map(|&point| self.surface.corners[point][corner] as i64).collect();
-            let share: Vec<f64> = points.iter().map(|&point| self.surface.weights[point][corner]).collect();
-            let ids = Tensor::<1, Int>::from_data(TensorData::new(ids, [points.len()]), &options.device);
-            let share = Tensor::<3>::from_data(TensorData::new(share, [points.len(), 1, 1]), options.clone());
-            let part = all.clone().select(0, ids) * share;
-            for (axis, sum) in window.iter_mut().enumerate() {
-                let part = part.clone().narrow(1, axis, 1).squeeze_dim::<2>(1);
-                *sum = Some(match sum.take() {
-                    None => part,
-                    Some(sum) => sum + part,
-                });
-            }
-        }
-        let [x, y, z] = window.map(|part| part.expect("there is at least one corner").matmul(weights.clone()));
-        Displacement { x, y, z }
     }
 
     /// Change of the points at every pose of the window: three components, each `[point, pose]`, metres.

@@ -3,9 +3,11 @@
 //! Precision: a frame's positions are computed on the host in f64, and the device receives only the *displacement*
 //! of each point from where it is in the middle of the frame, a few centimetres, in which f32 is exact to 1e-8 m.
 
+pub mod correction;
 pub mod facets;
 pub mod kinematics;
 pub mod motion;
+pub mod posing;
 pub mod skinning;
 pub mod surface;
 pub mod tensors;
@@ -19,12 +21,15 @@ pub(crate) mod test_bodies;
 
 use burn::tensor::{DType, Device, Tensor};
 
+pub use correction::{PoseCorrection, PoseTensors};
 pub use facets::{FacetEdges, facet_integral};
 pub use frame::BodyFrame;
 pub use motion::Interpolation;
+pub use posing::{PosedFrame, Posing};
 pub use surface::{Sampling, Surface, SurfaceConfig};
 
 use kinematics::{Matrix, Vector};
+use posing::DeviceBodies;
 use skinning::SkinnedBody;
 
 use crate::error::{Error, Result};
@@ -73,6 +78,9 @@ pub struct PosedBody {
     surface: Surface,
     canonical_m: Vec<[f64; 3]>,
     canonical_vertices_m: Vec<[f64; 3]>,
+    /// What devices keep of it; absent where the host poses it.
+    device_bodies: Option<DeviceBodies>,
+    correction: PoseCorrection,
 }
 
 impl PosedBody {
@@ -80,28 +88,41 @@ impl PosedBody {
     /// When the person cannot be posed: lengths that disagree, indices out of range, numbers that are not finite,
     /// times that do not ascend; or when the surface's settings cannot work.
     pub fn new(person: &Person, surface: &SurfaceConfig, interpolation: Interpolation) -> Result<Self> {
-        let pose_times_s = person.pose_times_s();
-        if !pose_times_s.windows(2).all(|pair| pair[0] < pair[1]) {
-            return Err(unusable("the poses' times do not ascend".into()));
-        }
-        let (source, rest_m, canonical_vertices_m) = match person {
-            Person::Skinned { model, motion, placement } => {
-                check_skinned(model, motion)?;
-                let body = SkinnedBody::new(model, &motion.betas);
-                let rest_m = body.rest_m();
-                (place(body, motion, placement), rest_m, model.template.clone())
-            }
-            Person::Meshes { vertices, .. } => {
-                check_meshes(vertices)?;
-                (Source::Meshes { vertices_m: vertices.clone() }, vertices[0].clone(), centred(&vertices[0]))
-            }
+        let (source, pose_times_s) = source(person)?;
+        let (rest_m, canonical_vertices_m) = match (&source, person) {
+            (Source::Skinned { body, .. }, Person::Skinned { model, .. }) => (body.rest_m(), model.template.clone()),
+            (_, person) => (first_mesh(person), centred(&first_mesh(person))),
         };
         if let Some(face) = person.faces().iter().find(|face| face.iter().any(|&vertex| vertex >= rest_m.len())) {
             return Err(unusable(format!("a face has the vertices {face:?}, but there are only {}", rest_m.len())));
         }
+        let device_bodies = (surface.posing == Posing::Tensor).then(|| match person {
+            Person::Skinned { model, .. } => DeviceBodies::new(Some(model)),
+            Person::Meshes { .. } => DeviceBodies::new(None),
+        });
         let surface = surface.init(&rest_m, person.faces())?;
         let canonical_m = surface.interpolate(&canonical_vertices_m);
-        Ok(Self { source, pose_times_s, interpolation, surface, canonical_m, canonical_vertices_m })
+        let correction = PoseCorrection::default();
+        Ok(Self { source, pose_times_s, interpolation, surface, canonical_m, canonical_vertices_m, device_bodies, correction })
+    }
+
+    /// The same scatterers on the same body, moved as `person` (the one it was made of) with a correction moves.
+    ///
+    /// # Errors
+    /// As [`Self::new`], of the corrected motion.
+    pub fn corrected(&self, person: &Person, correction: PoseCorrection) -> Result<Self> {
+        let (source, pose_times_s) = source(&correction.apply(person))?;
+        Ok(Self { source, pose_times_s, correction, ..self.clone() })
+    }
+
+    /// By how much it moves otherwise than the person it was made of.
+    pub fn correction(&self) -> &PoseCorrection {
+        &self.correction
+    }
+
+    /// Where frames are posed.
+    pub fn posing(&self) -> Posing {
+        if self.device_bodies.is_some() { Posing::Tensor } else { Posing::Host }
     }
 
     /// Rest positions of the points, `[point, xyz]`, metres: the same place of the body for every pose *and every
@@ -159,6 +180,32 @@ impl PosedBody {
         };
         let middle = motion::basis(&self.pose_times_s, &[middle_s], self.interpolation)?;
         Ok(frame::build(self, middle_s, basis, &middle))
+    }
+}
+
+/// What moves the mesh, and the times of its poses.
+fn source(person: &Person) -> Result<(Source, Vec<f64>)> {
+    let pose_times_s = person.pose_times_s();
+    if !pose_times_s.windows(2).all(|pair| pair[0] < pair[1]) {
+        return Err(unusable("the poses' times do not ascend".into()));
+    }
+    let source = match person {
+        Person::Skinned { model, motion, placement } => {
+            check_skinned(model, motion)?;
+            place(SkinnedBody::new(model, &motion.betas), motion, placement)
+        }
+        Person::Meshes { vertices, .. } => {
+            check_meshes(vertices)?;
+            Source::Meshes { vertices_m: vertices.clone() }
+        }
+    };
+    Ok((source, pose_times_s))
+}
+
+fn first_mesh(person: &Person) -> Vec<[f64; 3]> {
+    match person {
+        Person::Meshes { vertices, .. } => vertices[0].clone(),
+        Person::Skinned { model, .. } => model.template.clone(),
     }
 }
 

@@ -24,6 +24,10 @@ pub struct Poses {
     pub vertices_m: Vec<[f64; 3]>,
     /// `[joint, pose]`: from the rest pose to the world.
     pub rotations: Vec<Matrix>,
+    /// `[joint, pose]`, metres: what each joint adds to turned points of the rest pose, without the shift.
+    pub translations_m: Vec<Vector>,
+    /// `[vertex, pose]`, metres: change of the rest pose by the pose blend shapes, where there are any.
+    pub blends_m: Option<Vec<[f64; 3]>>,
 }
 
 impl SkinnedBody {
@@ -48,6 +52,15 @@ impl SkinnedBody {
         self.shaped.iter().map(|&vertex| vertex.into()).collect()
     }
 
+    pub fn parents(&self) -> &[Option<usize>] {
+        &self.parents
+    }
+
+    /// Joints of the rest pose of this shape, `[joint]`, metres.
+    pub fn rest_joints_m(&self) -> &[Vector] {
+        &self.rest_joints
+    }
+
     /// Poses the body: `world_from_body · LBS(pose) + shift`.
     ///
     /// `poses`: `[pose][joint]` axis-angle, radians. `shifts_m`: `[pose]`, metres, in the world.
@@ -68,17 +81,27 @@ impl SkinnedBody {
             .collect();
 
         let mut vertices_m = vec![[0.0; 3]; self.shaped.len() * count];
-        vertices_m.par_chunks_mut(count.max(1)).with_min_len(64).enumerate().for_each(|(vertex, posed)| {
-            for (pose, target) in posed.iter_mut().enumerate() {
-                let rest = self.shaped[vertex] + self.pose_blend(vertex, &features[pose]);
+        let mut blends_m = vec![[0.0; 3]; self.shaped.len() * count];
+        let posed = vertices_m.par_chunks_mut(count.max(1)).zip(blends_m.par_chunks_mut(count.max(1)));
+        posed.with_min_len(64).enumerate().for_each(|(vertex, (posed, blends))| {
+            for (pose, (target, blended)) in posed.iter_mut().zip(blends).enumerate() {
+                let blend = self.pose_blend(vertex, &features[pose]);
+                *blended = blend.into();
+                let rest = self.shaped[vertex] + blend;
                 let skinned: Vector =
                     self.skinning[vertex].iter().map(|&(joint, weight)| transforms[pose][joint].apply(rest) * weight).sum();
                 *target = (skinned + shifts_m[pose]).into();
             }
         });
         let joints = self.parents.len();
-        let rotations = (0..joints).flat_map(|joint| transforms.iter().map(move |pose| pose[joint].rotation)).collect();
-        Poses { count, vertices_m, rotations }
+        let all = || (0..joints).flat_map(|joint| transforms.iter().map(move |pose| pose[joint]));
+        Poses {
+            count,
+            vertices_m,
+            rotations: all().map(|transform| transform.rotation).collect(),
+            translations_m: all().map(|transform| transform.translation).collect(),
+            blends_m: (!self.pose_directions.is_empty()).then_some(blends_m),
+        }
     }
 
     /// Change of a vertex by the pose blend shapes, metres.

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 
 use super::kinematics::Vector;
+use super::posing::Posing;
 use crate::error::{Error, Result};
 
 /// Where on the mesh the scatterers sit.
@@ -30,11 +31,13 @@ pub struct SurfaceConfig {
     /// Longest edge after splitting, metres; only for `subdivided`. On a sphere of flat facets the error against
     /// the surface integral is −42 dB at half a wavelength and −75 dB at a quarter.
     pub edge_m: f64,
+    /// Where positions, normals and areas are computed.
+    pub posing: Posing,
 }
 
 impl Default for SurfaceConfig {
     fn default() -> Self {
-        Self { sampling: Sampling::Vertices, edge_m: 1.9e-3 }
+        Self { sampling: Sampling::Vertices, edge_m: 1.9e-3, posing: Posing::default() }
     }
 }
 
@@ -102,7 +105,7 @@ impl SurfaceConfig {
 
 /// What a point's area is made of.
 #[derive(Clone, Debug, PartialEq)]
-enum Shares {
+pub(super) enum Shares {
     /// Point = vertex: one third of each facet around it.
     Vertex,
     /// `[point]`: its facet and the part of it.
@@ -120,7 +123,7 @@ pub struct Surface {
     pub corners: Vec<[usize; 3]>,
     /// `[point, 3]`: its barycentric weights there; they sum to 1.
     pub weights: Vec<[f64; 3]>,
-    shares: Shares,
+    pub(super) shares: Shares,
 }
 
 impl Surface {
@@ -264,7 +267,7 @@ mod tests {
     const CENTRE: [f64; 3] = [0.1, 2.0, 0.05];
 
     fn config(sampling: Sampling, edge_m: f64) -> SurfaceConfig {
-        SurfaceConfig { sampling, edge_m }
+        SurfaceConfig { sampling, edge_m, ..Default::default() }
     }
 
     /// Coherent return of the lit side, with the cosine of incidence as amplitude.

@@ -1,38 +1,19 @@
 //! The body as tensor operations: shape, pose and translation to vertices, with gradients to all three.
 //!
 //! The host's f64 chain ([`super::kinematics`], [`super::skinning`]) is the reference. In f32, absolute positions are
-//! good to 1e-7 m only; the *difference form*, [`JointMotion::difference`] with [`skin`], keeps 1e-8 m.
+//! good to 1e-7 m only; what a frame needs is posed in differences ([`super::PosedFrame`]), which keep 1e-8 m.
 
 use burn::tensor::{Tensor, TensorCreationOptions, TensorData};
 
-use super::kinematics::JointTransform;
 use crate::person::BodyModel;
 
-/// What every joint does to points of the rest pose, or the difference of two such motions (skinning is linear in it).
+/// What every joint does to points of the rest pose.
 #[derive(Clone, Debug)]
 pub struct JointMotion {
     /// `[joint, row, column]`.
     pub rotation: Tensor<3>,
     /// `[joint, xyz]`, metres.
     pub translation: Tensor<2>,
-}
-
-impl JointMotion {
-    /// `to − from`, subtracted in f64 on the host before it is cast: small motions keep all their digits.
-    pub fn difference(to: &[JointTransform], from: &[JointTransform], options: impl Into<TensorCreationOptions>) -> Self {
-        assert_eq!(to.len(), from.len(), "body: {} and {} joints", to.len(), from.len());
-        let options = options.into();
-        let (mut rotation, mut translation) = (Vec::new(), Vec::<f64>::new());
-        for (to, from) in to.iter().zip(from) {
-            let turn = to.rotation - from.rotation;
-            rotation.extend((0..9).map(|entry| turn[(entry / 3, entry % 3)]));
-            translation.extend((to.translation - from.translation).iter());
-        }
-        Self {
-            rotation: Tensor::from_data(TensorData::new(rotation, [to.len(), 3, 3]), options.clone()),
-            translation: Tensor::from_data(TensorData::new(translation, [to.len(), 3]), options),
-        }
-    }
 }
 
 /// Linear blend skinning: Σ_joint w (R x + t).
@@ -65,6 +46,12 @@ fn rotate(x: Tensor<2>, rotation: Tensor<2>, weights: Tensor<2>) -> Tensor<2> {
 /// # Gradient
 /// Flows to the angles; smooth, at zero too.
 pub fn rotations(axis_angle: Tensor<2>) -> Tensor<3> {
+    let identity = Tensor::<2>::eye(3, &axis_angle.device()).cast(axis_angle.dtype()).unsqueeze::<3>();
+    turns(axis_angle) + identity
+}
+
+/// The same minus the identity, without cancellation: a small turn keeps all its digits.
+pub fn turns(axis_angle: Tensor<2>) -> Tensor<3> {
     let [joints, _] = axis_angle.dims();
     let square = axis_angle.clone().square().sum_dim(1);
     // Both factors are smooth functions of the squared angle; near zero their series avoid 0/0.
@@ -83,9 +70,8 @@ pub fn rotations(axis_angle: Tensor<2>) -> Tensor<3> {
     let zero = x.zeros_like();
     let cross: Tensor<3> = Tensor::cat(vec![zero.clone(), -z.clone(), y.clone(), z, zero.clone(), -x.clone(), -y, x, zero], 1)
         .reshape([joints, 3, 3]);
-    let identity = Tensor::<2>::eye(3, &axis_angle.device()).cast(axis_angle.dtype()).unsqueeze::<3>();
     let factor = |factor: Tensor<2>| -> Tensor<3> { factor.unsqueeze_dim(2) };
-    cross.clone() * factor(sine) + cross.clone().matmul(cross) * factor(cosine) + identity
+    cross.clone() * factor(sine) + cross.clone().matmul(cross) * factor(cosine)
 }
 
 /// A body model on a device.
@@ -94,11 +80,11 @@ pub struct BodyTensors {
     /// `[vertex, xyz]`, metres.
     template: Tensor<2>,
     /// `[shape, vertex · xyz]`.
-    shape_directions: Option<Tensor<2>>,
+    pub(super) shape_directions: Option<Tensor<2>>,
     /// `[9 (joint − 1), vertex · xyz]`.
-    pose_directions: Option<Tensor<2>>,
+    pub(super) pose_directions: Option<Tensor<2>>,
     /// `[joint, vertex]`.
-    regressor: Tensor<2>,
+    pub(super) regressor: Tensor<2>,
     /// `[vertex, joint]`.
     skinning: Tensor<2>,
     parents: Vec<Option<usize>>,
@@ -209,7 +195,7 @@ mod tests {
     use burn::tensor::{DType, Device};
 
     use super::*;
-    use crate::body::kinematics::{self, Matrix, Vector};
+    use crate::body::kinematics::{Matrix, Vector};
     use crate::body::skinning::SkinnedBody;
     use crate::body::test_bodies::random_body;
 
@@ -300,38 +286,5 @@ mod tests {
                 );
             }
         }
-    }
-
-    #[test]
-    fn the_difference_form_keeps_the_carrier_phase_in_single_precision() {
-        let model = random_body(200, JOINTS, 7);
-        let shaped = kinematics::shaped(&model, &[]);
-        let joints = kinematics::rest_joints(&model, &shaped);
-        let transforms = |time: f64| {
-            let turns: Vec<Matrix> =
-                (0..JOINTS).map(|joint| kinematics::rotation([0.4 + time, joint as f64 * 0.2 - time, time])).collect();
-            kinematics::joint_transforms(&model.parents, &joints, &turns)
-        };
-        // 0.03 rad at every joint: what a walking person does within a frame.
-        let (reference, moved) = (transforms(0.0), transforms(0.03));
-        let wanted: Vec<f64> = shaped
-            .iter()
-            .zip(&model.skinning)
-            .flat_map(|(&point, weights)| {
-                let at = |all: &[JointTransform]| {
-                    weights.iter().map(|&(joint, weight)| all[joint].apply(point) * weight).sum::<Vector>()
-                };
-                let change = at(&moved) - at(&reference);
-                [change.x, change.y, change.z]
-            })
-            .collect();
-        let device = Device::flex();
-        let body = BodyTensors::new(&model, (&device, DType::F32));
-        let rest = body.shaped(data(&[0.0], [1], &device, DType::F32));
-        let change = values(skin(rest, &JointMotion::difference(&moved, &reference, (&device, DType::F32)), body.skinning()));
-        let worst = change.iter().zip(&wanted).map(|(found, wanted)| (found - wanted).abs()).fold(0.0, f64::max);
-        let phase = 2.0 * std::f64::consts::TAU * worst * 77e9 / crate::radar::SPEED_OF_LIGHT;
-        println!("difference form in f32: {worst:.1e} m, {phase:.1e} rad of the two-way phase at 77 GHz");
-        assert!(worst < 2e-8, "{worst} m");
     }
 }

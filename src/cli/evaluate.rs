@@ -18,7 +18,7 @@ use crate::{
     evaluation::{self, Simulation},
     lpips::Lpips,
     metrics::MetricsConfig,
-    training::{LoadedRecording, checkpoint},
+    training::{LoadedRecording, checkpoint, refine},
 };
 
 #[derive(Args)]
@@ -54,10 +54,17 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.without.switch_off(&mut simulator)?;
     let lpips = arguments.lpips.config().map(|config| Lpips::open(&config, &device)).transpose()?;
     let metrics = MetricsConfig::default();
+    // Beside `best` and `last`, in the run folder.
+    let run_folder = arguments.checkpoint.join("..");
+    let poses = refine::read(&run_folder)?;
     let mut evaluations = Vec::new();
     for folder in &arguments.recordings {
         plausible::folder(folder, common)?;
         let recording = LoadedRecording::open(folder, &state.simulator, false)?;
+        let (recording, moved) = refine::refined(recording, &poses)?;
+        if moved {
+            eprintln!("note: {}: its motion as the training run refined it ({})", folder.display(), refine::FILE);
+        }
         report::same_radar(folder, &recording.scene.radar, &state.site.radar)?;
         report::tell_notes(&recording);
         let available = recording.scene.radar.frames;

@@ -64,6 +64,11 @@ impl TrainingProgress {
 
     pub fn show(&mut self, event: &Event) {
         match event {
+            Event::Refined(pose) => {
+                if !self.quiet {
+                    eprintln!("{}", pose.line());
+                }
+            }
             Event::Started { steps, first_step, training_frames, validation_frames } => {
                 let progress = Progress::new("training", *steps, self.quiet);
                 progress.line(&format!("{training_frames} frames to train on, {validation_frames} held out"));

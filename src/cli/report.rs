@@ -19,7 +19,7 @@ use crate::{
     metrics::{DbWindow, MetricsConfig},
     pictures::{self, Chart, Series},
     radar::Radar,
-    training::{FrameSplit, LoadedRecording, checkpoint, checkpoint::Progress},
+    training::{FrameSplit, LoadedRecording, RefinedPose, checkpoint, checkpoint::Progress},
 };
 
 /// Decibels that a picture shows below its strongest cell.
@@ -135,6 +135,8 @@ fn window(map_db: &Map) -> DbWindow {
 
 /// Everything the report of a training run is made of.
 pub(super) struct RunReport<'a> {
+    /// What was refined of the recordings' motions.
+    pub refined: &'a [RefinedPose],
     pub folder: &'a Path,
     pub config: &'a Config,
     pub recordings: &'a [LoadedRecording],
@@ -285,6 +287,9 @@ impl RunReport<'_> {
             first.score(),
             if held_out { ", on held-out frames" } else { " (no frames were held out)" }
         );
+        for pose in self.refined {
+            writeln!(text, "{} (`pose.toml`).\n", pose.line()).expect("text grows");
+        }
         for (folder, evaluation) in evaluations {
             let which = if held_out { "held-out" } else { "training" };
             writeln!(text, "`{}`, {which} frames:\n\n```\n{}```\n", folder.display(), scores::of_frames(evaluation))

@@ -14,7 +14,7 @@ use crate::{
     config::Config,
     data::atomic,
     error::{Error, Result},
-    training::load_recordings,
+    training::{load_recordings, refine},
 };
 
 #[derive(Args)]
@@ -79,7 +79,11 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let outcome = trainer.run(resume.as_deref(), &mut |event| progress.show(&event))?;
     progress.finish();
 
+    let refined = refine::read(&run_folder)?;
+    let recordings =
+        recordings.into_iter().map(|recording| Ok(refine::refined(recording, &refined)?.0)).collect::<Result<Vec<_>>>()?;
     let report = RunReport {
+        refined: &refined,
         folder: &run_folder,
         config: &config,
         recordings: &recordings,

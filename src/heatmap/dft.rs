@@ -58,6 +58,45 @@ impl RangeDoppler {
         self.range.dims()[1]
     }
 
+    /// Power that tones of amplitude 1 put into every range cell, whatever their phase.
+    ///
+    /// # Shapes
+    /// - `sweep_turns`: `[point, 1]`, turns across the window: beat frequencies in range bins
+    /// - result: `[point, range]`; of a real-sampled radar without the images at negative frequencies
+    ///
+    /// # Gradient
+    /// Flows to the sweep; smooth.
+    pub fn range_response(&self, sweep_turns: Tensor<2>) -> Tensor<2> {
+        let [samples, _] = self.range.dims();
+        let grid: Vec<f64> = (0..samples).map(|sample| TAU * sample as f64 / samples as f64).collect();
+        let options = (&sweep_turns.device().without_autodiff(), sweep_turns.dtype());
+        let angle = sweep_turns * Tensor::<2>::from_data(TensorData::new(grid, [1, samples]), options);
+        let power = Complex::new(angle.clone().cos(), angle.sin()).matmul(self.range.clone()).power();
+        match self.sampling {
+            Sampling::Complex => power,
+            // The matrix doubles amplitudes, of which a complex tone already has the whole.
+            Sampling::Real => power * 0.25,
+        }
+    }
+
+    /// Power that points of amplitude 1 put into every Doppler cell, once their mean over the loops is removed.
+    ///
+    /// # Shapes
+    /// - `phase_turns`: `[point, loop]`, turns
+    /// - result: `[point, doppler]`
+    ///
+    /// # Gradient
+    /// Flows to the phase; smooth.
+    pub fn moving_response(&self, phase_turns: Tensor<2>) -> Tensor<2> {
+        // The whole turns of a phase are no part of its sine; taken out first, f32 keeps the rest.
+        let whole = phase_turns.clone().detach().round();
+        let angle = (phase_turns - whole) * TAU;
+        let phasor = Complex::new(angle.clone().cos(), angle.sin());
+        let mean = phasor.clone().mean_dim(1);
+        let transposed = Complex::new(self.doppler.re.clone().transpose(), self.doppler.im.clone().transpose());
+        phasor.sub(mean).matmul(transposed).power()
+    }
+
     /// Complex maps of every antenna and frame.
     ///
     /// # Shapes

@@ -28,6 +28,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::{
+    body::{PoseTensors, PosedFrame},
     complex::Complex,
     effects::{Context, Effects},
     features::{Extent, Gcn, TriPlane, draw},
@@ -149,8 +150,20 @@ impl Simulator {
     /// # Gradient
     /// Flows to everything that learns.
     pub fn clean_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
+        self.signal_of_pose(scene, view, surfaces, None)
+    }
+
+    /// The same of a person who moves otherwise than the scene's.
+    ///
+    /// # Gradient
+    /// Flows to everything that learns, and to the pose through positions, directions, normals, areas and facets; not through
+    /// who is seen, not through normals at every chirp (`equations.amplitudes = "paper"`), and not through what effects know of the body beside its positions.
+    ///
+    /// # Panics
+    /// When a pose is given and the scene poses its body on the host.
+    pub fn signal_of_pose(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces, pose: Option<&PoseTensors>) -> Complex<4> {
         if self.effects.is_empty() {
-            return self.paths_signal(scene, view, surfaces);
+            return self.paths_signal(scene, view, surfaces, pose);
         }
         let frame = view.frame;
         // After lost frames a later one is seen, as far as the motion lasts.
@@ -159,7 +172,7 @@ impl Simulator {
             shift => scene.view(frame + shift).ok(),
         };
         let seen = later.as_deref().unwrap_or(view);
-        let mut signal = self.paths_signal(scene, seen, surfaces);
+        let mut signal = self.paths_signal(scene, seen, surfaces, pose);
         if let Some(reflectors) = self.reflectors_signal(scene, frame, seen) {
             signal = signal.add(reflectors);
         }
@@ -167,7 +180,9 @@ impl Simulator {
     }
 
     /// The sum of direct and indirect paths.
-    fn paths_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
+    fn paths_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces, pose: Option<&PoseTensors>) -> Complex<4> {
+        let posed = scene.posed(view, pose, &self.device());
+        let posed = posed.as_ref();
         let mut sum: Option<Complex<4>> = None;
         let mut add = |part: Complex<4>| {
             sum = Some(match sum.take() {
@@ -176,10 +191,10 @@ impl Simulator {
             });
         };
         if self.config.paths.has_direct() {
-            add(self.direct_signal(scene, view, surfaces));
+            add(self.direct_signal(scene, view, surfaces, posed));
         }
         if self.config.paths.has_indirect() && !scene.proxies.is_empty() {
-            add(self.indirect_signal(scene, view, surfaces));
+            add(self.indirect_signal(scene, view, surfaces, posed));
         }
         sum.unwrap_or_else(|| {
             let [_, tx, rx, loops, samples] = scene.radar.dims();
@@ -225,11 +240,15 @@ impl Simulator {
                 return Some("patch decoder");
             }
         }
+        let posed: Option<PosedFrame> = scene.posed(view, None, &self.device());
+        let posed = posed.as_ref();
         let finite = |signal: Complex<4>| is_finite(signal.re) && is_finite(signal.im);
-        if self.config.paths.has_direct() && !finite(self.direct_signal(scene, view, &surfaces)) {
+        if self.config.paths.has_direct() && !finite(self.direct_signal(scene, view, &surfaces, posed)) {
             return Some("direct path");
         }
-        if self.config.paths.has_indirect() && !scene.proxies.is_empty() && !finite(self.indirect_signal(scene, view, &surfaces))
+        if self.config.paths.has_indirect()
+            && !scene.proxies.is_empty()
+            && !finite(self.indirect_signal(scene, view, &surfaces, posed))
         {
             return Some("indirect path");
         }

@@ -8,7 +8,7 @@ use super::{
     surfaces::{column, rows},
 };
 use crate::{
-    body::Displacement,
+    body::{Displacement, PosedFrame},
     complex::Complex,
     if_signal::indirect_signal,
     paths::{Amplitude, Points},
@@ -24,6 +24,8 @@ use crate::{
 pub(super) struct Visible<'a> {
     pub scene: &'a Scene,
     pub view: &'a FrameView,
+    /// The body's frame on the device; absent for a room, and where the host poses the body.
+    pub posed: Option<&'a PosedFrame<'a>>,
     pub kind: Kind,
     pub points: &'a [usize],
     pub reference_m: Vec<[f64; 3]>,
@@ -56,13 +58,19 @@ pub(super) enum Kind {
 
 impl Simulator {
     /// Eq. 2 for all transmitters: `[tx, rx, loop, sample]`.
-    pub(super) fn direct_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
+    pub(super) fn direct_signal(
+        &self,
+        scene: &Scene,
+        view: &FrameView,
+        surfaces: &Surfaces,
+        posed: Option<&PosedFrame<'_>>,
+    ) -> Complex<4> {
         let [_, receivers_m] = scene.radar.antenna_centres_m();
         let (scattering, place) = match self.config.paths {
             PathModel::Coupled => (Scattering::Patches, scene.radar.centre_m()),
             _ => (Scattering::Microfacets, receivers_m),
         };
-        let groups = self.groups(scene, view, surfaces, &view.direct, scattering);
+        let groups = self.groups((scene, view, posed), surfaces, &view.direct, scattering);
         match self.config.equations.amplitudes {
             Amplitudes::Frame => {
                 let answers: Vec<_> = groups.iter().map(|group| (group, self.of_frame(group, place))).collect();
@@ -119,11 +127,17 @@ impl Simulator {
     }
 
     /// Eq. 3 for all transmitters and walls: `[tx, rx, loop, sample]`.
-    pub(super) fn indirect_signal(&self, scene: &Scene, view: &FrameView, surfaces: &Surfaces) -> Complex<4> {
+    pub(super) fn indirect_signal(
+        &self,
+        scene: &Scene,
+        view: &FrameView,
+        surfaces: &Surfaces,
+        posed: Option<&PosedFrame<'_>>,
+    ) -> Complex<4> {
         let frame = self.config.equations.amplitudes == Amplitudes::Frame;
         let walls: Vec<(usize, Group<'_>, Option<Tensor<2>>)> = (0..scene.proxies.len())
             .flat_map(|wall| {
-                let groups = self.groups(scene, view, surfaces, &view.proxies[wall], Scattering::Patches);
+                let groups = self.groups((scene, view, posed), surfaces, &view.proxies[wall], Scattering::Patches);
                 groups.into_iter().map(move |group| (wall, group))
             })
             .map(|(wall, group)| {
@@ -166,8 +180,7 @@ impl Simulator {
     /// The visible scatterers of body and room, with their decoded surface.
     fn groups<'a>(
         &self,
-        scene: &'a Scene,
-        view: &'a FrameView,
+        (scene, view, posed): (&'a Scene, &'a FrameView, Option<&'a PosedFrame<'a>>),
         surfaces: &Surfaces,
         seen: &'a Seen,
         scattering: Scattering,
@@ -182,7 +195,8 @@ impl Simulator {
                 Kind::Room => &scene.patches.position_m,
             };
             let reference_m = points.iter().map(|&point| all[point]).collect();
-            let visible = Visible { scene, view, kind, points, reference_m };
+            let posed = posed.filter(|_| kind == Kind::Body);
+            let visible = Visible { scene, view, posed, kind, points, reference_m };
             let picked = rows(points, all.len(), &device);
             let surface = Surface { material: surface.material.pick(&picked), patch: surface.patch.pick(&picked) };
             let weight = self.weight(&visible);
@@ -194,7 +208,7 @@ impl Simulator {
     /// Area times gain, `[point, 1]`, as far as amplitudes are weighted by either.
     fn weight(&self, visible: &Visible<'_>) -> Option<Tensor<2>> {
         let equations = &self.config.equations;
-        let area = (equations.weights == Weights::Area).then(|| column(visible.areas_m2().into_iter(), &self.device()));
+        let area = (equations.weights == Weights::Area).then(|| visible.area_tensor(&self.device()));
         let gain = (equations.gains == Gains::Learned).then(|| {
             let gain = match visible.kind {
                 Kind::Body => &self.decoders.body_gain,
@@ -251,8 +265,15 @@ impl Visible<'_> {
         self.pick(|| self.of_frame(|frame| &frame.normal), &self.scene.patches.normal)
     }
 
-    fn areas_m2(&self) -> Vec<f64> {
-        self.pick(|| self.of_frame(|frame| &frame.area_m2), &self.scene.patches.area_m2)
+    /// `[point, 1]`, m².
+    fn area_tensor(&self, device: &Device) -> Tensor<2> {
+        match self.posed {
+            Some(posed) => posed.areas_m2(self.points),
+            None => {
+                let areas_m2 = self.pick(|| self.of_frame(|frame| &frame.area_m2), &self.scene.patches.area_m2);
+                column(areas_m2.into_iter(), device)
+            }
+        }
     }
 
     /// Tangents that turn with the body; a room needs none.
@@ -272,6 +293,9 @@ impl Group<'_> {
         let Visible { scene, view, kind, points, .. } = &self.visible;
         let loops = scene.radar.loops_per_frame;
         let offset_m = (self.scattering == Scattering::Patches).then(|| self.surface.patch.offset_m.clone());
+        if let Some(posed) = self.visible.posed {
+            return posed.displacement(points, tx * loops..(tx + 1) * loops, offset_m);
+        }
         match (kind, &scene.body, &view.body, offset_m) {
             (Kind::Body, Some(body), Some(frame), offset_m) => {
                 body.displacement(frame, points, tx * loops..(tx + 1) * loops, offset_m, device)
@@ -285,9 +309,11 @@ impl Group<'_> {
     }
 
     fn amplitude(&self, amplitude: Tensor<2>, displacement: &Displacement, tx: usize) -> Amplitude {
-        let Visible { scene, view, kind, points, reference_m } = &self.visible;
+        let Visible { scene, view, posed, kind, points, reference_m } = &self.visible;
         match (kind, &view.body) {
-            (Kind::Body, Some(frame)) => scene.body_amplitude(frame, points, (reference_m, displacement), tx, amplitude),
+            (Kind::Body, Some(frame)) => {
+                scene.body_amplitude((frame, *posed), points, (reference_m, displacement), tx, amplitude)
+            }
             _ => Amplitude::real(amplitude),
         }
     }

@@ -5,13 +5,13 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use burn::tensor::Tensor;
+use burn::tensor::{DType, Device, Tensor};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::SimulatorConfig;
+use super::{SimulatorConfig, surfaces::directions};
 use crate::{
-    body::{BodyFrame, Displacement, PosedBody, Sampling, facets},
+    body::{BodyFrame, Displacement, PoseCorrection, PoseTensors, PosedBody, PosedFrame, Posing, Sampling, facets},
     error::Result,
     paths::Amplitude,
     person::{JOINT_NAMES, Person},
@@ -105,7 +105,7 @@ impl Scene {
     /// Flows to amplitude and displacement.
     pub(crate) fn body_amplitude(
         &self,
-        frame: &BodyFrame,
+        (frame, posed): (&BodyFrame, Option<&PosedFrame<'_>>),
         points: &[usize],
         (reference_m, displacement): (&[[f64; 3]], &Displacement),
         tx: usize,
@@ -116,9 +116,58 @@ impl Scene {
         let [_, receivers_m] = radar.antenna_centres_m();
         let antennas = [radar.tx_position_m(tx), receivers_m];
         let wavevector = facets::wavevector(reference_m, displacement, antennas, radar.wavelength_m());
-        let edges = body.facet_edges(frame, points, tx * loops..(tx + 1) * loops, &amplitude.device());
+        let chirps = tx * loops..(tx + 1) * loops;
+        let edges = match posed {
+            Some(posed) => posed.facet_edges(points, chirps),
+            None => body.facet_edges(frame, points, chirps, &amplitude.device()),
+        };
         let integral = facets::facet_integral(&edges, &wavevector);
         Amplitude { re: integral.re * amplitude.clone(), im: Some(integral.im * amplitude) }
+    }
+
+    /// The same scene with its person (the one it was made with) moved by a correction.
+    ///
+    /// # Errors
+    /// A motion that cannot be posed once corrected.
+    pub fn corrected(&self, person: &Person, correction: PoseCorrection) -> Result<Self> {
+        Ok(Self {
+            radar: self.radar.clone(),
+            body: self.body.as_ref().map(|body| body.corrected(person, correction)).transpose()?,
+            room: self.room.clone(),
+            patches: self.patches.clone(),
+            proxies: self.proxies.clone(),
+            facets: self.facets,
+            joints: self.joints.clone(),
+            flip_exponent: self.flip_exponent,
+            flattest: self.flattest.clone(),
+            views: Mutex::new(VecDeque::new()),
+        })
+    }
+
+    /// The body of a frame on a device, with what learns of its pose; `None` without a body or where the host poses it.
+    ///
+    /// # Panics
+    /// When a pose is given and the host poses the body.
+    pub fn posed<'a>(&'a self, view: &'a FrameView, pose: Option<&PoseTensors>, device: &Device) -> Option<PosedFrame<'a>> {
+        let (body, frame) = self.body.as_ref().zip(view.body.as_ref())?;
+        if body.posing() == Posing::Host {
+            assert!(pose.is_none(), "a pose learns only with posing = \"tensor\"");
+            return None;
+        }
+        Some(PosedFrame::new(body, frame, pose, device, DType::F32))
+    }
+
+    /// Unit vectors towards the radar's centre from points that have moved on the device, `[point, xyz]`.
+    ///
+    /// # Gradient
+    /// Flows to `moved_m` (`[point, xyz]`, metres from the references).
+    pub fn towards_radar(&self, reference_m: &[[f64; 3]], moved_m: Tensor<2>, device: &Device) -> Tensor<2> {
+        directions(reference_m.iter().copied(), moved_m, self.radar.centre_m(), device).squeeze_dim(1)
+    }
+
+    /// Of chosen points of the body the canonical axis that lies flattest on the surface.
+    pub(super) fn flattest_of(&self, points: &[usize]) -> Vec<usize> {
+        points.iter().map(|&point| self.flattest[point]).collect()
     }
 
     /// Range of the farthest echo that the scene can hold, metres.

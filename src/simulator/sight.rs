@@ -4,7 +4,7 @@ use burn::tensor::{DType, Device, Tensor};
 
 use super::{
     scattering::{Group, Kind, Scattering, Visible},
-    surfaces::{column, towards, vectors},
+    surfaces::{column, directions, towards, vectors},
 };
 use crate::body::Displacement;
 
@@ -25,6 +25,12 @@ pub(super) struct Sight {
 impl Visible<'_> {
     /// In the middle of the frame.
     pub fn attitude(&self, device: &Device) -> Attitude {
+        if let Some(posed) = self.posed {
+            return Attitude {
+                normal: posed.normals(self.points).unsqueeze_dim(1),
+                tangent: Some(posed.turned_axes(self.points, &self.scene.flattest_of(self.points)).unsqueeze_dim(1)),
+            };
+        }
         Attitude {
             normal: vectors(self.normals().into_iter(), device),
             tangent: self.tangents().map(|tangents| vectors(tangents.into_iter(), device)),
@@ -34,13 +40,19 @@ impl Visible<'_> {
     /// In the middle of the frame, from the transmitters' centre to a place.
     pub fn sight(&self, place: [f64; 3], device: &Device) -> Sight {
         let [transmitters_m, _] = self.scene.radar.antenna_centres_m();
-        let towards = |place| towards(self.reference_m.iter().copied(), place, device);
+        let towards = |place| {
+            let references = self.reference_m.iter().copied();
+            match self.posed {
+                Some(posed) => directions(references, posed.middle_m(self.points), place, device),
+                None => towards(references, place, device),
+            }
+        };
         Sight { incident: towards(transmitters_m), outgoing: towards(place) }
     }
 }
 
 impl Group<'_> {
-    /// At the chirps of a transmitter; tangents only for patches.
+    /// At the chirps of a transmitter, as the host has them: no gradient to the pose; tangents only for patches.
     pub fn attitude_at(&self, tx: usize, device: &Device) -> Attitude {
         let Visible { scene, view, kind, points, .. } = &self.visible;
         let (Kind::Body, Some(body), Some(frame)) = (kind, &scene.body, &view.body) else {

@@ -76,6 +76,23 @@ pub(super) fn towards(points: impl ExactSizeIterator<Item = [f64; 3]>, place: [f
     )
 }
 
+/// The same from points that have moved on the device, `[point, xyz]`, metres.
+///
+/// # Gradient
+/// Flows to `moved_m`.
+pub(super) fn directions(
+    points: impl ExactSizeIterator<Item = [f64; 3]>,
+    moved_m: Tensor<2>,
+    place: [f64; 3],
+    device: &Device,
+) -> Tensor<3> {
+    let ways = points.map(|point| std::array::from_fn(|axis| place[axis] - point[axis]));
+    let way = vectors(ways, device) - moved_m.unsqueeze_dim(1);
+    // The small number keeps value and gradient finite in the place itself.
+    let length = (way.clone().square().sum_dim(2) + 1e-18).sqrt();
+    way / length
+}
+
 /// `[point, 1, xyz]`.
 pub(super) fn vectors(values: impl ExactSizeIterator<Item = [f64; 3]>, device: &Device) -> Tensor<3> {
     let count = values.len();

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::Split;
+use super::{RefineConfig, Split};
 use crate::{
     error::{Error, Result},
     heatmap::HeatmapConfig,
@@ -39,6 +39,10 @@ pub struct TrainingConfig {
     pub patience_epochs: usize,
     /// Whether the simulator's effects learn too.
     pub learn_effects: bool,
+    /// Whether the motions of the recordings are refined first, by centimetres, degrees and milliseconds; needs
+    /// `simulator.surface.posing = "tensor"`.
+    pub refine_pose: bool,
+    pub refine: RefineConfig,
     pub heatmap: HeatmapConfig,
     pub loss: LossConfig,
 }
@@ -62,6 +66,8 @@ impl Default for TrainingConfig {
             start_from: None,
             patience_epochs: 0,
             learn_effects: true,
+            refine_pose: false,
+            refine: RefineConfig::default(),
             heatmap: HeatmapConfig::default(),
             loss: LossConfig::default(),
         }
@@ -85,6 +91,7 @@ impl TrainingConfig {
         if let Some((key, value)) = positive.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
             return Err(Error::setting(format!("training.{key}"), value, "a positive number"));
         }
+        self.refine.check("training.refine")?;
         if !(0.0..1.0).contains(&self.validation_fraction) {
             return Err(Error::setting("training.validation_fraction", self.validation_fraction, "0 or more, and less than 1")
                 .with_hint("something must be left to train on"));

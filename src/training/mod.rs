@@ -4,12 +4,14 @@ mod calibrate;
 pub mod checkpoint;
 mod config;
 mod metrics;
+pub mod refine;
 mod site;
 mod split;
 mod trainer;
 
 pub use config::TrainingConfig;
 pub use metrics::EpochMetrics;
+pub use refine::{RefineConfig, RefinedPose};
 pub use site::{LoadedRecording, load_recordings, refuse_ambiguous_ranges, site, site_from};
 pub use split::{FrameId, FrameSplit, Split, step_rng};
 pub use trainer::{Event, Outcome, Trainer};

@@ -38,6 +38,14 @@ impl LoadedRecording {
         Ok(loaded)
     }
 
+    /// The same recording read again, with a scene of its own.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn again(&self, config: &SimulatorConfig) -> Result<Self> {
+        Self::open(&self.folder, config, false)
+    }
+
     /// Where the person's motion stands, if a motion is what moves the person.
     pub fn placement(&self) -> Option<Placement> {
         match self.recording.person() {

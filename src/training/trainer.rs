@@ -12,9 +12,9 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    EpochMetrics, FrameId, FrameSplit, LoadedRecording, TrainingConfig, calibrate,
+    EpochMetrics, FrameId, FrameSplit, LoadedRecording, RefinedPose, TrainingConfig, calibrate,
     checkpoint::{self, CheckpointState, Progress, Site},
-    step_rng,
+    refine, step_rng,
 };
 use crate::{
     complex::Complex,
@@ -27,11 +27,24 @@ use crate::{
 /// What happens in a run, for whoever shows it.
 #[derive(Clone, Debug)]
 pub enum Event {
-    Started { steps: usize, first_step: usize, training_frames: usize, validation_frames: usize },
-    Step { step: usize, loss: f64 },
+    /// A recording's motion was refined, before the first step.
+    Refined(RefinedPose),
+    Started {
+        steps: usize,
+        first_step: usize,
+        training_frames: usize,
+        validation_frames: usize,
+    },
+    Step {
+        step: usize,
+        loss: f64,
+    },
     Epoch(EpochMetrics),
     Saved(PathBuf),
-    StoppedEarly { epoch: usize, best_epoch: usize },
+    StoppedEarly {
+        epoch: usize,
+        best_epoch: usize,
+    },
 }
 
 /// How a run ended.
@@ -72,8 +85,42 @@ impl Trainer<'_> {
     /// A resumed run visits the same frames with the same noise as one that was never stopped.
     pub fn run(&self, resume: Option<&Path>, emit: &mut dyn FnMut(Event)) -> Result<Outcome> {
         self.config.check()?;
+        if !self.config.refine_pose {
+            return self.train(resume, emit);
+        }
+        let mut poses = if resume.is_some() { refine::read(self.folder)? } else { Vec::new() };
+        if poses.is_empty() {
+            poses = self.refine(emit)?;
+            refine::write(self.folder, &poses)?;
+        }
+        let recordings: Vec<LoadedRecording> = self
+            .recordings
+            .iter()
+            .map(|recording| Ok(refine::refined(recording.again(self.simulator_config)?, &poses)?.0))
+            .collect::<Result<_>>()?;
+        Trainer { recordings: &recordings, site: self.site.clone(), ..*self }.train(resume, emit)
+    }
+
+    fn split(&self) -> FrameSplit {
         let counts: Vec<usize> = self.recordings.iter().map(|recording| recording.scene.radar.frames).collect();
-        let split = FrameSplit::new(&counts, self.config.validation_fraction, self.config.split, self.seed);
+        FrameSplit::new(&counts, self.config.validation_fraction, self.config.split, self.seed)
+    }
+
+    /// What every recording's motion lacks, from its training frames.
+    fn refine(&self, emit: &mut dyn FnMut(Event)) -> Result<Vec<RefinedPose>> {
+        let split = self.split();
+        let one = |(index, recording): (usize, &LoadedRecording)| -> Result<RefinedPose> {
+            let frames: Vec<usize> = split.training.iter().filter(|id| id.recording == index).map(|id| id.frame).collect();
+            let correction = refine::refine(recording, &frames, &self.config.refine, &self.config.heatmap, self.device())?;
+            let pose = RefinedPose { recording: recording.folder.clone(), correction };
+            emit(Event::Refined(pose.clone()));
+            Ok(pose)
+        };
+        self.recordings.iter().enumerate().map(one).collect()
+    }
+
+    fn train(&self, resume: Option<&Path>, emit: &mut dyn FnMut(Event)) -> Result<Outcome> {
+        let split = self.split();
         if let Some(frames) = self.config.frames.filter(|&frames| frames > split.training.len()) {
             return Err(Error::setting("training.frames", frames, format!("at most {}, all there are", split.training.len())));
         }

@@ -1,0 +1,503 @@
+//! The posed body as tensor operations: positions, normals and areas of a frame, with gradients to the pose.
+//!
+//! The host's f64 frame is the reference, and the device holds what differs from it: joints' motions minus those of the middle
+//! of the frame (subtracted in f64), and changes of the pose as expanded products. So f32 keeps the carrier's phase.
+
+mod area;
+mod chain;
+
+use std::ops::Range;
+use std::sync::{Arc, Mutex};
+
+use burn::tensor::{DType, Device, Int, Tensor, TensorData};
+use serde::{Deserialize, Serialize};
+
+use super::correction::PoseTensors;
+use super::facets::FacetEdges;
+use super::frame::Rotations;
+use super::kinematics::{Matrix, Vector, rotation};
+use super::surface::Shares;
+use super::tensors::{BodyTensors, turns};
+use super::{BodyFrame, Displacement, PosedBody, Source};
+use crate::person::BodyModel;
+use chain::Chain;
+
+/// Where the body is posed (setting `simulator.surface.posing`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Posing {
+    /// On the device, as tensor operations: gradients flow to the pose. The same values to f32's rounding.
+    #[default]
+    Tensor,
+    /// On the host in f64: positions, normals and areas are constants of training.
+    Host,
+}
+
+/// A device without its autodiff, and a number type: constants are made there, gradients come from what they meet.
+pub struct On {
+    device: Device,
+    dtype: DType,
+}
+
+/// What a device keeps of a body; made once.
+#[derive(Debug)]
+struct DeviceBody {
+    /// Absent where meshes move the body.
+    model: Option<BodyTensors>,
+    corners: area::Corners,
+}
+
+/// The device bodies made so far, shared by the clones of a [`PosedBody`].
+#[derive(Clone, Debug)]
+pub(super) struct DeviceBodies {
+    model: Option<Arc<BodyModel>>,
+    made: Arc<Mutex<Vec<(Device, DType, Arc<DeviceBody>)>>>,
+}
+
+impl DeviceBodies {
+    pub fn new(model: Option<&BodyModel>) -> Self {
+        Self { model: model.cloned().map(Arc::new), made: Arc::default() }
+    }
+
+    fn on(&self, on: &On, faces: &[[usize; 3]]) -> Arc<DeviceBody> {
+        let mut made = self.made.lock().expect("no panic while locked");
+        if let Some((_, _, body)) = made.iter().find(|(device, dtype, _)| *device == on.device && *dtype == on.dtype) {
+            return body.clone();
+        }
+        let corners = std::array::from_fn(|corner| on.ids(faces.iter().map(|face| face[corner])));
+        let model = self.model.as_ref().map(|model| BodyTensors::new(model, (&on.device, on.dtype)));
+        let body = Arc::new(DeviceBody { model, corners });
+        made.push((on.device.clone(), on.dtype, body.clone()));
+        body
+    }
+}
+
+impl On {
+    fn ids(&self, ids: impl Iterator<Item = usize>) -> Tensor<1, Int> {
+        let ids: Vec<i64> = ids.map(|id| id as i64).collect();
+        let count = ids.len();
+        Tensor::from_data(TensorData::new(ids, [count]), &self.device)
+    }
+}
+
+/// One frame of a body on a device.
+pub struct PosedFrame<'a> {
+    body: &'a PosedBody,
+    frame: &'a BodyFrame,
+    on: On,
+    /// Whether results must join a graph of gradients.
+    autodiff: bool,
+    /// `[vertex, pose, xyz]`, metres from the reference.
+    change_m: Tensor<3>,
+    /// `[vertex, pose · row · column]`: from the rest pose to the radar frame, before the heading's change.
+    rotation: Tensor<2>,
+    /// Transpose of the heading's rotation minus one.
+    heading: Option<Tensor<2>>,
+    /// Change of the clock, `[1, 1]`, seconds.
+    clock_s: Option<Tensor<2>>,
+    /// `[vertex, xyz]`, metres from the reference, in the middle of the frame.
+    middle_m: Tensor<2>,
+    /// `[facet, xyz]`, m².
+    doubled_areas: Tensor<2>,
+    /// `[vertex, xyz]`: unit, or zero where there is no area.
+    normals: Tensor<2>,
+    corners: area::Corners,
+}
+
+impl<'a> PosedFrame<'a> {
+    /// # Shapes
+    /// - `pose`: what learns of the pose; without it all is constant
+    /// - `device`: with autodiff where gradients are wanted
+    ///
+    /// # Gradient
+    /// Of everything below flows to each part of `pose`; smooth, but for normals of facets without area.
+    ///
+    /// # Panics
+    /// When the body is one that the host poses, or `frame` is another body's.
+    pub fn new(body: &'a PosedBody, frame: &'a BodyFrame, pose: Option<&PoseTensors>, device: &Device, dtype: DType) -> Self {
+        let on = On { device: device.clone().without_autodiff(), dtype };
+        let bodies = body.device_bodies.as_ref().expect("posing: this body is posed on the host");
+        let on_device = bodies.on(&on, &body.surface.faces);
+        let nothing = PoseTensors::default();
+        let pose = pose.unwrap_or(&nothing);
+        let mover = Mover { body, frame, on: &on, device: &on_device, pose };
+        let (own_m, rotation) = mover.before_heading();
+        let (change_m, heading) = mover.placed(own_m);
+        let clock_s = pose.clock_s.clone().map(|clock| (clock - body.correction.clock_s).reshape([1, 1]));
+        let [vertices, _, _] = change_m.dims();
+        let mut posed = Self {
+            middle_m: on.tensor(vec![0.0; vertices * 3], [vertices, 3]),
+            doubled_areas: on.tensor(vec![], [0, 3]),
+            normals: on.tensor(vec![], [0, 3]),
+            corners: on_device.corners.clone(),
+            autodiff: device.is_autodiff(),
+            body,
+            frame,
+            on,
+            change_m,
+            rotation,
+            heading,
+            clock_s,
+        };
+        posed.look_at_middle();
+        posed
+    }
+
+    fn look_at_middle(&mut self) {
+        let (on, frame) = (&self.on, self.frame);
+        let (poses, vertices) = (frame.basis.poses.len(), frame.vertices_m.len());
+        let weights = self.basis(&frame.middle.weights, &frame.middle.rates);
+        let parts: Vec<Tensor<2>> = (0..3).map(|axis| part(&self.change_m, axis).matmul(weights.clone())).collect();
+        debug_assert_eq!(parts[0].dims(), [vertices, 1], "{poses} poses");
+        self.middle_m = Tensor::cat(parts, 1);
+        let faces = &self.body.surface.faces;
+        let edge = |corner: usize| {
+            let at = |vertex: usize| Vector::from(frame.vertices_m[vertex]);
+            let flat = faces.iter().flat_map(|face| (at(face[corner]) - at(face[0])).data.0[0]).collect();
+            let rest: Tensor<2> = on.tensor(flat, [faces.len(), 3]);
+            let moved = |corner: usize| self.middle_m.clone().select(0, self.corners[corner].clone());
+            rest + moved(corner) - moved(0)
+        };
+        self.doubled_areas = area::doubled_areas(edge(1), edge(2));
+        let sums = area::around(self.doubled_areas.clone(), &self.corners, vertices);
+        self.normals = area::unit(sums, [0.0; 3]);
+    }
+
+    /// As [`PosedBody::displacement`], `[point, chirp]`, metres.
+    pub fn displacement(&self, points: &[usize], chirps: Range<usize>, offset: Option<Tensor<2>>) -> Displacement {
+        let poses = self.frame.basis.poses.len();
+        let table = self.change_m.clone().reshape([self.frame.vertices_m.len(), poses * 3]);
+        let mut window: Tensor<3> = self.at_points(table, points).reshape([points.len(), poses, 3]);
+        if let Some(offset) = offset {
+            let rotation: Tensor<4> = self.at_points(self.rotation.clone(), points).reshape([points.len(), poses, 3, 3]);
+            let turned = (rotation * offset.reshape([points.len(), 1, 1, 3])).sum_dim(3).squeeze_dim::<3>(3);
+            window = window + self.spun(turned);
+        }
+        let weights = self.chirps(&chirps);
+        self.joined(std::array::from_fn(|axis| part(&window, axis).matmul(weights.clone())))
+    }
+
+    /// As [`PosedBody::facet_edges`].
+    pub fn facet_edges(&self, points: &[usize], chirps: Range<usize>) -> FacetEdges {
+        let weights = self.chirps(&chirps);
+        let corners = &self.body.surface.corners;
+        let moved = |corner: usize| {
+            let ids = self.on.ids(points.iter().map(|&point| corners[point][corner]));
+            self.change_m.clone().select(0, ids)
+        };
+        let first = moved(0);
+        let edge = |corner: usize| {
+            let window = moved(corner) - first.clone();
+            self.joined(std::array::from_fn(|axis| {
+                let at = |vertex: usize| self.frame.vertices_m[vertex][axis];
+                let rest = points.iter().map(|&point| at(corners[point][corner]) - at(corners[point][0])).collect();
+                part(&window, axis).matmul(weights.clone()) + self.on.tensor(rest, [points.len(), 1])
+            }))
+        };
+        FacetEdges { second: edge(1), third: edge(2) }
+    }
+
+    /// Unit normals of chosen points in the middle of the frame, `[point, xyz]`.
+    pub fn normals(&self, points: &[usize]) -> Tensor<2> {
+        area::unit(self.at_points(self.normals.clone(), points), [0.0, 0.0, 1.0])
+    }
+
+    /// `[point, 1]`, m², in the middle of the frame.
+    pub fn areas_m2(&self, points: &[usize]) -> Tensor<2> {
+        let doubled = area::lengths(self.doubled_areas.clone());
+        match &self.body.surface.shares {
+            Shares::Vertex => {
+                let of_vertices = area::around(doubled / 6.0, &self.corners, self.frame.vertices_m.len());
+                of_vertices.select(0, self.on.ids(points.iter().copied()))
+            }
+            Shares::Facet(shares) => {
+                let facets = self.on.ids(points.iter().map(|&point| shares[point].0));
+                let share = points.iter().map(|&point| 0.5 * shares[point].1).collect();
+                doubled.select(0, facets) * self.on.tensor(share, [points.len(), 1])
+            }
+        }
+    }
+
+    /// Where chosen points are in the middle of the frame, `[point, xyz]`, metres from their references.
+    pub fn middle_m(&self, points: &[usize]) -> Tensor<2> {
+        self.at_points(self.middle_m.clone(), points)
+    }
+
+    /// A canonical axis of each chosen point (0, 1 or 2), turned with the body, `[point, xyz]`.
+    pub fn turned_axes(&self, points: &[usize], axes: &[usize]) -> Tensor<2> {
+        let pose = self.frame.basis.poses.len() / 2;
+        let rotation = self.at_points(self.rotation.clone().narrow(1, 9 * pose, 9), points).reshape([points.len(), 3, 3]);
+        let one_hot = axes.iter().flat_map(|&axis| (0..3).map(move |column| if column == axis { 1.0 } else { 0.0 })).collect();
+        let one_hot: Tensor<3> = self.on.tensor(one_hot, [points.len(), 1, 3]);
+        let turned: Tensor<2> = (rotation * one_hot).sum_dim(2).squeeze_dim(2);
+        self.spun(turned.unsqueeze_dim(1)).squeeze_dim(1)
+    }
+
+    /// Vectors `[point, pose, xyz]` after the heading's change.
+    fn spun(&self, vectors: Tensor<3>) -> Tensor<3> {
+        match &self.heading {
+            Some(heading) => vectors.clone() + times(vectors, heading.clone()),
+            None => vectors,
+        }
+    }
+
+    /// A quantity of the vertices at chosen points, `[vertex, feature]` to `[point, feature]`.
+    fn at_points(&self, table: Tensor<2>, points: &[usize]) -> Tensor<2> {
+        let surface = &self.body.surface;
+        if surface.is_vertices() {
+            return table.select(0, self.on.ids(points.iter().copied()));
+        }
+        let corner = |corner: usize| {
+            let share = points.iter().map(|&point| surface.weights[point][corner]).collect();
+            let ids = self.on.ids(points.iter().map(|&point| surface.corners[point][corner]));
+            table.clone().select(0, ids) * self.on.tensor(share, [points.len(), 1])
+        };
+        corner(0) + corner(1) + corner(2)
+    }
+
+    fn chirps(&self, chirps: &Range<usize>) -> Tensor<2> {
+        let poses = self.frame.basis.poses.len();
+        let rows = chirps.start * poses..chirps.end * poses;
+        self.basis(&self.frame.basis.weights[rows.clone()], &self.frame.basis.rates[rows])
+    }
+
+    /// `[pose, time]` from weights and rates `[time, pose]`: a later motion is seen at an earlier pose.
+    fn basis(&self, weights: &[f64], rates: &[f64]) -> Tensor<2> {
+        let poses = self.frame.basis.poses.len();
+        let times = weights.len() / poses;
+        let rows = |values: &[f64]| self.on.tensor(values.to_vec(), [times, poses]).transpose();
+        match &self.clock_s {
+            Some(clock) => rows(weights) - rows(rates) * clock.clone(),
+            None => rows(weights),
+        }
+    }
+
+    fn joined(&self, parts: [Tensor<2>; 3]) -> Displacement {
+        let [x, y, z] = parts.map(|part| if self.autodiff { part.autodiff() } else { part });
+        Displacement { x, y, z }
+    }
+}
+
+/// Component of vectors `[row, pose, xyz]`, `[row, pose]`.
+fn part(vectors: &Tensor<3>, axis: usize) -> Tensor<2> {
+    vectors.clone().narrow(2, axis, 1).squeeze_dim(2)
+}
+
+/// Vectors `[a, b, xyz]` times a matrix from the right.
+fn times(vectors: Tensor<3>, matrix: Tensor<2>) -> Tensor<3> {
+    let [a, b, _] = vectors.dims();
+    vectors.reshape([a * b, 3]).matmul(matrix).reshape([a, b, 3])
+}
+
+/// What moves the vertices of one frame.
+struct Mover<'a> {
+    body: &'a PosedBody,
+    frame: &'a BodyFrame,
+    on: &'a On,
+    device: &'a DeviceBody,
+    pose: &'a PoseTensors,
+}
+
+impl Mover<'_> {
+    /// Change of the vertices by motion, joints and shape, `[vertex, pose, xyz]`, and their rotations.
+    fn before_heading(&self) -> (Tensor<3>, Tensor<2>) {
+        let (poses, vertices) = (self.frame.basis.poses.len(), self.frame.vertices_m.len());
+        match (&self.frame.rotations, &self.body.source, &self.device.model) {
+            (Rotations::Joints(_), Source::Skinned { .. }, Some(model)) => self.skinned(model),
+            (Rotations::Vertices(rotations), _, _) => {
+                let flat = self.frame.change_m.iter().flatten().copied().collect();
+                let rotation = self.on.matrices(rotations.iter().copied()).reshape([vertices, poses * 9]);
+                (self.on.tensor(flat, [vertices, poses, 3]), rotation)
+            }
+            _ => panic!("posing: this frame belongs to another body"),
+        }
+    }
+
+    fn skinned(&self, model: &BodyTensors) -> (Tensor<3>, Tensor<2>) {
+        let (Rotations::Joints(posed), Source::Skinned { body, shifts_m, .. }) = (&self.frame.rotations, &self.body.source)
+        else {
+            unreachable!("the caller has matched both")
+        };
+        let on = self.on;
+        let window = self.frame.basis.poses.clone();
+        let (poses, vertices, joints) = (window.len(), self.frame.vertices_m.len(), body.parents().len());
+        let weights = &self.frame.middle.weights;
+        // The joints' motions minus their mean over the frame's middle, in f64.
+        let mut difference = Vec::with_capacity(joints * poses * 12);
+        let mut means = Vec::with_capacity(joints * 9);
+        for joint in 0..joints {
+            let (turns, places) = (&posed.rotations[joint * poses..][..poses], &posed.translations_m[joint * poses..][..poses]);
+            let mean_turn: Matrix = turns.iter().zip(weights).map(|(turn, &weight)| turn * weight).sum();
+            let mean_place: Vector = places.iter().zip(weights).map(|(place, &weight)| place * weight).sum();
+            for (turn, place) in turns.iter().zip(places) {
+                difference.extend(row_major(&(turn - mean_turn)));
+                difference.extend((place - mean_place).iter());
+            }
+            means.extend(row_major(&mean_turn));
+        }
+        let mut motion: Tensor<2> = on.tensor(difference, [joints, poses * 12]);
+        let shape = self.shape_change(model);
+        let local = self.local_change();
+        if local.is_some() || shape.is_some() {
+            let rest = shape.as_ref().map(|shape| model.regressor.clone().matmul(shape.clone()));
+            motion = motion + self.chain_change(local.clone(), rest);
+        }
+        let moved: Tensor<4> = model.skinning().matmul(motion).reshape([vertices, poses, 12, 1]);
+        let mean: Tensor<3> = model.skinning().matmul(on.tensor(means, [joints, 9])).reshape([vertices, 1, 9]);
+        let rotation = moved.clone().narrow(2, 0, 9);
+        let blended: Tensor<3> = rotation.clone().reshape([vertices, poses, 9]) + mean;
+        let about = |turn: Tensor<4>, x: Tensor<4>| -> Tensor<3> { (turn * x).sum_dim(3).squeeze_dim(3) };
+        let reference: Tensor<4> = on.tensor(body.rest_m().into_iter().flatten().collect(), [vertices, 1, 1, 3]);
+        let mut change = about(rotation.reshape([vertices, poses, 3, 3]), reference) + moved.narrow(2, 9, 3).squeeze_dim::<3>(3);
+        if let Some(blend) = self.blend(model, local, shape, posed.blends_m.as_deref()) {
+            let turned = about(blended.clone().reshape([vertices, poses, 3, 3]), blend.unsqueeze_dim(2));
+            let before = self.blend_in_the_middle(posed);
+            change = change + turned - on.tensor(before, [vertices, 1, 3]);
+        }
+        let shifts = &shifts_m[window];
+        let mean_shift: Vector = shifts.iter().zip(weights).map(|(shift, &weight)| shift * weight).sum();
+        let shifts = shifts.iter().flat_map(|shift| (shift - mean_shift).data.0[0]).collect();
+        (change + on.tensor(shifts, [1, poses, 3]), blended.reshape([vertices, poses * 9]))
+    }
+
+    /// `[vertex, xyz]`, metres.
+    fn shape_change(&self, model: &BodyTensors) -> Option<Tensor<2>> {
+        let (betas, directions) = (self.pose.betas.clone()?, model.shape_directions.as_ref()?);
+        let count = betas.dims()[0].min(directions.dims()[0]);
+        let known = (0..count).map(|shape| self.body.correction.betas.get(shape).copied().unwrap_or(0.0)).collect();
+        let change = betas.narrow(0, 0, count) - self.on.tensor(known, [count]);
+        let moved = change.unsqueeze::<2>().matmul(directions.clone().narrow(0, 0, count));
+        Some(moved.reshape([self.frame.vertices_m.len(), 3]))
+    }
+
+    /// Time of every pose of the window, seconds after the motion's first pose.
+    fn times_s(&self) -> Vec<f64> {
+        let all = &self.body.pose_times_s;
+        self.frame.basis.poses.clone().map(|pose| all[pose] - all[0]).collect()
+    }
+
+    /// A quantity of the knots at the poses of the window, `[knot, feature]` to `[pose, feature]`.
+    fn at_poses(&self, knots: Tensor<2>) -> Tensor<2> {
+        let around: Vec<_> = self.times_s().iter().map(|&time| self.body.correction.knots_around(time)).collect();
+        let first = around.iter().flatten().map(|&(knot, _)| knot).min().unwrap_or(0);
+        let last = around.iter().flatten().map(|&(knot, _)| knot).max().unwrap_or(0);
+        let width = last + 1 - first;
+        let mut weights = vec![0.0; around.len() * width];
+        for (pose, around) in around.iter().enumerate() {
+            around.iter().for_each(|&(knot, weight)| weights[pose * width + knot - first] += weight);
+        }
+        self.on.tensor(weights, [around.len(), width]).matmul(knots.narrow(0, first, width))
+    }
+
+    /// Change of the joints' rotations relative to their parents, `[pose, joint, row, column]`.
+    fn local_change(&self) -> Option<Tensor<4>> {
+        let knots = self.pose.turns_rad.clone()?;
+        let Source::Skinned { poses, .. } = &self.body.source else { return None };
+        let [count, joints, _] = knots.dims();
+        let window = &poses[self.frame.basis.poses.clone()];
+        let angles = self.at_poses(knots.reshape([count, joints * 3])).reshape([window.len() * joints, 3]);
+        let known: Vec<[f64; 3]> =
+            self.times_s().into_iter().flat_map(|time| self.body.correction.turns_at(time, joints)).collect();
+        let before = known.iter().map(|&turn| rotation(turn) - Matrix::identity());
+        // The joint's rotation without any correction.
+        let joint = window.iter().flatten().zip(&known).map(|(&joint, &turn)| rotation(turn).transpose() * rotation(joint));
+        let change = turns(angles) - self.on.matrices(before);
+        Some(change.matmul(self.on.matrices(joint)).reshape([window.len(), joints, 3, 3]))
+    }
+
+    fn chain_change(&self, local: Option<Tensor<4>>, rest_m: Option<Tensor<2>>) -> Tensor<2> {
+        let (Rotations::Joints(posed), Source::Skinned { body, poses, world_from_body, .. }) =
+            (&self.frame.rotations, &self.body.source)
+        else {
+            unreachable!("only a skinned body has joints")
+        };
+        let window = &poses[self.frame.basis.poses.clone()];
+        let joints = body.parents().len();
+        let rotations: Vec<Vec<Matrix>> = window.iter().map(|pose| pose.iter().map(|&joint| rotation(joint)).collect()).collect();
+        let chain = Chain {
+            parents: body.parents(),
+            rest_m: body.rest_joints_m(),
+            world_from_body,
+            local: &rotations,
+            world: &posed.rotations,
+        };
+        let still = || self.on.tensor(vec![0.0; window.len() * joints * 9], [window.len(), joints, 3, 3]);
+        chain.change(local.unwrap_or_else(still), rest_m, self.on)
+    }
+
+    /// What shape and pose blend shapes add to the rest pose, `[vertex, pose, xyz]`, metres.
+    fn blend(
+        &self,
+        model: &BodyTensors,
+        local: Option<Tensor<4>>,
+        shape: Option<Tensor<2>>,
+        known: Option<&[[f64; 3]]>,
+    ) -> Option<Tensor<3>> {
+        let (poses, vertices) = (self.frame.basis.poses.len(), self.frame.vertices_m.len());
+        let known =
+            known.map(|known| -> Tensor<3> { self.on.tensor(known.iter().flatten().copied().collect(), [vertices, poses, 3]) });
+        let by_pose = local.zip(model.pose_directions.as_ref()).map(|(local, directions)| {
+            let [_, joints, _, _] = local.dims();
+            let feature = local.narrow(1, 1, joints - 1).reshape([poses, 9 * (joints - 1)]);
+            feature.matmul(directions.clone()).reshape([poses, vertices, 3]).swap_dims(0, 1)
+        });
+        let by_shape = shape.map(|shape| shape.unsqueeze_dim::<3>(1).expand([vertices, poses, 3]));
+        [known, by_pose, by_shape].into_iter().flatten().reduce(|sum, part| sum + part)
+    }
+
+    /// What the known blend shapes add to the vertices in the middle of the frame, `[vertex, xyz]`, flat, metres.
+    fn blend_in_the_middle(&self, posed: &super::skinning::Poses) -> Vec<f64> {
+        let Source::Skinned { body, .. } = &self.body.source else { return Vec::new() };
+        let vertices = self.frame.vertices_m.len();
+        let Some(blends) = &posed.blends_m else { return vec![0.0; vertices * 3] };
+        let at = |vertex: usize| -> Vector {
+            let poses = self.frame.middle.weights.iter().enumerate();
+            poses
+                .map(|(pose, &weight)| {
+                    let blend = Vector::from(blends[vertex * posed.count + pose]);
+                    body.blended_rotation(vertex, pose, posed) * blend * weight
+                })
+                .sum()
+        };
+        (0..vertices).flat_map(|vertex| at(vertex).data.0[0]).collect()
+    }
+
+    /// Heading, shift and the knots' shifts; also the transpose of the heading's rotation minus one.
+    fn placed(&self, own_m: Tensor<3>) -> (Tensor<3>, Option<Tensor<2>>) {
+        let (correction, on) = (&self.body.correction, self.on);
+        let [vertices, poses, _] = own_m.dims();
+        let known: Vec<Vector> = self.times_s().into_iter().map(|time| correction.shift_at(time)).collect();
+        let flat_known = || known.iter().flat_map(|shift| shift.data.0[0]).collect::<Vec<f64>>();
+        let mut change = own_m.clone();
+        let heading = self.pose.heading_rad.clone().map(|heading| {
+            let angle = (heading - correction.heading_rad).reshape([1, 1]);
+            let (sine, half) = (angle.clone().sin(), (angle * 0.5).sin());
+            let less = half.square() * -2.0;
+            let zero = sine.zeros_like();
+            let rows = [less.clone(), sine.clone(), zero.clone(), -sine, less, zero.clone(), zero.clone(), zero.clone(), zero];
+            Tensor::cat(rows.to_vec(), 1).reshape([3, 3])
+        });
+        if let Some(heading) = &heading {
+            let pivot = Vector::from(correction.pivot_m) + Vector::from(correction.shift_m);
+            let arms = self.frame.vertices_m.iter().flat_map(|&vertex| (Vector::from(vertex) - pivot).data.0[0]).collect();
+            let arm = own_m + on.tensor(arms, [vertices, 1, 3]) - on.tensor(flat_known(), [1, poses, 3]);
+            change = change + times(arm, heading.clone());
+        }
+        if let Some(shift) = self.pose.shift_m.clone() {
+            change = change + (shift - on.tensor(correction.shift_m.to_vec(), [3])).reshape([1, 1, 3]);
+        }
+        if let Some(knots) = self.pose.shifts_m.clone() {
+            let shifts = self.at_poses(knots) - on.tensor(flat_known(), [poses, 3]);
+            change = change + shifts.unsqueeze_dim::<3>(0);
+        }
+        (change, heading)
+    }
+}
+
+fn row_major(matrix: &Matrix) -> impl Iterator<Item = f64> {
+    (0..9).map(move |entry| matrix[(entry / 3, entry % 3)])
+}
+
+#[cfg(test)]
+#[path = "posing/tests.rs"]
+mod tests;
