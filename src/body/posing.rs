@@ -47,11 +47,13 @@ struct DeviceBody {
     corners: area::Corners,
 }
 
+type Made = (Device, DType, Arc<DeviceBody>);
+
 /// The device bodies made so far, shared by the clones of a [`PosedBody`].
 #[derive(Clone, Debug)]
 pub(super) struct DeviceBodies {
     model: Option<Arc<BodyModel>>,
-    made: Arc<Mutex<Vec<(Device, DType, Arc<DeviceBody>)>>>,
+    made: Arc<Mutex<Vec<Made>>>,
 }
 
 impl DeviceBodies {

@@ -1,7 +1,7 @@
 //! Refinement of a motion that is off by centimetres, degrees and milliseconds, from the recording alone.
 //!
-//! Before the simulator learns, each recording's place, heading and clock, and then the poses of single frames, are moved until
-//! the power that the body is expected to return lies in the cells in which it was measured. The priors of
+//! Before the simulator learns, each recording's place, heading and clock (and on request the poses of single frames) are moved
+//! until the power that the body is expected to return lies in the cells in which it was measured. The priors of
 //! [`RefineConfig`] hold what the recording does not show.
 
 mod config;
