@@ -1,12 +1,16 @@
 """Golden arrays for tests/parity, from the formulas alone: NumPy in f64, seeded, sharing no code with the crate.
 
     python scripts/golden.py            writes tests/golden/*.npz
-    python scripts/golden.py --check    fails when those files differ from what would be written
+    python scripts/golden.py --check    fails when those files differ from what would be written, also src/body/golden.rs
+                                        where ../shared or $HYBRIDSIM_SHARED has the body that it is made from
 
 Every array is named; what is an input of a formula starts with `in_`. Axes as in the crate: frame, tx, rx, loop, sample;
 point, xyz; after the transforms doppler, range. Slow loops are welcome here: they are hard to get wrong in the same way.
 """
 
+import os
+import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -446,6 +450,41 @@ def skinning():
 TOPICS = [heatmap, metrics, direct, indirect, fresnel, microfacet, triplane, encoding, harmonics, skinning, equations]
 
 
+def differs(stored, made):
+    """What two arrays of one golden differ in. Another NumPy may order sums differently: 1e-9 of the largest value."""
+    if stored.shape != made.shape or stored.dtype != made.dtype:
+        return f"is {stored.dtype} {stored.shape}, expected {made.dtype} {made.shape}"
+    if made.size == 0:
+        return None
+    error = np.abs(stored.astype(complex) - made).max() / max(np.abs(made).max(), np.finfo(float).tiny)
+    return None if error <= 1e-9 else f"differs by {error:.1e} of its largest value"
+
+
+def check_topic(path, arrays):
+    """One line for every array that is not what the formulas give."""
+    if not path.exists():
+        return [f"{path.name}: is missing"]
+    stored = dict(np.load(path))
+    rows = [f"{path.name}: {name} is {word}" for names, word in [(arrays.keys() - stored.keys(), "missing"), (stored.keys() - arrays.keys(), "of no formula")] for name in sorted(names)]
+    both = [(name, differs(stored[name], np.asarray(arrays[name]))) for name in arrays if name in stored]
+    return rows + [f"{path.name}: {name} {difference}" for name, difference in both if difference]
+
+
+def check_pose():
+    """src/body/golden.rs, from the shared body; None where that is absent."""
+    root = FOLDER.parent.parent
+    body = Path(os.environ.get("HYBRIDSIM_SHARED", root.parent / "shared")) / "bodies" / "neutral_lite.npz"
+    if not body.exists():
+        return None
+    printed = subprocess.run([sys.executable, root / "scripts" / "golden_pose.py", body], capture_output=True, check=True, text=True).stdout
+    numbers = lambda text: np.array([float(number) for number in re.findall(r"-?\d+\.?\d*", text.split("=", 1)[1])])
+    stored = numbers((root / "src" / "body" / "golden.rs").read_text())
+    made = numbers(printed)
+    # Printed with twelve decimals.
+    same = stored.shape == made.shape and np.abs(stored - made).max() <= 2e-12
+    return [] if same else ["src/body/golden.rs: differs from scripts/golden_pose.py"]
+
+
 def main():
     check = "--check" in sys.argv[1:]
     FOLDER.mkdir(parents=True, exist_ok=True)
@@ -456,16 +495,16 @@ def main():
             # zip entries carry a fixed date: equal numbers make equal files
             np.savez(path, **arrays)
             continue
-        stored = dict(np.load(path)) if path.exists() else {}
-        # sums may be ordered differently by another NumPy
-        same = stored.keys() == arrays.keys() and all(
-            stored[name].shape == arrays[name].shape and np.allclose(stored[name], arrays[name], rtol=1e-9, atol=1e-11)
-            for name in arrays
-        )
-        if not same:
-            wrong.append(path.name)
+        wrong += check_topic(path, arrays)
+    if not check:
+        return
+    known = {f"{topic.__name__}.npz" for topic in TOPICS}
+    wrong += [f"{path.name}: is of no topic" for path in sorted(FOLDER.iterdir()) if path.name not in known]
+    pose = check_pose()
+    wrong += pose or []
     if wrong:
-        sys.exit(f"differ from scripts/golden.py: {', '.join(wrong)}")
+        sys.exit("goldens differ from scripts/golden.py:\n" + "\n".join(wrong))
+    print(f"{len(TOPICS)} goldens are those of their formulas" + (", skipped: src/body/golden.rs needs shared material" if pose is None else ", and src/body/golden.rs"))
 
 
 if __name__ == "__main__":

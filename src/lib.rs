@@ -3,6 +3,7 @@
 //! The modules in the order the data travels. A module imports only from those before it; `tests/layers.rs` enforces it.
 
 // 0: what everyone needs
+pub mod bounds;
 pub mod complex;
 pub mod error;
 // 1: what the user gives
@@ -48,6 +49,9 @@ pub mod experiments;
 pub mod cli;
 
 pub use error::{Error, Result};
+
+#[cfg(test)]
+mod gradient_tests;
 
 /// Helpers of the tests, shared with the integration tests.
 #[cfg(test)]

@@ -19,13 +19,15 @@ use hybridsim::{
     training::checkpoint,
 };
 
-/// Relative difference of the signals, and of all gradients together (L2). f32 sums of 10⁵ terms in another order.
+/// Relative differences of the signal, and of the gradient of every parameter tensor by itself (L2). f32 sums of 10⁵ terms
+/// in another order.
 const SIGNAL_TOLERANCE: f64 = 1e-4;
 const GRADIENT_TOLERANCE: f64 = 1e-3;
 
 struct Answer {
     signal: Vec<f64>,
-    gradients: Vec<f64>,
+    /// (name, gradient) of every parameter tensor; `None` where the loss does not depend on it.
+    gradients: Vec<(String, Option<Vec<f64>>)>,
 }
 
 /// A frame of the embedded person in the checkpoint's room, small enough for a GPU that a CPU imitates.
@@ -52,22 +54,31 @@ fn answer(device: &Device) -> Answer {
     let loss = power_db(transform.map(noisy).power(), 1e-3).powi_scalar(2).mean();
     let mut backward = loss.backward();
     let mut collected = GradientsParams::from_module(&mut backward, &simulator);
-    Answer { signal, gradients: flatten(&simulator, &mut collected) }
+    Answer { signal, gradients: by_parameter(&simulator, &mut collected) }
 }
 
-fn flatten(simulator: &Simulator, gradients: &mut GradientsParams) -> Vec<f64> {
-    struct Collect<'a>(&'a mut GradientsParams, Vec<f64>);
+fn by_parameter(simulator: &Simulator, gradients: &mut GradientsParams) -> Vec<(String, Option<Vec<f64>>)> {
+    struct Collect<'a> {
+        gradients: &'a mut GradientsParams,
+        path: Vec<String>,
+        found: Vec<(String, Option<Vec<f64>>)>,
+    }
     impl ModuleVisitor for Collect<'_> {
+        fn enter_module(&mut self, name: &str, _: &str) {
+            self.path.push(name.into());
+        }
+        fn exit_module(&mut self, _: &str, _: &str) {
+            self.path.pop();
+        }
         fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-            match self.0.remove::<D>(param.id) {
-                Some(gradient) => self.1.extend(gradient.into_data().convert::<f64>().try_into_vec::<f64>().unwrap()),
-                None => self.1.extend(std::iter::repeat_n(0.0, param.val().dims().iter().product())),
-            }
+            let gradient = self.gradients.remove::<D>(param.id);
+            let values = gradient.map(|gradient| gradient.into_data().convert::<f64>().try_into_vec::<f64>().unwrap());
+            self.found.push((self.path.join("."), values));
         }
     }
-    let mut collect = Collect(gradients, Vec::new());
+    let mut collect = Collect { gradients, path: Vec::new(), found: Vec::new() };
     simulator.visit(&mut collect);
-    collect.1
+    collect.found
 }
 
 fn relative_difference(found: &[f64], wanted: &[f64]) -> f64 {
@@ -76,18 +87,64 @@ fn relative_difference(found: &[f64], wanted: &[f64]) -> f64 {
     (squares(&mut found.iter().zip(wanted).map(|(a, b)| a - b)) / squares(&mut wanted.iter().copied())).sqrt()
 }
 
+/// A line for every parameter whose gradient differs by more than the tolerance of its own norm, exists on one side only,
+/// or is not finite. A gradient that is zero on one must be zero on the other.
+fn disagreements(found: &Answer, wanted: &Answer) -> Vec<String> {
+    assert_eq!(found.gradients.len(), wanted.gradients.len());
+    let mut rows = Vec::new();
+    for ((name, found), (other, wanted)) in found.gradients.iter().zip(&wanted.gradients) {
+        assert_eq!(name, other);
+        match (found, wanted) {
+            (None, None) => {}
+            (Some(found), Some(wanted)) if found == wanted => {}
+            (Some(found), Some(wanted)) => {
+                let difference = relative_difference(found, wanted);
+                // NaN is no agreement.
+                if difference.is_nan() || difference > GRADIENT_TOLERANCE {
+                    rows.push(format!("{name}: differs by {difference:.1e}, tolerance {GRADIENT_TOLERANCE:.1e}"));
+                }
+            }
+            _ => rows.push(format!("{name}: has a gradient on one of the two")),
+        }
+    }
+    rows
+}
+
 fn assert_same_as_flex(name: &str, device: &Device) {
     let (found, wanted) = (answer(device), answer(&Device::flex()));
-    assert!(wanted.signal.iter().chain(&wanted.gradients).all(|value| value.is_finite()));
-    assert!(wanted.gradients.iter().any(|&value| value != 0.0), "no gradient at all");
-    let (signal, gradients) =
-        (relative_difference(&found.signal, &wanted.signal), relative_difference(&found.gradients, &wanted.gradients));
-    println!("{name}: signal differs by {signal:.1e}, gradients by {gradients:.1e}");
-    assert!(signal < SIGNAL_TOLERANCE, "{name}: the signal differs by {signal:.1e} from flex, tolerance {SIGNAL_TOLERANCE:.1e}");
-    assert!(
-        gradients < GRADIENT_TOLERANCE,
-        "{name}: gradients differ by {gradients:.1e} from flex, tolerance {GRADIENT_TOLERANCE:.1e}"
+    assert!(wanted.signal.iter().chain(wanted.gradients.iter().filter_map(|g| g.1.as_ref()).flatten()).all(|v| v.is_finite()));
+    let moving = |gradient: &&(String, Option<Vec<f64>>)| gradient.1.iter().flatten().any(|&value| value != 0.0);
+    let moving: Vec<&str> = wanted.gradients.iter().filter(moving).map(|gradient| gradient.0.as_str()).collect();
+    for stage in ["triplane", "graph", "body_material", "room_patch", "gain", "noise"] {
+        assert!(moving.iter().any(|name| name.contains(stage)), "no gradient reaches `{stage}`; it reaches {moving:?}");
+    }
+    let signal = relative_difference(&found.signal, &wanted.signal);
+    println!(
+        "{name}: signal differs by {signal:.1e}; gradients of {} parameters, {} of them not zero",
+        wanted.gradients.len(),
+        moving.len()
     );
+    assert!(signal < SIGNAL_TOLERANCE, "{name}: the signal differs by {signal:.1e} from flex, tolerance {SIGNAL_TOLERANCE:.1e}");
+    let rows = disagreements(&found, &wanted);
+    assert!(rows.is_empty(), "{name}: gradients differ from flex:\n{}", rows.join("\n"));
+}
+
+/// Parameters far smaller than the rest of the gradient count as much.
+#[test]
+fn a_wrong_gradient_of_the_smallest_parameter_is_found_by_name() {
+    let answer = |small: f64, lost: Option<Vec<f64>>| Answer {
+        signal: vec![],
+        gradients: vec![("large".into(), Some(vec![1e6, -2e6])), ("small".into(), Some(vec![small])), ("lost".into(), lost)],
+    };
+    assert!(disagreements(&answer(1e-6, None), &answer(1e-6, None)).is_empty());
+    assert!(disagreements(&answer(1.0002e-6, None), &answer(1e-6, None)).is_empty());
+    for wrong in [2e-6, -1e-6, 0.0, f64::NAN] {
+        let rows = disagreements(&answer(wrong, None), &answer(1e-6, None));
+        assert!(rows.len() == 1 && rows[0].starts_with("small: differs"), "{wrong}: {rows:?}");
+    }
+    let rows = disagreements(&answer(1e-6, Some(vec![0.0])), &answer(1e-6, None));
+    assert_eq!(rows, ["lost: has a gradient on one of the two"]);
+    assert_eq!(disagreements(&answer(1e-9, None), &answer(0.0, None)).len(), 1, "zero on one side only");
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! The program as its user meets it: help, results, errors with their hints, exit status.
 
+mod support;
+
 use std::{
     path::{Path, PathBuf},
     process::{Command, Output},
@@ -306,7 +308,7 @@ fn a_folder_without_a_checkpoint_is_no_checkpoint() {
 fn a_full_disk_stops_with_what_to_do_and_leaves_nothing() {
     let full = Path::new("/dev/full");
     if !full.exists() {
-        println!("skipped: this system has no /dev/full");
+        support::skip("/dev/full");
         return;
     }
     // A folder on a full disk cannot be had without privileges; a file that cannot be created behaves alike.

@@ -1,7 +1,7 @@
 //! Recordings of real radars show what their descriptions say.
 //!
 //! The wanted numbers were found with NumPy, independently of this crate. The recordings lie in `$HYBRIDSIM_SHARED`, or in
-//! `../shared` beside the crate; without them these tests say so and pass.
+//! `../shared` beside the crate; without them these tests count as skipped.
 
 mod support;
 

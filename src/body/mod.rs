@@ -93,6 +93,7 @@ impl PosedBody {
             (Source::Skinned { body, .. }, Person::Skinned { model, .. }) => (body.rest_m(), model.template.clone()),
             (_, person) => (first_mesh(person), centred(&first_mesh(person))),
         };
+        person.check()?;
         if let Some(face) = person.faces().iter().find(|face| face.iter().any(|&vertex| vertex >= rest_m.len())) {
             return Err(unusable(format!("a face has the vertices {face:?}, but there are only {}", rest_m.len())));
         }
@@ -295,4 +296,4 @@ fn check_meshes(vertices: &[Vec<[f64; 3]>]) -> Result<()> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

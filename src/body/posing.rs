@@ -502,4 +502,4 @@ fn row_major(matrix: &Matrix) -> impl Iterator<Item = f64> {
 
 #[cfg(test)]
 #[path = "posing/tests.rs"]
-mod tests;
+pub(crate) mod tests;

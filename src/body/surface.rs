@@ -312,7 +312,8 @@ mod tests {
         };
         let excess = size(config(Sampling::Vertices, 1.0).init(&vertices, &faces).unwrap())
             - size(config(Sampling::Subdivided, 1.1e-3).init(&vertices, &faces).unwrap());
-        assert!((10.0..25.0).contains(&excess), "{excess} dB");
+        println!("vertices: {excess} dB too much");
+        assert!((excess - 16.0).abs() < 1.0, "{excess} dB");
     }
 
     #[test]

@@ -191,7 +191,7 @@ impl BodyTensors {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use burn::tensor::{DType, Device};
 
     use super::*;
@@ -248,8 +248,7 @@ mod tests {
         }
     }
 
-    #[test]
-    fn gradients_reach_pose_shape_and_translation() {
+    pub(crate) fn gradients_reach_pose_shape_and_translation() {
         let model = random_body(12, JOINTS, 6);
         let device = Device::flex().autodiff();
         let (betas, shift) = ([0.4, -0.8], [0.1, 2.0, -0.3]);
@@ -279,6 +278,7 @@ mod tests {
                     loss(&parameters)
                 };
                 let wanted = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+                crate::support::compared(&[wanted]);
                 assert!(
                     (found[entry] - wanted).abs() < 1e-7 * (1.0 + wanted.abs()),
                     "{which} {entry}: {}, wanted {wanted}",

@@ -15,8 +15,8 @@ use serde_json::Value;
 
 use super::commitment::{Commitment, canonical, hash_file, joint_root, read_json, sha256};
 use super::report::Report;
-use crate::data::Shard;
 use crate::data::atomic::{AtomicFolder, write_text};
+use crate::data::{Shard, files};
 use crate::error::{Error, Result};
 
 /// How the cases are to be diagnosed.
@@ -121,6 +121,7 @@ pub fn diagnose(case: &Path, out: &Path, config: &RunConfig) -> Result<()> {
     let (copy, answer) = (workplace.path().join("recording"), workplace.path().join("answer"));
     fs::create_dir(&copy).map_err(|source| Error::write(&copy, source))?;
     for entry in fs::read_dir(case).map_err(|source| Error::read(case, source))?.flatten() {
+        files::require(entry.path())?;
         fs::copy(entry.path(), copy.join(entry.file_name())).map_err(|source| Error::read(entry.path(), source))?;
     }
     let outcome = start(&copy, &answer, workplace.path(), config)

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use crate::data::hex;
+use crate::data::{files, hex};
 use crate::error::{Error, Result};
 
 /// `commitment.json`, or one of several where the cases were sealed in shards.
@@ -45,12 +45,12 @@ pub fn sha256(bytes: impl AsRef<[u8]>) -> String {
 }
 
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let text = fs::read_to_string(path).map_err(|source| Error::read(path, source))?;
+    let text = files::read_text(path)?;
     serde_json::from_str(&text).map_err(|error| Error::Parse { path: path.into(), message: error.to_string() })
 }
 
 pub fn hash_file(path: &Path) -> Result<String> {
-    fs::read(path).map(sha256).map_err(|source| Error::read(path, source))
+    files::read(path).map(sha256)
 }
 
 /// Keys in order, no spaces: equal values give equal texts.

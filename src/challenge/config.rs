@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::library;
+use crate::bounds;
 use crate::data::read_settings;
 use crate::error::{Error, Result};
 use crate::person::actions::Action;
@@ -171,9 +172,8 @@ impl ChallengeConfig {
 
     pub fn check(&self) -> Result<()> {
         self.radar.check("radar")?;
-        if self.cases == 0 {
-            return Err(Error::setting("cases", 0, "at least one case"));
-        }
+        // Each is planned before the first is recorded.
+        bounds::count("cases", self.cases, 1_000_000)?;
         if let Some(level) = self.every {
             if !(0.0..=1.0).contains(&level) {
                 return Err(Error::setting("every", level, "between 0 (weakest) and 1 (strongest)"));

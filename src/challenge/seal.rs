@@ -21,7 +21,7 @@ use super::plan::{Plan, plans};
 use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
 use super::secret::Secret;
 use crate::data::atomic::write_text;
-use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, read_toml, write_recording};
+use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, files, read_toml, write_recording};
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
 use crate::recorder::{EffectsConfig, ReceiverConfig, Recorder, RecorderConfig, Returns, World};
@@ -118,7 +118,7 @@ fn settle_secret(sealed: &Path, config: &ChallengeConfig, seed: Option<&str>, sh
     let settings = sealed.join("config.toml");
     if path.exists() {
         let begun: Secret = read_toml(&path)?;
-        let same_config = fs::read_to_string(&settings).is_ok_and(|text| text == config.to_toml());
+        let same_config = files::read_text(&settings).is_ok_and(|text| text == config.to_toml());
         if !same_config || seed.is_some_and(|seed| Secret::new(Some(seed)) != begun) {
             return Err(Error::Usage {
                 message: format!("{}: was begun with another seed or other settings", sealed.display()),

@@ -13,6 +13,7 @@ use crate::{
     data::{
         Recording,
         atomic::{self, AtomicFolder},
+        files,
         recording::SETTINGS_FILE,
         settings::settings_from_table,
     },
@@ -94,7 +95,9 @@ fn pairs(measured: &Path, simulated: &Path) -> Result<Vec<Pair>> {
         let folders = entries
             .filter_map(|entry| entry.ok())
             .filter(|entry| entry.path().is_dir() && is_recording(&recording_in(entry.path())));
-        let mut names: Vec<String> = folders.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+        let name =
+            |entry: std::fs::DirEntry| files::utf8(entry.path()).map(|()| entry.file_name().to_string_lossy().into_owned());
+        let mut names = folders.map(name).collect::<Result<Vec<String>>>()?;
         names.sort();
         Ok(names)
     };

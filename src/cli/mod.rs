@@ -34,6 +34,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::data::files;
 use crate::error::{Error, Result};
 
 pub use device::{available, device, devices};
@@ -195,8 +196,10 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// A checkpoint keeps the settings it was trained with: changing some would change nothing.
+/// Settings and reports are text and must be able to name every path. A checkpoint keeps the settings it was trained with:
+/// changing some would change nothing.
 fn refuse_idle_settings(cli: &Cli) -> Result<()> {
+    std::env::args_os().skip(1).try_for_each(files::utf8)?;
     match cli.command {
         Command::Infer(_) | Command::Evaluate(_) if !cli.common.set.is_empty() => Err(Error::Usage {
             message: "--set: a checkpoint keeps the settings it was trained with".into(),

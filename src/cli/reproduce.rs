@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{Common, Out, devices, progress::StageProgress, scores::LpipsArguments};
 use crate::{
-    data::atomic,
+    data::{atomic, files},
     error::{Error, Result},
     experiments::{self, Plan, ReproduceConfig, Store, report, results, stage::read_record, stage::stage_folder},
     lpips::Lpips,
@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     std::fs::create_dir_all(&out).map_err(|error| Error::write(&out, error))?;
     // Stages name each other's files.
-    let out = out.canonicalize().map_err(|error| Error::read(&out, error))?;
+    let out = files::absolute(&out)?;
     let plan = experiments::plan(&config, &out)?;
     if arguments.plan {
         list(&plan, &out);

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     config::Config,
-    data::atomic,
+    data::{atomic, files},
     error::{Error, Result},
     training::{load_recordings, refine},
 };
@@ -97,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 /// The resolved config must find its recordings from wherever a later command runs.
 fn absolute(paths: &mut [PathBuf]) -> Result<()> {
     for path in paths {
-        *path = path.canonicalize().map_err(|error| Error::read(&*path, error))?;
+        *path = files::absolute(&*path)?;
     }
     Ok(())
 }

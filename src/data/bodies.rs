@@ -20,7 +20,7 @@ pub fn read_body(path: impl AsRef<Path>) -> Result<BodyModel> {
     if npz.has("poses") && !npz.has("v_template") {
         return Err(Error::Parse { path: path.into(), message: "this is a motion (it has `poses`), expected a body".into() });
     }
-    let template: Array<f64> = npz.read("v_template", &[("vertex", None), ("xyz", Some(3))])?;
+    let template = npz.lengths("v_template", &[("vertex", None), ("xyz", Some(3))])?;
     let vertices = template.shape[0];
     let tree: Array<i64> = npz.read("kintree_table", &[("parent and child", Some(2)), ("joint", None)])?;
     let joints = tree.shape[1];
@@ -28,10 +28,10 @@ pub fn read_body(path: impl AsRef<Path>) -> Result<BodyModel> {
         let empty = if vertices == 0 { "v_template" } else { "kintree_table" };
         return Err(Error::field(path, empty, "empty", "at least one entry"));
     }
-    let shapes: Array<f64> = npz.read("shapedirs", &[("vertex", Some(vertices)), ("xyz", Some(3)), ("shape", None)])?;
+    let shapes = npz.lengths("shapedirs", &[("vertex", Some(vertices)), ("xyz", Some(3)), ("shape", None)])?;
     let entries = 9 * (joints - 1);
     let poses: Option<Array<f64>> = if npz.has("posedirs") {
-        Some(npz.read("posedirs", &[("vertex", Some(vertices)), ("xyz", Some(3)), ("entries of R - 1", Some(entries))])?)
+        Some(npz.lengths("posedirs", &[("vertex", Some(vertices)), ("xyz", Some(3)), ("entries of R - 1", Some(entries))])?)
     } else {
         None
     };

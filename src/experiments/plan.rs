@@ -16,7 +16,7 @@ use super::stage::{Key, read_record, stage_folder};
 use super::takes::{Take, check_split, read_takes, takes_in};
 use super::task::Task;
 use super::variants::Variant;
-use crate::data::hex;
+use crate::data::{files, hex};
 use crate::error::{Error, Result};
 use crate::site::{self, SiteConfig};
 use crate::training::TrainingConfig;
@@ -203,7 +203,7 @@ impl Planner<'_> {
     /// A site that is recorded, or a folder of recordings.
     fn place(&mut self, name: &str, path: &Path) -> Result<Place> {
         if path.is_dir() {
-            let recordings = path.canonicalize().map_err(|error| Error::read(path, error))?;
+            let recordings = files::absolute(path)?;
             let mut board = None;
             let takes = read_takes(&recordings, &mut |recording| Board::join(&mut board, recording))?;
             let (_, board) = board.expect("no takes are refused");
@@ -560,7 +560,7 @@ fn planned(config: &SiteConfig, settings_folder: &Path) -> Result<Vec<Take>> {
 fn digest(files: &[&PathBuf]) -> Result<String> {
     let mut digest = Sha256::new();
     for file in files {
-        digest.update(std::fs::read(file).map_err(|error| Error::read(file.as_path(), error))?);
+        digest.update(files::read(file)?);
     }
     Ok(hex(&digest.finalize()[..6]))
 }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::data::{atomic, hex};
+use crate::data::{atomic, files, hex};
 use crate::error::{Error, Result};
 
 const RECORD: &str = "stage.json";
@@ -148,7 +148,7 @@ pub fn stage_folder(root: &Path, key: &Key) -> PathBuf {
 
 /// The record of a finished stage; `None` where there is none.
 pub fn read_record(folder: &Path) -> Option<Record> {
-    serde_json::from_str(&fs::read_to_string(folder.join(RECORD)).ok()?).ok()
+    serde_json::from_str(&files::read_text(folder.join(RECORD)).ok()?).ok()
 }
 
 fn create(folder: &Path) -> Result<()> {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::data::Recording;
+use crate::data::{Recording, files};
 use crate::error::{Error, Result};
 
 /// One recording of a site.
@@ -29,6 +29,7 @@ pub fn read_takes(folder: &Path, look: &mut dyn FnMut(&Recording) -> Result<()>)
     let entries = std::fs::read_dir(folder).map_err(|error| Error::read(folder, error))?;
     let mut found: Vec<PathBuf> =
         entries.flatten().map(|entry| entry.path()).filter(|path| path.join("recording.toml").is_file()).collect();
+    found.iter().try_for_each(files::utf8)?;
     found.sort();
     if found.is_empty() {
         return Err(Error::Usage {

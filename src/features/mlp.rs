@@ -7,7 +7,12 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::draw;
+use crate::bounds;
 use crate::error::{Error, Result};
+
+/// Together at most a quarter of [`bounds::MOST_NUMBERS`]: 16 matrices of 2048 x 2048. NeRF's network has 8 layers of 256.
+const MOST_LAYERS: usize = 16;
+const MOST_WIDTH: usize = 2048;
 
 /// Settings of a network.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,10 +30,15 @@ impl Default for MlpConfig {
 
 impl MlpConfig {
     pub fn check(&self, key: &str) -> Result<()> {
-        match self.hidden.iter().position(|&width| width == 0) {
-            Some(layer) => Err(Error::setting(format!("{key}.hidden[{layer}]"), 0, "at least 1")),
-            None => Ok(()),
+        if self.hidden.len() > MOST_LAYERS {
+            return Err(Error::setting(
+                format!("{key}.hidden"),
+                format!("{} layers", self.hidden.len()),
+                format!("at most {MOST_LAYERS}"),
+            ));
         }
+        let width = |(layer, &width): (usize, &usize)| bounds::count(format!("{key}.hidden[{layer}]"), width, MOST_WIDTH);
+        self.hidden.iter().enumerate().try_for_each(width)
     }
 
     /// Weights are drawn evenly from ±√(6 / inputs) (Kaiming), those of the last layer from a twentieth of it, so that
@@ -103,7 +113,7 @@ pub fn sigmoid<const D: usize>(value: Tensor<D>) -> Tensor<D> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::support::{assert_close, check_finite, check_gradient, in_f64, input, numbers, tensor, values};
     use rand::SeedableRng;
@@ -120,8 +130,7 @@ mod tests {
         assert!((output[0] - output[2]).abs() > 1e-4);
     }
 
-    #[test]
-    fn gradients_to_the_input_and_every_parameter_agree_with_central_differences() {
+    pub(crate) fn gradients_to_the_input_and_every_parameter_agree_with_central_differences() {
         let network = in_f64(network(&[0.5, 0.5]));
         let mut inputs = vec![input("input", numbers(2, 12, -1.0, 1.0))];
         for (layer, name) in network.layers.iter().zip([("w0", "b0"), ("w1", "b1"), ("w2", "b2")]) {
@@ -157,6 +166,6 @@ mod tests {
     #[test]
     fn a_layer_without_width_is_refused() {
         let error = MlpConfig { hidden: vec![64, 0] }.check("decoder").unwrap_err();
-        assert_eq!(error.to_string(), "`decoder.hidden[1]` is 0, expected at least 1");
+        assert_eq!(error.to_string(), "`decoder.hidden[1]` is 0, expected 1 to 2048");
     }
 }

@@ -125,7 +125,7 @@ impl WeightedRows {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::support::{assert_close, check_backends, check_gradient, input, numbers, tensor, values};
 
@@ -164,8 +164,7 @@ mod tests {
         RowIndex::new(&[3], 3, &Device::flex());
     }
 
-    #[test]
-    fn gradients_agree_with_central_differences() {
+    pub(crate) fn gradients_agree_with_central_differences() {
         let inputs = [input("table", numbers(3, 8, -1.0, 1.0))];
         let apply = |x: &[Tensor<1>]| {
             let rows = WeightedRows::new(&[[0, 1, 2], [3, 3, 0]], &[[0.2, 0.3, 0.5], [0.5, 0.25, 0.25]], 4, &x[0].device());

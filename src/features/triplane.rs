@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::draw;
 use super::extent::Extent;
 use super::rows::WeightedRows;
+use crate::bounds;
 use crate::error::{Error, Result};
 
 /// What becomes of the three planes' samples.
@@ -24,6 +25,9 @@ pub enum Combination {
     /// Added: `features` numbers.
     Sum,
 }
+
+/// Eight times what published tri-planes have (EG3D, Chan et al. 2022: 32): the networks behind are as wide.
+const MOST_FEATURES: usize = 256;
 
 /// Settings of the planes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,9 +56,9 @@ impl TriPlaneConfig {
         if self.resolution < 2 {
             return Err(Error::setting(format!("{key}.resolution"), self.resolution, "at least 2 texels a side"));
         }
-        if self.features == 0 {
-            return Err(Error::setting(format!("{key}.features"), self.features, "at least 1"));
-        }
+        bounds::count(format!("{key}.features"), self.features, MOST_FEATURES)?;
+        let texels = [3, self.resolution, self.resolution, self.features];
+        bounds::numbers(format!("{key}.resolution"), "planes x side x side x features", &texels)?;
         if !(self.initial_bound.is_finite() && self.initial_bound >= 0.0) {
             return Err(Error::setting(format!("{key}.initial_bound"), self.initial_bound, "zero or more"));
         }
@@ -154,7 +158,7 @@ impl TriPlaneSampler {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::support::{assert_close, check_gradient, in_f64, input, numbers, tensor, values};
     use rand::SeedableRng;
@@ -215,8 +219,7 @@ mod tests {
         assert_close("sum", &values(&sums), &wanted, 1e-6);
     }
 
-    #[test]
-    fn gradients_to_the_texels_agree_with_central_differences() {
+    pub(crate) fn gradients_to_the_texels_agree_with_central_differences() {
         let plane = in_f64(planes(&TriPlaneConfig { resolution: 3, features: 2, ..Default::default() }));
         let texels = values(&plane.texels.val());
         check_gradient(&[input("texels", texels)], 1e-5, 1e-8, |x| {

@@ -193,4 +193,4 @@ pub fn time_doppler(map: Complex<5>) -> Tensor<2> {
 
 #[cfg(test)]
 #[path = "dft_tests.rs"]
-mod tests;
+pub(crate) mod tests;

@@ -10,7 +10,7 @@
 
 mod angle;
 mod axes;
-mod dft;
+pub(crate) mod dft;
 mod host;
 mod map;
 mod over_time;

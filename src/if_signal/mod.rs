@@ -15,7 +15,7 @@ mod exact;
 mod fused;
 mod grid;
 pub mod noise;
-mod signals;
+pub(crate) mod signals;
 mod split;
 mod spread;
 
@@ -83,4 +83,4 @@ fn is_cpu(device: &Device) -> bool {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

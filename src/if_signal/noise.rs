@@ -154,7 +154,7 @@ pub fn normals<const D: usize>(seed: u64, dims: [usize; D], device: &Device, dty
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
     fn signal(device: &Device, dtype: DType, scale: f64) -> Complex<3> {
@@ -213,8 +213,7 @@ mod tests {
         assert_ne!(draw(5), draw(6));
     }
 
-    #[test]
-    fn gradients_flow_to_the_rate_and_to_the_signal() {
+    pub(crate) fn gradients_flow_to_the_rate_and_to_the_signal() {
         let device = Device::flex().autodiff();
         let noise = config(NoiseLaw::Learned, 0.3).init(&device);
         let loss = |noise: &Noise, signal: Complex<3>| {
@@ -234,6 +233,7 @@ mod tests {
             numbers(&loss(&moved, clean.clone()))[0]
         };
         let wanted = (at_rate(step) - at_rate(-step)) / (2.0 * step);
+        crate::support::compared(&[wanted]);
         assert!((to_rate / wanted - 1.0).abs() < 1e-3, "{to_rate}, wanted {wanted}");
         for (i, found) in to_signal.iter().enumerate() {
             let at = |by: f64| {

@@ -74,4 +74,4 @@ fn silence(points: &Points, radar: &Radar) -> Complex<3> {
 
 #[cfg(test)]
 #[path = "signals_tests.rs"]
-mod tests;
+pub(crate) mod tests;

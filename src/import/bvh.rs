@@ -7,7 +7,10 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::error::{Error, Result};
+use crate::{
+    data,
+    error::{Error, Result},
+};
 
 /// What a column of the table does to its joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +53,7 @@ pub struct BvhPose {
 
 impl Bvh {
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|source| Error::read(path, source))?;
+        let bytes = data::files::read(path)?;
         // Names in old files are not always UTF-8.
         let bvh = Self::parse(&String::from_utf8_lossy(&bytes)).map_err(|message| Error::Parse { path: path.into(), message })?;
         Ok(Self { source: path.into(), ..bvh })

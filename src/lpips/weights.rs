@@ -5,7 +5,6 @@
 
 use std::{
     collections::BTreeMap,
-    fs::File,
     path::{Path, PathBuf},
 };
 
@@ -16,7 +15,10 @@ use burn::{
 
 use super::network::Network;
 use crate::{
-    data::arrays::{Array, Npz},
+    data::{
+        arrays::{Array, Npz},
+        files,
+    },
     error::{Error, Result},
 };
 
@@ -31,7 +33,7 @@ impl WeightFile {
     /// A file that is none of the three formats.
     pub fn open(path: &Path) -> Result<Self> {
         // the readers below word a missing file each in their own way
-        File::open(path).map_err(|source| Error::read(path, source))?;
+        files::require(path)?;
         let tensors = match path.extension().and_then(|extension| extension.to_str()) {
             Some("safetensors") => SafetensorsStore::from_file(path)
                 .get_all_tensors()

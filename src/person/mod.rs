@@ -8,6 +8,9 @@ pub mod procedural;
 
 use serde::{Deserialize, Serialize};
 
+use crate::bounds;
+use crate::error::{Error, Result};
+
 /// Names of the 24 SMPL joints, in SMPL's order.
 pub const JOINT_NAMES: [&str; 24] = [
     "pelvis",
@@ -144,6 +147,30 @@ impl Person {
         }
     }
 
+    /// Refuses positions that no scene of a radar has and turns beyond counting, whatever they were read from.
+    ///
+    /// # Errors
+    /// With what is where, and the bound.
+    pub fn check(&self) -> Result<()> {
+        let impossible = match self {
+            Self::Meshes { vertices, .. } => farthest("pose", vertices.iter().map(Vec::as_slice)),
+            Self::Skinned { model, motion, placement } => {
+                let rest = [model.shaped(&motion.betas), model.rest_joints(&motion.betas)];
+                farthest("the rest pose: vertices (0) and joints (1)", rest.iter().map(Vec::as_slice))
+                    .or_else(|| farthest("the translation of pose", motion.translations.iter().map(std::slice::from_ref)))
+                    .or_else(|| farthest("the placement's origin", [&placement.origin_m].map(std::slice::from_ref).into_iter()))
+                    .or_else(|| widest(&motion.poses))
+            }
+        };
+        match impossible {
+            None => Ok(()),
+            Some(message) => Err(Error::Usage {
+                message: format!("the person cannot be posed: {message}"),
+                hint: Some("lengths are in metres, angles in radians; check the body and motion files and their units".into()),
+            }),
+        }
+    }
+
     /// Radar time of every pose, seconds, ascending.
     pub fn pose_times_s(&self) -> Vec<f64> {
         match self {
@@ -152,5 +179,60 @@ impl Person {
             }
             Self::Meshes { pose_times_s, .. } => pose_times_s.clone(),
         }
+    }
+}
+
+/// The first position that is farther from its origin than any scene reaches.
+fn farthest<'a>(what: &str, places: impl Iterator<Item = &'a [[f64; 3]]>) -> Option<String> {
+    let beyond = |position: &&[f64; 3]| !position.iter().all(|value| value.abs() <= bounds::LONGEST_M);
+    places.enumerate().find_map(|(index, positions)| {
+        let position = positions.iter().find(beyond)?;
+        Some(format!("{what} {index} has a position of {position:?} m, expected at most {} m", bounds::LONGEST_M))
+    })
+}
+
+/// The first turn about a joint that is wider than anybody counts.
+fn widest(poses: &[Vec<[f64; 3]>]) -> Option<String> {
+    let beyond = |turn: &[f64; 3]| !turn.iter().all(|value| value.abs() <= bounds::WIDEST_RAD);
+    poses.iter().enumerate().find_map(|(pose, turns)| {
+        let joint = turns.iter().position(beyond)?;
+        Some(format!("pose {pose} turns joint {joint} by {:?} rad, expected at most {} rad", turns[joint], bounds::WIDEST_RAD))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn skinned() -> (BodyModel, Motion, Placement) {
+        let model = procedural::person(&procedural::PersonConfig::default()).unwrap();
+        let pose = vec![[0.0; 3]; model.parents.len()];
+        let motion = Motion { poses: vec![pose; 2], translations: vec![[0.0; 3]; 2], betas: vec![0.0; 5], rate_hz: 60.0 };
+        (model, motion, Placement::default())
+    }
+
+    fn refused(change: impl FnOnce(&mut BodyModel, &mut Motion, &mut Placement)) -> String {
+        let (mut model, mut motion, mut placement) = skinned();
+        change(&mut model, &mut motion, &mut placement);
+        Person::Skinned { model, motion, placement }.check().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_person_is_neither_as_large_as_a_galaxy_nor_turned_without_end() {
+        let (model, motion, placement) = skinned();
+        Person::Skinned { model, motion, placement }.check().unwrap();
+        assert!(refused(|model, _, _| model.template[7][1] = 1e300).contains("the rest pose"));
+        assert!(refused(|_, motion, _| motion.betas[0] = 1e9).contains("the rest pose"));
+        assert!(refused(|model, _, _| model.joint_regressor[3][0].1 = 1e30).contains("joints (1) 1"));
+        assert!(refused(|_, motion, _| motion.translations[1][2] = -1e6).contains("the translation of pose 1"));
+        assert!(refused(|_, _, placement| placement.origin_m[1] = f64::NAN).contains("the placement's origin"));
+        assert!(refused(|_, motion, _| motion.poses[1][4][0] = 1e7).contains("pose 1 turns joint 4"));
+        let meshes = |far: f64| Person::Meshes {
+            vertices: vec![vec![[0.0; 3]], vec![[far, 0.0, 0.0]]],
+            faces: vec![],
+            pose_times_s: vec![0.0, 1.0],
+        };
+        meshes(5.0).check().unwrap();
+        assert!(meshes(1e300).check().unwrap_err().to_string().contains("pose 1 has a position of [1e300, 0.0, 0.0] m"));
     }
 }

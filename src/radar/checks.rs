@@ -1,6 +1,7 @@
 //! Rules that a radar must keep, each with its formula, its reason and a three-valued result.
 
 use super::Radar;
+use crate::bounds;
 use crate::error::{Error, Result};
 
 /// One rule held against one radar.
@@ -15,6 +16,12 @@ pub struct Check {
     /// `None`: does not apply.
     pub passed: Option<bool>,
 }
+
+/// A Fourier matrix over so many samples or loops has [`bounds::MOST_NUMBERS`] entries.
+const MOST_TRANSFORMED: usize = 1 << 14;
+
+/// A day at a hundred frames a second, and some.
+const MOST_FRAMES: usize = 10_000_000;
 
 /// The rules that are advice: a recording that breaks one can still be read.
 pub fn checks(radar: &Radar, farthest_m: Option<f64>, fastest_mps: Option<f64>) -> Vec<Check> {
@@ -80,6 +87,15 @@ impl Radar {
         if !(self.adc_start_s.is_finite() && self.adc_start_s >= 0.0) {
             return Err(Error::setting(format!("{key}.adc_start_s"), self.adc_start_s, "zero or a positive number"));
         }
+        for (field, count, most) in [
+            ("samples_per_chirp", self.samples_per_chirp, MOST_TRANSFORMED),
+            ("loops_per_frame", self.loops_per_frame, MOST_TRANSFORMED),
+            ("frames", self.frames, MOST_FRAMES),
+        ] {
+            bounds::count(format!("{key}.{field}"), count, most)?;
+        }
+        let frame = [self.tx_m.len(), self.rx_m.len(), self.loops_per_frame, self.samples_per_chirp];
+        bounds::numbers(format!("{key}.samples_per_chirp"), "tx x rx x loops x samples of a frame", &frame)?;
         for (field, antennas) in [("tx_m", &self.tx_m), ("rx_m", &self.rx_m)] {
             if antennas.is_empty() {
                 return Err(Error::setting(format!("{key}.{field}"), "empty", "at least one antenna position"));

@@ -82,6 +82,8 @@ impl RecognitionConfig {
 
     /// Refuses numbers that cannot work.
     pub fn check(&self) -> Result<()> {
+        // Windows, batches and resamplings are held in memory; a million is a day's frames.
+        const MOST: usize = 1_000_000;
         for (key, value, least) in [
             ("window_frames", self.window_frames, 4),
             ("stride_frames", self.stride_frames, 1),
@@ -90,8 +92,8 @@ impl RecognitionConfig {
             ("resamplings", self.resamplings, 100),
             ("channels", self.channels.into_iter().min().unwrap_or(0), 1),
         ] {
-            if value < least {
-                return Err(Error::setting(key, value, format!("at least {least}")));
+            if !(least..=MOST).contains(&value) {
+                return Err(Error::setting(key, value, format!("{least} to {MOST}")));
             }
         }
         for (key, value, low, high) in [

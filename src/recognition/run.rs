@@ -12,7 +12,7 @@ use super::config::RecognitionConfig;
 use super::maps::{Sequence, sequence, windows};
 use super::scores::{Accuracy, ClassScores, Judgement, MacroF1, accuracy_of, class_scores, confusion, scores};
 use super::training::{judge, train};
-use crate::data::Recording;
+use crate::data::{Recording, files};
 use crate::diagnosis::statistics::binomial_interval;
 use crate::error::{Error, Result};
 use crate::radar::Radar;
@@ -175,6 +175,7 @@ fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>> {
             hint: Some("a site keeps its recordings in its folder `recordings`".into()),
         });
     }
+    found.iter().try_for_each(files::utf8)?;
     found.sort();
     Ok(found)
 }

@@ -147,7 +147,8 @@ mod tests {
         shuffled.iter_mut().enumerate().for_each(|(index, sequence)| sequence.class = index / 2 % 2);
         let network = train(&shuffled, 2, &config, &device, &mut |_, _| {}).unwrap();
         let accuracy = right(&network, &unseen, &config);
-        assert!((0.2..0.8).contains(&accuracy), "{accuracy}");
+        // Forty fair coins, one for each unseen sequence: within four standard errors of 0.079.
+        assert!((accuracy - 0.5).abs() < 0.32, "{accuracy}");
     }
 
     #[test]

@@ -9,6 +9,7 @@ use super::material::Material;
 use super::receiver::ReceiverConfig;
 use super::surface::SurfaceConfig;
 use super::timeline::Interpolation;
+use crate::bounds;
 use crate::error::{Error, Result};
 use crate::person::Person;
 use crate::radar::Radar;
@@ -187,6 +188,7 @@ impl World {
         self.radar.check("radar")?;
         self.radar.refuse_falling("radar", "the recorder makes no falling ones")?;
         self.room.check("room")?;
+        self.person.as_ref().map_or(Ok(()), Person::check)?;
         self.surface.check("surface")?;
         self.receiver.check("receiver")?;
         self.effects.check(self, "effects")?;
@@ -204,6 +206,10 @@ impl World {
                 return Err(Error::setting(key, value, format!("a number of at least {least}")));
             }
         }
+        let (low, high) = self.room.extent_m(self.walls.open_m);
+        let along = |axis: usize| ((high[axis] - low[axis]) / self.walls.patch_m).ceil() as usize;
+        let largest = [along(0), along(1), along(2)].into_iter().max().unwrap_or(0);
+        bounds::numbers("walls.patch_m", "patches of six walls along their longest side", &[6, largest, largest])?;
         for wall in &self.walls.image_walls {
             if self.room.distance_m(*wall).is_none() {
                 return Err(Error::setting("walls.image_walls", wall.name(), "a boundary that the room has")

@@ -166,7 +166,7 @@ impl Gain {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::support::{assert_close, check_gradient, cpu_devices, in_f64, input, numbers, tensor, values};
     use rand::SeedableRng;
@@ -218,8 +218,7 @@ mod tests {
         assert!((gain.db() - 60.0).abs() < 1e-4);
     }
 
-    #[test]
-    fn gradients_to_the_features_and_the_gain_agree_with_central_differences() {
+    pub(crate) fn gradients_to_the_features_and_the_gain_agree_with_central_differences() {
         let decoders = in_f64(decoders(&Device::flex()));
         let inputs = [input("features", numbers(2, 8, -1.0, 1.0)), input("gain", [0.3])];
         check_gradient(&inputs, 1e-5, 1e-7, |x| {

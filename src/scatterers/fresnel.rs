@@ -57,7 +57,7 @@ impl Reflectance {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::support::{assert_close, check_backends, check_finite, check_gradient, input, numbers, tensor, values};
     use burn::tensor::Device;
@@ -154,8 +154,7 @@ mod tests {
         reflectance(column(0), column(1), column(2)).mixed(column(3)).reshape([point])
     }
 
-    #[test]
-    fn gradients_agree_with_central_differences() {
+    pub(crate) fn gradients_agree_with_central_differences() {
         let inputs = [
             input("cosine squared", numbers(1, 8, 0.02, 0.98)),
             input("refraction", numbers(2, 8, 1.1, 6.0)),

@@ -180,7 +180,7 @@ impl Material {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::support::{assert_close, check_finite, check_gradient, input, numbers, tensor, values};
     use burn::tensor::Device;
@@ -220,8 +220,7 @@ mod tests {
         assert_eq!(values(&picked.extinction), [values(&decode(2).extinction)[1], values(&decode(1).extinction)[0]]);
     }
 
-    #[test]
-    fn gradients_agree_with_central_differences() {
+    pub(crate) fn gradients_agree_with_central_differences() {
         let decode = |x: &[Tensor<1>]| {
             let material = MaterialConfig::default().real(x[0].clone().reshape([2, 5]));
             let Material { roughness, metallic, refraction, extinction, polarisation } = material;

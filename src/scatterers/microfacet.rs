@@ -187,4 +187,4 @@ fn visibility(incident: &Side, outgoing: &Side, alpha_squared: Tensor<2>) -> Ten
 
 #[cfg(test)]
 #[path = "microfacet_tests.rs"]
-mod tests;
+pub(crate) mod tests;

@@ -156,4 +156,4 @@ pub fn aperture(patch: &Patch, tangential: [Tensor<2>; 2]) -> Tensor<2> {
 
 #[cfg(test)]
 #[path = "patches_tests.rs"]
-mod tests;
+pub(crate) mod tests;

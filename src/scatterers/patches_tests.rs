@@ -160,8 +160,7 @@ fn inputs() -> Vec<crate::support::Input> {
     ]
 }
 
-#[test]
-fn gradients_to_every_input_agree_with_central_differences() {
+pub(crate) fn gradients_to_every_input_agree_with_central_differences() {
     check_gradient(&inputs(), 1e-6, 1e-6, from_flat);
 }
 

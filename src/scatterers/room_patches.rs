@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::bounds;
 use crate::error::{Error, Result};
 use crate::room::{Boundary, Room};
 
@@ -53,6 +54,9 @@ pub struct Proxy {
 /// More patches than this cannot be meant.
 const MOST_PATCHES: f64 = 5e6;
 
+/// Each proxy costs a sum over all points: a thousand of them a thousand times the paper's one.
+const MOST_PROXIES: usize = 1000;
+
 impl RoomPatchesConfig {
     /// Refuses what cannot work. `key` names these settings in messages.
     pub fn check(&self, key: &str) -> Result<()> {
@@ -61,16 +65,12 @@ impl RoomPatchesConfig {
                 return Err(Error::setting(format!("{key}.{name}"), value, "a length above zero in metres"));
             }
         }
-        if self.patches == Some(0) {
-            return Err(
-                Error::setting(format!("{key}.patches"), 0, "at least one patch").with_hint("leave the room out for no room")
-            );
+        if let Some(patches) = self.patches {
+            bounds::count(format!("{key}.patches"), patches, MOST_PATCHES as usize)
+                .map_err(|error| error.with_hint("leave the room out for no room"))?;
         }
-        if self.proxies_per_boundary == 0 {
-            return Err(Error::setting(format!("{key}.proxies_per_boundary"), 0, "at least one")
-                .with_hint("switch the indirect path off instead"));
-        }
-        Ok(())
+        bounds::count(format!("{key}.proxies_per_boundary"), self.proxies_per_boundary, MOST_PROXIES)
+            .map_err(|error| error.with_hint("switch the indirect path off for none"))
     }
 
     /// The spacing in use, metres.
@@ -235,7 +235,9 @@ mod tests {
             assert!((found / wanted as f64 - 1.0).abs() < 0.05, "{found} for {wanted}");
         }
         let default = RoomPatchesConfig::default().init(&room()).unwrap().position_m.len();
-        assert!((4000..6000).contains(&default), "{default}");
+        let sides = room().boundaries().into_iter().map(|boundary| Side::new(&room(), boundary, 4.0).area_m2());
+        let wanted = sides.sum::<f64>() / 0.15f64.powi(2);
+        assert!((default as f64 / wanted - 1.0).abs() < 0.05, "{default} for {wanted}");
     }
 
     #[test]

@@ -76,7 +76,7 @@ pub fn directional(weights: Tensor<2>, direction: [Tensor<2>; 3]) -> Tensor<2> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::support::{assert_close, check_backends, check_gradient, cpu_devices, directions, input, numbers, tensor, values};
     use burn::tensor::Device;
@@ -135,8 +135,7 @@ mod tests {
         assert_close("constant", &all[0], &[CONSTANT; 5], 1e-15);
     }
 
-    #[test]
-    fn gradients_agree_with_central_differences() {
+    pub(crate) fn gradients_agree_with_central_differences() {
         for degree in 0..=3 {
             let count = coefficients(degree);
             let inputs = [input("weights", numbers(1, 2 * count, -1.0, 1.0)), input("direction", directions(2, 6))];

@@ -68,7 +68,7 @@ fn cross(a: Tensor<3>, b: Tensor<3>) -> Tensor<3> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::support::{assert_close, check_backends, check_finite, check_gradient, directions, input, tensor, values};
     use burn::tensor::Device;
@@ -112,8 +112,7 @@ mod tests {
         Tensor::cat([frame.tangent, frame.bitangent].map(|axis| axis.reshape([count])).to_vec(), 0)
     }
 
-    #[test]
-    fn gradients_agree_with_central_differences() {
+    pub(crate) fn gradients_agree_with_central_differences() {
         let inputs = [input("normal", directions(5, 4)), input("reference", directions(6, 4))];
         let along = |x: &[Tensor<1>]| flat(Frame::along(x[0].clone().reshape([2, 2, 3]), x[1].clone().reshape([2, 2, 3])));
         check_gradient(&inputs, 1e-6, 1e-7, along);

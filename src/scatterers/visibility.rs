@@ -210,7 +210,9 @@ mod tests {
             100.0 * through,
             1e3 * took
         );
-        assert!(share > 0.88 && through < 0.01, "{share} {through}");
+        // Two concave millimetres hide a point from the operator that a ray would reach: it loses one point in nine, and
+        // lets through almost none (γ = 2.25 was chosen for that). Of 6890 vertices, 0.5 % are four standard errors.
+        assert!((share - 0.89).abs() < 0.005 && through < 0.005, "{share} {through}");
     }
 
     #[test]
@@ -297,7 +299,10 @@ mod tests {
             assert!(share(&others) > 0.97, "{:?}: {}", proxy.boundary, share(&others));
         }
         let with_ball = seen(&ball);
-        assert!(share(&with_ball.direct[..ball.len()]) > 0.3 && share(&with_ball.direct[..ball.len()]) < 0.6);
+        // From outside one sees (1 − r / d) / 2 of a sphere: 0.45 of this one.
+        let ball_seen = share(&with_ball.direct[..ball.len()]);
+        println!("ball: {ball_seen} seen, expected 0.45");
+        assert!((ball_seen - 0.45).abs() < 0.03, "{ball_seen}");
         assert!(share(&with_ball.direct[ball.len()..]) < share(&empty.direct), "the ball throws a shadow");
     }
 }

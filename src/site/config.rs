@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::bounds;
 use crate::data::read_settings;
 use crate::error::{Error, Result};
 use crate::person::actions::Action;
@@ -113,9 +114,8 @@ impl SiteConfig {
         }
         unique("actions", &self.actions.iter().map(|action| action.name().to_string()).collect::<Vec<_>>())?;
         for (key, count) in [("actions", self.actions.len()), ("repetitions", self.repetitions)] {
-            if count == 0 {
-                return Err(Error::setting(key, 0, "at least one"));
-            }
+            // A hundred thousand repetitions of an action of ten seconds take twelve days to show.
+            bounds::count(key, count, 100_000)?;
         }
         if !(self.margin_m.is_finite() && self.margin_m >= 0.0) {
             return Err(Error::setting("margin_m", self.margin_m, "a distance of at least zero in metres"));

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::config::SiteConfig;
 use super::plan::{self, Sequence, sequences};
 use crate::data::atomic::write_text;
-use crate::data::{Recording, Shard};
+use crate::data::{Recording, Shard, files};
 use crate::error::{Error, Result};
 use crate::recorder::{Labels, RecorderConfig, write_world};
 
@@ -102,7 +102,7 @@ impl Job {
             return Ok(false);
         }
         let hint = "record into another folder, or remove this recording";
-        let found = fs::read_to_string(&self.settings_file).map_err(|source| Error::read(&self.settings_file, source))?;
+        let found = files::read_text(&self.settings_file)?;
         if let Some((was, is)) = found.lines().zip(self.settings.lines()).find(|(was, is)| was != is) {
             return Err(Error::field(&self.settings_file, "the settings", format!("`{was}`"), format!("`{is}`")).with_hint(hint));
         }

@@ -17,6 +17,8 @@ use super::metrics::EpochMetrics;
 use crate::{
     data::{
         atomic::{self, AtomicFolder},
+        files,
+        recording::check_placement,
         settings,
     },
     error::{Error, Result},
@@ -123,15 +125,32 @@ pub fn read_state(folder: &Path) -> Result<CheckpointState> {
     if state.format != 1 {
         return Err(Error::field(path, "format", state.format.to_string(), "1"));
     }
+    state.check(&path)?;
     Ok(state)
+}
+
+impl CheckpointState {
+    /// Refuses what a config or a recording with the same numbers would be refused for; `path` is the file they are in.
+    fn check(&self, path: &Path) -> Result<()> {
+        let Site { radar, room, placement, body_extent } = &self.site;
+        let room = room.as_ref().map_or(Ok(()), |room| room.check("site.room"));
+        self.simulator.check().and(radar.check("site.radar")).and(room).map_err(|error| error.in_file(path))?;
+        if let Some(placement) = placement {
+            check_placement(path, placement)?;
+        }
+        let Extent { low_m, high_m } = body_extent;
+        if low_m.iter().zip(high_m).any(|(low, high)| low > high) {
+            let found = format!("{low_m:?} to {high_m:?}");
+            return Err(Error::field(path, "site.body_extent", found, "a box whose low corner comes first"));
+        }
+        Ok(())
+    }
 }
 
 /// Loads the weights into a simulator that was initialised from the same settings.
 pub fn load_weights(folder: &Path, mut simulator: Simulator) -> Result<Simulator> {
     let path = folder.join(WEIGHTS);
-    if !path.is_file() {
-        return Err(Error::read(&path, std::io::Error::from(std::io::ErrorKind::NotFound)));
-    }
+    files::require(&path)?;
     let mut store = SafetensorsStore::from_file(&path).allow_partial(true).validate(false);
     let result = simulator
         .load_from(&mut store)
@@ -158,6 +177,7 @@ pub fn load_weights(folder: &Path, mut simulator: Simulator) -> Result<Simulator
 /// Loads the optimiser's state.
 pub fn load_optimizer(folder: &Path, optimizer: ModuleOptimizer) -> Result<ModuleOptimizer> {
     let path = folder.join(OPTIMIZER);
+    files::require(&path)?;
     optimizer.load(&path).map_err(|error| Error::Parse { path, message: format!("not an optimiser's state: {error}") })
 }
 

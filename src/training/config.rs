@@ -6,10 +6,14 @@ use serde::{Deserialize, Serialize};
 
 use super::{RefineConfig, Split};
 use crate::{
+    bounds,
     error::{Error, Result},
     heatmap::HeatmapConfig,
     loss::LossConfig,
 };
+
+/// Products of epochs, repeats and frames stay within 64 bits.
+const MOST_REPETITIONS: usize = 1_000_000;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -76,9 +80,8 @@ impl Default for TrainingConfig {
 
 impl TrainingConfig {
     pub fn check(&self) -> Result<()> {
-        let at_least_one = [("epochs", self.epochs), ("frames_per_step", self.frames_per_step), ("repeats", self.repeats)];
-        if let Some((key, _)) = at_least_one.into_iter().find(|(_, value)| *value == 0) {
-            return Err(Error::setting(format!("training.{key}"), 0, "at least 1"));
+        for (key, value) in [("epochs", self.epochs), ("frames_per_step", self.frames_per_step), ("repeats", self.repeats)] {
+            bounds::count(format!("training.{key}"), value, MOST_REPETITIONS)?;
         }
         if self.frames == Some(0) {
             return Err(Error::setting("training.frames", 0, "at least 1").with_hint("leave the key out to train on all"));
@@ -122,7 +125,7 @@ mod tests {
     #[test]
     fn settings_that_cannot_train_are_refused_by_name() {
         let config = TrainingConfig { epochs: 0, ..Default::default() };
-        assert_eq!(config.check().unwrap_err().to_string(), "`training.epochs` is 0, expected at least 1");
+        assert_eq!(config.check().unwrap_err().to_string(), "`training.epochs` is 0, expected 1 to 1000000");
         let config = TrainingConfig { learning_rate: -1.0, ..Default::default() };
         assert_eq!(config.check().unwrap_err().to_string(), "`training.learning_rate` is -1, expected a positive number");
         for fraction in [f64::NAN, 1.0, -0.1] {

@@ -17,6 +17,7 @@ use super::{
     refine, step_rng,
 };
 use crate::{
+    bounds,
     complex::Complex,
     error::{Error, Result},
     heatmap::RangeDoppler,
@@ -124,7 +125,9 @@ impl Trainer<'_> {
         if let Some(frames) = self.config.frames.filter(|&frames| frames > split.training.len()) {
             return Err(Error::setting("training.frames", frames, format!("at most {}, all there are", split.training.len())));
         }
-        let split = split.with_most(self.config.frames).repeated(self.config.repeats);
+        let split = split.with_most(self.config.frames);
+        bounds::numbers("training.repeats", "repeats x training frames", &[self.config.repeats, split.training.len()])?;
+        let split = split.repeated(self.config.repeats);
         let steps_per_epoch = split.training.len().div_ceil(self.config.frames_per_step);
         let steps = self.config.epochs * steps_per_epoch;
         let device = self.device().clone().autodiff();

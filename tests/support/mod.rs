@@ -7,21 +7,69 @@
 //! sign in two outputs cannot cancel.
 #![allow(dead_code)]
 
+use std::cell::Cell;
+use std::collections::BTreeSet;
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{DType, Device, Tensor, TensorData};
 
-/// A file or folder of the shared third-party data (`""` is all of it), or `None` with a message where that is absent.
+/// A file or folder of the shared third-party data (`""` is all of it), or `None` where that data is not at all.
+///
+/// Where it is (`HYBRIDSIM_SHARED` is set, or `../shared` has recordings), every test that uses it is required: what is
+/// missing then fails. Elsewhere the test counts as skipped.
+///
+/// # Panics
+/// Where the data is, but not this part of it.
 pub fn shared(path: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("HYBRIDSIM_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
-    let found = root.join(path);
-    if !found.exists() {
-        eprintln!("skipped: {} is absent; HYBRIDSIM_SHARED names the folder of shared data", found.display());
-        return None;
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
+    let found = find_shared(std::env::var_os("HYBRIDSIM_SHARED").map(PathBuf::from), &beside, path);
+    let found = found.unwrap_or_else(|message| panic!("{message}"));
+    if found.is_none() {
+        skip("shared material");
     }
-    Some(found)
+    found
+}
+
+fn find_shared(named: Option<PathBuf>, beside: &Path, path: &str) -> Result<Option<PathBuf>, String> {
+    let root = match named {
+        Some(root) => root,
+        None if beside.join("recordings").is_dir() => beside.into(),
+        None => return Ok(None),
+    };
+    let found = root.join(path);
+    match found.exists() {
+        true => Ok(Some(found)),
+        false => Err(format!("{} is absent, but required: the shared data is at {}", found.display(), root.display())),
+    }
+}
+
+/// Says that this test cannot run here for lack of something, and how many could not until now. `HYBRIDSIM_STRICT`, which
+/// CI sets, makes everything but shared material required; `HYBRIDSIM_SKIPPED` names a file that collects a line for each.
+///
+/// # Panics
+/// Where it is required.
+pub fn skip(lack: &'static str) {
+    static SKIPPED: Mutex<BTreeSet<(&str, String)>> = Mutex::new(BTreeSet::new());
+    assert!(
+        lack == "shared material" || std::env::var_os("HYBRIDSIM_STRICT").is_none(),
+        "{lack} is absent, but required by HYBRIDSIM_STRICT"
+    );
+    let test = std::thread::current().name().unwrap_or("a test").to_string();
+    let mut skipped = SKIPPED.lock().unwrap_or_else(PoisonError::into_inner);
+    if !skipped.insert((lack, test.clone())) {
+        return;
+    }
+    let count = skipped.iter().filter(|(other, _)| *other == lack).count();
+    // Straight to standard error: the harness hides what a passing test prints.
+    let _ = writeln!(std::io::stderr(), "skipped: {count} tests need {lack} ({test})");
+    if let Some(file) = std::env::var_os("HYBRIDSIM_SKIPPED") {
+        let opened = std::fs::OpenOptions::new().append(true).create(true).open(file);
+        let written = opened.and_then(|mut file| writeln!(file, "{lack}: {test}"));
+        assert!(written.is_ok(), "HYBRIDSIM_SKIPPED cannot be written: {written:?}");
+    }
 }
 
 /// A named input of the function under test, row by row.
@@ -159,6 +207,28 @@ pub fn backward(inputs: &[Input], device: &Device, function: &dyn Fn(&[Tensor<1>
         .collect()
 }
 
+thread_local! {
+    /// Derivatives that this test has held against central differences, and those of them that are not zero.
+    static COMPARED: Cell<(usize, usize)> = const { Cell::new((0, 0)) };
+}
+
+/// Counts derivatives that a test has held against central differences (or a closed form) by itself; `disagreements` does so for its own.
+pub fn compared(wanted: &[f64]) {
+    let (all, moving) = COMPARED.get();
+    COMPARED.set((all + wanted.len(), moving + wanted.iter().filter(|value| **value != 0.0).count()));
+}
+
+/// Runs a gradient test, which must hold derivatives against central differences that are not all zero.
+///
+/// # Panics
+/// As the test does; also if it compared nothing, or nothing that moves.
+pub fn with_evidence(test: fn()) {
+    COMPARED.set((0, 0));
+    test();
+    let (all, moving) = COMPARED.get();
+    assert!(moving > 0, "of {all} derivatives that were compared, none is other than zero: this test shows nothing");
+}
+
 /// Where the backward pass and central differences disagree by more than `tolerance` of the input's largest derivative:
 /// one line each.
 pub fn disagreements(
@@ -170,6 +240,7 @@ pub fn disagreements(
 ) -> Vec<String> {
     let found = backward(inputs, device, function);
     let wanted = central_difference(inputs, step, device, function);
+    wanted.iter().for_each(|wanted| compared(wanted));
     let mut rows = Vec::new();
     for ((input, found), wanted) in inputs.iter().zip(&found).zip(&wanted) {
         let largest = wanted.iter().fold(0.0_f64, |largest, w| largest.max(w.abs()));
@@ -307,6 +378,26 @@ mod tests {
     #[should_panic(expected = "gradient to x")]
     fn an_infinite_gradient_is_found() {
         check_finite(&[input("x", [0.0])], |x| x[0].clone().sqrt());
+    }
+
+    #[test]
+    fn a_gradient_test_that_shows_nothing_fails() {
+        with_evidence(|| check_gradient(&[input("x", [2.0])], 1e-4, 1e-6, |x| x[0].clone().powi_scalar(2)));
+        let silent: [fn(); 2] = [|| (), || check_gradient(&[input("x", [2.0])], 1e-4, 1e-6, |x| x[0].clone().detach() * 0.0)];
+        for test in silent {
+            assert!(std::panic::catch_unwind(|| with_evidence(test)).is_err());
+        }
+    }
+
+    #[test]
+    fn shared_data_that_is_there_is_required_and_what_is_not_is_skipped() {
+        let folder = tempfile::tempdir().unwrap();
+        let here = folder.path();
+        assert_eq!(find_shared(None, here, "bodies"), Ok(None));
+        assert!(find_shared(Some(here.join("nowhere")), here, "").is_err(), "whoever names a folder means it");
+        std::fs::create_dir(here.join("recordings")).unwrap();
+        assert_eq!(find_shared(None, here, "recordings"), Ok(Some(here.join("recordings"))));
+        assert!(find_shared(None, here, "bodies").unwrap_err().contains("bodies is absent, but required"));
     }
 
     #[test]

@@ -216,8 +216,7 @@ fn a_correction_on_the_device_equals_the_corrected_body_on_the_host() {
     }
 }
 
-#[test]
-fn gradients_of_positions_normals_and_areas_agree_with_central_differences_for_every_kind_of_parameter() {
+pub(crate) fn gradients_of_positions_normals_and_areas_agree_with_central_differences_for_every_kind_of_parameter() {
     let own = correction();
     for (name, on) in cpu_devices() {
         let on = on.autodiff();
@@ -250,6 +249,7 @@ fn gradients_of_positions_normals_and_areas_agree_with_central_differences_for_e
                         (moved(1e-6) - moved(-1e-6)) / 2e-6
                     };
                     let wanted: Vec<f64> = (0..at[kind].len()).map(central).collect();
+                    crate::support::compared(&wanted);
                     let largest = wanted.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
                     // A shift changes positions alone; a turn of the whole changes no area.
                     let rigid = name_of_kind.starts_with("shift") || (part == 2 && name_of_kind == "heading");

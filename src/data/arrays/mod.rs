@@ -18,6 +18,8 @@ use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
+use crate::bounds;
+use crate::data::files;
 use crate::error::{Error, Result};
 
 /// An array in C order: the last axis is the fastest.
@@ -73,7 +75,7 @@ impl Problem {
 pub fn read_npy<T: Element>(path: impl AsRef<Path>, axes: Axes) -> Result<Array<T>> {
     let path = path.as_ref();
     let (mut file, size) = open(path)?;
-    read_array(&mut file, size, Some(axes))
+    read_array(&mut file, size, Some(axes), u64::MAX)
         .and_then(|array: Array<T>| array.finite(axes).map(|()| array))
         .map_err(|problem| problem.at(path, &field_of(path)))
 }
@@ -85,16 +87,17 @@ pub fn field_of(path: &Path) -> String {
 
 /// Opens a file for buffered reading and says how long it is, bytes.
 pub(crate) fn open(path: &Path) -> Result<(BufReader<File>, u64)> {
-    let file = File::open(path).map_err(|source| Error::read(path, source))?;
-    let metadata = file.metadata().map_err(|source| Error::read(path, source))?;
-    if metadata.is_dir() {
-        return Err(Error::read(path, io::ErrorKind::IsADirectory.into()));
-    }
-    Ok((BufReader::with_capacity(1 << 16, file), metadata.len()))
+    let (file, size) = files::open(path)?;
+    Ok((BufReader::with_capacity(1 << 16, file), size))
 }
 
-/// Reads the `size` bytes of one array. `axes`: `None` takes any shape.
-pub(crate) fn read_array<T: Element>(reader: &mut impl Read, size: u64, axes: Option<Axes>) -> Checked<Array<T>> {
+/// Bytes that so many numbers need once they are read.
+fn memory_of<T>(numbers: u64) -> u64 {
+    numbers.saturating_mul(size_of::<T>() as u64)
+}
+
+/// Reads the `size` bytes of one array. `axes`: `None` takes any shape. `most`: bytes that it may take in memory.
+pub(crate) fn read_array<T: Element>(reader: &mut impl Read, size: u64, axes: Option<Axes>, most: u64) -> Checked<Array<T>> {
     let header = Header::read(reader, size)?;
     let expected = || format!("{}{}", T::EXPECTED, axes.map(|axes| format!(" {}", describe(axes))).unwrap_or_default());
     if !T::accepts(header.stored) {
@@ -104,6 +107,16 @@ pub(crate) fn read_array<T: Element>(reader: &mut impl Read, size: u64, axes: Op
         header.check_shape(axes, expected)?;
     }
     header.check_size(size)?;
+    let needed = memory_of::<T>(header.data_bytes() / header.stored.bytes.max(1) as u64).max(header.data_bytes());
+    if needed > most {
+        return Err(Problem::new(
+            format!("{needed} bytes once it is unpacked"),
+            format!("at most {most} for so small an archive"),
+        )
+        .with_hint(
+            "the archive is damaged or made to fill the memory; if it is right, save it without compression (numpy.savez)",
+        ));
+    }
     // `size` may come from an archive's directory, which may lie too: the buffer grows with what really arrives.
     let wanted = header.data_bytes();
     let mut bytes = Vec::new();
@@ -164,6 +177,13 @@ pub(crate) fn to_c_order<T: Copy>(values: Vec<T>, shape: &[usize]) -> Vec<T> {
 }
 
 impl<T> Array<T> {
+    /// ` at pose 3, xyz 1`
+    fn place(&self, position: usize, axes: Axes) -> String {
+        let place: Vec<_> =
+            axes.iter().zip(self.index_of(position)).map(|((name, _), index)| format!("{name} {index}")).collect();
+        if place.is_empty() { String::new() } else { format!(" at {}", place.join(", ")) }
+    }
+
     /// The index along every axis of the value at `position` of `values`.
     pub fn index_of(&self, position: usize) -> Vec<usize> {
         let mut rest = position;
@@ -180,14 +200,20 @@ impl<T: Element> Array<T> {
     /// Refuses NaN and infinity, naming where the first one is.
     pub fn finite(&self, axes: Axes) -> Checked<()> {
         let Some(position) = self.values.iter().position(|value| !value.is_finite()) else { return Ok(()) };
-        let place: Vec<_> =
-            axes.iter().zip(self.index_of(position)).map(|((name, _), index)| format!("{name} {index}")).collect();
-        let place = if place.is_empty() { String::new() } else { format!(" at {}", place.join(", ")) };
+        let place = self.place(position, axes);
         Err(Problem::new(format!("{}{place}", self.values[position].name_non_finite()), "finite numbers"))
     }
 }
 
 impl Array<f64> {
+    /// Refuses lengths that no scene of a radar has, naming where the first one is.
+    pub fn lengths(&self, axes: Axes) -> Checked<()> {
+        let Some(position) = self.values.iter().position(|value| value.abs() > bounds::LONGEST_M) else { return Ok(()) };
+        let found = format!("{:e} m{}", self.values[position], self.place(position, axes));
+        Err(Problem::new(found, format!("at most {:e} m", bounds::LONGEST_M))
+            .with_hint("lengths are in metres; the file is damaged or in another unit"))
+    }
+
     /// Rows of three, for arrays whose last axis is `xyz`.
     pub fn rows(&self) -> Vec<[f64; 3]> {
         self.values.as_chunks().0.to_vec()

@@ -275,3 +275,46 @@ fn an_archive_that_claims_to_grow_beyond_reason_is_refused() {
     let message = Npz::open(&path).and_then(|mut npz| npz.read::<f64>("trans", POSE)).unwrap_err().to_string();
     assert!(message.contains("`trans` is said to grow from ") && message.contains(" to 1879048192 bytes"), "{message}");
 }
+
+#[test]
+fn a_small_archive_cannot_fill_the_memory() {
+    let (_folder, path) = temporary("a.npz");
+    // Half a megabyte of zeros is compressed to half a kilobyte, as rest poses are.
+    write_npz(&path, &members(&vec![0.0; 60_000])).unwrap();
+    Npz::open(&path).unwrap().read::<f64>("trans", POSE).unwrap();
+    let zeros = vec![0.0; 12_000_000];
+    write_npz(&path, &members(&zeros)).unwrap();
+    let size = fs::metadata(&path).unwrap().len();
+    assert!(size < 200_000);
+    let error = Npz::open(&path).and_then(|mut npz| npz.read::<f64>("trans", POSE)).unwrap_err();
+    let most = (1 << 26) + 100 * size;
+    let wanted = format!("`trans` is 96000000 bytes once it is unpacked, expected at most {most} for so small an archive");
+    assert_eq!(error.to_string(), format!("{}: {wanted}", path.display()));
+    assert!(error.hint().unwrap().contains("numpy.savez"));
+    // As small numbers they would need eight times their size.
+    let kept = Member { name: "trans", shape: vec![4_000_000, 3], values: Values::I16(&vec![0; 12_000_000]) };
+    write_npz(&path, &[kept]).unwrap();
+    let error = Npz::open(&path).and_then(|mut npz| npz.read::<f64>("trans", POSE)).unwrap_err();
+    assert!(error.to_string().contains("`trans` is 96000000 bytes once it is unpacked"), "{error}");
+}
+
+#[test]
+fn all_that_one_archive_unpacks_counts() {
+    let (_folder, path) = temporary("a.npz");
+    let zeros = vec![0.0; 3_000_000];
+    let names = ["a", "b", "c", "d"];
+    let all: Vec<Member> =
+        names.iter().map(|name| Member { name, shape: vec![1_000_000, 3], values: Values::F64(&zeros) }).collect();
+    write_npz(&path, &all).unwrap();
+    let mut npz = Npz::open(&path).unwrap();
+    let read: Vec<bool> = names.iter().map(|name| npz.read::<f64>(name, POSE).is_ok()).collect();
+    assert_eq!(read, [true, true, true, false], "24 MB each, 64 MiB and a hundred times the file in all");
+}
+
+#[test]
+#[cfg(unix)]
+fn an_array_that_is_a_device_is_not_read() {
+    let message = read_npy::<f64>("/dev/zero", POSE).unwrap_err().to_string();
+    assert_eq!(message, "/dev/zero: this is a device, expected a regular file");
+    assert!(Npz::open("/dev/zero").is_err());
+}

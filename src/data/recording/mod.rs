@@ -167,8 +167,8 @@ fn frames_outside(radar: &Radar, person: &Person) -> Option<String> {
     })
 }
 
-/// The placement as the contract has it, for messages.
-fn check_placement(path: &Path, placement: &Placement) -> Result<()> {
+/// Refuses a placement that is no rigid motion; `path` is the file that holds it.
+pub fn check_placement(path: &Path, placement: &Placement) -> Result<()> {
     let rows = placement.radar_from_motion;
     let all = rows.as_flattened().iter().chain(&placement.origin_m).chain([&placement.start_s]);
     if all.into_iter().any(|value| !value.is_finite()) {

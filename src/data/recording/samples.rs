@@ -1,6 +1,5 @@
 //! `if.npy`: the samples, one frame at a time.
 
-use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
@@ -8,6 +7,7 @@ use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
 use crate::data::arrays::{Axes, Element, Header, Kind, Problem, Stored, describe, field_of, open, to_c_order};
+use crate::data::files;
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
 
@@ -184,7 +184,7 @@ impl IfFile {
     /// A frame in C order: a piece of the file, decoded block by block.
     fn read_block(&self, index: usize, parts: &mut Parts) -> std::io::Result<()> {
         let (stored, mut left) = (self.header.stored, self.frame_bytes());
-        let mut file = File::open(&self.path)?;
+        let mut file = files::regular(&self.path)?;
         file.seek(SeekFrom::Start(self.header.data_start + (index * left) as u64))?;
         let mut block = vec![0; left.min(BLOCK)];
         while left > 0 {
@@ -203,7 +203,7 @@ impl IfFile {
     fn read_strided(&self, index: usize, parts: &mut Parts) -> std::io::Result<()> {
         let (frames, stored, length) = (self.dims[0], self.header.stored, self.frame_bytes());
         let (width, shape) = (stored.bytes, &self.header.shape[1..]);
-        let mut file = File::open(&self.path)?;
+        let mut file = files::regular(&self.path)?;
         file.seek(SeekFrom::Start(self.header.data_start))?;
         let mut bytes = Vec::with_capacity(length);
         let mut block = vec![0; width * frames * BLOCK.div_ceil(width * frames)];

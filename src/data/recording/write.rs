@@ -9,7 +9,7 @@ use super::settings::{FORMAT, Files, RecordingSettings};
 use super::{Recording, SETTINGS_FILE};
 use crate::data::arrays::{Values, header_bytes, write_npy};
 use crate::data::atomic::{AtomicFile, AtomicFolder, write_text};
-use crate::data::{write_body, write_motion};
+use crate::data::{files, write_body, write_motion};
 use crate::error::{Error, Result};
 use crate::person::Person;
 use crate::radar::Radar;
@@ -81,7 +81,7 @@ fn write_person(folder: &Path, contents: &RecordingContents) -> Result<Files> {
             let body = contents.body_file.map_or_else(|| PathBuf::from("body.npz"), Path::to_path_buf);
             match contents.body_file {
                 // Seen from beside the future folder, which is where the temporary one is.
-                Some(body) => drop(std::fs::File::open(folder.join(body)).map_err(|source| Error::read(body, source))?),
+                Some(body) => files::require(folder.join(body))?,
                 None => write_body(folder.join(&body), model)?,
             }
             write_motion(folder.join("motion.npz"), motion)?;

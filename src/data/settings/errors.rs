@@ -1,6 +1,7 @@
 //! From what TOML and serde say to what, where, and which key was meant.
 
 use std::ops::Range;
+use std::path::PathBuf;
 
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
@@ -130,6 +131,18 @@ fn key_at(table: &DeTable, span: &Range<usize>) -> Option<Vec<String>> {
             path
         })
     })
+}
+
+/// The file that says something about a key, or about a table above it; `None` where `--set` does.
+pub(super) fn file_of(keys: &[String], sources: &[Source], sets: &[String]) -> Option<PathBuf> {
+    for length in (1..=keys.len()).rev() {
+        match origin(&keys[..length], sources, sets) {
+            Origin::Set => return None,
+            Origin::File { source, .. } => return Some(source.path.clone()),
+            Origin::Nowhere => {}
+        }
+    }
+    sources.first().map(|source| source.path.clone())
 }
 
 /// Who said something about a key.

@@ -1,6 +1,7 @@
 //! Settings in TOML: read, inherited, overridden, and refused with the place of what is wrong.
 
 mod errors;
+mod numbers;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,6 +9,7 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
+use crate::data::files;
 use crate::error::{Error, Result};
 
 /// The key with which a config names its parent.
@@ -15,13 +17,17 @@ const EXTENDS: &str = "extends";
 
 /// Reads one TOML file as it is.
 pub fn read_toml<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
-    let source = Source::read(path.as_ref())?;
-    toml::from_str(&source.text).map_err(|error| errors::explain(&error, &[source], &[]))
+    let sources = [Source::read(path.as_ref())?];
+    let text = sources[0].text.as_str();
+    let explained = |error| errors::explain(&error, &sources, &[]);
+    numbers::refuse_impossible(&toml::from_str(text).map_err(explained)?, &sources, &[])?;
+    toml::from_str(text).map_err(explained)
 }
 
 /// Reads a config: the file, over the parents it extends, under `sets`, each `a.b.c=value`.
 pub fn read_settings<T: DeserializeOwned>(path: impl AsRef<Path>, sets: &[String]) -> Result<T> {
     let (table, sources) = resolve_with_sources(path.as_ref(), sets)?;
+    numbers::refuse_impossible(&table, &sources, sets)?;
     T::deserialize(table).map_err(|error| errors::explain(&error, &sources, sets))
 }
 
@@ -33,8 +39,9 @@ pub fn resolve(path: impl AsRef<Path>, sets: &[String]) -> Result<Table> {
 /// Reads settings that are already a table, under `sets`; `name` is what messages call them.
 pub fn settings_from_table<T: DeserializeOwned>(mut table: Table, name: impl AsRef<Path>, sets: &[String]) -> Result<T> {
     apply_sets(&mut table, sets)?;
-    let source = Source { path: name.as_ref().into(), text: String::new() };
-    T::deserialize(table).map_err(|error| errors::explain(&error, &[source], sets))
+    let sources = [Source { path: name.as_ref().into(), text: String::new() }];
+    numbers::refuse_impossible(&table, &sources, sets)?;
+    T::deserialize(table).map_err(|error| errors::explain(&error, &sources, sets))
 }
 
 /// A file whose text went into the settings.
@@ -45,8 +52,7 @@ struct Source {
 
 impl Source {
     fn read(path: &Path) -> Result<Self> {
-        let text = fs::read_to_string(path).map_err(|source| Error::read(path, source))?;
-        Ok(Self { path: path.into(), text })
+        Ok(Self { path: path.into(), text: files::read_text(path)? })
     }
 }
 

@@ -156,3 +156,23 @@ fn an_override_that_is_none_is_refused() {
     assert_eq!(folder.refused("a.toml", &["training..epochs=1"]), "`--set training..epochs=1` is no setting");
     assert_eq!(folder.refused("a.toml", &["seed.x=1"]), "`seed` is 1, expected a table, as --set seed.x=1 has it");
 }
+
+#[test]
+fn a_number_that_nothing_can_have_is_refused_with_its_key_and_file() {
+    let folder = Folder::new(&[
+        ("a.toml", "walls_m = [1.0, nan]\n"),
+        ("b.toml", "extends = \"c.toml\"\n[training]\nepochs = 3\n"),
+        ("c.toml", "[training]\nlearning_rate = 1e300\n"),
+        ("d.toml", "seed = 9223372036854775807\n[training]\nepochs = 9223372036854775807\n"),
+    ]);
+    assert_eq!(folder.refused("a.toml", &[]), "a.toml: `walls_m.1` is NaN, expected a finite number");
+    let largest = "at most 3.403e38";
+    assert_eq!(folder.refused("b.toml", &[]), format!("c.toml: `training.learning_rate` is 1e300, expected {largest}"));
+    let counted = "is 9223372036854775807, expected a whole number of at most 2147483648";
+    assert_eq!(folder.refused("d.toml", &[]), format!("d.toml: `training.epochs` {counted}"));
+    // Whoever set it is not a file.
+    let set = ["training.learning_rate=0.1", "training.epochs=3", "walls_m=[1e300]"];
+    assert_eq!(folder.refused("d.toml", &set), "`walls_m.0` is 1e300, expected at most 1.000e5 metres");
+    // Seeds may be anything.
+    assert_eq!(folder.read("d.toml", &["training.epochs=3"]).unwrap().seed, i64::MAX as u64);
+}

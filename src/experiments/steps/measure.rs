@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::Bench;
-use crate::data::{Recording, atomic};
+use crate::data::{Recording, atomic, files};
 use crate::error::{Error, Result};
 use crate::evaluation::{ComparisonConfig, compare_frames};
 use crate::recognition::{self, RecognitionConfig, Stage};
@@ -27,7 +27,7 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
 
 pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let path = path.as_ref();
-    let text = std::fs::read_to_string(path).map_err(|error| Error::read(path, error))?;
+    let text = files::read_text(path)?;
     serde_json::from_str(&text).map_err(|error| Error::Parse { path: path.into(), message: error.to_string() })
 }
 

@@ -12,6 +12,7 @@ mod walking;
 use serde::{Deserialize, Serialize};
 
 use super::{BodyModel, JOINT_NAMES, Motion, Placement};
+use crate::bounds;
 use crate::error::{Error, Result};
 use plan::Plan;
 use posing::Figure;
@@ -123,7 +124,10 @@ pub fn motion(
     }
     let figure = Figure::new(model, betas);
     let variety = Variety::new(style);
-    let poses = (duration_s * rate_hz - 1e-9).ceil() as usize + 1;
+    let poses = (duration_s * rate_hz - 1e-9).ceil().max(0.0) as usize;
+    let poses = poses.saturating_add(1);
+    // A procedural motion is held in memory; so many poses last for 4.6 hours at 60 Hz.
+    bounds::count("motion.duration_s x rate_hz", poses, 1_000_000)?;
     let (poses, translations) = (0..poses)
         .map(|pose| figure.pose(&Plan::smoothed(pose as f64 / rate_hz, |time| plan(action, style, &figure, &variety, time))))
         .unzip();

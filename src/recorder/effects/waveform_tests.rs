@@ -87,7 +87,8 @@ fn phase_noise_has_the_stated_strength_at_three_metres_and_jitter_has_two_values
     let late: Vec<f64> =
         (0..4).flat_map(|k| recorder.stages().chirp_errors(recorder.world(), k).unwrap()).map(|e| e.late_s).collect();
     assert!(late.iter().all(|s| *s == 0.0 || *s == 1.1e-9));
-    assert!((10..54).contains(&late.iter().filter(|s| **s > 0.0).count()), "{late:?}");
+    // Sixty-four fair coins, within four standard deviations of 4.
+    assert!((16..=48).contains(&late.iter().filter(|s| **s > 0.0).count()), "{late:?}");
 }
 
 #[test]

@@ -417,9 +417,10 @@ mod tests {
         let line = Line { evidence: &evidence, empty: vec![true; 64], residual: None, fast: 0.0 };
         let [on, _, _, half] = line.strongest().map(|(found, _)| found.expect("empty ranges"));
         assert_eq!(half.at, (slow, fast));
-        // Scalloping of a Hann window: 1.42 dB along each axis.
+        // Scalloping of a Hann window (Harris 1978, table 1): 1.42 dB along each axis.
         let lost_db = 10.0 * ((half.power - 1.0) / (on.power - 1.0)).log10();
-        assert!((2.0..4.0).contains(&lost_db), "{lost_db}");
+        println!("lost {lost_db} dB");
+        assert!((lost_db - 2.84).abs() < 0.3, "{lost_db}");
     }
 
     #[test]
