@@ -39,6 +39,17 @@ pub fn require(path: impl AsRef<Path>) -> Result<()> {
     }
 }
 
+/// A regular file, for readers whose errors get their path later.
+///
+/// # Errors
+/// As `open`.
+pub fn regular(path: impl AsRef<Path>) -> io::Result<File> {
+    match other_kind(fs::metadata(&path)?.file_type()) {
+        None => File::open(path),
+        Some(kind) => Err(io::Error::new(io::ErrorKind::InvalidInput, format!("this is {kind}, expected a regular file"))),
+    }
+}
+
 /// What else than a regular file something is.
 fn other_kind(kind: FileType) -> Option<&'static str> {
     if kind.is_file() {

@@ -322,7 +322,7 @@ fn settings_that_cannot_be_are_refused_in_their_file() {
         "recording.toml: `motion.radar_from_motion` is a mirror image, expected a rotation"
     );
     assert!(with("[1.0, 0.0, 0.0]", "[2.0, 0.0, 0.0]").ends_with("expected a rotation"));
-    assert_eq!(with("\nstart_s = 0.0", "\nstart_s = nan"), "recording.toml: `motion` is not finite, expected finite numbers");
+    assert_eq!(with("\nstart_s = 0.0", "\nstart_s = nan"), "recording.toml: `motion.start_s` is NaN, expected a finite number");
     assert!(with("motion = \"motion.npz\"", "motion = \"other.npz\"").starts_with("other.npz: cannot be read: "));
     assert!(refused(&folder.join("none")).contains("recording.toml: cannot be read: "));
 }

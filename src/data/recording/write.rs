@@ -81,7 +81,7 @@ fn write_person(folder: &Path, contents: &RecordingContents) -> Result<Files> {
             let body = contents.body_file.map_or_else(|| PathBuf::from("body.npz"), Path::to_path_buf);
             match contents.body_file {
                 // Seen from beside the future folder, which is where the temporary one is.
-                Some(body) => files::require(folder.join(body))?,
+                Some(body) => files::regular(folder.join(body)).map(drop).map_err(|source| Error::read(body, source))?,
                 None => write_body(folder.join(&body), model)?,
             }
             write_motion(folder.join("motion.npz"), motion)?;

@@ -1,6 +1,5 @@
 //! Samples in a NumPy array of any order of axes.
 
-use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
@@ -13,7 +12,7 @@ use super::{Capture, Layout, Stated};
 use crate::data::arrays::{Element, Header, Kind, Problem, field_of, open as open_file};
 use crate::data::read_toml;
 use crate::data::settings::settings_from_table;
-use crate::data::{IfFrame, IfLayout};
+use crate::data::{IfFrame, IfLayout, files};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
 
@@ -175,7 +174,7 @@ impl Cube {
         let (width, shape) = (self.header.stored.bytes, &self.header.shape);
         let place = self.layout.place(Axis::Frame);
         let length: usize = shape.iter().enumerate().filter(|(axis, _)| Some(*axis) != place).map(|(_, length)| length).product();
-        let mut file = File::open(&self.path)?;
+        let mut file = files::regular(&self.path)?;
         if !self.header.fortran && place.is_none_or(|place| place == 0) {
             file.seek(SeekFrom::Start(self.header.data_start + (frame * length * width) as u64))?;
             let mut bytes = vec![0; length * width];

@@ -6,7 +6,7 @@ use super::schedule::{Selection, TiRadar};
 use super::stream::Words;
 use super::{Capture, Stated, lanes::Lanes, ti_cfg, ti_json};
 use crate::data::settings::settings_from_table;
-use crate::data::{IfFrame, IfLayout};
+use crate::data::{IfFrame, IfLayout, files};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
 
@@ -140,7 +140,7 @@ fn log_beside(source: &Path) -> Option<String> {
     let folder = source.parent()?;
     let log =
         ["_LogFile.csv", "_Raw_LogFile.csv"].iter().map(|end| folder.join(format!("{stem}{end}"))).find(|path| path.is_file())?;
-    let text = std::fs::read_to_string(&log).ok()?;
+    let text = files::read_text(&log).ok()?;
     let number = |key: &str| {
         text.lines()
             .find_map(|line| line.trim().strip_prefix(key)?.trim_start_matches([' ', '-', ',']).trim().parse::<u64>().ok())

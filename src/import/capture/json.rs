@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use crate::data::files;
 use crate::error::{Error, Result};
 
 /// A value and the way to it.
@@ -16,7 +17,7 @@ pub struct Json {
 
 impl Json {
     pub fn read(file: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(file).map_err(|source| Error::read(file, source))?;
+        let text = files::read_text(file)?;
         let value = serde_json::from_str(text.trim_start_matches('\u{feff}'))
             .map_err(|error| Error::Parse { path: file.into(), message: error.to_string() })?;
         Ok(Self { file: file.into(), path: String::new(), value })

@@ -1,9 +1,9 @@
 //! Several files that are one stream of 16-bit words.
 
-use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use crate::data::files;
 use crate::error::{Error, Result};
 
 /// The files of one capture, end to end. Words are little-endian; a frame may begin in one file and end in the next.
@@ -51,7 +51,7 @@ impl Words {
             }
             let part = bytes.len().min(filled + 2 * (words - skip) as usize);
             let mut read = || {
-                let mut file = File::open(path)?;
+                let mut file = files::regular(path)?;
                 file.seek(SeekFrom::Start(2 * skip))?;
                 file.read_exact(&mut bytes[filled..part])
             };

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use super::lanes::Lanes;
 use super::schedule::{Burst, Chirp, Profile, TiRadar, check_ramp, sampling_of};
+use crate::data::files;
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
 
@@ -46,7 +47,7 @@ impl Line<'_> {
 
 /// Reads the radar. A later line of the same command and number takes the earlier one's place, as on the radar.
 pub fn read_radar(file: &Path) -> Result<TiRadar> {
-    let text = std::fs::read_to_string(file).map_err(|source| Error::read(file, source))?;
+    let text = files::read_text(file)?;
     let lines: Vec<Line> = text
         .lines()
         .enumerate()
