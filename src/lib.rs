@@ -12,6 +12,8 @@ pub mod radar;
 pub mod room;
 // 2: the files it comes in
 pub mod data;
+// whether samples are whole, before anybody asks what is in them
+pub mod integrity;
 pub mod import;
 // whether it can be
 pub mod plausibility;

@@ -10,6 +10,7 @@ const FLOORS: [&[&str]; 28] = [
     &["radar", "room"],
     &["person"],
     &["data"],
+    &["integrity"],
     &["import"],
     &["plausibility"],
     &["recorder"],

@@ -94,7 +94,7 @@ fn or_default<'de, D: Deserializer<'de>, T: Deserialize<'de> + Default>(deserial
     Ok(Option::deserialize(deserializer)?.unwrap_or_default())
 }
 
-const VERDICTS: [&str; 5] = ["explained", "partly_explained", "unexplained", "no_mismatch", "undecided"];
+const VERDICTS: [&str; 6] = ["explained", "partly_explained", "unexplained", "no_mismatch", "undecided", "damaged"];
 
 impl Report {
     pub fn read(path: &Path) -> Result<Self> {
@@ -110,11 +110,11 @@ impl Report {
         self.simulator.as_ref().map_or(self.fit.before, |simulator| simulator.before)
     }
 
-    /// Whether it says that anything is missing, by name or without.
+    /// Whether it says that anything is missing, by name or without, or that the samples are damaged.
     pub fn claims(&self) -> bool {
         !self.effects.is_empty()
             || !self.unexplained.is_empty()
-            || matches!(self.verdict.as_str(), "explained" | "partly_explained" | "unexplained")
+            || matches!(self.verdict.as_str(), "explained" | "partly_explained" | "unexplained" | "damaged")
     }
 }
 
@@ -149,6 +149,7 @@ pub(crate) mod tests {
             report(json!({"verdict": verdict, "effects": [], "unexplained": unexplained, "fit": {"before": {}, "after": {}}}))
         };
         assert!(!with("undecided", json!([])).claims());
+        assert!(with("damaged", json!([])).claims());
         assert!(with("unexplained", json!([])).claims());
         assert!(with("no_mismatch", json!([{"where": null, "p_value": 1e-4}])).claims());
     }

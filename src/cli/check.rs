@@ -12,6 +12,7 @@ use crate::{
     error::Result,
     evaluation,
     heatmap::HeatmapConfig,
+    integrity,
     plausibility::Sources,
     radar::{self, Radar},
     room::Room,
@@ -114,10 +115,15 @@ pub(crate) fn show(recording: &Recording, common: &Common) -> Result<()> {
     }
     plausible::recording(recording, common)?;
     // Every frame is read once, so that a truncated or lying file shows here.
-    for frame in 0..recording.radar.frames {
-        recording.frame(frame)?;
-    }
+    let findings = integrity::inspect(recording, recording.radar.frames)?;
     say!("  samples            {}, all {} frames can be read", recording.number_type(), recording.radar.frames);
+    for finding in &findings {
+        if finding.ok {
+            say!("  ok       {} ({})", finding.expected, finding.found);
+        } else {
+            eprintln!("damaged: {}", finding.found);
+        }
+    }
     Ok(())
 }
 

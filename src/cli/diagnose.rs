@@ -95,12 +95,30 @@ fn simulate(
     };
     let simulated = before_and_after(&arguments.recording, &effects, &start, &keep, tell)?;
     diagnosis.report.simulator = simulated.as_ref().map(|simulated| simulated.fit);
+    if simulated.is_some() {
+        diagnosis.report.settings = config.diagnosis.fingerprint(&shaping(arguments, config, device)?);
+    }
     if simulated.is_none() {
         let note =
             "no simulator was trained, and no checkpoint left: neither body nor room is known, or there are fewer than 4 frames";
         diagnosis.report.notes.push(note.into());
     }
     Ok(simulated)
+}
+
+/// What shapes a trained simulator beside the settings of the diagnosis.
+fn shaping(arguments: &Arguments, config: &Config, device: &Device) -> Result<Vec<(&'static str, Vec<u8>)>> {
+    let text = |settings: std::result::Result<String, toml::ser::Error>| settings.expect("plain data").into_bytes();
+    let mut shaping = vec![
+        ("simulator", text(toml::to_string(&config.simulator))),
+        ("training", text(toml::to_string(&config.training))),
+        ("device", format!("{device:?}").into_bytes()),
+    ];
+    if let Some(checkpoint) = &arguments.checkpoint {
+        let weights = checkpoint.join(checkpoint::WEIGHTS);
+        shaping.push(("checkpoint", std::fs::read(&weights).map_err(|error| Error::read(&weights, error))?));
+    }
+    Ok(shaping)
 }
 
 /// The page first: whoever finds report.json finds both.

@@ -28,6 +28,10 @@ pub struct DiagnosisConfig {
     pub seed: u64,
 }
 
+fn short_hash(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes)[..6])
+}
+
 impl Default for DiagnosisConfig {
     fn default() -> Self {
         Self { alarm: 0.01, gain: 6.0, nameless_gain: 15.0, tie: 4.6, most: 10, epochs: 8, limits: true, seed: 1 }
@@ -48,10 +52,35 @@ impl DiagnosisConfig {
         Ok(())
     }
 
-    /// The settings as text, with their hash.
-    pub fn fingerprint(&self) -> String {
-        let text = toml::to_string(self).expect("plain data").replace('\n', "; ");
-        let digest = Sha256::digest(text.as_bytes());
-        format!("{} (sha256 {})", text.trim_end_matches("; "), hex(&digest[..6]))
+    /// All that decides the answer beside the recording: these settings as text, the program's version and its sources (which hold
+    /// every constant and table), and what else had a part, each by its hash; then the hash of all that.
+    pub fn fingerprint(&self, more: &[(&str, Vec<u8>)]) -> String {
+        let settings = toml::to_string(self).expect("plain data").replace('\n', "; ");
+        let program = format!("hybridsim {}, sources {}", env!("CARGO_PKG_VERSION"), env!("HYBRIDSIM_SOURCES"));
+        let mut text = format!("{}; {program}", settings.trim_end_matches("; "));
+        for (name, value) in more {
+            text += &format!("; {name} {}", short_hash(value));
+        }
+        let hash = short_hash(text.as_bytes());
+        format!("{text} (sha256 {hash})")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_decides_changes_the_fingerprint() {
+        let config = DiagnosisConfig::default();
+        let plain = config.fingerprint(&[]);
+        assert!(plain.contains("alarm = 0.01") && plain.contains(env!("HYBRIDSIM_SOURCES")), "{plain}");
+        let simulator = |text: &str| config.fingerprint(&[("simulator", text.into())]);
+        let other = DiagnosisConfig { tie: 4.7, ..config.clone() }.fingerprint(&[]);
+        let all = [plain.clone(), simulator("a"), simulator("b"), other];
+        let hash = |text: &String| text.rsplit_once("(sha256 ").unwrap().1.to_string();
+        let hashes: std::collections::BTreeSet<String> = all.iter().map(hash).collect();
+        assert_eq!(hashes.len(), 4);
+        assert_eq!(config.fingerprint(&[]), plain);
     }
 }

@@ -70,23 +70,6 @@ impl Place {
     }
 }
 
-/// The capacity ladder of DIAGNOSIS.md 3.0: how much freedom of the amplitudes a finding survives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Rung {
-    /// A common gain.
-    A,
-    /// Amplitudes that stay the same over time.
-    B,
-    /// And pose and time.
-    C,
-    /// And real amplitudes that are free in every frame: no BRDF can have made it.
-    D,
-    /// And complex amplitudes that are free in every frame: no error of the mesh can have made it.
-    E,
-    /// And radial velocities.
-    F,
-}
-
 /// What changes the samples of all frames.
 pub type Undo = Arc<dyn Fn(&mut Cube) + Send + Sync>;
 
@@ -163,7 +146,9 @@ pub struct Candidate {
     pub p_value: f64,
     /// Log-likelihood that held-out frames gain, nats.
     pub gain: f64,
-    pub rung: Rung,
+    /// Whether what it rests on (where the motion puts the body, a mesh, a chest) may err in held-out frames as in the others: a gain
+    /// beyond the least then says nothing more.
+    pub errs_alike: bool,
     /// Effects that would do the same to this recording, as far as it can tell.
     pub look_alikes: Vec<&'static str>,
     /// Plain words with numbers: what was left out, where, how large.
@@ -267,7 +252,7 @@ mod tests {
             place: Place::at("receiver"),
             p_value: 1e-9,
             gain: 30.0,
-            rung: Rung::E,
+            errs_alike: true,
             look_alikes: vec!["tx_leakage"],
             statement: "Something.".into(),
             curve: None,

@@ -64,6 +64,7 @@ pub fn lead(report: &Report) -> String {
     let first = |statement: &str| statement.to_string();
     match report.verdict {
         Verdict::Undecided => format!("Nothing can be said about this recording: {}.", report.reason),
+        Verdict::Damaged => format!("The recording is damaged: {}.", report.reason),
         Verdict::NoMismatch => {
             "Nothing was left out that this recording could show: body, static room and noise explain it.".into()
         }
@@ -145,13 +146,11 @@ fn section(page: &mut String, number: usize, effect: &Effect, curve: Option<&str
     let _ = write!(
         page,
         "<p>How sure: chance of such a finding with nothing missing {}; the held-out data's log-likelihood grows by {:.0} \
-         nats; mean squared dB error on held-out cells {:.2} → {:.2} dB². It stays significant up to rung {:?}: {}.</p>",
+         nats; mean squared dB error on held-out cells {:.2} → {:.2} dB².</p>",
         probability(evidence.p_value),
         evidence.held_out_loglik_gain,
         evidence.held_out_db_mse_before,
-        evidence.held_out_db_mse_after,
-        evidence.rung,
-        rung(evidence.rung)
+        evidence.held_out_db_mse_after
     );
     if effect.indistinguishable_from.is_empty() {
         page.push_str("<p>Nothing else in the library explains this recording as well.</p>");
@@ -190,7 +189,13 @@ fn without_name(page: &mut String, unexplained: &Unexplained, curve: Option<&str
 }
 
 fn fit(page: &mut String, report: &Report, pictures: &Pictures) {
-    let _ = write!(page, "<h2>Held-out data, before and after</h2><p>{} were never used to fit anything.</p>", held_out(report));
+    let _ = write!(
+        page,
+        "<h2>Held-out data, before and after</h2><p>{} are held out: static field, noise and the body's powers \
+         come from the others, and a simulator is trained on those. They are not untouched: a finding stands only where it makes them \
+         more probable, and what changes from chirp to chirp or from frame to frame is read in every one of them.</p>",
+        held_out(report)
+    );
     page.push_str("<table><tr><th><th>log-likelihood per sample<th>error, dB²<th>PSNR, dB");
     let rows = vec![("baseline", report.fit.before), ("with the effects", report.fit.after)];
     for (name, misfit) in rows {
@@ -288,18 +293,6 @@ fn limits(page: &mut String, report: &Report) {
         let _ = write!(page, "<li><code>{}</code>: {bound}{}", escape(&limit.id), escape(&limit.reason));
     }
     let _ = write!(page, "</ul><p class=\"small\">Settings: <code>{}</code></p>", escape(&report.settings));
-}
-
-fn rung(rung: super::finding::Rung) -> &'static str {
-    use super::finding::Rung;
-    match rung {
-        Rung::A => "only a common gain may adapt",
-        Rung::B => "no reflectivity that stays the same over time can imitate it",
-        Rung::C => "no reflectivity, pose or time offset can imitate it",
-        Rung::D => "no reflectivity can imitate it, even one that changes from frame to frame",
-        Rung::E => "neither reflectivities nor errors of the mesh can imitate it, even free in every frame",
-        Rung::F => "nothing that the body's single bounce or the static room can do imitates it",
-    }
 }
 
 fn place_text(place: &Place) -> String {

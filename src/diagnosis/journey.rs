@@ -17,6 +17,7 @@ use super::suspects::paths::body_rms;
 use crate::data::Recording;
 use crate::effects::EffectSetting;
 use crate::error::{Error, Result};
+use crate::integrity;
 use crate::person::Person;
 use crate::radar::Radar;
 
@@ -61,14 +62,17 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     }
     config.check()?;
     progress("reading");
+    let integrity = integrity::inspect(recording, most_frames)?;
+    let damage = integrity::damage(&integrity);
     let loaded = Loaded::read(recording, most_frames)?;
-    let body = recording.person().map(|person| prediction(recording, person, &loaded)).transpose()?;
-    notes.extend(audit::limits(&loaded, body.is_some(), recording.room.is_some()));
+    let whole = recording.person().filter(|_| damage.is_none());
+    let body = whole.map(|person| prediction(recording, person, &loaded)).transpose()?;
+    if damage.is_none() {
+        notes.extend(audit::limits(&loaded, body.is_some(), recording.room.is_some()));
+    }
     let radar = loaded.radar.clone();
     let held_out = HeldOut::of(&loaded.split);
     let original = Evidence::new(loaded, recording.room.clone(), body);
-    progress("checking conventions");
-    let checks = audit::audit(&original);
     let mut report = Report {
         format: FORMAT,
         recording: recording.folder.display().to_string(),
@@ -78,7 +82,7 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         probability_nothing_missing: 0.5,
         p_value: None,
         null: Null::default(),
-        audit: checks,
+        audit: integrity.into_iter().map(Check::from).collect(),
         effects: vec![],
         unexplained: vec![],
         not_detectable: vec![],
@@ -86,8 +90,15 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         located: Location::default(),
         notes,
         simulator: None,
-        settings: config.fingerprint(),
+        settings: config.fingerprint(&[]),
     };
+    if let Some(damage) = damage {
+        // Physics fitted to what no receiver sent would be a fiction.
+        (report.verdict, report.reason) = (Verdict::Damaged, damage);
+        return Ok(Diagnosis { report, radar, original, explanation: None });
+    }
+    progress("checking conventions");
+    report.audit.extend(audit::audit(&original, recording.person().and_then(Person::origin_m)));
     if let Some(reason) = audit::undecidable(&original, &report.audit) {
         report.reason = reason;
         return Ok(Diagnosis { report, radar, original, explanation: None });

@@ -350,7 +350,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::diagnosis::{Candidate, Correction, Place, Rung, Volume};
+    use crate::diagnosis::{Candidate, Correction, Place, Volume};
     use crate::radar::Radar;
 
     /// A return that stands still, whose samples have an image where nothing can stand.
@@ -375,7 +375,7 @@ mod tests {
             place: Place::at("receiver"),
             p_value: 0.0,
             gain: 0.0,
-            rung: Rung::F,
+            errs_alike: false,
             look_alikes: vec![],
             statement: String::new(),
             curve: None,

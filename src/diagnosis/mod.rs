@@ -34,6 +34,6 @@ pub mod suspects;
 pub use config::DiagnosisConfig;
 pub use cube::{Cube, Split};
 pub use evidence::Evidence;
-pub use finding::{Candidate, Correction, Estimate, Place, Rung, Volume};
+pub use finding::{Candidate, Correction, Estimate, Place, Volume};
 pub use journey::{Diagnosis, diagnose};
 pub use prediction::{BodyPrediction, Point};

@@ -154,7 +154,7 @@ fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::{Place, Rung};
+    use crate::diagnosis::Place;
 
     fn of(id: Option<&'static str>, behaves_like: &'static str, gain: f64) -> Candidate {
         Candidate {
@@ -165,7 +165,7 @@ mod tests {
             place: Place::at("scene"),
             p_value: 0.0,
             gain,
-            rung: Rung::F,
+            errs_alike: false,
             look_alikes: vec![],
             statement: String::new(),
             curve: None,

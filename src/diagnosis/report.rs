@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::audit::Check;
 use super::cube::Split;
-use super::finding::{Place, Rung};
+use super::finding::Place;
 use super::limits::Limit;
 use super::locate;
 use super::misfit::Misfit;
@@ -25,6 +25,8 @@ pub enum Verdict {
     Unexplained,
     NoMismatch,
     Undecided,
+    /// The samples are not whole: no physics was asked.
+    Damaged,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,7 +50,6 @@ pub struct Evidence {
     pub held_out_db_mse_before: f64,
     pub held_out_db_mse_after: f64,
     pub p_value: f64,
-    pub rung: Rung,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -274,7 +275,6 @@ impl Effect {
                 held_out_db_mse_before: accepted.before.db_mse,
                 held_out_db_mse_after: accepted.after.db_mse,
                 p_value: candidate.p_value,
-                rung: candidate.rung,
             },
             separate_by: info.filter(|_| !accepted.rivals.is_empty()).map(|info| info.separate_by.into()),
         }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::config::DiagnosisConfig;
 use super::evidence::Evidence;
-use super::finding::{Candidate, Correction, Rung};
+use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
 use super::remains::{ROUGHLY, is_by_chirp, is_left_by, is_of_receivers, is_of_remains, is_product, is_rough, is_same};
 use super::suspects::receiver::harmonic;
@@ -32,7 +32,7 @@ impl DiagnosisConfig {
         // What foretells held-out frames better than it must is as much less likely to be chance: the likelihood's ratio on data that
         // were not fitted exceeds e^gain by chance with a probability of e^-gain at most. Not where the body's prediction has a part:
         // what errs in it errs in held-out frames alike; nor where the frames that foretell are those of the p-value.
-        let surplus = untouched && candidate.rung == Rung::F && !SUSPECTS[suspect].foretells_all_frames;
+        let surplus = untouched && !candidate.errs_alike && !SUSPECTS[suspect].foretells_all_frames;
         let surplus = if surplus { (candidate.gain - least).exp().clamp(1.0, MOST_SURPLUS) } else { 1.0 };
         candidate.p_value <= self.p_value(suspect) * surplus && candidate.gain >= least && candidate.gain.is_finite()
     }

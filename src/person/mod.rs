@@ -171,6 +171,14 @@ impl Person {
         }
     }
 
+    /// Where the motion's origin is, in the radar frame; none for meshes, which have none.
+    pub fn origin_m(&self) -> Option<[f64; 3]> {
+        match self {
+            Self::Skinned { placement, .. } => Some(placement.origin_m),
+            Self::Meshes { .. } => None,
+        }
+    }
+
     /// Radar time of every pose, seconds, ascending.
     pub fn pose_times_s(&self) -> Vec<f64> {
         match self {

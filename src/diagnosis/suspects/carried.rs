@@ -6,12 +6,11 @@
 
 use rayon::prelude::*;
 
-use super::slow::repeated;
 use super::{Suspect, paths};
 use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::power::{LOBES, PowerModel, Template, fit_weights, log_likelihood, sum};
 use crate::diagnosis::prediction::{Centre, range_and_velocity};
-use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, Rung, statistics};
+use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, statistics};
 
 /// Power over that of the part's own skin, dB, from which on it is no skin.
 const LEAST_DB: f64 = 8.0;
@@ -45,7 +44,7 @@ fn find(evidence: &Evidence) -> Vec<Candidate> {
     let (Some(model), Some(body)) = (evidence.power(), evidence.body.as_ref()) else { return vec![] };
     let parts = body.parts.len();
     // Remains of paths that were taken out are near the body, too, and in a copied frame the body is not where it is said to be.
-    let remains = paths::LEAVE_REMAINS.iter().chain([&repeated::BEHAVES_LIKE]).any(|id| evidence.accepted.contains(id));
+    let remains = paths::LEAVE_REMAINS.iter().any(|id| evidence.accepted.contains(id));
     if parts < 2 || remains || body.centres.len() != body.frames.len() || evidence.accepted.contains(&"carried_reflector") {
         return vec![];
     }
@@ -175,7 +174,7 @@ fn candidate(
         place: Place { body_part: Some(name.into()), ..place },
         p_value: 1.0,
         gain: 0.0,
-        rung: Rung::B,
+        errs_alike: true,
         look_alikes: vec!["part_reflectivity"],
         statement: format!(
             "Something at the {}{beside} returns {:.0} dB more than the skin there would if it were like that of the rest of the body: \

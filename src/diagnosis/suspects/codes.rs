@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use crate::diagnosis::Cube;
 use crate::diagnosis::codes::{BITS, Component};
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics;
 
 /// The signal's deviation in units of the bit's value from which on the bit must be fair.
@@ -140,7 +140,7 @@ fn candidate(evidence: &Evidence, component: &Component, bit: usize, share: f64,
         place: Place { rx: Some(vec![rx]), ..Place::at("receiver") },
         p_value: p_value.max(f64::MIN_POSITIVE),
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "Bit {bit} (value {value:.0}) of the converter of receiver {rx}{part} {what}, while in the other receivers the same bit \

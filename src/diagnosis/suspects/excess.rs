@@ -1,7 +1,7 @@
 //! What nobody else explains: a box of range, Doppler and frames with more power than body, room and noise have.
 
 use crate::diagnosis::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::locate::{Residual, strongest};
 
 pub const BEHAVES_LIKE: &str = "excess power";
@@ -28,7 +28,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         place: Place { stage: "propagation".into(), ..place.clone() },
         p_value: found.p_value,
         gain: found.gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "there is {:.1} dB more power than body, room and noise can have, {place_words}; no effect of the library explains it",

@@ -18,7 +18,7 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
 use crate::diagnosis::statistics::{DECIBEL, corrected};
 
 use course::Frames;
@@ -134,7 +134,7 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, gai
         },
         p_value: p_value.max(f64::MIN_POSITIVE),
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "The static return {range_m:.2} m away changes from frame to frame by {:.0} % (over {:.1} dB) while the other static \

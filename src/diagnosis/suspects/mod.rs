@@ -63,7 +63,6 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect { foretells_all_frames: true, ..Suspect::new("one channel", slow::channels::find) },
     Suspect::new("single frame", slow::odd_frame::find),
     Suspect { last_in_chain: true, ..Suspect::new("slipped samples", slow::slip::find) },
-    Suspect { last_in_chain: true, ..Suspect::new("repeated frames", slow::repeated::find) },
     Suspect { last_in_chain: true, ..Suspect::new("converter's codes", codes::find) },
     Suspect::new("chirp", waveform::find),
     Suspect::new("vital signs", vital::find),

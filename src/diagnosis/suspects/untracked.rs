@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::region::{Region, joined, remove, run};
 use crate::diagnosis::evidence::{Evidence, transform};
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics;
 
 /// Standard deviation of how high something stands, which receivers in a row do not show, over its range.
@@ -142,7 +142,7 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
         },
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "Something moves at {range_m:.2} m with {velocity_mps:+.2} m/s along the line of sight{direction}, {decibel:.0} dB above \

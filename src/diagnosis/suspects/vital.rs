@@ -14,7 +14,7 @@ use rustfft::FftPlanner;
 use super::region::{Region, remove};
 use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::evidence::{Evidence, hann};
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
 use crate::diagnosis::statistics;
 
 /// Rates of breathing and of a heart, Hz.
@@ -207,7 +207,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
         },
         p_value: named.map_or(changed, |(_, r)| statistics::corrected(r.p_value, 4.0)),
         gain,
-        rung: Rung::D,
+        errs_alike: true,
         // A curtain in the wind does the same; so does whatever swings there.
         look_alikes: if named.is_some() { vec!["moving_reflector"] } else { vec![] },
         statement,

@@ -15,7 +15,7 @@ use rustfft::FftPlanner;
 
 use super::swings::Swings;
 use crate::diagnosis::evidence::{Evidence, Tapered};
-use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::{corrected, fisher_tail};
 
 /// Slower swings belong to people, faster ones to electronics.
@@ -454,7 +454,7 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Ca
         place: Place { range_m: Some([near_m, far_m]), ..Place::at("scene") },
         p_value: p_value.max(f64::MIN_POSITIVE),
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "The return {range_m:.2} m away swings at {frequency_hz:.1} Hz (or at that and a multiple of the {frame_rate_hz:.1} \

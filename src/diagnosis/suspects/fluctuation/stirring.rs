@@ -14,7 +14,7 @@ use super::returns::{Returns, SPACING};
 use super::{Free, LEAST_LIKELY, around};
 use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::evidence::{Evidence, blackman_harris};
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 
 pub const BEHAVES_LIKE: &str = "static returns that change at one range";
@@ -147,7 +147,7 @@ fn candidate(
         },
         p_value: change.p_value.max(f64::MIN_POSITIVE),
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "What stands still {range_m:.2} m away changes from frame to frame while the other static returns stay, and the body's \

@@ -17,7 +17,7 @@ use super::covariance::{Array, Cells, used};
 use super::{coupling, mismatch, places, skew};
 use crate::diagnosis::power::{PowerModel, part_templates};
 use crate::diagnosis::suspects::{paths::still_power, slow};
-use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, Rung, statistics};
+use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, statistics};
 use crate::radar::Radar;
 
 /// Expected power over the noise from which on a cell is used.
@@ -312,7 +312,7 @@ fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, g
         place: Place::at("scene"),
         p_value: bearing.p_value,
         gain,
-        rung: Rung::D,
+        errs_alike: true,
         // A phase in proportion to the receivers' places is a direction, whoever makes it.
         look_alikes: vec!["channel_mismatch"],
         statement: format!(

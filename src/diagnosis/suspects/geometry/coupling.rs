@@ -10,7 +10,7 @@ use super::covariance::Array;
 use super::mismatch;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;
-use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, Rung, Volume, statistics};
+use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, Volume, statistics};
 
 /// What errors of the prediction may imitate: 0.3° and 0.05 dB.
 const FLOOR: f64 = 0.005;
@@ -130,7 +130,7 @@ fn candidate(evidence: &Evidence, strength: Complex64, found: &Estimated) -> Can
         place: Place::at("antenna"),
         p_value: statistics::corrected(found.p_value, LOOKS),
         gain: found.gain,
-        rung: Rung::E,
+        errs_alike: true,
         // Of three receivers only the middle one is odd.
         look_alikes: if receivers < 4 { vec!["channel_mismatch"] } else { vec![] },
         statement: format!(

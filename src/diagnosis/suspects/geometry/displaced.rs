@@ -14,7 +14,7 @@ use super::change::{Change, Moves, frame_period_s};
 use super::trial::{Score, Trial};
 use crate::diagnosis::prediction::BEYOND;
 use crate::diagnosis::suspects::paths::PATH_LIKE;
-use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
+use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};
 use crate::effects::slope_error;
 
 /// Errors of the prediction that are no finding: metres of range, seconds.
@@ -307,17 +307,13 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
     let evidence = trial.evidence;
     let deviation = deviation(trial, fit).hypot(SCENE * fit.floor);
     let normal = |name| vec![Estimate::normal(name, fit.value, deviation)];
-    let (estimates, stage, rung, statement) = match fit.score.change {
-        Change::Range(_) => (
-            normal("offset_m"),
-            "scene",
-            Rung::D,
-            format!("The body appears {} than it stands, at whatever range.", farther(fit.value)),
-        ),
+    let (estimates, stage, statement) = match fit.score.change {
+        Change::Range(_) => {
+            (normal("offset_m"), "scene", format!("The body appears {} than it stands, at whatever range.", farther(fit.value)))
+        }
         Change::Scale(_) => (
             normal("relative"),
             "waveform",
-            Rung::D,
             format!(
                 "Ranges are stretched by {:.2} %: the ramp climbs by that much faster than stated, {:.1} mm at the body's mean range.",
                 1e2 * fit.value,
@@ -327,33 +323,27 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
         Change::Offset(_) => (
             vec![Estimate::list("offset_m", &[0.0, fit.value, 0.0], &[UNSEEN_M, deviation, UNSEEN_M])],
             "scene",
-            Rung::D,
             format!("The body stands {} along boresight than stated.", farther(fit.value)),
         ),
         Change::Clock(_) => (
             normal("offset_s"),
             "timing",
-            Rung::D,
             format!(
                 "The body is {:.0} ms {} in its motion than the clocks say: the error grows with each limb's velocity.",
                 1e3 * fit.value.abs(),
                 if fit.value > 0.0 { "later" } else { "earlier" }
             ),
         ),
-        Change::Drift(_) => (
-            normal("relative"),
-            "timing",
-            Rung::D,
-            format!("The motion's clock runs {:.2} % faster than the radar's.", 1e2 * fit.value),
-        ),
+        Change::Drift(_) => {
+            (normal("relative"), "timing", format!("The motion's clock runs {:.2} % faster than the radar's.", 1e2 * fit.value))
+        }
         Change::Again(echo) => {
             let (estimates, statement) = again::described(trial, echo, fit.value, deviation);
-            (estimates, "propagation", Rung::D, statement)
+            (estimates, "propagation", statement)
         }
         Change::Drop { at, count } => (
             vec![Estimate::normal("at", at as f64, 1.5), Estimate::normal("count", count as f64, 0.0)],
             "timing",
-            Rung::D,
             format!("From frame {at} on the body is {count} frame(s) later in its motion: frames were lost there."),
         ),
     };
@@ -375,7 +365,7 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
         place,
         p_value,
         gain,
-        rung,
+        errs_alike: true,
         look_alikes,
         statement,
         curve: None,

@@ -14,7 +14,7 @@ use super::covariance::{Array, Cells};
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;
 use crate::diagnosis::statistics::{DECIBEL, corrected};
-use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung, Volume};
+use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Volume};
 
 /// What errors of the prediction do to a gain and to a phase: a body that keeps its place shows the same wrong reflectivities in all frames.
 const GAIN_FLOOR_DB: f64 = 0.05;
@@ -114,7 +114,7 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
         place: Place { rx: Some((1..receivers).collect()), ..Place::at("antenna") },
         p_value,
         gain,
-        rung: Rung::E,
+        errs_alike: true,
         look_alikes: vec![],
         curve: None,
         energy,

@@ -11,7 +11,7 @@ use super::channels::{Found, LOOKS};
 use super::covariance::{Array, Cells};
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::statistics::corrected;
-use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Rung};
+use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};
 
 /// What errors of the prediction look like, radian per unit of the sine.
 const FLOOR: f64 = 0.02;
@@ -60,7 +60,7 @@ fn candidate(evidence: &Evidence, cells: &Cells, directions: &DMatrix<f64>, foun
         place: Place::at("antenna"),
         p_value: corrected(found.p_value, LOOKS),
         gain: found.gain,
-        rung: Rung::E,
+        errs_alike: true,
         look_alikes: vec![],
         statement: format!(
             "The phases between neighbouring receivers grow with the direction of the body, and not alike: the receivers stand {list} µm \

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use super::channels::{Bearing, Sums, along};
 use super::standing::Standing;
 use crate::diagnosis::suspects::slow::undo;
-use crate::diagnosis::{Candidate, Correction, Cube, Evidence, Place, Rung, Volume};
+use crate::diagnosis::{Candidate, Correction, Cube, Evidence, Place, Volume};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
 /// How the sine of a body that stands aside, or is seen in another direction, may depend on the range, and that of what is sampled
@@ -75,7 +75,7 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, gain: f64)
         // The ratio of the walls' likelihoods, whose numbers the body gave, is one on average by chance: a p-value may be divided by it.
         p_value: (bearing.p_value * (-walls_gain).exp()).clamp(f64::MIN_POSITIVE, 1.0),
         gain,
-        rung: Rung::D,
+        errs_alike: true,
         look_alikes: vec![],
         statement: format!(
             "Between the receivers everything is turned in proportion to its range, by {:.2} radian from the first to the last at \

@@ -11,7 +11,7 @@ use crate::diagnosis::evidence::transform;
 use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::receiver::harmonic;
-use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Rung, Volume};
+use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Volume};
 use crate::radar::SPEED_OF_LIGHT;
 
 /// Delays that are tried, half cells of range.
@@ -150,7 +150,7 @@ pub fn multibounce(scene: &Scene, tried: f64) -> Option<Candidate> {
         place,
         p_value,
         gain: found.held_out,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "The body's return comes a second time, {extra_m:.2} m behind itself and {:.0} dB weaker, with the body's own Doppler: \

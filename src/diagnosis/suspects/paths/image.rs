@@ -8,7 +8,7 @@ use super::removal::{empty_cells, patch};
 use super::scene::Scene;
 use crate::diagnosis::prediction::{SIDE_SPREAD, mirror_id, mirrored_return};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
-use crate::diagnosis::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::{Candidate, Correction, Estimate, Place};
 
 /// Log-likelihood within which two boundaries are not told apart.
 const CLOSE: f64 = 4.6;
@@ -59,7 +59,7 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
         place: Place { boundary: Some(name.into()), ..place },
         p_value: corrected(chi2_tail(2.0 * ghost.gain_all, 2.0), tried),
         gain: ghost.gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes,
         statement,
         curve: None,

@@ -8,7 +8,7 @@ use super::scene::Scene;
 use super::track::{Sighting, Track};
 use crate::diagnosis::power::Template;
 use crate::diagnosis::statistics::{corrected, median};
-use crate::diagnosis::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::{Candidate, Correction, Estimate, Place};
 
 /// Sightings are good to this share of a cell, and no better than that: the windows' law holds for a steady tone.
 const CELL_ERROR: f64 = 0.12;
@@ -168,7 +168,7 @@ impl Mover {
             place,
             p_value: corrected(self.track.p_value, tried),
             gain: self.gain,
-            rung: Rung::F,
+            errs_alike: false,
             look_alikes: self.look_alikes(scene),
             statement,
             curve: None,

@@ -14,7 +14,7 @@ use crate::diagnosis::denoised;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::receiver::harmonic;
-use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Rung, Volume};
+use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Volume};
 
 /// Log-likelihood within which two explanations are not told apart.
 const CLOSE: f64 = 4.6;
@@ -113,7 +113,7 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
         place: Place::at(stage),
         p_value,
         gain: found.held_out,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: fits
             .iter()
             .skip(1)

@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use super::steering::{power, steering};
 use crate::diagnosis::evidence::{hann, transform};
 use crate::diagnosis::statistics::corrected;
-use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, Rung};
+use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::{Boundary, Room};
 
@@ -218,7 +218,7 @@ fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candi
         place,
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "Something stands still {:.2} m away{whereabouts}: all receivers see one direction, {:.0} dB above the clutter of \

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::crossings::{self, Crossings};
 use super::support::energy;
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, OfSample, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, OfSample, Place};
 use crate::diagnosis::statistics::{corrected, median};
 use crate::diagnosis::{Cube, Evidence, Volume};
 
@@ -121,7 +121,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         place,
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes,
         statement,
         curve: None,

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung, Volume};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
 use crate::diagnosis::products::{Law, Product, without};
 use crate::diagnosis::{Cube, Evidence, denoised};
 
@@ -79,7 +79,7 @@ fn nonlinear(evidence: &Evidence, behaves_like: &'static str, laws: Vec<Law>, st
         place: Place::at("receiver"),
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement,
         curve: None,

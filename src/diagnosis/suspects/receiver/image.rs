@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::harmonic::QUADRATIC;
 use super::support::{beat_hz, ranges_m};
 use crate::diagnosis::evidence::spectrum;
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung, Volume};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
 use crate::diagnosis::statistics::{DECIBEL, chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
 
@@ -82,7 +82,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         place: Place::at("receiver"),
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "everything has a mirror image at the opposite beat frequency and velocity, {:.1} dB below it: the quadrature \

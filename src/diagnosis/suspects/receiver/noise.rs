@@ -11,7 +11,7 @@ use super::image::empty_bins;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::cube::folds;
 use crate::diagnosis::evidence::{hann, transform_under};
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale, median};
 
 /// Cells of a Hann-windowed map per independent one, with reserve for the quantile's inefficiency.
@@ -124,7 +124,7 @@ fn coloured(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
         place: Place::at("noise"),
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "the noise rises towards low beat frequencies, by 3 dB at {:.0} kHz and with the power {power:.2} of the frequency below: \
@@ -329,7 +329,7 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
         place: Place::at("noise"),
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "the receivers' noise is not independent: where nothing is, they agree with a correlation of {rho:.3} ({over} \

@@ -10,7 +10,7 @@ use rustfft::FftPlanner;
 use super::still::subtract;
 use super::support::{beat_hz, energy, range_m, ranges_m, tone};
 use crate::diagnosis::evidence::hann;
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence, denoised};
 
@@ -101,7 +101,7 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
         place: Place { samples: Some(indices), ..Place::at("receiver") },
         p_value: corrected((-wildest / mean.max(1e-300)).exp(), samples as f64),
         gain: gain(evidence, &term),
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "the {} {} of every chirp jump{} to {:.0} codes, {:.0} dB above the strongest sample in between, \
@@ -154,7 +154,7 @@ fn offset(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         place: Place { range_m: Some([0.0, 0.0]), ..Place::at("receiver") },
         p_value: corrected((-0.5 * (smallest / swing.max(1e-300)).powi(2) * samples as f64).exp(), 1.0),
         gain: gain(evidence, &term),
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "every sample has a constant of about {:.0} codes added (all receivers within {:.0}), {:.0} times what else stands \
@@ -238,7 +238,7 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         place: Place { range_m: Some([0.0, valley as f64 * bin_m]), ..Place::at("receiver") },
         p_value: chi2_tail(2.0 * over_noise * channels as f64, 2.0 * channels as f64),
         gain: gain(evidence, &term),
-        rung: Rung::F,
+        errs_alike: false,
         // A still reflector is seen alike by neighbouring receivers.
         look_alikes: if near_spread > far_spread + 3.0 { vec![] } else { vec!["static_reflector"] },
         statement: format!(

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::declip::{Declip, FARTHEST};
 use super::image::empty_bins;
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::paths::still_power;
 use crate::diagnosis::{Cube, Evidence, Volume, denoised};
@@ -95,7 +95,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         place: Place { frames: (!everywhere).then_some(frames), ..Place::at("receiver") },
         p_value: corrected((-excess).exp(), 2.0),
         gain: excess * held_share,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "{at} of the recorded components ({:.3} %) lie exactly at ±{largest:.0}, where {expected:.1} would by the values just \

@@ -15,7 +15,7 @@ use rustfft::FftPlanner;
 use super::field::{Field, add, orthonormal};
 use super::support::{beat_hz, dot, tone};
 use crate::diagnosis::evidence::hann;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung, Volume};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Volume};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
 
@@ -183,7 +183,7 @@ pub fn find(evidence: &Evidence, field: &Field, without: &[Vec<Complex64>]) -> O
         place: Place::at("receiver"),
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes,
         statement,
         curve: Some(Curve {

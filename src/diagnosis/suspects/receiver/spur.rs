@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::image::empty_bins;
 use super::slow_spur::{self, SlowSpur};
 use crate::diagnosis::evidence::{hann, spectrum, transform};
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::locate::Residual;
 use crate::diagnosis::power::Cells;
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
@@ -143,7 +143,7 @@ fn candidate(evidence: &Evidence, tone: Tone) -> Candidate {
         place: Place::at("receiver"),
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "a continuous tone at {:.4} MHz (or {:.4} MHz, as sampled), {level_db:.1} dB relative to the peak sample, runs through all frames \

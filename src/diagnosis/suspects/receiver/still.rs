@@ -12,7 +12,7 @@ use num_complex::Complex64;
 use super::field::{Field, Fitted, Templates, add, orthonormal, remove};
 use super::response;
 use super::support::{beat_hz, dot, energy, range_m, tone};
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence, denoised};
 
@@ -403,7 +403,7 @@ fn candidate(
         place,
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement,
         curve: None,
@@ -434,7 +434,7 @@ fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, gain: f64) -> O
         place: Place::at("receiver"),
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "every chirp holds something that never changes at beat frequencies where the room ({:.1} to {:.1} m) has nothing, \

@@ -13,7 +13,7 @@ use super::settling::Settling;
 use super::undo;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Rung, Volume};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Volume};
 use crate::diagnosis::statistics;
 use crate::radar::SPEED_OF_LIGHT;
 
@@ -156,7 +156,7 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
         place: Place::at(stage),
         p_value: statistics::corrected((-line.training_gain).exp(), line.tried),
         gain: line.held_out_gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement,
         curve: None,
@@ -230,7 +230,7 @@ pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -
         },
         p_value: drift.p_value,
         gain: drift.held_out_gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement,
         curve: Some(curve),
@@ -304,7 +304,7 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
         },
         p_value: if named { settling.p_value } else { free.p_value },
         gain: if named { settling.held_out_gain } else { free.held_out_gain },
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement,
         curve: Some(curve),
@@ -385,7 +385,7 @@ pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random
         place: place(part),
         p_value: random.p_value,
         gain: gain.min(random.gain_within),
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes,
         statement,
         curve: None,

@@ -13,7 +13,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::steady::Steady;
 use crate::diagnosis::cube::folds;
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, NINETY, Place, Rung, Volume};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, NINETY, Place, Volume};
 use crate::diagnosis::statistics::{self, DECIBEL};
 use crate::diagnosis::suspects::geometry;
 
@@ -327,7 +327,7 @@ impl Judged {
             },
             p_value: statistics::corrected(self.p_value, tried).max(f64::MIN_POSITIVE),
             gain: self.gain,
-            rung: Rung::F,
+            errs_alike: false,
             look_alikes: vec![],
             statement: format!(
                 "The gain of {what} {index} changes from frame to frame, over {:.2} ± {:.2} dB{phase}, at all ranges alike, while \

@@ -11,7 +11,6 @@ pub mod field;
 pub mod lines;
 pub mod odd_frame;
 pub mod random;
-pub mod repeated;
 pub mod settling;
 pub mod slip;
 pub mod steady;

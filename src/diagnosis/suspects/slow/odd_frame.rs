@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::diagnosis::Cube;
 use crate::diagnosis::evidence::{Evidence, spectrum};
-use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::{corrected, median};
 
 /// Fewest frames and channels among which one can be odd.
@@ -94,7 +94,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         },
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "In frame {frame} receiver {} sees the room otherwise than in all other frames, with {:.1} times the power of \

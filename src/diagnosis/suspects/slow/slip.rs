@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::odd_frame::halves;
 use crate::diagnosis::Cube;
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::receiver::{
     field::distance,
@@ -76,7 +76,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         choice: None,
         p_value: corrected((-gain).exp(), tried).max(f64::MIN_POSITIVE),
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "Between frames {first} and {last} the samples of {} frames come up to {} {} than in the others, in all channels alike: \

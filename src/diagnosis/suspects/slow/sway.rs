@@ -13,7 +13,7 @@ use super::field::{PATTERN, ahead};
 use super::lines::climb;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, Tapered};
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place, Rung, Volume};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place, Volume};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 
 /// Bins over which the window spreads what is independent.
@@ -359,7 +359,7 @@ fn candidate(
         place: Place::at("scene"),
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "All static returns swing at {frequency:.2} ± {:.2} Hz, in phase with one another but each with a strength of its own, \

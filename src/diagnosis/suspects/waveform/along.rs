@@ -20,7 +20,7 @@ use rustfft::FftPlanner;
 
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::evidence::hann;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Rung, Volume};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Volume};
 use crate::diagnosis::power::PowerModel;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::speckle::{Look, groups};
@@ -236,7 +236,7 @@ impl Chirps {
             place: Place::at("receiver"),
             p_value: corrected(found.p_value, LOOKS),
             gain: found.gain,
-            rung: Rung::E,
+            errs_alike: true,
             look_alikes: vec![],
             statement: format!(
                 "the power falls by {db:.2} dB from the first to the last sample of every chirp, whatever is seen",
@@ -289,7 +289,7 @@ impl Chirps {
             place: Place::at("waveform"),
             p_value: corrected(found.p_value, LOOKS),
             gain: found.gain,
-            rung: Rung::E,
+            errs_alike: true,
             look_alikes: vec![],
             statement: format!(
                 "The chirp's ramp is not straight: its frequency bends by {:.0} kHz along the chirp, which smears what is at {range_m:.1} m \

@@ -13,7 +13,7 @@ use rustfft::FftPlanner;
 
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, blackman_harris, hann};
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Rung};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
 use crate::diagnosis::statistics;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
@@ -175,7 +175,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
         place: Place::at("waveform"),
         p_value,
         gain,
-        rung: Rung::F,
+        errs_alike: false,
         look_alikes: vec![],
         statement: format!(
             "Every return has a pair of faint echoes {:.0} kHz ({:.2} m) before and behind it, higher the farther it is ({:.0} dB at 3 \

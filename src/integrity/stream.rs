@@ -1,0 +1,94 @@
+//! A frame as the converter sent it.
+
+use num_complex::Complex32;
+
+use crate::data::IfFrame;
+use crate::radar::{Radar, Sampling};
+
+/// The axes of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Schedule {
+    pub tx: usize,
+    pub rx: usize,
+    pub loops: usize,
+    pub samples: usize,
+    pub is_real: bool,
+}
+
+/// Where a sample is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Spot {
+    pub frame: usize,
+    pub index: usize,
+    pub tx: usize,
+    pub rx: usize,
+    pub sample: usize,
+}
+
+impl Schedule {
+    pub fn of(radar: &Radar) -> Self {
+        let [_, tx, rx, loops, samples] = radar.dims();
+        Self { tx, rx, loops, samples, is_real: radar.sampling == Sampling::Real }
+    }
+
+    pub fn channels(&self) -> usize {
+        self.tx * self.rx
+    }
+
+    /// Samples of one loop over all transmitters and receivers: a still scene repeats itself with this period.
+    pub fn period(&self) -> usize {
+        self.channels() * self.samples
+    }
+
+    /// Of a sample counted through the stream of all frames.
+    pub fn spot(&self, place: usize) -> Spot {
+        let (chirp, sample) = (place / self.samples, place % self.samples);
+        let (row, rx) = (chirp / self.rx, chirp % self.rx);
+        let (index, tx) = (row / self.tx, row % self.tx);
+        Spot { frame: index / self.loops, index: index % self.loops, tx, rx, sample }
+    }
+}
+
+impl std::fmt::Display for Spot {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "frame {}, loop {}, tx {}, rx {}, sample {}", self.frame, self.index, self.tx, self.rx, self.sample)
+    }
+}
+
+/// One frame's samples in the order in which they were taken: `[loop, tx, rx, sample]`.
+pub(super) struct Stream {
+    pub frame: usize,
+    pub schedule: Schedule,
+    pub values: Vec<Complex32>,
+}
+
+impl Stream {
+    pub fn of(schedule: Schedule, frame: usize, samples: &IfFrame) -> Self {
+        let Schedule { tx, rx, loops, samples: length, .. } = schedule;
+        let mut values = Vec::with_capacity(samples.re.len());
+        for index in 0..loops {
+            for channel in 0..tx * rx {
+                let start = samples.position(channel / rx, channel % rx, index, 0);
+                match &samples.im {
+                    Some(im) => {
+                        let pairs = samples.re[start..start + length].iter().zip(&im[start..start + length]);
+                        values.extend(pairs.map(|(&re, &im)| Complex32::new(re, im)));
+                    }
+                    None => values.extend(samples.re[start..start + length].iter().map(|&re| Complex32::new(re, 0.0))),
+                }
+            }
+        }
+        Self { frame, schedule, values }
+    }
+
+    /// `[tx, rx, sample]` of each loop.
+    pub fn loops(&self) -> impl Iterator<Item = &[Complex32]> {
+        self.values.chunks_exact(self.schedule.period())
+    }
+
+    /// `[rx, sample]` of each chirp, with its loop and its transmitter.
+    pub fn chirps(&self) -> impl Iterator<Item = (usize, usize, &[Complex32])> {
+        let Schedule { tx, rx, samples, .. } = self.schedule;
+        self.values.chunks_exact(rx * samples).enumerate().map(move |(chirp, values)| (chirp / tx, chirp % tx, values))
+    }
+}
