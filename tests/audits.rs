@@ -240,7 +240,7 @@ fn two_transmitters_in_the_wrong_order_are_found() {
 #[test]
 fn a_heading_turned_by_half_a_turn_and_a_wrong_frame_period_are_found() {
     let folder = tempfile::tempdir().unwrap();
-    let plain = recorded(folder.path(), "seed = 35\nmesh_error_m = 2e-3", ONE);
+    let plain = recorded(folder.path(), "seed = 35\nframes = 24\nmesh_error_m = 2e-3", ONE);
     let stated = audited(&plain, &|text| text);
     assert!(stated.iter().all(|check| check.ok), "{stated:?}");
     let turned = audited(&plain, &|text| {

@@ -232,7 +232,7 @@ fn a_receiver_that_compresses_is_no_mover() {
 }
 
 #[test]
-fn a_recorder_that_slips_and_repeats_itself_is_told() {
+fn a_recorder_that_slips_and_repeats_itself_has_damaged_the_recording() {
     let Some(plain) = support::shared("recordings/planted/p1") else { return };
     let before = Recording::open(&plain).unwrap().frame(19).unwrap();
     let report = changed(&|frame, re, im| {
@@ -245,13 +245,11 @@ fn a_recorder_that_slips_and_repeats_itself_is_told() {
         }
     })
     .unwrap();
-    assert!(report.effects.is_empty(), "{:?}", ids(&report));
-    let frames = |like: &str| -> Vec<usize> {
-        let found = report.unexplained.iter().find(|found| found.behaves_like == like);
-        found.unwrap_or_else(|| panic!("{like} in {:?}", report.unexplained)).place.frames.clone().unwrap()
-    };
-    assert_eq!(frames("repeated frames"), [20]);
-    assert_eq!(frames("slipped samples"), (12..24).collect::<Vec<_>>());
+    assert_eq!(report.verdict, Verdict::Damaged);
+    assert!(report.effects.is_empty() && report.unexplained.is_empty(), "{:?}", ids(&report));
+    let frames = |name: &str| report.audit.iter().find(|check| check.check == name && !check.ok).unwrap().frames.clone().unwrap();
+    assert_eq!(frames("integrity_stream"), [12]);
+    assert_eq!(frames("integrity_copies"), [20]);
 }
 
 #[test]
@@ -296,14 +294,17 @@ fn a_recording_that_says_nothing_gets_that_answer() {
         im[of].fill(0.0);
     });
     assert!(dead.contains("rx 1 is constant") && !dead.contains("frames"), "{dead}");
-    let dies = undecided("dies", &|frame, re, im| {
+    let dies = folder.path().join("dies");
+    rewritten(&plain, &dies, &|frame, re, im| {
         let of = second(re);
         if frame >= 5 {
             re[of.clone()].fill(0.0);
             im[of].fill(0.0);
         }
     });
-    assert!(dies.contains("rx 1 is constant in 3 frames from 5 to 7"), "{dies}");
+    let dies = report(&dies);
+    assert_eq!(dies.verdict, Verdict::Damaged);
+    assert!(dies.reason.contains("exact zeros") && dies.reason.contains("frames 5, 6, 7"), "{}", dies.reason);
     let missing = undecided("missing", &|_, _, im| im.fill(0.0));
     assert!(missing.contains("Q of tx 0 rx 0 is constant"), "{missing}");
     let deaf = undecided("deaf", &|frame, re, im| {

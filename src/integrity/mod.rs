@@ -16,8 +16,8 @@ use crate::data::Recording;
 use crate::error::Result;
 use stream::{Schedule, Stream};
 
-/// Chance that one check calls a whole recording damaged, at most. Five checks at this level take half of the family-wise 1 % that a
-/// diagnosis allows itself (`diagnosis.alarm`).
+/// Chance that one check calls a whole recording damaged, at most. Five checks at this level add at most half of the family-wise 1 % that
+/// a diagnosis allows itself (`diagnosis.alarm`).
 pub const ALARM: f64 = 1e-3;
 
 /// What one check says.

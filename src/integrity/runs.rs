@@ -70,7 +70,8 @@ impl Inspector for Runs {
     fn see(&mut self, stream: &Stream) {
         let period = self.schedule.period();
         for &value in &stream.values {
-            self.extremes = [self.extremes[0].min(value.re).min(value.im), self.extremes[1].max(value.re).max(value.im)];
+            let im = if self.schedule.is_real { value.re } else { value.im };
+            self.extremes = [self.extremes[0].min(value.re).min(im), self.extremes[1].max(value.re).max(im)];
             if value == self.current.value {
                 self.repeats[self.seen % period] += 1;
                 self.current.length += 1;

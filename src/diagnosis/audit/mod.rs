@@ -79,9 +79,12 @@ pub fn audit(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<Check> {
     checks.extend(body_place(evidence));
     checks.extend(heading::heading(evidence, origin_m));
     checks.extend(frame_period::frame_period(evidence));
-    checks.extend(body_direction::body_direction(evidence));
-    checks.extend(antennas::sides(evidence));
-    checks.extend(antennas::transmitter_order(evidence));
+    if !checks.iter().any(|check| !check.ok && is_convention(check)) {
+        // Phases foretell nothing where the body is not where it is said to be.
+        checks.extend(body_direction::body_direction(evidence));
+        checks.extend(antennas::sides(evidence));
+        checks.extend(antennas::transmitter_order(evidence));
+    }
     checks.extend(room_ranges::room_ranges(evidence));
     checks.extend(numerics::numerics(evidence));
     checks
