@@ -13,6 +13,8 @@ pub(super) struct Schedule {
     pub loops: usize,
     pub samples: usize,
     pub is_real: bool,
+    /// A falling chirp: nearer returns have the smaller negative beat frequency.
+    pub is_falling: bool,
 }
 
 /// Where a sample is.
@@ -28,7 +30,7 @@ pub(super) struct Spot {
 impl Schedule {
     pub fn of(radar: &Radar) -> Self {
         let [_, tx, rx, loops, samples] = radar.dims();
-        Self { tx, rx, loops, samples, is_real: radar.sampling == Sampling::Real }
+        Self { tx, rx, loops, samples, is_real: radar.sampling == Sampling::Real, is_falling: radar.slope_hz_per_s < 0.0 }
     }
 
     pub fn channels(&self) -> usize {

@@ -84,7 +84,11 @@ impl Inspector for Words {
         let (mut far, mut all, mut far_after) = (0.0, 0.0, 0.0);
         let half = samples / 2;
         for bin in GUARD..(half / 2).saturating_sub(GUARD - 1) {
-            let [near, away] = [[bin, half - bin], [samples - bin, half + bin]];
+            let mut halves = [[bin, half - bin], [samples - bin, half + bin]];
+            if self.schedule.is_falling {
+                halves.reverse();
+            }
+            let [near, away] = halves;
             let sum = |power: &[f64], bins: [usize; 2]| bins.into_iter().map(|bin| power[bin]).sum::<f64>();
             let (away_before, whole) = (sum(&as_read, away), sum(&as_read, near) + sum(&as_read, away));
             let away_after = sum(&reordered, away);
