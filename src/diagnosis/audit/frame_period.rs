@@ -13,9 +13,11 @@ pub(super) fn frame_period(evidence: &Evidence) -> Option<Check> {
         energy_at(evidence, shown, |point| Some(range_and_velocity(point, &evidence.radar)))
     };
     let twice = |frame: usize| Some(2 * frame).filter(|shown| *shown < frames);
-    let half = |frame: usize| (frame % 2 == 0).then_some(frame / 2);
-    let readings: [(f64, &dyn Fn(usize) -> Option<usize>); 2] = [(2.0, &twice), (0.5, &half)];
-    let compared = readings.map(|(factor, shown)| (factor, level(&|frame| shown(frame).map(|_| frame)), level(shown)));
+    let half = |frame: usize| frame.is_multiple_of(2).then_some(frame / 2);
+    // As stated, over the frames that the reading shows, and as read.
+    let both =
+        |factor: f64, shown: &dyn Fn(usize) -> Option<usize>| (factor, level(&|frame| shown(frame).map(|_| frame)), level(shown));
+    let compared = [both(2.0, &twice), both(0.5, &half)];
     let wrong = compared.iter().find(|(_, as_is, other)| *other >= PRESENT_DB && other - as_is >= CLEARLY_DB);
     let found = match wrong {
         Some((factor, as_is, other)) => format!(
