@@ -8,15 +8,18 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::commitment::{Commitment, canonical, hash_file, joint_root, read_json, sha256};
 use super::report::Report;
+use super::worker::Worker;
 use crate::data::atomic::{AtomicFolder, write_text};
-use crate::data::{Shard, files};
+use crate::data::entries::entries;
+use crate::data::unfinished::wait_if_ending;
+use crate::data::{Scratch, Shard, files};
 use crate::error::{Error, Result};
 
 /// How the cases are to be diagnosed.
@@ -116,16 +119,18 @@ fn answered(folder: &Path) -> bool {
 
 /// One case in a process of its own; whatever becomes of it is kept in `out`.
 pub fn diagnose(case: &Path, out: &Path, config: &RunConfig) -> Result<()> {
-    let workplace =
-        tempfile::Builder::new().prefix("case-").tempdir().map_err(|source| Error::write("a temporary folder", source))?;
+    let workplace = Scratch::new()?;
     let (copy, answer) = (workplace.path().join("recording"), workplace.path().join("answer"));
     fs::create_dir(&copy).map_err(|source| Error::write(&copy, source))?;
-    for entry in fs::read_dir(case).map_err(|source| Error::read(case, source))?.flatten() {
-        files::require(entry.path())?;
-        fs::copy(entry.path(), copy.join(entry.file_name())).map_err(|source| Error::read(entry.path(), source))?;
+    for file in entries(case)? {
+        files::require(&file)?;
+        let name = file.file_name().expect("an entry of a folder");
+        fs::copy(&file, copy.join(name)).map_err(|source| Error::read(&file, source))?;
     }
     let outcome = start(&copy, &answer, workplace.path(), config)
         .and_then(|()| Report::read(&answer.join("report.json")).map(drop).map_err(|error| format!("bad report: {error}")));
+    // What failed because everything is ended has not failed.
+    wait_if_ending();
     let folder = AtomicFolder::replacing(out)?;
     match outcome {
         Ok(()) => {
@@ -147,7 +152,8 @@ pub fn diagnose(case: &Path, out: &Path, config: &RunConfig) -> Result<()> {
 fn start(copy: &Path, answer: &Path, workplace: &Path, config: &RunConfig) -> std::result::Result<(), String> {
     let complaints = workplace.join("stderr");
     let stderr = fs::File::create(&complaints).map_err(|error| error.to_string())?;
-    let mut process = Command::new(&config.program)
+    let mut command = Command::new(&config.program);
+    command
         .arg("diagnose")
         .arg(copy)
         .arg("--out")
@@ -155,27 +161,20 @@ fn start(copy: &Path, answer: &Path, workplace: &Path, config: &RunConfig) -> st
         .arg("--quiet")
         .args(&config.arguments)
         .current_dir(workplace)
-        // Nothing that says where the challenge lies.
+        // Nothing that says where the challenge lies, and nothing left elsewhere.
         .env_remove("PWD")
         .env_remove("OLDPWD")
+        .env("TMPDIR", workplace)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
-        .stderr(stderr)
-        .spawn()
-        .map_err(|error| format!("{}: cannot be started: {error}", config.program.display()))?;
-    let begun = Instant::now();
-    let status = loop {
-        match process.try_wait().map_err(|error| error.to_string())? {
-            Some(status) => break status,
-            None if begun.elapsed() > config.limit => {
-                let _ = process.kill();
-                let _ = process.wait();
-                return Err(format!("not done after {:.0} s", config.limit.as_secs_f64()));
-            }
-            None => std::thread::sleep(Duration::from_millis(20)),
-        }
-    };
-    if status.success() { Ok(()) } else { Err(complaint(status, &complaints)) }
+        .stderr(stderr);
+    let mut worker =
+        Worker::start(&mut command).map_err(|error| format!("{}: cannot be started: {error}", config.program.display()))?;
+    match worker.wait(config.limit).map_err(|error| error.to_string())? {
+        None => Err(format!("not done after {:.0} s", config.limit.as_secs_f64())),
+        Some(status) if status.success() => Ok(()),
+        Some(status) => Err(complaint(status, &complaints)),
+    }
 }
 
 fn complaint(status: ExitStatus, stderr: &Path) -> String {

@@ -5,13 +5,13 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use crate::data::{files, hex};
+use crate::data::{entries::entries, files, hex};
 use crate::error::{Error, Result};
 
 /// `commitment.json`, or one of several where the cases were sealed in shards.
@@ -69,14 +69,8 @@ pub fn canonical(value: &Value) -> String {
 
 /// Over the names and contents of all files in a folder.
 pub fn hash_folder(folder: &Path) -> Result<String> {
-    let entries = fs::read_dir(folder).map_err(|source| Error::read(folder, source))?;
-    let mut files: Vec<PathBuf> = entries
-        .map(|entry| entry.map(|entry| entry.path()))
-        .collect::<std::io::Result<_>>()
-        .map_err(|source| Error::read(folder, source))?;
-    files.sort();
     let mut all = String::new();
-    for file in files {
+    for file in entries(folder)? {
         let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
         all.push_str(&format!("{name}:{}\n", hash_file(&file)?));
     }
@@ -99,14 +93,13 @@ pub fn merkle_root(leaves: &BTreeMap<String, String>) -> String {
 impl Commitment {
     /// All commitments of a folder, in the order of their shards, each consistent with itself.
     pub fn read_all(folder: &Path) -> Result<Vec<Self>> {
-        let entries = fs::read_dir(folder).map_err(|source| Error::read(folder, source))?;
         let mut found = vec![];
-        for entry in entries.flatten() {
-            let name = entry.file_name().to_string_lossy().into_owned();
+        for path in entries(folder)? {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             if name.starts_with("commitment") && name.ends_with(".json") {
-                let commitment: Self = read_json(&entry.path())?;
+                let commitment: Self = read_json(&path)?;
                 if merkle_root(&commitment.leaves) != commitment.root {
-                    return Err(Error::field(entry.path(), "root", "not the root of the leaves", "an untouched commitment"));
+                    return Err(Error::field(path, "root", "not the root of the leaves", "an untouched commitment"));
                 }
                 found.push(commitment);
             }

@@ -28,5 +28,6 @@ pub mod secret;
 pub mod surviving;
 pub mod table;
 pub mod twins;
+mod worker;
 
 pub use config::ChallengeConfig;

@@ -21,8 +21,10 @@ use super::seal::measured;
 use super::secret::Secret;
 use super::table::{Aim, Row, markdown, middle, share};
 use crate::data::atomic::write_text;
+use crate::data::entries::entries;
 use crate::data::{Recording, read_toml};
 use crate::error::{Error, Result};
+use crate::text::shown;
 
 /// A misfit per sample below this, nats, is nothing that could be removed.
 const LEAST_REMOVABLE: f64 = 2.0e-3;
@@ -119,8 +121,8 @@ fn verify_secret(challenge: &Path, commitments: &[Commitment]) -> Result<()> {
 /// The registry is closed: nothing was planted that was not committed to.
 fn nothing_else(challenge: &Path, leaves: &[(&String, &String)]) -> Result<()> {
     let folder = challenge.join("cases");
-    for entry in std::fs::read_dir(&folder).map_err(|source| Error::read(&folder, source))?.flatten() {
-        let name = entry.file_name().to_string_lossy().into_owned();
+    for case in entries(&folder)? {
+        let name = case.file_name().unwrap_or_default().to_string_lossy().into_owned();
         if !leaves.iter().any(|(leaf, _)| **leaf == name) {
             return Err(Error::Usage { message: format!("case {name}: was never committed to"), hint: None });
         }
@@ -471,7 +473,7 @@ impl Score {
     /// `results.md`, `score.json` and `psychometric.png` in a folder.
     pub fn write(&self, folder: &Path) -> Result<()> {
         std::fs::create_dir_all(folder).map_err(|source| Error::write(folder, source))?;
-        write_text(folder.join("results.md"), &self.markdown())?;
+        write_text(folder.join("results.md"), &shown(&self.markdown()))?;
         let value = serde_json::to_value(self).expect("plain data");
         write_text(folder.join("score.json"), &format!("{value:#}\n"))?;
         chart(&self.points, self.psychometric).save(&folder.join("psychometric.png"))

@@ -21,6 +21,7 @@ use super::plan::{Plan, plans};
 use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
 use super::secret::Secret;
 use crate::data::atomic::write_text;
+use crate::data::entries::entries;
 use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, files, read_toml, write_recording};
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
@@ -274,9 +275,8 @@ fn write_frames(world: &World, frames: &[IfFrame], case: &Path) -> Result<()> {
         truth: None,
     };
     write_recording(case, &contents, &mut |frame| Ok(frames[frame].clone()))?;
-    let entries = fs::read_dir(case).map_err(|source| Error::read(case, source))?;
-    for entry in entries.flatten() {
-        set_time(&entry.path())?;
+    for path in entries(case)? {
+        set_time(&path)?;
     }
     set_time(case)
 }

@@ -10,6 +10,7 @@ use super::commitment::Commitment;
 use super::config::Stratum;
 use super::judge::Truth;
 use super::seal::record_twin;
+use crate::data::Scratch;
 use crate::error::{Error, Result};
 
 /// Diagnoses the twins that have no report yet; `progress` hears how many are done. Returns how many there are.
@@ -36,7 +37,7 @@ pub fn run(challenge: &Path, answers: &Path, out: &Path, config: &RunConfig, pro
         if config.most.is_some_and(|most| done >= most) {
             break;
         }
-        let workplace = tempfile::tempdir().map_err(|source| Error::write("a temporary folder", source))?;
+        let workplace = Scratch::new()?;
         let case = workplace.path().join(name);
         record_twin(&truth.settings, &case)?;
         diagnose(&case, &folder, config)?;

@@ -83,12 +83,11 @@ enum Method {
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let device = device(&common.device)?;
     let maker = Maker::new(arguments, common, device)?;
+    let out = arguments.out.out.clone().unwrap_or_else(|| "runs/baseline".into());
+    let folder = AtomicFolder::create(&out)?;
     let recording = open(&arguments.recording, common)?;
     let baseline = maker.make(&arguments.recording, &recording)?;
     let gain = gain(arguments, common, &maker, &recording)?;
-
-    let out = arguments.out.out.clone().unwrap_or_else(|| "runs/baseline".into());
-    let folder = AtomicFolder::create(&out)?;
     let noise = noise(arguments, common, &recording)?;
     let rendering = Rendering { baseline: &*baseline, gain, noise };
     let mut seconds = 0.0;
@@ -118,13 +117,17 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         "noise_level": if let BaselineNoise::Level { deviation, .. } = noise { Some(deviation) } else { None },
         "seed": arguments.seed,
         "frames": frames,
-        "seconds_per_frame": seconds_per_frame,
     });
-    atomic::write_text(folder.path().join("baseline.json"), &format!("{about:#}\n"))?;
+    // What differs between equal runs.
+    let run = json!({ "version": env!("CARGO_PKG_VERSION"), "seconds_per_frame": seconds_per_frame });
+    for (name, value) in [("baseline.json", about), ("run.json", run)] {
+        atomic::write_text(folder.path().join(name), &format!("{value:#}\n"))?;
+    }
     folder.finish()?;
     say!("simulated {frames} frames, {seconds_per_frame:.3} s each: {}", out.display());
     say!("  recording/     IF samples as a recording folder");
-    say!("  baseline.json  settings, gain, time");
+    say!("  baseline.json  settings, gain");
+    say!("  run.json       time");
     say!("  *.png          heatmaps");
     Ok(())
 }
@@ -133,7 +136,7 @@ fn open(folder: &Path, common: &Common) -> Result<Recording> {
     let recording = Recording::open(folder)?;
     plausible::recording(&recording, common)?;
     for note in &recording.notes {
-        eprintln!("note: {}: {note}", folder.display());
+        remark!("note: {}: {note}", folder.display());
     }
     Ok(recording)
 }
@@ -219,7 +222,7 @@ fn gain(arguments: &Arguments, common: &Common, maker: &Maker, simulated: &Recor
     }
     if arguments.calibrate.is_empty() {
         if maker.method != Method::TwoBounce {
-            eprintln!("note: without --calibrate or --gain the level is arbitrary");
+            remark!("note: without --calibrate or --gain the level is arbitrary");
         }
         return Ok(1.0);
     }

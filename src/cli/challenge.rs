@@ -1,18 +1,18 @@
 //! `hybridsim challenge seal | run | twins | score`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
 
-use super::{Common, progress::Progress};
+use super::{Common, interrupt, progress::Progress};
 use crate::{
     challenge::{
         ChallengeConfig,
         answer::{self, RunConfig},
         score, seal, twins,
     },
-    data::Shard,
+    data::{Claim, Shard, atomic},
     error::{Error, Result},
 };
 
@@ -119,6 +119,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 fn seal(arguments: &Seal, common: &Common) -> Result<()> {
     let config = ChallengeConfig::read(&arguments.config, &common.set)?;
     let shard = arguments.shard.unwrap_or(Shard::ALL);
+    let _claim = claimed(&arguments.out, shard, "cases that are sealed")?;
     let count = (0..config.cases).filter(|&index| shard.holds(index)).count();
     let progress = Progress::new("sealing", count, common.quiet);
     let sealed = seal::seal(&config, arguments.seed.as_deref(), &arguments.out, shard, &|done| progress.set(done));
@@ -127,6 +128,14 @@ fn seal(arguments: &Seal, common: &Common) -> Result<()> {
     say!("sealed {} cases in {}", commitment.cases, arguments.out.display());
     say!("publish before anybody diagnoses: root {}", commitment.root);
     Ok(())
+}
+
+/// A folder that is filled by this process, or by one for each part.
+fn claimed(folder: &Path, shard: Shard, what: &'static str) -> Result<Claim> {
+    let claim = Claim::part(folder, shard)?;
+    atomic::sweep_all(folder);
+    interrupt::kept(move || format!("the {what} are kept; go on with: {}", interrupt::typed()));
+    Ok(claim)
 }
 
 impl How {
@@ -148,6 +157,7 @@ impl How {
 
 fn answer(arguments: &Run, common: &Common) -> Result<()> {
     let config = arguments.how.config(common)?;
+    let _claim = claimed(&arguments.out, config.shard, "answers")?;
     let progress = Progress::new("diagnosing", answer::waiting(&arguments.challenge, &arguments.out, &config)?, common.quiet);
     let answers = answer::run(&arguments.challenge, &arguments.out, &config, &mut |done| progress.set(done));
     progress.finish();
@@ -163,6 +173,7 @@ fn answer(arguments: &Run, common: &Common) -> Result<()> {
 
 fn twins(arguments: &Twins, common: &Common) -> Result<()> {
     let config = arguments.how.config(common)?;
+    let _claim = claimed(&arguments.out, config.shard, "reports of twins")?;
     let progress = Progress::new("twins", answer::waiting(&arguments.challenge, &arguments.out, &config)?, common.quiet);
     let done = twins::run(&arguments.challenge, &arguments.answers, &arguments.out, &config, &mut |done| progress.set(done));
     progress.finish();
@@ -172,12 +183,13 @@ fn twins(arguments: &Twins, common: &Common) -> Result<()> {
 
 fn score(arguments: &Score, common: &Common) -> Result<()> {
     let count = crate::challenge::commitment::Commitment::read_all(&arguments.challenge)?.iter().map(|part| part.cases).sum();
+    let out = arguments.out.clone().unwrap_or_else(|| arguments.answers.join("score"));
+    let _claim = super::claimed(&out)?;
     let progress = Progress::new("scoring", count, common.quiet);
     let Score { challenge, answers, twins, measure, .. } = arguments;
     let scored = score::score(challenge, answers, twins.as_deref(), *measure, &|done| progress.set(done));
     progress.finish();
     let scored = scored?;
-    let out = arguments.out.clone().unwrap_or_else(|| arguments.answers.join("score"));
     scored.write(&out)?;
     say!("{}", scored.markdown());
     say!("results: {}", out.join("results.md").display());

@@ -47,9 +47,11 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         return Ok(());
     }
     if path.is_dir() {
+        let out = arguments.out.out.as_ref().map(AtomicFolder::create).transpose()?;
         let recording = show_recording(path, common)?;
-        if let Some(out) = &arguments.out.out {
-            draw(&recording, out)?;
+        if let (Some(folder), Some(out)) = (out, &arguments.out.out) {
+            draw(&recording, folder)?;
+            say!("  heatmaps           {}", out.display());
         }
         return Ok(());
     }
@@ -65,7 +67,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         say!("a recording to be made:");
         show_radar(&world.radar, Some(&world.room));
         for note in record.motion_notes(path.parent().unwrap_or(Path::new("")))? {
-            eprintln!("note: {note}");
+            remark!("note: {note}");
         }
         plausible::scene(Some(&world.radar), Some(&world.room), world.person.as_ref(), &Sources::one(path), common)?;
     }
@@ -74,14 +76,11 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 }
 
 /// Heatmaps of what was measured, for `--out`.
-fn draw(recording: &Recording, out: &Path) -> Result<()> {
-    let folder = AtomicFolder::create(out)?;
+fn draw(recording: &Recording, folder: AtomicFolder) -> Result<()> {
     let frames = recording.frames().min(MOST_DRAWN);
     let samples = (0..frames).map(|frame| evaluation::measured_frame(recording, frame)).collect::<Result<Vec<_>>>()?.concat();
     report::Pictures::new(&recording.radar, &HeatmapConfig::default()).show(folder.path(), &samples)?;
-    folder.finish()?;
-    say!("  heatmaps           {}", out.display());
-    Ok(())
+    folder.finish()
 }
 
 /// Frames that pictures over time show at most: they are held in memory together.
@@ -111,7 +110,7 @@ pub(crate) fn show(recording: &Recording, common: &Common) -> Result<()> {
         None => say!("  person             none: only what needs no tracked body will work"),
     }
     for note in &recording.notes {
-        eprintln!("note: {note}");
+        remark!("note: {note}");
     }
     plausible::recording(recording, common)?;
     // Every frame is read once, so that a truncated or lying file shows here.
@@ -155,7 +154,7 @@ fn show_radar(radar: &Radar, room: Option<&Room>) {
     for check in radar::checks(radar, room.and_then(Room::farthest_wall_m), None) {
         match check.passed {
             Some(true) => say!("  ok       {} ({})", check.rule, check.found),
-            Some(false) => eprintln!("warning: {} does not hold ({}): {}", check.rule, check.found, check.reason),
+            Some(false) => remark!("warning: {} does not hold ({}): {}", check.rule, check.found, check.reason),
             None => {}
         }
     }

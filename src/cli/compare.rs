@@ -13,6 +13,7 @@ use crate::{
     data::{
         Recording,
         atomic::{self, AtomicFolder},
+        entries::entries,
         files,
         recording::SETTINGS_FILE,
         settings::settings_from_table,
@@ -91,15 +92,10 @@ fn pairs(measured: &Path, simulated: &Path) -> Result<Vec<Pair>> {
         return Ok(vec![Pair { name, measured: measured.into(), simulated: recording_in(simulated.into()) }]);
     }
     let list = |folder: &Path| -> Result<Vec<String>> {
-        let entries = std::fs::read_dir(folder).map_err(|source| Error::read(folder, source))?;
-        let folders = entries
-            .filter_map(|entry| entry.ok())
-            .filter(|entry| entry.path().is_dir() && is_recording(&recording_in(entry.path())));
+        let folders = entries(folder)?.into_iter().filter(|path| path.is_dir() && is_recording(&recording_in(path.clone())));
         let name =
-            |entry: std::fs::DirEntry| files::utf8(entry.path()).map(|()| entry.file_name().to_string_lossy().into_owned());
-        let mut names = folders.map(name).collect::<Result<Vec<String>>>()?;
-        names.sort();
-        Ok(names)
+            |path: PathBuf| files::utf8(&path).map(|()| path.file_name().unwrap_or_default().to_string_lossy().into_owned());
+        folders.map(name).collect()
     };
     let (wanted, names) = (list(measured)?, list(simulated)?);
     for (folder, names) in [(measured, &wanted), (simulated, &names)] {
@@ -117,7 +113,7 @@ fn pairs(measured: &Path, simulated: &Path) -> Result<Vec<Pair>> {
         });
     }
     if names.len() < wanted.len() {
-        eprintln!(
+        remark!(
             "note: {} of {} measured recordings have no simulation and are left out",
             wanted.len() - names.len(),
             wanted.len()

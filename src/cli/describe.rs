@@ -76,7 +76,7 @@ fn describe_motion(path: &Path, common: &Common) -> Result<()> {
     let model = procedural::person(&PersonConfig::default())?;
     let (motion, notes) = import::read_motion(path, &model, &BvhConfig::default())?;
     for note in notes {
-        eprintln!("note: {note}");
+        remark!("note: {note}");
     }
     show_motion(&motion, &model);
     let placement = Placement::default();

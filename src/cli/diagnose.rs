@@ -45,6 +45,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(checkpoint) = &arguments.checkpoint {
         checkpoint::read_state(checkpoint)?;
     }
+    let _claim = super::claimed(&arguments.out)?;
     for earlier in ["report.json", "report.html"].map(|name| arguments.out.join(name)) {
         if earlier.exists() {
             std::fs::remove_file(&earlier).map_err(|error| Error::write(&earlier, error))?;
@@ -60,7 +61,6 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         progress.set(steps);
     };
     let mut diagnosis = diagnosis::diagnose(&recording, &config.diagnosis, &mut tell)?;
-    std::fs::create_dir_all(&arguments.out).map_err(|error| Error::write(&arguments.out, error))?;
     let simulated = simulate(arguments, &device, &config, &mut diagnosis, &mut tell)?;
     let html = diagnosis::html::html(&diagnosis, simulated.as_ref())?;
     progress.finish();

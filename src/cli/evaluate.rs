@@ -49,6 +49,7 @@ fn parse_range(text: &str) -> std::result::Result<(usize, usize), String> {
 }
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
+    let _claim = arguments.out.out.as_ref().map(|out| super::claimed(out)).transpose()?;
     let device = device(&common.device)?;
     let (mut simulator, state) = checkpoint::open(&arguments.checkpoint, &device)?;
     arguments.without.switch_off(&mut simulator)?;
@@ -95,7 +96,6 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         super::tell(&scores::of_sequences(&summary));
     }
     if let Some(out) = &arguments.out.out {
-        std::fs::create_dir_all(out).map_err(|error| Error::write(out, error))?;
         atomic::write_text(out.join("metrics.json"), &scores::json(&evaluations))?;
     }
     Ok(())

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::{Common, check};
 use crate::{
+    data::atomic::AtomicFolder,
     error::{Error, Result},
     import::capture::{self, Layout, Stated},
 };
@@ -42,6 +43,8 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
+    // What cannot be written is said before anything is read.
+    AtomicFolder::create(&arguments.out).map(drop)?;
     let stated = Stated {
         configs: arguments.config.clone(),
         board: arguments.board.clone(),

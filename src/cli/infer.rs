@@ -159,7 +159,7 @@ fn new_person(arguments: &Arguments, state: &CheckpointState) -> Result<Person> 
             config.up = arguments.up.or(config.up);
             let (motion, notes) = import::read_motion(path, &model, &config)?;
             for note in notes {
-                eprintln!("note: {note}");
+                remark!("note: {note}");
             }
             motion
         }

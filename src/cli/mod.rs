@@ -1,11 +1,16 @@
 //! The command line: verbs, their help, and what they say on the terminal.
 //!
 //! Results go to standard output, progress and warnings to standard error. Exit status: 0 done, 1 failed,
-//! 2 wrong usage, configuration or input.
+//! 2 wrong usage, configuration or input, 130 and 143 interrupted by SIGINT and SIGTERM.
 
 /// A line on standard output.
 macro_rules! say {
     ($($text:tt)*) => { $crate::cli::tell(&format!("{}\n", format_args!($($text)*))) };
+}
+
+/// A line on standard error.
+macro_rules! remark {
+    ($($text:tt)*) => { $crate::cli::complain(&format!($($text)*)) };
 }
 
 mod baseline;
@@ -19,6 +24,7 @@ mod effects;
 mod evaluate;
 mod import;
 mod infer;
+mod interrupt;
 mod plausible;
 mod progress;
 mod recognize;
@@ -30,23 +36,35 @@ mod simulated;
 mod site;
 mod train;
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::data::files;
-use crate::error::{Error, Result};
+use crate::{
+    data::{Claim, atomic, files, unfinished},
+    error::{Error, Result},
+    text::shown,
+};
 
 pub use device::{available, device, devices};
 
 /// Text on standard output. Whoever reads may have closed the pipe: what was made is made.
 fn tell(text: &str) {
-    if let Err(error) = std::io::Write::write_all(&mut std::io::stdout(), text.as_bytes())
+    if let Err(error) = std::io::Write::write_all(&mut std::io::stdout(), shown(text).as_bytes())
         && error.kind() != std::io::ErrorKind::BrokenPipe
     {
-        eprintln!("error: standard output: {error}");
+        remark!("error: standard output: {error}");
+        unfinished::abandon();
         std::process::exit(1);
     }
+}
+
+/// A line on standard error; nobody may be there to read it.
+fn complain(text: &str) {
+    let _ = std::io::Write::write_all(&mut std::io::stderr(), format!("{}\n", shown(text)).as_bytes());
 }
 
 /// Simulate mmWave radar recordings of moving people, and learn the physics from recordings.
@@ -160,15 +178,23 @@ pub(crate) struct Out {
     pub out: Option<PathBuf>,
 }
 
+/// A folder that results are added to, made and tried before the work; nobody else works there until this is dropped.
+fn claimed(folder: &Path) -> Result<Claim> {
+    let claim = Claim::take(folder)?;
+    atomic::sweep(folder);
+    Ok(claim)
+}
+
 /// Parses, runs, reports. Every error is printed once, here, with its hint.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            let _ = error.print();
+            show_usage(&error);
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
+    interrupt::watch();
     let result = refuse_idle_settings(&cli).and_then(|()| match &cli.command {
         Command::Check(arguments) => check::run(arguments, &cli.common),
         Command::Import(arguments) => import::run(arguments, &cli.common),
@@ -187,12 +213,23 @@ pub fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            // What failed because everything is ended has not failed.
+            unfinished::wait_if_ending();
+            remark!("error: {error}");
             if let Some(hint) = error.hint() {
-                eprintln!("hint: {hint}");
+                remark!("hint: {hint}");
             }
             ExitCode::from(status(&error))
         }
+    }
+}
+
+/// What clap says: in colour, unless a terminal would obey words that were typed, which clap repeats.
+fn show_usage(error: &clap::Error) {
+    let obeyed = |word: std::ffi::OsString| matches!(shown(&word.to_string_lossy()), std::borrow::Cow::Owned(_));
+    match std::env::args_os().any(obeyed) {
+        true => complain(error.render().to_string().trim_end()),
+        false => drop(error.print()),
     }
 }
 

@@ -70,6 +70,6 @@ pub(super) fn tell(mut facts: Facts, sources: &Sources, common: &Common) -> Resu
 }
 
 pub(super) fn tell_findings(verdict: Verdict) -> Result<()> {
-    verdict.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    verdict.notes.iter().for_each(|note| remark!("note: {note}"));
     verdict.into_result()
 }

@@ -4,7 +4,7 @@ use std::{io::IsTerminal, time::Duration};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::{experiments::Event as StageEvent, training::Event};
+use crate::{experiments::Event as StageEvent, text::shown, training::Event};
 
 /// Shows how far a task is, with the time that remains.
 pub struct Progress {
@@ -25,7 +25,7 @@ impl Progress {
         bar.set_prefix(what.to_string());
         bar.enable_steady_tick(Duration::from_millis(500));
         if !quiet && !terminal {
-            eprintln!("{what}: {length} steps");
+            remark!("{what}: {length} steps");
         }
         Self { bar, quiet, terminal }
     }
@@ -35,7 +35,7 @@ impl Progress {
     }
 
     pub fn message(&self, text: String) {
-        self.bar.set_message(text);
+        self.bar.set_message(shown(&text).into_owned());
     }
 
     /// A line that stays, above the bar.
@@ -43,7 +43,7 @@ impl Progress {
         if self.quiet {
             return;
         }
-        if self.terminal { self.bar.println(text) } else { eprintln!("{text}") }
+        if self.terminal { self.bar.println(shown(text)) } else { remark!("{text}") }
     }
 
     pub fn finish(self) {
@@ -130,7 +130,7 @@ impl StageProgress {
             bar
         };
         if !quiet && !terminal {
-            eprintln!("reproducing: {stages} stages");
+            remark!("reproducing: {stages} stages");
         }
         Self {
             stages: bar(stages as u64, "stages [{bar:30}] {pos}/{len}  {elapsed} elapsed, {eta} left"),
@@ -147,7 +147,7 @@ impl StageProgress {
                 self.stages.set_position(*index as u64);
                 self.within.set_position(0);
                 self.within.set_length(0);
-                self.within.set_message(name.to_string());
+                self.within.set_message(shown(name).into_owned());
                 self.known += usize::from(*known);
             }
             StageEvent::Step { done, of } => {
@@ -156,7 +156,7 @@ impl StageProgress {
             }
             StageEvent::Done { name, seconds } if !self.quiet => {
                 let text = format!("{seconds:8.1} s  {name}");
-                if self.terminal { self.stages.println(text) } else { eprintln!("{text}") }
+                if self.terminal { self.stages.println(shown(&text)) } else { remark!("{text}") }
             }
             StageEvent::Done { .. } => {}
         }
@@ -166,7 +166,7 @@ impl StageProgress {
         self.within.finish_and_clear();
         self.stages.finish_and_clear();
         if !self.quiet && self.known > 0 {
-            eprintln!("{} stages had been done before", self.known);
+            remark!("{} stages had been done before", self.known);
         }
     }
 }

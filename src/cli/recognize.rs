@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::{Common, device::device, progress::Progress};
 use crate::{
+    data::atomic::AtomicFolder,
     error::Result,
     recognition::{self, RecognitionConfig, Stage},
 };
@@ -18,7 +19,7 @@ pub(crate) struct Arguments {
     /// Recordings to be tested on
     #[arg(long, value_name = "DIR", num_args = 1.., required = true)]
     test: Vec<PathBuf>,
-    /// Folder for recognition.json, recognition.md, confusion.png and config.toml; must be new
+    /// Folder for recognition.json, recognition.md, confusion.png, config.toml and run.json; must be new or empty
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
     /// Settings of maps, network and training [default: the built-in ones]
@@ -28,6 +29,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let config = RecognitionConfig::read(arguments.config.as_deref(), &common.set)?;
+    let folder = AtomicFolder::create(&arguments.out)?;
     let device = device(&common.device)?;
     let mut shown: Option<(bool, Progress)> = None;
     let mut show = |stage: Stage| {
@@ -53,7 +55,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         progress.finish();
     }
     let result = result?;
-    recognition::write(&result, &config, &arguments.out)?;
+    recognition::write(&result, &config, folder)?;
     super::tell(&recognition::text(&result));
     say!("\nresult: {}", arguments.out.display());
     Ok(())

@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 use super::{Common, Out, plausible, progress::Progress};
 use crate::{
     config::Config,
-    data::hex,
+    data::{atomic::AtomicFolder, hex},
     error::Result,
     plausibility::Sources,
     recorder::{self, RecorderConfig},
@@ -26,10 +26,12 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let config = Config::read(&arguments.config, &common.set)?;
     let record = config.record(&arguments.config)?;
     for note in record.motion_notes(arguments.config.parent().unwrap_or(Path::new("")))? {
-        eprintln!("note: {note}");
+        remark!("note: {note}");
     }
     let folder = match &arguments.out.out {
         Some(out) => {
+            // What cannot be written is said before anything is worked out.
+            AtomicFolder::create(out).map(drop)?;
             make(record, &arguments.config, out, common)?;
             out.clone()
         }

@@ -19,6 +19,7 @@ use crate::{
     metrics::{DbWindow, MetricsConfig},
     pictures::{self, Chart, Series},
     radar::Radar,
+    text::shown,
     training::{FrameSplit, LoadedRecording, RefinedPose, checkpoint, checkpoint::Progress},
 };
 
@@ -38,13 +39,13 @@ pub(super) fn fresh_run_folder(config: &Path) -> PathBuf {
 /// What had to be fitted when a recording was read, on standard error.
 pub(super) fn tell_notes(loaded: &LoadedRecording) {
     for note in &loaded.recording.notes {
-        eprintln!("note: {}: {note}", loaded.folder.display());
+        remark!("note: {}: {note}", loaded.folder.display());
     }
     if loaded.recording.person().is_none() {
-        eprintln!("note: {}: no person: only the room is simulated", loaded.folder.display());
+        remark!("note: {}: no person: only the room is simulated", loaded.folder.display());
     }
     if loaded.recording.room.is_none() {
-        eprintln!("note: {}: no room: only the person is simulated, without indirect path", loaded.folder.display());
+        remark!("note: {}: no room: only the person is simulated, without indirect path", loaded.folder.display());
     }
 }
 
@@ -279,9 +280,8 @@ impl RunReport<'_> {
         let history = &self.progress.history;
         let (first, best) = (&history[0], &history[self.progress.best_epoch]);
         let mut text = format!(
-            "# Training run\n\n{} epochs in {:.0} s; the best was epoch {}: loss {:.2} dB² after {:.2} dB² in the first{}.\n\n",
+            "# Training run\n\n{} epochs; the best was epoch {}: loss {:.2} dB² after {:.2} dB² in the first{}.\n\n",
             self.progress.epochs_done,
-            self.seconds,
             best.epoch + 1,
             best.score(),
             first.score(),
@@ -297,7 +297,9 @@ impl RunReport<'_> {
         }
         text.push_str("![loss](loss.png)\n![range-Doppler](range_doppler.png)\n");
         text.push_str("![range-Doppler, static removed](range_doppler_moving.png)\n![time-Doppler](time_doppler.png)\n\n");
-        text.push_str("Settings: `config.toml`. Numbers: `metrics.json`, `run.json`. Weights: `best/`, `last/`.\n");
-        atomic::write_text(self.folder.join("report.md"), &text)
+        text.push_str(
+            "Settings: `config.toml`. Numbers: `metrics.json`. Time and command: `run.json`. Weights: `best/`, `last/`.\n",
+        );
+        atomic::write_text(self.folder.join("report.md"), &shown(&text))
     }
 }

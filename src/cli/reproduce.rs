@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Common, Out, devices, progress::StageProgress, scores::LpipsArguments};
+use super::{Common, Out, devices, interrupt, progress::StageProgress, scores::LpipsArguments};
 use crate::{
     data::{atomic, files},
     error::{Error, Result},
@@ -50,6 +50,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     // As Burn prints it, without the wrapping type.
     let name = format!("{:?}", devices[0]).trim_start_matches("Device<").trim_end_matches('>').to_lowercase();
     let store = Store::open(&out, name)?;
+    interrupt::kept(|| {
+        let kept = "the stages that are done are kept, and of the one at work what it can go on from";
+        format!("{kept}; go on with: {}", interrupt::typed())
+    });
     atomic::write_text(out.join("config.toml"), &config.to_toml())?;
     let mut progress = StageProgress::new(plan.stages.len(), common.quiet);
     let records = experiments::run(&plan, &store, &devices, &mut |event| progress.show(&event))?;

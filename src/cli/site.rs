@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Common, plausible, progress::Progress};
+use super::{Common, interrupt, plausible, progress::Progress};
 use crate::{
-    data::Shard,
+    data::{Claim, Shard},
     error::Result,
     plausibility::{Sources, Verdict},
     site::{self, SiteConfig},
@@ -26,6 +26,9 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let config = SiteConfig::read(&arguments.config, &common.set)?;
+    let shard = arguments.shard.unwrap_or(Shard::ALL);
+    let _claim = Claim::part(&arguments.out, shard)?;
+    interrupt::kept(|| format!("the recordings that are whole are kept; go on with: {}", interrupt::typed()));
     let settings_folder = arguments.config.parent().unwrap_or(Path::new(""));
     for (name, findings) in site::implausible(&config, settings_folder, common.as_stated)? {
         let sources = Sources::one(format!("{} ({name})", arguments.config.display()));
@@ -37,7 +40,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         progress.set(done);
         progress.message(name.to_string());
     };
-    let made = site::record(&config, settings_folder, &arguments.out, arguments.shard.unwrap_or(Shard::ALL), &mut show);
+    let made = site::record(&config, settings_folder, &arguments.out, shard, &mut show);
     if let Some(progress) = shown {
         progress.finish();
     }

@@ -1,11 +1,11 @@
 //! `hybridsim train`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::{
-    Common, Out, devices, plausible,
+    Common, Out, devices, interrupt, plausible,
     progress::TrainingProgress,
     record,
     report::{self, RunReport},
@@ -30,6 +30,8 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
+    // Before anything in it is looked at.
+    let resumed = arguments.resume.as_deref().map(super::claimed).transpose()?;
     let (config_path, run_folder, resume) = match (&arguments.resume, &arguments.config) {
         (Some(run), _) => {
             atomic::recover(run.join("last"))?;
@@ -58,6 +60,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
             hint: Some("continue it with --resume, or choose another folder with --out".into()),
         });
     }
+    let _claim = resumed.map_or_else(|| super::claimed(&run_folder), Ok)?;
     if config.data.recordings.is_empty() {
         let recorded = record::recorded(config.record(&config_path)?, &config_path, common)?;
         config.data.recordings = vec![recorded];
@@ -68,8 +71,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         plausible::folder(recording, common)?;
     }
     let config_toml = config.to_toml();
-    std::fs::create_dir_all(&run_folder).map_err(|error| Error::write(&run_folder, error))?;
     atomic::write_text(run_folder.join("config.toml"), &config_toml)?;
+    tell_how_to_go_on(&run_folder, config.training.epochs, common);
 
     let started = std::time::Instant::now();
     let recordings = load_recordings(&config.data.recordings, &config.simulator)?;
@@ -92,6 +95,22 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         seconds: started.elapsed().as_secs_f64(),
     };
     report.write()
+}
+
+/// If it is interrupted: which epoch the checkpoint is of, and the command that goes on from it.
+fn tell_how_to_go_on(run_folder: &Path, epochs: usize, common: &Common) {
+    let (folder, device) = (run_folder.to_path_buf(), common.device.clone());
+    let as_stated = if common.as_stated { " --as-stated" } else { "" };
+    interrupt::kept(move || {
+        let done = std::fs::read_to_string(folder.join("last/checkpoint.toml"))
+            .ok()
+            .and_then(|text| text.parse::<toml::Table>().ok()?.get("progress")?.get("epochs_done")?.as_integer())
+            .unwrap_or(0);
+        let program = std::env::args().next().unwrap_or_else(|| "hybridsim".into());
+        let words = [&program, "train", "--resume", &folder.to_string_lossy(), "--device", &device].map(interrupt::quoted);
+        let kept = format!("{done} of {epochs} epochs are kept in {}", folder.display());
+        format!("{kept}; go on with: {}{as_stated}", words.join(" "))
+    });
 }
 
 /// The resolved config must find its recordings from wherever a later command runs.

@@ -6,17 +6,23 @@
 pub mod arrays;
 pub mod atomic;
 pub mod bodies;
+mod claim;
+pub mod entries;
 pub mod files;
 mod hex;
 pub mod motions;
 pub mod recording;
+mod scratch;
 pub mod settings;
 mod shard;
+pub mod unfinished;
 
 pub use bodies::{read_body, write_body};
+pub use claim::Claim;
 pub use hex::hex;
 pub use motions::{Figure, MotionOptions, RotationUnit, UpAxis, find_up, read_motion, read_motion_upright, write_motion};
-pub use recording::{IfFrame, IfLayout, Recording, RecordingContents, write_recording};
+pub use recording::{IfFrame, IfLayout, Recording, RecordingContents, write_recording, write_recording_into};
+pub use scratch::Scratch;
 pub use settings::{read_settings, read_toml};
 pub use shard::Shard;
 

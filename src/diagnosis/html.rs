@@ -13,12 +13,13 @@ use super::locate;
 use super::report::{Effect, Report, Unexplained, Verdict};
 use super::simulate::Simulated;
 use super::support::Support;
-use crate::data::files;
+use crate::data::{Scratch, files};
 use crate::error::{Error, Result};
 use crate::heatmap::{Axis, Map, range_axis, velocity_axis};
 use crate::metrics::DbWindow;
 use crate::pictures::{Chart, Series, comparison};
 use crate::radar::Radar;
+use crate::text::shown;
 
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1c1c1c}\
 h1{font-size:1.6rem}h2{font-size:1.25rem;margin-top:2.2rem;border-bottom:1px solid #ccc}\
@@ -347,7 +348,7 @@ fn digits(size: f64) -> usize {
 }
 
 fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    shown(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// PNGs as data addresses.
@@ -359,7 +360,7 @@ struct Pictures {
 
 impl Pictures {
     fn draw(diagnosis: &Diagnosis, simulated: Option<&Simulated>) -> Result<Self> {
-        let folder = tempfile::tempdir().map_err(|error| Error::write(std::env::temp_dir(), error))?;
+        let folder = Scratch::new()?;
         let mut pictures = Self { maps: vec![], curves: vec![], profiles: vec![] };
         let Some(explanation) = &diagnosis.explanation else { return Ok(pictures) };
         let path = folder.path().join("picture.png");

@@ -44,7 +44,7 @@ impl ComparisonConfig {
 /// Scores all frames of a simulated recording, or of one that was measured again, against the measured one.
 ///
 /// # Errors
-/// Recordings of different radars, frames or labels; samples that cannot be read; maps too small for `lpips`.
+/// Recordings of different radars, frames or labels; measured samples without a signal, or that cannot be read; maps too small for `lpips`.
 pub fn compare(
     measured: &Recording,
     simulated: &Recording,
@@ -66,6 +66,7 @@ pub fn compare_frames(
     lpips: Option<&Lpips>,
 ) -> Result<Evaluation> {
     refuse_different(measured, simulated)?;
+    measured.refuse_dead(frames.iter().copied())?;
     let pair = Pair {
         radar: &measured.radar,
         tracked: measured.person().is_some(),

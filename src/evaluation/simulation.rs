@@ -51,7 +51,7 @@ impl<'a> Simulation<'a> {
 /// `observe` sees the maps of every frame: all cells, then static-removed ones.
 ///
 /// # Errors
-/// A frame that cannot be read or lies outside the motion; maps too small for `lpips`.
+/// Frames without a signal; a frame that cannot be read or lies outside the motion; maps too small for `lpips`.
 pub fn evaluate(
     recording: &LoadedRecording,
     simulation: &Simulation<'_>,
@@ -61,6 +61,7 @@ pub fn evaluate(
     lpips: Option<&Lpips>,
     observe: &mut dyn FnMut(usize, FrameMaps, FrameMaps),
 ) -> Result<Evaluation> {
+    recording.recording.refuse_dead(frames.iter().copied())?;
     let pair = Pair {
         radar: &recording.scene.radar,
         tracked: recording.recording.person().is_some(),

@@ -16,7 +16,7 @@ use super::stage::{Key, read_record, stage_folder};
 use super::takes::{Take, check_split, read_takes, takes_in};
 use super::task::Task;
 use super::variants::Variant;
-use crate::data::{files, hex};
+use crate::data::{entries::entries, files, hex};
 use crate::error::{Error, Result};
 use crate::site::{self, SiteConfig};
 use crate::training::TrainingConfig;
@@ -570,8 +570,7 @@ fn contents(folder: &Path) -> Result<Vec<(String, u64, u128)>> {
     let mut found = vec![];
     let mut folders = vec![folder.to_path_buf()];
     while let Some(at) = folders.pop() {
-        for entry in std::fs::read_dir(&at).map_err(|error| Error::read(&at, error))?.flatten() {
-            let path = entry.path();
+        for path in entries(&at)? {
             let about = std::fs::metadata(&path).map_err(|error| Error::read(&path, error))?;
             if about.is_dir() {
                 folders.push(path);

@@ -10,6 +10,7 @@ use super::tables::tables;
 use crate::data::atomic;
 use crate::error::Result;
 use crate::pictures::{Chart, Series};
+use crate::text::shown;
 
 /// Writes all of it. `command`: what was typed.
 pub fn write(folder: &Path, config: &ReproduceConfig, results: &Results, command: &str) -> Result<()> {
@@ -31,7 +32,7 @@ pub fn write(folder: &Path, config: &ReproduceConfig, results: &Results, command
         writeln!(text, "The stages were done by several builds of the program: {}.\n", builds.join(", ")).expect("text grows");
     }
     text += &tables(results);
-    atomic::write_text(folder.join("results.md"), &text)?;
+    atomic::write_text(folder.join("results.md"), &shown(&text))?;
     let json = serde_json::to_string_pretty(results).expect("plain data");
     atomic::write_text(folder.join("results.json"), &json)?;
     if let Some(chart) = adaptation(results) {

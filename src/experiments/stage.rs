@@ -3,7 +3,7 @@
 //! A stage works in `OUT/unfinished/NAME-HASH`, which is renamed to `OUT/stages/NAME-HASH` when it is complete. A killed
 //! run leaves the unfinished folder; the next run goes on in it where the work can, and starts it again where it cannot.
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::data::{atomic, files, hex};
+use crate::data::{Claim, atomic, files, hex};
 use crate::error::{Error, Result};
 
 const RECORD: &str = "stage.json";
@@ -65,23 +65,16 @@ pub struct Store {
     device: String,
     program: String,
     /// Held for as long as this process writes here.
-    _lock: File,
+    _claim: Claim,
 }
 
 impl Store {
     /// # Errors
     /// A folder that cannot be written, or that another process works in.
     pub fn open(root: &Path, device: impl Into<String>) -> Result<Self> {
-        create(root)?;
-        let path = root.join(".lock");
-        let lock = File::create(&path).map_err(|error| Error::write(&path, error))?;
-        if matches!(lock.try_lock(), Err(fs::TryLockError::WouldBlock)) {
-            return Err(Error::Usage {
-                message: format!("{}: another process works here", root.display()),
-                hint: Some("wait for it, or choose another folder with --out".into()),
-            });
-        }
-        Ok(Self { root: root.into(), device: device.into(), program: program(), _lock: lock })
+        let claim = Claim::take(root)?;
+        atomic::sweep_all(root);
+        Ok(Self { root: root.into(), device: device.into(), program: program(), _claim: claim })
     }
 
     /// Where the results of a stage are, or will be.
@@ -130,7 +123,7 @@ impl Store {
         create(target.parent().expect("inside the root"))?;
         // Without a record it is no result.
         let _ = fs::remove_dir_all(&target);
-        fs::rename(&unfinished, &target).map_err(|error| Error::write(&target, error))?;
+        atomic::rename_folder(&unfinished, &target)?;
         Ok(record)
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::data::{Recording, files};
+use crate::data::{Recording, entries};
 use crate::error::{Error, Result};
 
 /// One recording of a site.
@@ -26,11 +26,7 @@ pub fn takes_in(folder: &Path) -> Result<Vec<Take>> {
 
 /// The same; `look` sees every recording while it is open.
 pub fn read_takes(folder: &Path, look: &mut dyn FnMut(&Recording) -> Result<()>) -> Result<Vec<Take>> {
-    let entries = std::fs::read_dir(folder).map_err(|error| Error::read(folder, error))?;
-    let mut found: Vec<PathBuf> =
-        entries.flatten().map(|entry| entry.path()).filter(|path| path.join("recording.toml").is_file()).collect();
-    found.iter().try_for_each(files::utf8)?;
-    found.sort();
+    let found = entries::recordings_in(folder)?;
     if found.is_empty() {
         return Err(Error::Usage {
             message: format!("{}: holds no recordings", folder.display()),

@@ -1,7 +1,6 @@
 //! PNG pictures for people: heatmaps, measured beside simulated, curves.
 //!
-//! The letters come with the program, so that a bare machine draws them too. A picture is written aside and then renamed:
-//! whatever happens, no half picture is left.
+//! The letters come with the program, so that a bare machine draws them too.
 
 mod chart;
 mod confusion;
@@ -11,12 +10,12 @@ pub use chart::{Chart, Series};
 pub use confusion::confusion;
 pub use heatmap::{comparison, heatmap};
 
-use std::{io, io::Write, path::Path, sync::Once};
+use std::{io, path::Path, sync::Once};
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use crate::error::{Error, Result};
+use crate::{data::atomic::write_file, error::Result};
 
 type Area<'a> = DrawingArea<BitMapBackend<'a>, Shift>;
 type DrawResult = std::result::Result<(), Box<dyn std::error::Error>>;
@@ -42,33 +41,14 @@ fn save(path: &Path, size: (u32, u32), draw: impl FnOnce(&Area<'_>) -> DrawResul
         draw(&area).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         area.present().expect("a buffer of the right size");
     }
-    write(path, size, &pixels).map_err(|error| Error::write(path, error))
-}
-
-fn write(path: &Path, size: (u32, u32), pixels: &[u8]) -> io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::Builder::new().prefix(".picture").tempfile_in(folder)?;
-    let mut encoder = png::Encoder::new(io::BufWriter::new(file.as_file_mut()), size.0, size.1);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(pixels)?;
-    writer.finish()?;
-    file.as_file_mut().flush()?;
-    readable_by_all(file.as_file())?;
-    file.persist(path).map(|_| ()).map_err(|error| error.error)
-}
-
-/// Temporary files are private; a result is an ordinary file.
-fn readable_by_all(file: &std::fs::File) -> io::Result<()> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.set_permissions(std::fs::Permissions::from_mode(0o644))?;
-    }
-    #[cfg(not(unix))]
-    let _ = file;
-    Ok(())
+    write_file(path, |file| {
+        let mut encoder = png::Encoder::new(file, size.0, size.1);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&pixels)?;
+        writer.finish().map_err(io::Error::from)
+    })
 }
 
 /// Ticks without needless digits.
@@ -82,6 +62,7 @@ fn tick(value: &f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Error;
 
     #[test]
     fn ticks_have_no_needless_digits() {

@@ -1,13 +1,13 @@
 //! The result for people, for programs, and as a picture.
 
 use std::fmt::Write;
-use std::path::Path;
 
 use super::config::RecognitionConfig;
 use super::run::{Material, Recognition};
 use crate::data::atomic::{AtomicFolder, write_text};
 use crate::error::Result;
 use crate::pictures;
+use crate::text::shown;
 
 /// The result as text (Markdown).
 pub fn text(result: &Recognition) -> String {
@@ -19,7 +19,7 @@ pub fn text(result: &Recognition) -> String {
     };
     let accuracy = &result.accuracy;
     let lines = [
-        format!("trained on {} in {:.0} s", of(&result.training), result.training_s),
+        format!("trained on {}", of(&result.training)),
         format!("tested on {}", of(&result.test)),
         format!(
             "accuracy   {}  over sequences {}, as if windows were independent {}",
@@ -42,13 +42,15 @@ pub fn text(result: &Recognition) -> String {
     text
 }
 
-/// Writes `config.toml` (resolved), `recognition.json`, `recognition.md` and `confusion.png` into a new folder.
-pub fn write(result: &Recognition, config: &RecognitionConfig, out: &Path) -> Result<()> {
-    let folder = AtomicFolder::create(out)?;
+/// Writes `config.toml` (resolved), `recognition.json`, `recognition.md`, `confusion.png` and `run.json` (what differs
+/// between equal runs: the time) into a new folder.
+pub fn write(result: &Recognition, config: &RecognitionConfig, folder: AtomicFolder) -> Result<()> {
     let within = |name: &str| folder.path().join(name);
     write_text(within("config.toml"), &config.to_toml())?;
     write_text(within("recognition.json"), &serde_json::to_string_pretty(result).expect("plain data"))?;
-    write_text(within("recognition.md"), &text(result))?;
+    write_text(within("recognition.md"), &shown(&text(result)))?;
+    let run = serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "training_s": result.training_s });
+    write_text(within("run.json"), &format!("{run:#}\n"))?;
     pictures::confusion(&within("confusion.png"), "recognised actions", &result.actions, &result.confusion)?;
     folder.finish()
 }

@@ -1,7 +1,6 @@
 //! From folders to scores.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -12,7 +11,7 @@ use super::config::RecognitionConfig;
 use super::maps::{Sequence, sequence, windows};
 use super::scores::{Accuracy, ClassScores, Judgement, MacroF1, accuracy_of, class_scores, confusion, scores};
 use super::training::{judge, train};
-use crate::data::{Recording, files};
+use crate::data::{Recording, entries};
 use crate::diagnosis::statistics::binomial_interval;
 use crate::error::{Error, Result};
 use crate::radar::Radar;
@@ -45,6 +44,8 @@ pub struct Recognition {
     pub training_loss: f64,
     /// Share of the training windows that are judged rightly.
     pub training_accuracy: f64,
+    /// Differs between equal runs: not among the results.
+    #[serde(skip)]
     pub training_s: f64,
     pub accuracy: Accuracy,
     pub macro_f1: MacroF1,
@@ -162,27 +163,17 @@ fn open_all(folders: &[PathBuf]) -> Result<Vec<Labelled>> {
 
 /// The folder itself, or the recording folders in it.
 fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>> {
-    let is_recording = |folder: &Path| folder.join("recording.toml").is_file();
-    if is_recording(folder) {
+    if entries::is_recording(folder) {
         return Ok(vec![folder.into()]);
     }
-    let entries = fs::read_dir(folder).map_err(|source| Error::read(folder, source))?;
-    let mut found: Vec<PathBuf> =
-        entries.flatten().map(|entry| entry.path()).filter(|path| is_recording(path) && !hidden(path)).collect();
+    let found = entries::recordings_in(folder)?;
     if found.is_empty() {
         return Err(Error::Usage {
             message: format!("{}: neither a recording nor a folder of recordings", folder.display()),
             hint: Some("a site keeps its recordings in its folder `recordings`".into()),
         });
     }
-    found.iter().try_for_each(files::utf8)?;
-    found.sort();
     Ok(found)
-}
-
-/// Unfinished recordings have names that begin with a dot.
-fn hidden(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
 }
 
 /// The trained actions, sorted, once everything fits together.

@@ -7,7 +7,8 @@ use super::config::RecorderConfig;
 use super::record::Recorder;
 use super::truth::truth;
 use super::world::World;
-use crate::data::{Recording, RecordingContents, write_recording};
+use crate::data::atomic::AtomicFolder;
+use crate::data::{Recording, RecordingContents, write_recording_into};
 use crate::error::Result;
 
 /// What a recording says about itself, `[labels]`.
@@ -30,6 +31,8 @@ pub fn record_to(
 /// Records a world into a folder, frame by frame, with its truth beside it. The person that is written is the one the
 /// world was given, not the displaced one that was recorded.
 pub fn write_world(world: &World, labels: Labels, out: &Path, progress: &mut dyn FnMut(usize, usize)) -> Result<Recording> {
+    // What cannot be written is said before anything is worked out.
+    let target = AtomicFolder::create(out)?;
     let frames = world.radar.frames;
     progress(0, frames);
     let recorder = Recorder::new(world)?;
@@ -44,7 +47,7 @@ pub fn write_world(world: &World, labels: Labels, out: &Path, progress: &mut dyn
         truth: Some(&truth),
     };
     let mut recorded = recorder.frames();
-    write_recording(out, &contents, &mut |frame| {
+    write_recording_into(target, &contents, &mut |frame| {
         let samples = recorded.next().expect("as many frames as the radar has")?;
         progress(frame + 1, frames);
         Ok(samples)

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::config::SiteConfig;
 use super::plan::{self, Sequence, sequences};
-use crate::data::atomic::write_text;
+use crate::data::atomic::{sweep_all, write_text};
 use crate::data::{Recording, Shard, files};
 use crate::error::{Error, Result};
 use crate::recorder::{Labels, RecorderConfig, write_world};
@@ -63,6 +63,7 @@ pub fn record(
             open.push(job);
         }
     }
+    sweep_all(out);
     for folder in ["settings/recordings", "settings/again"] {
         let folder = out.join(folder);
         fs::create_dir_all(&folder).map_err(|source| Error::write(&folder, source))?;

@@ -3,11 +3,11 @@
 //! A checkpoint is a folder, written under a temporary name and renamed when it is complete:
 //! `weights.safetensors`, `optimizer.bpk`, `config.toml` (resolved), `checkpoint.toml` (progress and site).
 
-use std::path::Path;
+use std::{io::Write, path::Path};
 
 use burn::{
     module::{Module, ModuleMapper, ModuleVisitor, Param, ParamId},
-    optim::ModuleOptimizer,
+    optim::{ModuleOptimizer, OptimizerRecord},
     store::{ModuleSnapshot, SafetensorsStore},
     tensor::{Device, Tensor},
 };
@@ -95,18 +95,22 @@ pub fn save(
     config_toml: &str,
 ) -> Result<()> {
     let partial = AtomicFolder::replacing(folder)?;
-    let weights = partial.path().join(WEIGHTS);
-    simulator
-        .save_into(&mut SafetensorsStore::from_file(&weights).metadata("hybridsim", &state.version))
-        .map_err(|error| Error::write(&weights, std::io::Error::other(error.to_string())))?;
+    let write_error = |name: &str, error: String| Error::write(partial.path().join(name), std::io::Error::other(error));
+    // Through memory: files that Burn writes are private. One entry of metadata, for more stand in random order.
+    let mut store = SafetensorsStore::from_bytes(None).clear_metadata().metadata("hybridsim", &state.version);
+    let saved = simulator.save_into(&mut store).and_then(|()| store.get_bytes());
+    let weights = saved.map_err(|error| write_error(WEIGHTS, error.to_string()))?;
+    atomic::write_file(partial.path().join(WEIGHTS), |file| file.write_all(&weights))?;
     if let Some(optimizer) = optimizer {
-        let path = partial.path().join(OPTIMIZER);
-        optimizer.save(&path).map_err(|error| Error::write(&path, std::io::Error::other(error.to_string())))?;
+        // Its tensors come in random order; who reads them back gets them by name.
+        let bytes =
+            optimizer.to_record().into_bytes().and_then(OptimizerRecord::from_bytes).and_then(|sorted| sorted.into_bytes());
+        let bytes = bytes.map_err(|error| write_error(OPTIMIZER, error.to_string()))?;
+        atomic::write_file(partial.path().join(OPTIMIZER), |file| file.write_all(&bytes))?;
     }
     let state = toml::to_string(state).expect("plain data");
     for (name, text) in [("config.toml", config_toml), (STATE, &state)] {
-        let path = partial.path().join(name);
-        std::fs::write(&path, text).map_err(|error| Error::write(&path, error))?;
+        atomic::write_text(partial.path().join(name), text)?;
     }
     partial.finish()
 }

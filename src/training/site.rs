@@ -117,13 +117,14 @@ pub fn signal_tensor(frame: &IfFrame, device: &Device) -> Complex<4> {
 /// Opens all recordings of one site.
 ///
 /// # Errors
-/// As `LoadedRecording::open`; also recordings of different radars or rooms, or without anything to simulate.
+/// As `LoadedRecording::open`; also recordings without a signal, of different radars or rooms, or without anything to simulate.
 pub fn load_recordings(folders: &[PathBuf], config: &SimulatorConfig) -> Result<Vec<LoadedRecording>> {
     let loaded = folders.iter().map(|folder| LoadedRecording::open(folder, config, true)).collect::<Result<Vec<_>>>()?;
     let Some(first) = loaded.first() else {
         return Err(Error::setting("data.recordings", "empty", "at least one recording folder"));
     };
     for other in &loaded {
+        other.recording.refuse_dead(0..other.recording.frames())?;
         let file = other.folder.join("recording.toml");
         if other.recording.person().is_none() && other.recording.room.is_none() {
             return Err(Error::field(file, "room", "missing", "a room, or a body with its motion")

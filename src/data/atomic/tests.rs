@@ -1,3 +1,7 @@
+use std::fs::File;
+use std::time::{Duration, SystemTime};
+
+use super::leftovers::siblings;
 use super::*;
 use crate::data::test_support::names;
 
@@ -86,7 +90,7 @@ fn a_replaced_folder_is_the_old_or_the_new_one() {
     }
     assert_eq!(names(parent.path()), ["last"]);
     // As if killed between the two renames.
-    fs::rename(&target, parent.path().join(".last.old-abc")).unwrap();
+    fs::rename(&target, parent.path().join(".last.hybridsim-old-abc")).unwrap();
     recover(&target).unwrap();
     assert_eq!(names(&target), ["second"]);
 }
@@ -95,18 +99,118 @@ fn a_replaced_folder_is_the_old_or_the_new_one() {
 fn leftovers_of_a_killed_writer_go_and_those_of_a_living_one_stay() {
     let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("a.txt");
-    let long_ago = SystemTime::now() - Duration::from_secs(3600);
-    let dead = folder.path().join(".a.txt.partial-dead");
-    let other = folder.path().join(".b.txt.partial-dead");
+    let dead = folder.path().join(".a.txt.hybridsim-partial-dead");
+    let other = folder.path().join(".b.txt.hybridsim-partial-dead");
     for path in [&dead, &other] {
-        File::create(path).unwrap().set_modified(long_ago).unwrap();
+        File::create(path).unwrap();
     }
     let living = AtomicFile::create(&target).unwrap();
-    living.file.get_ref().as_file().set_modified(long_ago).unwrap();
     assert!(!dead.exists() && other.exists());
     write_text(&target, "second").unwrap();
     living.finish().unwrap();
-    assert_eq!(names(folder.path()), [".b.txt.partial-dead", "a.txt"]);
+    assert_eq!(names(folder.path()), [".b.txt.hybridsim-partial-dead", "a.txt"]);
+}
+
+#[test]
+fn a_sweep_takes_what_the_dead_left_at_any_depth_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let below = folder.path().join("stages/site/recordings");
+    fs::create_dir_all(below.join(".s1.hybridsim-partial-dead")).unwrap();
+    fs::create_dir_all(below.join(".last.hybridsim-old-dead")).unwrap();
+    fs::create_dir_all(below.join(".best.hybridsim-old-only")).unwrap();
+    fs::create_dir_all(below.join("last")).unwrap();
+    for name in [".s2.hybridsim-lock", ".gitignore", ".s3.partial-x", "s.hybridsim-partial-x"] {
+        fs::write(below.join(name), "").unwrap();
+    }
+    let living = AtomicFolder::create(below.join("s4")).unwrap();
+    sweep(folder.path());
+    assert_eq!(names(&below).len(), 10);
+    sweep_all(folder.path());
+    let left = names(&below);
+    assert_eq!(left.len(), 7, "{left:?}");
+    for name in [".s1.hybridsim-partial-dead", ".last.hybridsim-old-dead", ".s2.hybridsim-lock"] {
+        assert!(!left.contains(&name.to_string()), "{name}");
+    }
+    living.finish().unwrap();
+    assert_eq!(names(&below), [".best.hybridsim-old-only", ".gitignore", ".s3.partial-x", "last", "s.hybridsim-partial-x", "s4"]);
+}
+
+#[test]
+fn two_writers_of_one_folder_are_not_let_begin() {
+    let parent = tempfile::tempdir().unwrap();
+    let target = parent.path().join("result");
+    let first = AtomicFolder::create(&target).unwrap();
+    let error = AtomicFolder::create(&target).err().unwrap();
+    assert!(error.to_string().contains("another process"), "{error}");
+    first.finish().unwrap();
+    assert_eq!(names(parent.path()), ["result"]);
+}
+
+/// An empty folder stays what it is (a mount point cannot be replaced): its mode tells.
+#[test]
+#[cfg(unix)]
+fn an_empty_folder_is_filled_where_it_is_and_so_is_one_that_a_link_leads_to() {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
+    let parent = tempfile::tempdir().unwrap();
+    let (real, link) = (parent.path().join("real"), parent.path().join("link"));
+    fs::create_dir(&real).unwrap();
+    fs::set_permissions(&real, fs::Permissions::from_mode(0o750)).unwrap();
+    fs::write(real.join(".keep"), "").unwrap();
+    let number = fs::metadata(&real).unwrap().ino();
+    std::os::unix::fs::symlink("real", &link).unwrap();
+    let fill = || {
+        let folder = AtomicFolder::create(&link).unwrap();
+        fs::create_dir(folder.path().join("recording")).unwrap();
+        write_text(folder.path().join("a.txt"), "x").unwrap();
+        write_text(folder.path().join("a.toml"), "x").unwrap();
+        assert_eq!(folder.seen_from(), real.canonicalize().unwrap());
+        folder
+    };
+    drop(fill());
+    assert_eq!(names(&real), [".keep"]);
+    fill().finish().unwrap();
+    assert_eq!(names(&real), [".keep", "a.toml", "a.txt", "recording"]);
+    let metadata = fs::metadata(&real).unwrap();
+    assert_eq!((metadata.ino(), metadata.mode() & 0o777), (number, 0o750));
+    assert!(link.is_symlink());
+    let error = AtomicFolder::create(&link).err().unwrap();
+    assert!(error.to_string().contains("not an empty folder"), "{error}");
+    fs::remove_dir_all(&real).unwrap();
+    let error = AtomicFolder::create(&link).err().unwrap();
+    assert!(error.to_string().ends_with("link: is a link that leads nowhere"), "{error}");
+}
+
+#[test]
+fn a_folder_whose_writer_was_killed_while_it_moved_the_entries_is_completed() {
+    let folder = tempfile::tempdir().unwrap();
+    let ready = folder.path().join(".hybridsim-ready-dead");
+    fs::create_dir(&ready).unwrap();
+    for path in [folder.path().join("if.npy"), ready.join("motion.npz"), ready.join("recording.toml")] {
+        fs::write(path, "").unwrap();
+    }
+    sweep(folder.path());
+    assert_eq!(names(folder.path()), ["if.npy", "motion.npz", "recording.toml"]);
+}
+
+#[test]
+fn what_gets_its_name_was_brought_to_the_disk_before_and_its_name_after() {
+    let parent = tempfile::tempdir().unwrap();
+    let target = parent.path().join("result");
+    let folder = AtomicFolder::create(&target).unwrap();
+    fs::write(folder.path().join("a"), "x").unwrap();
+    let temporary = folder.path().to_path_buf();
+    sync::SYNCED.with_borrow_mut(Vec::clear);
+    folder.finish().unwrap();
+    let synced = sync::SYNCED.with_borrow(Clone::clone);
+    assert_eq!(synced, [temporary.join("a"), temporary, parent.path().to_path_buf()]);
+    sync::SYNCED.with_borrow_mut(Vec::clear);
+    rename_folder(&target, &parent.path().join("moved")).unwrap();
+    let synced = sync::SYNCED.with_borrow(Clone::clone);
+    assert_eq!(synced[..2], [target.join("a"), target]);
+    assert!(synced.len() > 2);
+    sync::SYNCED.with_borrow_mut(Vec::clear);
+    write_text(parent.path().join("text"), "x").unwrap();
+    assert_eq!(sync::SYNCED.with_borrow(Clone::clone), [parent.path().join("text"), parent.path().to_path_buf()]);
 }
 
 /// Where the writer that is going to be killed works; unset in every other run.
@@ -147,11 +251,7 @@ fn a_killed_writer_leaves_the_old_ones_and_the_next_writer_cleans_up() {
 
     assert_eq!(fs::read_to_string(&file).unwrap(), "old");
     assert_eq!(names(&last), ["old.txt"]);
-    let leftovers = [siblings(&file, "partial"), siblings(&last, "partial")].concat();
-    assert_eq!(leftovers.len(), 2);
-    for path in leftovers {
-        File::open(path).unwrap().set_modified(SystemTime::now() - Duration::from_secs(3600)).unwrap();
-    }
+    assert_eq!([siblings(&file, PARTIAL), siblings(&last, PARTIAL)].concat().len(), 2);
     write_text(&file, "new").unwrap();
     AtomicFolder::replacing(&last).unwrap().finish().unwrap();
     assert_eq!(names(folder.path()), ["a.txt", "last", "ready"]);

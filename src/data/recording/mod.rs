@@ -2,13 +2,14 @@
 //!
 //! `truth.json`, which practice recordings carry, is written here when a recorder asks for it and never read.
 
+mod dead;
 mod samples;
 mod settings;
 mod write;
 
 pub use samples::{IfFrame, IfLayout};
 pub use settings::{FORMAT, Files, RecordingSettings};
-pub use write::{RecordingContents, write_recording};
+pub use write::{RecordingContents, write_recording, write_recording_into};
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

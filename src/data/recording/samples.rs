@@ -156,6 +156,10 @@ impl IfFile {
         self.layout
     }
 
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// NumPy's name of the stored numbers, such as `int16`.
     pub fn number_type(&self) -> String {
         self.header.stored.name()

@@ -39,14 +39,22 @@ pub fn write_recording(
     contents: &RecordingContents,
     frame: &mut dyn FnMut(usize) -> Result<IfFrame>,
 ) -> Result<Recording> {
+    write_recording_into(AtomicFolder::create(folder)?, contents, frame)
+}
+
+/// The same into a folder that was begun before.
+pub fn write_recording_into(
+    target: AtomicFolder,
+    contents: &RecordingContents,
+    frame: &mut dyn FnMut(usize) -> Result<IfFrame>,
+) -> Result<Recording> {
     let (radar, layout) = (contents.radar, contents.layout);
     radar.check("radar")?;
     if layout.sampling() != radar.sampling {
         let expected = format!("{:?} for samples stored as {layout:?}", layout.sampling()).to_lowercase();
         return Err(Error::setting("radar.sampling", format!("{:?}", radar.sampling).to_lowercase(), expected));
     }
-    let target = AtomicFolder::create(&folder)?;
-    let files = write_person(target.path(), contents)?;
+    let files = write_person(&target, contents)?;
     let settings = RecordingSettings {
         format: FORMAT,
         radar: radar.clone(),
@@ -64,6 +72,7 @@ pub fn write_recording(
         write_text(target.path().join("truth.json"), &format!("{truth:#}\n"))?;
     }
     let clipped = write_samples(&target.path().join(&settings.files.samples), contents, frame)?;
+    let folder = target.target().to_path_buf();
     target.finish()?;
     let mut recording = Recording::open(&folder)?;
     if clipped > 0 {
@@ -73,15 +82,17 @@ pub fn write_recording(
 }
 
 /// Writes the person's files and says how they are called.
-fn write_person(folder: &Path, contents: &RecordingContents) -> Result<Files> {
+fn write_person(target: &AtomicFolder, contents: &RecordingContents) -> Result<Files> {
+    let folder = target.path();
     let mut files = Files { samples: "if.npy".into(), body: None, motion: None, vertices: None, faces: None, pose_times: None };
     match contents.person {
         None => {}
         Some(Person::Skinned { model, motion, .. }) => {
             let body = contents.body_file.map_or_else(|| PathBuf::from("body.npz"), Path::to_path_buf);
             match contents.body_file {
-                // Seen from beside the future folder, which is where the temporary one is.
-                Some(body) => files::regular(folder.join(body)).map(drop).map_err(|source| Error::read(body, source))?,
+                Some(body) => {
+                    files::regular(target.seen_from().join(body)).map(drop).map_err(|source| Error::read(body, source))?
+                }
                 None => write_body(folder.join(&body), model)?,
             }
             write_motion(folder.join("motion.npz"), motion)?;

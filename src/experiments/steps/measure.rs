@@ -66,5 +66,5 @@ pub fn recognise(
     let result = folder.join("classifier");
     // An earlier attempt may have come as far as this.
     let _ = std::fs::remove_dir_all(&result);
-    recognition::write(&found, config, &result)
+    recognition::write(&found, config, atomic::AtomicFolder::create(&result)?)
 }

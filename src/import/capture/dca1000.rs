@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::schedule::{Selection, TiRadar};
 use super::stream::Words;
 use super::{Capture, Stated, lanes::Lanes, ti_cfg, ti_json};
+use crate::data::entries::entries;
 use crate::data::settings::settings_from_table;
 use crate::data::{IfFrame, IfLayout, files};
 use crate::error::{Error, Result};
@@ -70,10 +71,8 @@ fn descriptions(source: &Path, stated: &Stated, notes: &mut Vec<String>) -> Resu
     let mut given = stated.configs.clone();
     if given.is_empty() {
         let folder = source.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let entries = std::fs::read_dir(folder).map_err(|error| Error::read(folder, error))?;
-        let mut beside: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+        let mut beside = entries(folder)?;
         beside.retain(|path| is(path, ".mmwave.json") || is(path, ".setup.json") || is(path, ".cfg"));
-        beside.sort();
         given = beside;
         for path in &given {
             notes.push(format!("the radar is that of {}, which lies beside the samples", path.display()));

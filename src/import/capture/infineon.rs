@@ -9,7 +9,7 @@ use super::arrays::{Cube, half_scale_note};
 use super::boards::Board;
 use super::json::Json;
 use super::{Capture, Layout, Stated, dca1000::apply};
-use crate::data::IfLayout;
+use crate::data::{IfLayout, entries::entries};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
 
@@ -48,10 +48,8 @@ fn device_folder(folder: &Path) -> Result<PathBuf> {
     if folder.join(SAMPLES).is_file() {
         return Ok(folder.into());
     }
-    let entries = std::fs::read_dir(folder).map_err(|source| Error::read(folder, source))?;
-    let mut below: Vec<PathBuf> =
-        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.join(SAMPLES).is_file()).collect();
-    below.sort();
+    let mut below = entries(folder)?;
+    below.retain(|path| path.join(SAMPLES).is_file());
     match &below[..] {
         [only] => Ok(only.clone()),
         [] => Err(Error::Usage {

@@ -1,3 +1,4 @@
+use std::fs;
 use std::slice::from_ref;
 
 use super::*;
@@ -68,7 +69,7 @@ fn two_motions_are_told_apart_in_recordings_of_others_and_the_result_is_written(
     let again = attempt(from_ref(&training), &[test]).unwrap();
     assert_eq!((&again.confusion, again.training_loss), (&result.confusion, result.training_loss));
     let out = folder.path().join("result");
-    super::super::write(&result, &config(), &out).unwrap();
+    super::super::write(&result, &config(), crate::data::atomic::AtomicFolder::create(&out).unwrap()).unwrap();
     for name in ["config.toml", "recognition.json", "recognition.md", "confusion.png"] {
         assert!(out.join(name).is_file(), "{name}");
     }
