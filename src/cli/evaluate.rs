@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         let recording = LoadedRecording::open(folder, &state.simulator, false)?;
         let (recording, moved) = refine::refined(recording, &poses)?;
         if moved {
-            eprintln!("note: {}: its motion as the training run refined it ({})", folder.display(), refine::FILE);
+            remark!("note: {}: its motion as the training run refined it ({})", folder.display(), refine::FILE);
         }
         report::same_radar(folder, &recording.scene.radar, &state.site.radar)?;
         report::tell_notes(&recording);

@@ -66,7 +66,7 @@ impl TrainingProgress {
         match event {
             Event::Refined(pose) => {
                 if !self.quiet {
-                    eprintln!("{}", pose.line());
+                    remark!("{}", pose.line());
                 }
             }
             Event::Started { steps, first_step, training_frames, validation_frames } => {
