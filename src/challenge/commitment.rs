@@ -4,7 +4,6 @@
 //! trying out truths; the root is the Merkle root of the leaves in the order of the cases' names.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};

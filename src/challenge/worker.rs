@@ -79,7 +79,8 @@ fn die_with_this_process(command: &mut Command) {
     let _ = command;
 }
 
-#[cfg(all(test, target_os = "linux"))]
+#[cfg(test)]
+#[cfg(target_os = "linux")]
 mod tests {
     use super::*;
 

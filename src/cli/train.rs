@@ -102,7 +102,7 @@ fn tell_how_to_go_on(run_folder: &Path, epochs: usize, common: &Common) {
     let (folder, device) = (run_folder.to_path_buf(), common.device.clone());
     let as_stated = if common.as_stated { " --as-stated" } else { "" };
     interrupt::kept(move || {
-        let done = std::fs::read_to_string(folder.join("last/checkpoint.toml"))
+        let done = files::read_text(folder.join("last/checkpoint.toml"))
             .ok()
             .and_then(|text| text.parse::<toml::Table>().ok()?.get("progress")?.get("epochs_done")?.as_integer())
             .unwrap_or(0);

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use super::Shard;
 use super::atomic::leftovers::{is_linked, lock_name, parent_of};
+use super::files;
 use super::unfinished::Undo;
 use crate::error::{Error, Result};
 
@@ -131,7 +132,7 @@ fn release(path: &Path, file: &File, made: Option<&Path>) {
 
 fn refusal(folder: &Path, lock: &Path) -> Error {
     let mut text = String::new();
-    let read = File::open(lock).and_then(|file| file.take(20).read_to_string(&mut text));
+    let read = files::regular(lock).and_then(|file| file.take(20).read_to_string(&mut text));
     let who = match read.ok().and_then(|_| text.trim().parse::<u32>().ok()) {
         Some(id) => format!("another process, number {id}, works here"),
         None => "another process works here".into(),

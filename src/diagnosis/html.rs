@@ -14,7 +14,7 @@ use super::report::{Effect, Report, Unexplained, Verdict};
 use super::simulate::Simulated;
 use super::support::Support;
 use crate::data::{Scratch, files};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::heatmap::{Axis, Map, range_axis, velocity_axis};
 use crate::metrics::DbWindow;
 use crate::pictures::{Chart, Series, comparison};

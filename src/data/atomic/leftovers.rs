@@ -93,7 +93,9 @@ pub(crate) fn is_linked(file: &File, path: &Path) -> bool {
 
 /// The lock of something whose writer is dead; `None` where it lives, or where that cannot be known.
 pub(crate) fn orphaned(path: &Path) -> Option<File> {
-    File::open(path).ok().filter(|handle| handle.try_lock().is_ok() && is_linked(handle, path))
+    // A pipe would be waited for.
+    let ordinary = path.symlink_metadata().is_ok_and(|metadata| metadata.is_dir() || metadata.is_file());
+    ordinary.then(|| File::open(path).ok()).flatten().filter(|handle| handle.try_lock().is_ok() && is_linked(handle, path))
 }
 
 /// Removes what dead writers of `target` left beside it, and an old version once there is a newer one.
@@ -106,9 +108,7 @@ pub(super) fn remove_beside(target: &Path) {
 
 /// Removes a temporary, unless its writer lives.
 fn remove(path: &Path) {
-    // A pipe would be waited for.
-    let ordinary = path.symlink_metadata().is_ok_and(|metadata| metadata.is_dir() || metadata.is_file());
-    if let Some(_lock) = ordinary.then(|| orphaned(path)).flatten() {
+    if let Some(_lock) = orphaned(path) {
         let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
     }
 }
