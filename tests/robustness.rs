@@ -157,8 +157,8 @@ fn hidden(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-fn is_partial(path: &PathBuf) -> bool {
-    path.to_string_lossy().contains(".hybridsim-partial-")
+fn is_partial(path: impl AsRef<Path>) -> bool {
+    path.as_ref().to_string_lossy().contains(".hybridsim-partial-")
 }
 
 /// A site of two recordings, each of which takes a moment.

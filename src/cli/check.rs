@@ -120,7 +120,7 @@ pub(crate) fn show(recording: &Recording, common: &Common) -> Result<()> {
         if finding.ok {
             say!("  ok       {} ({})", finding.expected, finding.found);
         } else {
-            eprintln!("damaged: {}", finding.found);
+            remark!("damaged: {}", finding.found);
         }
     }
     Ok(())
