@@ -21,10 +21,23 @@ pub enum Combine {
     Mean,
 }
 
+/// What of a cell is compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scale {
+    /// Decibels (the paper).
+    #[default]
+    Db,
+    /// The amplitude over that of the recording's strongest cell: what the paper's supplement 7 argues against.
+    Linear,
+}
+
 /// Which maps are compared, and down to which level.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LossConfig {
+    #[serde(skip_serializing_if = "is_db")]
+    pub scale: Scale,
     pub combine: Combine,
     /// Antenna pairs that count, as `tx · receivers + rx`; empty for all.
     pub channels: Vec<usize>,
@@ -35,10 +48,16 @@ pub struct LossConfig {
     pub static_removed: bool,
 }
 
-/// Mean squared difference of decibel maps; built once for a recording.
+fn is_db(scale: &Scale) -> bool {
+    *scale == Scale::Db
+}
+
+/// Mean squared difference of decibel maps, or of linear ones; built once for a recording.
 #[derive(Clone, Debug)]
 pub struct DbLoss {
     transform: RangeDoppler,
+    scale: Scale,
+    peak_amplitude: f64,
     combine: Combine,
     channels: Vec<usize>,
     static_removed: bool,
@@ -68,6 +87,8 @@ impl DbLoss {
         }
         Ok(Self {
             transform: RangeDoppler::new(radar.loops_per_frame, radar.samples_per_chirp, radar.sampling, heatmap, options),
+            scale: config.scale,
+            peak_amplitude,
             combine: config.combine,
             channels: if config.channels.is_empty() { (0..count).collect() } else { config.channels.clone() },
             static_removed: config.static_removed,
@@ -80,7 +101,7 @@ impl DbLoss {
         &self.transform
     }
 
-    /// The maps that are compared, in decibels.
+    /// The maps that are compared, in decibels; with the linear scale, in amplitudes of the strongest cell.
     ///
     /// # Shapes
     /// - `signal`: `[frame, tx, rx, loop, sample]`; noise already added
@@ -105,6 +126,14 @@ impl DbLoss {
             Combine::Each => power.reshape([frames * chosen, doppler, range]),
             Combine::Mean => power.mean_dim(1).reshape([frames, doppler, range]),
         };
+        if self.scale == Scale::Linear {
+            // The floor keeps the root's gradient finite where there is nothing; a clamp's level is a share of the peak, too.
+            let amplitude = ((power + self.floor_amplitude.powi(2)).sqrt()) / self.peak_amplitude;
+            return match self.clamp_db {
+                Some(level) => amplitude.clamp_min(10f64.powf(level / 20.0) / self.peak_amplitude),
+                None => amplitude,
+            };
+        }
         let db = power_db(power, self.floor_amplitude);
         match self.clamp_db {
             Some(level) => db.clamp_min(level),
@@ -112,7 +141,7 @@ impl DbLoss {
         }
     }
 
-    /// ℒ: mean squared difference over all cells, dB².
+    /// ℒ: mean squared difference over all cells, dB²; with the linear scale, without a unit.
     ///
     /// # Shapes
     /// - `simulated`: `[frame, tx, rx, loop, sample]`, with the noise injected before
@@ -187,6 +216,20 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_linear_loss_hardly_sees_what_is_weak() {
+        let device = Device::flex();
+        // Half the amplitude, of everything or of what is far below the strongest cell: decibels weigh both alike.
+        let lost = |scale: Scale, level: f64| {
+            let loss = loss(&LossConfig { scale, ..Default::default() }, &device);
+            let measured = loss.maps_db(signal(1, &device).scale_by(level));
+            loss.loss(signal(1, &device).scale_by(0.5 * level), measured).into_scalar::<f64>()
+        };
+        let ratio = |scale: Scale| lost(scale, 0.01) / lost(scale, 1.0);
+        assert!((ratio(Scale::Linear) - 1e-4).abs() < 1e-6, "{}", ratio(Scale::Linear));
+        assert!((ratio(Scale::Db) - 1.0).abs() < 0.01, "{}", ratio(Scale::Db));
+    }
+
+    #[test]
     fn antennas_are_chosen_and_averaged_as_the_settings_say() {
         let device = Device::flex();
         let dims = |config: LossConfig| loss(&config, &device).maps_db(signal(1, &device)).dims();
@@ -212,6 +255,7 @@ pub(crate) mod tests {
             LossConfig::default(),
             LossConfig { combine: Combine::Mean, channels: vec![1, 2], ..Default::default() },
             LossConfig { clamp_db: Some(-15.0), static_removed: true, ..Default::default() },
+            LossConfig { scale: Scale::Linear, ..Default::default() },
         ];
         for config in settings {
             let loss = loss(&config, &device);

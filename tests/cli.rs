@@ -227,6 +227,30 @@ fn effects_are_part_of_the_checkpoint_and_can_be_left_out() {
     let without = infer("without", &["--without-effects"]);
     assert_ne!(with, without);
     assert_eq!(without, infer("named", &["--without-effect", "if_highpass"]));
+    // What acts on the sum of the parts leaves no part alone; without it, the three of them are the whole.
+    let part = |name: &str, more: &[&str]| {
+        let arguments = ["infer", "--checkpoint", "run/best", "--action", "lunge", "--frames", "2", "-q", "--out", name];
+        hybridsim(&[&arguments, more].concat(), folder.path())
+    };
+    assert_refused(
+        &part("direct", &["--only", "direct"]),
+        2,
+        &["--only direct: the checkpoint has effects", "--without-effects"],
+    );
+    let samples = |name: &str, more: &[&str]| -> Vec<f32> {
+        let output = part(name, &[&["--without-effects"], more].concat());
+        assert!(output.status.success(), "{}", err(&output));
+        assert!(folder.path().join(name).join("range_doppler.png").is_file());
+        let recording = hybridsim::data::Recording::open(folder.path().join(name).join("recording")).unwrap();
+        let frame = recording.frame(1).unwrap();
+        frame.re.iter().chain(frame.im.iter().flatten()).copied().collect()
+    };
+    let whole = samples("whole", &[]);
+    let parts = ["direct", "indirect", "noise"].map(|name| samples(name, &["--only", name]));
+    let largest = |values: &[f32]| values.iter().fold(0.0f32, |most, value| most.max(value.abs()));
+    assert!(parts.iter().all(|part| largest(part) > 1e-3 * largest(&whole)));
+    let apart: Vec<f32> = (0..whole.len()).map(|n| whole[n] - parts.iter().map(|part| part[n]).sum::<f32>()).collect();
+    assert!(largest(&apart) < 1e-5 * largest(&whole), "{} of {}", largest(&apart), largest(&whole));
     let arguments = ["infer", "--checkpoint", "run/best", "--action", "lunge", "--without-effect", "dc_offset"];
     assert_refused(&hybridsim(&arguments, folder.path()), 2, &["the checkpoint has no such effect", "if_highpass"]);
     let wrong = ["train", &test_config(), "--set", "simulator.effects=[{id=\"if_hipass\"}]"];

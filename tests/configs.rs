@@ -32,6 +32,7 @@ fn all_configs_parse_and_resolve_to_themselves() {
             // Its site is a path, which the resolved form has from here.
             let config = ReproduceConfig::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
             assert!(config.site.is_file() && config.second_room.as_ref().is_none_or(|room| room.is_file()));
+            assert!(config.second_scene.as_ref().is_none_or(|scene| scene.site.is_file()), "{}", path.display());
             std::fs::write(&resolved, config.to_toml()).unwrap();
             assert_eq!(ReproduceConfig::read(&resolved, &[]).unwrap(), config, "{}", path.display());
         } else if name.starts_with("challenge") {

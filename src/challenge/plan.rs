@@ -152,6 +152,7 @@ fn scene(config: &ChallengeConfig, seed: u64, random: &mut ChaCha8Rng) -> (Recor
             amplitude: between([0.8, 1.2], random),
             path_scale: between([0.7, 1.0], random),
             variation: 1.0,
+            backward: false,
             seed: u64::from(random.random::<u32>()),
         },
         placement: Some(Placement { start_s: MOTION_START_S, ..placement(room.floor_m.unwrap_or(1.0), distance_m) }),

@@ -22,7 +22,7 @@ use crate::{
     },
     plausibility::Sources,
     radar::Radar,
-    simulator::Scene,
+    simulator::{Part, Scene, Simulator},
     training::{
         LoadedRecording,
         checkpoint::{self, CheckpointState},
@@ -62,6 +62,9 @@ pub(crate) struct Arguments {
     /// Leave out the learned noise
     #[arg(long)]
     clean: bool,
+    /// One part of the signal alone; the three add up to the whole
+    #[arg(long, value_enum, value_name = "PART", conflicts_with = "clean")]
+    only: Option<Only>,
     #[command(flatten)]
     without: WithoutEffects,
     #[command(flatten)]
@@ -73,9 +76,35 @@ fn parse_up(name: &str) -> std::result::Result<UpAxis, String> {
     UpAxis::ALL.into_iter().find(|axis| axis.name() == name).ok_or_else(|| format!("expected one of {names}"))
 }
 
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Only {
+    Direct,
+    Indirect,
+    Noise,
+}
+
+impl Only {
+    /// # Errors
+    /// A checkpoint whose effects are on.
+    fn part(self, simulator: &Simulator) -> Result<Part> {
+        let part = match self {
+            Self::Direct => Part::Direct,
+            Self::Indirect => Part::Indirect,
+            Self::Noise => Part::Noise,
+        };
+        if !simulator.effects.is_empty() {
+            return Err(Error::Usage {
+                message: format!("--only {}: the checkpoint has effects, which act on the sum of the parts", part.name()),
+                hint: Some("leave them out with --without-effects".into()),
+            });
+        }
+        Ok(part)
+    }
+}
+
 fn parse_action(name: &str) -> std::result::Result<Action, String> {
-    Action::ALL.into_iter().find(|action| action.name() == name).ok_or_else(|| {
-        let names: Vec<&str> = Action::ALL.iter().map(|action| action.name()).collect();
+    Action::every().find(|action| action.name() == name).ok_or_else(|| {
+        let names: Vec<&str> = Action::every().map(Action::name).collect();
         format!("expected one of {}", names.join(", "))
     })
 }
@@ -84,6 +113,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let device = device(&common.device)?;
     let (mut simulator, state) = checkpoint::open(&arguments.checkpoint, &device)?;
     arguments.without.switch_off(&mut simulator)?;
+    let only = arguments.only.map(|only| only.part(&simulator)).transpose()?;
     let out = arguments.out.out.clone().unwrap_or_else(|| "runs/inferred".into());
     let folder = AtomicFolder::create(&out)?;
 
@@ -136,6 +166,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         measured: measured.as_ref().map(|loaded| &loaded.recording),
     };
     let simulation = Simulation::new(&simulator, scene, state.seed, !arguments.clean);
+    let simulation = match only {
+        Some(part) => simulation.only(part),
+        None => simulation,
+    };
     simulated::write(folder.path(), &sequence, &state.heatmap, common.quiet, &mut |frame| simulation.frame(frame))?;
     folder.finish()?;
     say!("simulated {} frames: {}", radar.frames, out.display());

@@ -78,7 +78,7 @@ impl TrainingProgress {
                 progress.set(*first_step);
                 self.progress = Some(progress);
             }
-            Event::Step { step, loss } => {
+            Event::Step { step, loss, .. } => {
                 if let Some(progress) = &self.progress {
                     progress.set(*step);
                     progress.message(format!("loss {loss:.2} dB^2"));

@@ -19,6 +19,10 @@ pub(crate) struct Arguments {
     /// List the stages, with what is done already, and do nothing
     #[arg(long)]
     plan: bool,
+    /// Do only the stages whose names begin so, such as `figure` or `train/scene`, and what they need; may be repeated. The
+    /// tables are written when all stages are done
+    #[arg(long, value_name = "BEGINNING", conflicts_with = "plan")]
+    stages: Vec<String>,
     #[command(flatten)]
     lpips: LpipsArguments,
     #[command(flatten)]
@@ -42,6 +46,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         list(&plan, &out);
         return Ok(());
     }
+    let wanted = match arguments.stages.as_slice() {
+        [] => None,
+        beginnings => Some(plan.needed(beginnings)?),
+    };
     let devices = devices(&common.device)?;
     if let Some(lpips) = &config.comparison.lpips {
         // A file that is none is refused now, not after the trainings.
@@ -55,6 +63,14 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         format!("{kept}; go on with: {}", interrupt::typed())
     });
     atomic::write_text(out.join("config.toml"), &config.to_toml())?;
+    if let Some(wanted) = wanted {
+        let mut progress = StageProgress::new(wanted.len(), common.quiet);
+        experiments::run_some(&plan, &wanted, &store, &devices, &mut |event| progress.show(&event))?;
+        progress.finish();
+        let done = plan.stages.iter().filter(|stage| store.done(&stage.key).is_some()).count();
+        say!("{done} of {} stages are done: {}", plan.stages.len(), out.display());
+        return Ok(());
+    }
     let mut progress = StageProgress::new(plan.stages.len(), common.quiet);
     let records = experiments::run(&plan, &store, &devices, &mut |event| progress.show(&event))?;
     progress.finish();

@@ -12,7 +12,7 @@ use crate::{
     heatmap::HeatmapConfig,
     lpips::Lpips,
     metrics::MetricsConfig,
-    simulator::{Mode, Scene, Simulator, Surfaces},
+    simulator::{Mode, Part, Scene, Simulator, Surfaces},
     training::{LoadedRecording, step_rng},
 };
 
@@ -23,12 +23,23 @@ pub struct Simulation<'a> {
     surfaces: Surfaces,
     seed: u64,
     noise: bool,
+    only: Option<Part>,
 }
 
 impl<'a> Simulation<'a> {
     /// `noise` off gives the clean signal.
     pub fn new(simulator: &'a Simulator, scene: &'a Scene, seed: u64, noise: bool) -> Self {
-        Self { simulator, scene, surfaces: simulator.surfaces(&simulator.constants(scene), Mode::Inference), seed, noise }
+        let surfaces = simulator.surfaces(&simulator.constants(scene), Mode::Inference);
+        Self { simulator, scene, surfaces, seed, noise, only: None }
+    }
+
+    /// The same, of one part of the signal alone; all parts of a frame add up to it with noise.
+    ///
+    /// # Panics
+    /// With effects that are switched on: they act on the sum.
+    pub fn only(self, part: Part) -> Self {
+        assert!(self.simulator.effects.is_empty(), "one part of a simulation: effects act on the sum");
+        Self { only: Some(part), ..self }
     }
 
     /// `[tx, rx, loop, sample]`, in the units of the recordings it was trained on.
@@ -37,9 +48,13 @@ impl<'a> Simulation<'a> {
     /// A frame outside the motion.
     pub fn frame(&self, frame: usize) -> Result<Vec<Complex32>> {
         let view = self.scene.view(frame)?;
+        let seed = || step_rng(self.seed, frame, 0x51A1).random();
+        if let Some(part) = self.only {
+            return Ok(self.simulator.part_signal(part, self.scene, &view, &self.surfaces, seed()).to_host());
+        }
         let clean = self.simulator.clean_signal(self.scene, &view, &self.surfaces);
         let signal = match self.noise {
-            true => self.simulator.with_noise(&self.scene.radar, clean, step_rng(self.seed, frame, 0x51A1).random()),
+            true => self.simulator.with_noise(&self.scene.radar, clean, seed()),
             false => clean,
         };
         Ok(signal.to_host())

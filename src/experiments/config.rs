@@ -10,6 +10,7 @@ use crate::data::read_settings;
 use crate::diagnosis::DiagnosisConfig;
 use crate::error::{Error, Result};
 use crate::evaluation::ComparisonConfig;
+use crate::person::actions::Action;
 use crate::recognition::RecognitionConfig;
 use crate::simulator::SimulatorConfig;
 use crate::training::{Split, TrainingConfig};
@@ -81,11 +82,15 @@ pub struct SubjectSplit {
     pub training: String,
     /// No simulator and no classifier learns from this subject's measured recordings.
     pub unseen: String,
+    /// A second unseen subject, on whom the full simulator alone is scored (paper, supplement 8). No simulator learns from
+    /// this subject, and no classifier that is tested on it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub additional: Option<String>,
 }
 
 impl Default for SubjectSplit {
     fn default() -> Self {
-        Self { training: "s1".into(), unseen: "s4".into() }
+        Self { training: "s1".into(), unseen: "s4".into(), additional: None }
     }
 }
 
@@ -105,6 +110,84 @@ impl Default for AdaptationConfig {
     }
 }
 
+/// Another room with other, smaller actions (paper, section 4.7).
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SecondSceneConfig {
+    /// As [`ReproduceConfig::site`]; recordings of the training subject count.
+    pub site: PathBuf,
+    /// Actions that the simulator learns from.
+    #[serde(default = "learned_actions")]
+    pub training: Vec<String>,
+    /// Actions that it is scored on, and that a classifier tells apart.
+    #[serde(default = "tested_actions")]
+    pub evaluated: Vec<String>,
+}
+
+fn learned_actions() -> Vec<String> {
+    Action::SMALL[..8].iter().map(|action| action.name().into()).collect()
+}
+
+fn tested_actions() -> Vec<String> {
+    Action::SMALL[8..].iter().map(|action| action.name().into()).collect()
+}
+
+/// A long training with the graph convolution and one without it, neither of them tamed: the learning rate stays, and the
+/// gradient is not clipped, of which the paper says nothing (supplement 9: without it training breaks, "typically around epoch
+/// 7400").
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StabilityConfig {
+    /// Frames to learn from, evenly spaced over the training recordings.
+    pub frames: usize,
+    /// Visits of every frame in an epoch, which is a point of the curves.
+    pub repeats: usize,
+    pub epochs: usize,
+    /// That of `[training]` where it begins, by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub learning_rate: Option<f64>,
+}
+
+impl Default for StabilityConfig {
+    /// 10,400 steps of one frame.
+    fn default() -> Self {
+        Self { frames: 8, repeats: 13, epochs: 100, learning_rate: None }
+    }
+}
+
+impl StabilityConfig {
+    /// No gradient is longer than this before something breaks.
+    const UNCLIPPED: f64 = 1e30;
+
+    fn check(&self) -> Result<()> {
+        for (key, count) in [("frames", self.frames), ("repeats", self.repeats), ("epochs", self.epochs)] {
+            if count == 0 {
+                return Err(Error::setting(format!("stability.{key}"), 0, "at least 1"));
+            }
+        }
+        match self.learning_rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+            Some(rate) => Err(Error::setting("stability.learning_rate", rate, "a positive number")),
+            None => Ok(()),
+        }
+    }
+
+    /// `base` without what would hide an instability.
+    pub fn training(&self, base: &TrainingConfig) -> TrainingConfig {
+        let learning_rate = self.learning_rate.unwrap_or(base.learning_rate);
+        TrainingConfig {
+            epochs: self.epochs,
+            learning_rate,
+            final_learning_rate: learning_rate,
+            gradient_clip: Self::UNCLIPPED,
+            validation_fraction: 0.0,
+            frames: Some(self.frames),
+            repeats: self.repeats,
+            patience_epochs: 0,
+            ..base.clone()
+        }
+    }
+}
+
 /// `hybridsim reproduce CONFIG`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -116,6 +199,10 @@ pub struct ReproduceConfig {
     /// The same for another room.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub second_room: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second_scene: Option<SecondSceneConfig>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stability: Option<StabilityConfig>,
     #[serde(default)]
     pub split: SubjectSplit,
     #[serde(default = "all_variants")]
@@ -180,11 +267,28 @@ fn effects_only() -> DiagnosisConfig {
     DiagnosisConfig { limits: false, ..DiagnosisConfig::default() }
 }
 
+impl SecondSceneConfig {
+    fn check(&self) -> Result<()> {
+        for (key, actions) in [("training", &self.training), ("evaluated", &self.evaluated)] {
+            if actions.is_empty() {
+                return Err(Error::setting(format!("second_scene.{key}"), "empty", "names of actions"));
+            }
+        }
+        match self.evaluated.iter().find(|action| self.training.contains(action)) {
+            Some(action) => {
+                Err(Error::setting("second_scene.evaluated", action, "actions that are not in second_scene.training"))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
 impl ReproduceConfig {
     pub fn read(path: &Path, sets: &[String]) -> Result<Self> {
         let mut config: Self = read_settings(path, sets)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        for site in std::iter::once(&mut config.site).chain(&mut config.second_room) {
+        let scene = config.second_scene.as_mut().map(|scene| &mut scene.site);
+        for site in std::iter::once(&mut config.site).chain(&mut config.second_room).chain(scene) {
             if site.is_relative() {
                 *site = folder.join(&*site);
             }
@@ -208,6 +312,17 @@ impl ReproduceConfig {
         }
         if self.split.training == self.split.unseen {
             return Err(Error::setting("split.unseen", &self.split.unseen, "another subject than split.training"));
+        }
+        let SubjectSplit { training, unseen, additional } = &self.split;
+        if additional.as_ref().is_some_and(|additional| additional == training || additional == unseen) {
+            let expected = "another subject than split.training and split.unseen";
+            return Err(Error::setting("split.additional", additional.as_deref().unwrap_or_default(), expected));
+        }
+        if let Some(scene) = &self.second_scene {
+            scene.check()?;
+        }
+        if let Some(stability) = &self.stability {
+            stability.check()?;
         }
         if self.training.split != Split::Last || self.training.validation_fraction == 0.0 {
             return Err(Error::setting(
@@ -253,6 +368,16 @@ mod tests {
     #[test]
     fn what_cannot_be_reproduced_is_refused_by_name() {
         assert!(refused(|config| config.split.unseen = "s1".into()).contains("`split.unseen`"));
+        assert!(refused(|config| config.split.additional = Some("s4".into())).contains("`split.additional` is s4"));
+        let scene = |training: &[&str], evaluated: &[&str]| {
+            let names = |names: &[&str]| names.iter().map(ToString::to_string).collect();
+            let scene = SecondSceneConfig { site: "x".into(), training: names(training), evaluated: names(evaluated) };
+            refused(|config| config.second_scene = Some(scene))
+        };
+        assert!(scene(&["bow"], &[]).contains("`second_scene.evaluated` is empty"));
+        assert!(scene(&["bow", "jab"], &["jab"]).contains("`second_scene.evaluated` is jab"));
+        let stability = StabilityConfig { epochs: 0, ..Default::default() };
+        assert!(refused(|config| config.stability = Some(stability)).contains("`stability.epochs` is 0"));
         assert!(refused(|config| config.variants = vec![Variant::Coupled]).contains("`variants`"));
         assert!(refused(|config| config.training.split = Split::Random).contains("`training.split`"));
         assert!(refused(|config| config.training.frames = Some(3)).contains("`training.frames`"));
@@ -262,6 +387,16 @@ mod tests {
         });
         assert!(error.contains("`adaptation`"));
         assert!(refused(|config| config.simulator.surface.sampling = Sampling::Facets).contains("coupled"));
+    }
+
+    #[test]
+    fn nothing_tames_the_training_whose_stability_is_asked_for() {
+        let training = StabilityConfig::default().training(&TrainingConfig::default());
+        training.check().unwrap();
+        assert_eq!(training.learning_rate_at(0, 100), training.learning_rate_at(99, 100));
+        assert!(training.gradient_clip > 1e20 && training.validation_fraction == 0.0);
+        // More than the paper's number, if its epoch is a step.
+        assert!(training.epochs * training.repeats * training.frames.unwrap() > 7400);
     }
 
     #[test]

@@ -9,6 +9,9 @@
 //! - [`results`], [`paper`], [`tables`], [`report`]: numbers, the paper's, and both side by side
 
 pub mod config;
+pub mod figures;
+mod further;
+pub mod pairs;
 pub mod paper;
 pub mod plan;
 pub mod preflight;
@@ -24,5 +27,5 @@ pub mod variants;
 
 pub use config::ReproduceConfig;
 pub use plan::{Plan, plan};
-pub use run::{Event, run};
+pub use run::{Event, run, run_some};
 pub use stage::Store;

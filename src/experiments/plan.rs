@@ -1,9 +1,12 @@
 //! All stages of a reproduction and what they depend on, known before the first one runs.
 //!
 //! Measured recordings come first, then trainings, then every method's simulation of every recording (one recording after
-//! the other, so that its geometry is worked out once for all methods) with its scores, then recognition.
+//! the other, so that its geometry is worked out once for all methods) with its scores, then recognition, then [`further`]
+//! experiments and the figures.
 
-use std::collections::BTreeMap;
+mod further;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -38,6 +41,12 @@ pub enum Method {
     Adapted(usize),
     /// Trained from the beginning on so many frames of the second room, as many steps long.
     FromScratch(usize),
+    /// Trained on some actions of the second scene, used on others.
+    SceneOurs,
+    /// Used on them as the first site trained it.
+    SceneUnadapted,
+    /// As [`Method::Again`], in the second scene.
+    SceneAgain,
 }
 
 impl Method {
@@ -51,6 +60,9 @@ impl Method {
             Self::OtherMesh => "other_mesh".into(),
             Self::Adapted(frames) => format!("adapted_{frames}"),
             Self::FromScratch(frames) => format!("from_scratch_{frames}"),
+            Self::SceneOurs => "scene_ours".into(),
+            Self::SceneUnadapted => "scene_unadapted".into(),
+            Self::SceneAgain => "scene_again".into(),
         }
     }
 
@@ -64,6 +76,9 @@ impl Method {
             Self::OtherMesh => "measured with another mesh error".into(),
             Self::Adapted(frames) => format!("HybridSim, adapted to {frames} frames"),
             Self::FromScratch(frames) => format!("HybridSim, trained on {frames} frames only"),
+            Self::SceneOurs => "HybridSim, trained there on other actions".into(),
+            Self::SceneUnadapted => "HybridSim as the first site trained it".into(),
+            Self::SceneAgain => "measured again there (ceiling)".into(),
         }
     }
 }
@@ -87,9 +102,13 @@ pub struct MethodStages {
     pub intra: Vec<usize>,
     /// Scores on the unseen subject.
     pub cross: Vec<usize>,
-    /// The names of `cross`' actions.
+    /// The names of `cross`' actions, and of its recordings.
     pub cross_actions: Vec<String>,
+    pub cross_takes: Vec<String>,
     pub recognition: BTreeMap<Protocol, usize>,
+    /// Scores and recognition of the additional unseen subject.
+    pub additional: Vec<usize>,
+    pub additional_recognition: Option<usize>,
 }
 
 /// What is to be done, in an order in which it can be.
@@ -99,6 +118,36 @@ pub struct Plan {
     /// In the order of the tables.
     pub methods: Vec<(Method, MethodStages)>,
     pub diagnosis: Option<usize>,
+    /// With the graph convolution, and without.
+    pub stability: Vec<(Variant, usize)>,
+    /// By the names of their pictures.
+    pub figures: Vec<(String, usize)>,
+}
+
+impl Plan {
+    /// The stages whose names begin with one of these, and all that they need, in the plan's order.
+    ///
+    /// # Errors
+    /// A beginning that no stage has.
+    pub fn needed(&self, beginnings: &[String]) -> Result<BTreeSet<usize>> {
+        let mut found = BTreeSet::new();
+        for beginning in beginnings {
+            let named = |&index: &usize| self.stages[index].key.name.starts_with(beginning.as_str());
+            let mut open: Vec<usize> = (0..self.stages.len()).filter(named).collect();
+            if open.is_empty() {
+                return Err(Error::Usage {
+                    message: format!("--stages {beginning}: no stage's name begins so"),
+                    hint: Some("`--plan` lists them".into()),
+                });
+            }
+            while let Some(stage) = open.pop() {
+                if found.insert(stage) {
+                    open.extend(&self.stages[stage].parents);
+                }
+            }
+        }
+        Ok(found)
+    }
 }
 
 /// The settings' name of the site where everything is compared.
@@ -148,21 +197,23 @@ pub fn plan(config: &ReproduceConfig, root: &Path) -> Result<Plan> {
     let mut planner = Planner { config, root, weights, plan: Plan::default() };
     let first = planner.place(FIRST, &config.site)?;
     let second = config.second_room.as_deref().map(|site| planner.place("second_room", site)).transpose()?;
-    planner.all(&first, second.as_ref())?;
+    let scene = config.second_scene.as_ref().map(|scene| planner.place("second_scene", &scene.site)).transpose()?;
+    let trained = planner.all(&first, second.as_ref())?;
+    planner.beyond(&first, scene.as_ref(), &trained[&Variant::Ours])?;
     Ok(planner.plan)
 }
 
 /// A training stage and the checkpoint that it leaves.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 struct Trained {
     stage: usize,
     checkpoint: PathBuf,
 }
 
 impl Planner<'_> {
-    fn all(&mut self, first: &Place, second: Option<&Place>) -> Result<()> {
-        let SubjectSplit { training, unseen } = &self.config.split;
-        check_split(&first.takes, training, unseen)?;
+    fn all(&mut self, first: &Place, second: Option<&Place>) -> Result<BTreeMap<Variant, Trained>> {
+        let SubjectSplit { training, unseen, additional } = &self.config.split;
+        check_split(&first.takes, training, unseen, additional.as_deref())?;
         if let Some(second) = second
             && second.of_subject(training).next().is_none()
         {
@@ -180,6 +231,18 @@ impl Planner<'_> {
         if let (Some(second), Some(adapted)) = (second, adapted) {
             self.second_room(second, &adapted);
         }
+        Ok(trained)
+    }
+
+    /// What is asked for beyond the comparison and the adaptation.
+    fn beyond(&mut self, first: &Place, scene: Option<&Place>, ours: &Trained) -> Result<()> {
+        if let (Some(place), Some(scene)) = (scene, &self.config.second_scene) {
+            self.second_scene(first, place, scene, ours)?;
+        }
+        if let Some(stability) = &self.config.stability {
+            self.stability(first, stability);
+        }
+        self.figures(first, ours);
         Ok(())
     }
 
@@ -245,7 +308,7 @@ impl Planner<'_> {
         if !(self.config.other_mesh && name == FIRST && config.record.mesh_error_m > 0.0) {
             return None;
         }
-        let SubjectSplit { training, unseen } = &self.config.split;
+        let SubjectSplit { training, unseen, .. } = &self.config.split;
         let settled = config.subjects.first()?;
         let compared = |subject: &&String| [training, unseen, settled].contains(subject);
         let mut config = SiteConfig { again: vec![], ..config.clone() };
@@ -273,7 +336,7 @@ impl Planner<'_> {
                 recordings: recordings.clone(),
                 names: names.clone(),
                 simulator,
-                training: Box::new(config.training.clone()),
+                training: Box::new(variant.training(&config.training)),
                 seed: config.seed,
                 effects,
                 start_from: None,
@@ -303,7 +366,7 @@ impl Planner<'_> {
     /// Simulation, scores and recognition of every method, on the first site.
     fn methods(&mut self, place: &Place, trained: &BTreeMap<Variant, Trained>) {
         let config = self.config;
-        let SubjectSplit { training, unseen } = &config.split;
+        let SubjectSplit { training, unseen, additional } = &config.split;
         let rules: &[fn(BaselineName) -> Method] =
             if config.receiver_noise { &[Method::Baseline, Method::ReceiverNoise] } else { &[Method::Baseline] };
         let baselines = config.baselines.iter().flat_map(|&name| rules.iter().map(move |rule| rule(name)));
@@ -314,9 +377,14 @@ impl Planner<'_> {
         let [mut again, mut other_mesh] = [MethodStages::default(), MethodStages::default()];
         // Everybody is needed where the classifier learns from others.
         let everybody = config.protocols.contains(&Protocol::OtherSubjects);
-        let needed = |take: &&Take| everybody || take.subject == *training || take.subject == *unseen;
+        let is_additional = |take: &Take| additional.as_ref() == Some(&take.subject);
+        let needed = |take: &&Take| everybody || take.subject == *training || take.subject == *unseen || is_additional(take);
+        let mut simulations: Vec<Vec<(usize, &Take)>> = vec![vec![]; methods.len()];
         for take in place.takes.iter().filter(needed) {
-            for (method, stages) in &mut methods {
+            for ((method, stages), simulations) in methods.iter_mut().zip(&mut simulations) {
+                if !everybody && is_additional(take) && *method != Method::Variant(Variant::Ours) {
+                    continue;
+                }
                 let ours = &trained[&Variant::Ours];
                 let simulate = match *method {
                     Method::Variant(variant) => {
@@ -331,19 +399,31 @@ impl Planner<'_> {
                     _ => unreachable!("the first site has baselines and variants"),
                 };
                 stages.simulate.push(simulate);
+                simulations.push((simulate, take));
                 let simulated = self.folder(simulate).join("recording");
                 self.scores(stages, *method, place, take, simulate, simulated);
             }
             if place.again.subjects.contains(&take.subject) {
                 self.scores_again(&mut again, Method::Again, place, take, place.again.folder.join(&take.name), None);
             }
-            if let Some(stage) = place.other_mesh {
+            // Another mesh is recorded of the compared subjects alone.
+            if let Some(stage) = place.other_mesh.filter(|_| !is_additional(take)) {
                 let recorded = self.folder(stage).join("recordings").join(&take.name);
                 self.scores_again(&mut other_mesh, Method::OtherMesh, place, take, recorded, Some(stage));
             }
         }
-        for (method, stages) in &mut methods {
-            let simulated: Vec<(usize, &Take)> = stages.simulate.iter().copied().zip(place.takes.iter().filter(needed)).collect();
+        let tested: Vec<&Take> = place.of_subject(unseen).collect();
+        let second: Vec<&Take> = place.takes.iter().filter(|take| is_additional(take)).collect();
+        let learn_additional = !second.is_empty() && config.protocols.contains(&Protocol::SameMotions);
+        for ((method, stages), simulated) in methods.iter_mut().zip(&simulations) {
+            if *method == Method::Variant(Variant::Ours) && learn_additional {
+                let learned: Vec<usize> =
+                    simulated.iter().filter(|(_, take)| is_additional(take)).map(|&(stage, _)| stage).collect();
+                let folders = learned.iter().map(|&stage| self.folder(stage).join("recording")).collect();
+                let id = format!("{}_additional", method.id());
+                stages.additional_recognition =
+                    Some(self.recognition(id, Protocol::SameMotions, place, &second, learned, folders));
+            }
             for &protocol in &config.protocols {
                 let learned: Vec<usize> = simulated
                     .iter()
@@ -351,7 +431,7 @@ impl Planner<'_> {
                     .map(|&(stage, _)| stage)
                     .collect();
                 let folders = learned.iter().map(|&stage| self.folder(stage).join("recording")).collect();
-                let stage = self.recognition(method.id(), protocol, place, learned, folders);
+                let stage = self.recognition(method.id(), protocol, place, &tested, learned, folders);
                 stages.recognition.insert(protocol, stage);
             }
         }
@@ -368,9 +448,14 @@ impl Planner<'_> {
                 }
             };
             if let Some(folders) = folders {
-                let stage = self.recognition("again".into(), protocol, place, vec![], folders);
+                let stage = self.recognition("again".into(), protocol, place, &tested, vec![], folders);
                 again.recognition.insert(protocol, stage);
             }
+        }
+        if learn_additional && second.iter().all(|take| place.again.subjects.contains(&take.subject)) {
+            let folders = second.iter().map(|take| place.again.folder.join(&take.name)).collect();
+            let id = "again_additional".into();
+            again.additional_recognition = Some(self.recognition(id, Protocol::SameMotions, place, &second, vec![], folders));
         }
         self.plan.methods.extend(methods);
         if let Some(stage) = place.other_mesh {
@@ -378,7 +463,7 @@ impl Planner<'_> {
                 let recorded = self.folder(stage).join("recordings");
                 let folders = place.of_subject(unseen).map(|take| recorded.join(&take.name)).collect();
                 let id = Method::OtherMesh.id();
-                let learned = self.recognition(id, Protocol::SameMotions, place, vec![stage], folders);
+                let learned = self.recognition(id, Protocol::SameMotions, place, &tested, vec![stage], folders);
                 other_mesh.recognition.insert(Protocol::SameMotions, learned);
             }
             self.plan.methods.push((Method::OtherMesh, other_mesh));
@@ -434,12 +519,18 @@ impl Planner<'_> {
         simulated: PathBuf,
     ) {
         let held_out = take.subject == self.config.split.training;
-        if !held_out && take.subject != self.config.split.unseen {
+        let additional = self.is_additional(take);
+        let scored = held_out || take.subject == self.config.split.unseen;
+        if !scored && !(additional && method == Method::Variant(Variant::Ours)) {
             return;
         }
         let task = self.compare(place, take, simulated, held_out);
         let stage = self.add(format!("compare/{}/{}", method.id(), take.name), vec![parent], Some(place), task);
-        stages.note(stage, take, held_out);
+        if additional {
+            stages.additional.push(stage);
+        } else {
+            stages.note(stage, take, held_out);
+        }
     }
 
     /// Scores of what was recorded in place of a simulation, by a stage of its own or with the site.
@@ -453,12 +544,21 @@ impl Planner<'_> {
         by: Option<usize>,
     ) {
         let held_out = take.subject == self.config.split.training;
-        if held_out || take.subject == self.config.split.unseen {
+        let additional = self.is_additional(take);
+        if held_out || additional || take.subject == self.config.split.unseen {
             let task = self.compare(place, take, again, held_out);
             let parents = by.into_iter().collect();
             let stage = self.add(format!("compare/{}/{}", method.id(), take.name), parents, Some(place), task);
-            stages.note(stage, take, held_out);
+            if additional {
+                stages.additional.push(stage);
+            } else {
+                stages.note(stage, take, held_out);
+            }
         }
+    }
+
+    fn is_additional(&self, take: &Take) -> bool {
+        self.config.split.additional.as_ref() == Some(&take.subject)
     }
 
     fn compare(&self, place: &Place, take: &Take, simulated: PathBuf, held_out: bool) -> Task {
@@ -472,8 +572,15 @@ impl Planner<'_> {
         }
     }
 
-    fn recognition(&mut self, id: String, protocol: Protocol, place: &Place, parents: Vec<usize>, train: Vec<PathBuf>) -> usize {
-        let test: Vec<&Take> = place.of_subject(&self.config.split.unseen).collect();
+    fn recognition(
+        &mut self,
+        id: String,
+        protocol: Protocol,
+        place: &Place,
+        test: &[&Take],
+        parents: Vec<usize>,
+        train: Vec<PathBuf>,
+    ) -> usize {
         let task = Task::Recognise {
             train,
             test: test.iter().map(|take| place.recordings.join(&take.name)).collect(),
@@ -543,6 +650,7 @@ impl MethodStages {
         } else {
             self.cross.push(stage);
             self.cross_actions.push(take.action.clone());
+            self.cross_takes.push(take.name.clone());
         }
     }
 }

@@ -1,4 +1,6 @@
 use super::*;
+use crate::experiments::config::{SecondSceneConfig, StabilityConfig};
+use crate::experiments::figures::Panel;
 
 const SUBJECTS: [&str; 3] = ["s1", "s2", "s3"];
 const ACTIONS: [&str; 2] = ["lunge", "walk_back_forth_armswing"];
@@ -70,8 +72,8 @@ fn nothing_is_learned_from_what_it_is_tested_on() {
             _ => {}
         }
     }
-    // Ten variants less the one that shares its training, and the second room's two; five baselines under two kinds of noise.
-    assert_eq!((trainings, classifiers), (9 + 2, 2 * (2 * 5 + 10 + 1)));
+    // Eleven variants less the one that shares its training, and the second room's two; five baselines under two kinds of noise.
+    assert_eq!((trainings, classifiers), (10 + 2, 2 * (2 * 5 + 11 + 1)));
 }
 
 #[test]
@@ -143,7 +145,7 @@ fn takes_are_planned_in_the_order_in_which_they_are_found() {
     let names: Vec<String> = super::planned(&config, Path::new("configs")).unwrap().into_iter().map(|take| take.name).collect();
     let mut sorted = names.clone();
     sorted.sort();
-    assert!(names == sorted && names.len() == 8, "{names:?}");
+    assert!(names == sorted && names.len() == 12, "{names:?}");
 }
 
 #[test]
@@ -158,4 +160,133 @@ fn another_mesh_is_recorded_of_the_compared_subjects_only() {
     let Task::Site { config: other, .. } = &planner.plan.stages[stage].task else { panic!("a site") };
     assert_eq!((&other.subjects[..], &other.again[..], other.record.redraw), (&["s1".to_string(), "s2".into()][..], &[][..], 1));
     other.check().unwrap();
+}
+
+/// The second scene as recordings of `s1`.
+fn scene() -> Place {
+    let mut scene = place("second_scene");
+    let take = |action: &str| Take { name: format!("s1_{action}"), subject: "s1".into(), action: action.into() };
+    scene.takes = ["bow", "clap", "hand_wave", "jab"].map(take).to_vec();
+    scene
+}
+
+fn scene_config() -> ReproduceConfig {
+    let names = |names: [&str; 2]| names.map(String::from).to_vec();
+    let second_scene =
+        SecondSceneConfig { site: "unused".into(), training: names(["bow", "hand_wave"]), evaluated: names(["clap", "jab"]) };
+    ReproduceConfig { second_scene: Some(second_scene), stability: Some(StabilityConfig::default()), ..config() }
+}
+
+fn planned_further(config: &ReproduceConfig) -> Result<Plan> {
+    let mut planner = Planner { config, root: Path::new("/out"), weights: None, plan: Plan::default() };
+    let first = place("site");
+    let trained = planner.all(&first, None)?;
+    planner.beyond(&first, Some(&scene()), &trained[&Variant::Ours])?;
+    Ok(planner.plan)
+}
+
+#[test]
+fn the_second_scene_is_learned_from_some_actions_and_scored_on_others() {
+    let plan = planned_further(&scene_config()).unwrap();
+    let ours = method(&plan, Method::SceneOurs);
+    let Task::Train { names, start_from, .. } = &plan.stages[ours.train.unwrap()].task else { unreachable!() };
+    assert_eq!((&names[..], start_from), (&["s1_bow".to_string(), "s1_hand_wave".into()][..], &None));
+    for wanted in [Method::SceneOurs, Method::SceneUnadapted, Method::SceneAgain] {
+        let stages = method(&plan, wanted);
+        assert_eq!(stages.cross_takes, ["s1_clap", "s1_jab"]);
+        let Task::Recognise { train, test, .. } = &plan.stages[stages.recognition[&Protocol::SameMotions]].task else {
+            unreachable!()
+        };
+        assert!(train.len() == 2 && test.len() == 2 && test.iter().all(|folder| folder.starts_with("/measured/second_scene")));
+        assert!(train.iter().all(|folder| !test.contains(folder)));
+        for &stage in &stages.cross {
+            let Task::Compare { held_out_fraction, .. } = &plan.stages[stage].task else { unreachable!() };
+            assert_eq!(*held_out_fraction, None);
+        }
+    }
+    // Its simulators are not the first site's.
+    assert_ne!(ours.train, method(&plan, Method::Variant(Variant::Ours)).train);
+    assert_eq!(method(&plan, Method::SceneUnadapted).train, method(&plan, Method::Variant(Variant::Ours)).train);
+    let mut config = scene_config();
+    config.second_scene.as_mut().unwrap().evaluated.push("lunge".into());
+    let error = planned_further(&config).unwrap_err().to_string();
+    assert!(error.contains("`second_scene.evaluated` is lunge"), "{error}");
+}
+
+#[test]
+fn the_long_trainings_differ_by_the_graph_alone() {
+    let plan = planned_further(&scene_config()).unwrap();
+    let simulators: Vec<crate::simulator::SimulatorConfig> = plan
+        .stability
+        .iter()
+        .map(|&(_, stage)| match &plan.stages[stage].task {
+            Task::Stability { simulator, training, .. } => {
+                assert_eq!(training.patience_epochs, 0);
+                (**simulator).clone()
+            }
+            _ => unreachable!(),
+        })
+        .collect();
+    let [with, without] = simulators.as_slice() else { panic!("two") };
+    assert!(with.graph.used > 0.0 && without.graph.used == 0.0);
+    let mut same = without.clone();
+    same.graph.used = with.graph.used;
+    assert_eq!(same, *with);
+}
+
+#[test]
+fn an_additional_subject_is_simulated_by_the_full_simulator_alone() {
+    let mut config = config();
+    config.split.additional = Some("s3".into());
+    config.protocols = vec![Protocol::SameMotions];
+    let mut planner = Planner { config: &config, root: Path::new("/out"), weights: None, plan: Plan::default() };
+    planner.all(&place("site"), None).unwrap();
+    let plan = planner.plan;
+    let of_additional: Vec<&str> =
+        plan.stages.iter().map(|stage| stage.key.name.as_str()).filter(|name| name.contains("s3_")).collect();
+    assert_eq!(
+        of_additional,
+        [
+            "simulate/ours/s3_lunge",
+            "compare/ours/s3_lunge",
+            "simulate/ours/s3_walk_back_forth_armswing",
+            "compare/ours/s3_walk_back_forth_armswing",
+        ]
+    );
+    let ours = method(&plan, Method::Variant(Variant::Ours));
+    assert_eq!((ours.additional.len(), ours.cross.len()), (2, 2));
+    let Task::Recognise { train, names, .. } = &plan.stages[ours.additional_recognition.unwrap()].task else { unreachable!() };
+    assert!(train.len() == 2 && train.iter().all(|folder| folder.to_string_lossy().contains("simulate/ours/s3_")));
+    assert_eq!(*names, ["s3_lunge", "s3_walk_back_forth_armswing"]);
+    // What is learned and scored of the others is as without it.
+    assert!(ours.cross_takes.iter().all(|name| name.starts_with("s2_")));
+}
+
+#[test]
+fn figures_show_what_was_simulated_before() {
+    let plan = planned_further(&scene_config()).unwrap();
+    let names: Vec<&str> = plan.figures.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["decomposition", "noise", "loss_scale", "graph"]);
+    for (name, stage) in &plan.figures {
+        let stage = &plan.stages[*stage];
+        let Task::Figure(task) = &stage.task else { unreachable!() };
+        assert_eq!(task.measured.len(), if name == "decomposition" { ACTIONS.len() } else { 1 }, "{name}");
+        let simulated = task.columns.iter().filter(|column| matches!(column.panel, Panel::Simulated(_))).count();
+        // Ours, and a stage for each column that shows recordings.
+        assert_eq!(stage.parents.len(), 1 + simulated, "{name}");
+    }
+    // Without the variants that a figure compares, there is none.
+    let plan = planned_further(&ReproduceConfig { variants: vec![Variant::Ours], ..scene_config() }).unwrap();
+    assert_eq!(plan.figures.len(), 1);
+}
+
+#[test]
+fn some_stages_bring_along_what_they_need_and_nothing_else() {
+    let plan = planned_further(&scene_config()).unwrap();
+    let needed = plan.needed(&["figure/noise".into()]).unwrap();
+    let names: Vec<&str> = needed.iter().map(|&stage| plan.stages[stage].key.name.as_str()).collect();
+    assert_eq!(names.iter().filter(|name| name.starts_with("train/")).count(), 3, "{names:?}");
+    assert_eq!(names.iter().filter(|name| name.starts_with("simulate/")).count(), 3, "{names:?}");
+    assert!(names.last() == Some(&"figure/noise") && names.len() == 7, "{names:?}");
+    assert!(plan.needed(&["nothing".into()]).unwrap_err().to_string().contains("--stages nothing"));
 }

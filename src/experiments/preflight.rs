@@ -81,15 +81,21 @@ pub fn check_recognition(config: &ReproduceConfig, board: &Board) -> Result<()> 
     Ok(())
 }
 
+/// # Errors
+/// Another radar than the first site's.
+pub fn check_same_board(key: &str, first: &Board, other: &Board) -> Result<()> {
+    if other.radar.is_same_board(&first.radar) {
+        return Ok(());
+    }
+    Err(Error::setting(key, "another radar", "that of `site`").with_hint("a trained simulator speaks for one radar"))
+}
+
 /// What only the second room is asked for. `takes`: recordings of the training subject there.
 ///
 /// # Errors
 /// More frames to adapt to than training keeps; another radar than the first site's.
 pub fn check_adaptation(config: &ReproduceConfig, first: &Board, second: &Board, takes: usize) -> Result<()> {
-    if !second.radar.is_same_board(&first.radar) {
-        return Err(Error::setting("second_room", "another radar", "that of `site`")
-            .with_hint("a trained simulator speaks for one radar"));
-    }
+    check_same_board("second_room", first, second)?;
     let frames = vec![second.radar.frames; takes];
     let all = FrameSplit::new(&frames, config.training.validation_fraction, Split::Last, 0).training.len();
     match config.adaptation.frames.iter().find(|&&frames| frames > all) {

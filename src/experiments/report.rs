@@ -1,16 +1,19 @@
-//! What a reproduction leaves at its top: `results.md`, `results.json` and `adaptation.png`.
+//! What a reproduction leaves at its top: `results.md`, `results.json`, and the pictures that it names.
 
 use std::fmt::Write;
+use std::io::Write as _;
 use std::path::Path;
 
 use super::config::ReproduceConfig;
 use super::plan::Method;
 use super::results::{MethodResults, Results};
 use super::tables::tables;
+use super::variants::Variant;
 use crate::data::atomic;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::pictures::{Chart, Series};
 use crate::text::shown;
+use crate::training::EpochMetrics;
 
 /// Writes all of it. `command`: what was typed.
 pub fn write(folder: &Path, config: &ReproduceConfig, results: &Results, command: &str) -> Result<()> {
@@ -35,10 +38,58 @@ pub fn write(folder: &Path, config: &ReproduceConfig, results: &Results, command
     atomic::write_text(folder.join("results.md"), &shown(&text))?;
     let json = serde_json::to_string_pretty(results).expect("plain data");
     atomic::write_text(folder.join("results.json"), &json)?;
+    for figure in &results.figures {
+        let target = folder.join(format!("{}.png", figure.name));
+        let picture = std::fs::read(&figure.picture).map_err(|error| Error::read(&figure.picture, error))?;
+        atomic::write_file(&target, |file| file.write_all(&picture))?;
+    }
+    if !results.stability.is_empty() {
+        atomic::write_text(folder.join("stability.csv"), &stability_csv(results))?;
+        let [loss, gradient] = stability(results);
+        loss.save(&folder.join("stability_loss.png"))?;
+        gradient.save(&folder.join("stability_gradient.png"))?;
+    }
     if let Some(chart) = adaptation(results) {
         chart.save(&folder.join("adaptation.png"))?;
     }
     Ok(())
+}
+
+/// One line for each epoch of each long training.
+fn stability_csv(results: &Results) -> String {
+    let mut text = String::from("run,epoch,mean_loss_db2,largest_loss_db2,largest_gradient\n");
+    for found in &results.stability {
+        for epoch in &found.run.history {
+            let number = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
+            let (loss, gradient) = (number(epoch.largest_loss), number(epoch.largest_gradient));
+            let line = format!("{},{},{},{loss},{gradient}", found.variant.id(), epoch.epoch + 1, epoch.training_loss);
+            writeln!(text, "{line}").expect("text grows");
+        }
+    }
+    text
+}
+
+/// Largest loss and largest gradient of a step in every epoch, on a logarithmic scale.
+fn stability(results: &Results) -> [Chart; 2] {
+    let chart = |what: &str, unit: &str, value: fn(&EpochMetrics) -> Option<f64>| Chart {
+        title: format!("Largest {what} of a step"),
+        x_label: "epoch".into(),
+        y_label: format!("log10 of the largest {what}{unit}"),
+        series: results
+            .stability
+            .iter()
+            .map(|found| Series {
+                name: if found.variant == Variant::WithoutGcn { "without GCN" } else { "with GCN" }.into(),
+                points: found
+                    .run
+                    .history
+                    .iter()
+                    .filter_map(|epoch| Some([(epoch.epoch + 1) as f64, value(epoch)?.log10()]))
+                    .collect(),
+            })
+            .collect(),
+    };
+    [chart("loss", " (dB²)", |epoch| epoch.largest_loss), chart("gradient", "", |epoch| epoch.largest_gradient)]
 }
 
 /// Quality in the second room against the number of its frames.

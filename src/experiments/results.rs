@@ -7,13 +7,14 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::config::Protocol;
+use super::figures::Levels;
+use super::pairs::{Behind, On, Pair, asked_for};
 use super::plan::{Method, MethodStages, Plan};
 use super::stage::{Record, Store};
-use super::steps::{Speed, read_json};
+use super::steps::{Speed, Stability, read_json};
 use super::variants::Variant;
 use crate::error::{Error, Result};
-use crate::evaluation::{Evaluation, ScoreSummary, SequenceSummary, over_sequences};
-use crate::metrics::Spread;
+use crate::evaluation::{Evaluation, SequenceSummary, over_sequences};
 
 /// The action on which the paper looks at the graph convolution more closely (table 6).
 pub const ARM_SWING: &str = "walk_back_forth_armswing";
@@ -33,33 +34,13 @@ pub struct MethodResults {
     /// The unseen subject's walking back and forth with arm swing.
     pub arm_swing: Option<SequenceSummary>,
     pub recognition: BTreeMap<Protocol, Recognised>,
+    /// The additional unseen subject.
+    pub additional: Option<SequenceSummary>,
+    pub additional_recognition: Option<Recognised>,
     /// Folder of the training stage, its seconds, and whether they are those of its last attempt only.
     pub training: Option<Training>,
     /// Over all simulated recordings.
     pub speed: Option<Speed>,
-}
-
-/// Paired differences of PSNR, dB.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Behind {
-    pub global: Option<Spread>,
-    pub moving: Option<Spread>,
-    pub person: Option<Spread>,
-}
-
-impl Behind {
-    /// None where the two were not scored on the same recordings.
-    fn of(ours: &[Evaluation], other: &[Evaluation]) -> Option<Self> {
-        let region = |of: fn(&Evaluation) -> Option<&ScoreSummary>| {
-            let pairs = ours.iter().zip(other).filter_map(|(ours, other)| Some((of(ours)?, of(other)?)));
-            Spread::of(pairs.map(|(ours, other)| ours.psnr_db.mean - other.psnr_db.mean))
-        };
-        (!ours.is_empty() && ours.len() == other.len()).then(|| Self {
-            global: region(|evaluation| evaluation.global.as_ref()),
-            moving: region(|evaluation| evaluation.moving.as_ref()),
-            person: region(|evaluation| evaluation.person.as_ref()),
-        })
-    }
 }
 
 /// A share of the test windows, with its 95 % interval over recordings.
@@ -89,6 +70,10 @@ pub struct Training {
 #[derive(Clone, Debug, Serialize)]
 pub struct Results {
     pub methods: Vec<MethodResults>,
+    /// Differences between methods other than the full simulator.
+    pub pairs: Vec<Pair>,
+    pub stability: Vec<StabilityResults>,
+    pub figures: Vec<Figure>,
     /// What the detective said about the diagnosed recording; ids of the effects that were added.
     pub effects: Option<Vec<String>>,
     /// Wall clock by kind of stage, seconds; what was cached counts as it was when it was made.
@@ -98,12 +83,29 @@ pub struct Results {
     pub programs: BTreeMap<String, usize>,
 }
 
+/// A long training.
+#[derive(Clone, Debug, Serialize)]
+pub struct StabilityResults {
+    pub variant: Variant,
+    pub run: Stability,
+}
+
+/// A picture that a stage drew, and how strong what it shows is.
+#[derive(Clone, Debug, Serialize)]
+pub struct Figure {
+    pub name: String,
+    #[serde(skip)]
+    pub picture: PathBuf,
+    pub levels: Levels,
+}
+
 /// Reads what a plan's stages left; `records` are in the plan's order.
 pub fn collect(plan: &Plan, store: &Store, records: &[Record]) -> Result<Results> {
     let folder = |stage: usize| store.folder(&plan.stages[stage].key);
     let scores = |stages: &[usize]| read_all::<Evaluation>(stages.iter().map(|&stage| folder(stage).join("scores.json")));
     let full = plan.methods.iter().find(|(method, _)| *method == Method::Variant(Variant::Ours));
     let ours = scores(full.map_or(&[], |(_, stages)| &stages.cross))?;
+    let our_takes = full.map_or(&[][..], |(_, stages)| &stages.cross_takes);
     let methods = plan
         .methods
         .iter()
@@ -113,7 +115,7 @@ pub fn collect(plan: &Plan, store: &Store, records: &[Record]) -> Result<Results
                 id: method.id(),
                 method: *method,
                 intra: summary(&scores(&stages.intra)?),
-                behind: Behind::of(&ours, &cross),
+                behind: (stages.cross_takes == our_takes).then(|| Behind::of(&ours, &cross)).flatten(),
                 cross: summary(&cross),
                 arm_swing: summary(&scores(&arm_swing(stages).collect::<Vec<_>>())?),
                 recognition: stages
@@ -121,6 +123,11 @@ pub fn collect(plan: &Plan, store: &Store, records: &[Record]) -> Result<Results
                     .iter()
                     .map(|(&protocol, &stage)| Ok((protocol, read_json(folder(stage).join("classifier/recognition.json"))?)))
                     .collect::<Result<_>>()?,
+                additional: summary(&scores(&stages.additional)?),
+                additional_recognition: stages
+                    .additional_recognition
+                    .map(|stage| read_json(folder(stage).join("classifier/recognition.json")))
+                    .transpose()?,
                 training: stages.train.map(|stage| Training {
                     folder: format!("stages/{}", plan.stages[stage].key.folder()),
                     seconds: records[stage].seconds,
@@ -130,6 +137,15 @@ pub fn collect(plan: &Plan, store: &Store, records: &[Record]) -> Result<Results
             })
         })
         .collect::<Result<_>>()?;
+    let stability = plan.stability.iter().map(|&(variant, stage)| {
+        Ok::<_, Error>(StabilityResults { variant, run: read_json(folder(stage).join("stability.json"))? })
+    });
+    let figures = plan.figures.iter().map(|(name, stage)| {
+        let folder = folder(*stage);
+        let levels = read_json(folder.join("figure.json"))?;
+        Ok::<_, Error>(Figure { name: name.clone(), picture: folder.join(format!("{name}.png")), levels })
+    });
+    let (stability, figures) = (stability.collect::<Result<_>>()?, figures.collect::<Result<_>>()?);
     let effects = plan.diagnosis.map(|stage| {
         let found: Vec<serde_json::Value> = read_json(folder(stage).join("effects.json"))?;
         Ok::<_, Error>(found.iter().filter_map(|effect| Some(effect["id"].as_str()?.to_string())).collect())
@@ -142,7 +158,27 @@ pub fn collect(plan: &Plan, store: &Store, records: &[Record]) -> Result<Results
     let mut programs = BTreeMap::new();
     records.iter().for_each(|record| *programs.entry(record.program.clone()).or_default() += 1);
     let device = records.last().map(|record| record.device.clone()).unwrap_or_default();
-    Ok(Results { methods, effects: effects.transpose()?, seconds, device, programs })
+    let pairs = pairs(plan, &scores)?;
+    Ok(Results { methods, pairs, stability, figures, effects: effects.transpose()?, seconds, device, programs })
+}
+
+/// Every pair that is asked for and was scored on the same recordings.
+fn pairs(plan: &Plan, scores: &dyn Fn(&[usize]) -> Result<Vec<Evaluation>>) -> Result<Vec<Pair>> {
+    let methods: Vec<Method> = plan.methods.iter().map(|(method, _)| *method).collect();
+    let stages = |wanted: Method| plan.methods.iter().find(|(method, _)| *method == wanted).map(|(_, stages)| stages);
+    let mut found = vec![];
+    for (first, second, on) in asked_for(&methods) {
+        let (Some(one), Some(other)) = (stages(first), stages(second)) else { continue };
+        let (one, other) = match on {
+            On::HeldOutFrames => (&one.intra, &other.intra),
+            _ if one.cross_takes == other.cross_takes => (&one.cross, &other.cross),
+            _ => continue,
+        };
+        if let Some(difference) = Behind::of(&scores(one)?, &scores(other)?) {
+            found.push(Pair { first: first.id(), second: second.id(), methods: (first, second), on, difference });
+        }
+    }
+    Ok(found)
 }
 
 fn arm_swing(stages: &MethodStages) -> impl Iterator<Item = usize> + '_ {

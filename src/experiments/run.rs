@@ -1,12 +1,13 @@
 //! Does the stages of a plan, one after the other.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use burn::tensor::Device;
 
 use super::plan::{Plan, Stage};
 use super::stage::{Record, Store};
-use super::steps::{Bench, baseline, compare, diagnose, recognise, simulate, site, train};
+use super::steps::{Bench, baseline, compare, diagnose, figure, recognise, simulate, site, train};
 use super::task::Task;
 use crate::error::Result;
 
@@ -26,10 +27,24 @@ pub enum Event<'a> {
 /// # Errors
 /// Whatever a stage refuses; what was done before stays done.
 pub fn run(plan: &Plan, store: &Store, devices: &[Device], tell: &mut dyn FnMut(Event)) -> Result<Vec<Record>> {
+    run_some(plan, &(0..plan.stages.len()).collect(), store, devices, tell)
+}
+
+/// The same for some stages, which must hold all that they need ([`Plan::needed`]).
+///
+/// # Errors
+/// Whatever a stage refuses; what was done before stays done.
+pub fn run_some(
+    plan: &Plan,
+    wanted: &BTreeSet<usize>,
+    store: &Store,
+    devices: &[Device],
+    tell: &mut dyn FnMut(Event),
+) -> Result<Vec<Record>> {
     let mut bench = Bench::new(devices);
-    let of = plan.stages.len();
+    let of = wanted.len();
     let mut records = Vec::with_capacity(of);
-    for (index, stage) in plan.stages.iter().enumerate() {
+    for (index, stage) in wanted.iter().map(|&stage| &plan.stages[stage]).enumerate() {
         let name = stage.key.name.as_str();
         let known = store.done(&stage.key);
         tell(Event::Stage { index, of, name, known: known.is_some() });
@@ -57,6 +72,11 @@ fn work(stage: &Stage, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut(us
             let task = train::Task { recordings, simulator, training, seed: *seed, effects, start_from };
             train::train(&task, folder, bench, step)
         }
+        Task::Stability { recordings, simulator, training, seed, .. } => {
+            let task = train::Task { recordings, simulator, training, seed: *seed, effects: &None, start_from: &None };
+            train::stability(&task, folder, bench, step)
+        }
+        Task::Figure(task) => figure(task, folder, bench, step),
         Task::Simulate { checkpoint, recording, name, graph_at_inference, seed } => {
             let task = simulate::Task { checkpoint, recording, name, graph_at_inference: *graph_at_inference, seed: *seed };
             simulate::simulate(&task, folder, bench, step)

@@ -4,20 +4,22 @@
 use std::fmt::Write;
 
 use super::config::{BaselineName, Protocol};
+use super::further;
+use super::pairs::Behind;
 use super::paper::{self, Paper};
 use super::plan::Method;
-use super::results::{Behind, MethodResults, Recognised, Results, Share};
+use super::results::{MethodResults, Recognised, Results, Share};
 use super::variants::Variant;
 use crate::evaluation::{ScoreSummary, SequenceSummary};
 use crate::metrics::Spread;
 
 /// A table that grows row by row.
-struct Table {
+pub(super) struct Table {
     text: String,
 }
 
 impl Table {
-    fn new(title: &str, note: &str, columns: &[&str]) -> Self {
+    pub(super) fn new(title: &str, note: &str, columns: &[&str]) -> Self {
         let mut text = format!("### {title}\n\n");
         if !note.is_empty() {
             text += &format!("{note}\n\n");
@@ -26,17 +28,17 @@ impl Table {
         Self { text }
     }
 
-    fn row(&mut self, cells: &[String]) {
+    pub(super) fn row(&mut self, cells: &[String]) {
         writeln!(self.text, "| {} |", cells.join(" | ")).expect("text grows");
     }
 
-    fn end(self) -> String {
+    pub(super) fn end(self) -> String {
         self.text + "\n"
     }
 }
 
 /// A number with its interval, and the paper's in brackets.
-fn number(found: Option<Spread>, places: usize, paper: Option<f64>) -> String {
+pub(super) fn number(found: Option<Spread>, places: usize, paper: Option<f64>) -> String {
     let ours = match found {
         None => "–".into(),
         Some(Spread { mean, interval: Some(interval), .. }) => format!("{mean:.places$} ± {interval:.places$}"),
@@ -52,14 +54,14 @@ fn with_paper(ours: String, paper: Option<String>) -> String {
     }
 }
 
-type Region = fn(&SequenceSummary) -> Option<&ScoreSummary>;
+pub(super) type Region = fn(&SequenceSummary) -> Option<&ScoreSummary>;
 
-const GLOBAL: Region = |summary| summary.global.as_ref();
-const MOVING: Region = |summary| summary.moving.as_ref();
-const PERSON: Region = |summary| summary.person.as_ref();
+pub(super) const GLOBAL: Region = |summary| summary.global.as_ref();
+pub(super) const MOVING: Region = |summary| summary.moving.as_ref();
+pub(super) const PERSON: Region = |summary| summary.person.as_ref();
 
 /// PSNR, SSIM and LPIPS of a region.
-fn scores(summary: Option<&SequenceSummary>, region: Region, paper: Paper) -> [String; 3] {
+pub(super) fn scores(summary: Option<&SequenceSummary>, region: Region, paper: Paper) -> [String; 3] {
     let found = summary.and_then(region);
     let lpips = match (found, found.and_then(|found| found.lpips)) {
         (Some(_), None) => with_paper("not available".into(), paper.lpips.map(|value| format!("{value:.3}"))),
@@ -69,7 +71,7 @@ fn scores(summary: Option<&SequenceSummary>, region: Region, paper: Paper) -> [S
 }
 
 /// Accuracy in per cent, and macro F1.
-fn recognised(found: Option<&Recognised>, paper: Paper) -> [String; 2] {
+pub(super) fn recognised(found: Option<&Recognised>, paper: Paper) -> [String; 2] {
     let share = |share: Share, interval: [f64; 2], factor: f64, places: usize| {
         let [low, high] = interval.map(|limit| factor * limit);
         format!("{:.places$} [{low:.places$}, {high:.places$}]", factor * share.value)
@@ -82,7 +84,7 @@ fn recognised(found: Option<&Recognised>, paper: Paper) -> [String; 2] {
     ]
 }
 
-fn cells(first: String, rest: impl IntoIterator<Item = String>) -> Vec<String> {
+pub(super) fn cells(first: String, rest: impl IntoIterator<Item = String>) -> Vec<String> {
     std::iter::once(first).chain(rest).collect()
 }
 
@@ -92,7 +94,9 @@ pub fn tables(results: &Results) -> String {
     text += &main_table(results);
     text += &regions(results);
     text += &behind(results);
+    text += &further::pairs(results);
     text += &recognition(results);
+    text += &further::additional(results);
     let variants = |list: &[Variant]| list.iter().map(|&variant| Method::Variant(variant)).collect::<Vec<_>>();
     text += &ablation(results, "Coupled Gaussian patches (paper, table 3)", "", &variants(&[Variant::Coupled, Variant::Ours]));
     let mut indirect = vec![Method::Baseline(BaselineName::TwoBounce), Method::ReceiverNoise(BaselineName::TwoBounce)];
@@ -100,6 +104,8 @@ pub fn tables(results: &Results) -> String {
     text += &ablation(results, "Indirect path (paper, section 4.6)", "", &indirect);
     let noises = [Variant::WithoutNoise, Variant::FixedNoise, Variant::ThermalNoise, Variant::Ours];
     text += &ablation(results, "Noise (paper, table 4)", "", &variants(&noises));
+    let scales = variants(&[Variant::LinearLoss, Variant::Ours]);
+    text += &ablation(results, "Linear or dB loss (paper, supplement 7, which shows maps alone)", "", &scales);
     text += &ablation(
         results,
         "Graph convolution (paper, table 5)",
@@ -107,6 +113,9 @@ pub fn tables(results: &Results) -> String {
         &variants(&[Variant::GcnAtInference, Variant::WithoutGcn, Variant::Ours]),
     );
     text += &arm_swing(results);
+    text += &further::stability(results);
+    let parts = results.figures.iter().find(|figure| figure.name == "decomposition");
+    text += &further::decomposition(parts.map(|figure| &figure.levels));
     let mut surfaces = variants(&[Variant::DenseSurface, Variant::Ours]);
     surfaces.extend([BaselineName::MmgpeSurface, BaselineName::Mmgpe].map(Method::ReceiverNoise));
     text += &ablation(results, "Surface: vertices or all of it", "", &surfaces);
@@ -121,6 +130,7 @@ pub fn tables(results: &Results) -> String {
         &found,
         &variants(&[Variant::WithEffects, Variant::Ours]),
     );
+    text += &further::second_scene(results);
     text += &second_room(results);
     text += &speed(results);
     text
@@ -259,13 +269,10 @@ fn second_room(results: &Results) -> String {
     if !results.methods.iter().any(|found| of_room(&found)) {
         return String::new();
     }
-    let note = format!(
-        "Held-out frames of the training subject in another room; every training takes the same number of steps. The paper \
-         trains on eight actions in its second room and tests on four others: {}. `adaptation.png` is this table as curves.",
-        paper::SECOND_ROOM
-    );
+    let note = "Held-out frames of the training subject in another room, the same actions as in the first; every training takes the same \
+                number of steps. `adaptation.png` is this table as curves.";
     let columns = ["", "PSNR", "SSIM", "LPIPS", "PSNR, static removed", "PSNR, person's cells"];
-    let mut table = Table::new("Second room (paper, section 4.7)", &note, &columns);
+    let mut table = Table::new("Second room, the same actions", note, &columns);
     for found in results.methods.iter().filter(of_room) {
         let [moving, _, _] = scores(found.intra.as_ref(), MOVING, Paper::default());
         let [person, _, _] = scores(found.intra.as_ref(), PERSON, Paper::default());

@@ -56,10 +56,11 @@ fn take(folder: &Path, recording: &Recording) -> Result<Take> {
 ///
 /// # Errors
 /// A subject that nobody recorded; an action of the unseen subject that the training subject does not show.
-pub fn check_split(takes: &[Take], training: &str, unseen: &str) -> Result<()> {
+pub fn check_split(takes: &[Take], training: &str, unseen: &str, additional: Option<&str>) -> Result<()> {
     let subjects: BTreeSet<&str> = takes.iter().map(|take| take.subject.as_str()).collect();
     let names = subjects.iter().copied().collect::<Vec<_>>().join(", ");
-    for (key, subject) in [("split.training", training), ("split.unseen", unseen)] {
+    let unseen = [("split.unseen", unseen)].into_iter().chain(additional.map(|subject| ("split.additional", subject)));
+    for (key, subject) in std::iter::once(("split.training", training)).chain(unseen.clone()) {
         if !subjects.contains(subject) {
             return Err(Error::setting(key, subject, format!("one of the site's subjects: {names}")));
         }
@@ -67,12 +68,11 @@ pub fn check_split(takes: &[Take], training: &str, unseen: &str) -> Result<()> {
     let actions = |subject: &str| -> BTreeSet<&str> {
         takes.iter().filter(|take| take.subject == subject).map(|take| take.action.as_str()).collect()
     };
-    if let Some(strange) = actions(unseen).difference(&actions(training)).next() {
-        return Err(Error::setting(
-            "split.unseen",
-            format!("{unseen}, who does `{strange}`"),
-            format!("only what {training} does"),
-        ));
+    for (key, subject) in unseen {
+        if let Some(strange) = actions(subject).difference(&actions(training)).next() {
+            let found = format!("{subject}, who does `{strange}`");
+            return Err(Error::setting(key, found, format!("only what {training} does")));
+        }
     }
     Ok(())
 }
@@ -85,10 +85,12 @@ mod tests {
     fn a_split_needs_both_subjects_and_their_actions() {
         let take = |subject: &str, action: &str| Take { name: String::new(), subject: subject.into(), action: action.into() };
         let takes = [take("s1", "lunge"), take("s2", "lunge"), take("s3", "arm_swing")];
-        assert!(check_split(&takes, "s1", "s2").is_ok());
-        let error = check_split(&takes, "s1", "s9").unwrap_err().to_string();
+        assert!(check_split(&takes, "s1", "s2", None).is_ok());
+        let error = check_split(&takes, "s1", "s9", None).unwrap_err().to_string();
         assert!(error.contains("`split.unseen` is s9") && error.contains("s1, s2, s3"), "{error}");
-        assert!(check_split(&takes, "s1", "s3").unwrap_err().to_string().contains("arm_swing"));
+        assert!(check_split(&takes, "s1", "s3", None).unwrap_err().to_string().contains("arm_swing"));
+        let error = check_split(&takes, "s1", "s2", Some("s3")).unwrap_err().to_string();
+        assert!(error.contains("`split.additional`") && error.contains("arm_swing"), "{error}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::config::BaselineName;
+use super::figures::FigureTask;
 use crate::diagnosis::DiagnosisConfig;
 use crate::evaluation::ComparisonConfig;
 use crate::recognition::RecognitionConfig;
@@ -44,6 +45,17 @@ pub enum Task {
         #[serde(skip)]
         start_from: Option<PathBuf>,
     },
+    /// Leaves `stability.json`, with the largest loss and gradient of every epoch, also where the training breaks.
+    Stability {
+        #[serde(skip)]
+        recordings: Vec<PathBuf>,
+        names: Vec<String>,
+        simulator: Box<SimulatorConfig>,
+        training: Box<TrainingConfig>,
+        seed: u64,
+    },
+    /// Leaves a picture under the figure's name, and `figure.json`.
+    Figure(Box<FigureTask>),
     /// Leaves `recording/` and `speed.json`.
     Simulate {
         #[serde(skip)]

@@ -4,7 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::body::SurfaceConfig;
 use crate::if_signal::NoiseLaw;
+use crate::loss::Scale;
 use crate::simulator::{PathModel, SimulatorConfig};
+use crate::training::TrainingConfig;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -24,6 +26,8 @@ pub enum Variant {
     FixedNoise,
     /// What receivers have: one level whatever the signal, learned.
     ThermalNoise,
+    /// Trained on linear amplitudes (paper, supplement 7, which shows maps and no such training).
+    LinearLoss,
     /// The surface as it is, in place of the mesh's vertices.
     DenseSurface,
     /// Ours, with what the detective found in one training recording.
@@ -31,7 +35,7 @@ pub enum Variant {
 }
 
 impl Variant {
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Ours,
         Self::Coupled,
         Self::WithoutIndirect,
@@ -40,6 +44,7 @@ impl Variant {
         Self::WithoutNoise,
         Self::FixedNoise,
         Self::ThermalNoise,
+        Self::LinearLoss,
         Self::DenseSurface,
         Self::WithEffects,
     ];
@@ -55,6 +60,7 @@ impl Variant {
             Self::WithoutNoise => "without_noise",
             Self::FixedNoise => "fixed_noise",
             Self::ThermalNoise => "thermal_noise",
+            Self::LinearLoss => "linear_loss",
             Self::DenseSurface => "dense_surface",
             Self::WithEffects => "with_effects",
         }
@@ -71,6 +77,7 @@ impl Variant {
             Self::WithoutNoise => "HybridSim without noise",
             Self::FixedNoise => "HybridSim, fixed noise",
             Self::ThermalNoise => "HybridSim, thermal noise",
+            Self::LinearLoss => "HybridSim, linear loss",
             Self::DenseSurface => "HybridSim, dense surface",
             Self::WithEffects => "HybridSim with found effects",
         }
@@ -98,9 +105,18 @@ impl Variant {
                 settings.noise.level = 0.0;
             }
             Self::DenseSurface => settings.surface = dense.clone(),
-            Self::Ours | Self::GcnAtInference | Self::WithEffects => {}
+            Self::Ours | Self::GcnAtInference | Self::LinearLoss | Self::WithEffects => {}
         }
         settings
+    }
+
+    /// How it is trained.
+    pub fn training(self, base: &TrainingConfig) -> TrainingConfig {
+        let mut training = base.clone();
+        if self == Self::LinearLoss {
+            training.loss.scale = Scale::Linear;
+        }
+        training
     }
 }
 
@@ -112,9 +128,11 @@ mod tests {
     fn every_ablation_changes_what_it_is_named_after() {
         let base = SimulatorConfig::default();
         let dense = SurfaceConfig { sampling: crate::body::Sampling::Facets, ..Default::default() };
-        let same = [Variant::Ours, Variant::GcnAtInference, Variant::WithEffects];
+        let same = [Variant::Ours, Variant::GcnAtInference, Variant::LinearLoss, Variant::WithEffects];
+        let training = TrainingConfig::default();
         for variant in Variant::ALL {
             assert_eq!(variant.settings(&base, &dense) == base, same.contains(&variant), "{}", variant.id());
+            assert_eq!(variant.training(&training) == training, variant != Variant::LinearLoss, "{}", variant.id());
             assert_eq!(serde_json::to_value(variant).unwrap(), variant.id());
         }
         assert_eq!(Variant::Coupled.settings(&base, &dense).paths, PathModel::Coupled);

@@ -53,7 +53,7 @@ pub fn comparison(path: &Path, title: &str, measured_db: &Map, simulated_db: &Ma
 }
 
 /// From numbers to colours.
-struct Colours {
+pub(super) struct Colours {
     low: f64,
     high: f64,
     gradient: fn(f64) -> colorous::Color,
@@ -61,7 +61,11 @@ struct Colours {
 
 impl Colours {
     fn sequential(window: DbWindow) -> Self {
-        Self { low: window.low_db, high: window.high_db, gradient: |t| colorous::VIRIDIS.eval_continuous(t) }
+        Self::between(window.low_db, window.high_db)
+    }
+
+    pub(super) fn between(low: f64, high: f64) -> Self {
+        Self { low, high, gradient: |t| colorous::VIRIDIS.eval_continuous(t) }
     }
 
     /// White at zero, red above, blue below.
@@ -76,7 +80,12 @@ impl Colours {
 }
 
 /// The area below a centred line of text.
-fn under<'a>(area: &Area<'a>, text: &str, size: u32, height: u32) -> std::result::Result<Area<'a>, Box<dyn std::error::Error>> {
+pub(super) fn under<'a>(
+    area: &Area<'a>,
+    text: &str,
+    size: u32,
+    height: u32,
+) -> std::result::Result<Area<'a>, Box<dyn std::error::Error>> {
     let (top, rest) = area.split_vertically(height);
     let style = letters(size);
     let width = area.estimate_text_size(text, &style)?.0 as i32;
@@ -115,8 +124,12 @@ fn draw_map(area: &Area<'_>, map: &Map, colours: &Colours) -> DrawResult {
         .x_label_formatter(&tick)
         .y_label_formatter(&tick)
         .draw()?;
+    paint(&chart.plotting_area().strip_coord_spec(), map, colours)
+}
+
+/// The map alone, over all of an area.
+pub(super) fn paint(plot: &Area<'_>, map: &Map, colours: &Colours) -> DrawResult {
     // pixel by pixel, so that neighbouring cells leave no seams
-    let plot = chart.plotting_area().strip_coord_spec();
     let (width, height) = plot.dim_in_pixel();
     let [rows, columns] = map.dims();
     for y in 0..height {
@@ -129,7 +142,7 @@ fn draw_map(area: &Area<'_>, map: &Map, colours: &Colours) -> DrawResult {
     Ok(())
 }
 
-fn draw_bar(area: &Area<'_>, unit: &str, colours: &Colours) -> DrawResult {
+pub(super) fn draw_bar(area: &Area<'_>, unit: &str, colours: &Colours) -> DrawResult {
     let mut chart = ChartBuilder::on(area)
         .margin(10)
         .margin_left(0)

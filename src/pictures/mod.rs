@@ -4,10 +4,12 @@
 
 mod chart;
 mod confusion;
+mod grid;
 mod heatmap;
 
 pub use chart::{Chart, Series};
 pub use confusion::confusion;
+pub use grid::Grid;
 pub use heatmap::{comparison, heatmap};
 
 use std::{io, path::Path, sync::Once};

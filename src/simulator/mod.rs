@@ -9,6 +9,7 @@
 
 mod config;
 mod equations;
+mod parts;
 mod points;
 mod scattering;
 mod scene;
@@ -17,6 +18,7 @@ mod surfaces;
 
 pub use config::{PathModel, SimulatorConfig};
 pub use equations::{Amplitudes, EquationsConfig, Gains, Weights};
+pub use parts::Part;
 pub use scene::{FrameView, Scene, Seen};
 pub use surfaces::{SceneConstants, Surface, Surfaces};
 

@@ -49,6 +49,9 @@ pub struct StyleRanges {
     pub turn_deg: [f64; 2],
     /// How long the person has been at it when the recording begins.
     pub begun_s: [f64; 2],
+    /// Walks back and forth go back backwards; not drawn.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub backward: bool,
 }
 
 impl Default for StyleRanges {
@@ -62,6 +65,7 @@ impl Default for StyleRanges {
             sideways_m: [-0.15, 0.15],
             turn_deg: [-10.0, 10.0],
             begun_s: [0.0, 4.0],
+            backward: false,
         }
     }
 }

@@ -102,6 +102,7 @@ fn sequence(config: &SiteConfig, subject: &str, action: Action, repetition: usiz
         path_scale: draw(ranges.path_scale),
         variation: draw(ranges.variation),
         seed: seed("motion"),
+        backward: ranges.backward,
     };
     person.distance_m = draw(ranges.distance_m);
     let upright = actions::placement(recorder.room.floor_m.unwrap_or(1.0), person.distance_m);

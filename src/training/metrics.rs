@@ -12,6 +12,12 @@ pub struct EpochMetrics {
     /// The same on held-out frames as at inference; `None` without any.
     pub validation_loss: Option<f64>,
     pub noise_rate: Option<f64>,
+    /// Of a single step, dB²; checkpoints of before do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest_loss: Option<f64>,
+    /// Largest absolute derivative of a step's loss by any number that learns, before clipping.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest_gradient: Option<f64>,
 }
 
 impl EpochMetrics {

@@ -3,6 +3,7 @@
 mod calibrate;
 pub mod checkpoint;
 mod config;
+mod largest;
 mod metrics;
 pub mod refine;
 mod site;

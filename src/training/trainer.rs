@@ -14,6 +14,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{
     EpochMetrics, FrameId, FrameSplit, LoadedRecording, RefinedPose, TrainingConfig, calibrate,
     checkpoint::{self, CheckpointState, Progress, Site},
+    largest::largest_gradient,
     refine, step_rng,
 };
 use crate::{
@@ -36,9 +37,11 @@ pub enum Event {
         training_frames: usize,
         validation_frames: usize,
     },
+    /// `gradient`: the largest absolute derivative of the loss by any number that learns, before clipping.
     Step {
         step: usize,
         loss: f64,
+        gradient: f64,
     },
     Epoch(EpochMetrics),
     Saved(PathBuf),
@@ -203,16 +206,18 @@ impl Trainer<'_> {
                 break;
             }
             let order = split.epoch_order(self.seed, epoch);
-            let mut sum = 0.0;
+            let (mut sum, mut largest) = (0.0, [0.0f64; 2]);
             let mut learning_rate = self.config.learning_rate;
             for batch in order.chunks(self.config.frames_per_step) {
                 learning_rate = self.config.learning_rate_at(progress.steps_done, steps);
                 let all: Vec<&[Prepared]> = std::iter::once(&prepared).chain(&further).map(Vec::as_slice).collect();
-                let (stepped, loss) = self.step(simulator, &mut optimizer, &all, batch, progress.steps_done, learning_rate)?;
+                let (stepped, loss, gradient) =
+                    self.step(simulator, &mut optimizer, &all, batch, progress.steps_done, learning_rate)?;
                 simulator = stepped;
                 sum += loss * batch.len() as f64;
+                largest = [largest[0].max(loss), largest[1].max(gradient)];
                 progress.steps_done += 1;
-                emit(Event::Step { step: progress.steps_done, loss });
+                emit(Event::Step { step: progress.steps_done, loss, gradient });
             }
             let metrics = EpochMetrics {
                 epoch,
@@ -220,6 +225,8 @@ impl Trainer<'_> {
                 training_loss: sum / order.len() as f64,
                 validation_loss: self.validate(&simulator, &prepared, &split.validation)?,
                 noise_rate: simulator.noise_rate(),
+                largest_loss: Some(largest[0]),
+                largest_gradient: Some(largest[1]),
             };
             progress.epochs_done = epoch + 1;
             let better = metrics.score() < progress.best_validation;
@@ -272,7 +279,7 @@ impl Trainer<'_> {
         Ok(())
     }
 
-    /// One step of the optimiser on a few frames; its loss, dB².
+    /// One step of the optimiser on a few frames; its loss, dB², and its largest gradient.
     ///
     /// `prepared`: for every device.
     fn step(
@@ -283,7 +290,7 @@ impl Trainer<'_> {
         batch: &[FrameId],
         step: usize,
         learning_rate: f64,
-    ) -> Result<(Simulator, f64)> {
+    ) -> Result<(Simulator, f64, f64)> {
         let mut rng = step_rng(self.seed, step, 0x57E9);
         let mode = Mode::Training { seed: rng.random() };
         let draws = draws(batch, &mut rng);
@@ -299,10 +306,12 @@ impl Trainer<'_> {
         }
         let mut sum = GradientsAccumulator::new();
         parts.into_iter().for_each(|(gradients, _)| sum.accumulate(&simulator, gradients));
-        let simulator = optimizer.step(learning_rate, simulator, sum.grads());
+        let gradients = sum.grads();
+        let gradient = largest_gradient(&simulator, &gradients);
+        let simulator = optimizer.step(learning_rate, simulator, gradients);
         match checkpoint::first_non_finite(&simulator) {
             Some(name) => Err(Error::NonFinite { stage: format!("the gradient of `{name}`"), step }),
-            None => Ok((simulator, value)),
+            None => Ok((simulator, value, gradient)),
         }
     }
 

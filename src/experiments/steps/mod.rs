@@ -2,11 +2,14 @@
 
 pub mod baseline;
 mod bench;
+mod figure;
 mod measure;
 pub mod simulate;
 mod sources;
 pub mod train;
 
 pub use bench::Bench;
+pub use figure::figure;
 pub use measure::{Speed, compare, read_json, recognise};
 pub use sources::{diagnose, site};
+pub use train::Stability;

@@ -2,13 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
+
+use super::measure::write_json;
 use super::{Bench, read_json};
 use crate::config::{Config, DataConfig};
 use crate::data::atomic;
 use crate::effects::EffectSetting;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::simulator::SimulatorConfig;
-use crate::training::{Event, TrainingConfig};
+use crate::training::checkpoint::read_state;
+use crate::training::{EpochMetrics, Event, Outcome, TrainingConfig};
 
 pub struct Task<'a> {
     pub recordings: &'a [PathBuf],
@@ -22,6 +26,41 @@ pub struct Task<'a> {
 /// Leaves the run folder that `hybridsim train` would: its `config.toml` makes the same again. A training that was killed
 /// goes on after its last whole epoch.
 pub fn train(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut(usize, usize)) -> Result<()> {
+    write_json(&folder.join("progress.json"), &run(task, folder, bench, step)?.progress)
+}
+
+/// How a training went.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Stability {
+    /// Steps of the optimiser that were done.
+    pub steps: usize,
+    /// Where a number was no longer finite; none where the training came to its end.
+    pub broke: Option<Broke>,
+    /// Whole epochs.
+    pub history: Vec<EpochMetrics>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Broke {
+    pub step: usize,
+    pub stage: String,
+}
+
+/// The same of a training that may break: that it does is a result.
+pub fn stability(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut(usize, usize)) -> Result<()> {
+    let found = match run(task, folder, bench, step) {
+        Ok(Outcome { progress, .. }) => Stability { steps: progress.steps_done, broke: None, history: progress.history },
+        Err(Error::NonFinite { stage, step }) => {
+            let last = folder.join("last");
+            let history = if last.is_dir() { read_state(&last)?.progress.history } else { vec![] };
+            Stability { steps: step, broke: Some(Broke { step, stage }), history }
+        }
+        Err(error) => return Err(error),
+    };
+    write_json(&folder.join("stability.json"), &found)
+}
+
+fn run(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut(usize, usize)) -> Result<Outcome> {
     let mut simulator = task.simulator.clone();
     if let Some(effects) = task.effects {
         simulator.effects.extend(read_json::<Vec<EffectSetting>>(effects)?);
@@ -40,14 +79,12 @@ pub fn train(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut
     let last = folder.join("last");
     atomic::recover(&last)?;
     let mut steps = 0;
-    let outcome = trainer.run(last.is_dir().then_some(last.as_path()), &mut |event| match event {
+    trainer.run(last.is_dir().then_some(last.as_path()), &mut |event| match event {
         Event::Started { steps: all, first_step, .. } => {
             steps = all;
             step(first_step, steps);
         }
         Event::Step { step: done, .. } => step(done, steps),
         _ => {}
-    })?;
-    let progress = serde_json::to_string_pretty(&outcome.progress).expect("plain data");
-    atomic::write_text(folder.join("progress.json"), &progress)
+    })
 }

@@ -1,20 +1,20 @@
 //! The actions that stay on one spot.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use nalgebra::{Vector3, vector};
 
 use super::{
     StyleConfig,
-    plan::{ArmPlan, FootPlan, Plan, ease},
+    plan::{ArmPlan, FootPlan, Plan, bump, ease},
     posing::Figure,
     variety::Variety,
     walking::{Gait, Waypoint},
 };
 
-fn standing(figure: &Figure) -> Plan {
+pub(super) fn standing(figure: &Figure) -> Plan {
     let foot = |out: f64| FootPlan { place: vector![1.15 * out * figure.hip_m(), 0.0, 0.0], heading: 0.12 * out, pitch: 0.0 };
-    let arm = ArmPlan { swing: 0.04, raise: 0.15, elbow: 0.22 };
+    let arm = ArmPlan { swing: 0.04, raise: 0.15, elbow: 0.22, twist: 0.0 };
     Plan { feet: [foot(1.0), foot(-1.0)], arms: [arm; 2], ..Plan::default() }
 }
 
@@ -31,22 +31,46 @@ pub fn torso_rotation(style: &StyleConfig, figure: &Figure, time: f64) -> Plan {
         swing: 0.25 - 0.10 * out * style.amplitude * phase.cos(),
         raise: 0.70,
         elbow: 1.75,
+        ..ArmPlan::default()
     });
     plan
 }
 
-/// Both arms swing far, in opposite directions.
-pub fn arm_swing(style: &StyleConfig, figure: &Figure, time: f64) -> Plan {
+/// Each arm swings again and again horizontally, upward or downward, drawn at random for every swing (paper, supplement 10).
+pub fn arm_swing(style: &StyleConfig, figure: &Figure, variety: &Variety, time: f64) -> Plan {
     let mut plan = standing(figure);
-    let phase = TAU * 0.75 * style.tempo * time;
-    plan.arms = [1.0, -1.0].map(|out| {
-        let forward = out * style.amplitude * phase.sin();
-        ArmPlan { swing: 0.15 + 0.85 * forward, raise: 0.16, elbow: 0.22 + 0.16 * (1.0 + forward) }
+    let phase = 0.55 * style.tempo * time;
+    let (number, within) = (phase.floor() as i64, phase - phase.floor());
+    let size = style.amplitude.min(1.15);
+    plan.arms = [0, 1].map(|side| {
+        let rest = plan.arms[side];
+        match variety.choice(side, number, 3) {
+            0 => horizontal(rest, size, within),
+            1 => upward(rest, size, within),
+            _ => downward(rest, size, within),
+        }
     });
     // The left shoulder follows the left arm forwards.
-    plan.trunk.y = -0.12 * style.amplitude * phase.sin();
-    plan.pelvis_turn.y = 0.03 * style.amplitude * phase.sin();
+    plan.trunk.y = -0.06 * (plan.arms[0].swing - plan.arms[1].swing);
     plan
+}
+
+/// Forwards to the height of the shoulder, out to the side, in again and down.
+fn horizontal(rest: ArmPlan, size: f64, within: f64) -> ArmPlan {
+    let lifted = ease(within / 0.28) - ease((within - 0.72) / 0.28);
+    ArmPlan { swing: rest.swing + 1.40 * lifted, raise: rest.raise + 1.10 * size * bump(within, 0.18, 0.64), ..rest }
+}
+
+/// Forwards and up beside the head.
+fn upward(rest: ArmPlan, size: f64, within: f64) -> ArmPlan {
+    let up = bump(within, 0.0, 1.0);
+    ArmPlan { swing: rest.swing + 2.40 * size * up, raise: rest.raise + 0.10 * up, ..rest }
+}
+
+/// From in front down and behind the back.
+fn downward(rest: ArmPlan, size: f64, within: f64) -> ArmPlan {
+    let (before, behind) = (bump(within, 0.0, 0.60), bump(within, 0.42, 0.58));
+    ArmPlan { swing: rest.swing + size * (1.30 * before - 0.65 * behind), elbow: rest.elbow + 0.20 * before, ..rest }
 }
 
 /// Steps on the spot with high knees.
@@ -81,7 +105,7 @@ pub fn lunge(style: &StyleConfig, figure: &Figure, variety: &Variety, time: f64)
     // Foot out, body down; body up, foot back.
     let stepped = ease((within - 0.04) / 0.26) - ease((within - 0.64) / 0.28);
     let lowered = ease((within - 0.12) / 0.30) - ease((within - 0.52) / 0.34);
-    let moving = |from: f64, length: f64| (PI * ((within - from) / length).clamp(0.0, 1.0)).sin().powi(2);
+    let moving = |from: f64, length: f64| bump(within, from, length);
     let lift = 0.09 * (moving(0.04, 0.26) + moving(0.64, 0.28));
 
     let front = number.rem_euclid(2) as usize;
@@ -93,7 +117,7 @@ pub fn lunge(style: &StyleConfig, figure: &Figure, variety: &Variety, time: f64)
     plan.pelvis_turn.x = 0.10 * lowered;
     plan.arms = [0, 1].map(|side| {
         let forward = if side == front { -0.25 } else { 0.35 };
-        ArmPlan { swing: 0.1 + forward * stepped, raise: 0.25, elbow: 0.3 + 0.8 * lowered }
+        ArmPlan { swing: 0.1 + forward * stepped, raise: 0.25, elbow: 0.3 + 0.8 * lowered, twist: 0.0 }
     });
     plan
 }

@@ -1,4 +1,5 @@
-//! The eight actions of the paper's data set as procedural motion: smooth, seeded, without a download.
+//! The eight actions of the paper's data set, and twelve smaller ones for a second scene, as procedural motion: smooth, seeded,
+//! without a download.
 //!
 //! An action says where pelvis, feet and arms should be at any time (`plan`); `posing` finds the joint rotations that
 //! bring them there. Feet that carry weight stay where they are on the floor.
@@ -6,6 +7,7 @@
 mod in_place;
 mod plan;
 mod posing;
+mod small;
 mod variety;
 mod walking;
 
@@ -31,9 +33,22 @@ pub enum Action {
     WalkBackForthArmswing,
     MarchInPlace,
     Lunge,
+    HandWave,
+    Drink,
+    ForearmCurl,
+    SideBend,
+    Bow,
+    KneeBend,
+    HeelRaise,
+    WeightShift,
+    Clap,
+    Jab,
+    HipCircle,
+    FootTap,
 }
 
 impl Action {
+    /// The paper's.
     pub const ALL: [Self; 8] = [
         Self::TorsoRotation,
         Self::WalkClockwise,
@@ -44,6 +59,28 @@ impl Action {
         Self::MarchInPlace,
         Self::Lunge,
     ];
+
+    /// Smaller ones, on the spot, for the second scene (paper, section 4.7, which does not say what its twelve are): the first
+    /// eight to train on, the last four to test.
+    pub const SMALL: [Self; 12] = [
+        Self::HandWave,
+        Self::Drink,
+        Self::ForearmCurl,
+        Self::SideBend,
+        Self::Bow,
+        Self::KneeBend,
+        Self::HeelRaise,
+        Self::WeightShift,
+        Self::Clap,
+        Self::Jab,
+        Self::HipCircle,
+        Self::FootTap,
+    ];
+
+    /// All that there are.
+    pub fn every() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().chain(Self::SMALL)
+    }
 
     /// The name in settings and labels.
     pub fn name(self) -> &'static str {
@@ -56,6 +93,18 @@ impl Action {
             Self::WalkBackForthArmswing => "walk_back_forth_armswing",
             Self::MarchInPlace => "march_in_place",
             Self::Lunge => "lunge",
+            Self::HandWave => "hand_wave",
+            Self::Drink => "drink",
+            Self::ForearmCurl => "forearm_curl",
+            Self::SideBend => "side_bend",
+            Self::Bow => "bow",
+            Self::KneeBend => "knee_bend",
+            Self::HeelRaise => "heel_raise",
+            Self::WeightShift => "weight_shift",
+            Self::Clap => "clap",
+            Self::Jab => "jab",
+            Self::HipCircle => "hip_circle",
+            Self::FootTap => "foot_tap",
         }
     }
 }
@@ -74,11 +123,14 @@ pub struct StyleConfig {
     pub variation: f64,
     /// Of the irregularity.
     pub seed: u64,
+    /// Walking back and forth goes back backwards, as the paper has it, and not after a turn.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub backward: bool,
 }
 
 impl Default for StyleConfig {
     fn default() -> Self {
-        Self { tempo: 1.0, amplitude: 1.0, path_scale: 1.0, variation: 1.0, seed: 0 }
+        Self { tempo: 1.0, amplitude: 1.0, path_scale: 1.0, variation: 1.0, seed: 0, backward: false }
     }
 }
 
@@ -135,15 +187,28 @@ pub fn motion(
 }
 
 fn plan(action: Action, style: &StyleConfig, figure: &Figure, variety: &Variety, time: f64) -> Plan {
+    let small = |action: &small::SmallAction| action.plan(style, figure, variety, time);
     let mut plan = match action {
         Action::TorsoRotation => in_place::torso_rotation(style, figure, time),
-        Action::ArmSwing => in_place::arm_swing(style, figure, time),
+        Action::ArmSwing => in_place::arm_swing(style, figure, variety, time),
         Action::MarchInPlace => in_place::march(style, figure, variety, time),
         Action::Lunge => in_place::lunge(style, figure, variety, time),
         Action::WalkClockwise => walking::circle(style, figure, variety, -1.0, time),
         Action::WalkCounterclockwise => walking::circle(style, figure, variety, 1.0, time),
         Action::WalkBackForth => walking::back_and_forth(style, figure, variety, 0.25, time),
         Action::WalkBackForthArmswing => walking::back_and_forth(style, figure, variety, 1.3, time),
+        Action::HandWave => small(&small::hand_wave::ACTION),
+        Action::Drink => small(&small::drink::ACTION),
+        Action::ForearmCurl => small(&small::forearm_curl::ACTION),
+        Action::SideBend => small(&small::side_bend::ACTION),
+        Action::Bow => small(&small::bow::ACTION),
+        Action::KneeBend => small(&small::knee_bend::ACTION),
+        Action::HeelRaise => small(&small::heel_raise::ACTION),
+        Action::WeightShift => small(&small::weight_shift::ACTION),
+        Action::Clap => small(&small::clap::ACTION),
+        Action::Jab => small(&small::jab::ACTION),
+        Action::HipCircle => small(&small::hip_circle::ACTION),
+        Action::FootTap => small(&small::foot_tap::ACTION),
     };
     variety.sway(&mut plan, time);
     plan

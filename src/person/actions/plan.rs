@@ -21,6 +21,8 @@ pub struct ArmPlan {
     /// Sideways; 0 hangs, π/2 is a T-pose.
     pub raise: f64,
     pub elbow: f64,
+    /// Of the upper arm about its own axis, which turns a bent forearm outwards (up where the arm is in a T-pose).
+    pub twist: f64,
 }
 
 /// The whole body. All numbers may be averaged, headings are not wrapped.
@@ -55,6 +57,7 @@ impl Plan {
             arm.swing += more.swing * weight;
             arm.raise += more.raise * weight;
             arm.elbow += more.elbow * weight;
+            arm.twist += more.twist * weight;
         }
     }
 
@@ -76,6 +79,11 @@ impl Plan {
 pub fn ease(fraction: f64) -> f64 {
     let fraction = fraction.clamp(0.0, 1.0);
     fraction * fraction * (3.0 - 2.0 * fraction)
+}
+
+/// The rise from 0 to 1 and the fall back to 0 between `from` and `from + length`, with level ends, and 0 beyond.
+pub fn bump(at: f64, from: f64, length: f64) -> f64 {
+    (std::f64::consts::PI * ((at - from) / length).clamp(0.0, 1.0)).sin().powi(2)
 }
 
 pub fn mix(from: f64, to: f64, share: f64) -> f64 {

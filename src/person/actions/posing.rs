@@ -51,6 +51,13 @@ impl Figure {
         self.thigh_m(0) + self.shank_m(0)
     }
 
+    /// How far an ankle rises when its foot stands on the ball with this pitch.
+    pub fn heel_rise_m(&self, pitch: f64) -> f64 {
+        let (ankle, ball) = (self.joints[7], self.joints[10]);
+        let (forward, height) = (ball.z - ankle.z, ankle.y - self.sole);
+        forward * pitch.sin() - height * (1.0 - pitch.cos())
+    }
+
     fn thigh_m(&self, side: usize) -> f64 {
         (self.joints[4 + side] - self.joints[1 + side]).norm()
     }
@@ -146,7 +153,7 @@ fn bend_arm(side: usize, arm: &ArmPlan, local: &mut [Rotation3<f64>]) {
     let lowering = FRAC_PI_2 - arm.raise;
     let collar = about(1, -0.08 * out * arm.swing) * about(2, -0.09 * out * lowering);
     local[13 + side] = collar;
-    local[16 + side] = collar.inverse() * about(0, -arm.swing) * about(2, -out * lowering);
+    local[16 + side] = collar.inverse() * about(0, -arm.swing) * about(2, -out * lowering) * about(0, -arm.twist);
     local[18 + side] = about(1, -out * arm.elbow);
     // Relaxed hands.
     local[20 + side] = about(2, -0.06 * out);

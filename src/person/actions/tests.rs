@@ -45,7 +45,7 @@ fn usual(action: Action, seconds: f64) -> Motion {
 
 #[test]
 fn the_feet_stay_on_the_floor() {
-    for action in Action::ALL {
+    for action in Action::every() {
         let motion = usual(action, 12.0);
         for (pose, (_, vertices)) in posed(body(), &motion, 3).iter().enumerate() {
             let lowest = vertices.iter().map(|vertex| vertex.y).fold(f64::INFINITY, f64::min);
@@ -57,7 +57,7 @@ fn the_feet_stay_on_the_floor() {
 #[test]
 fn a_foot_that_carries_weight_does_not_slide() {
     // While the lower foot is flat, its ankle moves at most a little (it pivots in turns).
-    for action in Action::ALL {
+    for action in Action::every() {
         let motion = usual(action, 10.0);
         let joints: Vec<Points> = posed(body(), &motion, 1).into_iter().map(|(joints, _)| joints).collect();
         let flat = body().rest_joints(&[])[7][1] + 0.936;
@@ -81,7 +81,7 @@ fn a_foot_that_carries_weight_does_not_slide() {
 
 #[test]
 fn knees_and_elbows_bend_the_way_they_do() {
-    for action in Action::ALL {
+    for action in Action::every() {
         let motion = usual(action, 10.0);
         for (pose, rotations) in motion.poses.iter().enumerate() {
             for joint in [4, 5] {
@@ -112,7 +112,7 @@ fn arms_hang_while_walking() {
 
 #[test]
 fn motions_are_smooth() {
-    for action in Action::ALL {
+    for action in Action::every() {
         let motion = usual(action, 12.0);
         let joints: Vec<Points> = posed(body(), &motion, 1).into_iter().map(|(joints, _)| joints).collect();
         let mut most = (0.0f64, 0.0f64);
@@ -132,7 +132,7 @@ fn motions_are_smooth() {
 #[test]
 fn twice_the_rate_halves_the_steps_of_the_velocity() {
     // Continuous velocity: its largest step between poses shrinks with the pose interval.
-    for action in Action::ALL {
+    for action in Action::every() {
         let step = |rate: f64| {
             let motion = motion(action, &StyleConfig::default(), body(), &[], 6.0, rate).unwrap();
             let joints: Vec<Points> = posed(body(), &motion, 1).into_iter().map(|(joints, _)| joints).collect();
@@ -217,9 +217,9 @@ fn lunges_go_down_and_marching_lifts_the_knees() {
 #[test]
 fn styles_and_bodies_change_the_motion_and_every_number_is_finite() {
     let model = procedural::person(&procedural::subject("s2").unwrap()).unwrap();
-    for action in Action::ALL {
+    for action in Action::every() {
         for (tempo, amplitude, path_scale) in [(0.3, 0.3, 0.3), (2.0, 1.5, 5.0), (1.0, 1.2, 0.5)] {
-            let style = StyleConfig { tempo, amplitude, path_scale, variation: 2.0, seed: 7 };
+            let style = StyleConfig { tempo, amplitude, path_scale, variation: 2.0, seed: 7, backward: amplitude == 1.2 };
             let motion = motion(action, &style, &model, &[0.5, -1.0], 6.0, 30.0).unwrap();
             assert_eq!(motion.poses.len(), 181);
             assert_eq!(motion.betas, [0.5, -1.0]);
@@ -261,7 +261,7 @@ fn settings_that_cannot_work_are_refused() {
 
 #[test]
 fn names_are_those_of_the_settings_file() {
-    for action in Action::ALL {
+    for action in Action::every() {
         let value = toml::Value::try_from(action).unwrap();
         assert_eq!(value.as_str(), Some(action.name()));
     }
@@ -281,4 +281,144 @@ fn arms_swing_against_the_legs() {
     let joints = posed(body(), &usual(Action::WalkBackForthArmswing, 2.0), 1);
     let product = joints.iter().map(|(joints, _)| (joints[20].z - joints[16].z - 0.1) * (joints[7].z - joints[1].z)).sum::<f64>();
     assert!(product < -0.5, "{product}");
+}
+
+/// Places of all joints, pose by pose, without the style's irregularity.
+fn regular(action: Action, style: &StyleConfig, seconds: f64, rate_hz: f64) -> Vec<Points> {
+    let style = StyleConfig { variation: 0.0, ..style.clone() };
+    let motion = motion(action, &style, body(), &[], seconds, rate_hz).unwrap();
+    posed(body(), &motion, 1).into_iter().map(|(joints, _)| joints).collect()
+}
+
+/// Root of the mean squared distance of joints, and of all poses.
+fn apart(one: &[Points], other: &[Points]) -> f64 {
+    let squares = one.iter().zip(other).flat_map(|(one, other)| one.iter().zip(other).map(|(a, b)| (a - b).norm_squared()));
+    (squares.sum::<f64>() / (one.len() * one[0].len()) as f64).sqrt()
+}
+
+#[test]
+fn small_actions_repeat_themselves_after_their_period_and_not_before() {
+    for (action, rate_hz) in Action::SMALL.into_iter().zip([1.2, 0.25, 0.7, 0.4, 0.35, 0.5, 0.6, 0.45, 1.3, 0.8, 0.5, 1.1]) {
+        for tempo in [1.0, 0.8] {
+            // So many poses that a period is a whole number of them.
+            let poses = 48;
+            let joints =
+                regular(action, &StyleConfig { tempo, ..Default::default() }, 2.2 / (tempo * rate_hz), 48.0 * tempo * rate_hz);
+            let (first, second) = (&joints[..poses], &joints[poses..2 * poses]);
+            assert!(apart(first, second) < 1e-9, "{}: {}", action.name(), apart(first, second));
+            // Half of it is no period.
+            let half = apart(first, &joints[poses / 2..poses + poses / 2]);
+            assert!(half > 0.003, "{}: {half}", action.name());
+        }
+    }
+}
+
+/// Aligned in time as well as they can be, no action is another one.
+#[test]
+fn small_actions_differ_from_each_other() {
+    // One repetition of each, sampled alike.
+    let cycle =
+        |(action, rate_hz): (Action, f64)| regular(action, &StyleConfig::default(), 1.0 / rate_hz, 40.0 * rate_hz)[..40].to_vec();
+    let rates = [1.2, 0.25, 0.7, 0.4, 0.35, 0.5, 0.6, 0.45, 1.3, 0.8, 0.5, 1.1];
+    let cycles: Vec<Vec<Points>> = Action::SMALL.into_iter().zip(rates).map(cycle).collect();
+    for (index, one) in cycles.iter().enumerate() {
+        for (other, another) in cycles.iter().enumerate().skip(index + 1) {
+            let nearest =
+                (0..40).map(|shift| apart(one, &[&another[shift..], &another[..shift]].concat())).fold(f64::INFINITY, f64::min);
+            let names = [Action::SMALL[index].name(), Action::SMALL[other].name()];
+            assert!(nearest > 0.01, "{names:?} differ by {nearest} m");
+        }
+    }
+}
+
+#[test]
+fn small_actions_are_smaller_than_the_papers() {
+    let speed = |action: Action| {
+        let joints = regular(action, &StyleConfig::default(), 10.0, 60.0);
+        60.0 * apart(&joints[1..], &joints[..joints.len() - 1])
+    };
+    let slowest = Action::ALL.into_iter().map(speed).fold(f64::INFINITY, f64::min);
+    let speeds: Vec<f64> = Action::SMALL.into_iter().map(speed).collect();
+    let mean = speeds.iter().sum::<f64>() / speeds.len() as f64;
+    assert!(mean < slowest, "{speeds:?} m/s, the paper's slowest {slowest}");
+}
+
+/// The normal ranges of the American Academy of Orthopaedic Surgeons ("Joint Motion: Method of Measuring and Recording",
+/// 1965): elbow 150°, knee 135°, hip 120°, ankle 50° down and 20° up, trunk 80° ahead, 35° aside and 45° about itself, neck 45°.
+#[test]
+fn small_actions_and_the_arm_swing_keep_within_the_ranges_of_the_joints() {
+    for action in Action::SMALL.into_iter().chain([Action::ArmSwing]) {
+        for (pose, rotations) in usual(action, 12.0).poses.iter().enumerate() {
+            let angle = |joint: usize| Vector3::from(rotations[joint]).norm().to_degrees();
+            let within = |what: &str, found: f64, most: f64| {
+                assert!(found <= most, "{} pose {pose}: {what} {found:.0} degrees", action.name());
+            };
+            for side in 0..2 {
+                within("elbow", angle(18 + side), 150.0);
+                within("knee", angle(4 + side), 135.0);
+                within("hip", angle(1 + side), 120.0);
+                // About x: heel up is positive, toes up negative.
+                let ankle = rotations[7 + side][0].to_degrees();
+                within("ankle, foot down", ankle, 50.0);
+                within("ankle, foot up", -ankle, 20.0);
+            }
+            // Three joints share the trunk's, two the neck's.
+            let trunk = Vector3::from(rotations[3]).map(|part| 3.0 * part.to_degrees());
+            within("trunk ahead", trunk.x.abs(), 80.0);
+            within("trunk about itself", trunk.y.abs(), 45.0);
+            within("trunk aside", trunk.z.abs(), 35.0);
+            within("neck", 2.0 * angle(12), 45.0);
+        }
+    }
+}
+
+#[test]
+fn arm_swings_go_horizontally_upward_and_downward_at_random() {
+    let style = StyleConfig { seed: 4, ..StyleConfig::default() };
+    let motion = motion(Action::ArmSwing, &style, body(), &[], 40.0, 30.0).unwrap();
+    let joints = posed(body(), &motion, 1);
+    // Of every swing of either arm: the wrist's farthest way up, to the side and behind, seen from the shoulder.
+    let mut seen = [0; 3];
+    let repetition = (30.0 / 0.55f64) as usize;
+    for side in 0..2 {
+        let out = if side == 0 { 1.0 } else { -1.0 };
+        for swing in joints.chunks_exact(repetition) {
+            let reach: Points = swing.iter().map(|(joints, _)| joints[20 + side] - joints[16 + side]).collect();
+            let most = |of: &dyn Fn(&Vector3<f64>) -> f64| reach.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+            let level = most(&|wrist| if wrist.y.abs() < 0.2 { out * wrist.x } else { f64::NEG_INFINITY });
+            seen[0] += usize::from(level > 0.35);
+            seen[1] += usize::from(most(&|wrist| wrist.y) > 0.3);
+            seen[2] += usize::from(most(&|wrist| -wrist.z) > 0.15);
+        }
+    }
+    assert!(seen.iter().all(|&count| count >= 5), "{seen:?}");
+    let other = StyleConfig { seed: 5, ..style };
+    assert_ne!(motion.poses, super::motion(Action::ArmSwing, &other, body(), &[], 40.0, 30.0).unwrap().poses);
+}
+
+#[test]
+fn walking_backward_faces_the_radar_all_the_time() {
+    let style = StyleConfig { backward: true, ..StyleConfig::default() };
+    for action in [Action::WalkBackForth, Action::WalkBackForthArmswing] {
+        let motion = motion(action, &style, body(), &[], 14.0, 60.0).unwrap();
+        let (mut ahead, mut back) = (0, 0);
+        for (pose, pair) in motion.translations.windows(2).enumerate() {
+            let facing = Rotation3::new(Vector3::from(motion.poses[pose][0])) * Vector3::z();
+            assert!(facing.z > 0.9, "{} pose {pose}", action.name());
+            let speed = 60.0 * (pair[1][2] - pair[0][2]);
+            ahead += usize::from(speed > 0.6);
+            back += usize::from(speed < -0.6);
+        }
+        assert!(ahead > 150 && back > 150, "{}: {ahead} poses ahead, {back} back", action.name());
+        let [low, high] = [f64::min, f64::max].map(|pick| motion.translations.iter().map(|place| place[2]).reduce(pick).unwrap());
+        assert!((low + 1.0).abs() < 0.1 && (high - 1.0).abs() < 0.1, "{low} to {high}");
+        // As on the floor and as smooth as the others.
+        let joints = posed(body(), &motion, 1);
+        let lowest = |vertices: &Points| vertices.iter().map(|vertex| vertex.y).fold(f64::INFINITY, f64::min);
+        assert!(joints.iter().step_by(3).all(|(_, vertices)| (-0.015..0.01).contains(&lowest(vertices))), "{}", action.name());
+        let jump = joints.windows(3).flat_map(|triple| {
+            (0..24).map(move |joint| (triple[2].0[joint] - triple[1].0[joint] * 2.0 + triple[0].0[joint]).norm())
+        });
+        assert!(jump.fold(0.0, f64::max) * 3600.0 < 60.0, "{}", action.name());
+    }
 }

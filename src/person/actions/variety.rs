@@ -45,6 +45,12 @@ impl Variety {
         1.0 + 0.06 * self.scale * self.steps[number.rem_euclid(STEPS as i64) as usize][0]
     }
 
+    /// Which of `count` ways the n-th repetition of a side takes: at random, however regular the style.
+    pub fn choice(&self, side: usize, number: i64, count: usize) -> usize {
+        let [_, _, drawn] = self.steps[(2 * number + side as i64).rem_euclid(STEPS as i64) as usize];
+        ((0.5 * (drawn + 1.0) * count as f64) as usize).min(count - 1)
+    }
+
     /// Adds the sway of a living body.
     pub fn sway(&self, plan: &mut Plan, time: f64) {
         let wander = |channel: usize| self.wander(channel, time);

@@ -49,7 +49,7 @@ impl<Path: Fn(f64) -> Waypoint> Gait<'_, Path> {
         let reaching = (TAU * (phase - self.arm_phase)).cos();
         let arm = |sign: f64| {
             let forward = sign * reaching * self.arm_swing * mix(0.35, 1.0, here.pace);
-            ArmPlan { swing: 0.04 + forward, raise: 0.15, elbow: self.elbow + 0.35 * (forward + self.arm_swing) }
+            ArmPlan { swing: 0.04 + forward, raise: 0.15, elbow: self.elbow + 0.35 * (forward + self.arm_swing), twist: 0.0 }
         };
         Plan {
             pelvis: here.place + leftwards(here.heading) * (0.018 * carrying),
@@ -151,28 +151,85 @@ pub fn circle(style: &StyleConfig, figure: &Figure, variety: &Variety, sense: f6
     plan
 }
 
-/// Along z through the origin, first towards +z, turning on the spot at both ends.
+/// Along z through the origin, first towards +z, turning on the spot at both ends, or going backwards from the far one.
 pub fn back_and_forth(style: &StyleConfig, figure: &Figure, variety: &Variety, arms: f64, time: f64) -> Plan {
+    if style.backward {
+        return forth_and_backward(style, figure, variety, arms, time);
+    }
     let (length, speed) = (2.0 * style.path_scale, cruise(style, figure).1);
     // Starting takes this long, and so does stopping; a way shorter than both is walked slower.
     let (start_s, turn_s) = (0.7 / style.tempo, 1.6 / style.tempo);
     let speed = speed.min(length / start_s);
     let way_s = length / speed + start_s;
     let half = way_s + turn_s;
+    let way = Way { speed, start_s, way_s };
     let path = |time: f64| {
         let number = (time / half).floor();
         let within = time - number * half;
         let returning = number.rem_euclid(2.0) == 1.0;
-        let travelled = |time: f64| {
-            let begun = (time / start_s).clamp(0.0, 1.0);
-            speed * (start_s * (begun.powi(3) - 0.5 * begun.powi(4)) + (time - start_s).max(0.0))
-        };
-        let gone = if within < 0.5 * way_s { travelled(within) } else { length - travelled((way_s - within).max(0.0)) };
-        let pace = ease(within / start_s) * ease((way_s - within) / start_s);
+        let (gone, pace) = way.at(within);
         // Turns to the left at the near end and back to the right at the far end.
         let turned = PI * ease((within - way_s) / turn_s);
         let (sign, heading) = if returning { (-1.0, PI - turned) } else { (1.0, turned) };
         Waypoint { place: vector![0.0, 0.0, sign * (gone - 0.5 * length)], heading, pace }
     };
     gait(path, style, figure, variety, arms).plan(time)
+}
+
+/// A straight way from standing to standing.
+struct Way {
+    speed: f64,
+    /// Starting takes this long, and so does stopping.
+    start_s: f64,
+    way_s: f64,
+}
+
+impl Way {
+    /// Metres gone after this time, and the speed relative to cruising.
+    fn at(&self, time: f64) -> (f64, f64) {
+        let Self { speed, start_s, way_s } = *self;
+        let travelled = |time: f64| {
+            let begun = (time / start_s).clamp(0.0, 1.0);
+            speed * (start_s * (begun.powi(3) - 0.5 * begun.powi(4)) + (time - start_s).max(0.0))
+        };
+        let length = speed * (way_s - start_s);
+        let gone = if time < 0.5 * way_s { travelled(time) } else { length - travelled((way_s - time).max(0.0)) };
+        (gone, ease(time / start_s) * ease((way_s - time) / start_s))
+    }
+}
+
+/// Share of the stride at which both feet are on the floor.
+const BOTH_FEET: f64 = 0.05;
+
+/// Towards +z and backwards again, facing +z all the time (paper, supplement 10).
+///
+/// The joints of a backward walk move nearly as those of a forward one reversed in time (Winter, Pluck and Yang, "Backward
+/// walking: a simple reversal of forward walking?", 1989). So the gait has a clock of its own, which slows down, stands and runs
+/// backwards; it stands where both feet are on the floor.
+fn forth_and_backward(style: &StyleConfig, figure: &Figure, variety: &Variety, arms: f64, time: f64) -> Plan {
+    let (length, (strides_per_s, speed)) = (2.0 * style.path_scale, cruise(style, figure));
+    let (start_s, turn_s) = (0.7 / style.tempo, 1.2 / style.tempo);
+    let speed = speed.min(length / start_s);
+    // Whole steps, so that the other end is one where both feet are on the floor, too.
+    let steps = (2.0 * strides_per_s * (length / speed + start_s)).ceil();
+    let way_s = 0.5 * steps / strides_per_s;
+    let way = Way { speed: length / (way_s - start_s), start_s, way_s };
+    // What the clock still runs while it slows down as a cosine.
+    let slowing_s = turn_s / PI;
+    let full_s = way_s - 2.0 * slowing_s;
+    let half_s = full_s + turn_s;
+    let number = (time / half_s).floor();
+    let within = time - number * half_s;
+    let run = if within < full_s {
+        slowing_s + within
+    } else {
+        slowing_s + full_s + slowing_s * (PI * (within - full_s) / turn_s).sin()
+    };
+    let clock = if number.rem_euclid(2.0) == 0.0 { run } else { way_s - run };
+    let first = BOTH_FEET / strides_per_s;
+    let path = |time: f64| {
+        let (gone, pace) = way.at(time - first);
+        Waypoint { place: vector![0.0, 0.0, gone - 0.5 * length], heading: 0.0, pace }
+    };
+    gait(path, style, figure, variety, arms).plan(first + clock)
 }

@@ -1,0 +1,216 @@
+//! Stages beyond the comparison on the first site and the adaptation to another room: the second scene, the long trainings whose
+//! stability is asked for, and the figures.
+
+use std::path::PathBuf;
+
+use super::{Method, MethodStages, Place, Planner, Trained};
+use crate::error::{Error, Result};
+use crate::experiments::config::{Protocol, SecondSceneConfig, StabilityConfig};
+use crate::experiments::figures::{FigureColumn, FigureTask, Panel};
+use crate::experiments::preflight;
+use crate::experiments::results::ARM_SWING;
+use crate::experiments::takes::Take;
+use crate::experiments::task::Task;
+use crate::experiments::variants::Variant;
+use crate::simulator::Part;
+
+impl Planner<'_> {
+    /// Trained on some actions of the second scene, scored and recognised on others (paper, section 4.7; that the classifier
+    /// tells the evaluated actions apart, learned from simulations of the very motions it is tested on as in section 4.4, is our
+    /// reading).
+    pub(super) fn second_scene(&mut self, first: &Place, place: &Place, scene: &SecondSceneConfig, ours: &Trained) -> Result<()> {
+        let config = self.config;
+        let subject = &config.split.training;
+        for (key, actions) in [("training", &scene.training), ("evaluated", &scene.evaluated)] {
+            let shown = |action: &String| place.of_subject(subject).any(|take| take.action == *action);
+            if let Some(missing) = actions.iter().find(|action| !shown(action)) {
+                return Err(Error::setting(format!("second_scene.{key}"), missing, format!("an action of {subject} there")));
+            }
+        }
+        preflight::check(config, "second_scene.site", &place.board)?;
+        preflight::check_recognition(config, &place.board)?;
+        preflight::check_same_board("second_scene.site", &first.board, &place.board)?;
+        let of = |actions: &[String]| -> Vec<&Take> {
+            place.of_subject(subject).filter(|take| actions.contains(&take.action)).collect()
+        };
+        let (learned, tested) = (of(&scene.training), of(&scene.evaluated));
+        let task = Task::Train {
+            recordings: learned.iter().map(|take| place.recordings.join(&take.name)).collect(),
+            names: learned.iter().map(|take| take.name.clone()).collect(),
+            simulator: Box::new(config.simulator.clone()),
+            training: Box::new(config.training.clone()),
+            seed: config.seed,
+            effects: None,
+            start_from: None,
+        };
+        let stage = self.add(format!("train/{}", Method::SceneOurs.id()), vec![], Some(place), task);
+        let there = Trained { stage, checkpoint: self.folder(stage).join("last") };
+        for (method, trained) in [(Method::SceneOurs, &there), (Method::SceneUnadapted, ours)] {
+            let mut stages = MethodStages { train: Some(trained.stage), ..Default::default() };
+            let mut folders = vec![];
+            for take in &tested {
+                let simulate = self.simulate(method, place, take, trained);
+                stages.simulate.push(simulate);
+                folders.push(self.folder(simulate).join("recording"));
+                self.scene_scores(&mut stages, method, place, take, vec![simulate], folders[folders.len() - 1].clone());
+            }
+            let parents = stages.simulate.clone();
+            self.scene_recognition(&mut stages, method, place, &tested, parents, folders);
+            self.plan.methods.push((method, stages));
+        }
+        if place.again.subjects.contains(subject) {
+            let mut stages = MethodStages::default();
+            let folders: Vec<PathBuf> = tested.iter().map(|take| place.again.folder.join(&take.name)).collect();
+            for (take, folder) in tested.iter().zip(&folders) {
+                self.scene_scores(&mut stages, Method::SceneAgain, place, take, vec![], folder.clone());
+            }
+            self.scene_recognition(&mut stages, Method::SceneAgain, place, &tested, vec![], folders);
+            self.plan.methods.push((Method::SceneAgain, stages));
+        }
+        Ok(())
+    }
+
+    fn scene_scores(
+        &mut self,
+        stages: &mut MethodStages,
+        method: Method,
+        place: &Place,
+        take: &Take,
+        parents: Vec<usize>,
+        simulated: PathBuf,
+    ) {
+        let task = self.compare(place, take, simulated, false);
+        let stage = self.add(format!("compare/{}/{}", method.id(), take.name), parents, Some(place), task);
+        stages.note(stage, take, false);
+    }
+
+    fn scene_recognition(
+        &mut self,
+        stages: &mut MethodStages,
+        method: Method,
+        place: &Place,
+        tested: &[&Take],
+        parents: Vec<usize>,
+        folders: Vec<PathBuf>,
+    ) {
+        if self.config.protocols.contains(&Protocol::SameMotions) {
+            let stage = self.recognition(method.id(), Protocol::SameMotions, place, tested, parents, folders);
+            stages.recognition.insert(Protocol::SameMotions, stage);
+        }
+    }
+
+    /// Two long trainings on the first site, with the graph convolution and without.
+    pub(super) fn stability(&mut self, place: &Place, stability: &StabilityConfig) {
+        let config = self.config;
+        let (recordings, names) = super::training_takes(config, place);
+        for variant in [Variant::Ours, Variant::WithoutGcn] {
+            let task = Task::Stability {
+                recordings: recordings.clone(),
+                names: names.clone(),
+                simulator: Box::new(variant.settings(&config.simulator, &config.dense_surface)),
+                training: Box::new(stability.training(&config.training)),
+                seed: config.seed,
+            };
+            let stage = self.add(format!("stability/{}", variant.id()), vec![], Some(place), task);
+            self.plan.stability.push((variant, stage));
+        }
+    }
+
+    /// The paper's pictures of range-Doppler maps, as far as their variants are asked for.
+    pub(super) fn figures(&mut self, place: &Place, ours: &Trained) {
+        let unseen: Vec<&Take> = place.of_subject(&self.config.split.unseen).collect();
+        let column = |title: &str, panel: Panel| FigureColumn { title: title.into(), panel };
+        let parts = Part::ALL.map(|part| column(part.name(), Panel::Part(part)));
+        let whole = [column("sum", Panel::Whole), column("measured", Panel::Measured)];
+        // One row for each action.
+        let mut actions: Vec<&Take> = vec![];
+        for take in &unseen {
+            if !actions.iter().any(|known| known.action == take.action) {
+                actions.push(take);
+            }
+        }
+        // Effects act on the sum.
+        if self.config.simulator.effects.is_empty() {
+            let columns = parts.into_iter().chain(whole).collect();
+            self.figure(
+                "decomposition",
+                "Parts of the signal, range-Doppler, middle frame",
+                false,
+                columns,
+                &actions,
+                place,
+                ours,
+            );
+        }
+        let Some(&take) = unseen.iter().find(|take| take.action == ARM_SWING).or(unseen.first()) else { return };
+        let simulated = |planner: &Self, title: &str, variant: Variant| {
+            let stage = planner.simulated(Method::Variant(variant), take)?;
+            Some(column(title, Panel::Simulated(vec![planner.folder(stage).join("recording")])))
+        };
+        let of = |planner: &Self, list: &[(&str, Variant)]| -> Option<Vec<FigureColumn>> {
+            list.iter().map(|&(title, variant)| simulated(planner, title, variant)).collect()
+        };
+        let noises =
+            [("no noise", Variant::WithoutNoise), ("fixed noise", Variant::FixedNoise), ("learned noise", Variant::Ours)];
+        if let Some(mut columns) = of(self, &noises) {
+            columns.push(column("measured", Panel::Measured));
+            self.figure("noise", "Noise, range-Doppler, middle frame", false, columns, &[take], place, ours);
+        }
+        if let Some(learned) =
+            of(self, &[("learned by a linear loss", Variant::LinearLoss), ("learned by a dB loss", Variant::Ours)])
+        {
+            let measured = [column("measured, linear", Panel::MeasuredLinear), column("measured, dB", Panel::Measured)];
+            let columns = measured.into_iter().chain(learned).collect();
+            self.figure("loss_scale", "Linear or dB, range-Doppler, middle frame", false, columns, &[take], place, ours);
+        }
+        let graphs = [
+            ("no GCN in training", Variant::WithoutGcn),
+            ("GCN at inference", Variant::GcnAtInference),
+            ("HybridSim", Variant::Ours),
+        ];
+        if let Some(mut columns) = of(self, &graphs) {
+            columns.push(column("measured", Panel::Measured));
+            let title = "Graph convolution, range-Doppler, middle frame, static removed";
+            self.figure("graph", title, true, columns, &[take], place, ours);
+        }
+    }
+
+    /// The stage that simulated a recording of the first site.
+    fn simulated(&self, method: Method, take: &Take) -> Option<usize> {
+        let name = format!("simulate/{}/{}", method.id(), take.name);
+        self.plan.stages.iter().position(|stage| stage.key.name == name)
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "one call says all of a figure")]
+    fn figure(
+        &mut self,
+        name: &str,
+        title: &str,
+        static_removed: bool,
+        columns: Vec<FigureColumn>,
+        takes: &[&Take],
+        place: &Place,
+        ours: &Trained,
+    ) {
+        let mut parents = vec![ours.stage];
+        for column in &columns {
+            if let Panel::Simulated(folders) = &column.panel {
+                let of = |stage: &usize| folders.iter().any(|folder| folder.starts_with(self.folder(*stage)));
+                parents.extend((0..self.plan.stages.len()).filter(of));
+            }
+        }
+        let task = FigureTask {
+            figure: name.into(),
+            title: title.into(),
+            static_removed,
+            columns,
+            measured: takes.iter().map(|take| place.recordings.join(&take.name)).collect(),
+            names: takes.iter().map(|take| take.name.clone()).collect(),
+            actions: takes.iter().map(|take| take.action.clone()).collect(),
+            checkpoint: ours.checkpoint.clone(),
+            seed: self.config.seed,
+        };
+        let stage = self.add(format!("figure/{name}"), parents, Some(place), Task::Figure(Box::new(task)));
+        self.plan.figures.push((name.into(), stage));
+    }
+}
