@@ -301,9 +301,9 @@ fn small_actions_repeat_themselves_after_their_period_and_not_before() {
     for (action, rate_hz) in Action::SMALL.into_iter().zip([1.2, 0.25, 0.7, 0.4, 0.35, 0.5, 0.6, 0.45, 1.3, 0.8, 0.5, 1.1]) {
         for tempo in [1.0, 0.8] {
             // So many poses that a period is a whole number of them.
-            let poses = 48;
+            let poses = 96;
             let joints =
-                regular(action, &StyleConfig { tempo, ..Default::default() }, 2.2 / (tempo * rate_hz), 48.0 * tempo * rate_hz);
+                regular(action, &StyleConfig { tempo, ..Default::default() }, 2.2 / (tempo * rate_hz), 96.0 * tempo * rate_hz);
             let (first, second) = (&joints[..poses], &joints[poses..2 * poses]);
             assert!(apart(first, second) < 1e-9, "{}: {}", action.name(), apart(first, second));
             // Half of it is no period.

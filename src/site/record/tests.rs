@@ -119,11 +119,13 @@ fn a_person_outside_the_room_is_refused_before_anything_is_recorded() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("site");
     let mut config = tiny();
-    config.record.room.front_m = Some(3.4);
+    // The wall where they stand.
+    config.style.distance_m = [3.2, 3.2];
+    config.record.room.front_m = Some(3.2);
     let message = make(&config, &out, Shard::ALL).unwrap_err().to_string();
-    assert!(message.contains("style of s1_") && message.contains("front"), "{message}");
+    assert!(message.contains("style of s") && message.contains("front"), "{message}");
     config = tiny();
-    config.style.distance_m = [0.5, 0.5];
+    config.style.distance_m = [0.2, 0.2];
     config.record.room.back_m = None;
     let message = make(&config, &out, Shard::ALL).unwrap_err().to_string();
     assert!(message.contains("radar"), "{message}");
