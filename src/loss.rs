@@ -1,4 +1,4 @@
-//! The loss: how far two range-Doppler maps are apart in decibels (ℒ of the paper, sec. 3.4 and supplement 7).
+//! The loss: how far two range-Doppler maps are apart in decibels (ℒ of the paper, sec. 3.4 and supplement 8).
 
 use burn::tensor::{Tensor, TensorCreationOptions};
 use serde::{Deserialize, Serialize};
@@ -28,7 +28,7 @@ pub enum Scale {
     /// Decibels (the paper).
     #[default]
     Db,
-    /// The amplitude over that of the recording's strongest cell: what the paper's supplement 7 argues against.
+    /// The amplitude over that of the recording's strongest cell: what the paper's supplement 8 argues against.
     Linear,
 }
 

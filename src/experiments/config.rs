@@ -82,7 +82,7 @@ pub struct SubjectSplit {
     pub training: String,
     /// No simulator and no classifier learns from this subject's measured recordings.
     pub unseen: String,
-    /// A second unseen subject, on whom the full simulator alone is scored (paper, supplement 8). No simulator learns from
+    /// A second unseen subject, on whom the full simulator alone is scored (paper, supplement 9). No simulator learns from
     /// this subject, and no classifier that is tested on it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub additional: Option<String>,
@@ -110,7 +110,7 @@ impl Default for AdaptationConfig {
     }
 }
 
-/// Another room with other, smaller actions (paper, section 4.7).
+/// Another room with other, smaller actions (paper, section 4.8).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SecondSceneConfig {
@@ -133,7 +133,7 @@ fn tested_actions() -> Vec<String> {
 }
 
 /// A long training with the graph convolution and one without it, neither of them tamed: the learning rate stays, and the
-/// gradient is not clipped, of which the paper says nothing (supplement 9: without it training breaks, "typically around epoch
+/// gradient is not clipped, of which the paper says nothing (supplement 10: without it training breaks, "typically around epoch
 /// 7400").
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

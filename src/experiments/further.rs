@@ -44,7 +44,7 @@ pub fn additional(results: &Results) -> String {
     }
     let note = "The full simulator on a second subject whom no simulator learned from; the classifier learned from simulations \
                 of this subject's own motions. The embedded subjects have stature and proportions but no sex.";
-    let mut table = Table::new("An additional unseen subject (paper, supplement 8)", note, &COLUMNS);
+    let mut table = Table::new("An additional unseen subject (paper, supplement 9)", note, &COLUMNS);
     for found in found {
         let paper = paper::additional(found.method);
         let recognition = recognised(found.additional_recognition.as_ref(), paper);
@@ -61,9 +61,9 @@ pub fn second_scene(results: &Results) -> String {
         return String::new();
     }
     let note = "Smaller actions on the spot in another room: trained on some, scored on all frames of others, which the classifier \
-                tells apart. That it learned from simulations of the very motions it is tested on, as in the paper's section 4.4, is our \
+                tells apart. That it learned from simulations of the very motions it is tested on, as in the paper's section 4.5, is our \
                 reading; which twelve actions the paper has, it does not say.";
-    let mut table = Table::new("Second scene with other actions (paper, section 4.7)", note, &COLUMNS);
+    let mut table = Table::new("Second scene with other actions (paper, section 4.8)", note, &COLUMNS);
     for found in found {
         let paper = paper::second_scene(found.method);
         let recognition = recognised(found.recognition.get(&Protocol::SameMotions), paper);
@@ -89,7 +89,7 @@ pub fn stability(results: &Results) -> String {
         "largest gradient, median over epochs",
         "largest gradient",
     ];
-    let mut table = Table::new("Stability without graph convolution (paper, supplement 9)", note, &columns);
+    let mut table = Table::new("Stability without graph convolution (paper, supplement 10)", note, &columns);
     for found in &results.stability {
         table.row(&stability_row(found));
     }
@@ -130,7 +130,7 @@ pub fn decomposition(levels: Option<&Levels>) -> String {
     let note = "Power of the middle frame over that of the measured one, dB: all of it, and with the static part removed from both. \
                 `decomposition.png` shows the maps.";
     let columns: Vec<&str> = std::iter::once("action").chain(levels.columns.iter().map(String::as_str)).collect();
-    let mut table = Table::new("Parts of the signal (paper, supplement 12)", note, &columns);
+    let mut table = Table::new("Parts of the signal (paper, supplement 13)", note, &columns);
     for (row, action) in levels.rows.iter().enumerate() {
         let shown = |value: Option<f64>| value.map_or("none".into(), |db| format!("{db:.1}"));
         let pairs = levels.all_db[row].iter().zip(&levels.moving_db[row]);

@@ -36,7 +36,7 @@ pub fn intra(method: Method) -> Paper {
     }
 }
 
-/// Tables 1 (unseen human), 3 and 5, and the recognition of table 2 and of section 4.6, all on the unseen subject.
+/// Tables 1 (unseen human), 3 and 5, and the recognition of table 2 and of section 4.7, all on the unseen subject.
 pub fn cross(method: Method) -> Paper {
     let (found, recognition) = match method {
         Method::Baseline(BaselineName::RfGenesis) => (scores(20.02, 0.218, 0.271), recognised(30.68, 0.2584)),

@@ -101,11 +101,11 @@ pub fn tables(results: &Results) -> String {
     text += &ablation(results, "Coupled Gaussian patches (paper, table 3)", "", &variants(&[Variant::Coupled, Variant::Ours]));
     let mut indirect = vec![Method::Baseline(BaselineName::TwoBounce), Method::ReceiverNoise(BaselineName::TwoBounce)];
     indirect.extend(variants(&[Variant::WithoutIndirect, Variant::Ours]));
-    text += &ablation(results, "Indirect path (paper, section 4.6)", "", &indirect);
+    text += &ablation(results, "Indirect path (paper, section 4.7)", "", &indirect);
     let noises = [Variant::WithoutNoise, Variant::FixedNoise, Variant::ThermalNoise, Variant::Ours];
     text += &ablation(results, "Noise (paper, table 4)", "", &variants(&noises));
     let scales = variants(&[Variant::LinearLoss, Variant::Ours]);
-    text += &ablation(results, "Linear or dB loss (paper, supplement 7, which shows maps alone)", "", &scales);
+    text += &ablation(results, "Linear or dB loss (paper, supplement 8, which shows maps alone)", "", &scales);
     text += &ablation(
         results,
         "Graph convolution (paper, table 5)",

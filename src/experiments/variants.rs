@@ -14,19 +14,19 @@ pub enum Variant {
     Ours,
     /// Both paths by Gaussian patches (paper, table 3).
     Coupled,
-    /// Paper, section 4.6.
+    /// Paper, section 4.7.
     WithoutIndirect,
-    /// No graph convolution in training (paper, supplement 9).
+    /// No graph convolution in training (paper, supplement 10).
     WithoutGcn,
     /// Ours, with the graph convolution kept on at inference (paper, tables 5 and 6).
     GcnAtInference,
     /// Paper, table 4.
     WithoutNoise,
-    /// The paper's fixed rate of 0.025 (paper, table 4 and supplement 11).
+    /// The paper's fixed rate of 0.025 (paper, table 4 and supplement 12).
     FixedNoise,
     /// What receivers have: one level whatever the signal, learned.
     ThermalNoise,
-    /// Trained on linear amplitudes (paper, supplement 7, which shows maps and no such training).
+    /// Trained on linear amplitudes (paper, supplement 8, which shows maps and no such training).
     LinearLoss,
     /// The surface as it is, in place of the mesh's vertices.
     DenseSurface,

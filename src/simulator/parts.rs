@@ -1,4 +1,4 @@
-//! A frame's signal taken apart (paper, supplement 12).
+//! A frame's signal taken apart (paper, supplement 13).
 
 use serde::{Deserialize, Serialize};
 

@@ -15,8 +15,8 @@ use crate::experiments::variants::Variant;
 use crate::simulator::Part;
 
 impl Planner<'_> {
-    /// Trained on some actions of the second scene, scored and recognised on others (paper, section 4.7; that the classifier
-    /// tells the evaluated actions apart, learned from simulations of the very motions it is tested on as in section 4.4, is our
+    /// Trained on some actions of the second scene, scored and recognised on others (paper, section 4.8; that the classifier
+    /// tells the evaluated actions apart, learned from simulations of the very motions it is tested on as in section 4.5, is our
     /// reading).
     pub(super) fn second_scene(&mut self, first: &Place, place: &Place, scene: &SecondSceneConfig, ours: &Trained) -> Result<()> {
         let config = self.config;

@@ -36,7 +36,7 @@ pub fn torso_rotation(style: &StyleConfig, figure: &Figure, time: f64) -> Plan {
     plan
 }
 
-/// Each arm swings again and again horizontally, upward or downward, drawn at random for every swing (paper, supplement 10).
+/// Each arm swings again and again horizontally, upward or downward, drawn at random for every swing (paper, supplement 11).
 pub fn arm_swing(style: &StyleConfig, figure: &Figure, variety: &Variety, time: f64) -> Plan {
     let mut plan = standing(figure);
     let phase = 0.55 * style.tempo * time;

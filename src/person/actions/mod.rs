@@ -60,7 +60,7 @@ impl Action {
         Self::Lunge,
     ];
 
-    /// Smaller ones, on the spot, for the second scene (paper, section 4.7, which does not say what its twelve are): the first
+    /// Smaller ones, on the spot, for the second scene (paper, section 4.8, which does not say what its twelve are): the first
     /// eight to train on, the last four to test.
     pub const SMALL: [Self; 12] = [
         Self::HandWave,

@@ -201,7 +201,7 @@ impl Way {
 /// Share of the stride at which both feet are on the floor.
 const BOTH_FEET: f64 = 0.05;
 
-/// Towards +z and backwards again, facing +z all the time (paper, supplement 10).
+/// Towards +z and backwards again, facing +z all the time (paper, supplement 11).
 ///
 /// The joints of a backward walk move nearly as those of a forward one reversed in time (Winter, Pluck and Yang, "Backward
 /// walking: a simple reversal of forward walking?", 1989). So the gait has a clock of its own, which slows down, stands and runs
