@@ -9,8 +9,8 @@ use super::plan::Method;
 use super::results::{MethodResults, Results};
 use super::tables::tables;
 use super::variants::Variant;
-use crate::data::atomic;
-use crate::error::{Error, Result};
+use crate::data::{atomic, files};
+use crate::error::Result;
 use crate::pictures::{Chart, Series};
 use crate::text::shown;
 use crate::training::EpochMetrics;
@@ -40,7 +40,7 @@ pub fn write(folder: &Path, config: &ReproduceConfig, results: &Results, command
     atomic::write_text(folder.join("results.json"), &json)?;
     for figure in &results.figures {
         let target = folder.join(format!("{}.png", figure.name));
-        let picture = std::fs::read(&figure.picture).map_err(|error| Error::read(&figure.picture, error))?;
+        let picture = files::read(&figure.picture)?;
         atomic::write_file(&target, |file| file.write_all(&picture))?;
     }
     if !results.stability.is_empty() {
