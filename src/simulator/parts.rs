@@ -42,9 +42,14 @@ impl Simulator {
     pub fn part_signal(&self, part: Part, scene: &Scene, view: &FrameView, surfaces: &Surfaces, noise_seed: u64) -> Complex<4> {
         assert!(self.effects.is_empty(), "the parts of a signal: effects act on their sum");
         let paths = self.config.paths;
+        // Without a pose of its own the person moves as the scene says.
+        let posed = scene.posed(view, None, &self.device());
+        let posed = posed.as_ref();
         match part {
-            Part::Direct if paths.has_direct() => self.direct_signal(scene, view, surfaces),
-            Part::Indirect if paths.has_indirect() && !scene.proxies.is_empty() => self.indirect_signal(scene, view, surfaces),
+            Part::Direct if paths.has_direct() => self.direct_signal(scene, view, surfaces, posed),
+            Part::Indirect if paths.has_indirect() && !scene.proxies.is_empty() => {
+                self.indirect_signal(scene, view, surfaces, posed)
+            }
             Part::Direct | Part::Indirect => {
                 let [_, tx, rx, loops, samples] = scene.radar.dims();
                 Complex::zeros([tx, rx, loops, samples], &self.device())
