@@ -520,8 +520,9 @@ impl Planner<'_> {
     ) {
         let held_out = take.subject == self.config.split.training;
         let additional = self.is_additional(take);
-        let scored = held_out || take.subject == self.config.split.unseen;
-        if !scored && !(additional && method == Method::Variant(Variant::Ours)) {
+        let full = method == Method::Variant(Variant::Ours);
+        let scored = held_out || take.subject == self.config.split.unseen || (additional && full);
+        if !scored {
             return;
         }
         let task = self.compare(place, take, simulated, held_out);
