@@ -26,11 +26,15 @@ const TWO: &str = "tx_m = [[-0.0153, 0.0, 0.0], [-0.0077, 0.0, 0.0]]\nrx_m = [[0
 const SQUARE: &str =
     "tx_m = [[-0.0153, 0.0, 0.0]]\nrx_m = [[0.0, 0.0, 0.0], [0.0019, 0.0, 0.0], [0.0, 0.0, 0.0019], [0.0019, 0.0, 0.0019]]";
 
-/// `text` is TOML over the recorder's defaults.
+/// `text` is TOML over the recorder's defaults; ten frames a second.
 fn recorded(folder: &Path, text: &str, antennas: &str) -> PathBuf {
+    recorded_every(0.1, folder, text, antennas)
+}
+
+fn recorded_every(frame_period_s: f64, folder: &Path, text: &str, antennas: &str) -> PathBuf {
     let radar = format!(
         "[radar]\nstart_frequency_hz = 77.0e9\nslope_hz_per_s = 60.012e12\nsample_rate_hz = 4.4e6\nsamples_per_chirp = 128\n\
-         loops_per_frame = 32\nadc_start_s = 6.0e-6\nchirp_period_s = 108.0e-6\nframe_period_s = 0.1\nframes = 12\n{antennas}"
+         loops_per_frame = 32\nadc_start_s = 6.0e-6\nchirp_period_s = 108.0e-6\nframe_period_s = {frame_period_s}\nframes = 12\n{antennas}"
     );
     let config: RecorderConfig = toml::from_str(&format!("{text}\n{radar}")).unwrap();
     let out = folder.join("recording");
@@ -240,7 +244,8 @@ fn two_transmitters_in_the_wrong_order_are_found() {
 #[test]
 fn a_heading_turned_by_half_a_turn_and_a_wrong_frame_period_are_found() {
     let folder = tempfile::tempdir().unwrap();
-    let plain = recorded(folder.path(), "seed = 35\nframes = 24\nmesh_error_m = 2e-3", ONE);
+    // In five seconds the walk leaves the cells where half of the period would put it.
+    let plain = recorded_every(0.2, folder.path(), "seed = 35\nframes = 24\nmesh_error_m = 2e-3", ONE);
     let stated = audited(&plain, &|text| text);
     assert!(stated.iter().all(|check| check.ok), "{stated:?}");
     let turned = audited(&plain, &|text| {
@@ -255,9 +260,9 @@ fn a_heading_turned_by_half_a_turn_and_a_wrong_frame_period_are_found() {
     });
     let heading = check(&turned, "heading");
     assert!(!heading.ok && heading.found.contains("180°"), "{heading:?}");
-    let halved = audited(&plain, &|text| text.replace("frame_period_s = 0.1", "frame_period_s = 0.05"));
+    let halved = audited(&plain, &|text| text.replace("frame_period_s = 0.2", "frame_period_s = 0.1"));
     let period = check(&halved, "frame_period");
-    assert!(!period.ok && period.found.contains("should be 0.100000"), "{period:?}");
+    assert!(!period.ok && period.found.contains("should be 0.200000"), "{period:?}");
 }
 
 /// All recordings at hand whose samples are whole, and those whose damage is known.

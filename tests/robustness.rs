@@ -359,13 +359,12 @@ fn what_a_terminal_would_obey_is_printed_written_out() {
     fs::write(&settings, text.replace("walk_back_forth", "walk\\u001b[2J")).unwrap();
     let checkpoint = made().join("run/best").display().to_string();
     let (plain, missing) = (made().join("recording").display().to_string(), format!("{evil}/missing"));
-    let commands: [&[&str]; 6] = [
+    let commands: [&[&str]; 5] = [
         &["check", evil],
         &["check", &missing],
         &["compare", evil, evil],
         &["compare", &plain, evil],
         &["evaluate", evil, "--checkpoint", &checkpoint],
-        &["recognize", "--train", evil, "--test", evil, "--out", "found"],
     ];
     // Of a wrong command without it.
     assert!(!err(&hybridsim(&["check", "one", evil], folder.path())).contains('\u{1b}'));

@@ -11,7 +11,7 @@ use clap::Args;
 use super::{Common, device, plausible, progress::Progress};
 use crate::{
     config::Config,
-    data::{Recording, atomic},
+    data::{Recording, atomic, files},
     diagnosis::{
         self, Diagnosis,
         simulate::{Simulated, Start, before_and_after},
@@ -116,7 +116,7 @@ fn shaping(arguments: &Arguments, config: &Config, device: &Device) -> Result<Ve
     ];
     if let Some(checkpoint) = &arguments.checkpoint {
         let weights = checkpoint.join(checkpoint::WEIGHTS);
-        shaping.push(("checkpoint", std::fs::read(&weights).map_err(|error| Error::read(&weights, error))?));
+        shaping.push(("checkpoint", files::read(&weights)?));
     }
     Ok(shaping)
 }

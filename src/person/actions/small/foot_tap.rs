@@ -6,5 +6,5 @@ pub const ACTION: SmallAction = SmallAction { rate_hz: 1.1, shape };
 
 fn shape(plan: &mut Plan, moment: &Moment) {
     plan.pelvis.x = 0.03;
-    plan.feet[1].pitch = -0.20 * moment.reach * moment.cycle;
+    plan.feet[1].pitch = -0.16 * moment.reach * moment.cycle;
 }
