@@ -56,14 +56,15 @@ mod unix {
 
     pub(super) fn watch() {
         let heeded: Vec<i32> = [SIGINT, SIGTERM].into_iter().filter(|&signal| !is_ignored(signal)).collect();
-        // Where it cannot be set up, signals end the program as they always did.
-        let Ok(mut signals) = Signals::new(&heeded) else { return };
         for &signal in &heeded {
-            // The second one, whatever the first is at.
+            // The second one, whatever the first is at. Both flags come before the thread is woken: it sets `ending`, too, and
+            // the first signal would pass for the second.
             let again = flag::register_conditional_shutdown(signal, 128 + signal, unfinished::ending().clone());
             let first = flag::register(signal, unfinished::ending().clone());
             debug_assert!(again.is_ok() && first.is_ok());
         }
+        // Where it cannot be set up, the second signal ends the program.
+        let Ok(mut signals) = Signals::new(&heeded) else { return };
         std::thread::spawn(move || {
             if let Some(signal) = signals.forever().next() {
                 end(signal);
