@@ -1,6 +1,6 @@
 //! What numbers in settings and files can be at all. Everything that reads numbers asks here.
 //!
-//! [`unit`] bounds a number by the unit that its key ends with, so that a new key is bounded without a word; [`count`]
+//! [`unit()`] bounds a number by the unit that its key ends with, so that a new key is bounded without a word; [`count`]
 //! bounds what is allocated, and stands in the `check` of the settings that it belongs to. Neither says what is
 //! plausible: that is for who knows the scene.
 

@@ -2,7 +2,7 @@
 //!
 //! Everything is written under a temporary name beside its target, brought to the disk, and only then renamed; then the
 //! name, too, is brought to the disk. An error, a drop or a signal removes the temporary. A killed process cannot; it leaves
-//! the temporary, never a half-written target, and whoever starts next removes it ([`leftovers`]).
+//! the temporary, never a half-written target, and whoever starts next removes it (`leftovers`).
 
 mod folder;
 pub(crate) mod leftovers;

@@ -1,7 +1,7 @@
 //! All stages of a reproduction and what they depend on, known before the first one runs.
 //!
 //! Measured recordings come first, then trainings, then every method's simulation of every recording (one recording after
-//! the other, so that its geometry is worked out once for all methods) with its scores, then recognition, then [`further`]
+//! the other, so that its geometry is worked out once for all methods) with its scores, then recognition, then `further`
 //! experiments and the figures.
 
 mod further;

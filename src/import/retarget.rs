@@ -1,7 +1,7 @@
 //! From the skeleton of a BVH file to poses of a body in SMPL layout.
 //!
 //! What is carried over is the orientation of every bone in space. How the axes of the file's joints lie in a person who
-//! stands is found once ([`super::neutral`]); all rotations are unit quaternions, exact at no turn and at half a turn.
+//! stands is found once (`neutral`); all rotations are unit quaternions, exact at no turn and at half a turn.
 
 use std::{collections::BTreeMap, path::Path};
 
