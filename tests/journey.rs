@@ -255,7 +255,7 @@ fn levels_are_found_beside_a_known_leakage_and_learned_effects_survive_the_check
     config.simulator.effects[0].parameters.insert("re".into(), vec![0.8]);
     config.training.learning_rate = 2e-2;
     config.training.final_learning_rate = 2e-2;
-    config.training.epochs = 6;
+    config.training.epochs = 3;
     let learned = gains(&config).1[0].parameters["re"][0];
     assert!((learned - 0.8).abs() > 1e-4, "{learned}");
     config.training.learn_effects = false;
