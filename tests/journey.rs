@@ -256,9 +256,12 @@ fn levels_are_found_beside_a_known_leakage_and_learned_effects_survive_the_check
     config.training.learning_rate = 2e-2;
     config.training.final_learning_rate = 2e-2;
     config.training.epochs = 3;
-    let learned = gains(&config).1[0].parameters["re"][0];
-    assert!((learned - 0.8).abs() > 1e-4, "{learned}");
+    let learned = gains(&config).1[0].parameters.clone();
+    // Range and amplitude make up for each other, and a dozen steps go to and fro: either may be back where it started.
+    let moved = [learned["range_m"][0] / LEAK_M - 1.0, learned["re"][0] / 0.8 - 1.0];
+    assert!(moved.into_iter().any(|share| share.abs() > 1e-3), "{learned:?}");
     config.training.learn_effects = false;
-    let kept = gains(&config).1[0].parameters["re"][0];
-    assert!((kept - 0.8).abs() < 1e-6, "{kept}");
+    let kept = gains(&config).1[0].parameters.clone();
+    let moved = [kept["range_m"][0] / LEAK_M - 1.0, kept["re"][0] / 0.8 - 1.0];
+    assert!(moved.into_iter().all(|share| share.abs() < 1e-6), "{kept:?}");
 }

@@ -1,6 +1,6 @@
 //! Small statistics that several suspects need; distributions come from `statrs`.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Gamma, Normal};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Gamma, Normal, StudentsT};
 use statrs::function::beta::inv_beta_reg;
 
 /// Decibels of a natural logarithm of an amplitude.
@@ -34,6 +34,18 @@ pub fn fisher_tail(ratio: f64, above: f64, below: f64) -> f64 {
 /// Probability that a standard normal deviates by more than this, both ways.
 pub fn normal_tails(z: f64) -> f64 {
     2.0 * Normal::standard().sf(z.abs())
+}
+
+/// Probability that the mean of independent differences around zero is as much above it (Student's t).
+pub fn paired_tail(differences: &[f64]) -> f64 {
+    let count = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / count;
+    let variance = differences.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let deviation = (variance / count).sqrt();
+    if count < 2.0 || deviation <= 0.0 {
+        return 1.0;
+    }
+    StudentsT::new(0.0, 1.0, count - 1.0).map_or(1.0, |law| law.sf(mean / deviation))
 }
 
 /// Probability of so many events or more where a mean number is expected.
@@ -130,6 +142,11 @@ mod tests {
         assert!(gumbel_tail(3.0, vec![1.0; 9]) == 1.0 && gumbel_tail(3.0, vec![]) == 1.0);
         let [low, high] = binomial_interval(0, 300, 0.95);
         assert!(low == 0.0 && (high - 0.01222).abs() < 1e-4, "{high}");
+        // Student's table: 2.776 at 2.5 % with four degrees of freedom. The mean of these is one, the deviation of it is that below.
+        let five = |step: f64| [1.0 - 2.0 * step, 1.0 - step, 1.0, 1.0 + step, 1.0 + 2.0 * step];
+        let deviation_of_mean = (2.5f64 / 5.0).sqrt();
+        assert!((paired_tail(&five(1.0 / (2.776 * deviation_of_mean))) - 0.025).abs() < 1e-5);
+        assert!(paired_tail(&[]) == 1.0 && paired_tail(&[3.0]) == 1.0 && paired_tail(&[0.0; 9]) == 1.0);
         let mut values: Vec<f64> = (1..=1000).map(|i| -(1.0 - (i as f64 - 0.5) / 1000.0f64).ln() * 3.0).collect();
         assert!((exponential_scale(&mut values, 0.35) - 3.0).abs() < 0.05);
     }

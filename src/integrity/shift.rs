@@ -5,6 +5,9 @@
 //! stand out of the rest (weights by frequency, which a turn leaves as they are), with a free gain: a likelihood ratio of Gaussian
 //! rests. All samples of a chirp count as one, as one thing that moves may be in all of them, so the ratio is that of so many channels:
 //! it must exceed the number of loops and turns that were tried (Bonferroni), summed over loops in a row that agree about the turn.
+//!
+//! After a loss nothing else is new: the turned loop leaves no more than the loops before it did. A body that begins to move leaves more
+//! at every turn, whichever is the best of them, and is learned as noise.
 
 use std::sync::Arc;
 
@@ -37,6 +40,8 @@ pub(super) struct Shift {
     still: Vec<Complex64>,
     noise: Vec<f64>,
     averaged: usize,
+    /// Most that a loop left where it was expected, in units of the noise.
+    usual: f64,
     /// Turn that the last loops agree about, since which frame and loop, and their likelihood ratio.
     run: (usize, [usize; 2], f64),
     /// Likelihood ratio at which each loss was believed.
@@ -49,7 +54,7 @@ impl Shift {
         let (mut planner, period) = (FftPlanner::new(), schedule.period());
         let fft = [planner.plan_fft_forward(period), planner.plan_fft_inverse(period)];
         let (still, noise) = (vec![Complex64::ZERO; period], vec![0.0; period]);
-        Self { schedule, fft, still, noise, averaged: 0, run: (0, [0, 0], 0.0), losses: vec![], seen: 0 }
+        Self { schedule, fft, still, noise, averaged: 0, usual: 0.0, run: (0, [0, 0], 0.0), losses: vec![], seen: 0 }
     }
 
     fn learn(&mut self, spectrum: &[Complex64], gain: Complex64) {
@@ -68,8 +73,8 @@ impl Shift {
         }
     }
 
-    /// Gain of the mean loop in this one, the turn that fits best, and the logarithm of how much less it leaves.
-    fn best_turn(&self, spectrum: &[Complex64]) -> (Complex64, usize, f64) {
+    /// Gain of the mean loop in this one, the turn that fits best, and what is left without a turn and with it.
+    fn best_turn(&self, spectrum: &[Complex64]) -> (Complex64, usize, [f64; 2]) {
         let floor = LEAST_NOISE * self.noise.iter().sum::<f64>() / self.noise.len() as f64;
         let weight = |noise: f64| 1.0 / (noise + floor).max(f64::MIN_POSITIVE);
         let (mut own, mut still) = (0.0, 0.0);
@@ -84,25 +89,25 @@ impl Shift {
         let explained = |turn: usize| common[turn].norm_sqr() / still.max(f64::MIN_POSITIVE);
         let best = (0..common.len()).max_by(|a, b| common[*a].norm_sqr().total_cmp(&common[*b].norm_sqr())).unwrap_or(0);
         let left = |turn: usize| (own - explained(turn)).max(f64::MIN_POSITIVE);
-        (common[0] / still.max(f64::MIN_POSITIVE), best, (left(0) / left(best)).ln())
+        (common[0] / still.max(f64::MIN_POSITIVE), best, [left(0), left(best)])
     }
 
     fn look(&mut self, frame: usize, index: usize, spectrum: &[Complex64]) {
-        if self.averaged < LEARNED {
-            let (gain, ..) = self.best_turn(spectrum);
-            self.learn(spectrum, gain);
-            return;
-        }
-        let (gain, turn, ratio) = self.best_turn(spectrum);
-        if turn == 0 {
+        let (gain, turn, [aligned, turned]) = self.best_turn(spectrum);
+        let is_loss = self.averaged >= LEARNED && turn != 0 && turned <= self.usual;
+        if !is_loss {
             self.run = (0, [0, 0], 0.0);
+            // Of fewer loops the noise is not known.
+            if self.averaged >= LEARNED / 2 && (turn == 0 || self.averaged < LEARNED) {
+                self.usual = self.usual.max(aligned);
+            }
             self.learn(spectrum, gain);
             return;
         }
         if self.run.0 != turn {
             self.run = (turn, [frame, index], 0.0);
         }
-        self.run.2 += self.schedule.channels() as f64 * ratio;
+        self.run.2 += self.schedule.channels() as f64 * (aligned / turned).ln();
         let [since, at] = self.run.1;
         // Two loops at least: one alone is not a stream.
         let log_p = ((self.seen * spectrum.len()) as f64).ln() - self.run.2;

@@ -1,39 +1,111 @@
-//! Energy where the body is predicted.
+//! How the power of the moving cells follows a prediction of where the body's points are.
 
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::prediction::Point;
+use crate::diagnosis::statistics::paired_tail;
 use crate::radar::Radar;
 
-/// Mean energy at the cells of the body's points, dB over the noise: in each frame those of the frame of the motion that `shown` says,
-/// if any, each at the range (m) and velocity (m/s) that `cell` says.
-pub(super) fn energy_at(
-    evidence: &Evidence,
-    shown: impl Fn(usize) -> Option<usize>,
-    cell: impl Fn(&Point) -> Option<[f64; 2]>,
-) -> f64 {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let Some(body) = &evidence.body else { return 0.0 };
-    let maps = evidence.maps();
-    let mut hit = vec![false; maps.len()];
-    for frame in 0..body.frames.len() {
-        let Some(points) = shown(frame).and_then(|shown| body.frames.get(shown)) else { continue };
-        for [range_m, velocity] in points.iter().filter_map(&cell) {
-            let bin = range_m / evidence.radar.range_resolution_m();
-            let doppler = velocity / evidence.radar.velocity_resolution_mps();
-            if doppler.abs() < 2.5 {
-                continue;
-            }
-            let (bin, doppler) =
-                ((bin.round() as i64).rem_euclid(samples as i64), (doppler.round() as i64).rem_euclid(loops as i64));
-            hit[(frame * loops + doppler as usize) * samples + bin as usize] = true;
-        }
+/// Below that many Doppler cells, what stands still leaks.
+const STILL_CELLS: f64 = 2.5;
+
+/// Count, sum, and sum of squares of ln power over the noise.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums([f64; 3]);
+
+impl Sums {
+    fn add(&mut self, value: f64) {
+        let Sums([count, sum, squares]) = *self;
+        *self = Sums([count + 1.0, sum + value, squares + value * value]);
     }
-    let (sum, count) = hit
-        .iter()
-        .zip(maps)
-        .filter(|(hit, _)| **hit)
-        .fold((0.0, 0.0), |(s, n), (_, value)| (s + f64::from(*value).max(1.0).ln(), n + 1.0));
-    if count > 0.0 { 10.0 / std::f64::consts::LN_10 * sum / count } else { 0.0 }
+
+    fn plus(self, other: Self) -> Self {
+        Sums(std::array::from_fn(|i| self.0[i] + other.0[i]))
+    }
+
+    fn mean(self) -> f64 {
+        self.0[1] / self.0[0].max(1.0)
+    }
+
+    /// Sum of squares around a value.
+    fn around(self, value: f64) -> f64 {
+        let Sums([count, sum, squares]) = self;
+        squares - 2.0 * value * sum + count * value * value
+    }
+}
+
+/// Of the predicted cells and of all others, by frame of the recording; none where the prediction says nothing of a frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Fit {
+    frames: Vec<Option<[Sums; 2]>>,
+}
+
+/// One prediction against another, over the frames of both.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Comparison {
+    /// By how much less of a frame's sum of squares the first leaves unexplained, mean over the frames.
+    pub better: f64,
+    /// Chance of that mean where neither is better.
+    pub p_value: f64,
+}
+
+impl Fit {
+    fn groups(&self, wanted: impl Fn(usize) -> bool) -> [Sums; 2] {
+        let frames = self.frames.iter().enumerate().filter(|(frame, _)| wanted(*frame)).filter_map(|(_, sums)| *sums);
+        frames.fold([Sums::default(); 2], |all, sums| [all[0].plus(sums[0]), all[1].plus(sums[1])])
+    }
+
+    /// Mean of the logarithms of power at the predicted cells, dB over the noise.
+    pub fn level_db(&self) -> f64 {
+        10.0 / std::f64::consts::LN_10 * self.groups(|_| true)[0].mean()
+    }
+
+    /// A paired t-test over frames: each prediction explains a frame's ln power by two means, one of the predicted cells and one of all
+    /// others. A frame is one sample, as all of its cells show one body.
+    ///
+    /// The levels alone are no comparison: of two predictions the one with fewer cells, of the strongest part of a motion, has the
+    /// higher level, while it leaves the rest of the body's power unexplained.
+    pub fn against(&self, other: &Fit) -> Comparison {
+        let common = |frame: usize| [self, other].iter().all(|fit| fit.frames.get(frame).is_some_and(Option::is_some));
+        let left = |fit: &Fit| -> Vec<f64> {
+            let [predicted, others] = fit.groups(common);
+            // Where less is than elsewhere, nothing is foretold.
+            let means = match predicted.mean() > others.mean() {
+                true => [predicted.mean(), others.mean()],
+                false => [predicted.plus(others).mean(); 2],
+            };
+            let frames = fit.frames.iter().enumerate().filter(|(frame, _)| common(*frame)).filter_map(|(_, sums)| *sums);
+            frames.map(|sums| (0..2).map(|group| sums[group].around(means[group])).sum()).collect()
+        };
+        let differences: Vec<f64> = left(self).into_iter().zip(left(other)).map(|(own, other)| other - own).collect();
+        let better = differences.iter().sum::<f64>() / (differences.len() as f64).max(1.0);
+        Comparison { better, p_value: paired_tail(&differences) }
+    }
+}
+
+/// In the frames to which `shown` gives one of the motion's, each point at the range (m) and velocity (m/s) that `cell` says.
+pub(super) fn fit(evidence: &Evidence, shown: impl Fn(usize) -> Option<usize>, cell: impl Fn(&Point) -> Option<[f64; 2]>) -> Fit {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let Some(body) = &evidence.body else { return Fit::default() };
+    let moving: Vec<usize> = (0..loops).filter(|&row| row.min(loops - row) as f64 >= STILL_CELLS).collect();
+    let of_frame = |frame: usize| {
+        let points = shown(frame).and_then(|shown| body.frames.get(shown))?;
+        let mut predicted = vec![false; loops * samples];
+        for [range_m, velocity] in points.iter().filter_map(&cell) {
+            let bin = (range_m / evidence.radar.range_resolution_m()).round() as i64;
+            let doppler = velocity / evidence.radar.velocity_resolution_mps();
+            if doppler.abs() >= STILL_CELLS {
+                let row = (doppler.round() as i64).rem_euclid(loops as i64) as usize;
+                predicted[row * samples + bin.rem_euclid(samples as i64) as usize] = true;
+            }
+        }
+        let map = &evidence.maps()[frame * loops * samples..][..loops * samples];
+        let mut groups = [Sums::default(); 2];
+        for cell in moving.iter().flat_map(|row| row * samples..(row + 1) * samples) {
+            groups[usize::from(!predicted[cell])].add(f64::from(map[cell]).max(1.0).ln());
+        }
+        Some(groups)
+    };
+    Fit { frames: (0..body.frames.len()).map(of_frame).collect() }
 }
 
 /// Range and radial velocity of a point of the body.
@@ -46,7 +118,19 @@ pub fn range_and_velocity(point: &Point, radar: &Radar) -> [f64; 2] {
 
 /// Whether the body ever moves fast enough to be told from what stands still.
 pub(super) fn moves(evidence: &Evidence) -> bool {
-    let fast = 2.5 * evidence.radar.velocity_resolution_mps();
+    let fast = STILL_CELLS * evidence.radar.velocity_resolution_mps();
     let points = evidence.body.iter().flat_map(|body| body.frames.iter().flatten());
     points.map(|point| range_and_velocity(point, &evidence.radar)[1].abs()).any(|speed| speed > fast)
+}
+
+/// Another reading of the recording's conventions, under which the body would be elsewhere.
+pub(super) struct Alternative {
+    pub check: &'static str,
+    /// What is stated.
+    pub expected: &'static str,
+    pub fit: Fit,
+    /// `at the opposite velocities`
+    pub place: String,
+    /// What is wrong where this reading is right.
+    pub hint: String,
 }

@@ -13,12 +13,13 @@ mod frame_period;
 mod heading;
 mod iq_order;
 mod numerics;
+mod placement;
 mod room_ranges;
 
 use serde::{Deserialize, Serialize};
 
-pub use body_place::body_place;
 use channels::{rail_share, strongest_still};
+pub use placement::body_place;
 
 use super::cube::Loaded;
 use super::evidence::Evidence;
@@ -59,8 +60,6 @@ impl From<Finding> for Check {
 const CLEARLY_DB: f64 = 6.0;
 /// A cell counts as a return above this many times the noise.
 const RETURN: f64 = 20.0;
-/// Least energy over the noise where the motion puts the body.
-const PRESENT_DB: f64 = 2.0;
 /// Share of the samples at the ends of the range from which on nothing can be restored.
 const SATURATED: f64 = 0.3;
 /// Fewest samples of a chirp, and fewest chirps of a transmitter in a frame, that say anything.
@@ -74,11 +73,8 @@ pub fn audit(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<Check> {
     if !evidence.is_real() {
         checks.push(iq_order::iq_order(evidence));
     }
-    checks.extend(doppler_sign::doppler_sign(evidence));
     checks.extend(body_in_room::body_in_room(evidence));
-    checks.extend(body_place(evidence));
-    checks.extend(heading::heading(evidence, origin_m));
-    checks.extend(frame_period::frame_period(evidence));
+    checks.extend(placement::placement(evidence, origin_m));
     if !checks.iter().any(|check| !check.ok && is_convention(check)) {
         // Phases foretell nothing where the body is not where it is said to be.
         checks.extend(body_direction::body_direction(evidence));
@@ -111,7 +107,7 @@ pub fn is_convention(check: &Check) -> bool {
 
 /// Whether a body was expected and is heard nowhere.
 pub fn is_silent(check: &Check) -> bool {
-    check.check == "body_place" && check.found.contains(body_place::SILENT)
+    check.check == "body_place" && check.found.contains(placement::SILENT)
 }
 
 /// Why nothing can be said about a recording, if so.
