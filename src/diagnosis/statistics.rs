@@ -36,16 +36,21 @@ pub fn normal_tails(z: f64) -> f64 {
     2.0 * Normal::standard().sf(z.abs())
 }
 
-/// Probability that the mean of independent differences around zero is as much above it (Student's t).
-pub fn paired_tail(differences: &[f64]) -> f64 {
-    let count = differences.len() as f64;
-    let mean = differences.iter().sum::<f64>() / count;
-    let variance = differences.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    let deviation = (variance / count).sqrt();
-    if count < 2.0 || deviation <= 0.0 {
-        return 1.0;
+/// The ratio of the sums of values and their weights, and the probability that it is as much above zero where the values are independent
+/// around zero, with variances in proportion to their weights (ratio estimator; Student's t).
+pub fn ratio_tail(values: &[f64], weights: &[f64]) -> (f64, f64) {
+    let telling: Vec<(f64, f64)> =
+        values.iter().copied().zip(weights.iter().copied()).filter(|(_, weight)| *weight > 0.0).collect();
+    let all: f64 = telling.iter().map(|(_, weight)| weight).sum();
+    if telling.len() < 2 {
+        return (0.0, 1.0);
     }
-    StudentsT::new(0.0, 1.0, count - 1.0).map_or(1.0, |law| law.sf(mean / deviation))
+    let ratio = telling.iter().map(|(value, _)| value).sum::<f64>() / all;
+    let freedom = telling.len() as f64 - 1.0;
+    let variance = telling.iter().map(|(value, weight)| (value - ratio * weight).powi(2) / weight).sum::<f64>() / freedom;
+    let deviation = (variance / all).sqrt();
+    let tail = StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| law.sf(ratio / deviation.max(f64::MIN_POSITIVE)));
+    (ratio, tail)
 }
 
 /// Probability of so many events or more where a mean number is expected.
@@ -145,8 +150,14 @@ mod tests {
         // Student's table: 2.776 at 2.5 % with four degrees of freedom. The mean of these is one, the deviation of it is that below.
         let five = |step: f64| [1.0 - 2.0 * step, 1.0 - step, 1.0, 1.0 + step, 1.0 + 2.0 * step];
         let deviation_of_mean = (2.5f64 / 5.0).sqrt();
-        assert!((paired_tail(&five(1.0 / (2.776 * deviation_of_mean))) - 0.025).abs() < 1e-5);
-        assert!(paired_tail(&[]) == 1.0 && paired_tail(&[3.0]) == 1.0 && paired_tail(&[0.0; 9]) == 1.0);
+        let (ratio, tail) = ratio_tail(&five(1.0 / (2.776 * deviation_of_mean)), &[1.0; 5]);
+        assert!((tail - 0.025).abs() < 1e-5 && ratio == 1.0);
+        // Twice the weight is the same as two values that are alike, but for the freedom; none is nothing.
+        let (ratio, _) = ratio_tail(&[1.0, 4.0, 9.0], &[1.0, 2.0, 0.0]);
+        assert!((ratio - 5.0 / 3.0).abs() < 1e-12);
+        assert!(
+            ratio_tail(&[], &[]).1 == 1.0 && ratio_tail(&[3.0], &[1.0]).1 == 1.0 && ratio_tail(&[0.0; 9], &[1.0; 9]).1 == 0.5
+        );
         let mut values: Vec<f64> = (1..=1000).map(|i| -(1.0 - (i as f64 - 0.5) / 1000.0f64).ln() * 3.0).collect();
         assert!((exponential_scale(&mut values, 0.35) - 3.0).abs() < 0.05);
     }

@@ -2,7 +2,7 @@
 
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::prediction::Point;
-use crate::diagnosis::statistics::paired_tail;
+use crate::diagnosis::statistics::ratio_tail;
 use crate::radar::Radar;
 
 /// Below that many Doppler cells, what stands still leaks.
@@ -33,25 +33,33 @@ impl Sums {
     }
 }
 
-/// Of the predicted cells and of all others, by frame of the recording; none where the prediction says nothing of a frame.
+#[derive(Clone, Debug)]
+struct Frame {
+    /// Numbers of the predicted cells, ascending.
+    predicted: Vec<usize>,
+    /// Of the predicted cells and of all others.
+    sums: [Sums; 2],
+}
+
+/// By frame of the recording; none where the prediction says nothing of a frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fit {
-    frames: Vec<Option<[Sums; 2]>>,
+    frames: Vec<Option<Frame>>,
 }
 
 /// One prediction against another, over the frames of both.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Comparison {
-    /// By how much less of a frame's sum of squares the first leaves unexplained, mean over the frames.
+    /// Logarithm of how much less of a frame's sum of squares the first leaves unexplained, for each cell that one predicts alone.
     pub better: f64,
-    /// Chance of that mean where neither is better.
+    /// Chance of that where neither is better.
     pub p_value: f64,
 }
 
 impl Fit {
     fn groups(&self, wanted: impl Fn(usize) -> bool) -> [Sums; 2] {
-        let frames = self.frames.iter().enumerate().filter(|(frame, _)| wanted(*frame)).filter_map(|(_, sums)| *sums);
-        frames.fold([Sums::default(); 2], |all, sums| [all[0].plus(sums[0]), all[1].plus(sums[1])])
+        let frames = self.frames.iter().enumerate().filter(|(frame, _)| wanted(*frame)).filter_map(|(_, frame)| frame.as_ref());
+        frames.fold([Sums::default(); 2], |all, Frame { sums, .. }| [all[0].plus(sums[0]), all[1].plus(sums[1])])
     }
 
     /// Mean of the logarithms of power at the predicted cells, dB over the noise.
@@ -59,26 +67,36 @@ impl Fit {
         10.0 / std::f64::consts::LN_10 * self.groups(|_| true)[0].mean()
     }
 
-    /// A paired t-test over frames: each prediction explains a frame's ln power by two means, one of the predicted cells and one of all
-    /// others. A frame is one sample, as all of its cells show one body.
+    /// Each prediction explains a frame's ln power by two means, one of the predicted cells and one of all others; a frame tells them
+    /// apart by the logarithm of what they leave, its likelihood ratio with a free variance. The test is Student's over frames (a frame is
+    /// one sample, as all of its cells show one body), weighted by how many cells one of the two predicts alone: where the body hardly
+    /// moves, they predict the same.
     ///
     /// The levels alone are no comparison: of two predictions the one with fewer cells, of the strongest part of a motion, has the
     /// higher level, while it leaves the rest of the body's power unexplained.
     pub fn against(&self, other: &Fit) -> Comparison {
         let common = |frame: usize| [self, other].iter().all(|fit| fit.frames.get(frame).is_some_and(Option::is_some));
-        let left = |fit: &Fit| -> Vec<f64> {
-            let [predicted, others] = fit.groups(common);
+        let common: Vec<usize> = (0..self.frames.len()).filter(|frame| common(*frame)).collect();
+        let means = [self, other].map(|fit| {
+            let [predicted, others] = fit.groups(|frame| common.binary_search(&frame).is_ok());
             // Where less is than elsewhere, nothing is foretold.
-            let means = match predicted.mean() > others.mean() {
+            match predicted.mean() > others.mean() {
                 true => [predicted.mean(), others.mean()],
                 false => [predicted.plus(others).mean(); 2],
+            }
+        });
+        let (mut ratios, mut weights) = (vec![], vec![]);
+        for frame in common {
+            let (Some(own), Some(others)) = (&self.frames[frame], &other.frames[frame]) else { continue };
+            let left = |frame: &Frame, means: [f64; 2]| {
+                frame.sums.iter().zip(means).map(|(sums, mean)| sums.around(mean)).sum::<f64>().max(f64::MIN_POSITIVE)
             };
-            let frames = fit.frames.iter().enumerate().filter(|(frame, _)| common(*frame)).filter_map(|(_, sums)| *sums);
-            frames.map(|sums| (0..2).map(|group| sums[group].around(means[group])).sum()).collect()
-        };
-        let differences: Vec<f64> = left(self).into_iter().zip(left(other)).map(|(own, other)| other - own).collect();
-        let better = differences.iter().sum::<f64>() / (differences.len() as f64).max(1.0);
-        Comparison { better, p_value: paired_tail(&differences) }
+            let shared = own.predicted.iter().filter(|cell| others.predicted.binary_search(cell).is_ok()).count();
+            ratios.push((left(others, means[1]) / left(own, means[0])).ln());
+            weights.push((own.predicted.len() + others.predicted.len() - 2 * shared) as f64);
+        }
+        let (better, p_value) = ratio_tail(&ratios, &weights);
+        Comparison { better, p_value }
     }
 }
 
@@ -99,11 +117,11 @@ pub(super) fn fit(evidence: &Evidence, shown: impl Fn(usize) -> Option<usize>, c
             }
         }
         let map = &evidence.maps()[frame * loops * samples..][..loops * samples];
-        let mut groups = [Sums::default(); 2];
+        let mut sums = [Sums::default(); 2];
         for cell in moving.iter().flat_map(|row| row * samples..(row + 1) * samples) {
-            groups[usize::from(!predicted[cell])].add(f64::from(map[cell]).max(1.0).ln());
+            sums[usize::from(!predicted[cell])].add(f64::from(map[cell]).max(1.0).ln());
         }
-        Some(groups)
+        Some(Frame { predicted: (0..predicted.len()).filter(|cell| predicted[*cell]).collect(), sums })
     };
     Fit { frames: (0..body.frames.len()).map(of_frame).collect() }
 }
