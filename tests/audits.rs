@@ -28,13 +28,13 @@ const SQUARE: &str =
 
 /// `text` is TOML over the recorder's defaults; ten frames a second.
 fn recorded(folder: &Path, text: &str, antennas: &str) -> PathBuf {
-    recorded_every(0.1, folder, text, antennas)
+    recorded_as("loops_per_frame = 32\nchirp_period_s = 108.0e-6\nframe_period_s = 0.1", folder, text, antennas)
 }
 
-fn recorded_every(frame_period_s: f64, folder: &Path, text: &str, antennas: &str) -> PathBuf {
+fn recorded_as(timing: &str, folder: &Path, text: &str, antennas: &str) -> PathBuf {
     let radar = format!(
         "[radar]\nstart_frequency_hz = 77.0e9\nslope_hz_per_s = 60.012e12\nsample_rate_hz = 4.4e6\nsamples_per_chirp = 128\n\
-         loops_per_frame = 32\nadc_start_s = 6.0e-6\nchirp_period_s = 108.0e-6\nframe_period_s = {frame_period_s}\nframes = 12\n{antennas}"
+         adc_start_s = 6.0e-6\n{timing}\nframes = 12\n{antennas}"
     );
     let config: RecorderConfig = toml::from_str(&format!("{text}\n{radar}")).unwrap();
     let out = folder.join("recording");
@@ -244,8 +244,9 @@ fn two_transmitters_in_the_wrong_order_are_found() {
 #[test]
 fn a_heading_turned_by_half_a_turn_and_a_wrong_frame_period_are_found() {
     let folder = tempfile::tempdir().unwrap();
-    // In five seconds the walk leaves the cells where half of the period would put it.
-    let plain = recorded_every(0.2, folder.path(), "seed = 35\nframes = 24\nmesh_error_m = 2e-3", ONE);
+    // Half of the period shows half of the frames: twenty of them tell.
+    let timing = "loops_per_frame = 64\nchirp_period_s = 216.0e-6\nframe_period_s = 0.2";
+    let plain = recorded_as(timing, folder.path(), "seed = 35\nframes = 40\nmesh_error_m = 2e-3", ONE);
     let stated = audited(&plain, &|text| text);
     assert!(stated.iter().all(|check| check.ok), "{stated:?}");
     let turned = audited(&plain, &|text| {

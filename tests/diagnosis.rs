@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use hybridsim::data::{IfLayout, Recording, RecordingContents, write_recording};
 use hybridsim::diagnosis::report::{Report, Verdict};
-use hybridsim::diagnosis::statistics::uniform_chance;
+use hybridsim::diagnosis::statistics::{poisson_tail, uniform_chance};
 use hybridsim::diagnosis::{DiagnosisConfig, diagnose};
 use hybridsim::recorder::{self, RecorderConfig};
 use num_complex::Complex32;
@@ -362,9 +362,17 @@ fn nulls_stay_silent_and_their_p_values_are_uniform() {
             report(&recorded(folder.path(), &text))
         })
         .collect();
-    for (case, null) in nulls.iter().enumerate() {
-        assert_eq!(null.verdict, Verdict::NoMismatch, "null {case}: {:?} {:?}", null.effects, null.unexplained);
-    }
+    // A recording without anything missing is alarmed about once in a hundred times (`diagnosis.alarm`): as many as that makes likely.
+    let alarmed: Vec<String> = nulls
+        .iter()
+        .enumerate()
+        .filter(|(_, null)| null.verdict != Verdict::NoMismatch)
+        .map(|(case, null)| format!("null {case}: {:?} {:?} {}", null.verdict, ids(null), null.reason))
+        .collect();
+    println!("{alarmed:?}");
+    let chance = poisson_tail(alarmed.len(), DiagnosisConfig::default().alarm * nulls.len() as f64);
+    assert!(chance > 0.05, "{} alarms, chance {chance:.3}: {alarmed:?}", alarmed.len());
+    assert!(nulls.iter().all(|null| null.verdict != Verdict::Damaged), "{alarmed:?}");
     // Once in a hundred seeds a law that is uniform fails this; a bound such as the suspects' own fails with all of them.
     let uniform = |what: &str, of: &dyn Fn(&Report) -> Option<f64>| {
         let values: Vec<f64> = nulls.iter().filter_map(of).collect();

@@ -167,6 +167,35 @@ fn check_says_what_a_body_or_a_motion_is() {
 }
 
 #[test]
+fn check_says_what_a_mesh_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let faces = "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    let cuboid = |height: f64| {
+        let corner = |x: f64, y: f64, z: f64| format!("v {x} {y} {z}\n");
+        let level = |z: f64| [corner(0.0, 0.0, z), corner(0.5, 0.0, z), corner(0.5, 0.3, z), corner(0.0, 0.3, z)].concat();
+        format!("{}{}{faces}", level(0.0), level(height))
+    };
+    let path = folder.path().join("body.obj");
+    std::fs::write(&path, cuboid(1.7)).unwrap();
+    let output = hybridsim(&["check", "body.obj"], folder.path());
+    let text = String::from_utf8_lossy(&output.stdout).to_string();
+    assert!(output.status.success() && text.contains("8 x 12, one pose") && text.contains("closed, volume 0.2550 m3"), "{text}");
+    assert!(err(&output).contains("metres are assumed"), "{}", err(&output));
+    // In millimetres along one axis, and inside out.
+    std::fs::write(&path, cuboid(1700.0)).unwrap();
+    let text = err(&hybridsim(&["check", "body.obj"], folder.path()));
+    assert!(text.contains("a body 1700.0000 m long") && text.contains("millimetres"), "{text}");
+    let upright = cuboid(1.7);
+    let turned = upright.lines().map(|line| match line.strip_prefix("f ") {
+        Some(corners) => format!("f {}\n", corners.split(' ').rev().collect::<Vec<_>>().join(" ")),
+        None => format!("{line}\n"),
+    });
+    std::fs::write(&path, turned.collect::<String>()).unwrap();
+    let output = hybridsim(&["check", "body.obj"], folder.path());
+    assert!(output.status.code() == Some(2) && err(&output).contains("turned inside out"), "{}", err(&output));
+}
+
+#[test]
 fn check_states_no_velocity_of_one_chirp_a_frame_and_reads_a_falling_one() {
     let folder = recorded("slope_hz_per_s", "slope_hz_per_s = -60.012e12");
     let output = hybridsim(&["check", "recording"], folder.path());

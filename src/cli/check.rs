@@ -21,7 +21,8 @@ use crate::{
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// A config file, a recording folder, a checkpoint folder, a body (.npz) or a motion (.npz, .bvh)
+    /// A config file, a recording folder, a checkpoint folder, a body (.npz), a motion (.npz, .bvh) or a mesh
+    /// (vertices .npy, .obj)
     path: PathBuf,
     #[command(flatten)]
     out: Out,
@@ -38,6 +39,13 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
             state.progress.best_epoch + 1
         );
         show_radar(&state.site.radar, state.site.room.as_ref());
+        plausible::scene(
+            Some(&state.site.radar),
+            state.site.room.as_ref(),
+            None,
+            &Sources::one(path.join("checkpoint.toml")),
+            common,
+        )?;
         for effect in simulator.effects.settings() {
             let values = effect.parameters.iter().map(|(name, values)| format!("{name} {values:.4?}"));
             let values: Vec<String> = effect.choice.iter().cloned().chain(values).collect();

@@ -1,10 +1,10 @@
-//! `hybridsim check` of a body or a motion by itself: what the file says it is.
+//! `hybridsim check` of a body, a motion or a mesh by itself: what the file says it is.
 
 use std::path::Path;
 
 use super::{Common, plausible};
 use crate::{
-    data::{arrays::Npz, read_body},
+    data::{arrays::Npz, read_body, read_meshes},
     error::Result,
     import::{self, Bvh, BvhConfig},
     person::{
@@ -16,16 +16,20 @@ use crate::{
 
 /// Whether a file is described by itself, by its name.
 pub(super) fn knows(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| ["npz", "bvh"].contains(&extension.to_string_lossy().to_lowercase().as_str()))
+    path.extension()
+        .is_some_and(|extension| ["npz", "bvh", "npy", "obj"].contains(&extension.to_string_lossy().to_lowercase().as_str()))
 }
 
-/// Describes a body or a motion.
+/// Describes a body, a motion or a mesh.
 ///
 /// # Errors
-/// A file that is neither, or cannot be read, or cannot be meant.
+/// A file that is none of them, or cannot be read, or cannot be meant.
 pub(super) fn run(path: &Path, common: &Common) -> Result<()> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("bvh")) {
         return describe_bvh(path, common);
+    }
+    if path.extension().is_some_and(|extension| ["npy", "obj"].iter().any(|mesh| extension.eq_ignore_ascii_case(mesh))) {
+        return describe_meshes(path, common);
     }
     let archive = Npz::open(path)?;
     if archive.has("v_template") {
@@ -50,6 +54,24 @@ fn describe_body(path: &Path, common: &Common) -> Result<()> {
     let facts = BodyFacts::of_mesh(&model.template, &model.faces);
     let surface = facts.open.as_ref().map_or("closed".to_string(), |why| format!("open: {why}"));
     say!("  surface            {surface}, volume {:.4} m3", facts.volume_m3);
+    plausible::tell(Facts { body: Some(facts), ..Facts::default() }, &Sources::one(path), common)
+}
+
+fn describe_meshes(path: &Path, common: &Common) -> Result<()> {
+    let meshes = read_meshes(path)?;
+    let first = &meshes.vertices[0];
+    let poses = if meshes.vertices.len() == 1 { "one pose".into() } else { format!("{} poses", meshes.vertices.len()) };
+    say!("mesh: {}", path.display());
+    say!("  vertices x faces   {} x {}, {poses}", first.len(), meshes.faces.len());
+    for note in &meshes.notes {
+        remark!("note: {note}");
+    }
+    show_extent("first pose", first);
+    let facts = BodyFacts::of_meshes(&meshes.vertices, &meshes.faces);
+    if !meshes.faces.is_empty() {
+        let surface = facts.open.as_ref().map_or("closed".to_string(), |why| format!("open: {why}"));
+        say!("  surface            {surface}, volume {:.4} m3", facts.volume_m3);
+    }
     plausible::tell(Facts { body: Some(facts), ..Facts::default() }, &Sources::one(path), common)
 }
 

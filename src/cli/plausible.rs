@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 
 use super::Common;
 use crate::{
-    data::Recording,
+    data::{Recording, entries::recordings_in},
     error::Result,
     person::Person,
     plausibility::{CodeFacts, Facts, Sources, Verdict, findings},
     radar::Radar,
     recorder::{Interpolation, body::MovingBody},
     room::Room,
+    site::{self, SiteConfig},
 };
 
 /// Notes what is odd about a recording, and refuses what cannot be.
@@ -57,6 +58,22 @@ pub(super) fn scene(
     tell(facts(radar, room, person)?, sources, common)
 }
 
+/// The same of all sequences of a site: of its config, or of its folder of recordings.
+///
+/// # Errors
+/// Settings that cannot be a site; as [`recording`].
+pub(super) fn site(path: &Path, set: &[String], common: &Common) -> Result<()> {
+    if path.is_dir() {
+        return recordings_in(path)?.iter().try_for_each(|recording| folder(recording, common));
+    }
+    let config = SiteConfig::read(path, set)?;
+    for (name, findings) in site::implausible(&config, path.parent().unwrap_or(Path::new("")), common.as_stated)? {
+        let sources = Sources::one(format!("{} ({name})", path.display()));
+        tell_findings(Verdict::new(findings, &sources, common.as_stated))?;
+    }
+    Ok(())
+}
+
 /// What the checks look at.
 pub(super) fn facts(radar: Option<&Radar>, room: Option<&Room>, person: Option<&Person>) -> Result<Facts> {
     let body = person.map(|person| MovingBody::new(person, Interpolation::Linear)).transpose()?;
@@ -69,7 +86,7 @@ pub(super) fn tell(mut facts: Facts, sources: &Sources, common: &Common) -> Resu
     tell_findings(Verdict::new(findings(&facts), sources, common.as_stated))
 }
 
-pub(super) fn tell_findings(verdict: Verdict) -> Result<()> {
+fn tell_findings(verdict: Verdict) -> Result<()> {
     verdict.notes.iter().for_each(|note| remark!("note: {note}"));
     verdict.into_result()
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Common, Out, devices, interrupt, progress::StageProgress, scores::LpipsArguments};
+use super::{Common, Out, devices, interrupt, plausible, progress::StageProgress, scores::LpipsArguments};
 use crate::{
     data::{atomic, files},
     error::{Error, Result},
@@ -50,6 +50,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         [] => None,
         beginnings => Some(plan.needed(beginnings)?),
     };
+    let scene = config.second_scene.as_ref().map(|scene| &scene.site);
+    for site in std::iter::once(&config.site).chain(&config.second_room).chain(scene) {
+        plausible::site(site, &[], common)?;
+    }
     let devices = devices(&common.device)?;
     if let Some(lpips) = &config.comparison.lpips {
         // A file that is none is refused now, not after the trainings.

@@ -8,7 +8,6 @@ use super::{Common, interrupt, plausible, progress::Progress};
 use crate::{
     data::{Claim, Shard},
     error::Result,
-    plausibility::{Sources, Verdict},
     site::{self, SiteConfig},
 };
 
@@ -30,10 +29,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let _claim = Claim::part(&arguments.out, shard)?;
     interrupt::kept(|| format!("the recordings that are whole are kept; go on with: {}", interrupt::typed()));
     let settings_folder = arguments.config.parent().unwrap_or(Path::new(""));
-    for (name, findings) in site::implausible(&config, settings_folder, common.as_stated)? {
-        let sources = Sources::one(format!("{} ({name})", arguments.config.display()));
-        plausible::tell_findings(Verdict::new(findings, &sources, common.as_stated))?;
-    }
+    plausible::site(&arguments.config, &common.set, common)?;
     let mut shown = None;
     let mut show = |done: usize, of: usize, name: &str| {
         let progress = shown.get_or_insert_with(|| Progress::new("recording", of, common.quiet));

@@ -14,7 +14,7 @@ use crate::{
     config::Config,
     data::{atomic, files},
     error::{Error, Result},
-    training::{load_recordings, refine},
+    training::{load_recordings, load_recordings_as_stated, refine},
 };
 
 #[derive(Args)]
@@ -75,7 +75,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     tell_how_to_go_on(&run_folder, config.training.epochs, common);
 
     let started = std::time::Instant::now();
-    let recordings = load_recordings(&config.data.recordings, &config.simulator)?;
+    let load = if common.as_stated { load_recordings_as_stated } else { load_recordings };
+    let recordings = load(&config.data.recordings, &config.simulator)?;
     recordings.iter().for_each(report::tell_notes);
     let trainer = config.trainer(&recordings, &config_toml, &run_folder, &devices)?;
     let mut progress = TrainingProgress::new(common.quiet);

@@ -115,13 +115,7 @@ impl BodyFacts {
     fn new(person: &Person) -> Self {
         match person {
             Person::Skinned { model, motion, .. } => Self::of_mesh(&model.shaped(&motion.betas), &model.faces),
-            Person::Meshes { vertices, faces, .. } => {
-                let lengths: Vec<f64> = vertices.iter().map(|mesh| longest(mesh)).collect();
-                let least = lengths.iter().copied().fold(f64::INFINITY, f64::min);
-                let largest = lengths.iter().copied().fold(0.0, f64::max);
-                let first = vertices.first().map_or(&[][..], Vec::as_slice);
-                Self { length_m: [least, largest], meshes: true, ..Self::of_mesh(first, faces) }
-            }
+            Person::Meshes { vertices, faces, .. } => Self::of_meshes(vertices, faces),
         }
     }
 
@@ -138,6 +132,15 @@ impl BodyFacts {
             open: mesh::check_closed(vertices.len(), faces).err(),
             meshes: false,
         }
+    }
+
+    /// Of a sequence of meshes, `[pose][vertex]`.
+    pub fn of_meshes(vertices: &[Vec<Point>], faces: &[[usize; 3]]) -> Self {
+        let lengths = vertices.iter().map(|mesh| longest(mesh));
+        let [least, most] =
+            lengths.fold([f64::INFINITY, 0.0], |[least, most], length| [least.min(length), f64::max(most, length)]);
+        let first = vertices.first().map_or(&[][..], Vec::as_slice);
+        Self { length_m: [least, most], meshes: true, ..Self::of_mesh(first, faces) }
     }
 }
 

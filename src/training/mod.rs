@@ -13,6 +13,6 @@ mod trainer;
 pub use config::TrainingConfig;
 pub use metrics::EpochMetrics;
 pub use refine::{RefineConfig, RefinedPose};
-pub use site::{LoadedRecording, load_recordings, refuse_ambiguous_ranges, site, site_from};
+pub use site::{LoadedRecording, load_recordings, load_recordings_as_stated, refuse_ambiguous_ranges, site, site_from};
 pub use split::{FrameId, FrameSplit, Split, step_rng};
 pub use trainer::{Event, Outcome, Trainer};

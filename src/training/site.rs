@@ -119,7 +119,19 @@ pub fn signal_tensor(frame: &IfFrame, device: &Device) -> Complex<4> {
 /// # Errors
 /// As `LoadedRecording::open`; also recordings without a signal, of different radars or rooms, or without anything to simulate.
 pub fn load_recordings(folders: &[PathBuf], config: &SimulatorConfig) -> Result<Vec<LoadedRecording>> {
-    let loaded = folders.iter().map(|folder| LoadedRecording::open(folder, config, true)).collect::<Result<Vec<_>>>()?;
+    of_one_site(folders, config, true)
+}
+
+/// The same, with rooms as they are stated: one may end beyond the unambiguous range, whose far echoes are then learned as near ones.
+///
+/// # Errors
+/// As [`load_recordings`], but for that.
+pub fn load_recordings_as_stated(folders: &[PathBuf], config: &SimulatorConfig) -> Result<Vec<LoadedRecording>> {
+    of_one_site(folders, config, false)
+}
+
+fn of_one_site(folders: &[PathBuf], config: &SimulatorConfig, strict: bool) -> Result<Vec<LoadedRecording>> {
+    let loaded = folders.iter().map(|folder| LoadedRecording::open(folder, config, strict)).collect::<Result<Vec<_>>>()?;
     let Some(first) = loaded.first() else {
         return Err(Error::setting("data.recordings", "empty", "at least one recording folder"));
     };
@@ -161,7 +173,7 @@ pub fn refuse_ambiguous_ranges(radar: &Radar, room: Option<&Room>, refusal: impl
     if farthest > limit {
         let expected = format!("within the radar's unambiguous range of {limit:.2} m");
         return Err(refusal(format!("up to {farthest:.2} m away"), expected)
-            .with_hint("a higher sample rate or a lower slope reaches farther; `hybridsim check` shows the limits"));
+            .with_hint("a higher sample rate or a lower slope reaches farther; `hybridsim check` shows the limits; --as-stated takes it as it is"));
     }
     Ok(())
 }

@@ -18,6 +18,7 @@ use samples::IfFile;
 
 use crate::data::arrays::{Array, read_npy};
 use crate::data::bodies::{read_body, read_faces};
+use crate::data::meshes::read_vertices;
 use crate::data::motions::read_motion;
 use crate::error::{Error, Result};
 use crate::person::{Person, Placement};
@@ -132,11 +133,8 @@ fn read_person(folder: &Path, path: &Path, settings: &RecordingSettings, notes: 
 }
 
 fn read_meshes(vertices: &Path, faces: &Path, times: &Path) -> Result<Person> {
-    let positions: Array<f64> = read_npy(vertices, &[("pose", None), ("vertex", None), ("xyz", Some(3))])?;
-    let [poses, count, _] = positions.shape[..] else { unreachable!("three axes were asked for") };
-    if poses == 0 || count == 0 {
-        return Err(Error::field(vertices, "vertices", format!("{:?}", positions.shape), "at least one pose and one vertex"));
-    }
+    let positions = read_vertices(vertices)?;
+    let (poses, count) = (positions.len(), positions[0].len());
     let corners: Array<i64> = read_npy(faces, &[("face", None), ("corner", Some(3))])?;
     let pose_times: Array<f64> = read_npy(times, &[("pose", Some(poses))])?;
     if let Some(pose) = (1..poses).find(|&pose| pose_times.values[pose] <= pose_times.values[pose - 1]) {
@@ -144,7 +142,7 @@ fn read_meshes(vertices: &Path, faces: &Path, times: &Path) -> Result<Person> {
         return Err(Error::field(times, "pose_times", found, "times that ascend"));
     }
     Ok(Person::Meshes {
-        vertices: positions.rows().chunks(count).map(<[_]>::to_vec).collect(),
+        vertices: positions,
         faces: read_faces(faces, "faces", &corners, count)?,
         pose_times_s: pose_times.values,
     })

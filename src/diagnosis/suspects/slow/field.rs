@@ -31,6 +31,8 @@ pub struct Field {
     deviation: Vec<Complex64>,
     /// Inverse variance of a complex deviation, `[frame, group]`; zero where nothing can be said.
     weight: Vec<f64>,
+    /// Whether the body is at none of a group's ranges, `[frame, group]`.
+    free: Vec<bool>,
     /// Radar time of every loop, `[frame, loop]`: the mean over its transmitters.
     pub times_s: Vec<f64>,
     /// Radians up to which a phase can be read.
@@ -72,6 +74,8 @@ const CLEAN: f64 = 1.25;
 /// Share of a deviation's power across the channels that may lie aside of the static return's: a strong phase that all
 /// share leaves as much where one cell holds returns from several directions.
 const ASIDE: f64 = 0.03;
+/// Bins beside the body that are not free of it.
+const MARGIN: usize = 2;
 /// What a range would gain (nats) by a deviation that it shares, for its silence to tell anything.
 const TELLING_GAIN: f64 = 10.0;
 
@@ -176,11 +180,16 @@ impl Field {
             deviation.extend(values);
             weight.extend(weights);
         }
+        let of_groups = |frame: usize| {
+            let free = free(evidence, frame, bins);
+            groups.iter().map(|group| free[group.bins.clone()].iter().all(|free| *free)).collect::<Vec<bool>>()
+        };
+        let free = (0..frames).flat_map(of_groups).collect();
         let middle_s = 0.5 * (radar.tx_m.len() as f64 - 1.0) * radar.chirp_period_s;
         let times_s = (0..frames * loops)
             .map(|i| evidence.starts_s[i / loops] + (i % loops) as f64 * radar.loop_period_s() + middle_s)
             .collect();
-        let mut field = Self { frames, loops, groups, deviation, weight, times_s, farthest: FARTHEST[0] };
+        let mut field = Self { frames, loops, groups, deviation, weight, free, times_s, farthest: FARTHEST[0] };
         field.unroll(&evidence.split.training);
         field.calibrate();
         let known = (0..frames).filter(|&f| field.weights(f).iter().filter(|w| **w > 0.0).count() >= 2).count();
@@ -286,23 +295,25 @@ impl Field {
     /// Whether most of the ranges that could contradict a deviation share it: one that is far stronger than the others (a
     /// body that stands still for a while) must not speak for all. `predicted` gives it for frame, loop and group.
     pub fn shared(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> bool {
-        most_have(&self.told(predicted), 0.0)
+        most_have(&self.told(predicted, |_| true), 0.0)
     }
 
     /// The same of a deviation that was read from these ranges chirp by chirp, in which the strongest one finds itself: most of the
-    /// others must have most of it.
+    /// others must have most of it, and one of them at least must tell anything. The body's ranges do not, while it is there: its own
+    /// still returns move with it.
     pub fn shared_by_others(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> bool {
-        let mut told = self.told(predicted);
+        let mut told = self.told(predicted, |place| self.free[place]);
         let strongest = told.iter().enumerate().max_by(|(_, a), (_, b)| a[1].total_cmp(&b[1])).map(|(index, _)| index);
         strongest.map(|index| told.swap_remove(index));
-        most_have(&told, 0.5)
+        !told.is_empty() && most_have(&told, 0.5)
     }
 
-    /// What ranges gain by a deviation, and what they would if all of it were theirs (nats): those that tell anything of it.
-    fn told(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> Vec<[f64; 2]> {
+    /// What ranges gain by a deviation, and what they would if all of it were theirs (nats): those that tell anything of it. `wanted`:
+    /// of frame · groups + group.
+    fn told(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64, wanted: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
         let of_group = |(g, group): (usize, &Group)| {
             let (mut gain, mut most) = (0.0, 0.0);
-            for frame in 0..self.frames {
+            for frame in (0..self.frames).filter(|frame| wanted(frame * self.groups.len() + g)) {
                 let weight = self.weights(frame)[g];
                 for index in 0..self.loops {
                     let (value, model) = (self.deviations(frame, index)[g], predicted(frame, index, group));
@@ -367,6 +378,18 @@ impl Series {
         }
         gain
     }
+}
+
+/// Ranges at which the body is not, in one frame.
+pub fn free(evidence: &Evidence, frame: usize, bins: usize) -> Vec<bool> {
+    let samples = evidence.cube.dims[4];
+    let Some(model) = evidence.power() else { return vec![true; bins] };
+    let mut free = vec![true; bins];
+    for (cell, _) in model.support(frame).iter().enumerate().filter(|(_, there)| **there) {
+        let range = cell % samples;
+        (range.saturating_sub(MARGIN)..(range + MARGIN + 1).min(bins)).for_each(|near| free[near] = false);
+    }
+    free
 }
 
 /// Deviations `[loop, group]` of a frame and their inverse variances.

@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::field::{PATTERN, ahead};
+use super::field::{PATTERN, ahead, free};
 use super::lines::climb;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, Tapered};
@@ -18,8 +18,6 @@ use crate::diagnosis::statistics::{chi2_tail, corrected};
 
 /// Bins over which the window spreads what is independent.
 const BINS_PER_VALUE: f64 = 2.0;
-/// Bins beside the body that it is kept away from.
-const MARGIN: usize = 2;
 /// Bins whose deviations are judged together.
 const GROUP_BINS: usize = 4;
 /// Groups that must be able to contradict, and the share of them that must agree.
@@ -229,18 +227,6 @@ impl Sums {
         let ([cc, cs, ss], [c, s]) = (self.squares, self.data);
         (ss * c.norm_sqr() + cc * s.norm_sqr() - 2.0 * cs * (c.conj() * s).re) / (cc * ss - cs * cs)
     }
-}
-
-/// Ranges at which the body is not, in one frame.
-fn free(evidence: &Evidence, frame: usize, bins: usize) -> Vec<bool> {
-    let samples = evidence.cube.dims[4];
-    let Some(model) = evidence.power() else { return vec![true; bins] };
-    let mut free = vec![true; bins];
-    for (cell, _) in model.support(frame).iter().enumerate().filter(|(_, there)| **there) {
-        let range = cell % samples;
-        (range.saturating_sub(MARGIN)..(range + MARGIN + 1).min(bins)).for_each(|near| free[near] = false);
-    }
-    free
 }
 
 pub fn find(evidence: &Evidence) -> Option<Candidate> {
