@@ -178,7 +178,7 @@ fn check_says_what_a_mesh_is() {
     let path = folder.path().join("body.obj");
     std::fs::write(&path, cuboid(1.7)).unwrap();
     let output = hybridsim(&["check", "body.obj"], folder.path());
-    let text = String::from_utf8_lossy(&output.stdout).to_string();
+    let text = out(&output);
     assert!(output.status.success() && text.contains("8 x 12, one pose") && text.contains("closed, volume 0.2550 m3"), "{text}");
     assert!(err(&output).contains("metres are assumed"), "{}", err(&output));
     // In millimetres along one axis, and inside out.

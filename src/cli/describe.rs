@@ -14,10 +14,14 @@ use crate::{
     plausibility::{BodyFacts, Facts, Sources},
 };
 
+/// Name's ending in small letters, without the dot.
+fn ending(path: &Path) -> String {
+    path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default()
+}
+
 /// Whether a file is described by itself, by its name.
 pub(super) fn knows(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|extension| ["npz", "bvh", "npy", "obj"].contains(&extension.to_string_lossy().to_lowercase().as_str()))
+    ["npz", "bvh", "npy", "obj"].contains(&ending(path).as_str())
 }
 
 /// Describes a body, a motion or a mesh.
@@ -25,11 +29,10 @@ pub(super) fn knows(path: &Path) -> bool {
 /// # Errors
 /// A file that is none of them, or cannot be read, or cannot be meant.
 pub(super) fn run(path: &Path, common: &Common) -> Result<()> {
-    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("bvh")) {
-        return describe_bvh(path, common);
-    }
-    if path.extension().is_some_and(|extension| ["npy", "obj"].iter().any(|mesh| extension.eq_ignore_ascii_case(mesh))) {
-        return describe_meshes(path, common);
+    match ending(path).as_str() {
+        "bvh" => return describe_bvh(path, common),
+        "npy" | "obj" => return describe_meshes(path, common),
+        _ => {}
     }
     let archive = Npz::open(path)?;
     if archive.has("v_template") {
@@ -52,8 +55,7 @@ fn describe_body(path: &Path, common: &Common) -> Result<()> {
     );
     show_extent("rest pose", &model.template);
     let facts = BodyFacts::of_mesh(&model.template, &model.faces);
-    let surface = facts.open.as_ref().map_or("closed".to_string(), |why| format!("open: {why}"));
-    say!("  surface            {surface}, volume {:.4} m3", facts.volume_m3);
+    show_surface(&facts);
     plausible::tell(Facts { body: Some(facts), ..Facts::default() }, &Sources::one(path), common)
 }
 
@@ -69,10 +71,14 @@ fn describe_meshes(path: &Path, common: &Common) -> Result<()> {
     show_extent("first pose", first);
     let facts = BodyFacts::of_meshes(&meshes.vertices, &meshes.faces);
     if !meshes.faces.is_empty() {
-        let surface = facts.open.as_ref().map_or("closed".to_string(), |why| format!("open: {why}"));
-        say!("  surface            {surface}, volume {:.4} m3", facts.volume_m3);
+        show_surface(&facts);
     }
     plausible::tell(Facts { body: Some(facts), ..Facts::default() }, &Sources::one(path), common)
+}
+
+fn show_surface(facts: &BodyFacts) {
+    let surface = facts.open.as_ref().map_or("closed".to_string(), |why| format!("open: {why}"));
+    say!("  surface            {surface}, volume {:.4} m3", facts.volume_m3);
 }
 
 /// The box around points, and the axis that it is longest along.

@@ -58,16 +58,23 @@ pub(super) fn scene(
     tell(facts(radar, room, person)?, sources, common)
 }
 
-/// The same of all sequences of a site: of its config, or of its folder of recordings.
+/// The same of a site: of its config file, or of its folder of recordings.
+///
+/// # Errors
+/// As [`sequences`] and [`recording`].
+pub(super) fn site(path: &Path, common: &Common) -> Result<()> {
+    match path.is_dir() {
+        true => recordings_in(path)?.iter().try_for_each(|recording| folder(recording, common)),
+        false => sequences(&SiteConfig::read(path, &[])?, path, common),
+    }
+}
+
+/// The same of all sequences of a site's config, which was read from `path`.
 ///
 /// # Errors
 /// Settings that cannot be a site; as [`recording`].
-pub(super) fn site(path: &Path, set: &[String], common: &Common) -> Result<()> {
-    if path.is_dir() {
-        return recordings_in(path)?.iter().try_for_each(|recording| folder(recording, common));
-    }
-    let config = SiteConfig::read(path, set)?;
-    for (name, findings) in site::implausible(&config, path.parent().unwrap_or(Path::new("")), common.as_stated)? {
+pub(super) fn sequences(config: &SiteConfig, path: &Path, common: &Common) -> Result<()> {
+    for (name, findings) in site::implausible(config, path.parent().unwrap_or(Path::new("")), common.as_stated)? {
         let sources = Sources::one(format!("{} ({name})", path.display()));
         tell_findings(Verdict::new(findings, &sources, common.as_stated))?;
     }

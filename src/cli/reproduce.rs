@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     let scene = config.second_scene.as_ref().map(|scene| &scene.site);
     for site in std::iter::once(&config.site).chain(&config.second_room).chain(scene) {
-        plausible::site(site, &[], common)?;
+        plausible::site(site, common)?;
     }
     let devices = devices(&common.device)?;
     if let Some(lpips) = &config.comparison.lpips {

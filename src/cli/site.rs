@@ -29,7 +29,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let _claim = Claim::part(&arguments.out, shard)?;
     interrupt::kept(|| format!("the recordings that are whole are kept; go on with: {}", interrupt::typed()));
     let settings_folder = arguments.config.parent().unwrap_or(Path::new(""));
-    plausible::site(&arguments.config, &common.set, common)?;
+    plausible::sequences(&config, &arguments.config, common)?;
     let mut shown = None;
     let mut show = |done: usize, of: usize, name: &str| {
         let progress = shown.get_or_insert_with(|| Progress::new("recording", of, common.quiet));

@@ -33,8 +33,7 @@ pub fn read_meshes(path: impl AsRef<Path>) -> Result<Meshes> {
         let note = "there is no faces.npy beside it: the surface cannot be looked at".into();
         return Ok(Meshes { vertices, faces: vec![], notes: vec![note] });
     }
-    let corners: Array<i64> = read_npy(&faces_path, &[("face", None), ("corner", Some(3))])?;
-    let faces = read_faces(&faces_path, "faces", &corners, vertices[0].len())?;
+    let faces = read_triangles(&faces_path, vertices[0].len())?;
     Ok(Meshes { vertices, faces, notes: vec![format!("faces from {}", faces_path.display())] })
 }
 
@@ -46,6 +45,12 @@ pub(super) fn read_vertices(path: &Path) -> Result<Vec<Vec<[f64; 3]>>> {
         return Err(Error::field(path, "vertices", format!("{:?}", positions.shape), "at least one pose and one vertex"));
     }
     Ok(positions.rows().chunks(count).map(<[_]>::to_vec).collect())
+}
+
+/// `[face, corner]`, of so many vertices.
+pub(super) fn read_triangles(path: &Path, vertices: usize) -> Result<Vec<[usize; 3]>> {
+    let corners: Array<i64> = read_npy(path, &[("face", None), ("corner", Some(3))])?;
+    read_faces(path, "faces", &corners, vertices)
 }
 
 /// All objects of the file together. Faces of more corners are cut into triangles.

@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 use samples::IfFile;
 
 use crate::data::arrays::{Array, read_npy};
-use crate::data::bodies::{read_body, read_faces};
-use crate::data::meshes::read_vertices;
+use crate::data::bodies::read_body;
+use crate::data::meshes::{read_triangles, read_vertices};
 use crate::data::motions::read_motion;
 use crate::error::{Error, Result};
 use crate::person::{Person, Placement};
@@ -134,18 +134,13 @@ fn read_person(folder: &Path, path: &Path, settings: &RecordingSettings, notes: 
 
 fn read_meshes(vertices: &Path, faces: &Path, times: &Path) -> Result<Person> {
     let positions = read_vertices(vertices)?;
-    let (poses, count) = (positions.len(), positions[0].len());
-    let corners: Array<i64> = read_npy(faces, &[("face", None), ("corner", Some(3))])?;
+    let (poses, faces) = (positions.len(), read_triangles(faces, positions[0].len())?);
     let pose_times: Array<f64> = read_npy(times, &[("pose", Some(poses))])?;
     if let Some(pose) = (1..poses).find(|&pose| pose_times.values[pose] <= pose_times.values[pose - 1]) {
         let found = format!("{} s at pose {pose} after {} s", pose_times.values[pose], pose_times.values[pose - 1]);
         return Err(Error::field(times, "pose_times", found, "times that ascend"));
     }
-    Ok(Person::Meshes {
-        vertices: positions,
-        faces: read_faces(faces, "faces", &corners, count)?,
-        pose_times_s: pose_times.values,
-    })
+    Ok(Person::Meshes { vertices: positions, faces, pose_times_s: pose_times.values })
 }
 
 /// A note for frames that no pose covers: using them will be an error.

@@ -56,15 +56,28 @@ pub(super) struct Comparison {
     pub p_value: f64,
 }
 
-impl Fit {
-    fn groups(&self, wanted: impl Fn(usize) -> bool) -> [Sums; 2] {
-        let frames = self.frames.iter().enumerate().filter(|(frame, _)| wanted(*frame)).filter_map(|(_, frame)| frame.as_ref());
+impl Frame {
+    /// Sums over some frames.
+    fn all<'a>(frames: impl Iterator<Item = &'a Frame>) -> [Sums; 2] {
         frames.fold([Sums::default(); 2], |all, Frame { sums, .. }| [all[0].plus(sums[0]), all[1].plus(sums[1])])
     }
 
+    /// Sum of squares around a mean for each group.
+    fn left(&self, means: [f64; 2]) -> f64 {
+        self.sums.iter().zip(means).map(|(sums, mean)| sums.around(mean)).sum::<f64>().max(f64::MIN_POSITIVE)
+    }
+
+    /// Cells that one of two predictions has alone.
+    fn apart(&self, other: &Frame) -> usize {
+        let shared = self.predicted.iter().filter(|cell| other.predicted.binary_search(cell).is_ok()).count();
+        self.predicted.len() + other.predicted.len() - 2 * shared
+    }
+}
+
+impl Fit {
     /// Mean of the logarithms of power at the predicted cells, dB over the noise.
     pub fn level_db(&self) -> f64 {
-        10.0 / std::f64::consts::LN_10 * self.groups(|_| true)[0].mean()
+        10.0 / std::f64::consts::LN_10 * Frame::all(self.frames.iter().flatten())[0].mean()
     }
 
     /// Each prediction explains a frame's ln power by two means, one of the predicted cells and one of all others; a frame tells them
@@ -75,26 +88,17 @@ impl Fit {
     /// The levels alone are no comparison: of two predictions the one with fewer cells, of the strongest part of a motion, has the
     /// higher level, while it leaves the rest of the body's power unexplained.
     pub fn against(&self, other: &Fit) -> Comparison {
-        let common = |frame: usize| [self, other].iter().all(|fit| fit.frames.get(frame).is_some_and(Option::is_some));
-        let common: Vec<usize> = (0..self.frames.len()).filter(|frame| common(*frame)).collect();
-        let means = [self, other].map(|fit| {
-            let [predicted, others] = fit.groups(|frame| common.binary_search(&frame).is_ok());
-            // Where less is than elsewhere, nothing is foretold.
-            match predicted.mean() > others.mean() {
-                true => [predicted.mean(), others.mean()],
-                false => [predicted.plus(others).mean(); 2],
-            }
-        });
-        let (mut ratios, mut weights) = (vec![], vec![]);
-        for frame in common {
-            let (Some(own), Some(others)) = (&self.frames[frame], &other.frames[frame]) else { continue };
-            let left = |frame: &Frame, means: [f64; 2]| {
-                frame.sums.iter().zip(means).map(|(sums, mean)| sums.around(mean)).sum::<f64>().max(f64::MIN_POSITIVE)
-            };
-            let shared = own.predicted.iter().filter(|cell| others.predicted.binary_search(cell).is_ok()).count();
-            ratios.push((left(others, means[1]) / left(own, means[0])).ln());
-            weights.push((own.predicted.len() + others.predicted.len() - 2 * shared) as f64);
-        }
+        let both = self.frames.iter().zip(&other.frames).filter_map(|(own, other)| own.as_ref().zip(other.as_ref()));
+        let both: Vec<(&Frame, &Frame)> = both.collect();
+        // Where less is than elsewhere, nothing is foretold.
+        let means = |[predicted, others]: [Sums; 2]| match predicted.mean() > others.mean() {
+            true => [predicted.mean(), others.mean()],
+            false => [predicted.plus(others).mean(); 2],
+        };
+        let own_means = means(Frame::all(both.iter().map(|(own, _)| *own)));
+        let other_means = means(Frame::all(both.iter().map(|(_, other)| *other)));
+        let ratios: Vec<f64> = both.iter().map(|(own, other)| (other.left(other_means) / own.left(own_means)).ln()).collect();
+        let weights: Vec<f64> = both.iter().map(|(own, other)| own.apart(other) as f64).collect();
         let (better, p_value) = ratio_tail(&ratios, &weights);
         Comparison { better, p_value }
     }

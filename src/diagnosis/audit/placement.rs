@@ -35,24 +35,16 @@ pub(super) fn placement(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<
         let explains = |fit: &Fit| reading.fit.level_db() > fit.level_db() && reading.fit.against(fit).p_value < alarm;
         reading.fit.level_db() >= PRESENT_DB && (is_silent || stated.iter().all(|(_, fit)| explains(fit)))
     };
-    let believed = (0..readings.len())
-        .filter(|&index| is_believed(&readings[index]))
-        .max_by(|a, b| better(&readings[*a]).total_cmp(&better(&readings[*b])));
+    let by_better = |a: &&Alternative, b: &&Alternative| better(a).total_cmp(&better(b));
+    let believed = readings.iter().filter(|reading| is_believed(reading)).max_by(by_better);
     let here_db = here.level_db();
     let mut checks: Vec<Check> = vec![];
     for reading in readings.chunk_by(|a, b| a.check == b.check) {
-        let Alternative { check, expected, .. } = reading[0];
-        let wrong = believed.map(|index| &readings[index]).filter(|reading| reading.check == check);
-        let found = match wrong {
-            Some(Alternative { fit, place, hint, .. }) => {
-                format!("{here_db:.1} dB where the motion puts the body, {:.1} dB {place}: {hint}", fit.level_db())
-            }
-            None => {
-                let best = reading.iter().max_by(|a, b| better(a).total_cmp(&better(b))).unwrap_or(&reading[0]);
-                format!("{here_db:.1} dB where the motion puts the body, {:.1} dB {}", best.fit.level_db(), best.place)
-            }
-        };
-        checks.push(Check::new(check, expected, found, wrong.is_none()));
+        let wrong = believed.filter(|believed| believed.check == reading[0].check);
+        let told = wrong.or_else(|| reading.iter().max_by(by_better)).unwrap_or(&reading[0]);
+        let hint = wrong.map_or(String::new(), |wrong| format!(": {}", wrong.hint));
+        let found = format!("{here_db:.1} dB where the motion puts the body, {:.1} dB {}{hint}", told.fit.level_db(), told.place);
+        checks.push(Check::new(told.check, told.expected, found, wrong.is_none()));
     }
     if believed.is_none()
         && let Some(place) = checks.iter_mut().find(|check| check.check == "body_place")
@@ -72,7 +64,9 @@ pub(super) fn placement(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<
     checks
 }
 
-/// Whether a body is heard where it is stated to be, once something was undone.
+/// Whether a body is heard where it is stated to be, once something was undone; none where another reading of the scene is believed.
 pub fn body_place(evidence: &Evidence) -> Option<Check> {
-    placement(evidence, None).into_iter().find(|check| check.check == "body_place")
+    let checks = placement(evidence, None);
+    let other_reading = checks.iter().any(|check| !check.ok && check.check != "body_place");
+    checks.into_iter().find(|check| !other_reading && check.check == "body_place")
 }
