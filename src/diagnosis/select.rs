@@ -210,10 +210,11 @@ fn is_displaced(candidate: &Candidate) -> bool {
     matches!(candidate.correction, Correction::Body(_)) && candidate.place.stage != "propagation"
 }
 
-/// Whether it acts on every return, or on all of the body.
-fn is_on_all(candidate: &Candidate) -> bool {
+/// Whether it acts on every return, or on all of the body. What has no name does where nobody is tracked: most ranges share it then.
+fn is_on_all(candidate: &Candidate, evidence: &Evidence) -> bool {
     let id = candidate.id.unwrap_or_default();
-    !id.is_empty() && (id == "radar_vibration" || is_displaced(candidate) || UPSTREAM.contains(&candidate.place.stage.as_str()))
+    (!id.is_empty() || evidence.body.is_none())
+        && (id == "radar_vibration" || is_displaced(candidate) || UPSTREAM.contains(&candidate.place.stage.as_str()))
 }
 
 /// Whether it may be something else's echoes of the body.
@@ -236,7 +237,7 @@ fn upstream<'a>(
         let mut of_the_chirp = passing.iter().filter(|(_, candidate)| candidate.place.stage == "waveform");
         return of_the_chirp.find(|(_, candidate)| !left(&evidence.with(candidate))).copied().unwrap_or(best);
     }
-    let others = passing.iter().filter(|(_, candidate)| is_on_all(candidate));
+    let others = passing.iter().filter(|(_, candidate)| is_on_all(candidate, evidence));
     let Some(other) = others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| is_echo(&best.1)) else {
         return best;
     };

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::receiver::wandering;
 use super::region::{Region, joined, remove, run};
 use crate::diagnosis::evidence::{Evidence, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
@@ -74,6 +75,11 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
     let p_value = statistics::corrected(statistics::mean_power_tail(mean[peak], count), cells as f64);
     let another = evidence.accepted.contains(&"moving_reflector");
     if p_value > 0.01 || held_out.is_empty() || another && mean[peak] < BESIDE_ANOTHER {
+        return None;
+    }
+    // What keeps its beat frequency whatever its Doppler frequency says is no return.
+    let tone = wandering::find(evidence).filter(|tone| tone.p_value < 0.01 && tone.is_at([doppler, range], [loops, samples]));
+    if tone.is_some() {
         return None;
     }
     let signed = |d: usize| if 2 * d >= loops { d as f64 - loops as f64 } else { d as f64 };

@@ -14,3 +14,4 @@ mod slow_spur;
 pub mod spur;
 pub mod still;
 pub mod support;
+pub mod wandering;

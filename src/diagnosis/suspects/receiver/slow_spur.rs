@@ -31,8 +31,8 @@ const FORETOLD: f64 = 0.9;
 /// Range bins that what turns so, and moves, leaves during the recording at least, and up to which share of that a tone may seem to.
 const LEAST_BINS: f64 = 0.8;
 const STAYS: f64 = 0.3;
-/// Share of its amplitude that the opposite Doppler frequency may have: what is modulated has both.
-const OPPOSITE: f64 = 0.3;
+/// Chance at which what goes on at the opposite Doppler frequency is none: what is modulated, or swings about its place, has both.
+const OPPOSITE: f64 = 1e-3;
 
 /// How a tone turns from loop to loop, and from one frame's beginning to the next.
 #[derive(Clone, Copy, Debug)]
@@ -108,8 +108,7 @@ pub fn find(evidence: &Evidence) -> Option<SlowSpur> {
         return None;
     }
     let fast = spectra.beat(&training, turns, bin) / samples as f64;
-    let goes_on = |turns: Turns| spectra.goes_on(&spectra.held(turns.per_loop, bin), turns.per_frame);
-    if goes_on(turns.opposite()) > OPPOSITE * OPPOSITE * goes_on(turns) {
+    if spectra.opposite(turns, bin) < OPPOSITE {
         return None;
     }
     let tried = (cells.len() * STEPS * FINE * evidence.cube.dims[0]) as f64;
@@ -208,6 +207,25 @@ impl<'a> Spectra<'a> {
         let mean =
             |channel: &Vec<Complex64>| channel[..self.training].iter().sum::<Complex64>().norm_sqr() / self.training as f64;
         self.turned_back(held, per_frame).iter().map(mean).sum()
+    }
+
+    /// Chance that so much of what lies at the opposite Doppler frequency goes on from frame to frame, once the tone is away.
+    fn opposite(&self, turns: Turns, bin: usize) -> f64 {
+        let opposite = turns.opposite();
+        let own = self.turned_back(&self.held(turns.per_loop, bin), turns.per_frame);
+        let leak = |frame: &usize| {
+            let turned = |(i, weight): (usize, &f64)| Complex64::cis(2.0 * TAU * turns.per_loop * i as f64) * weight;
+            let within = self.window.iter().enumerate().map(turned).sum::<Complex64>() / self.window.iter().sum::<f64>();
+            within * Complex64::cis(TAU * turns.per_frame * self.starts[*frame])
+        };
+        let leaks: Vec<Complex64> = self.frames.iter().map(leak).collect();
+        let mut left = self.held(opposite.per_loop, bin);
+        for (channel, own) in left.iter_mut().zip(own) {
+            let mean = own[..self.training].iter().sum::<Complex64>() / self.training as f64;
+            channel.iter_mut().zip(&leaks).for_each(|(value, leak)| *value -= mean * leak);
+        }
+        let coherence = self.goes_on(&left, opposite.per_frame) / self.energy(&left).max(f64::MIN_POSITIVE);
+        (1.0 - coherence).clamp(1e-16, 1.0).powi(self.training as i32 - 1)
     }
 
     /// Share of the held-out frames' power that the training frames' mean foretells.

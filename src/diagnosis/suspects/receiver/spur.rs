@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::image::empty_bins;
 use super::slow_spur::{self, SlowSpur};
+use super::wandering::{self, Wandering, deviation_bins};
 use crate::diagnosis::evidence::{hann, spectrum, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::locate::Residual;
@@ -38,7 +39,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.accepted.iter().filter(|id| **id == "spur").count() > 2 {
         return vec![];
     }
-    aside(evidence).or_else(|| among_the_slow(evidence)).into_iter().collect()
+    aside(evidence).or_else(|| among_the_slow(evidence)).or_else(|| wanders(evidence)).into_iter().collect()
 }
 
 /// A line where nothing of the room or the body can stay.
@@ -109,6 +110,26 @@ fn among_the_slow(evidence: &Evidence) -> Option<Candidate> {
     Some(candidate(evidence, Tone { slow, fast, amplitudes, p_value, gain, how, correction }))
 }
 
+/// One whose Doppler frequency wanders from frame to frame, where nobody is tracked.
+fn wanders(evidence: &Evidence) -> Option<Candidate> {
+    let Wandering { slow, fast, amplitudes, p_value, gain } = wandering::find(evidence)?;
+    if p_value > UNLIKELY {
+        return None;
+    }
+    let turns = slow.clone();
+    let correction = Correction::Samples(Arc::new(move |cube: &mut Cube| {
+        let channels = cube.channels();
+        let amplitudes = wandering::amplitudes(cube, &turns, fast);
+        cube.each_chirp(|[frame, channel, chirp], values| {
+            let amplitude = amplitudes[frame * channels + channel];
+            values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(turns[frame], fast, chirp, n));
+        });
+    }));
+    let how = "at one beat frequency, where whatever turns like that and moves would have left its range";
+    let mean = slow.iter().sum::<f64>() / slow.len() as f64;
+    Some(candidate(evidence, Tone { slow: mean, fast, amplitudes, p_value, gain, how, correction }))
+}
+
 /// A tone that was found.
 struct Tone {
     /// Turns per chirp and per sample.
@@ -156,12 +177,6 @@ fn candidate(evidence: &Evidence, tone: Tone) -> Candidate {
         energy: strength * strength * (frames * evidence.cube.channels() * loops * samples) as f64,
         correction,
     }
-}
-
-/// Of a frequency, from the tone's energy over the noise in the held-out frames, which are fewer than those it is sought in: Cramér and
-/// Rao's bound, with a Hann window's loss, and a fiftieth of a bin for all else.
-fn deviation_bins(energy: f64) -> f64 {
-    0.02f64.hypot(1.3 * (6.0 / energy.max(1.0)).sqrt() / TAU)
 }
 
 /// Where a line of a fixed range and Doppler frequency cannot be anything that moves, and the powers there.

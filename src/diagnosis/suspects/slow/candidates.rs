@@ -21,15 +21,15 @@ use crate::radar::SPEED_OF_LIGHT;
 const STATED_AT_M: f64 = 3.0;
 
 /// Delay of the range at which phases are stated.
-fn stated_delay_s() -> f64 {
+pub(super) fn stated_delay_s() -> f64 {
     2.0 * STATED_AT_M / SPEED_OF_LIGHT
 }
 
 /// Frame, transmitter and loop to the deviation of that chirp.
-type Deviation = Arc<dyn Fn([usize; 3]) -> f64 + Send + Sync>;
+pub(super) type Deviation = Arc<dyn Fn([usize; 3]) -> f64 + Send + Sync>;
 
 /// `spent`: nats per chirp on deviations that no law foretells.
-fn correction(evidence: &Evidence, part: Part, deviation: Deviation, spent: f64) -> Correction {
+pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, spent: f64) -> Correction {
     let (radar, room) = (evidence.radar.clone(), evidence.room.clone());
     let undo = move |cube: &mut Cube| {
         let receivers = cube.dims[2];
@@ -75,7 +75,7 @@ fn typical_delay_s(field: &Field) -> f64 {
     (sum / f64::max(weight, f64::MIN_POSITIVE)).sqrt()
 }
 
-fn behaves_like(part: Part) -> &'static str {
+pub(super) fn behaves_like(part: Part) -> &'static str {
     match part {
         Part::Gain => "slow-time gain",
         Part::Phase | Part::Boresight => "slow-time phase",
@@ -83,7 +83,7 @@ fn behaves_like(part: Part) -> &'static str {
     }
 }
 
-fn place(part: Part) -> Place {
+pub(super) fn place(part: Part) -> Place {
     Place::at(if part == Part::Delay { "waveform" } else { "receiver" })
 }
 

@@ -12,6 +12,7 @@ pub mod lines;
 pub mod odd_frame;
 pub mod random;
 pub mod settling;
+mod shared;
 pub mod slip;
 pub mod steady;
 mod sway;
@@ -67,17 +68,21 @@ impl From<Candidate> for Found {
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let known = |candidate: &Candidate| candidate.id.is_some_and(|id| evidence.accepted.contains(&id));
+    let tells = |candidate: &Candidate| candidate.p_value < PASSED_ON && candidate.gain > LEAST_GAIN && !known(candidate);
+    let of_all = |found: Candidate| Candidate { p_value: statistics::corrected(found.p_value, LOOKS), ..found };
+    // Where nobody is tracked, what the ranges share needs no law in time to be told.
+    let untracked = evidence.body.is_none();
+    let shared = untracked.then(|| shared::find(evidence)).flatten().map(of_all).filter(tells);
     let Some(field) = Field::new(evidence) else {
         // No range stands still: nothing does, or returns from many directions swing.
-        let found = sway::find(evidence).map(|found| Candidate { p_value: statistics::corrected(found.p_value, LOOKS), ..found });
-        return found.into_iter().filter(|c| c.p_value < PASSED_ON && c.gain > LEAST_GAIN && !known(c)).collect();
+        return shared.or_else(|| sway::find(evidence).map(of_all).filter(tells)).into_iter().collect();
     };
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     let frame_s = evidence.radar.frame_duration_s();
     // Of a few parameters, and those that are free in every chirp.
     let (mut found, mut free): (Vec<Found>, Vec<Found>) = (vec![], vec![]);
     for part in [Part::Gain, Part::Phase, Part::Delay, Part::Boresight] {
-        if part == Part::Boresight && evidence.room.is_none() {
+        if part == Part::Boresight && evidence.room.is_none() || part != Part::Gain && shared.is_some() {
             continue;
         }
         let series = field.series(part, |_| true);
@@ -131,7 +136,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         for Found { candidate, .. } in list.iter_mut() {
             candidate.p_value = statistics::corrected(candidate.p_value, LOOKS);
         }
-        list.retain(|Found { candidate: c, .. }| c.p_value < PASSED_ON && c.gain > LEAST_GAIN && !known(c));
+        list.retain(|Found { candidate, .. }| tells(candidate));
     }
     // One cause shows in several looks. A law of few parameters wins where it explains nearly as much as what is free in
     // every chirp (over the noise alone: a background that makes a law unsure is part of what is free in every chirp), and a name
@@ -182,5 +187,5 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         }
         candidate
     };
-    found.into_iter().map(judged).collect()
+    found.into_iter().map(judged).chain(shared).collect()
 }
