@@ -33,7 +33,7 @@ pub fn noise_level<'a>(recordings: impl IntoIterator<Item = &'a Recording>, fram
     for recording in recordings {
         let radar = &recording.radar;
         let moving = Moving::new(radar);
-        for frame in spread(radar, frames) {
+        for frame in spread(recording, frames) {
             variance +=
                 moving.floor(&moving.map(&measured_frame(recording, frame)?)) / HeatmapConfig::default().noise_gain(radar);
             count += 1.0;
@@ -42,10 +42,11 @@ pub fn noise_level<'a>(recordings: impl IntoIterator<Item = &'a Recording>, fram
     Ok((variance / f64::max(count, 1.0)).sqrt())
 }
 
-/// Up to so many frames of a recording, evenly.
-fn spread(radar: &Radar, frames: usize) -> impl Iterator<Item = usize> + use<> {
-    let (all, count) = (radar.frames, frames.clamp(1, radar.frames.max(1)).min(radar.frames));
-    (0..count).map(move |part| (2 * part + 1) * all / (2 * count))
+/// Up to so many whole frames of a recording, evenly.
+fn spread(recording: &Recording, frames: usize) -> impl Iterator<Item = usize> + use<> {
+    let whole: Vec<usize> = recording.whole_frames().collect();
+    let count = frames.clamp(1, whole.len().max(1)).min(whole.len());
+    (0..count).map(move |part| whole[(2 * part + 1) * whole.len() / (2 * count)])
 }
 
 impl Calibration {
@@ -56,7 +57,7 @@ impl Calibration {
     pub fn add(&mut self, recording: &Recording, baseline: &dyn Baseline, frames: usize) -> Result<()> {
         let radar = baseline.radar();
         let moving = Moving::new(radar);
-        for frame in spread(radar, frames) {
+        for frame in spread(recording, frames) {
             let measured = moving.map(&measured_frame(recording, frame)?);
             let simulated = moving.map(&baseline.clean_signal(frame)?.to_host());
             self.measured += person_power(&measured, moving.floor(&measured));

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use burn::tensor::Device;
 use clap::Args;
 
-use super::{Common, Out, describe, plausible, report};
+use super::{Common, Out, conventions, conventions::Against, describe, plausible, report};
 use crate::{
     config::Config,
     data::{Recording, atomic::AtomicFolder},
@@ -85,8 +85,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 
 /// Heatmaps of what was measured, for `--out`.
 fn draw(recording: &Recording, folder: AtomicFolder) -> Result<()> {
-    let frames = recording.frames().min(MOST_DRAWN);
-    let samples = (0..frames).map(|frame| evaluation::measured_frame(recording, frame)).collect::<Result<Vec<_>>>()?.concat();
+    let frames = recording.whole_stretch()?.take(MOST_DRAWN);
+    let samples = frames.map(|frame| evaluation::measured_frame(recording, frame)).collect::<Result<Vec<_>>>()?.concat();
     report::Pictures::new(&recording.radar, &HeatmapConfig::default()).show(folder.path(), &samples)?;
     folder.finish()
 }
@@ -100,8 +100,18 @@ fn show_recording(folder: &Path, common: &Common) -> Result<Recording> {
     Ok(recording)
 }
 
-/// What a recording is, and that all of its samples can be read.
-pub(crate) fn show(recording: &Recording, common: &Common) -> Result<()> {
+/// What a recording is, that all of its samples can be read, and what they say of themselves.
+fn show(recording: &Recording, common: &Common) -> Result<()> {
+    tell(recording, common)?;
+    // Every whole frame is read once, so that a truncated or lying file shows here.
+    let findings = integrity::inspect(recording, recording.radar.frames)?;
+    say!("  samples            {}, all {} frames can be read", recording.number_type(), recording.whole_frames().count());
+    conventions::show(&recording.radar, &findings, Against::Questioned);
+    Ok(())
+}
+
+/// What is stated of a recording, and whether it can be.
+pub(super) fn tell(recording: &Recording, common: &Common) -> Result<()> {
     say!("recording: {}", recording.folder.display());
     show_radar(&recording.radar, recording.room.as_ref());
     match recording.person() {
@@ -120,18 +130,7 @@ pub(crate) fn show(recording: &Recording, common: &Common) -> Result<()> {
     for note in &recording.notes {
         remark!("note: {note}");
     }
-    plausible::recording(recording, common)?;
-    // Every frame is read once, so that a truncated or lying file shows here.
-    let findings = integrity::inspect(recording, recording.radar.frames)?;
-    say!("  samples            {}, all {} frames can be read", recording.number_type(), recording.radar.frames);
-    for finding in &findings {
-        if finding.ok {
-            say!("  ok       {} ({})", finding.expected, finding.found);
-        } else {
-            remark!("damaged: {}", finding.found);
-        }
-    }
-    Ok(())
+    plausible::recording(recording, common)
 }
 
 fn show_radar(radar: &Radar, room: Option<&Room>) {

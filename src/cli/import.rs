@@ -4,16 +4,16 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use clap::Args;
 
-use super::{Common, check};
+use super::{Common, check, conventions, conventions::Against};
 use crate::{
     data::atomic::AtomicFolder,
     error::{Error, Result},
-    import::capture::{self, Layout, Stated},
+    import::capture::{self, Layout, Preset, Stated},
 };
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// The capture: .bin files of one DCA1000 capture in their order, a folder of the Infineon SDK, or a .npy array
+    /// The capture: .bin files of one DCA1000 capture in their order, a folder of the Infineon SDK, or an array (.npy, .npz, .mat, .h5)
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,
     /// What describes the radar: .mmwave.json, .setup.json or .cfg of TI, or TOML with [radar]; may be repeated
@@ -25,6 +25,12 @@ pub(crate) struct Arguments {
     /// The order of an array's axes, outer to inner, of frame, tx, rx, loop, chirp, sample, iq
     #[arg(long, value_name = "AXES")]
     layout: Option<Layout>,
+    /// The array of a file that holds several; RE,IM where real and imaginary parts are two arrays
+    #[arg(long, value_name = "NAME")]
+    variable: Option<String>,
+    /// A public data set whose layout and radar are known, such as uw_raw_adc
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
     /// Which chirp profile, where a frame has several
     #[arg(long, value_name = "ID")]
     profile: Option<usize>,
@@ -49,6 +55,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         configs: arguments.config.clone(),
         board: arguments.board.clone(),
         layout: arguments.layout.clone(),
+        variable: arguments.variable.clone(),
+        preset: arguments.preset.as_deref().map(Preset::named).transpose()?,
         profile: arguments.profile,
         subframe: arguments.subframe,
         tx: arguments.tx,
@@ -62,7 +70,14 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         Ok((name.trim().to_string(), text.trim().to_string()))
     });
     let labels = labels.collect::<Result<BTreeMap<_, _>>>()?;
-    let capture = capture::open(&arguments.sources, &stated)?;
-    let recording = capture::import(capture, &arguments.out, labels)?;
-    check::show(&recording, common)
+    let draft = capture::draft(capture::open(&arguments.sources, &stated)?, &arguments.out, labels)?;
+    let recording = draft.recording();
+    check::tell(recording, common)?;
+    let against = if common.as_stated { Against::Kept } else { Against::Refused };
+    conventions::show(&recording.radar, &draft.findings, against);
+    let told = recording.notes.clone();
+    let recording = draft.publish(common.as_stated)?;
+    recording.notes.iter().filter(|note| !told.contains(note)).for_each(|note| remark!("note: {note}"));
+    say!("imported: {}", recording.folder.display());
+    Ok(())
 }

@@ -17,6 +17,7 @@ mod baseline;
 mod challenge;
 mod check;
 mod compare;
+mod conventions;
 mod describe;
 mod device;
 mod diagnose;
@@ -86,8 +87,8 @@ pub(crate) struct Common {
     /// flex, ndarray, wgpu, wgpu-cpu, cuda:0 or auto (a real GPU if there is one, else flex)
     #[arg(long, global = true, value_name = "NAME", default_value = "auto")]
     pub device: String,
-    /// Take radar, body, motion and place as they are stated, however implausible
-    #[arg(long, global = true)]
+    /// Take radar, body, motion, place and the samples of a capture as they are stated, however implausible
+    #[arg(long, global = true, alias = "yes-as-stated")]
     pub as_stated: bool,
     /// Print results and errors only
     #[arg(short, long, global = true)]
@@ -104,8 +105,9 @@ enum Command {
     Check(check::Arguments),
     /// Turn a capture of a radar board into a recording
     ///
-    /// Reads adc_data.bin of a DCA1000 with its .mmwave.json or .cfg, recording folders of the Infineon SDK, and NumPy
-    /// arrays whose axes --layout names. Writes a recording folder that every other verb reads, and says what it assumed.
+    /// Reads adc_data.bin of a DCA1000 with its .mmwave.json or .cfg, recording folders of the Infineon SDK, and arrays
+    /// (NumPy, MATLAB, HDF5) whose axes --layout names. Holds the samples against what is stated of them, and writes a
+    /// recording folder that every other verb reads; where they contradict it, nothing, unless --as-stated.
     /// --set radar.KEY=VALUE corrects what the files say.
     Import(import::Arguments),
     /// Make a recording of a person in a room, in a world that shares nothing with the simulator

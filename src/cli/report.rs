@@ -152,8 +152,7 @@ impl RunReport<'_> {
         let best = self.folder.join("best");
         let (simulator, _) = checkpoint::open(&best, self.device)?;
         let training = &self.config.training;
-        let counts: Vec<usize> = self.recordings.iter().map(|recording| recording.scene.radar.frames).collect();
-        let split = FrameSplit::new(&counts, training.validation_fraction, training.split, self.config.seed);
+        let split = FrameSplit::of(self.recordings, training, self.config.seed);
         let held_out = if split.validation.is_empty() { &split.training } else { &split.validation };
 
         let mut evaluations = Vec::new();
@@ -207,10 +206,12 @@ impl RunReport<'_> {
     /// Time-Doppler needs all frames at once; a long recording shows its first minute or so.
     fn draw_over_time(&self, recording: &LoadedRecording, simulation: &Simulation<'_>) -> Result<()> {
         let radar = &recording.scene.radar;
-        let frames = radar.frames.min(600);
+        let stretch = recording.recording.whole_stretch()?;
+        let frames = stretch.len().min(600);
         if frames < 2 {
             return Ok(());
         }
+        let shown = || stretch.clone().take(frames);
         let analysis = Analysis::new(radar, &self.config.training.heatmap);
         let [_, tx, rx, loops, samples] = radar.dims();
         let map = |signal: Vec<Complex32>| {
@@ -219,8 +220,8 @@ impl RunReport<'_> {
             analysis.time_doppler(Samples::new(&moving, dims), &Gate::default())
         };
         let measured =
-            map((0..frames).map(|frame| measured_frame(&recording.recording, frame)).collect::<Result<Vec<_>>>()?.concat());
-        let simulated = map((0..frames).map(|frame| simulation.frame(frame)).collect::<Result<Vec<_>>>()?.concat());
+            map(shown().map(|frame| measured_frame(&recording.recording, frame)).collect::<Result<Vec<_>>>()?.concat());
+        let simulated = map(shown().map(|frame| simulation.frame(frame)).collect::<Result<Vec<_>>>()?.concat());
         let floor = self.config.training.heatmap.floor_amplitude(measured.max().sqrt());
         let (measured, simulated) = (measured.db(floor), simulated.db(floor));
         pictures::comparison(

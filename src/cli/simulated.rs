@@ -57,7 +57,12 @@ pub(super) fn write(
     let mut pictures = report::Pictures::new(radar, heatmap);
     match sequence.measured {
         Some(recording) => {
-            let measured = (0..radar.frames).map(|frame| measured_frame(recording, frame)).collect::<Result<Vec<_>>>()?.concat();
+            recording.whole_stretch()?;
+            let whole: Vec<usize> = recording.whole_frames().take_while(|frame| *frame < radar.frames).collect();
+            let measured = whole.iter().map(|&frame| measured_frame(recording, frame)).collect::<Result<Vec<_>>>()?.concat();
+            let length = tx * rx * loops * samples;
+            let simulated: Vec<_> =
+                whole.iter().flat_map(|frame| &simulated[frame * length..(frame + 1) * length]).copied().collect();
             pictures.compare(folder, &measured, &simulated)
         }
         None => pictures.show(folder, &simulated),

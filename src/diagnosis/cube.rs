@@ -115,16 +115,17 @@ impl Split {
 }
 
 impl Loaded {
-    /// Reads a recording, at most `most_frames` of it.
+    /// Reads a recording: at most `most_frames` of its longest stretch of whole frames, in which slow time has no gaps.
     ///
     /// # Errors
-    /// Samples that cannot be read; too few chirps to say anything.
+    /// Samples that cannot be read; no whole frame; too few chirps to say anything.
     pub fn read(recording: &Recording, most_frames: usize) -> Result<Self> {
         let mut radar = recording.radar.clone();
-        radar.frames = radar.frames.min(most_frames);
+        let stretch = recording.whole_stretch()?;
+        radar.frames = stretch.len().min(most_frames);
         let (mut samples, mut extremes) = (Vec::new(), [f64::INFINITY, f64::NEG_INFINITY]);
         for index in 0..radar.frames {
-            let frame = recording.frame(index)?;
+            let frame = recording.frame(stretch.start + index)?;
             for &value in frame.re.iter().chain(frame.im.iter().flatten()) {
                 extremes = [extremes[0].min(f64::from(value)), extremes[1].max(f64::from(value))];
             }
@@ -149,11 +150,12 @@ impl Loaded {
             (cube, radar, Some(loops))
         };
         let starts_s = match block_loops {
-            None => (0..radar.frames).map(|frame| radar.chirp_time_s(frame, 0, 0)).collect(),
+            None => (0..radar.frames).map(|frame| radar.chirp_time_s(stretch.start + frame, 0, 0)).collect(),
             Some(loops) => {
                 let whole = &recording.radar;
-                let blocks = radar.frames / whole.frames.min(most_frames);
-                (0..radar.frames).map(|block| whole.chirp_time_s(block / blocks, 0, block % blocks * loops)).collect()
+                let blocks = radar.frames / stretch.len().min(most_frames);
+                let time_s = |block: usize| whole.chirp_time_s(stretch.start + block / blocks, 0, block % blocks * loops);
+                (0..radar.frames).map(time_s).collect()
             }
         };
         Ok(Self { cube, split: Split::new(radar.frames, block_loops), radar, starts_s, extremes })

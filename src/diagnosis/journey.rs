@@ -57,8 +57,15 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     let per_frame: usize = recording.radar.dims()[1..].iter().product();
     let most_frames = MOST_FRAMES.min((MOST_SAMPLES / per_frame.max(1)).max(1));
     let mut notes = recording.notes.clone();
-    if recording.radar.frames > most_frames {
-        notes.push(format!("the first {most_frames} of {} frames were looked at", recording.radar.frames));
+    let stretch = recording.whole_stretch()?;
+    if stretch.len() < recording.radar.frames {
+        let (first, last) = (stretch.start, stretch.end - 1);
+        notes.push(format!(
+            "the frames {first} to {last} were looked at, the longest stretch without lost chirps; frames are counted from frame {first}"
+        ));
+    }
+    if stretch.len() > most_frames {
+        notes.push(format!("the first {most_frames} of {} frames were looked at", stretch.len()));
     }
     config.check()?;
     progress("reading");

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Evaluation,
-    frames::{Pair, measured_frame, score},
+    frames::{Pair, measured_frame, score, whole},
 };
 use crate::{
     data::{Recording, recording::SETTINGS_FILE},
@@ -66,6 +66,7 @@ pub fn compare_frames(
     lpips: Option<&Lpips>,
 ) -> Result<Evaluation> {
     refuse_different(measured, simulated)?;
+    let frames = &whole(measured, frames)?[..];
     measured.refuse_dead(frames.iter().copied())?;
     let pair = Pair {
         radar: &measured.radar,

@@ -5,7 +5,7 @@ use num_complex::Complex32;
 use super::{Evaluation, RegionScores, ScoreSummary};
 use crate::{
     data::Recording,
-    error::Result,
+    error::{Error, Result},
     heatmap::{Analysis, HeatmapConfig, Map, Samples, StaticRemoval, remove_static},
     lpips::Lpips,
     metrics::{DbWindow, MetricsConfig, bounding_box, crop, person_cells, scores},
@@ -17,6 +17,19 @@ pub fn measured_frame(recording: &Recording, frame: usize) -> Result<Vec<Complex
     let samples = recording.frame(frame)?;
     let im = samples.im.iter().flatten().copied().chain(std::iter::repeat(0.0));
     Ok(samples.re.iter().copied().zip(im).map(|(re, im)| Complex32::new(re, im)).collect())
+}
+
+/// Those of some frames that are whole: lost chirps are compared with nothing.
+///
+/// # Errors
+/// None of them is.
+pub(super) fn whole(recording: &Recording, frames: &[usize]) -> Result<Vec<usize>> {
+    let whole: Vec<usize> = frames.iter().copied().filter(|frame| recording.is_whole(*frame)).collect();
+    if whole.is_empty() && !frames.is_empty() {
+        let found = format!("lost chirps in all of {} frames", frames.len());
+        return Err(Error::field(recording.folder.join("recording.toml"), "files.valid", found, "a frame that is whole"));
+    }
+    Ok(whole)
 }
 
 /// A frame's maps in decibels, measured and simulated.

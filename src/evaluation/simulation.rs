@@ -5,7 +5,7 @@ use rand::RngExt;
 
 use super::{
     Evaluation,
-    frames::{FrameMaps, Pair, measured_frame, score},
+    frames::{FrameMaps, Pair, measured_frame, score, whole},
 };
 use crate::{
     error::Result,
@@ -76,6 +76,7 @@ pub fn evaluate(
     lpips: Option<&Lpips>,
     observe: &mut dyn FnMut(usize, FrameMaps, FrameMaps),
 ) -> Result<Evaluation> {
+    let frames = &whole(&recording.recording, frames)?[..];
     recording.recording.refuse_dead(frames.iter().copied())?;
     let pair = Pair {
         radar: &recording.scene.radar,

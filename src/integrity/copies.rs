@@ -10,7 +10,7 @@ use std::hash::{DefaultHasher, Hasher};
 use num_complex::Complex32;
 
 use super::stream::{Schedule, Stream};
-use super::{ALARM, Finding, Inspector, frames_listed, listed};
+use super::{ALARM, Finding, Inspector, Kind, frames_listed, listed};
 
 const CHECK: &str = "integrity_copies";
 const EXPECTED: &str = "no chirp and no frame twice";
@@ -69,7 +69,7 @@ impl Inspector for Copies {
         let chirps = (self.seen.len() + self.copies.len()) as f64;
         let log_p = (rx * samples) as f64 * ((equal + 1.0) / (compared + 2.0)).ln() + (0.5 * chirps * chirps).max(1.0).ln();
         if self.copies.is_empty() || log_p >= ALARM.ln() {
-            return Some(Finding::whole(CHECK, EXPECTED, "none"));
+            return Some(Finding::as_stated(CHECK, EXPECTED, "none"));
         }
         let mut by_frame: Vec<(usize, Vec<[Place; 2]>)> = vec![];
         for copy in self.copies {
@@ -100,6 +100,8 @@ impl Inspector for Copies {
             ));
         }
         let frames = by_frame.iter().map(|(frame, _)| *frame).collect();
-        Some(Finding::damaged(CHECK, EXPECTED, found.join("; "), frames, log_p))
+        let again = by_frame.iter().flat_map(|(_, copies)| copies.iter().map(|[copy, _]| *copy));
+        let chirps = again.flat_map(|[frame, index, tx]| (0..rx).map(move |rx| [frame, tx, rx, index])).collect();
+        Some(Finding { frames, chirps, ..Finding::wrong(Kind::Lost, CHECK, EXPECTED, found.join("; "), log_p) })
     }
 }

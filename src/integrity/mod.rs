@@ -1,46 +1,76 @@
-//! Whether a recording's samples are whole, before any physics is asked: packets of zeros, values that stand still, copies, a stream
-//! that moved, transmitters that were not separated, words in the wrong order.
+//! Whether a recording's samples are whole and are what they are stated to be, before any physics is asked: packets of zeros, values
+//! that stand still, copies, a stream that moved, numbers of another byte order or sign, chirps and frames that begin elsewhere,
+//! transmitters that were not separated, words in the wrong order, I and Q exchanged.
 //!
-//! The checks know the converter's stream and the radar's schedule, nothing of a body or a room. Each has a law that says how often
-//! a whole recording would look so; a recording is called damaged where that is rarer than [`ALARM`]. One frame is in memory at a
-//! time.
+//! The checks know the converter's stream and the radar's schedule, and where it is stated the size of the room, nothing of a body.
+//! Each has a law that says how often a recording that is as stated would look so; a check fails where that is rarer than [`ALARM`].
+//! One frame is in memory at a time.
 
+mod boundary;
 mod copies;
+mod iq_order;
+mod numbers;
+mod period;
 mod runs;
 mod shift;
+mod start;
 mod stream;
+mod tails;
 mod transmitters;
 mod words;
 
 use crate::data::Recording;
 use crate::error::Result;
+use crate::radar::Radar;
 use stream::{Schedule, Stream};
 
-/// Chance that one check calls a whole recording damaged, at most. Five checks at this level add at most half of the family-wise 1 % that
-/// a diagnosis allows itself (`diagnosis.alarm`).
+/// Chance that one check fails on a recording that is whole and as stated, at most. Eleven checks at this level add up to about the
+/// family-wise 1 % that a diagnosis allows itself (`diagnosis.alarm`).
 pub const ALARM: f64 = 1e-3;
+
+/// What a check that fails says of the samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Some were lost or repeated; the others are right.
+    Lost,
+    /// They were put together in another order, or as other numbers, than they were sent.
+    Misread,
+    /// They are right, but a convention is not the one that is stated.
+    Convention,
+}
 
 /// What one check says.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
     pub check: &'static str,
+    pub kind: Kind,
+    /// What is stated.
     pub expected: &'static str,
     /// Plain words: what, and in which frames, loops and samples.
     pub found: String,
     pub ok: bool,
+    /// Whether the samples can say anything here; where not, `ok` is true and `found` says why not.
+    pub told: bool,
     /// Frames that are damaged; empty where nothing is, or where all are.
     pub frames: Vec<usize>,
-    /// A bound on the chance that a whole recording looks like this; none where nothing was found.
+    /// Chirps that were lost or repeated: frame, transmitter, receiver, loop.
+    pub chirps: Vec<[usize; 4]>,
+    /// A bound on the chance that a recording as stated looks like this; none where nothing was found.
     pub p_value: Option<f64>,
 }
 
 impl Finding {
-    fn whole(check: &'static str, expected: &'static str, found: impl Into<String>) -> Self {
-        Self { check, expected, found: found.into(), ok: true, frames: vec![], p_value: None }
+    fn as_stated(check: &'static str, expected: &'static str, found: impl Into<String>) -> Self {
+        let (frames, chirps) = (vec![], vec![]);
+        Self { check, kind: Kind::Lost, expected, found: found.into(), ok: true, told: true, frames, chirps, p_value: None }
     }
 
-    fn damaged(check: &'static str, expected: &'static str, found: String, frames: Vec<usize>, log_p: f64) -> Self {
-        Self { check, expected, found, ok: false, frames, p_value: Some(log_p.min(0.0).exp()) }
+    fn untold(check: &'static str, expected: &'static str, why: impl std::fmt::Display) -> Self {
+        Self { told: false, ..Self::as_stated(check, expected, format!("cannot be told: {why}")) }
+    }
+
+    fn wrong(kind: Kind, check: &'static str, expected: &'static str, found: String, log_p: f64) -> Self {
+        Self { kind, ok: false, p_value: Some(log_p.min(0.0).exp()), ..Self::as_stated(check, expected, found) }
     }
 }
 
@@ -51,29 +81,72 @@ trait Inspector {
     fn conclude(self: Box<Self>) -> Option<Finding>;
 }
 
-/// Looks at the first frames of a recording, at most so many.
+/// Looks at the first frames of a recording, at most so many; those with lost chirps are left out.
+///
+/// The checks come in the order in which one rests on another: of samples that were misread, nothing later is told.
 ///
 /// # Errors
 /// Samples that cannot be read.
 pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>> {
-    let schedule = Schedule::of(&recording.radar);
-    let mut inspectors: [Box<dyn Inspector>; 5] = [
+    let schedule = Schedule::of(&recording.radar, recording.room.as_ref());
+    let mut inspectors: [Box<dyn Inspector>; 11] = [
         Box::new(runs::Runs::new(schedule)),
         Box::new(copies::Copies::new(schedule)),
+        Box::new(numbers::Numbers::new(numbers::BYTE_ORDER)),
+        Box::new(numbers::Numbers::new(numbers::SIGN)),
         Box::new(shift::Shift::new(schedule)),
+        Box::new(period::Period::new(schedule)),
+        Box::new(start::Start::new(schedule)),
+        Box::new(boundary::Boundary::new(schedule)),
         Box::new(transmitters::Transmitters::new(schedule)),
         Box::new(words::Words::new(schedule)),
+        Box::new(iq_order::IqOrder::new(schedule)),
     ];
-    for index in 0..recording.frames().min(most_frames) {
+    for index in recording.whole_frames().take(most_frames) {
         let stream = Stream::of(schedule, index, &recording.frame(index)?);
         inspectors.iter_mut().for_each(|inspector| inspector.see(&stream));
     }
-    Ok(inspectors.into_iter().filter_map(Inspector::conclude).collect())
+    let mut findings: Vec<Finding> = inspectors.into_iter().filter_map(Inspector::conclude).collect();
+    if let Some(first) = findings.iter().position(|finding| !finding.ok && finding.kind == Kind::Misread) {
+        let (misread, later) = findings.split_at_mut(first + 1);
+        let name = misread[first].name();
+        let rests = later.iter_mut().filter(|finding| finding.kind != Kind::Lost || finding.ok);
+        rests.for_each(|finding| {
+            *finding = Finding::untold(finding.check, finding.expected, format!("first the {name} must be right"))
+        });
+    }
+    Ok(findings)
 }
 
-/// What is damaged, in one sentence; none where all is whole.
+/// Conventions that samples alone never tell, for tables of all that is stated.
+pub fn never_told(radar: &Radar) -> Vec<Finding> {
+    let body = "a body whose motion is known tells it (`hybridsim diagnose`)";
+    let mut untold = vec![
+        Finding::untold("adc_start", "radar.adc_start_s", "it turns every return by a constant phase"),
+        Finding::untold("doppler_sign", "a receding body has a positive Doppler frequency", body),
+    ];
+    if radar.tx_m.len() > 1 {
+        untold.push(Finding::untold("tx_order", "transmitters fire in the order of tx_m", body));
+    }
+    untold
+}
+
+impl Finding {
+    /// Of the check, as people read it: `byte order`.
+    pub fn name(&self) -> String {
+        self.check.trim_start_matches("integrity_").replace('_', " ")
+    }
+
+    /// Whether the samples cannot be used as they are, nor in part.
+    pub fn is_refusal(&self) -> bool {
+        !self.ok && self.kind != Kind::Lost
+    }
+}
+
+/// What is damaged, in one sentence; none where all is whole. A convention is no damage.
 pub fn damage(findings: &[Finding]) -> Option<String> {
-    let found: Vec<&str> = findings.iter().filter(|finding| !finding.ok).map(|finding| finding.found.as_str()).collect();
+    let damaged = findings.iter().filter(|finding| !finding.ok && finding.kind != Kind::Convention);
+    let found: Vec<&str> = damaged.map(|finding| finding.found.as_str()).collect();
     (!found.is_empty()).then(|| found.join("; "))
 }
 

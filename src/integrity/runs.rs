@@ -7,7 +7,7 @@
 use num_complex::Complex32;
 
 use super::stream::{Schedule, Stream};
-use super::{ALARM, Finding, Inspector, frames_listed};
+use super::{ALARM, Finding, Inspector, Kind, frames_listed};
 
 const CHECK: &str = "integrity_runs";
 const EXPECTED: &str = "no run of one value that is as long as a packet";
@@ -30,6 +30,8 @@ pub(super) struct Runs {
     repeats: Vec<usize>,
     current: Run,
     runs: Vec<Run>,
+    /// Place of the next sample in the stream of all frames, and how many were seen: frames may be left out.
+    place: usize,
     seen: usize,
     /// Least and largest component.
     extremes: [f32; 2],
@@ -39,7 +41,7 @@ impl Runs {
     pub fn new(schedule: Schedule) -> Self {
         let current = Run { start: 0, length: 0, value: Complex32::new(f32::NAN, f32::NAN) };
         let repeats = vec![0; schedule.period()];
-        Self { schedule, repeats, current, runs: vec![], seen: 0, extremes: [f32::INFINITY, f32::NEG_INFINITY] }
+        Self { schedule, repeats, current, runs: vec![], place: 0, seen: 0, extremes: [f32::INFINITY, f32::NEG_INFINITY] }
     }
 
     fn least(&self) -> usize {
@@ -69,17 +71,24 @@ impl Runs {
 impl Inspector for Runs {
     fn see(&mut self, stream: &Stream) {
         let period = self.schedule.period();
+        let begins = stream.frame * stream.values.len();
+        if self.place != begins {
+            self.close();
+            self.current.length = 0;
+            self.current.value = Complex32::new(f32::NAN, f32::NAN);
+            self.place = begins;
+        }
         for &value in &stream.values {
             let im = if self.schedule.is_real { value.re } else { value.im };
             self.extremes = [self.extremes[0].min(value.re).min(im), self.extremes[1].max(value.re).max(im)];
             if value == self.current.value {
-                self.repeats[self.seen % period] += 1;
+                self.repeats[self.place % period] += 1;
                 self.current.length += 1;
             } else {
                 self.close();
-                self.current = Run { start: self.seen, length: 1, value };
+                self.current = Run { start: self.place, length: 1, value };
             }
-            self.seen += 1;
+            (self.place, self.seen) = (self.place + 1, self.seen + 1);
         }
     }
 
@@ -94,7 +103,7 @@ impl Inspector for Runs {
         let log_p = |run: &Run| self.log_chance(run, &sums) + (self.seen.max(1) as f64).ln();
         let bad: Vec<&Run> = self.runs.iter().filter(|run| !self.is_clipped(run.value) && log_p(run) < ALARM.ln()).collect();
         let Some(first) = bad.first() else {
-            return Some(Finding::whole(CHECK, EXPECTED, "none"));
+            return Some(Finding::as_stated(CHECK, EXPECTED, "none"));
         };
         let frame_length = self.schedule.loops * self.schedule.period();
         let of = |run: &&Run| run.start / frame_length..=(run.start + run.length - 1) / frame_length;
@@ -116,6 +125,9 @@ impl Inspector for Runs {
             self.schedule.spot(first.start)
         );
         let likeliest = bad.iter().map(|run| log_p(run)).fold(f64::INFINITY, f64::min);
-        Some(Finding::damaged(CHECK, EXPECTED, found, frames, likeliest))
+        let mut chirps: Vec<[usize; 4]> =
+            bad.iter().flat_map(|run| self.schedule.chirps(run.start..run.start + run.length)).collect();
+        chirps.dedup();
+        Some(Finding { frames, chirps, ..Finding::wrong(Kind::Lost, CHECK, EXPECTED, found, likeliest) })
     }
 }

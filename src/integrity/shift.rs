@@ -15,7 +15,7 @@ use num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 
 use super::stream::{Schedule, Stream};
-use super::{ALARM, Finding, Inspector};
+use super::{ALARM, Finding, Inspector, Kind};
 
 const CHECK: &str = "integrity_stream";
 const EXPECTED: &str = "every loop's samples at the same places of the stream";
@@ -135,7 +135,7 @@ impl Inspector for Shift {
             return None;
         }
         let Some(likeliest) = self.losses.iter().map(|loss| loss.log_p).reduce(f64::min) else {
-            return Some(Finding::whole(CHECK, EXPECTED, "they are"));
+            return Some(Finding::as_stated(CHECK, EXPECTED, "they are"));
         };
         let period = self.schedule.period();
         let told: Vec<String> = self
@@ -151,6 +151,6 @@ impl Inspector for Shift {
             })
             .collect();
         let frames = self.losses.iter().map(|loss| loss.frame).collect();
-        Some(Finding::damaged(CHECK, EXPECTED, told.join("; "), frames, likeliest))
+        Some(Finding { frames, ..Finding::wrong(Kind::Misread, CHECK, EXPECTED, told.join("; "), likeliest) })
     }
 }

@@ -4,6 +4,7 @@ use num_complex::Complex32;
 
 use crate::data::IfFrame;
 use crate::radar::{Radar, Sampling};
+use crate::room::Room;
 
 /// The axes of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,6 +16,8 @@ pub(super) struct Schedule {
     pub is_real: bool,
     /// A falling chirp: nearer returns have the smaller negative beat frequency.
     pub is_falling: bool,
+    /// Range bin of the room's farthest corner; none where the room is unknown.
+    pub farthest_bin: Option<f64>,
 }
 
 /// Where a sample is.
@@ -28,9 +31,11 @@ pub(super) struct Spot {
 }
 
 impl Schedule {
-    pub fn of(radar: &Radar) -> Self {
+    pub fn of(radar: &Radar, room: Option<&Room>) -> Self {
         let [_, tx, rx, loops, samples] = radar.dims();
-        Self { tx, rx, loops, samples, is_real: radar.sampling == Sampling::Real, is_falling: radar.slope_hz_per_s < 0.0 }
+        let (is_real, is_falling) = (radar.sampling == Sampling::Real, radar.slope_hz_per_s < 0.0);
+        let farthest_bin = room.and_then(Room::farthest_m).map(|far| far / radar.range_resolution_m());
+        Self { tx, rx, loops, samples, is_real, is_falling, farthest_bin }
     }
 
     pub fn channels(&self) -> usize {
@@ -48,6 +53,14 @@ impl Schedule {
         let (row, rx) = (chirp / self.rx, chirp % self.rx);
         let (index, tx) = (row / self.tx, row % self.tx);
         Spot { frame: index / self.loops, index: index % self.loops, tx, rx, sample }
+    }
+
+    /// Frame, transmitter, receiver and loop of every chirp that some samples of the stream touch.
+    pub fn chirps(&self, places: std::ops::Range<usize>) -> impl Iterator<Item = [usize; 4]> {
+        (places.start / self.samples..places.end.div_ceil(self.samples)).map(|chirp| {
+            let Spot { frame, index, tx, rx, .. } = self.spot(chirp * self.samples);
+            [frame, tx, rx, index]
+        })
     }
 }
 

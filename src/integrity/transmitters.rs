@@ -8,7 +8,7 @@
 use num_complex::Complex64;
 
 use super::stream::{Schedule, Stream};
-use super::{ALARM, Finding, Inspector};
+use super::{ALARM, Finding, Inspector, Kind};
 
 const CHECK: &str = "integrity_transmitters";
 const EXPECTED: &str = "loops of one transmitter alike";
@@ -79,13 +79,13 @@ impl Inspector for Transmitters {
         let at_most = self.chirps * (separated / both).ln();
         let log_p = -ratio;
         if log_p >= ALARM.ln() || 2.0 * ratio < at_most {
-            return Some(Finding::whole(CHECK, EXPECTED, "they are"));
+            return Some(Finding::as_stated(CHECK, EXPECTED, "they are"));
         }
         let found = format!(
             "loops of one transmitter alternate between {tx} kinds, and chirps in the order of firing leave {:.1} dB less: the {tx} \
              transmitters were not separated, the chirps lie in the order of firing",
             10.0 * (separated / unseparated).log10()
         );
-        Some(Finding::damaged(CHECK, EXPECTED, found, vec![], log_p))
+        Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p))
     }
 }

@@ -10,7 +10,8 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 use super::stream::{Schedule, Stream};
-use super::{ALARM, Finding, Inspector};
+use super::tails::log_binomial_tail;
+use super::{ALARM, Finding, Inspector, Kind};
 
 const CHECK: &str = "integrity_word_order";
 const EXPECTED: &str = "I and Q of one sample side by side";
@@ -37,30 +38,27 @@ fn exchanged(chirp: &[Complex64]) -> Vec<Complex64> {
     swapped.chain(rest.iter().copied()).collect()
 }
 
+/// Hann's.
+fn window(n: usize, samples: usize) -> f64 {
+    (std::f64::consts::PI * (n as f64 + 0.5) / samples as f64).sin().powi(2)
+}
+
+/// Power of a bin of `spectrum` where every sample has a noise of unit power.
+pub(super) fn window_power(samples: usize) -> f64 {
+    (0..samples).map(|n| window(n, samples).powi(2)).sum()
+}
+
 /// Power over all channels by frequency, under a Hann window, without the mean.
-fn spectrum<'a>(chirps: impl Iterator<Item = &'a [Complex64]>, samples: usize) -> Vec<f64> {
+pub(super) fn spectrum<'a>(chirps: impl Iterator<Item = &'a [Complex64]>, samples: usize) -> Vec<f64> {
     let fft = FftPlanner::new().plan_fft_forward(samples);
     let mut power = vec![0.0; samples];
     for chirp in chirps {
         let mean = chirp.iter().sum::<Complex64>() / samples as f64;
-        let window = |n: usize| (std::f64::consts::PI * (n as f64 + 0.5) / samples as f64).sin().powi(2);
-        let mut values: Vec<Complex64> = chirp.iter().enumerate().map(|(n, value)| (value - mean) * window(n)).collect();
+        let mut values: Vec<Complex64> = chirp.iter().enumerate().map(|(n, value)| (value - mean) * window(n, samples)).collect();
         fft.process(&mut values);
         power.iter_mut().zip(values).for_each(|(power, value)| *power += value.norm_sqr());
     }
     power
-}
-
-/// Logarithm of the chance of at least so many heads.
-fn log_binomial_tail(heads: usize, tosses: usize) -> f64 {
-    let (mut term, mut tail) = (-(tosses as f64) * std::f64::consts::LN_2, 0.0);
-    for k in 0..=tosses {
-        if k >= heads {
-            tail += f64::exp(term);
-        }
-        term += ((tosses - k) as f64 / (k + 1) as f64).ln();
-    }
-    tail.ln()
 }
 
 impl Inspector for Words {
@@ -96,18 +94,18 @@ impl Inspector for Words {
             fewer += usize::from(away_after < away_before.min(0.5 * whole));
             (far, all, far_after) = (far + away_before, all + whole, far_after + away_after);
         }
-        let log_p = log_binomial_tail(fewer, groups);
+        let log_p = log_binomial_tail(fewer, groups, 0.5);
         let shares = format!(
             "the far half of the spectrum holds {:.1} % of the still energy, and {:.1} % with every second pair of words exchanged",
             100.0 * far / f64::max(all, f64::MIN_POSITIVE),
             100.0 * far_after / f64::max(all, f64::MIN_POSITIVE)
         );
         if log_p >= ALARM.ln() {
-            return Some(Finding::whole(CHECK, EXPECTED, shares));
+            return Some(Finding::as_stated(CHECK, EXPECTED, shares));
         }
         let found = format!(
             "{shares}, in {fewer} of {groups} groups of frequencies less: I I Q Q was read as I Q I Q, or the other way round"
         );
-        Some(Finding::damaged(CHECK, EXPECTED, found, vec![], log_p))
+        Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p))
     }
 }

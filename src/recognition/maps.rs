@@ -36,10 +36,10 @@ pub struct Window {
 /// a frame, in decibels below the recording's own strongest cell. One frame is in memory per thread.
 ///
 /// # Errors
-/// A recording whose samples cannot be read, that is shorter than a window, or in which nothing moves.
+/// A recording whose samples cannot be read, whose longest stretch of whole frames is shorter than a window, or in which nothing moves.
 pub fn sequence(recording: &Recording, class: usize, config: &RecognitionConfig) -> Result<Sequence> {
-    let radar = &recording.radar;
-    let (name, frames) = (recording.folder.display().to_string(), recording.frames());
+    let (radar, stretch) = (&recording.radar, recording.whole_stretch()?);
+    let (name, frames) = (recording.folder.display().to_string(), stretch.len());
     if frames < config.window_frames {
         let expected = format!("at least the {} of a window", config.window_frames);
         return Err(Error::field(recording.folder.join("recording.toml"), "radar.frames", frames.to_string(), expected)
@@ -53,7 +53,7 @@ pub fn sequence(recording: &Recording, class: usize, config: &RecognitionConfig)
     let columns: Vec<[Vec<f64>; 3]> = (0..frames)
         .into_par_iter()
         .map(|frame| {
-            let measured: Vec<Complex32> = measured_frame(recording, frame)?;
+            let measured: Vec<Complex32> = measured_frame(recording, stretch.start + frame)?;
             let moving = remove_static(Samples::new(&measured, dims), StaticRemoval::Loops);
             let moving = Samples::new(&moving, dims);
             let range = analysis.time_range(moving, &Gate::default());

@@ -136,7 +136,8 @@ fn of_one_site(folders: &[PathBuf], config: &SimulatorConfig, strict: bool) -> R
         return Err(Error::setting("data.recordings", "empty", "at least one recording folder"));
     };
     for other in &loaded {
-        other.recording.refuse_dead(0..other.recording.frames())?;
+        other.recording.whole_stretch()?;
+        other.recording.refuse_dead(other.recording.whole_frames())?;
         let file = other.folder.join("recording.toml");
         if other.recording.person().is_none() && other.recording.room.is_none() {
             return Err(Error::field(file, "room", "missing", "a room, or a body with its motion")

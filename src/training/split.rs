@@ -5,6 +5,8 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
+use super::{LoadedRecording, TrainingConfig};
+
 /// How the held-out frames are chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -59,6 +61,16 @@ impl FrameSplit {
         training.sort_unstable();
         validation.sort_unstable();
         Self { training, validation }
+    }
+
+    /// The split of these recordings' whole frames: those with lost chirps are in neither part.
+    pub fn of(recordings: &[LoadedRecording], config: &TrainingConfig, seed: u64) -> Self {
+        let counts: Vec<usize> = recordings.iter().map(|recording| recording.scene.radar.frames).collect();
+        let mut split = Self::new(&counts, config.validation_fraction, config.split, seed);
+        for part in [&mut split.training, &mut split.validation] {
+            part.retain(|id| recordings[id.recording].recording.is_whole(id.frame));
+        }
+        split
     }
 
     /// The same split with at most so many training frames, evenly spaced over all of them.

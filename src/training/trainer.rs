@@ -106,8 +106,7 @@ impl Trainer<'_> {
     }
 
     fn split(&self) -> FrameSplit {
-        let counts: Vec<usize> = self.recordings.iter().map(|recording| recording.scene.radar.frames).collect();
-        FrameSplit::new(&counts, self.config.validation_fraction, self.config.split, self.seed)
+        FrameSplit::of(self.recordings, self.config, self.seed)
     }
 
     /// What every recording's motion lacks, from its training frames.
@@ -125,6 +124,14 @@ impl Trainer<'_> {
 
     fn train(&self, resume: Option<&Path>, emit: &mut dyn FnMut(Event)) -> Result<Outcome> {
         let split = self.split();
+        if split.training.is_empty() {
+            return Err(Error::setting(
+                "training.validation_fraction",
+                self.config.validation_fraction,
+                "one whole frame to train on",
+            )
+            .with_hint("frames with lost chirps train nothing; hold fewer frames out, or record again"));
+        }
         if let Some(frames) = self.config.frames.filter(|&frames| frames > split.training.len()) {
             return Err(Error::setting("training.frames", frames, format!("at most {}, all there are", split.training.len())));
         }

@@ -148,10 +148,10 @@ impl Element for i16 {
 }
 
 impl Element for bool {
-    const EXPECTED: &'static str = "bool";
+    const EXPECTED: &'static str = "bool or uint8";
 
     fn accepts(stored: Stored) -> bool {
-        stored.kind == Kind::Bool
+        stored.kind == Kind::Bool || (stored.kind, stored.bytes) == (Kind::Unsigned, 1)
     }
 
     fn decode(_: Stored, bytes: &mut [u8]) -> Vec<Self> {

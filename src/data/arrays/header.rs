@@ -22,7 +22,7 @@ pub struct Header {
 
 impl Header {
     /// Reads up to the first number of a file of `size` bytes.
-    pub fn read(reader: &mut impl Read, size: u64) -> Checked<Self> {
+    pub fn read(reader: &mut (impl Read + ?Sized), size: u64) -> Checked<Self> {
         const ARRAY: &str = "a NumPy array (.npy)";
         if size == 0 {
             return Err(Problem::new("an empty file", ARRAY).with_hint("whatever wrote it did not finish; make it again"));

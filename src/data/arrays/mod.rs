@@ -97,7 +97,12 @@ fn memory_of<T>(numbers: u64) -> u64 {
 }
 
 /// Reads the `size` bytes of one array. `axes`: `None` takes any shape. `most`: bytes that it may take in memory.
-pub(crate) fn read_array<T: Element>(reader: &mut impl Read, size: u64, axes: Option<Axes>, most: u64) -> Checked<Array<T>> {
+pub(crate) fn read_array<T: Element>(
+    reader: &mut (impl Read + ?Sized),
+    size: u64,
+    axes: Option<Axes>,
+    most: u64,
+) -> Checked<Array<T>> {
     let header = Header::read(reader, size)?;
     let expected = || format!("{}{}", T::EXPECTED, axes.map(|axes| format!(" {}", describe(axes))).unwrap_or_default());
     if !T::accepts(header.stored) {

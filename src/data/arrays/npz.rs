@@ -8,7 +8,7 @@ use zip::ZipArchive;
 use zip::result::ZipError;
 
 use super::header::name_content;
-use super::{Array, Axes, Element, Problem, describe, memory_of, open, read_array};
+use super::{Array, Axes, Checked, Element, Problem, describe, memory_of, open, read_array};
 use crate::error::{Error, Result};
 
 /// Deflate cannot make data smaller than this; who claims more is lying.
@@ -111,8 +111,26 @@ impl Npz {
     fn member<T: Element>(&mut self, name: &str, axes: Option<Axes>) -> Result<Array<T>> {
         if !self.has(name) {
             let expected = axes.map_or("a single number".into(), |axes| format!("{} {}", T::EXPECTED, describe(axes)));
-            return Err(Error::field(&self.path, name, "missing", expected)
-                .with_hint(format!("the file holds: {}", self.names().join(", "))));
+            return Err(self.missing(name, expected));
+        }
+        let most = self.left;
+        let (array, size) = self.with_member(name, |file, size| Ok((read_array::<T>(file, size, axes, most)?, size)))?;
+        // An archive may name the same bytes many times.
+        self.left = self.left.saturating_sub(memory_of::<T>(array.values.len() as u64).max(size));
+        Ok(array)
+    }
+
+    fn missing(&self, name: &str, expected: String) -> Error {
+        Error::field(&self.path, name, "missing", expected).with_hint(format!("the file holds: {}", self.names().join(", ")))
+    }
+
+    /// Hands a member's unpacked bytes, and how many there are said to be, to whoever reads them.
+    ///
+    /// # Errors
+    /// A member that is missing, or claims to grow more than deflating can; what the reader finds.
+    pub fn with_member<T>(&mut self, name: &str, read: impl FnOnce(&mut dyn Read, u64) -> Checked<T>) -> Result<T> {
+        if !self.has(name) {
+            return Err(self.missing(name, "an array".into()));
         }
         let path = &self.path;
         let damaged = |error: ZipError| match error {
@@ -125,9 +143,6 @@ impl Npz {
             let found = format!("said to grow from {compressed} to {size} bytes");
             return Err(Error::field(path, name, found, "a size that deflating can reach").with_hint("the archive is damaged"));
         }
-        let array: Array<T> = read_array(&mut file, size, axes, self.left).map_err(|problem: Problem| problem.at(path, name))?;
-        // An archive may name the same bytes many times.
-        self.left = self.left.saturating_sub(memory_of::<T>(array.values.len() as u64).max(size));
-        Ok(array)
+        read(&mut file, size).map_err(|problem: Problem| problem.at(path, name))
     }
 }

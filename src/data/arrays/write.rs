@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 /// Numbers to write, in C order.
 #[derive(Clone, Copy, Debug)]
 pub enum Values<'a> {
+    Bool(&'a [bool]),
     I16(&'a [i16]),
     I32(&'a [i32]),
     I64(&'a [i64]),
@@ -34,6 +35,7 @@ pub struct Member<'a> {
 macro_rules! each_kind {
     ($values:expr, $slice:ident => $result:expr) => {
         match $values {
+            Values::Bool($slice) => $result,
             Values::I16($slice) => $result,
             Values::I32($slice) => $result,
             Values::I64($slice) => $result,
@@ -53,6 +55,7 @@ impl Values<'_> {
     /// NumPy's type string.
     fn descr(&self) -> &'static str {
         match self {
+            Self::Bool(_) => "|b1",
             Self::I16(_) => "<i2",
             Self::I32(_) => "<i4",
             Self::I64(_) => "<i8",
@@ -76,6 +79,7 @@ impl Values<'_> {
             })
         }
         match self {
+            Self::Bool(values) => blocks(writer, values, |value| [u8::from(value)]),
             Self::I16(values) => blocks(writer, values, i16::to_le_bytes),
             Self::I32(values) => blocks(writer, values, i32::to_le_bytes),
             Self::I64(values) => blocks(writer, values, i64::to_le_bytes),

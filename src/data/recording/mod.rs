@@ -5,11 +5,13 @@
 mod dead;
 mod samples;
 mod settings;
+mod valid;
 mod write;
 
 pub use samples::{IfFrame, IfLayout};
 pub use settings::{FORMAT, Files, RecordingSettings};
-pub use write::{RecordingContents, write_recording, write_recording_into};
+pub use valid::Valid;
+pub use write::{RecordingContents, StagedRecording, stage_recording, write_recording, write_recording_into};
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -41,6 +43,7 @@ pub struct Recording {
     /// Which files hold what, relative to the folder.
     pub files: Files,
     person: Option<Person>,
+    valid: Option<Valid>,
     samples: IfFile,
 }
 
@@ -56,6 +59,8 @@ impl Recording {
         let mut notes = vec![];
         let person = read_person(folder, &path, &settings, &mut notes)?;
         notes.extend(person.as_ref().and_then(|person| frames_outside(&settings.radar, person)));
+        let valid = settings.files.valid.as_ref().map(|file| Valid::read(&folder.join(file), &settings.radar)).transpose()?;
+        notes.extend(valid.iter().zip(&settings.files.valid).filter_map(|(valid, file)| valid.note(file)));
         Ok(Self {
             folder: folder.into(),
             radar: settings.radar,
@@ -64,6 +69,7 @@ impl Recording {
             notes,
             files: settings.files,
             person,
+            valid,
             samples,
         })
     }

@@ -36,6 +36,9 @@ pub struct RecordingSettings {
 pub struct Files {
     #[serde(rename = "if")]
     pub samples: PathBuf,
+    /// Which chirps were recorded; absent: all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub valid: Option<PathBuf>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body: Option<PathBuf>,
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::samples::{IfFrame, IfLayout, not_finite};
 use super::settings::{FORMAT, Files, RecordingSettings};
-use super::{Recording, SETTINGS_FILE};
+use super::{Recording, SETTINGS_FILE, Valid};
 use crate::data::arrays::{Values, header_bytes, write_npy};
 use crate::data::atomic::{AtomicFile, AtomicFolder, write_text};
 use crate::data::{files, write_body, write_motion};
@@ -48,6 +48,58 @@ pub fn write_recording_into(
     contents: &RecordingContents,
     frame: &mut dyn FnMut(usize) -> Result<IfFrame>,
 ) -> Result<Recording> {
+    stage_recording(target, contents, frame)?.publish()
+}
+
+/// A recording that is written and can be read, but has not appeared yet: dropped, it leaves nothing.
+pub struct StagedRecording {
+    target: AtomicFolder,
+    /// Read from where it lies for now; its folder is the one that it will have.
+    pub recording: Recording,
+    clipped: Option<String>,
+}
+
+impl StagedRecording {
+    /// States which chirps were recorded.
+    pub fn set_valid(&mut self, valid: &Valid) -> Result<()> {
+        let file = PathBuf::from("valid.npy");
+        valid.write(&self.target.path().join(&file))?;
+        let path = self.target.path().join(SETTINGS_FILE);
+        let mut settings = RecordingSettings::read(&path)?;
+        settings.files.valid = Some(file);
+        write_settings(&path, &settings)?;
+        self.recording = reopened(&self.target)?;
+        Ok(())
+    }
+
+    /// Gives the folder its name.
+    pub fn publish(self) -> Result<Recording> {
+        let folder = self.target.target().to_path_buf();
+        self.target.finish()?;
+        let mut recording = Recording::open(&folder)?;
+        recording.notes.extend(self.clipped);
+        Ok(recording)
+    }
+}
+
+/// Reads what is staged, under the name that it will have.
+fn reopened(target: &AtomicFolder) -> Result<Recording> {
+    Ok(Recording { folder: target.target().to_path_buf(), ..Recording::open(target.path())? })
+}
+
+fn write_settings(path: &Path, settings: &RecordingSettings) -> Result<()> {
+    write_text(path, &toml::to_string(settings).expect("settings of plain numbers and texts are TOML"))
+}
+
+/// Writes a recording that somebody looks at before it appears.
+///
+/// # Errors
+/// As [`write_recording`].
+pub fn stage_recording(
+    target: AtomicFolder,
+    contents: &RecordingContents,
+    frame: &mut dyn FnMut(usize) -> Result<IfFrame>,
+) -> Result<StagedRecording> {
     let (radar, layout) = (contents.radar, contents.layout);
     radar.check("radar")?;
     if layout.sampling() != radar.sampling {
@@ -66,25 +118,21 @@ pub fn write_recording_into(
         files,
         labels: contents.labels.clone(),
     };
-    let text = toml::to_string(&settings).expect("settings of plain numbers and texts are TOML");
-    write_text(target.path().join(SETTINGS_FILE), &text)?;
+    write_settings(&target.path().join(SETTINGS_FILE), &settings)?;
     if let Some(truth) = contents.truth {
         write_text(target.path().join("truth.json"), &format!("{truth:#}\n"))?;
     }
     let clipped = write_samples(&target.path().join(&settings.files.samples), contents, frame)?;
-    let folder = target.target().to_path_buf();
-    target.finish()?;
-    let mut recording = Recording::open(&folder)?;
-    if clipped > 0 {
-        recording.notes.push(format!("{clipped} samples were beyond int16 and brought to its limits"));
-    }
-    Ok(recording)
+    let clipped = (clipped > 0).then(|| format!("{clipped} samples were beyond int16 and brought to its limits"));
+    let recording = reopened(&target)?;
+    Ok(StagedRecording { target, recording, clipped })
 }
 
 /// Writes the person's files and says how they are called.
 fn write_person(target: &AtomicFolder, contents: &RecordingContents) -> Result<Files> {
     let folder = target.path();
-    let mut files = Files { samples: "if.npy".into(), body: None, motion: None, vertices: None, faces: None, pose_times: None };
+    let mut files =
+        Files { samples: "if.npy".into(), valid: None, body: None, motion: None, vertices: None, faces: None, pose_times: None };
     match contents.person {
         None => {}
         Some(Person::Skinned { model, motion, .. }) => {

@@ -11,7 +11,6 @@ mod doppler_sign;
 mod energy;
 mod frame_period;
 mod heading;
-mod iq_order;
 mod numerics;
 mod placement;
 mod room_ranges;
@@ -56,8 +55,6 @@ impl From<Finding> for Check {
     }
 }
 
-/// How much stronger a wrong convention must fit before it is believed, dB of energy at the predicted cells.
-const CLEARLY_DB: f64 = 6.0;
 /// A cell counts as a return above this many times the noise.
 const RETURN: f64 = 20.0;
 /// Share of the samples at the ends of the range from which on nothing can be restored.
@@ -70,9 +67,6 @@ const FEWEST_LOOPS: usize = 2;
 pub fn audit(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<Check> {
     let mut checks = channels::channels(evidence);
     checks.push(channels::rail(evidence));
-    if !evidence.is_real() {
-        checks.push(iq_order::iq_order(evidence));
-    }
     checks.extend(body_in_room::body_in_room(evidence));
     checks.extend(placement::placement(evidence, origin_m));
     if !checks.iter().any(|check| !check.ok && is_convention(check)) {

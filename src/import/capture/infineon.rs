@@ -5,8 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::arrays::{Cube, half_scale_note};
 use super::boards::Board;
+use super::cube::{Cube, half_scale_note};
 use super::json::Json;
 use super::{Capture, Layout, Stated, dca1000::apply};
 use crate::data::{IfLayout, entries::entries};
@@ -32,7 +32,7 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
         None
     };
     let board = board(stated, description.as_deref(), &mut notes)?;
-    let cube = Cube::open(&folder.join(SAMPLES), Layout::parse("frame rx loop sample")?)?;
+    let cube = Cube::open(&folder.join(SAMPLES), None, Layout::parse("frame rx loop sample")?)?;
     let radar = radar(&config, &shape, board, cube.frames(), &mut notes)?;
     let radar = apply(radar, &stated.sets)?;
     cube.check(&radar)?;
@@ -40,7 +40,13 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
     if !folder.join("timestamps.csv").is_file() && !folder.join("radar_timestamp.csv").is_file() {
         notes.push("no time stamps: frames are taken to be evenly spaced".into());
     }
-    Ok(Capture { radar, layout: IfLayout::RealCodes, notes, frame: Box::new(move |index| cube.frame(index)) })
+    Ok(Capture {
+        source: folder.join(SAMPLES),
+        radar,
+        layout: IfLayout::RealCodes,
+        notes,
+        frame: Box::new(move |index| cube.frame(index)),
+    })
 }
 
 /// The folder with the samples: this one, or the only one of its kind below.

@@ -2,15 +2,18 @@
 //!
 //! A source says which radar it is of and gives its samples frame by frame; nothing of it is held in memory but the
 //! frame at hand. What had to be assumed is a note. One layout, one file: `dca1000` (TI boards with a DCA1000 capture
-//! card), `infineon` (folders of the Radar SDK and of ifxdaq), `arrays` (NumPy arrays of any order of axes).
+//! card), `infineon` (folders of the Radar SDK and of ifxdaq), `arrays` (arrays of any order of axes, in any file of `container`).
 
 mod arrays;
 pub mod boards;
+mod container;
+mod cube;
 mod dca1000;
 mod infineon;
 mod json;
 mod lanes;
 mod layout;
+mod presets;
 mod schedule;
 mod stream;
 mod ti_cfg;
@@ -19,11 +22,14 @@ mod ti_json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::data::{IfFrame, IfLayout, Recording, RecordingContents, write_recording};
+use crate::data::atomic::AtomicFolder;
+use crate::data::{IfFrame, IfLayout, Recording, RecordingContents, StagedRecording, Valid, stage_recording};
 use crate::error::{Error, Result};
+use crate::integrity::{self, Finding};
 use crate::radar::Radar;
 
 pub use layout::Layout;
+pub use presets::Preset;
 
 /// What a user says of a capture besides its files.
 #[derive(Clone, Debug, Default)]
@@ -34,6 +40,10 @@ pub struct Stated {
     pub board: Option<String>,
     /// The order of an array's axes, outer to inner.
     pub layout: Option<Layout>,
+    /// Which of a file's arrays; `RE,IM` where its parts are two.
+    pub variable: Option<String>,
+    /// A public data set, whose layout and radar are known.
+    pub preset: Option<Preset>,
     /// Which of several chirp profiles, or which subframe of an advanced frame.
     pub profile: Option<usize>,
     pub subframe: Option<usize>,
@@ -45,6 +55,8 @@ pub struct Stated {
 
 /// A capture that has been understood: its radar, and a way to its samples.
 pub struct Capture {
+    /// The file that messages name.
+    pub source: PathBuf,
     pub radar: Radar,
     pub layout: IfLayout,
     pub notes: Vec<String>,
@@ -69,18 +81,66 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         Some("bin") => dca1000::open(sources, stated),
         Some("json") => dca1000::open_setup(one(sources)?, stated),
         Some("npy") if infineon::is_samples(first) => infineon::open(first.parent().unwrap_or(Path::new("")), stated),
-        Some("npy") => arrays::open(one(sources)?, stated),
+        Some(kind) if container::EXTENSIONS.contains(&kind) => arrays::open(one(sources)?, stated),
         other => Err(Error::Usage {
             message: format!("{}: a capture of type `{}`", first.display(), other.unwrap_or("none")),
             hint: Some(
-                "known are .bin or .setup.json (DCA1000), folders with radar.npy and config.json (Infineon), and .npy with --layout".into(),
+                "known are .bin or .setup.json (DCA1000), folders with radar.npy and config.json (Infineon), and .npy, .npz, .mat or .h5 \
+                 with --layout"
+                    .into(),
             ),
         }),
     }
 }
 
-/// Writes a capture as a recording folder and opens it; its notes come first.
-pub fn import(mut capture: Capture, folder: &Path, labels: BTreeMap<String, String>) -> Result<Recording> {
+/// A capture that is written as a recording and was looked at, but has not appeared yet: dropped, it leaves nothing.
+pub struct Draft {
+    source: PathBuf,
+    staged: StagedRecording,
+    /// What the samples say of what is stated.
+    pub findings: Vec<Finding>,
+}
+
+impl Draft {
+    /// The recording, its notes first those of the capture.
+    pub fn recording(&self) -> &Recording {
+        &self.staged.recording
+    }
+
+    /// Makes the recording appear. Chirps that were lost are stated in `valid.npy`.
+    ///
+    /// # Errors
+    /// Samples that contradict what is stated of them, unless `as_stated`; no frame without a lost chirp.
+    pub fn publish(mut self, as_stated: bool) -> Result<Recording> {
+        if let Some(finding) = self.findings.iter().find(|finding| finding.is_refusal() && !as_stated) {
+            return Err(Error::field(&self.source, finding.name(), &finding.found, finding.expected).with_hint(
+                "correct the description or the layout, or take the samples of another file; --as-stated keeps your word against the data",
+            ));
+        }
+        let mut notes = std::mem::take(&mut self.staged.recording.notes);
+        let lost: Vec<[usize; 4]> = self.findings.iter().flat_map(|finding| finding.chirps.iter().copied()).collect();
+        if !lost.is_empty() {
+            self.staged.set_valid(&Valid::without(&self.staged.recording.radar, lost))?;
+            if self.staged.recording.whole_frames().next().is_none() {
+                return Err(Error::field(
+                    &self.source,
+                    "samples",
+                    "lost chirps in every frame",
+                    "one frame at least that is whole",
+                )
+                .with_hint("too much was lost to use this capture: record again"));
+            }
+        }
+        let mut recording = self.staged.publish()?;
+        recording.notes.retain(|note| !notes.contains(note));
+        notes.append(&mut recording.notes);
+        recording.notes = notes;
+        Ok(recording)
+    }
+}
+
+/// Writes a capture under a temporary name and asks its samples whether they are what they are stated to be.
+pub fn draft(mut capture: Capture, folder: &Path, labels: BTreeMap<String, String>) -> Result<Draft> {
     let contents = RecordingContents {
         radar: &capture.radar,
         room: None,
@@ -90,9 +150,18 @@ pub fn import(mut capture: Capture, folder: &Path, labels: BTreeMap<String, Stri
         layout: capture.layout,
         truth: None,
     };
-    let mut recording = write_recording(folder, &contents, &mut capture.frame)?;
-    recording.notes.splice(0..0, capture.notes);
-    Ok(recording)
+    let mut staged = stage_recording(AtomicFolder::create(folder)?, &contents, &mut capture.frame)?;
+    staged.recording.notes.splice(0..0, capture.notes);
+    let findings = integrity::inspect(&staged.recording, staged.recording.radar.frames)?;
+    Ok(Draft { source: capture.source, staged, findings })
+}
+
+/// Writes a capture as a recording folder and opens it; its notes come first.
+///
+/// # Errors
+/// As [`Draft::publish`]; nothing is left then.
+pub fn import(capture: Capture, folder: &Path, labels: BTreeMap<String, String>) -> Result<Recording> {
+    draft(capture, folder, labels)?.publish(false)
 }
 
 fn one(sources: &[PathBuf]) -> Result<&Path> {

@@ -1,0 +1,40 @@
+#!/usr/bin/env python3
+"""Writes tests/golden/containers: one small cube in every container that `hybridsim import` reads.
+
+Needs numpy, scipy and h5py. The cube is [frame 2, chirp 3, rx 4, sample 8]; number n in C order is (3 n - 200) + j (150 - 2 n).
+"""
+
+import pathlib
+
+import h5py
+import numpy as np
+import scipy.io
+
+FOLDER = pathlib.Path(__file__).parent.parent / "tests/golden/containers"
+FOLDER.mkdir(parents=True, exist_ok=True)
+
+n = np.arange(2 * 3 * 4 * 8).reshape(2, 3, 4, 8)
+re, im = (3 * n - 200).astype(np.int16), (150 - 2 * n).astype(np.int16)
+cube = (re + 1j * im).astype(np.complex64)
+pairs = np.stack([re, im], axis=-1)
+
+for name, compressed in [("v6.mat", False), ("v7.mat", True)]:
+    variables = {"cube": cube, "pairs": pairs, "note": "not a number", "rate": 2e6}
+    scipy.io.savemat(FOLDER / name, variables, do_compression=compressed)
+
+# As MATLAB 7.3 does: a block of its own first, axes in reverse, complex numbers as a compound of real and imag.
+with h5py.File(FOLDER / "v73.mat", "w", userblock_size=512, libver="earliest") as file:
+    parts = np.empty(cube.T.shape, dtype=[("real", "<i2"), ("imag", "<i2")])
+    parts["real"], parts["imag"] = re.T, im.T
+    file.create_dataset("cube", data=parts, chunks=(8, 4, 3, 1), compression="gzip").attrs["MATLAB_class"] = np.bytes_("int16")
+    file.create_dataset("rate", data=np.array([[2e6]])).attrs["MATLAB_class"] = np.bytes_("double")
+with open(FOLDER / "v73.mat", "r+b") as file:
+    file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64, HDF5 schema 1.00 .".ljust(124) + b"\x00\x02IM")
+
+with h5py.File(FOLDER / "h5py.h5", "w") as file:
+    file.create_dataset("radar/cube", data=cube, chunks=(1, 3, 2, 8), compression="gzip", shuffle=True)
+    file.create_dataset("radar/re", data=re)
+    file.create_dataset("radar/im", data=im)
+
+np.savez(FOLDER / "parts.npz", real=re, imag=im)
+np.savez_compressed(FOLDER / "cube.npz", cube=cube, rate=2e6, names=np.array(["a", "b"]))

@@ -1,0 +1,177 @@
+//! An array of samples whose axes are known by name.
+
+use std::path::Path;
+
+use super::container::{self, Source};
+use super::layout::{Axis, Layout};
+use crate::data::arrays::Kind;
+use crate::data::{IfFrame, IfLayout};
+use crate::error::{Error, Result};
+use crate::radar::{Radar, Sampling};
+
+/// Half of an unsigned 16-bit word's range: where a signed word's negative numbers begin.
+const WRAP: f32 = 65536.0;
+
+/// An array whose axes are known by name. Its samples stay on the disk until a frame is asked for.
+pub struct Cube {
+    source: Source,
+    layout: Layout,
+    /// Set by `check`: how many transmitters take turns along an axis of chirps.
+    transmitters: std::cell::Cell<usize>,
+    /// Negative numbers were stored as unsigned words.
+    wrapped: bool,
+}
+
+impl Cube {
+    /// Finds the array in its file, holds the number of axes against the layout, and looks at the first frame's numbers.
+    pub fn open(path: &Path, variable: Option<&str>, layout: Layout) -> Result<Self> {
+        let source = container::open(path, variable, layout.0.len())?;
+        if source.shape().len() != layout.0.len() {
+            return Err(source
+                .wrong(source.describe(), format!("{} axes: {}", layout.0.len(), layout.describe()))
+                .with_hint("write --layout with one word for every axis of the array"));
+        }
+        let pairs = layout.place(Axis::Iq).map(|place| source.shape()[place]);
+        if pairs.is_some_and(|pairs| pairs != 2) || pairs.is_some() && source.is_complex() {
+            return Err(source.wrong(source.describe(), "an axis `iq` of length 2 and real numbers"));
+        }
+        let mut cube = Self { source, layout, transmitters: 1.into(), wrapped: false };
+        cube.wrapped = cube.looks_wrapped()?;
+        Ok(cube)
+    }
+
+    /// The length of an axis, 1 where the array has none.
+    pub fn length(&self, axis: Axis) -> usize {
+        self.layout.place(axis).map_or(1, |place| self.source.shape()[place])
+    }
+
+    pub fn has(&self, axis: Axis) -> bool {
+        self.layout.place(axis).is_some()
+    }
+
+    pub fn frames(&self) -> usize {
+        self.length(Axis::Frame)
+    }
+
+    pub fn sampling(&self) -> Sampling {
+        let complex = self.source.is_complex() || self.has(Axis::Iq);
+        if complex { Sampling::Complex } else { Sampling::Real }
+    }
+
+    /// How a recording stores these numbers: whole ones of 16 bits as codes.
+    pub fn stored_as(&self) -> IfLayout {
+        match (self.sampling(), self.wrapped || self.source.holds_codes()) {
+            (Sampling::Complex, true) => IfLayout::Codes,
+            (Sampling::Complex, false) => IfLayout::Complex,
+            (Sampling::Real, true) => IfLayout::RealCodes,
+            (Sampling::Real, false) => IfLayout::Real,
+        }
+    }
+
+    /// Refuses a radar of other lengths.
+    pub fn check(&self, radar: &Radar) -> Result<()> {
+        let [frames, tx, rx, loops, samples] = radar.dims();
+        let expected = self.layout.0.iter().map(|axis| match axis {
+            Axis::Frame => frames,
+            Axis::Tx => tx,
+            Axis::Rx => rx,
+            Axis::Loop => loops,
+            Axis::Chirp => loops * tx,
+            Axis::Sample => samples,
+            Axis::Iq => 2,
+        });
+        let expected: Vec<usize> = expected.collect();
+        let covered = self.length(Axis::Chirp) * self.length(Axis::Tx) * self.length(Axis::Loop) == tx * loops;
+        if expected != self.source.shape() || !covered || self.length(Axis::Rx) != rx || self.frames() != frames {
+            let what =
+                format!("{expected:?} for {} of {tx} tx, {rx} rx, {loops} loops, {samples} samples", self.layout.describe());
+            return Err(self
+                .source
+                .wrong(self.source.describe(), what)
+                .with_hint("the radar's settings or --layout do not belong to this array"));
+        }
+        if radar.sampling != self.sampling() {
+            let found = format!("{:?}", radar.sampling).to_lowercase();
+            let expected = format!("{:?}, as the array is", self.sampling()).to_lowercase();
+            return Err(Error::setting("radar.sampling", found, expected));
+        }
+        self.transmitters.set(tx);
+        Ok(())
+    }
+
+    /// The samples of a frame as `[tx, rx, loop, sample]`.
+    pub fn frame(&self, index: usize) -> Result<IfFrame> {
+        let (re, im) = self.numbers(index)?;
+        let (n_tx, n_rx, samples) = (self.transmitters.get(), self.length(Axis::Rx), self.length(Axis::Sample));
+        let loops = self.length(Axis::Loop) * self.length(Axis::Chirp) * self.length(Axis::Tx) / n_tx;
+        let inner: Vec<Axis> = self.layout.0.iter().copied().filter(|axis| *axis != Axis::Frame).collect();
+        let mut strides = vec![1; inner.len()];
+        for place in (1..inner.len()).rev() {
+            strides[place - 1] = strides[place] * self.length(inner[place]);
+        }
+        let stride = |axis: Axis| inner.iter().position(|other| *other == axis).map_or(0, |place| strides[place]);
+        let [tx_stride, rx_stride, loop_stride, chirp_stride, sample_stride, iq_stride] =
+            [Axis::Tx, Axis::Rx, Axis::Loop, Axis::Chirp, Axis::Sample, Axis::Iq].map(stride);
+        let count = n_tx * n_rx * loops * samples;
+        let (mut real, mut imaginary) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        for tx in 0..n_tx {
+            for rx in 0..n_rx {
+                for index in 0..loops {
+                    let start = tx * tx_stride + rx * rx_stride + index * loop_stride + (index * n_tx + tx) * chirp_stride;
+                    for sample in 0..samples {
+                        let place = start + sample * sample_stride;
+                        real.push(re[place]);
+                        match &im {
+                            Some(im) => imaginary.push(im[place]),
+                            None if iq_stride > 0 => imaginary.push(re[place + iq_stride]),
+                            None => {}
+                        }
+                    }
+                }
+            }
+        }
+        let quadrature = self.sampling() == Sampling::Complex;
+        Ok(IfFrame::new([n_tx, n_rx, loops, samples], real, quadrature.then_some(imaginary)))
+    }
+
+    /// A frame's numbers in the array's order without its axis of frames; the imaginary parts of complex ones apart.
+    fn numbers(&self, frame: usize) -> Result<(Vec<f32>, Option<Vec<f32>>)> {
+        let (mut re, mut im) = self.source.numbers(self.layout.place(Axis::Frame), frame)?;
+        for value in re.iter_mut().chain(im.iter_mut().flatten()).filter(|value| self.wrapped && **value >= WRAP / 2.0) {
+            *value -= WRAP;
+        }
+        Ok((re, im))
+    }
+
+    /// Whether signed 16-bit words were stored as unsigned ones.
+    ///
+    /// Read as unsigned, a signed signal jumps by 65,536 at every change of sign; read as signed, an unsigned one
+    /// around half scale does. Whichever reading has the smaller variance is the signal.
+    fn looks_wrapped(&self) -> Result<bool> {
+        let (re, im) = self.numbers(0)?;
+        let values: Vec<f32> = re.into_iter().chain(im.into_iter().flatten()).collect();
+        let words = values.iter().all(|value| value.fract() == 0.0 && (0.0..WRAP).contains(value));
+        if !words || values.iter().all(|&value| value < WRAP / 2.0) {
+            return Ok(false);
+        }
+        let variance = |signed: bool| {
+            let value = |&value: &f32| f64::from(if signed && value >= WRAP / 2.0 { value - WRAP } else { value });
+            let mean = values.iter().map(value).sum::<f64>() / values.len() as f64;
+            values.iter().map(|entry| (value(entry) - mean).powi(2)).sum::<f64>()
+        };
+        Ok(variance(true) < variance(false))
+    }
+}
+
+/// Says what the numbers of unsigned codes mean.
+pub fn half_scale_note(cube: &Cube) -> Result<Option<String>> {
+    if cube.wrapped {
+        return Ok(Some("numbers up to 65535 are signed words that were stored as unsigned ones: 65535 is read as -1".into()));
+    }
+    if cube.source.number().0 != Kind::Unsigned {
+        return Ok(None);
+    }
+    let (re, _) = cube.numbers(0)?;
+    let mean = re.iter().map(|&value| f64::from(value)).sum::<f64>() / re.len() as f64;
+    Ok(Some(format!("unsigned codes around {mean:.0} are kept as they are: their mean is a static offset")))
+}

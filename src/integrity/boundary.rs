@@ -1,0 +1,120 @@
+//! Frames that begin elsewhere than is stated: another number of loops, or loops that were cut off at the beginning.
+//!
+//! Between frames more time passes than between loops, so what moves changes more. Within frames as stated, a step between loops is the
+//! largest of its frame as often as any other one: that the same step is so in many frames has a binomial law, Bonferroni over the
+//! steps. What begins with a frame (a receiver that settles) makes one step the largest, too, but changes as much from frame to frame;
+//! so the step must also exceed that between frames, which a boundary that is as stated does not: a sign test over frames.
+
+use num_complex::Complex32;
+
+use super::stream::{Schedule, Stream};
+use super::tails::{log_binomial_tail, log_same_place, most_frequent};
+use super::{ALARM, Finding, Inspector, Kind};
+
+const CHECK: &str = "frame_boundary";
+const EXPECTED: &str = "the first loop of a frame first";
+/// Fewest loops of a frame whose steps can be compared.
+const FEWEST_LOOPS: usize = 4;
+
+pub(super) struct Boundary {
+    schedule: Schedule,
+    /// The largest step of each frame, how large it is, and the step to the next frame where that was seen.
+    steps: Vec<(usize, f64, Option<f64>)>,
+    last: Option<(usize, Vec<Complex32>)>,
+}
+
+impl Boundary {
+    pub fn new(schedule: Schedule) -> Self {
+        Self { schedule, steps: vec![], last: None }
+    }
+}
+
+fn step(before: &[Complex32], after: &[Complex32]) -> f64 {
+    before.iter().zip(after).map(|(before, after)| f64::from((after - before).norm_sqr())).sum()
+}
+
+impl Inspector for Boundary {
+    fn see(&mut self, stream: &Stream) {
+        if self.schedule.loops < FEWEST_LOOPS {
+            return;
+        }
+        let loops: Vec<&[Complex32]> = stream.loops().collect();
+        if let (Some((frame, last)), Some((_, _, next))) = (&self.last, self.steps.last_mut())
+            && frame + 1 == stream.frame
+        {
+            *next = Some(step(last, loops[0]));
+        }
+        let sizes = loops.windows(2).map(|pair| step(pair[0], pair[1])).enumerate();
+        if let Some((place, size)) = sizes.max_by(|a, b| a.1.total_cmp(&b.1)) {
+            self.steps.push((place, size, None));
+        }
+        self.last = Some((stream.frame, loops[loops.len() - 1].to_vec()));
+    }
+
+    fn conclude(self: Box<Self>) -> Option<Finding> {
+        if self.steps.len() < 2 {
+            return None;
+        }
+        let places: Vec<usize> = self.steps.iter().map(|(place, ..)| *place).collect();
+        let (place, count) = most_frequent(&places)?;
+        let at_place = self.steps.iter().filter(|(own, ..)| *own == place);
+        let against: Vec<bool> = at_place.filter_map(|(_, size, next)| next.map(|next| *size > next)).collect();
+        let larger = against.iter().filter(|larger| **larger).count();
+        let log_p =
+            log_same_place(count, places.len(), self.schedule.loops - 1).max(log_binomial_tail(larger, against.len(), 0.5));
+        if log_p < ALARM.ln() {
+            let found = format!(
+                "in {count} of {} frames the scene changes most between the loops {place} and {}, in {larger} of {} more than to the next \
+                 frame: frames begin there, or the number of loops is another",
+                places.len(),
+                place + 1,
+                against.len()
+            );
+            return Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p));
+        }
+        let after: Vec<bool> = self.steps.iter().filter_map(|(_, size, next)| next.map(|next| next > *size)).collect();
+        let between = after.iter().filter(|larger| **larger).count();
+        let found = format!("the scene changes more to the next frame than within it in {between} of {} frames", after.len());
+        if log_binomial_tail(between, after.len(), 0.5) < ALARM.ln() {
+            return Some(Finding::as_stated(CHECK, EXPECTED, found));
+        }
+        Some(Finding::untold(CHECK, EXPECTED, found))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::IfFrame;
+    use crate::support::numbers;
+
+    const LOOPS: usize = 8;
+
+    /// Something that moves a little from loop to loop and more from frame to frame; the stream begins so many loops late. `settling`:
+    /// how much the first loop of a frame differs.
+    fn seen(late: usize, settling: f64) -> Finding {
+        let schedule = Schedule { tx: 1, rx: 1, loops: LOOPS, samples: 16, is_real: true, is_falling: false, farthest_bin: None };
+        let drawn = numbers(8, 40 * LOOPS * 16, -0.05, 0.05);
+        let mut inspector = Box::new(Boundary::new(schedule));
+        for frame in 0..24 {
+            let value = |i: usize| {
+                let (index, sample) = (frame * LOOPS + i / 16 + late, i % 16);
+                let time = index as f64 * 0.01 + (index / LOOPS) as f64 * 0.37;
+                let first = if index % LOOPS == 0 { settling } else { 0.0 };
+                ((0.4 * sample as f64 + 6.0 * time).sin() + first + drawn[frame * LOOPS * 16 + i]) as f32
+            };
+            let re = (0..LOOPS * 16).map(value).collect();
+            inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, 1, LOOPS, 16], re, None)));
+        }
+        inspector.conclude().unwrap()
+    }
+
+    #[test]
+    fn frames_that_begin_late_are_found_and_what_settles_is_not_accused() {
+        let stated = seen(0, 0.0);
+        assert!(stated.ok && stated.told, "{stated:?}");
+        let late = seen(3, 0.0);
+        assert!(late.is_refusal() && late.found.contains("between the loops 4 and 5"), "{late:?}");
+        assert!(seen(0, 0.7).ok, "{:?}", seen(0, 0.7));
+    }
+}

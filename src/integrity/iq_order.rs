@@ -1,0 +1,146 @@
+//! I and Q exchanged: the samples are the conjugates of what was sent.
+//!
+//! Returns lie at the beat frequencies of their ranges, and those of a pair of frequencies ±f are those of a near and of a far range. In
+//! a room whose size is stated, nothing lies beyond its farthest corner; in an unknown one, returns weaken with range. So over the pairs
+//! in which still returns stand out of the noise, and of which not both are within the room, the mean of ln(far / near) is zero at most:
+//! a paired Student test over pairs of the still chirps' spectrum, power summed over the channels. Every second bin counts, as the window
+//! joins neighbours. Where far returns are as strong as near ones, nothing can be told.
+
+use num_complex::{Complex32, Complex64};
+
+use super::stream::{Schedule, Stream};
+use super::tails::student_tail;
+use super::words::{spectrum, window_power};
+use super::{ALARM, Finding, Inspector, Kind};
+
+const CHECK: &str = "iq_order";
+const EXPECTED: &str = "still returns at the beat frequencies of the room's ranges";
+/// Bins beside 0 in which the radar's own leakage and its offset lie under the window.
+const GUARD: usize = 3;
+/// Bins between pairs that share nothing under a Hann window, whose main lobe is four bins wide.
+const APART: usize = 2;
+/// A pair counts above this many times the noise: of noise alone, e⁻²⁰.
+const RETURN: f64 = 20.0;
+
+pub(super) struct IqOrder {
+    schedule: Schedule,
+    /// Sum of all chirps, `[tx, rx, sample]`, and the loop before.
+    sum: Vec<Complex64>,
+    before: Vec<Complex32>,
+    /// Sum of the squared differences of neighbouring loops, and how many loops and differences there were.
+    noise: f64,
+    loops: f64,
+    differences: f64,
+}
+
+impl IqOrder {
+    pub fn new(schedule: Schedule) -> Self {
+        Self { schedule, sum: vec![Complex64::ZERO; schedule.period()], before: vec![], noise: 0.0, loops: 0.0, differences: 0.0 }
+    }
+
+    /// Near and far bin of each pair that can tell.
+    fn pairs(&self) -> impl Iterator<Item = [usize; 2]> {
+        let Schedule { samples, is_falling, farthest_bin, .. } = self.schedule;
+        let outside = move |far: usize| farthest_bin.is_none_or(|farthest| far as f64 > farthest + GUARD as f64);
+        let pairs = (GUARD..(samples / 2).saturating_sub(GUARD)).step_by(APART).map(move |near| [near, samples - near]);
+        pairs.filter(move |[_, far]| outside(*far)).map(move |[near, far]| if is_falling { [far, near] } else { [near, far] })
+    }
+}
+
+impl Inspector for IqOrder {
+    fn see(&mut self, stream: &Stream) {
+        for samples in stream.loops() {
+            self.sum.iter_mut().zip(samples).for_each(|(sum, v)| *sum += Complex64::new(v.re.into(), v.im.into()));
+            let differences = samples.iter().zip(&self.before).map(|(value, before)| f64::from((value - before).norm_sqr()));
+            self.noise += differences.sum::<f64>();
+            self.differences += f64::from(u8::from(!self.before.is_empty()));
+            self.before = samples.to_vec();
+            self.loops += 1.0;
+        }
+    }
+
+    fn conclude(self: Box<Self>) -> Option<Finding> {
+        if self.schedule.is_real {
+            return None;
+        }
+        if self.differences == 0.0 {
+            return Some(Finding::untold(CHECK, EXPECTED, "one chirp shows no noise to tell returns from"));
+        }
+        let samples = self.schedule.samples;
+        // Of a sample, over all channels; a difference has twice the noise.
+        let variance = self.noise / (2.0 * self.differences * samples as f64);
+        let least = RETURN * self.loops * variance * window_power(samples);
+        let power = spectrum(self.sum.chunks_exact(samples), samples);
+        let told: Vec<[f64; 2]> =
+            self.pairs().map(|pair| pair.map(|bin| power[bin])).filter(|pair| pair[0].max(pair[1]) >= least).collect();
+        let ratios: Vec<f64> = told.iter().map(|[near, far]| (far / near.max(f64::MIN_POSITIVE)).ln()).collect();
+        if ratios.len() < 2 {
+            return Some(Finding::untold(CHECK, EXPECTED, "still returns stand out of the noise at too few frequencies"));
+        }
+        let mean_db = 10.0 / std::f64::consts::LN_10 * ratios.iter().sum::<f64>() / ratios.len() as f64;
+        let found =
+            format!("of {} pairs of beat frequencies with still returns, the far one is {mean_db:+.1} dB stronger", ratios.len());
+        let exchanged = student_tail(&ratios);
+        if exchanged < ALARM {
+            let found = format!("{found}: I and Q are exchanged, or the samples conjugated");
+            return Some(Finding::wrong(Kind::Convention, CHECK, EXPECTED, found, exchanged.ln()));
+        }
+        if student_tail(&ratios.iter().map(|ratio| -ratio).collect::<Vec<_>>()) >= ALARM {
+            return Some(Finding::untold(CHECK, EXPECTED, found));
+        }
+        Some(Finding::as_stated(CHECK, EXPECTED, found))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::IfFrame;
+    use crate::support::numbers;
+
+    const LOOPS: usize = 16;
+    const SAMPLES: usize = 128;
+    const SCHEDULE: Schedule =
+        Schedule { tx: 1, rx: 2, loops: LOOPS, samples: SAMPLES, is_real: false, is_falling: false, farthest_bin: None };
+
+    /// Still returns at so many bins, falling with range, under noise.
+    fn seen(schedule: Schedule, bins: std::ops::Range<usize>, sign: f32) -> Finding {
+        let noise = numbers(9, 4 * LOOPS * SAMPLES, -3.0, 3.0);
+        let phases = numbers(10, 2 * SAMPLES, 0.0, std::f64::consts::TAU);
+        let value = |place: usize| -> Complex64 {
+            let (channel, sample) = (place / SAMPLES / LOOPS, place % SAMPLES);
+            let tone = |bin: usize| {
+                let phase = std::f64::consts::TAU * (bin * sample) as f64 / SAMPLES as f64 + phases[channel * SAMPLES + bin];
+                Complex64::from_polar(100.0 / bin as f64, phase)
+            };
+            bins.clone().map(tone).sum::<Complex64>() + Complex64::new(noise[2 * place], noise[2 * place + 1])
+        };
+        let values: Vec<Complex64> = (0..2 * LOOPS * SAMPLES).map(value).collect();
+        let (re, im) = values.iter().map(|value| (value.re as f32, sign * value.im as f32)).unzip();
+        let mut inspector = Box::new(IqOrder::new(schedule));
+        inspector.see(&Stream::of(schedule, 0, &IfFrame::new([1, 2, LOOPS, SAMPLES], re, Some(im))));
+        inspector.conclude().unwrap()
+    }
+
+    #[test]
+    fn a_room_is_on_its_side_and_its_mirror_image_is_not() {
+        for (schedule, bins) in
+            [(SCHEDULE, 2..60), (Schedule { farthest_bin: Some(60.0), ..SCHEDULE }, 2..60), (SCHEDULE, 2..110)]
+        {
+            let right = seen(schedule, bins.clone(), 1.0);
+            assert!(right.ok && right.told, "{right:?}");
+            let exchanged = seen(schedule, bins.clone(), -1.0);
+            assert!(exchanged.is_refusal() && exchanged.kind == Kind::Convention, "{exchanged:?}");
+            // A falling chirp has the mirror image of its room.
+            assert!(seen(Schedule { is_falling: true, ..schedule }, bins, -1.0).ok);
+        }
+    }
+
+    #[test]
+    fn noise_and_a_room_up_to_the_last_bin_tell_nothing() {
+        let noise = seen(SCHEDULE, 0..0, 1.0);
+        assert!(noise.ok && !noise.told, "{noise:?}");
+        let full = seen(Schedule { farthest_bin: Some(126.0), ..SCHEDULE }, 2..126, -1.0);
+        assert!(full.ok && !full.told, "{full:?}");
+    }
+}

@@ -1,0 +1,138 @@
+//! Chirps that begin elsewhere than is stated: a header before the first sample, samples that were cut off.
+//!
+//! Between one chirp and the next the signal breaks; within a chirp it goes on. A linear prediction (Burg 1975: forwards and backwards)
+//! of the still chirps foretells what goes on, so its error is largest where chirps begin. Within a chirp that is as stated, noise makes
+//! the error as large at one sample as at any other, and independently in every channel: that the same few samples come first in several
+//! channels has a binomial law, Bonferroni over the samples. Errors across the stated beginning compete, and a
+//! break within a few samples of it is taken for a transient.
+
+use num_complex::Complex64;
+
+use super::stream::{Schedule, Stream};
+use super::tails::log_binomial_tail;
+use super::{ALARM, Finding, Inspector, Kind};
+
+const CHECK: &str = "chirp_start";
+const EXPECTED: &str = "the first sample of a chirp first";
+/// Samples from which the next one is foretold: what is left of the weaker returns is small against a break. A break spoils as many
+/// predictions, of which any may be the worst.
+const ORDER: usize = 4;
+/// Share of a chirp at either end in which what begins or ends with it (a filter that settles, a ramp that is over) may break most.
+const TRANSIENT: usize = 32;
+
+pub(super) struct Start {
+    schedule: Schedule,
+    /// Sum of all chirps, `[tx, rx, sample]`.
+    sum: Vec<Complex64>,
+}
+
+impl Start {
+    pub fn new(schedule: Schedule) -> Self {
+        Self { schedule, sum: vec![Complex64::ZERO; schedule.period()] }
+    }
+}
+
+/// Coefficients that foretell a sample from the `ORDER` before it, by Burg's method.
+fn prediction(chirp: &[Complex64]) -> Vec<Complex64> {
+    let (mut forward, mut backward) = (chirp.to_vec(), chirp.to_vec());
+    let mut filter = vec![Complex64::ONE];
+    for order in 1..=ORDER {
+        let pairs = || (order..chirp.len()).map(|n| (n, n - 1));
+        let energy: f64 = pairs().map(|(n, m)| forward[n].norm_sqr() + backward[m].norm_sqr()).sum();
+        let common: Complex64 = pairs().map(|(n, m)| forward[n] * backward[m].conj()).sum();
+        let reflection = if energy > 0.0 { -2.0 * common / energy } else { Complex64::ZERO };
+        let mirrored: Vec<Complex64> = filter.iter().rev().map(|value| value.conj()).collect();
+        filter.push(Complex64::ZERO);
+        filter.iter_mut().skip(1).zip(mirrored).for_each(|(value, mirror)| *value += reflection * mirror);
+        for n in (order..chirp.len()).rev() {
+            let (f, b) = (forward[n], backward[n - 1]);
+            forward[n] = f + reflection * b;
+            backward[n] = b + reflection.conj() * f;
+        }
+    }
+    filter
+}
+
+impl Inspector for Start {
+    fn see(&mut self, stream: &Stream) {
+        for samples in stream.loops() {
+            self.sum.iter_mut().zip(samples).for_each(|(sum, v)| *sum += Complex64::new(v.re.into(), v.im.into()));
+        }
+    }
+
+    fn conclude(self: Box<Self>) -> Option<Finding> {
+        let samples = self.schedule.samples;
+        if samples < 4 * ORDER {
+            return Some(Finding::untold(CHECK, EXPECTED, "a chirp is too short"));
+        }
+        // The still stream goes on from channel to channel, and after the last one with the first.
+        let at = |place: usize| self.sum[place % self.sum.len()];
+        let first = |channel: usize| {
+            let filter = prediction(&self.sum[channel * samples..][..samples]);
+            let error = |place: usize| -> f64 {
+                let place = self.sum.len() + channel * samples + place;
+                filter.iter().enumerate().map(|(back, factor)| factor * at(place - back)).sum::<Complex64>().norm_sqr()
+            };
+            (0..samples).map(|sample| (sample, error(sample))).max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(sample, _)| sample)
+        };
+        let breaks: Vec<usize> = (0..self.schedule.channels()).map(first).collect();
+        let near = |place: usize| breaks.iter().filter(|other| (*other + samples - place) % samples < ORDER).count();
+        // The stated beginning first: `max_by_key` takes the last of equals.
+        let place = (0..samples).rev().max_by_key(|place| near(*place))?;
+        let count = near(place);
+        let log_p = (samples as f64).ln() + log_binomial_tail(count, breaks.len(), ORDER as f64 / samples as f64);
+        let found =
+            format!("the signal breaks most at sample {place} or shortly after it in {count} of {} channels", breaks.len());
+        if log_p >= ALARM.ln() {
+            return Some(Finding::untold(CHECK, EXPECTED, found));
+        }
+        let beside = (samples / TRANSIENT).max(2 * ORDER);
+        if place < beside || place + beside >= samples {
+            return Some(Finding::as_stated(CHECK, EXPECTED, found));
+        }
+        let found = format!("{found}: chirps begin there; a header lies before the first sample, or samples were cut off");
+        Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::IfFrame;
+    use crate::support::numbers;
+
+    /// Chirps of 6 channels with five returns each, turned by so many samples of the stream.
+    fn seen(turn: usize, noise: f64) -> Finding {
+        let (channels, samples, loops) = (6, 64, 4);
+        let schedule = Schedule { tx: 1, rx: channels, loops, samples, is_real: false, is_falling: false, farthest_bin: None };
+        let (phases, drawn) =
+            (numbers(6, 5 * channels, 0.0, std::f64::consts::TAU), numbers(7, 2 * channels * samples * loops, -1.0, 1.0));
+        let of_stream = |place: usize| -> Complex64 {
+            let (channel, sample) = (place / samples % channels, place % samples);
+            (0..5).map(|i| Complex64::from_polar(10.0, 0.17 * (i + 1) as f64 * sample as f64 + phases[5 * channel + i])).sum()
+        };
+        let mut values = vec![];
+        for channel in 0..channels {
+            for place in
+                (0..loops).flat_map(|index| (0..samples).map(move |sample| (index * channels + channel) * samples + sample))
+            {
+                values.push(of_stream(place + turn) + noise * Complex64::new(drawn[2 * place], drawn[2 * place + 1]));
+            }
+        }
+        let (re, im) = values.iter().map(|value| (value.re as f32, value.im as f32)).unzip();
+        let mut inspector = Box::new(Start::new(schedule));
+        inspector.see(&Stream::of(schedule, 0, &IfFrame::new([1, channels, loops, samples], re, Some(im))));
+        inspector.conclude().unwrap()
+    }
+
+    #[test]
+    fn a_header_moves_the_break_and_noise_hides_it() {
+        let stated = seen(0, 0.5);
+        assert!(stated.ok && stated.told, "{stated:?}");
+        // 44 samples of a chirp were cut off: the next one begins 20 samples after the stated beginning.
+        let moved = seen(44, 0.5);
+        assert!(moved.is_refusal() && (17..=20).any(|place| moved.found.contains(&format!("at sample {place} "))), "{moved:?}");
+        let hidden = seen(44, 1000.0);
+        assert!(hidden.ok && !hidden.told, "{hidden:?}");
+    }
+}
