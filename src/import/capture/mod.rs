@@ -9,7 +9,7 @@ pub mod boards;
 mod dca1000;
 mod infineon;
 mod json;
-mod lanes;
+pub mod lanes;
 mod layout;
 mod schedule;
 mod stream;
