@@ -127,10 +127,11 @@ pub fn write_dataset(dataset: &Dataset, folder: &Path, progress: &mut dyn FnMut(
             config: &dataset.config,
             progress: &mut |done| progress(before + done, &shard.name),
         };
-        let found = dataset
-            .target
-            .write(&mut source, &place)
-            .map_err(|error| error.in_file(shard.recording.folder.join("recording.toml")))?;
+        let file = shard.recording.folder.join("recording.toml");
+        let found = dataset.target.write(&mut source, &place).map_err(|error| match &error {
+            Error::Setting { key, .. } if key.starts_with("radar.") => error.in_file(file),
+            _ => error,
+        })?;
         found.into_iter().for_each(|note| notes.entry(note).or_default().push(&shard.name));
         before += shard.recording.frames();
     }

@@ -54,7 +54,7 @@ fn white_noise_is_detected_at_the_stated_rate() {
         [(Method::Ca, 1, 0.01, false), (Method::Ca, 4, 0.01, true), (Method::Os, 1, 0.01, false), (Method::Os, 3, 0.02, false)]
     {
         let config = PointsConfig { method, false_alarm_rate: rate, remove_static, ..PointsConfig::default() };
-        let [found, of] = alarms(&small(antennas, Sampling::Complex), &config, 600, 11);
+        let [found, of] = alarms(&small(antennas, Sampling::Complex), &config, 1500, 11);
         let expected = rate * of as f64;
         // Four deviations of a binomial count, and 5 % for the law of correlated training cells, which is approximated.
         let allowed = 4.0 * (expected * (1.0 - rate)).sqrt() + 0.05 * expected;
@@ -69,7 +69,7 @@ fn white_noise_is_detected_at_the_stated_rate() {
 #[test]
 fn a_smaller_factor_would_be_noticed() {
     let config = PointsConfig { false_alarm_rate: 0.01, ..PointsConfig::default() };
-    let [found, of] = alarms(&small(1, Sampling::Complex), &PointsConfig { false_alarm_rate: 0.013, ..config }, 600, 11);
+    let [found, of] = alarms(&small(1, Sampling::Complex), &PointsConfig { false_alarm_rate: 0.014, ..config }, 1500, 11);
     assert!(found as f64 > 0.01 * of as f64 * 1.05 + 4.0 * (0.01 * of as f64).sqrt(), "{found} of {of}");
 }
 
