@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Hold the exports of a recording against programs of others: mmwcore, OpenRadar, xwr, h5py, plyfile, NumPy.
 
-    pip install numpy h5py plyfile mmwcore==0.3.0 xwr && pip install --no-deps openradar
+    pip install numpy h5py plyfile mmwcore==0.3.0 xwr scikit-learn matplotlib && pip install --no-deps openradar
     python3 scripts/export_oracles.py target/release/hybridsim RECORDING
 
 RECORDING must be one of int16 codes with a quadrature receiver and an even number of samples. Needs Python 3.12 (mmwcore).

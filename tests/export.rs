@@ -1,5 +1,7 @@
 //! Recordings that go out and come back: every sample equal, and every change to a file noticed.
 
+mod support;
+
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -169,6 +171,22 @@ fn two_lanes_are_as_the_document_draws_them() {
     assert_eq!(words, wanted);
 }
 
+/// A capture that a board made, converted by hand, goes out as the board's own bytes.
+#[test]
+fn a_real_capture_goes_out_as_the_bytes_that_came_in() {
+    let (Some(source), Some(raw)) =
+        (support::shared("recordings/real/room_60ghz"), support::shared("fixtures/raw/ti_iwr6843_mmwave_eyes/adc_data.bin"))
+    else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    run(&["export", text(&source), "--to", "dca1000", "--board", "IWR6843ISK", "--out", text(&out), "-q"]);
+    let (found, wanted) = (fs::read(out.join("room_60ghz_Raw_0.bin")).unwrap(), fs::read(raw).unwrap());
+    assert_eq!(found.len(), wanted.len());
+    assert!(found == wanted, "first other byte: {:?}", found.iter().zip(&wanted).position(|(found, wanted)| found != wanted));
+}
+
 #[test]
 fn whatever_is_changed_in_a_capture_is_noticed() {
     let folder = tempfile::tempdir().unwrap();
@@ -275,7 +293,7 @@ fn an_archive_holds_the_samples_with_their_axes_and_the_body() {
     let folder = tempfile::tempdir().unwrap();
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/test.toml");
     let (source, out) = (folder.path().join("walk"), folder.path().join("out"));
-    run(&["record", text(&config), "--out", text(&source), "-q"]);
+    run(&["record", text(&config), "--set", "record.frames=2", "--out", text(&source), "-q"]);
     run(&["export", text(&source), "--to", "npz", "--out", text(&out), "-q"]);
     let recording = Recording::open(&source).unwrap();
     let mut npz = Npz::open(&out.join("walk.npz")).unwrap();
@@ -465,6 +483,11 @@ fn a_data_set_has_shards_labels_splits_and_a_card() {
     }
     assert_eq!(fs::read(out.join("c/c.npz")).unwrap(), fs::read(again.join("c/c.npz")).unwrap(), "equal runs write equal bytes");
     assert_eq!(table, fs::read_to_string(again.join("labels.csv")).unwrap());
+    // Whom a site calls unseen nothing is trained on.
+    fs::write(site.join("site.toml"), "unseen = ['s4']\n").unwrap();
+    let table = fs::read_to_string(export("unseen").join("labels.csv")).unwrap();
+    assert_eq!(table.lines().map(split).filter(|split| split == "test").count(), 1);
+    assert_eq!(split(table.lines().nth(4).unwrap()), "test", "{table}");
     let one = site.join("recordings/a");
     refused(
         &["export", text(&one), text(&one), "--to", "npz", "--out", text(&folder.path().join("twice")), "-q"],

@@ -47,12 +47,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     for note in notes {
         remark!("note: {note}");
     }
-    say!(
-        "{} recordings, {} frames as {}: {}",
-        dataset.shards.len(),
-        dataset.frames(),
-        dataset.target.name,
-        arguments.out.display()
-    );
+    let count = match dataset.shards.len() {
+        1 => "1 recording".to_string(),
+        count => format!("{count} recordings"),
+    };
+    say!("{count}, {} frames as {}: {}", dataset.frames(), dataset.target.name, arguments.out.display());
     Ok(())
 }

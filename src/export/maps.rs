@@ -103,8 +103,11 @@ pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
         source.done(frame + 1);
     }
     sink.finish()?;
-    let mut notes =
-        vec!["velocities beyond the unambiguous ones appear folded, and at wrong angles where transmitters take turns".into()];
+    let mut notes = Vec::new();
+    if radar.tx_m.len() > 1 {
+        notes
+            .push("velocities beyond the unambiguous ones appear folded, and so at wrong angles: transmitters take turns".into());
+    }
     for (axis, what, count) in [(0, "azimuth", azimuths.len()), (2, "elevation", elevations.len())] {
         if count > 1 && aperture_m(radar, axis) == 0.0 {
             notes.push(format!("the antennas do not tell {what}: all of its cells are equal"));
