@@ -296,7 +296,7 @@ fn an_archive_holds_the_samples_with_their_axes_and_the_body() {
     run(&["record", text(&config), "--set", "record.frames=2", "--out", text(&source), "-q"]);
     run(&["export", text(&source), "--to", "npz", "--out", text(&out), "-q"]);
     let recording = Recording::open(&source).unwrap();
-    let mut npz = Npz::open(&out.join("walk.npz")).unwrap();
+    let mut npz = Npz::open(out.join("walk.npz")).unwrap();
     let found = samples(&mut npz, &recording.radar);
     let mut place = 0;
     for index in 0..recording.frames() {
@@ -368,7 +368,7 @@ fn maps_and_points_show_a_point_where_it_is() {
     let (range, azimuth) = ((1.5f64 * 1.5 + 2.6 * 2.6).sqrt(), (1.5f64 / 2.6).atan().to_degrees());
     let maps = folder.path().join("maps");
     run(&["export", text(&source), "--to", "maps", "--set", "maps.farthest_m=6", "--out", text(&maps), "-q"]);
-    let mut npz = Npz::open(&maps.join("point_maps.npz")).unwrap();
+    let mut npz = Npz::open(maps.join("point_maps.npz")).unwrap();
     let ranges: Array<f64> = npz.read("range_m", &[("range", None)]).unwrap();
     let azimuths: Array<f64> = npz.read("azimuth_deg", &[("azimuth", Some(61))]).unwrap();
     assert!(*ranges.values.last().unwrap() <= 6.0);
@@ -388,7 +388,7 @@ fn maps_and_points_show_a_point_where_it_is() {
         let out = clouds.with_extension(method);
         let set = format!("points.method={method}");
         run(&["export", text(&source), "--to", "points", "--set", &set, "--out", text(&out), "-q"]);
-        let mut npz = Npz::open(&out.join("point_points.npz")).unwrap();
+        let mut npz = Npz::open(out.join("point_points.npz")).unwrap();
         let [x, y, snr] = ["x_m", "y_m", "snr_db"].map(|name| npz.read::<f32>(name, &[("point", None)]).unwrap().values);
         let frames: Array<i64> = npz.read("frame", &[("point", Some(x.len()))]).unwrap();
         let best = (0..snr.len()).max_by(|a, b| snr[*a].total_cmp(&snr[*b])).expect("the point is detected");

@@ -110,6 +110,14 @@ pub struct Point {
     pub snr_db: f64,
 }
 
+impl Point {
+    /// x, y, z, velocity and signal-to-noise ratio, as files have them.
+    fn numbers(&self) -> [f64; 5] {
+        let [x, y, z] = self.position_m;
+        [x, y, z, self.velocity_mps, self.snr_db]
+    }
+}
+
 /// Finds the points of one frame after the other.
 pub struct Finder {
     analysis: Analysis,
@@ -186,15 +194,9 @@ pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
     let mut sink: Box<dyn Sink> = Box::new(NpzSink::create(&folder.join(format!("{}_points.npz", source.name)))?);
     let shape = [points.len()];
     sink.array(Layout { name: "frame", axes: "point", unit: "", shape: &shape }, Values::I32(&frames))?;
-    let columns: [(&str, &str, fn(&Point) -> f64); 5] = [
-        ("x_m", "m", |point| point.position_m[0]),
-        ("y_m", "m", |point| point.position_m[1]),
-        ("z_m", "m", |point| point.position_m[2]),
-        ("velocity_m_s", "m/s", |point| point.velocity_mps),
-        ("snr_db", "dB", |point| point.snr_db),
-    ];
-    for (name, unit, of) in columns {
-        let values: Vec<f32> = points.iter().map(|point| of(point) as f32).collect();
+    let columns = [("x_m", "m"), ("y_m", "m"), ("z_m", "m"), ("velocity_m_s", "m/s"), ("snr_db", "dB")];
+    for (column, (name, unit)) in columns.into_iter().enumerate() {
+        let values: Vec<f32> = points.iter().map(|point| point.numbers()[column] as f32).collect();
         sink.array(Layout { name, axes: "point", unit, shape: &shape }, Values::F32(&values))?;
     }
     let times: Vec<f64> = (0..radar.frames).map(|frame| radar.chirp_time_s(frame, 0, 0)).collect();

@@ -16,8 +16,8 @@ pub fn write(path: &Path, points: &[Point]) -> Result<()> {
         }
         writeln!(file, "end_header")?;
         points.iter().try_for_each(|point| {
-            let [x, y, z] = point.position_m;
-            writeln!(file, "{x:.5} {y:.5} {z:.5} {:.5} {:.3}", point.velocity_mps, point.snr_db)
+            let [x, y, z, velocity, snr_db] = point.numbers();
+            writeln!(file, "{x:.5} {y:.5} {z:.5} {velocity:.5} {snr_db:.3}")
         })
     })
 }
