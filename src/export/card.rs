@@ -23,8 +23,8 @@ pub fn text(dataset: &Dataset, notes: &[String]) -> String {
         true => " The recordings are simulated: those of a site, whose settings are in its `site.toml`.\n\n",
         false => " Whether the recordings are measured or simulated, where and of whom: (to be filled in).\n\n",
     };
-    text += "## Labels\n\n| label | values (recordings) |\n|---|---|\n";
     let keys: BTreeSet<&String> = shards.iter().flat_map(|shard| shard.recording.labels.keys()).collect();
+    text += if keys.is_empty() { "## Labels\n\nNone.\n" } else { "## Labels\n\n| label | values (recordings) |\n|---|---|\n" };
     for key in keys {
         let values = shards.iter().map(|shard| shard.recording.labels.get(key).map_or("(none)", String::as_str));
         text += &format!("| {} | {} |\n", cell(key), counted(values));
