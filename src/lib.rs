@@ -38,6 +38,8 @@ pub mod simulator;
 pub mod training;
 pub mod evaluation;
 pub mod pictures;
+// recordings and what is seen in them, in the layouts of others
+pub mod export;
 // how others simulate the same recordings
 pub mod baselines;
 // why a recording and the simulator disagree

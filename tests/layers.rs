@@ -27,7 +27,7 @@ const FLOORS: [&[&str]; 29] = [
     &["simulator"],
     &["training"],
     &["evaluation", "pictures"],
-    &["baselines"],
+    &["baselines", "export"],
     &["diagnosis"],
     &["recognition"],
     &["config"],

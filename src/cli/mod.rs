@@ -23,6 +23,7 @@ mod device;
 mod diagnose;
 mod effects;
 mod evaluate;
+mod export;
 mod import;
 mod infer;
 mod interrupt;
@@ -110,6 +111,12 @@ enum Command {
     /// recording folder that every other verb reads; where they contradict it, nothing, unless --as-stated.
     /// --set radar.KEY=VALUE corrects what the files say.
     Import(import::Arguments),
+    /// Write recordings in the layouts of others
+    ///
+    /// npz, hdf5: IF samples with their axes, radar and body. dca1000: _Raw_0.bin with .mmwave.json, as a capture of a TI
+    /// board. rover: a trace of roverd. maps: range-Doppler-angle power. points: a CFAR point cloud, also as PLY. Of several
+    /// recordings, or a site, also labels.csv and card.md, and with --split-by splits. --set KEY=VALUE: docs/export.md.
+    Export(export::Arguments),
     /// Make a recording of a person in a room, in a world that shares nothing with the simulator
     ///
     /// Writes a recording folder (recording.toml, if.npy, body.npz, motion.npz, truth.json) from the [record] section
@@ -200,6 +207,7 @@ pub fn main() -> ExitCode {
     let result = refuse_idle_settings(&cli).and_then(|()| match &cli.command {
         Command::Check(arguments) => check::run(arguments, &cli.common),
         Command::Import(arguments) => import::run(arguments, &cli.common),
+        Command::Export(arguments) => export::run(arguments, &cli.common),
         Command::Record(arguments) => record::run(arguments, &cli.common),
         Command::Recognize(arguments) => recognize::run(arguments, &cli.common),
         Command::Site(arguments) => site::run(arguments, &cli.common),

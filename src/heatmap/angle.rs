@@ -1,9 +1,11 @@
 //! Range-angle maps: a beam steered over the virtual array, wherever its antennas are.
 
+use std::ops::Range;
+
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::{Analysis, Axis, Gate, Map, doppler_turns_per_loop};
+use super::{Analysis, Axis, Gate, Map, doppler_turns_per_loop, range_bins};
 
 /// The directions that a beam visits.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,27 +50,40 @@ impl Analysis {
         let (velocities, ranges) = (self.velocity_axis(), self.range_axis());
         let [loops, bins] = [velocities.len(), ranges.len()];
         let maps = self.range_doppler_complex(frame);
-        let channels = self.channel_positions_m().len();
-        assert_eq!(maps.len(), channels * loops * bins, "range_angle: {} values, {channels} antennas", frame.len());
         let power: Vec<f64> = scan
             .directions
             .par_iter()
             .flat_map_iter(|&direction| {
                 let mut power = vec![0.0; bins];
-                let mut beam = vec![Complex64::default(); bins];
                 for doppler in (0..loops).filter(|&doppler| gate.holds_velocity(velocities.values[doppler])) {
-                    beam.fill(Complex64::default());
-                    for (channel, weight) in self.steering(direction, doppler).into_iter().enumerate() {
-                        let start = (channel * loops + doppler) * bins;
-                        beam.iter_mut().zip(&maps[start..start + bins]).for_each(|(sum, value)| *sum += weight * value);
-                    }
-                    power.iter_mut().zip(&beam).for_each(|(sum, value)| *sum += value.norm_sqr());
+                    let beam = self.beam(&maps, direction, doppler, 0..bins);
+                    power.iter_mut().zip(beam).for_each(|(sum, value)| *sum += value.norm_sqr());
                 }
                 power.iter_mut().zip(&ranges.values).filter(|(_, range)| !gate.holds_range(**range)).for_each(|(p, _)| *p = 0.0);
                 power
             })
             .collect();
         Map::new(scan.axis.clone(), ranges, power)
+    }
+
+    /// A beam towards `direction`, a unit vector in the radar frame: the cells `bins` of one Doppler bin, `[range]`.
+    ///
+    /// `maps`: of every antenna, as [`Analysis::range_doppler_complex`] gives them. The phase that the bin's velocity gathers
+    /// between the turns of the transmitters is taken away; one that is beyond the unambiguous velocities is not.
+    ///
+    /// # Panics
+    /// When `maps` are not those of all antennas.
+    pub fn beam(&self, maps: &[Complex64], direction: [f64; 3], doppler: usize, bins: Range<usize>) -> Vec<Complex64> {
+        let (loops, columns) = (self.radar.loops_per_frame, range_bins(self.radar.samples_per_chirp, self.radar.sampling));
+        let weights = self.steering(direction, doppler);
+        assert_eq!(maps.len(), weights.len() * loops * columns, "beam: {} cells, {} antennas", maps.len(), weights.len());
+        let mut beam = vec![Complex64::default(); bins.len()];
+        for (channel, weight) in weights.into_iter().enumerate() {
+            let start = (channel * loops + doppler) * columns;
+            let cells = &maps[start + bins.start..start + bins.end];
+            beam.iter_mut().zip(cells).for_each(|(sum, value)| *sum += weight * value);
+        }
+        beam
     }
 
     /// Weights of every antenna pair for one direction and Doppler bin, which sum to 1 in size.

@@ -7,11 +7,13 @@
 mod element;
 mod header;
 mod npz;
+mod stream;
 mod write;
 
 pub use element::{Element, Kind, Stored};
 pub use header::Header;
 pub use npz::Npz;
+pub use stream::NpzWriter;
 pub use write::{Member, Values, header_bytes, write_npy, write_npz};
 
 use std::fs::File;

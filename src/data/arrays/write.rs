@@ -48,8 +48,16 @@ macro_rules! each_kind {
 }
 
 impl Values<'_> {
-    fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         each_kind!(self, slice => slice.len())
+    }
+
+    /// Bytes of one number.
+    pub(super) fn width(&self) -> usize {
+        fn of<T>(_: &[T]) -> usize {
+            size_of::<T>()
+        }
+        each_kind!(self, slice => of(slice))
     }
 
     /// NumPy's type string.

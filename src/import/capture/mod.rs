@@ -11,7 +11,7 @@ mod cube;
 mod dca1000;
 mod infineon;
 mod json;
-mod lanes;
+pub mod lanes;
 mod layout;
 mod presets;
 mod schedule;
