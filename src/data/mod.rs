@@ -23,7 +23,7 @@ pub use claim::Claim;
 pub use hex::hex;
 pub use meshes::{Meshes, read_meshes};
 pub use motions::{Figure, MotionOptions, RotationUnit, UpAxis, find_up, read_motion, read_motion_upright, write_motion};
-pub use recording::{IfFrame, IfLayout, Recording, RecordingContents, write_recording, write_recording_into};
+pub use recording::{IfFrame, IfLayout, Recording, RecordingContents, write_placement, write_recording, write_recording_into};
 pub use scratch::Scratch;
 pub use settings::{read_settings, read_toml};
 pub use shard::Shard;

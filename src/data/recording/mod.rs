@@ -3,10 +3,12 @@
 //! `truth.json`, which practice recordings carry, is written here when a recorder asks for it and never read.
 
 mod dead;
+mod placement;
 mod samples;
 mod settings;
 mod write;
 
+pub use placement::write_placement;
 pub use samples::{IfFrame, IfLayout};
 pub use settings::{FORMAT, Files, RecordingSettings};
 pub use write::{RecordingContents, write_recording, write_recording_into};

@@ -1,0 +1,316 @@
+//! What may be said of the places that were found.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::chance::Chance;
+use super::climb::{Maximum, UNIT, active};
+use super::coarse::turned_rad;
+use super::fit::{COHERENCE, Fitter, Score};
+use super::place::{AZIMUTH, CLOCK, COUNT, FACING, HEIGHT, Pivot, Place, RANGE, stated};
+use super::poses::Poses;
+use super::readings::Readings;
+use super::report::{Alignment, Alternative, Estimate, FORMAT, Gain, TOLD, Verdict};
+use super::tracks::{self, Track};
+use crate::diagnosis::statistics::ratio_tail;
+use crate::person::{BodyModel, Motion, Person, Placement};
+
+/// Chance below which frames in a wrong order are no explanation, and one placement is worse than another: the diagnosis' `alarm`.
+const ALARM: f64 = 0.01;
+/// Standard deviations of what the power model does to a place, by number: its reflectivities and visibility are rough. Root mean
+/// squares over the practice recordings, whose motions are where they are stated.
+const FLOOR: [f64; COUNT] = [0.004, 0.03, 0.015, 0.03, 0.05];
+/// Half of the widest 90 % interval that says something, in the units of the report: a fifth of a step's period; an eighth of a turn;
+/// half a metre; two beams of the smallest array.
+const WIDEST: [(&str, f64); 8] = [
+    ("start_s", 0.25),
+    ("rotation_deg", 45.0),
+    ("origin_x_m", 0.5),
+    ("origin_y_m", 0.5),
+    ("origin_z_m", 0.5),
+    ("range_m", 0.5),
+    ("azimuth_deg", 30.0),
+    ("facing_deg", 45.0),
+];
+/// Numbers of a place that each number of the report depends on.
+const NEEDS: [(&str, &[usize]); 8] = [
+    ("start_s", &[CLOCK]),
+    ("rotation_deg", &[FACING, AZIMUTH]),
+    ("origin_x_m", &[FACING, RANGE, AZIMUTH]),
+    ("origin_y_m", &[FACING, RANGE, AZIMUTH]),
+    ("origin_z_m", &[HEIGHT]),
+    ("range_m", &[RANGE]),
+    ("azimuth_deg", &[AZIMUTH]),
+    ("facing_deg", &[FACING]),
+];
+
+/// All that the verdict is about.
+pub struct Found<'a> {
+    pub person: &'a Person,
+    pub readings: &'a Readings,
+    pub poses: &'a Poses,
+    pub maxima: Vec<Maximum<'a>>,
+    pub chance: Chance,
+    /// Largest clock that was tried, seconds.
+    pub lag_s: f64,
+    pub notes: Vec<String>,
+}
+
+/// `recording`: its folder.
+pub fn alignment(found: &Found, recording: String) -> Alignment {
+    let readings = found.readings;
+    let pivot = Pivot { stated_m: found.poses.middle_m(&readings.middle_s), centre_m: readings.radar.centre_m() };
+    let fitter = Fitter { readings, poses: found.poses, pivot, coherence: COHERENCE }.with_best_coherence(&pivot.stated());
+    let before = fitter.score_at(&pivot.stated());
+    let mut notes = found.notes.clone();
+    let best = found.maxima.first();
+    let gain = gain(found, &before, best);
+    let estimates = best.map_or_else(BTreeMap::new, |best| estimates(found, best));
+    let alternatives = best.map_or_else(Vec::new, |best| alternatives(found, best, &estimates));
+    let estimates = told_apart(estimates, &alternatives);
+    let reason = cannot_tell(found, &gain, &estimates);
+    let verdict = match (&reason, alternatives.is_empty()) {
+        (Some(_), _) => Verdict::CannotTell,
+        (None, false) => Verdict::Ambiguous,
+        (None, true) => Verdict::Aligned,
+    };
+    let holds = |estimate: &Estimate| estimate.ci90.is_none_or(|[low, high]| (low..=high).contains(&estimate.stated));
+    let as_stated = verdict == Verdict::Aligned && estimates.values().all(holds);
+    notes.push("the vertical is the radar frame's z, and the motion's own poses and height are taken as they are".into());
+    if readings.channels.len() > 1 {
+        notes.push("azimuths are those of the array as stated: a phase that grows along the antennas is a direction".into());
+    }
+    let [range_time_db, velocity_time_db] = tracks::maps(readings);
+    let after = best.map_or_else(Track::default, |best| Track::of(&best.fitter, &best.place));
+    let sentence = sentence(verdict, reason, &estimates, &alternatives, as_stated);
+    Alignment {
+        format: FORMAT,
+        recording,
+        verdict,
+        sentence,
+        as_stated,
+        held_out_frames: readings.split.held_out.clone(),
+        stated: stated(found.person),
+        motion: best.map_or_else(|| stated(found.person), |best| placement(found.person, &best.fitter, &best.place)),
+        estimates,
+        gain,
+        alternatives,
+        notes,
+        range_time_db,
+        velocity_time_db,
+        tracks: [Track::of(&fitter, &pivot.stated()), after],
+    }
+}
+
+fn gain(found: &Found, before: &Score, best: Option<&Maximum>) -> Gain {
+    let split = &found.readings.split;
+    let none = Score { by_frame: vec![0.0; found.readings.frames()], weights: before.weights };
+    let after = best.map_or(&none, |best| &best.score);
+    let over = |frames: &[usize]| after.over(frames) - before.over(frames);
+    Gain {
+        training_over_stated: over(&split.training),
+        held_out_over_stated: over(&split.held_out),
+        held_out_over_none: after.over(&split.held_out),
+        p_value_stated: worse(after, before),
+        grid: found.chance.gain,
+        grid_shuffled: found.chance.shuffled,
+        p_value_chance: found.chance.p_value,
+    }
+}
+
+/// Chance that one place is as good as another that was found to be better: Student's t over frames.
+fn worse(better: &Score, other: &Score) -> f64 {
+    let ratios: Vec<f64> = better.by_frame.iter().zip(&other.by_frame).map(|(better, other)| better - other).collect();
+    // Frames of which both say nothing tell nothing.
+    let weights: Vec<f64> = ratios.iter().map(|ratio| f64::from(*ratio != 0.0)).collect();
+    ratio_tail(&ratios, &weights).1
+}
+
+/// The motion's placement at a place.
+fn placement(person: &Person, fitter: &Fitter, place: &Place) -> Placement {
+    let correction = fitter.pivot.correction(place);
+    // A body without vertices: only its placement is asked for.
+    let bare = Person::Skinned {
+        model: BodyModel {
+            template: vec![],
+            shape_directions: vec![],
+            pose_directions: vec![],
+            joint_regressor: vec![],
+            skinning: vec![],
+            parents: vec![],
+            faces: vec![],
+        },
+        motion: Motion { poses: vec![], translations: vec![], betas: vec![], rate_hz: 1.0 },
+        placement: stated(person),
+    };
+    match correction.apply(&bare) {
+        Person::Skinned { placement, .. } => placement,
+        Person::Meshes { .. } => unreachable!("a skinned person stays one"),
+    }
+}
+
+/// Numbers of the report at a place, in the order of [`TOLD`].
+fn numbers(person: &Person, fitter: &Fitter, place: &Place) -> [f64; 8] {
+    let Placement { start_s, origin_m: [x, y, z], .. } = placement(person, fitter, place);
+    let heading = fitter.pivot.correction(place).heading_rad;
+    let angles = [heading, place.facing_rad].map(|angle| turned_rad(angle).to_degrees());
+    [start_s, angles[0], x, y, z, place.range_m, place.azimuth_rad.to_degrees(), angles[1]]
+}
+
+fn estimates(found: &Found, best: &Maximum) -> BTreeMap<&'static str, Estimate> {
+    let fitter = &best.fitter;
+    let at = |place: &Place| numbers(found.person, fitter, place);
+    let (here, stated) = (at(&best.place), at(&fitter.pivot.stated()));
+    let active = active(found.readings);
+    // Of a linear change.
+    let mut slopes = DMatrix::zeros(8, COUNT);
+    for &number in &active {
+        let side = |step: f64| at(&best.place.with(number, best.place.values()[number] + step * UNIT[number]));
+        let (low, high) = (side(-1.0), side(1.0));
+        for row in 0..8 {
+            let (change, angle) = (high[row] - low[row], TOLD[row].1 == "degrees");
+            let change = if angle { turned_rad(change.to_radians()).to_degrees() } else { change };
+            slopes[(row, number)] = change / (2.0 * UNIT[number]);
+        }
+    }
+    let mut covariance = best.covariance.clone();
+    active.iter().for_each(|&number| covariance[(number, number)] += FLOOR[number].powi(2));
+    let covariance = &slopes * covariance * slopes.transpose();
+    let quantile = StudentsT::new(0.0, 1.0, best.freedom).map_or(1.645, |law| law.inverse_cdf(0.95));
+    let estimate = |row: usize| {
+        let half = quantile * covariance[(row, row)].max(0.0).sqrt();
+        let missing = NEEDS[row].1.iter().find(|number| !active.contains(number));
+        let why_not = match missing {
+            Some(&number) => Some(untold(number, best.place.range_m)),
+            None => (half.is_nan() || half > WIDEST[row].1).then(|| too_wide(TOLD[row].0, half, TOLD[row].1)),
+        };
+        let ci90 = why_not.is_none().then_some([here[row] - half, here[row] + half]);
+        let estimate = Estimate { stated: stated[row], value: here[row], ci90, identified: why_not.is_none(), why_not };
+        (TOLD[row].0, estimate)
+    };
+    (0..8).map(estimate).collect()
+}
+
+fn untold(number: usize, range_m: f64) -> String {
+    match number {
+        AZIMUTH => format!(
+            "the antennas tell no left and right: the body may stand anywhere on the circle of {range_m:.2} m about the radar, turned \
+             with it; the azimuth as stated was kept"
+        ),
+        _ => "the antennas lie in one height and tell no other: the height as stated was kept".into(),
+    }
+}
+
+fn too_wide(name: &str, half: f64, unit: &str) -> String {
+    let why = match name {
+        "start_s" => "the motion looks alike for so long",
+        "rotation_deg" | "facing_deg" => "what moves returns the same at other headings",
+        "range_m" => "ranges are not told",
+        "azimuth_deg" => "the directions of what moves are not told",
+        _ => "it depends on what is not told",
+    };
+    format!("{why}: ± {half:.2} {unit} (90 %)")
+}
+
+/// Other maxima that are places of their own, and not worse beyond chance.
+fn alternatives(found: &Found, best: &Maximum, estimates: &BTreeMap<&'static str, Estimate>) -> Vec<Alternative> {
+    let of = |other: &Maximum| {
+        let p_value = worse(&best.score, &other.score);
+        let values: BTreeMap<&'static str, f64> =
+            TOLD.iter().map(|(name, ..)| *name).zip(numbers(found.person, &other.fitter, &other.place)).collect();
+        let apart = estimates.iter().any(|(name, estimate)| {
+            // Within one and the same peak, the climbs end within its interval.
+            estimate.ci90.is_some_and(|[low, high]| difference(name, values[name], estimate.value).abs() > high - low)
+        });
+        let motion = placement(found.person, &other.fitter, &other.place);
+        (apart && p_value > ALARM).then_some(Alternative { values, motion, p_value })
+    };
+    found.maxima.iter().skip(1).filter_map(of).collect()
+}
+
+fn difference(name: &str, a: f64, b: f64) -> f64 {
+    if name.ends_with("_deg") { turned_rad((a - b).to_radians()).to_degrees() } else { a - b }
+}
+
+/// A number is not identified where an alternative has another one.
+fn told_apart(mut estimates: BTreeMap<&'static str, Estimate>, alternatives: &[Alternative]) -> BTreeMap<&'static str, Estimate> {
+    for (name, estimate) in &mut estimates {
+        let Some([low, high]) = estimate.ci90 else { continue };
+        let others = alternatives.iter().map(|alternative| alternative.values[name]);
+        let others: Vec<String> = others
+            .filter(|other| difference(name, *other, estimate.value).abs() > high - low)
+            .map(|other| format!("{other:.2}"))
+            .collect();
+        if !others.is_empty() {
+            estimate.why_not = Some(format!("{:.2} or {}: both explain the recording", estimate.value, others.join(" or ")));
+            (estimate.identified, estimate.ci90) = (false, None);
+        }
+    }
+    estimates
+}
+
+fn cannot_tell(found: &Found, gain: &Gain, estimates: &BTreeMap<&'static str, Estimate>) -> Option<String> {
+    let lag_s = found.lag_s;
+    let Some(best) = found.maxima.first() else {
+        return Some(format!(
+            "nowhere, and at no clock within {lag_s} s, does the motion explain what moves in the recording (does the person move, and \
+             is the recording of this motion?)"
+        ));
+    };
+    let telling = best.score.by_frame.iter().filter(|gain| **gain != 0.0).count();
+    if telling < 4 {
+        return Some("the person hardly moves: in less than four frames is any part faster than what stands still".into());
+    }
+    if gain.p_value_chance.is_nan() || gain.p_value_chance > ALARM {
+        return Some(format!(
+            "the motion explains what moves no better than with its frames in a wrong order (chance {:.2})",
+            gain.p_value_chance
+        ));
+    }
+    if gain.held_out_over_none <= 0.0 {
+        return Some("the placement that explains the fitted frames does not explain the others".into());
+    }
+    let any = estimates.values().any(|estimate| estimate.identified);
+    (!any).then(|| "no number of the placement is told well enough".into())
+}
+
+fn sentence(
+    verdict: Verdict,
+    reason: Option<String>,
+    estimates: &BTreeMap<&'static str, Estimate>,
+    alternatives: &[Alternative],
+    as_stated: bool,
+) -> String {
+    if let Some(reason) = reason {
+        return format!("Where the body is cannot be told: {reason}.");
+    }
+    let of = |name: &str| estimates.get(name).filter(|estimate| estimate.identified);
+    let mut parts = vec![];
+    if let Some(start) = of("start_s") {
+        let later = start.value - start.stated;
+        parts.push(format!("the motion starts {:.3} s {}", later.abs(), if later >= 0.0 { "later" } else { "earlier" }));
+    }
+    if let (Some(x), Some(y)) = (of("origin_x_m"), of("origin_y_m")) {
+        let moved = (x.value - x.stated).hypot(y.value - y.stated);
+        parts.push(format!("its origin is {moved:.2} m away"));
+    } else if let Some(range) = of("range_m") {
+        let farther = range.value - range.stated;
+        parts.push(format!("the body is {:.2} m {}", farther.abs(), if farther >= 0.0 { "farther" } else { "nearer" }));
+    }
+    if let Some(turn) = of("rotation_deg").or(of("facing_deg")) {
+        let to_sight = if of("rotation_deg").is_some() { "" } else { " against the line of sight" };
+        let way = if turn.value >= 0.0 { "counter-clockwise" } else { "clockwise" };
+        parts.push(format!("it is turned by {:.1} degrees {way}{to_sight}", turn.value.abs()));
+    }
+    let told = if parts.is_empty() { "what can be told is below".to_string() } else { parts.join(", ") };
+    match verdict {
+        Verdict::Ambiguous => format!(
+            "{} placements explain the recording equally well; by one of them, {told} than stated.",
+            alternatives.len() + 1
+        ),
+        _ if as_stated => format!("The recording agrees with the placement as stated: {told}, each within its interval."),
+        _ => format!("The placement as stated is wrong: {told}."),
+    }
+}
