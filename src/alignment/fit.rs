@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::likelihood::{Compared, Predicted, WEIGHTS, first_weights, improve};
+use super::likelihood::{Compared, Predicted, WEIGHTS, first_weights, improve, most_power_gain};
 use super::place::{Pivot, Place};
 use super::poses::{Pose, Poses};
 use super::readings::Readings;
@@ -97,6 +97,19 @@ impl<'a> Fitter<'a> {
     /// The same from nothing.
     pub fn score_at(&self, place: &Place) -> Score {
         self.score(place, &self.sight(place, 0.0), None)
+    }
+
+    /// Share of what could be gained in the frames that a place explains, if what is expected of every cell were read from the recording
+    /// itself, that the place gains.
+    pub fn explained(&self, place: &Place, weights: &[f64; WEIGHTS]) -> f64 {
+        let of = |(frame, predicted): (usize, &Option<Predicted>)| {
+            let Some(predicted) = predicted else { return [0.0; 2] };
+            [predicted.power_gain(self.readings, frame, weights), most_power_gain(self.readings, frame)]
+        };
+        let predicted = self.predicted(place, &self.sight(place, 0.0));
+        let sums: Vec<[f64; 2]> = predicted.par_iter().enumerate().map(of).collect();
+        let [own, most] = [0, 1].map(|side| sums.iter().map(|sum| sum[side]).sum::<f64>());
+        if most > 0.0 { own / most } else { 0.0 }
     }
 
     /// With the coherence that makes the training frames likeliest at a place.

@@ -105,6 +105,13 @@ impl Predicted {
         }
     }
 
+    /// Gain of the cells' mean power over the channels with this body, nats: the law of one channel.
+    pub fn power_gain(&self, readings: &Readings, frame: usize, weights: &[f64; WEIGHTS]) -> f64 {
+        let power = readings.power(frame);
+        let of = |(&cell, templates): (&u32, &[f32; WEIGHTS])| power_gain(power[cell as usize], expected(templates, weights));
+        self.cells.iter().zip(&self.templates).map(of).sum()
+    }
+
     /// What the recording has there.
     pub fn against(&self, readings: &Readings, frame: usize, coherence: f64, later_rad: f64) -> Compared {
         let channels = readings.channels.len();
@@ -128,6 +135,27 @@ impl Predicted {
         });
         Compared { channels: channels as f64, looks: looks.collect(), templates: self.templates.clone() }
     }
+}
+
+/// The same of all usable cells with what is expected of a cell read from the recording: the mean of it and its neighbours, where that
+/// is clearly above the noise.
+pub fn most_power_gain(readings: &Readings, frame: usize) -> f64 {
+    /// Over the noise: a mean of nine such cells exceeds it by chance in one of 10⁷ cells.
+    const CLEAR: f64 = 3.5;
+    let (power, samples, loops) = (readings.power(frame), readings.cells.samples, readings.cells.loops);
+    let of = |cell: usize| {
+        let around = [loops - 1, 0, 1].into_iter().flat_map(|row| [samples - 1, 0, 1].map(|bin| (row, bin))).map(|(row, bin)| {
+            f64::from(power[(cell / samples + row) % loops * samples + (cell % samples + bin) % samples])
+        });
+        let mean = around.sum::<f64>() / 9.0;
+        if mean < CLEAR { 0.0 } else { power_gain(power[cell], mean - 1.0) }
+    };
+    (0..readings.size()).filter(|&cell| readings.usable[cell]).map(of).sum()
+}
+
+fn power_gain(power: f32, expected: f64) -> f64 {
+    let look = Look { along: f64::from(power), aside: 0.0, coherence: 1.0 };
+    look.log_likelihood(expected, 1.0) - look.log_likelihood(0.0, 1.0)
 }
 
 fn expected(templates: &[f32; WEIGHTS], weights: &[f64; WEIGHTS]) -> f64 {

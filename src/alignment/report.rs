@@ -44,6 +44,8 @@ pub struct Gain {
     pub held_out_over_stated: f64,
     /// Of the best placement over a recording without the body, held-out frames.
     pub held_out_over_none: f64,
+    /// Share of what the moving power could gain at most (were it predicted by itself) that the best placement gains.
+    pub explained: f64,
     /// Chance that the placement as stated is as good (Student's t over frames).
     pub p_value_stated: f64,
     /// Of the grid's best place, and mean of the best places of frames in a wrong order.
@@ -60,6 +62,8 @@ pub struct Alternative {
     pub motion: Placement,
     /// Chance that it is as good as the best.
     pub p_value: f64,
+    /// Frames of the recording that the motion has there; it is compared with the best in those.
+    pub frames: usize,
 }
 
 #[derive(Clone, Debug, Serialize)]

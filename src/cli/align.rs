@@ -67,7 +67,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     super::tell(&alignment.lines());
     for alternative in &alignment.alternatives {
         let values: Vec<String> = alternative.values.iter().map(|(name, value)| format!("{name} {value:.3}")).collect();
-        say!("  or: {} (chance {:.2})", values.join(", "), alternative.p_value);
+        say!("  or: {} (chance {:.2}, {} frames)", values.join(", "), alternative.p_value, alternative.frames);
+    }
+    if !alignment.alternatives.is_empty() {
+        remark!("note: where the clock is known better, a smaller --lag leaves fewer placements");
     }
     if arguments.apply && alignment.verdict == Verdict::Aligned {
         let settings = recording.folder.join(SETTINGS_FILE);
