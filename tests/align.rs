@@ -58,7 +58,8 @@ fn recorded(folder: &Path, text: &str, receivers: usize, stated: &Placement) -> 
     out
 }
 
-const WALK: &str = "[person]\naction = \"walk_counterclockwise\"\n[surface]\nedge_m = 0.012";
+const WALK: &str = "[person]\naction = \"walk_back_forth_armswing\"\n[surface]\nedge_m = 0.012";
+const CIRCLE: &str = "[person]\naction = \"walk_counterclockwise\"\n[surface]\nedge_m = 0.012";
 
 fn aligned(folder: &Path) -> Alignment {
     let alignment = align(&Recording::open(folder).unwrap(), &Search::default(), &mut |_| {}).unwrap();
@@ -99,6 +100,18 @@ fn a_motion_that_is_stated_right_stays() {
     found(&alignment, "range_m", alignment.estimates["range_m"].stated, 0.05);
 }
 
+/// A step later and farther round the circle, a walker does the same again.
+#[test]
+fn a_circle_of_equal_steps_is_placed_at_several_clocks() {
+    let folder = tempfile::tempdir().unwrap();
+    let alignment = aligned(&recorded(folder.path(), CIRCLE, 4, &wrong()));
+    assert_eq!(alignment.verdict, Verdict::Ambiguous, "{}", alignment.sentence);
+    let start = &alignment.estimates["start_s"];
+    assert!(!start.identified && start.ci90.is_none() && !alignment.alternatives.is_empty(), "{start:?}");
+    let starts = alignment.alternatives.iter().map(|other| other.values["start_s"]).chain([start.value]);
+    assert!(starts.clone().any(|start| (start - truth().start_s).abs() < 0.03), "{:?}", starts.collect::<Vec<_>>());
+}
+
 #[test]
 fn one_receiver_tells_no_direction() {
     let folder = tempfile::tempdir().unwrap();
@@ -119,7 +132,7 @@ fn another_motion_than_the_recorded_one_is_placed_nowhere() {
     let model = procedural::person(&PersonConfig::default()).unwrap();
     let betas = vec![0.0; model.shape_directions.len()];
     let style = StyleConfig { seed: 3, ..StyleConfig::default() };
-    let other = actions::motion(Action::Bow, &style, &model, &betas, 4.5, 60.0).unwrap();
+    let other = actions::motion(Action::Lunge, &style, &model, &betas, 4.5, 60.0).unwrap();
     write_motion(recording.join("motion.npz"), &other).unwrap();
     let alignment = aligned(&recording);
     assert_eq!(alignment.verdict, Verdict::CannotTell, "{}", alignment.sentence);
