@@ -5,9 +5,9 @@ use std::process::Command;
 
 use hybridsim::alignment::{Alignment, Search, Verdict, align};
 use hybridsim::data::{Recording, recording::RecordingSettings, write_motion, write_placement};
+use hybridsim::person::Placement;
 use hybridsim::person::actions::{self, Action, StyleConfig};
 use hybridsim::person::procedural::{self, PersonConfig};
-use hybridsim::person::Placement;
 use hybridsim::recorder::{self, RecorderConfig};
 
 /// Cells of 8.6 cm and 0.28 m/s; four receivers half a wavelength apart.
@@ -59,7 +59,7 @@ fn recorded(folder: &Path, text: &str, receivers: usize, stated: &Placement) -> 
 }
 
 const WALK: &str = "[person]\naction = \"walk_back_forth_armswing\"\n[surface]\nedge_m = 0.012";
-const CIRCLE: &str = "[person]\naction = \"walk_counterclockwise\"\n[surface]\nedge_m = 0.012";
+const CIRCLE: &str = "[person]\naction = \"walk_counterclockwise\"\nstyle.variation = 0.0\n[surface]\nedge_m = 0.012";
 
 fn aligned(folder: &Path) -> Alignment {
     let alignment = align(&Recording::open(folder).unwrap(), &Search::default(), &mut |_| {}).unwrap();

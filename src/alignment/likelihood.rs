@@ -144,9 +144,10 @@ pub fn most_power_gain(readings: &Readings, frame: usize) -> f64 {
     const CLEAR: f64 = 3.5;
     let (power, samples, loops) = (readings.power(frame), readings.cells.samples, readings.cells.loops);
     let of = |cell: usize| {
-        let around = [loops - 1, 0, 1].into_iter().flat_map(|row| [samples - 1, 0, 1].map(|bin| (row, bin))).map(|(row, bin)| {
-            f64::from(power[(cell / samples + row) % loops * samples + (cell % samples + bin) % samples])
-        });
+        let around = [loops - 1, 0, 1]
+            .into_iter()
+            .flat_map(|row| [samples - 1, 0, 1].map(|bin| (row, bin)))
+            .map(|(row, bin)| f64::from(power[(cell / samples + row) % loops * samples + (cell % samples + bin) % samples]));
         let mean = around.sum::<f64>() / 9.0;
         if mean < CLEAR { 0.0 } else { power_gain(power[cell], mean - 1.0) }
     };
