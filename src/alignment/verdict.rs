@@ -74,21 +74,22 @@ pub fn alignment(found: &Found, recording: String) -> Alignment {
     let estimates = best.map_or_else(BTreeMap::new, |best| estimates(found, best));
     let alternatives = best.map_or_else(Vec::new, |best| alternatives(found, best, &estimates));
     let reason = cannot_tell(found, &gain, &estimates);
-    let estimates = told_apart(estimates, &alternatives);
+    let sentence_of = |verdict, as_stated| sentence(verdict, reason.as_deref(), &estimates, alternatives.len(), as_stated);
+    let told = told_apart(estimates.clone(), &alternatives);
     let verdict = match (&reason, alternatives.is_empty()) {
         (Some(_), _) => Verdict::CannotTell,
         (None, false) => Verdict::Ambiguous,
         (None, true) => Verdict::Aligned,
     };
     let holds = |estimate: &Estimate| estimate.ci90.is_none_or(|[low, high]| (low..=high).contains(&estimate.stated));
-    let as_stated = verdict == Verdict::Aligned && estimates.values().all(holds);
+    let as_stated = verdict == Verdict::Aligned && told.values().all(holds);
     notes.push("the vertical is the radar frame's z, and the motion's own poses and height are taken as they are".into());
     if readings.channels.len() > 1 {
         notes.push("azimuths are those of the array as stated: a phase that grows along the antennas is a direction".into());
     }
     let [range_time_db, velocity_time_db] = tracks::maps(readings);
     let after = best.map_or_else(Track::default, |best| Track::of(&best.fitter, &best.place));
-    let sentence = sentence(verdict, reason, &estimates, &alternatives, as_stated);
+    let sentence = sentence_of(verdict, as_stated);
     Alignment {
         format: FORMAT,
         recording,
@@ -98,7 +99,7 @@ pub fn alignment(found: &Found, recording: String) -> Alignment {
         held_out_frames: readings.split.held_out.clone(),
         stated: stated(found.person),
         motion: best.map_or_else(|| stated(found.person), |best| placement(found.person, &best.fitter, &best.place)),
-        estimates,
+        estimates: told,
         gain,
         alternatives,
         notes,
@@ -290,11 +291,12 @@ fn cannot_tell(found: &Found, gain: &Gain, estimates: &BTreeMap<&'static str, Es
     (!any).then(|| "no number of the placement is told well enough".into())
 }
 
+/// `estimates`: those of the best placement by itself; `others`: how many explain as much.
 fn sentence(
     verdict: Verdict,
-    reason: Option<String>,
+    reason: Option<&str>,
     estimates: &BTreeMap<&'static str, Estimate>,
-    alternatives: &[Alternative],
+    others: usize,
     as_stated: bool,
 ) -> String {
     if let Some(reason) = reason {
@@ -320,10 +322,10 @@ fn sentence(
     }
     let told = if parts.is_empty() { "what can be told is below".to_string() } else { parts.join(", ") };
     match verdict {
-        Verdict::Ambiguous => format!(
-            "{} placements explain the recording equally well; by one of them, {told} than stated.",
-            alternatives.len() + 1
-        ),
+        Verdict::Ambiguous => {
+            let count = others + 1;
+            format!("{count} placements explain the recording equally well: by the likeliest, against what is stated, {told}.")
+        }
         _ if as_stated => format!("The recording agrees with the placement as stated: {told}, each within its interval."),
         _ => format!("The placement as stated is wrong: {told}."),
     }
