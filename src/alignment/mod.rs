@@ -9,6 +9,7 @@
 mod chance;
 mod climb;
 mod coarse;
+mod estimates;
 mod fit;
 mod likelihood;
 mod place;
