@@ -8,6 +8,7 @@ use hybridsim::data::{Recording, recording::RecordingSettings, write_motion, wri
 use hybridsim::person::Placement;
 use hybridsim::person::actions::{self, Action, StyleConfig};
 use hybridsim::person::procedural::{self, PersonConfig};
+use hybridsim::radar::Radar;
 use hybridsim::recorder::{self, RecorderConfig};
 
 /// Cells of 8.6 cm and 0.28 m/s; four receivers half a wavelength apart.
@@ -47,10 +48,14 @@ fn wrong() -> Placement {
 
 /// Records with the true placement; the recording states another one.
 fn recorded(folder: &Path, text: &str, receivers: usize, stated: &Placement) -> PathBuf {
+    recorded_by(folder, text, |radar| radar.rx_m.truncate(receivers), stated)
+}
+
+fn recorded_by(folder: &Path, text: &str, change: impl Fn(&mut Radar), stated: &Placement) -> PathBuf {
     let mut config: RecorderConfig = toml::from_str(&format!("seed = 5\nmesh_error_m = 2e-3\n{text}\n{RADAR}")).unwrap();
     config.person.placement = Some(truth());
     let mut radar = config.radar.radar().unwrap();
-    radar.rx_m.truncate(receivers);
+    change(&mut radar);
     config.radar = recorder::RadarChoice::Full(Box::new(radar));
     let out = folder.join("recording");
     recorder::record_to(&config, Path::new("."), &out, &mut |_, _| {}).unwrap();
@@ -88,6 +93,23 @@ fn a_motion_that_is_late_turned_and_aside_is_put_back() {
     found(&alignment, "origin_y_m", truth().origin_m[1], 0.1);
     // No antenna is higher than another.
     assert!(!alignment.estimates["origin_z_m"].identified);
+}
+
+/// Two transmitters that take turns, and receivers in a square.
+#[test]
+fn antennas_above_each_other_tell_the_height() {
+    let folder = tempfile::tempdir().unwrap();
+    let square = |radar: &mut Radar| {
+        radar.tx_m = vec![[-0.0153, 0.0, 0.0], [-0.0115, 0.0, 0.0]];
+        radar.rx_m = vec![[0.0; 3], [0.0019, 0.0, 0.0], [0.0, 0.0, 0.0019], [0.0019, 0.0, 0.0019]];
+        radar.chirp_period_s *= 0.5;
+    };
+    let mut stated = wrong();
+    stated.origin_m[2] += 0.2;
+    let alignment = aligned(&recorded_by(folder.path(), WALK, square, &stated));
+    assert_eq!(alignment.verdict, Verdict::Aligned, "{}", alignment.sentence);
+    found(&alignment, "origin_z_m", truth().origin_m[2], 0.1);
+    found(&alignment, "rotation_deg", -25.0, 5.0);
 }
 
 #[test]

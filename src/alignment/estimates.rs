@@ -14,7 +14,7 @@ use crate::person::{BodyModel, Motion, Person, Placement};
 
 /// Standard deviations of what the power model does to a place, by number, as its reflectivities and visibility are rough. On the eight
 /// practice recordings, whose motions are where they are stated, the root mean squares were 1.3 ms, 0.7°, 6 mm and 0.15°; range and clock
-/// as the diagnosis has them, azimuth for arrays that are calibrated to some degrees. The height is a guess.
+/// as the diagnosis has them, azimuth for arrays whose phases are known to some degrees. The height is a guess.
 const FLOOR: [f64; COUNT] = [0.002, 0.0175, 0.008, 0.009, 0.05];
 /// Half of the widest 90 % interval that says something, in the units of the report: a fifth of a step's period; an eighth of a turn;
 /// half a metre; two beams of the smallest array.
