@@ -44,6 +44,8 @@ pub mod export;
 pub mod baselines;
 // why a recording and the simulator disagree
 pub mod diagnosis;
+// where and when a recording's motion happens
+pub mod alignment;
 // what somebody does in a recording
 pub mod recognition;
 pub mod config;

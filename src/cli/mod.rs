@@ -13,6 +13,7 @@ macro_rules! remark {
     ($($text:tt)*) => { $crate::cli::complain(&format!($($text)*)) };
 }
 
+mod align;
 mod baseline;
 mod challenge;
 mod check;
@@ -161,6 +162,11 @@ enum Command {
     /// The label `action` is the class. Give simulated recordings to --train and measured ones to --test to see what
     /// simulation is worth; measured ones of other people to both for the ceiling.
     Recognize(recognize::Arguments),
+    /// Find where the body is in the radar's frame, and when
+    ///
+    /// Estimates origin, turn about the vertical and start of a recording's motion from the recording itself, with
+    /// intervals, or says what it cannot tell. Writes align.json, motion.toml and a picture before and after.
+    Align(align::Arguments),
     /// Find out why a recording and the simulator disagree
     ///
     /// Says what physics was left out, where, how large and how sure, what it cannot tell apart, and how much better
@@ -216,6 +222,7 @@ pub fn main() -> ExitCode {
         Command::Baseline(arguments) => baseline::run(arguments, &cli.common),
         Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
         Command::Compare(arguments) => compare::run(arguments, &cli.common),
+        Command::Align(arguments) => align::run(arguments, &cli.common),
         Command::Diagnose(arguments) => diagnose::run(arguments, &cli.common),
         Command::Challenge(arguments) => challenge::run(arguments, &cli.common),
         Command::Reproduce(arguments) => reproduce::run(arguments, &cli.common),

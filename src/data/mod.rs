@@ -24,7 +24,7 @@ pub use hex::hex;
 pub use meshes::{Meshes, read_meshes};
 pub use motions::{Figure, MotionOptions, RotationUnit, UpAxis, find_up, read_motion, read_motion_upright, write_motion};
 pub use recording::{
-    IfFrame, IfLayout, Recording, RecordingContents, StagedRecording, Valid, stage_recording, write_recording,
+    IfFrame, IfLayout, Recording, RecordingContents, StagedRecording, Valid, stage_recording, write_placement, write_recording,
     write_recording_into,
 };
 pub use scratch::Scratch;

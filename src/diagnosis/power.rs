@@ -193,7 +193,8 @@ fn add(map: &mut [f32], template: &Template, weight: f64) {
     }
 }
 
-fn usable(cells: &Cells) -> Vec<bool> {
+/// Cells that mean something, `[doppler, range]`: away from what stands still, and in range of the receiver.
+pub fn usable(cells: &Cells) -> Vec<bool> {
     let far_from_still = |doppler: usize| cells.loops < 8 || doppler.min(cells.loops - doppler) > STILL_BINS;
     (0..cells.loops * cells.samples)
         .map(|cell| far_from_still(cell / cells.samples) && cell % cells.samples < cells.bins)

@@ -202,7 +202,7 @@ fn centres(position_m: &[[f64; 3]], velocity_mps: &[[f64; 3]], of_vertex: &[usiz
 }
 
 /// The parts' names, and the part of every vertex: the joint that moves it most.
-fn parts(person: &Person) -> (Vec<String>, Vec<usize>) {
+pub fn parts(person: &Person) -> (Vec<String>, Vec<usize>) {
     match person {
         Person::Skinned { model, .. } => {
             let most =

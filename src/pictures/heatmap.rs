@@ -60,7 +60,7 @@ pub(super) struct Colours {
 }
 
 impl Colours {
-    fn sequential(window: DbWindow) -> Self {
+    pub(super) fn sequential(window: DbWindow) -> Self {
         Self::between(window.low_db, window.high_db)
     }
 
@@ -105,6 +105,11 @@ fn label(axis: &Axis) -> String {
 }
 
 fn draw_map(area: &Area<'_>, map: &Map, colours: &Colours) -> DrawResult {
+    draw_map_under(area, map, colours, &[])
+}
+
+/// A map with lines over it, each of points in the axes' units.
+pub(super) fn draw_map_under(area: &Area<'_>, map: &Map, colours: &Colours, lines: &[Vec<(f64, f64)>]) -> DrawResult {
     let mut chart = ChartBuilder::on(area)
         .margin(10)
         .margin_right(16)
@@ -124,7 +129,13 @@ fn draw_map(area: &Area<'_>, map: &Map, colours: &Colours) -> DrawResult {
         .x_label_formatter(&tick)
         .y_label_formatter(&tick)
         .draw()?;
-    paint(&chart.plotting_area().strip_coord_spec(), map, colours)
+    paint(&chart.plotting_area().strip_coord_spec(), map, colours)?;
+    for (edge, width) in [(BLACK, 4), (WHITE, 2)] {
+        for line in lines {
+            chart.draw_series(LineSeries::new(line.iter().copied(), edge.stroke_width(width)))?;
+        }
+    }
+    Ok(())
 }
 
 /// The map alone, over all of an area.

@@ -6,11 +6,13 @@ mod chart;
 mod confusion;
 mod grid;
 mod heatmap;
+mod overlay;
 
 pub use chart::{Chart, Series};
 pub use confusion::confusion;
 pub use grid::Grid;
 pub use heatmap::{comparison, heatmap};
+pub use overlay::{Line, overlay};
 
 use std::{io, path::Path, sync::Once};
 

@@ -3,11 +3,13 @@
 //! `truth.json`, which practice recordings carry, is written here when a recorder asks for it and never read.
 
 mod dead;
+mod placement;
 mod samples;
 mod settings;
 mod valid;
 mod write;
 
+pub use placement::write_placement;
 pub use samples::{IfFrame, IfLayout};
 pub use settings::{FORMAT, Files, RecordingSettings};
 pub use valid::Valid;
