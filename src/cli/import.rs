@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use clap::Args;
 
-use super::{Common, check};
+use super::{Common, check, progress::Progress};
 use crate::{
     data::atomic::AtomicFolder,
     error::{Error, Result},
@@ -63,6 +63,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     });
     let labels = labels.collect::<Result<BTreeMap<_, _>>>()?;
     let capture = capture::open(&arguments.sources, &stated)?;
-    let recording = capture::import(capture, &arguments.out, labels)?;
+    let progress = Progress::new("importing", capture.radar.frames, common.quiet);
+    let recording = capture::import(capture, &arguments.out, labels, &mut |done, _| progress.set(done))?;
+    progress.finish();
     check::show(&recording, common)
 }

@@ -79,8 +79,14 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     }
 }
 
-/// Writes a capture as a recording folder and opens it; its notes come first.
-pub fn import(mut capture: Capture, folder: &Path, labels: BTreeMap<String, String>) -> Result<Recording> {
+/// Writes a capture as a recording folder and opens it; its notes come first. `progress` hears how many of how many frames
+/// are done.
+pub fn import(
+    mut capture: Capture,
+    folder: &Path,
+    labels: BTreeMap<String, String>,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Recording> {
     let contents = RecordingContents {
         radar: &capture.radar,
         room: None,
@@ -90,7 +96,10 @@ pub fn import(mut capture: Capture, folder: &Path, labels: BTreeMap<String, Stri
         layout: capture.layout,
         truth: None,
     };
-    let mut recording = write_recording(folder, &contents, &mut capture.frame)?;
+    let mut recording = write_recording(folder, &contents, &mut |frame| {
+        progress(frame, capture.radar.frames);
+        (capture.frame)(frame)
+    })?;
     recording.notes.splice(0..0, capture.notes);
     Ok(recording)
 }
