@@ -53,6 +53,8 @@ pub mod config;
 pub mod challenge;
 // the paper's tables, from nothing
 pub mod experiments;
+// what the verbs do, without a terminal
+pub mod verbs;
 pub mod cli;
 
 pub use error::{Error, Result};

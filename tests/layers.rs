@@ -34,6 +34,7 @@ const FLOORS: [&[&str]; 30] = [
     &["config"],
     &["challenge"],
     &["experiments"],
+    &["verbs"],
     &["cli"],
 ];
 

@@ -12,9 +12,7 @@ use serde_json::{Value, json};
 
 use super::{
     Common, Out, device, plausible,
-    progress::Progress,
-    report,
-    simulated::{self, Sequence},
+    progress::{Progress, Shown},
 };
 use crate::{
     baselines::{
@@ -29,6 +27,11 @@ use crate::{
     error::{Error, Result},
     heatmap::HeatmapConfig,
     person::Person,
+    verbs::{
+        Told,
+        heatmaps::same_radar,
+        simulated::{self, Sequence},
+    },
 };
 
 #[derive(Args)]
@@ -98,12 +101,15 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         labels: recording.labels.clone(),
         measured: Some(&recording),
     };
-    simulated::write(folder.path(), &sequence, &HeatmapConfig::default(), common.quiet, &mut |frame| {
+    let mut shown = Shown::new(common.quiet);
+    let mut tell = |told: Told<'_>| shown.show(told);
+    simulated::write(folder.path(), &sequence, &HeatmapConfig::default(), &mut tell, &mut |frame| {
         let start = Instant::now();
         let signal = rendering.frame(frame);
         seconds += start.elapsed().as_secs_f64();
         signal
     })?;
+    shown.finish();
     let frames = recording.radar.frames;
     let seconds_per_frame = seconds / frames as f64;
     let about = json!({
@@ -194,7 +200,7 @@ impl Maker {
                 let room = recording.room.as_ref();
                 let (baseline, state) =
                     TwoBounce::open(checkpoint, radar, room, recording.person(), &self.config(), &self.device)?;
-                report::same_radar(folder, radar, &state.site.radar)?;
+                same_radar(folder, radar, &state.site.radar)?;
                 Box::new(baseline)
             }
         })

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use burn::tensor::Device;
 use clap::Args;
 
-use super::{Common, Out, conventions, conventions::Against, describe, plausible, report};
+use super::{Common, Out, conventions, conventions::Against, describe, plausible};
 use crate::{
     config::Config,
     data::{Recording, atomic::AtomicFolder},
@@ -17,6 +17,7 @@ use crate::{
     radar::{self, Radar},
     room::Room,
     training::checkpoint,
+    verbs::heatmaps::Pictures,
 };
 
 #[derive(Args)]
@@ -87,7 +88,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 fn draw(recording: &Recording, folder: AtomicFolder) -> Result<()> {
     let frames = recording.whole_stretch()?.take(MOST_DRAWN);
     let samples = frames.map(|frame| evaluation::measured_frame(recording, frame)).collect::<Result<Vec<_>>>()?.concat();
-    report::Pictures::new(&recording.radar, &HeatmapConfig::default()).show(folder.path(), &samples)?;
+    Pictures::new(&recording.radar, &HeatmapConfig::default()).show(folder.path(), &samples)?;
     folder.finish()
 }
 

@@ -5,19 +5,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use burn::tensor::Device;
 use clap::Args;
 
-use super::{Common, device, plausible, progress::Progress};
+use super::{Common, device, progress::Shown};
 use crate::{
     config::Config,
-    data::{Recording, atomic, files},
-    diagnosis::{
-        self, Diagnosis,
-        simulate::{Simulated, Start, before_and_after},
-    },
-    error::{Error, Result},
-    training::checkpoint,
+    diagnosis::{self, Diagnosis},
+    error::Result,
+    verbs::{self, diagnose::Diagnose},
 };
 
 #[derive(Args)]
@@ -40,91 +35,18 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         Some(path) => Config::read(path, &common.set)?,
         None => Config::defaults(&common.set)?,
     };
-    // What would be refused after the diagnosis is refused before it; an earlier answer must not pass for this one's.
     let device = device(&common.device)?;
-    if let Some(checkpoint) = &arguments.checkpoint {
-        checkpoint::read_state(checkpoint)?;
-    }
-    let _claim = super::claimed(&arguments.out)?;
-    for earlier in ["report.json", "report.html"].map(|name| arguments.out.join(name)) {
-        if earlier.exists() {
-            std::fs::remove_file(&earlier).map_err(|error| Error::write(&earlier, error))?;
-        }
-    }
-    let recording = Recording::open(&arguments.recording)?;
-    plausible::recording(&recording, common)?;
-    let progress = Progress::new("diagnosing", config.diagnosis.most + 2 * config.diagnosis.epochs, common.quiet);
-    let mut steps = 0;
-    let mut tell = |text: &str| {
-        steps += 1;
-        progress.line(text);
-        progress.set(steps);
+    let what = Diagnose {
+        recording: &arguments.recording,
+        checkpoint: arguments.checkpoint.as_deref(),
+        config: &config,
+        out: &arguments.out,
     };
-    let mut diagnosis = diagnosis::diagnose(&recording, &config.diagnosis, &mut tell)?;
-    let simulated = simulate(arguments, &device, &config, &mut diagnosis, &mut tell)?;
-    let html = diagnosis::html::html(&diagnosis, simulated.as_ref())?;
-    progress.finish();
-    write(&arguments.out, &diagnosis, &html)?;
+    let mut shown = Shown::new(common.quiet);
+    let diagnosis = verbs::diagnose::diagnose(&what, &device, common.as_stated, &mut |told| shown.show(told))?;
+    shown.finish();
     tell_result(&diagnosis, &arguments.out);
     Ok(())
-}
-
-/// The trained simulator, without and with what was found.
-fn simulate(
-    arguments: &Arguments,
-    device: &Device,
-    config: &Config,
-    diagnosis: &mut Diagnosis,
-    tell: &mut dyn FnMut(&str),
-) -> Result<Option<Simulated>> {
-    let (effects, keep) = (diagnosis.effects(), arguments.out.join("simulator"));
-    // One with another recording's effects must not stay.
-    if keep.exists() {
-        std::fs::remove_dir_all(&keep).map_err(|error| Error::write(&keep, error))?;
-    }
-    if diagnosis.explanation.is_none() || config.diagnosis.epochs == 0 {
-        return Ok(None);
-    }
-    let start = Start {
-        simulator: &config.simulator,
-        learning: &config.training,
-        epochs: config.diagnosis.epochs,
-        seed: config.diagnosis.seed,
-        device,
-        checkpoint: arguments.checkpoint.as_deref(),
-    };
-    let simulated = before_and_after(&arguments.recording, &effects, &start, &keep, tell)?;
-    diagnosis.report.simulator = simulated.as_ref().map(|simulated| simulated.fit);
-    if simulated.is_some() {
-        diagnosis.report.settings = config.diagnosis.fingerprint(&shaping(arguments, config, device)?);
-    }
-    if simulated.is_none() {
-        let note =
-            "no simulator was trained, and no checkpoint left: neither body nor room is known, or there are fewer than 4 frames";
-        diagnosis.report.notes.push(note.into());
-    }
-    Ok(simulated)
-}
-
-/// What shapes a trained simulator beside the settings of the diagnosis.
-fn shaping(arguments: &Arguments, config: &Config, device: &Device) -> Result<Vec<(&'static str, Vec<u8>)>> {
-    let text = |settings: std::result::Result<String, toml::ser::Error>| settings.expect("plain data").into_bytes();
-    let mut shaping = vec![
-        ("simulator", text(toml::to_string(&config.simulator))),
-        ("training", text(toml::to_string(&config.training))),
-        ("device", format!("{device:?}").into_bytes()),
-    ];
-    if let Some(checkpoint) = &arguments.checkpoint {
-        let weights = checkpoint.join(checkpoint::WEIGHTS);
-        shaping.push(("checkpoint", files::read(&weights)?));
-    }
-    Ok(shaping)
-}
-
-/// The page first: whoever finds report.json finds both.
-fn write(out: &Path, diagnosis: &Diagnosis, html: &str) -> Result<()> {
-    atomic::write_text(out.join("report.html"), html)?;
-    atomic::write_text(out.join("report.json"), &serde_json::to_string_pretty(&diagnosis.report).expect("plain data"))
 }
 
 fn tell_result(diagnosis: &Diagnosis, out: &Path) {

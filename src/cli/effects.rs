@@ -2,10 +2,7 @@
 
 use clap::Args;
 
-use crate::{
-    error::{Error, Result},
-    simulator::Simulator,
-};
+use crate::{error::Result, simulator::Simulator, verbs::simulate::Without};
 
 #[derive(Args, Clone)]
 pub(super) struct WithoutEffects {
@@ -18,23 +15,13 @@ pub(super) struct WithoutEffects {
 }
 
 impl WithoutEffects {
+    pub(super) fn without(&self) -> Without {
+        Without { all: self.without_effects, ids: self.without_effect.clone() }
+    }
+
     /// # Errors
     /// An effect that the checkpoint does not have.
     pub(super) fn switch_off(&self, simulator: &mut Simulator) -> Result<()> {
-        if self.without_effects {
-            simulator.effects.switch_off(None);
-        }
-        for id in &self.without_effect {
-            if !simulator.effects.switch_off(Some(id)) {
-                let mut known: Vec<&str> = simulator.effects.list.iter().map(|effect| effect.id()).collect();
-                known.dedup();
-                let known = if known.is_empty() { "none".to_string() } else { known.join(", ") };
-                return Err(Error::Usage {
-                    message: format!("--without-effect {id}: the checkpoint has no such effect"),
-                    hint: Some(format!("its effects: {known}")),
-                });
-            }
-        }
-        Ok(())
+        self.without().switch_off(simulator)
     }
 }

@@ -9,7 +9,6 @@ use super::{
     effects::WithoutEffects,
     plausible,
     progress::Progress,
-    report,
     scores::{self, LpipsArguments},
 };
 use crate::{
@@ -19,6 +18,7 @@ use crate::{
     lpips::Lpips,
     metrics::MetricsConfig,
     training::{LoadedRecording, checkpoint, refine},
+    verbs::{heatmaps::same_radar, notes},
 };
 
 #[derive(Args)]
@@ -66,8 +66,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         if moved {
             remark!("note: {}: its motion as the training run refined it ({})", folder.display(), refine::FILE);
         }
-        report::same_radar(folder, &recording.scene.radar, &state.site.radar)?;
-        report::tell_notes(&recording);
+        same_radar(folder, &recording.scene.radar, &state.site.radar)?;
+        notes::of(&recording).iter().for_each(|note| remark!("note: {note}"));
         let available = recording.scene.radar.frames;
         let (first, end) = arguments.frames.unwrap_or((0, available));
         if end > available {

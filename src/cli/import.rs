@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use clap::Args;
 
-use super::{Common, check, conventions, conventions::Against};
+use super::{Common, check, conventions, conventions::Against, progress::Progress};
 use crate::{
     data::atomic::AtomicFolder,
     error::{Error, Result},
@@ -70,7 +70,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         Ok((name.trim().to_string(), text.trim().to_string()))
     });
     let labels = labels.collect::<Result<BTreeMap<_, _>>>()?;
-    let draft = capture::draft(capture::open(&arguments.sources, &stated)?, &arguments.out, labels)?;
+    let capture = capture::open(&arguments.sources, &stated)?;
+    let progress = Progress::new("importing", capture.radar.frames, common.quiet);
+    let draft = capture::draft(capture, &arguments.out, labels, &mut |done, _| progress.set(done))?;
+    progress.finish();
     let recording = draft.recording();
     check::tell(recording, common)?;
     let against = if common.as_stated { Against::Kept } else { Against::Refused };

@@ -32,24 +32,20 @@ mod plausible;
 mod progress;
 mod recognize;
 mod record;
-mod report;
 mod reproduce;
 mod scores;
-mod simulated;
 mod site;
 mod train;
 
-use std::{
-    path::{Path, PathBuf},
-    process::ExitCode,
-};
+use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Args, Parser, Subcommand};
 
 use crate::{
-    data::{Claim, atomic, files, unfinished},
+    data::{files, unfinished},
     error::{Error, Result},
     text::shown,
+    verbs::claimed,
 };
 
 pub use device::{available, device, devices};
@@ -191,13 +187,6 @@ pub(crate) struct Out {
     /// Folder for the results
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-}
-
-/// A folder that results are added to, made and tried before the work; nobody else works there until this is dropped.
-fn claimed(folder: &Path) -> Result<Claim> {
-    let claim = Claim::take(folder)?;
-    atomic::sweep(folder);
-    Ok(claim)
 }
 
 /// Parses, runs, reports. Every error is printed once, here, with its hint.

@@ -4,7 +4,7 @@ use std::{io::IsTerminal, time::Duration};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::{experiments::Event as StageEvent, text::shown, training::Event};
+use crate::{experiments::Event as StageEvent, text::shown, training::Event, verbs::Told};
 
 /// Shows how far a task is, with the time that remains.
 pub struct Progress {
@@ -103,6 +103,43 @@ impl TrainingProgress {
         if let Some(progress) = self.progress {
             progress.finish();
         }
+    }
+}
+
+/// Notes of a verb on standard error; all else that it tells is for [`Shown`].
+pub fn notes(told: Told<'_>) {
+    if let Told::Note(note) = told {
+        remark!("note: {note}");
+    }
+}
+
+/// Shows what a verb tells.
+pub struct Shown {
+    progress: Option<Progress>,
+    training: TrainingProgress,
+    quiet: bool,
+}
+
+impl Shown {
+    pub fn new(quiet: bool) -> Self {
+        Self { progress: None, training: TrainingProgress::new(quiet), quiet }
+    }
+
+    pub fn show(&mut self, told: Told<'_>) {
+        match told {
+            Told::Note(_) => notes(told),
+            Told::Begun { what, steps } => self.progress = Some(Progress::new(what, steps, self.quiet)),
+            Told::Done(steps) => self.progress.iter().for_each(|progress| progress.set(steps)),
+            Told::Line(text) => self.progress.iter().for_each(|progress| progress.line(text)),
+            // Whatever was made to train on is made.
+            Told::Run { .. } => self.progress.take().into_iter().for_each(Progress::finish),
+            Told::Training(event) => self.training.show(event),
+        }
+    }
+
+    pub fn finish(self) {
+        self.progress.into_iter().for_each(Progress::finish);
+        self.training.finish();
     }
 }
 

@@ -83,7 +83,8 @@ impl Sources {
         Self { settings: path.clone(), samples: path.clone(), body: path.clone(), motion: path }
     }
 
-    fn of(&self, part: Part) -> &PathBuf {
+    /// The file of a part.
+    pub fn of(&self, part: Part) -> &PathBuf {
         match part {
             Part::Settings => &self.settings,
             Part::Samples => &self.samples,

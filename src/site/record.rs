@@ -35,7 +35,7 @@ struct Job {
 /// `again`, `settings/…/<name>.toml` with each recording's resolved settings, and `site.toml`.
 ///
 /// Recordings that are there are kept if their settings agree; sequences may be added to a site, never changed.
-/// `progress` hears how many of how many recordings are done, and the name of the next.
+/// `progress` hears how many of how many recordings are done, and the name of the next, at each of its frames.
 ///
 /// # Errors
 /// Whatever [`sequences`] refuses; a recording made with other settings or with labels that are not its name's. All of
@@ -71,10 +71,11 @@ pub fn record(
     write_text(out.join("site.toml"), &config.to_toml())?;
     let (kept, recorded) = (count - open.len(), open.len());
     for (index, job) in open.into_iter().enumerate() {
-        progress(kept + index, count, &job.folder.file_name().unwrap_or_default().to_string_lossy());
+        let name = job.folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mut within = |_, _| progress(kept + index, count, &name);
         // The settings first: a recording never stands beside those of another.
         write_text(&job.settings_file, &job.settings)?;
-        write_world(&job.recorder.world(settings_folder)?, job.labels, &job.folder, &mut |_, _| {})?;
+        write_world(&job.recorder.world(settings_folder)?, job.labels, &job.folder, &mut within)?;
     }
     progress(count, count, "");
     Ok(Site { sequences: mine.len(), of: all.len(), kept, recorded })

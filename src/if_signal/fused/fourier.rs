@@ -33,31 +33,38 @@ impl Fourier {
     }
 
     /// Y\[k\] = Σ_g x\[g\] exp(+j2πgk/C), in place; x at its places, Y in natural order. A row is `width` complex lanes.
-    pub fn transform(&self, grid: &mut [Lanes], width: usize) {
-        let half = grid.len() / (4 * width);
-        if half == 0 {
-            return;
-        }
+    #[inline(always)]
+    pub fn transform<const FUSED: bool>(&self, grid: &mut [Lanes], width: usize) {
+        let row = 2 * width;
         // Halves first, and theirs before: small ones stay in the cache from their first to their last pass.
-        let (low, high) = grid.split_at_mut(half * 2 * width);
-        self.transform(low, width);
-        self.transform(high, width);
-        self.butterflies(low, high, width, |a, b, root| {
-            let b = multiply(b, root);
-            (add(a, b), subtract(a, b))
-        });
+        for end in (2..=self.length).step_by(2) {
+            let mut size = 2;
+            while size <= self.length && end % size == 0 {
+                let (low, high) = grid[(end - size) * row..end * row].split_at_mut(size / 2 * row);
+                self.butterflies(low, high, width, |a, b, root| {
+                    let b = multiply::<FUSED>(b, root);
+                    (add(a, b), subtract(a, b))
+                });
+                size *= 2;
+            }
+        }
     }
 
     /// The adjoint: x\[g\] = Σ_k Y\[k\] exp(−j2πgk/C), in place; Y in natural order, x at its places.
-    pub fn adjoint(&self, grid: &mut [Lanes], width: usize) {
-        let half = grid.len() / (4 * width);
-        if half == 0 {
-            return;
+    #[inline(always)]
+    pub fn adjoint<const FUSED: bool>(&self, grid: &mut [Lanes], width: usize) {
+        let row = 2 * width;
+        for start in (0..self.length).step_by(2) {
+            let mut size = self.length;
+            while start % size != 0 {
+                size /= 2;
+            }
+            while size >= 2 {
+                let (low, high) = grid[start * row..(start + size) * row].split_at_mut(size / 2 * row);
+                self.butterflies(low, high, width, |a, b, (c, s)| (add(a, b), multiply::<FUSED>(subtract(a, b), (c, -s))));
+                size /= 2;
+            }
         }
-        let (low, high) = grid.split_at_mut(half * 2 * width);
-        self.butterflies(low, high, width, |a, b, (c, s)| (add(a, b), multiply(subtract(a, b), (c, -s))));
-        self.adjoint(low, width);
-        self.adjoint(high, width);
     }
 
     /// Replaces every pair of complex lanes of two halves; the root belongs to the row.
@@ -94,8 +101,8 @@ fn subtract(a: Pair, b: Pair) -> Pair {
 }
 
 #[inline(always)]
-fn multiply(a: Pair, (c, s): (f32, f32)) -> Pair {
-    (zip(a.0, a.1, |re, im| multiply_add(c, re, -s * im)), zip(a.0, a.1, |re, im| multiply_add(c, im, s * re)))
+fn multiply<const FUSED: bool>(a: Pair, (c, s): (f32, f32)) -> Pair {
+    (zip(a.0, a.1, |re, im| multiply_add::<FUSED>(c, re, -s * im)), zip(a.0, a.1, |re, im| multiply_add::<FUSED>(c, im, s * re)))
 }
 
 #[cfg(test)]
@@ -117,9 +124,9 @@ mod tests {
                 }
             }
             if forward {
-                fourier.transform(&mut grid, width)
+                fourier.transform::<false>(&mut grid, width)
             } else {
-                fourier.adjoint(&mut grid, width)
+                fourier.adjoint::<false>(&mut grid, width)
             }
             for k in 0..length {
                 let (mut re, mut im) = (0.0, 0.0);

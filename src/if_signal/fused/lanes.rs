@@ -26,16 +26,16 @@ pub fn zip(mut a: Lanes, b: Lanes, of: impl Fn(f32, f32) -> f32) -> Lanes {
     a
 }
 
-/// a·b + c, fused where the machine can: elsewhere `mul_add` would be a slow call.
+/// a·b + c, fused where the processor can ([`super::machine::Work`]).
 #[inline(always)]
-pub fn multiply_add(a: f32, b: f32, c: f32) -> f32 {
-    if cfg!(any(target_feature = "fma", target_arch = "aarch64")) { a.mul_add(b, c) } else { a * b + c }
+pub fn multiply_add<const FUSED: bool>(a: f32, b: f32, c: f32) -> f32 {
+    if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
 #[inline(always)]
-pub fn fma(a: Lanes, b: Lanes, mut c: Lanes) -> Lanes {
+pub fn fma<const FUSED: bool>(a: Lanes, b: Lanes, mut c: Lanes) -> Lanes {
     for ((a, b), c) in a.iter().zip(&b).zip(&mut c) {
-        *c = multiply_add(*a, *b, *c);
+        *c = multiply_add::<FUSED>(*a, *b, *c);
     }
     c
 }
@@ -48,7 +48,7 @@ pub fn round(x: f32) -> f32 {
 
 /// cos and sin of 2π turns, to 10⁻⁷.
 #[inline(always)]
-pub fn cis(turns: Lanes) -> (Lanes, Lanes) {
+pub fn cis<const FUSED: bool>(turns: Lanes) -> (Lanes, Lanes) {
     let mut cos = [0.0; LANES];
     let mut sin = [0.0; LANES];
     for ((turns, cos), sin) in turns.iter().zip(&mut cos).zip(&mut sin) {
@@ -57,8 +57,8 @@ pub fn cis(turns: Lanes) -> (Lanes, Lanes) {
         let far = whole.abs() > 0.25;
         let h = if far { 0.5f32.copysign(whole) - whole } else { whole };
         let u = h * h;
-        let even = horner(u, COS.map(|c| c as f32));
-        let odd = horner(u, SIN.map(|c| c as f32));
+        let even = horner::<FUSED>(u, COS.map(|c| c as f32));
+        let odd = horner::<FUSED>(u, SIN.map(|c| c as f32));
         *cos = if far { -even } else { even };
         *sin = h * odd;
     }
@@ -66,8 +66,9 @@ pub fn cis(turns: Lanes) -> (Lanes, Lanes) {
 }
 
 #[inline(always)]
-fn horner(u: f32, [a, b, c, d, e]: [f32; 5]) -> f32 {
-    multiply_add(multiply_add(multiply_add(multiply_add(e, u, d), u, c), u, b), u, a)
+fn horner<const FUSED: bool>(u: f32, [a, b, c, d, e]: [f32; 5]) -> f32 {
+    let sum = multiply_add::<FUSED>(multiply_add::<FUSED>(e, u, d), u, c);
+    multiply_add::<FUSED>(multiply_add::<FUSED>(sum, u, b), u, a)
 }
 
 /// Sixteen values from `at` on, or `width` of them and the last one repeated.

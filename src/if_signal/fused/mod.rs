@@ -8,8 +8,10 @@ mod extension;
 mod fourier;
 mod kernel;
 mod lanes;
+mod machine;
 mod moving;
 mod phasors;
+mod plan;
 mod scratch;
 
 use std::sync::Arc;

@@ -6,8 +6,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::kernel::{self, Return, Returns, Sink};
+use super::kernel::{self, Returns, Sink};
 use super::lanes::{LANES, Lanes, ZERO, accumulate, fma, load, map, multiply_add, store, zip};
+use super::machine::{Work, widest};
+use super::plan::Return;
 use super::scratch::Scratch;
 use crate::paths::{AtRest, NEAR_FIELD_M2, SOFTENING_M, Waveform, difference, distance};
 
@@ -85,9 +87,9 @@ impl Geometry {
 
     /// Reference length of a leg, and its square softened.
     #[inline(always)]
-    fn length(&self, point: usize, leg: usize) -> (f32, f32) {
+    fn length<const FUSED: bool>(&self, point: usize, leg: usize) -> (f32, f32) {
         let length = self.lengths_m[leg][point];
-        (length, multiply_add(length, length, (SOFTENING_M * SOFTENING_M) as f32))
+        (length, multiply_add::<FUSED>(length, length, (SOFTENING_M * SOFTENING_M) as f32))
     }
 }
 
@@ -116,6 +118,36 @@ pub struct Moving<'a> {
     stride: usize,
 }
 
+/// Finds the changes of a point's legs.
+struct Changes<'a> {
+    geometry: &'a Geometry,
+    tensors: &'a Tensors<'a>,
+    point: usize,
+    /// `[leg][stride]`
+    changes_m: &'a mut [f32],
+    stride: usize,
+}
+
+impl Work for Changes<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        let Self { geometry, tensors, point, changes_m, stride } = self;
+        let chirps = tensors.chirps;
+        let [x, y, z] = tensors.axes.map(|axis| &axis[point * chirps..][..chirps]);
+        for (leg, row) in changes_m.chunks_mut(stride).enumerate() {
+            let v = geometry.offset_m(point, leg);
+            let (length, squared) = geometry.length::<FUSED>(point, leg);
+            for (((change, x), y), z) in row[1..=chirps].iter_mut().zip(x).zip(y).zip(z) {
+                let growth = growth(v, *x, *y, *z);
+                *change = growth / ((growth + squared).sqrt() + length);
+            }
+            extend(row, chirps);
+        }
+    }
+}
+
 /// Of one receiver's path at sixteen chirps.
 struct Path {
     lengths_m: [Lanes; 2],
@@ -130,17 +162,8 @@ impl<'a> Moving<'a> {
         let size = geometry.points() * legs * stride;
         let mut changes_m = Scratch::new(size.div_ceil(LANES));
         let rows = &mut changes_m.as_flattened_mut()[..size];
-        rows.par_chunks_mut(legs * stride).enumerate().with_min_len(256).for_each(|(point, changes)| {
-            let [x, y, z] = tensors.axes.map(|axis| &axis[point * chirps..][..chirps]);
-            for (leg, row) in changes.chunks_mut(stride).enumerate() {
-                let v = geometry.offset_m(point, leg);
-                let (length, squared) = geometry.length(point, leg);
-                for (((change, x), y), z) in row[1..=chirps].iter_mut().zip(x).zip(y).zip(z) {
-                    let growth = growth(v, *x, *y, *z);
-                    *change = growth / ((growth + squared).sqrt() + length);
-                }
-                extend(row, chirps);
-            }
+        rows.par_chunks_mut(legs * stride).enumerate().with_min_len(256).for_each(|(point, changes_m)| {
+            widest(Changes { geometry: &geometry, tensors: &tensors, point, changes_m, stride });
         });
         Self { geometry, tensors, changes_m, stride }
     }
@@ -150,11 +173,11 @@ impl<'a> Moving<'a> {
     }
 
     #[inline(always)]
-    fn path(&self, receiver: usize, point: usize, chirp: usize) -> Path {
+    fn path<const FUSED: bool>(&self, receiver: usize, point: usize, chirp: usize) -> Path {
         let (a, b) = (load(self.row(point, 0), chirp + 1, LANES), load(self.row(point, receiver + 1), chirp + 1, LANES));
         let lengths = (self.geometry.lengths_m[0][point], self.geometry.lengths_m[receiver + 1][point]);
         let lengths_m = [map(a, |change| change + lengths.0), map(b, |change| change + lengths.1)];
-        let spreading = zip(lengths_m[0], lengths_m[1], |a, b| 1.0 / multiply_add(a, b, NEAR_FIELD_M2 as f32));
+        let spreading = zip(lengths_m[0], lengths_m[1], |a, b| 1.0 / multiply_add::<FUSED>(a, b, NEAR_FIELD_M2 as f32));
         Path { lengths_m, spreading, change_m: zip(a, b, |a, b| a + b) }
     }
 
@@ -204,18 +227,19 @@ impl Returns for Moving<'_> {
     }
 
     #[inline(always)]
-    fn load(&self, receiver: usize, point: usize, chirp: usize) -> Return {
-        let path = self.path(receiver, point, chirp);
+    fn load<const FUSED: bool>(&self, receiver: usize, point: usize, chirp: usize) -> Return {
+        let path = self.path::<FUSED>(receiver, point, chirp);
         let rest = self.geometry.at_rest[receiver][point];
-        let mut sweep = map(path.change_m, |change| multiply_add(change, self.geometry.sweep_per_metre, rest.sweep_turns));
+        let mut sweep =
+            map(path.change_m, |change| multiply_add::<FUSED>(change, self.geometry.sweep_per_metre, rest.sweep_turns));
         if self.geometry.sweep_per_step != 0.0 && self.tensors.chirps > 1 {
-            sweep = fma(self.step(receiver, point, chirp), [self.geometry.sweep_per_step; LANES], sweep);
+            sweep = fma::<FUSED>(self.step(receiver, point, chirp), [self.geometry.sweep_per_step; LANES], sweep);
         }
         let spread = |values: &[f32]| zip(self.amplitude(values, point, chirp), path.spreading, |a, w| a * w);
         Return {
             re: spread(self.tensors.re),
             im: self.tensors.im.map_or(ZERO, spread),
-            phase: map(path.change_m, |change| multiply_add(change, rest.turns_per_metre, rest.phase_turns)),
+            phase: map(path.change_m, |change| multiply_add::<FUSED>(change, rest.turns_per_metre, rest.phase_turns)),
             sweep,
         }
     }
@@ -283,31 +307,32 @@ impl Sink for Back<'_> {
     }
 
     #[inline(always)]
-    fn put(&mut self, receiver: usize, local: usize, chirp: usize, gradient: &Return) {
+    fn put<const FUSED: bool>(&mut self, receiver: usize, local: usize, chirp: usize, gradient: &Return) {
         let Moving { geometry, tensors, .. } = self.moving;
         let (point, width, chirps) = (self.first + local, tensors.chirps - chirp, tensors.chirps);
-        let path = self.moving.path(receiver, point, chirp);
+        let path = self.moving.path::<FUSED>(receiver, point, chirp);
         let spread = |gradient: Lanes| zip(gradient, path.spreading, |g, w| g * w);
         Self::to_amplitude(self.re, tensors.amplitude_chirps, local, chirp, width, spread(gradient.re));
         let mut to_spreading = zip(gradient.re, self.moving.amplitude(tensors.re, point, chirp), |g, a| g * a);
         if let (Some(values), Some(im)) = (&mut self.im, tensors.im) {
             Self::to_amplitude(values, tensors.amplitude_chirps, local, chirp, width, spread(gradient.im));
-            to_spreading = fma(gradient.im, self.moving.amplitude(im, point, chirp), to_spreading);
+            to_spreading = fma::<FUSED>(gradient.im, self.moving.amplitude(im, point, chirp), to_spreading);
         }
         // The spreading is 1/(a·b + ε): to either length it falls by its square times the other one.
         let to_product = zip(to_spreading, path.spreading, |g, w| -g * w * w);
         let turns_per_metre = geometry.at_rest[receiver][point].turns_per_metre;
         let common = zip(gradient.phase, gradient.sweep, |phase, sweep| {
-            multiply_add(phase, turns_per_metre, sweep * geometry.sweep_per_metre)
+            multiply_add::<FUSED>(phase, turns_per_metre, sweep * geometry.sweep_per_metre)
         });
         for (leg, other) in [(0, 1), (receiver + 1, 0)] {
-            let to_leg = fma(to_product, path.lengths_m[other], common);
+            let to_leg = fma::<FUSED>(to_product, path.lengths_m[other], common);
             accumulate(self.to_legs.as_flattened_mut(), (local * geometry.legs() + leg) * chirps + chirp, width, to_leg);
         }
         store(self.to_sweep.as_flattened_mut(), local * chirps + chirp, width, gradient.sweep);
     }
 
-    fn close(&mut self, receiver: usize) {
+    #[inline(always)]
+    fn close<const FUSED: bool>(&mut self, receiver: usize) {
         let (chirps, legs) = (self.moving.tensors.chirps, self.moving.geometry.legs());
         let per_step = self.moving.geometry.sweep_per_step;
         if per_step != 0.0 && chirps > 1 {
@@ -320,13 +345,14 @@ impl Sink for Back<'_> {
             }
         }
         if receiver + 1 == self.moving.receivers() {
-            self.close_legs();
+            self.close_legs::<FUSED>();
         }
     }
 }
 
 impl Back<'_> {
-    fn close_legs(&mut self) {
+    #[inline(always)]
+    fn close_legs<const FUSED: bool>(&mut self) {
         let Moving { geometry, tensors, .. } = self.moving;
         let chirps = tensors.chirps;
         let [to_x, to_y, to_z] = &mut self.axes;
@@ -338,7 +364,7 @@ impl Back<'_> {
             let [x, y, z] = tensors.axes.map(|axis| &axis[point * chirps..][..chirps]);
             for (leg, to_change) in to_legs.chunks(chirps).enumerate() {
                 let v = geometry.offset_m(point, leg);
-                let (length, squared) = geometry.length(point, leg);
+                let (length, squared) = geometry.length::<FUSED>(point, leg);
                 let to = to_x.iter_mut().zip(to_y.iter_mut()).zip(to_z.iter_mut());
                 for ((((x, y), z), to_change), ((to_x, to_y), to_z)) in x.iter().zip(y).zip(z).zip(to_change).zip(to) {
                     let growth = growth(v, *x, *y, *z);
@@ -346,9 +372,9 @@ impl Back<'_> {
                     let both = 1.0 / (whole + length);
                     // The growth's derivative is 2(v + u), that of growth/(whole + length) to it half of this factor.
                     let factor = to_change * (2.0 * both - growth * both * both / whole);
-                    *to_x = multiply_add(factor, v[0] + x, *to_x);
-                    *to_y = multiply_add(factor, v[1] + y, *to_y);
-                    *to_z = multiply_add(factor, v[2] + z, *to_z);
+                    *to_x = multiply_add::<FUSED>(factor, v[0] + x, *to_x);
+                    *to_y = multiply_add::<FUSED>(factor, v[1] + y, *to_y);
+                    *to_z = multiply_add::<FUSED>(factor, v[2] + z, *to_z);
                 }
             }
         }

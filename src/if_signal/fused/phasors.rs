@@ -1,7 +1,8 @@
 //! Returns given as phasors, and the gradients to these.
 
-use super::kernel::{self, Return, Returns, Sink};
+use super::kernel::{self, Returns, Sink};
 use super::lanes::{ZERO, load, store};
+use super::plan::Return;
 
 /// Tensors `[point, chirp]` in row-major order.
 #[derive(Clone, Copy)]
@@ -28,7 +29,7 @@ impl Returns for Inputs<'_> {
     }
 
     #[inline(always)]
-    fn load(&self, _: usize, point: usize, chirp: usize) -> Return {
+    fn load<const FUSED: bool>(&self, _: usize, point: usize, chirp: usize) -> Return {
         let (at, width) = (point * self.chirps + chirp, self.chirps - chirp);
         Return {
             re: load(self.re, at, width),
@@ -68,10 +69,11 @@ impl Sink for Columns<'_> {
         self.phase.len() / self.chirps
     }
 
+    #[inline(always)]
     fn open(&mut self) {}
 
     #[inline(always)]
-    fn put(&mut self, _: usize, local: usize, chirp: usize, gradient: &Return) {
+    fn put<const FUSED: bool>(&mut self, _: usize, local: usize, chirp: usize, gradient: &Return) {
         let (at, width) = (local * self.chirps + chirp, self.chirps - chirp);
         store(self.re, at, width, gradient.re);
         if let Some(im) = &mut self.im {
@@ -81,5 +83,6 @@ impl Sink for Columns<'_> {
         store(self.sweep, at, width, gradient.sweep);
     }
 
-    fn close(&mut self, _: usize) {}
+    #[inline(always)]
+    fn close<const FUSED: bool>(&mut self, _: usize) {}
 }

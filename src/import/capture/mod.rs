@@ -139,8 +139,14 @@ impl Draft {
     }
 }
 
-/// Writes a capture under a temporary name and asks its samples whether they are what they are stated to be.
-pub fn draft(mut capture: Capture, folder: &Path, labels: BTreeMap<String, String>) -> Result<Draft> {
+/// Writes a capture under a temporary name and asks its samples whether they are what they are stated to be. `progress` hears how
+/// many of how many frames are done.
+pub fn draft(
+    mut capture: Capture,
+    folder: &Path,
+    labels: BTreeMap<String, String>,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Draft> {
     let contents = RecordingContents {
         radar: &capture.radar,
         room: None,
@@ -150,18 +156,26 @@ pub fn draft(mut capture: Capture, folder: &Path, labels: BTreeMap<String, Strin
         layout: capture.layout,
         truth: None,
     };
-    let mut staged = stage_recording(AtomicFolder::create(folder)?, &contents, &mut capture.frame)?;
+    let mut staged = stage_recording(AtomicFolder::create(folder)?, &contents, &mut |frame| {
+        progress(frame, capture.radar.frames);
+        (capture.frame)(frame)
+    })?;
     staged.recording.notes.splice(0..0, capture.notes);
     let findings = integrity::inspect(&staged.recording, staged.recording.radar.frames)?;
     Ok(Draft { source: capture.source, staged, findings })
 }
 
-/// Writes a capture as a recording folder and opens it; its notes come first.
+/// Writes a capture as a recording folder and opens it; its notes come first. `progress` as in [`draft`].
 ///
 /// # Errors
 /// As [`Draft::publish`]; nothing is left then.
-pub fn import(capture: Capture, folder: &Path, labels: BTreeMap<String, String>) -> Result<Recording> {
-    draft(capture, folder, labels)?.publish(false)
+pub fn import(
+    capture: Capture,
+    folder: &Path,
+    labels: BTreeMap<String, String>,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Recording> {
+    draft(capture, folder, labels, progress)?.publish(false)
 }
 
 fn one(sources: &[PathBuf]) -> Result<&Path> {

@@ -420,7 +420,7 @@ fn a_folder_of_the_infineon_sdk_is_read() {
     let frame = (capture.frame)(2).unwrap();
     assert_eq!(frame.sample(0, 1, 1, 7).re, 95.0);
     let out = folder.path().join("recording");
-    let recording = import(capture, &out, [("action".into(), "sit".into())].into()).unwrap();
+    let recording = import(capture, &out, [("action".into(), "sit".into())].into(), &mut |_, _| {}).unwrap();
     assert_eq!(recording.labels["action"], "sit");
     assert_eq!(recording.frame(2).unwrap(), frame);
 }

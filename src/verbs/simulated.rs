@@ -1,10 +1,10 @@
-//! What `infer` and `baseline` leave behind: a recording folder of simulated samples, and heatmaps.
+//! What simulations leave behind: a recording folder of simulated samples, and heatmaps.
 
 use std::{collections::BTreeMap, path::Path};
 
 use num_complex::Complex32;
 
-use super::{progress::Progress, report};
+use super::{Tell, Told, heatmaps::Pictures};
 use crate::{
     data::{IfFrame, IfLayout, Recording, RecordingContents, write_recording},
     error::Result,
@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// What is simulated.
-pub(super) struct Sequence<'a> {
+pub struct Sequence<'a> {
     pub radar: &'a Radar,
     pub room: Option<&'a Room>,
     pub person: Option<&'a Person>,
@@ -26,15 +26,15 @@ pub(super) struct Sequence<'a> {
 }
 
 /// Writes `folder/recording`, asking `frame` for `[tx, rx, loop, sample]` one after the other, and the heatmaps.
-pub(super) fn write(
+pub fn write(
     folder: &Path,
     sequence: &Sequence<'_>,
     heatmap: &HeatmapConfig,
-    quiet: bool,
+    tell: &mut Tell<'_>,
     frame: &mut dyn FnMut(usize) -> Result<Vec<Complex32>>,
 ) -> Result<()> {
     let radar = sequence.radar;
-    let progress = Progress::new("simulating", radar.frames, quiet);
+    tell(Told::Begun { what: "simulating", steps: radar.frames });
     let contents = RecordingContents {
         radar,
         room: sequence.room,
@@ -49,12 +49,11 @@ pub(super) fn write(
     write_recording(folder.join("recording"), &contents, &mut |index| {
         let signal = frame(index)?;
         simulated.extend_from_slice(&signal);
-        progress.set(index + 1);
+        tell(Told::Done(index + 1));
         let im = (radar.sampling == Sampling::Complex).then(|| signal.iter().map(|value| value.im).collect());
         Ok(IfFrame::new([tx, rx, loops, samples], signal.iter().map(|value| value.re).collect(), im))
     })?;
-    progress.finish();
-    let mut pictures = report::Pictures::new(radar, heatmap);
+    let mut pictures = Pictures::new(radar, heatmap);
     match sequence.measured {
         Some(recording) => {
             recording.whole_stretch()?;

@@ -9,133 +9,21 @@ use burn::tensor::Device;
 use num_complex::Complex32;
 use serde_json::json;
 
-use super::scores;
+use super::{heatmaps::window, scores};
 use crate::{
     config::Config,
     data::atomic,
-    error::{Error, Result},
+    error::Result,
     evaluation::{self, Evaluation, FrameMaps, Simulation, measured_frame},
-    heatmap::{Analysis, Gate, HeatmapConfig, Map, Samples, Scan, StaticRemoval, remove_static},
-    metrics::{DbWindow, MetricsConfig},
+    heatmap::{Analysis, Gate, Samples, StaticRemoval, remove_static},
+    metrics::MetricsConfig,
     pictures::{self, Chart, Series},
-    radar::Radar,
     text::shown,
     training::{FrameSplit, LoadedRecording, RefinedPose, checkpoint, checkpoint::Progress},
 };
 
-/// Decibels that a picture shows below its strongest cell.
-const SHOWN_DB: f64 = 60.0;
-
-/// `runs/<config>`, or the next `runs/<config>-N` that is free.
-pub(super) fn fresh_run_folder(config: &Path) -> PathBuf {
-    let stem = config.file_stem().map_or("run".into(), |stem| stem.to_string_lossy().into_owned());
-    std::iter::once(stem.clone())
-        .chain((2..).map(|count| format!("{stem}-{count}")))
-        .map(|name| Path::new("runs").join(name))
-        .find(|folder| !folder.exists())
-        .expect("one of endlessly many names is free")
-}
-
-/// What had to be fitted when a recording was read, on standard error.
-pub(super) fn tell_notes(loaded: &LoadedRecording) {
-    for note in &loaded.recording.notes {
-        remark!("note: {}: {note}", loaded.folder.display());
-    }
-    if loaded.recording.person().is_none() {
-        remark!("note: {}: no person: only the room is simulated", loaded.folder.display());
-    }
-    if loaded.recording.room.is_none() {
-        remark!("note: {}: no room: only the person is simulated, without indirect path", loaded.folder.display());
-    }
-}
-
-/// A trained simulator speaks for one radar; the number of frames is free.
-pub(super) fn same_radar(folder: &Path, found: &Radar, trained: &Radar) -> Result<()> {
-    if found.is_same_board(trained) {
-        return Ok(());
-    }
-    Err(Error::field(folder.join("recording.toml"), "radar", "another radar", "that of the checkpoint")
-        .with_hint("train on a recording of this radar first; `hybridsim check` shows both"))
-}
-
-/// Draws heatmaps of recordings of one radar.
-pub(super) struct Pictures {
-    radar: Radar,
-    analysis: Analysis,
-    heatmap: HeatmapConfig,
-}
-
-impl Pictures {
-    pub fn new(radar: &Radar, heatmap: &HeatmapConfig) -> Self {
-        Self { radar: radar.clone(), analysis: Analysis::new(radar, heatmap), heatmap: heatmap.clone() }
-    }
-
-    /// Pictures of one recording, `[frame, tx, rx, loop, sample]`.
-    pub fn show(&mut self, folder: &Path, samples: &[Complex32]) -> Result<()> {
-        for (name, title, map) in self.maps(samples) {
-            let map = self.db(&map, &map);
-            pictures::heatmap(&folder.join(name), title, &map, window(&map))?;
-        }
-        Ok(())
-    }
-
-    /// Pictures of a measured recording, its simulation and their difference.
-    pub fn compare(&mut self, folder: &Path, measured: &[Complex32], simulated: &[Complex32]) -> Result<()> {
-        for ((name, title, measured), (_, _, simulated)) in self.maps(measured).into_iter().zip(self.maps(simulated)) {
-            let (measured, simulated) = (self.db(&measured, &measured), self.db(&simulated, &measured));
-            pictures::comparison(&folder.join(name), title, &measured, &simulated, window(&measured))?;
-        }
-        Ok(())
-    }
-
-    fn db(&self, map: &Map, reference: &Map) -> Map {
-        map.db(self.heatmap.floor_amplitude(reference.max().sqrt()))
-    }
-
-    /// (file, title, power) of every picture.
-    fn maps(&self, samples: &[Complex32]) -> Vec<(&'static str, &'static str, Map)> {
-        let [_, tx, rx, loops, length] = self.radar.dims();
-        let frames = samples.len() / (tx * rx * loops * length);
-        let dims = [frames, tx, rx, loops, length];
-        let still = Samples::new(samples, dims);
-        let moving = remove_static(still, StaticRemoval::Loops);
-        let moving = Samples::new(&moving, dims);
-        let middle = frames / 2;
-        let everywhere = Gate::default();
-        let scan = Scan::azimuth(60.0, 2.0);
-        let mut maps = vec![
-            ("range_doppler.png", "Range-Doppler, middle frame", self.analysis.range_doppler(still.frame(middle))),
-            (
-                "range_doppler_moving.png",
-                "Range-Doppler, middle frame, static removed",
-                self.analysis.range_doppler(moving.frame(middle)),
-            ),
-        ];
-        if tx * rx > 1 {
-            maps.push((
-                "range_azimuth.png",
-                "Range-azimuth, middle frame, static removed",
-                self.analysis.range_angle(moving.frame(middle), &scan, &everywhere),
-            ));
-        }
-        if frames > 1 {
-            maps.push(("time_doppler.png", "Time-Doppler, static removed", self.analysis.time_doppler(moving, &everywhere)));
-            maps.push(("time_range.png", "Time-range, static removed", self.analysis.time_range(moving, &everywhere)));
-            if tx * rx > 1 {
-                let map = self.analysis.time_angle(moving, &scan, &everywhere);
-                maps.push(("time_azimuth.png", "Time-azimuth, static removed", map));
-            }
-        }
-        maps
-    }
-}
-
-fn window(map_db: &Map) -> DbWindow {
-    DbWindow::below(map_db.max(), SHOWN_DB)
-}
-
 /// Everything the report of a training run is made of.
-pub(super) struct RunReport<'a> {
+pub struct RunReport<'a> {
     /// What was refined of the recordings' motions.
     pub refined: &'a [RefinedPose],
     pub folder: &'a Path,
@@ -147,8 +35,8 @@ pub(super) struct RunReport<'a> {
 }
 
 impl RunReport<'_> {
-    /// Evaluates the best checkpoint on held-out frames and writes everything into the run folder.
-    pub fn write(&self) -> Result<()> {
+    /// Evaluates the best checkpoint on held-out frames and writes everything into the run folder; the scores by recording.
+    pub fn write(&self) -> Result<Vec<(PathBuf, Evaluation)>> {
         let best = self.folder.join("best");
         let (simulator, _) = checkpoint::open(&best, self.device)?;
         let training = &self.config.training;
@@ -187,12 +75,7 @@ impl RunReport<'_> {
         self.draw_loss()?;
         self.write_numbers(&evaluations)?;
         self.write_report(&evaluations, !split.validation.is_empty())?;
-        for (folder, evaluation) in &evaluations {
-            say!("{}", folder.display());
-            super::tell(&scores::of_frames(evaluation));
-        }
-        say!("report: {}", self.folder.join("report.md").display());
-        Ok(())
+        Ok(evaluations)
     }
 
     fn draw_held_out(&self, frame: usize, all: &FrameMaps, moving: &FrameMaps) -> Result<()> {

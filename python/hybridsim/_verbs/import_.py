@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+
+from .. import _hybridsim
+from .._progress import Teller, Watcher
+from .._recording import Recording
+from .._types import Settings, StrPath, paths, sets
+
+
+def import_(
+    sources: StrPath | Iterable[StrPath],
+    out: StrPath,
+    *,
+    config: StrPath | Iterable[StrPath] = (),
+    board: str | None = None,
+    layout: str | None = None,
+    profile: int | None = None,
+    subframe: int | None = None,
+    tx: int | None = None,
+    labels: Mapping[str, str] | None = None,
+    set: Settings = (),
+    as_stated: bool = False,
+    progress: Watcher = True,
+) -> Recording:
+    """Turns a capture of a radar board into a recording.
+
+    Args:
+        sources: ``adc_data.bin`` files of one DCA1000 capture in their order, a folder of the Infineon SDK, or a ``.npy`` array.
+        out: folder of the recording, which must not exist yet, or be empty. It appears when it is complete.
+        config: what describes the radar: ``.mmwave.json``, ``.setup.json`` or ``.cfg`` of TI, or TOML with ``[radar]``.
+        board: whose antenna positions are then known, such as ``"IWR6843ISK"``.
+        layout: the order of an array's axes, outer to inner, of frame, tx, rx, loop, chirp, sample, iq; such as
+            ``"frame loop rx sample"``.
+        profile: which chirp profile, where a frame has several.
+        subframe: which subframe of an advanced frame.
+        tx: keep the chirps of one transmitter alone.
+        labels: such as ``{"action": "walk"}``.
+        set: corrects what the files say, such as ``{"radar.frame_period_s": 0.05}``.
+        as_stated: take what is stated, however implausible.
+        progress: ``True``, ``False``, or a function of :class:`hybridsim.Progress`.
+
+    Returns:
+        The recording; what was assumed comes first in its notes, and as warnings of the class :class:`hybridsim.Note`.
+
+    Raises:
+        hybridsim.Error: a source of no known kind, a description that is missing or does not fit the samples.
+    """
+    with Teller(progress) as tell:
+        notes = _hybridsim.import_(
+            paths(sources),
+            os.fspath(out),
+            paths(config),
+            board,
+            layout,
+            profile,
+            subframe,
+            tx,
+            dict(labels or {}),
+            sets(set),
+            as_stated,
+            tell,
+        )
+    recording = Recording(out)
+    recording.notes = notes
+    return recording
+

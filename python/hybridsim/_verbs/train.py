@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from .. import _hybridsim
+from .._progress import Teller, Watcher
+from .._types import Run, Settings, StrPath, path, sets
+
+
+def train(
+    config: StrPath | None = None,
+    *,
+    out: StrPath | None = None,
+    resume: StrPath | None = None,
+    set: Settings = (),
+    device: str = "auto",
+    as_stated: bool = False,
+    progress: Watcher = True,
+) -> Run:
+    """Fits the simulator to recordings.
+
+    Args:
+        config: the experiment, a TOML file such as ``configs/quickstart.toml``. It names recordings, or has a ``[record]`` section.
+        out: run folder; ``runs/<config>``, or the next free name, by default.
+        resume: a run folder that was interrupted, in place of a config. Ctrl-C keeps the checkpoint of the last whole epoch.
+        set: changes of settings, such as ``{"training.epochs": 10}``.
+        device: ``flex``, ``ndarray``, ``wgpu``, ``cuda:0``, ``auto``, or several with commas between.
+        as_stated: take what is stated, however implausible.
+        progress: ``True``, ``False``, or a function of :class:`hybridsim.Progress`, whose ``epoch`` holds the losses.
+
+    Raises:
+        hybridsim.Error: settings or recordings that cannot be used; a loss that became NaN.
+    """
+    with Teller(progress) as tell:
+        about = _hybridsim.train(path(config), path(resume), path(out), sets(set), device, as_stated, tell)
+    found = json.loads(about)
+    return Run(**{**found, "folder": Path(found["folder"])})

@@ -1,0 +1,31 @@
+//! HybridSim for Python: the verbs of the program on arrays. The Python package around this module (`hybridsim/`) has the types,
+//! the docs and what needs no Rust.
+//!
+//! Settings and reports cross as JSON, which is what the program's files hold; samples cross as buffers, without a copy.
+//! A verb is one file of `verbs`, with its function listed here.
+
+mod buffer;
+mod errors;
+mod told;
+mod verbs;
+mod work;
+
+#[pyo3::pymodule]
+mod _hybridsim {
+    #[pymodule_export]
+    use crate::buffer::Numbers;
+    #[pymodule_export]
+    use crate::verbs::{
+        check::check,
+        diagnose::diagnose,
+        heatmaps::heatmaps,
+        import::import,
+        read::{Recording, read},
+        record::record,
+        simulate::simulate,
+        site::{recordings_in, site},
+        train::train,
+    };
+    #[pymodule_export]
+    use crate::work::abandon;
+}

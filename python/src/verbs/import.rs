@@ -1,0 +1,48 @@
+//! Turning a capture of a radar board into a recording.
+
+use std::{collections::BTreeMap, path::PathBuf};
+
+use hybridsim::{
+    data::atomic::AtomicFolder,
+    import::capture::{self, Layout, Stated},
+    integrity,
+    verbs::{Told, plausible},
+};
+use pyo3::prelude::*;
+
+use crate::{errors::raised, work::run};
+
+/// Imports `sources` into `out`; the notes of the import.
+#[pyfunction(name = "import_")]
+#[allow(clippy::too_many_arguments)]
+pub fn import(
+    py: Python<'_>,
+    sources: Vec<PathBuf>,
+    out: PathBuf,
+    configs: Vec<PathBuf>,
+    board: Option<String>,
+    layout: Option<String>,
+    profile: Option<usize>,
+    subframe: Option<usize>,
+    tx: Option<usize>,
+    labels: BTreeMap<String, String>,
+    sets: Vec<String>,
+    as_stated: bool,
+    tell: &Bound<'_, PyAny>,
+) -> PyResult<Vec<String>> {
+    let layout = layout.map(|text| Layout::parse(&text)).transpose().map_err(|error| raised(py, &error))?;
+    let stated = Stated { configs, board, layout, profile, subframe, tx, sets };
+    run(py, tell, move |tell| {
+        // What cannot be written is said before anything is read.
+        AtomicFolder::create(&out).map(drop)?;
+        let capture = capture::open(&sources, &stated)?;
+        tell(Told::Begun { what: "importing", steps: capture.radar.frames });
+        let recording = capture::import(capture, &out, labels, &mut |done, _| tell(Told::Done(done)))?;
+        recording.notes.iter().for_each(|note| tell(Told::Note(note)));
+        plausible::recording(&recording, as_stated, tell)?;
+        for finding in integrity::inspect(&recording, recording.radar.frames)?.iter().filter(|finding| !finding.ok) {
+            tell(Told::Note(&format!("damaged: {}", finding.found)));
+        }
+        Ok(recording.notes.clone())
+    })
+}

@@ -1,0 +1,11 @@
+//! A verb, a file.
+
+pub mod check;
+pub mod diagnose;
+pub mod heatmaps;
+pub mod import;
+pub mod read;
+pub mod record;
+pub mod simulate;
+pub mod site;
+pub mod train;

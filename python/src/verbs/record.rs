@@ -1,0 +1,30 @@
+//! Making a recording in the independent world.
+
+use std::path::{Path, PathBuf};
+
+use hybridsim::{config::Config, data::atomic::AtomicFolder, verbs};
+use pyo3::prelude::*;
+
+use crate::work::run;
+
+/// Records the `[record]` section of a config into `out`.
+#[pyfunction]
+pub fn record(
+    py: Python<'_>,
+    config: PathBuf,
+    out: PathBuf,
+    sets: Vec<String>,
+    as_stated: bool,
+    tell: &Bound<'_, PyAny>,
+) -> PyResult<()> {
+    run(py, tell, move |tell| {
+        let settings = Config::read(&config, &sets)?;
+        let record = settings.record(&config)?;
+        for note in record.motion_notes(config.parent().unwrap_or(Path::new("")))? {
+            tell(verbs::Told::Note(&note));
+        }
+        // What cannot be written is said before anything is worked out.
+        AtomicFolder::create(&out).map(drop)?;
+        verbs::record::make(record, &config, &out, as_stated, tell).map(drop)
+    })
+}

@@ -1,0 +1,135 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hybridsim
+
+
+def test_an_array_becomes_a_recording(recording: hybridsim.Recording, tmp_path: Path) -> None:
+    samples = recording.samples()[:, 0]  # [frame, rx, loop, sample]
+    np.save(tmp_path / "capture.npy", samples.transpose(0, 2, 1, 3))
+    text = (recording.folder / "recording.toml").read_text()
+    radar = text[text.index("[radar]") : text.index("[room]")]
+    (tmp_path / "radar.toml").write_text(radar)
+    made = hybridsim.import_(
+        tmp_path / "capture.npy",
+        tmp_path / "out",
+        config=tmp_path / "radar.toml",
+        layout="frame loop rx sample",
+        labels={"action": "walk"},
+        progress=False,
+    )
+    assert made.labels == {"action": "walk"} and made.radar == recording.radar
+    assert np.array_equal(made.samples(), recording.samples())
+
+
+def test_what_is_odd_is_a_warning_where_the_verb_was_called(config: Path, tmp_path: Path) -> None:
+    # Half of a quadrature receiver's range: the room ends beyond it.
+    settings = {"record.radar.sampling": "real"}
+    with pytest.raises(hybridsim.Error, match="unambiguous range of 2.75 m") as caught:
+        hybridsim.record(config, tmp_path / "out", set=settings, progress=False)
+    assert caught.value.hint is not None and caught.value.hint.endswith("--as-stated takes it as it is")
+    with pytest.warns(hybridsim.Note, match="taken as stated") as said:
+        hybridsim.record(config, tmp_path / "out", set=settings, as_stated=True, progress=False)
+    assert said[0].filename == __file__
+
+
+def test_check_finds_what_is_damaged(recording: hybridsim.Recording, tmp_path: Path) -> None:
+    whole = hybridsim.check(recording)
+    assert whole.ok and {finding.about for finding in whole.findings} >= {"radar", "integrity"}
+    for file in recording.folder.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    samples = np.load(tmp_path / "if.npy")
+    samples[3] = samples[2]
+    np.save(tmp_path / "if.npy", samples)
+    damaged = [finding for finding in hybridsim.check(tmp_path).findings if not finding.ok]
+    assert [finding.about for finding in damaged] == ["integrity"] and damaged[0].frames == [3]
+    assert damaged[0].p_value is not None and damaged[0].p_value < 1e-3
+
+
+def test_a_point_peaks_at_its_range_and_velocity(recording: hybridsim.Recording) -> None:
+    radar = recording.radar
+    wavelength, bins = radar.derived["wavelength_m"], 10
+    loop, sample = np.arange(radar.loops_per_frame), np.arange(radar.samples_per_chirp)
+    turns = np.add.outer(4 / radar.loops_per_frame * loop, bins / radar.samples_per_chirp * sample)
+    samples = np.broadcast_to(np.exp(2j * np.pi * turns), radar.shape).astype(np.complex64)
+    maps = hybridsim.heatmaps(samples, radar)
+    assert set(maps) == {
+        "range_doppler",
+        "range_doppler_moving",
+        "range_azimuth",
+        "time_doppler",
+        "time_range",
+        "time_azimuth",
+    }
+    found = maps["range_doppler"]
+    assert found.values.shape == (len(found.rows.values), len(found.columns.values)) == (16, 32)
+    row, column = np.unravel_index(found.values.argmax(), found.values.shape)
+    assert found.values[row, column] == pytest.approx(0.0, abs=1e-4)
+    assert (found.rows.unit, found.columns.unit) == ("m/s", "m")
+    assert found.columns.values[column] == pytest.approx(bins * radar.derived["range_resolution_m"])
+    velocity = 4 / radar.loops_per_frame * wavelength / (2 * radar.derived["loop_period_s"])
+    assert found.rows.values[row] == pytest.approx(velocity)
+
+
+def test_heatmaps_of_a_recording_are_those_of_its_samples(recording: hybridsim.Recording) -> None:
+    of_array = hybridsim.heatmaps(recording.samples([1, 2]), recording.radar, db=False)
+    for name, found in hybridsim.heatmaps(recording, frames=[1, 2], db=False).items():
+        assert np.array_equal(found.values, of_array[name].values)
+    with pytest.raises(ValueError, match="expected frame x tx x rx x loop x sample"):
+        hybridsim.heatmaps(recording.samples()[0], recording.radar)
+    with pytest.raises(hybridsim.Error, match="unknown variant `flat`"):
+        hybridsim.heatmaps(recording, range_window="flat")
+
+
+def test_training_tells_how_far_it_is_and_leaves_a_run(
+    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    heard: list[hybridsim.Progress] = []
+    run = hybridsim.train(config, out="run", set=["training.epochs=2"], device="flex", progress=heard.append)
+    assert run.epochs == 2 and (run.folder / "report.md").is_file() and (run.best / "checkpoint.toml").is_file()
+    assert [now.epoch["epoch"] for now in heard if now.epoch] == [0, 1]
+    training = [now for now in heard if now.what == "training"]
+    assert training[-1].done == training[-1].of > 0
+    assert {now.what for now in heard} == {"recording", "training"}
+    assert len(run.history) == 2 and list(run.scores)
+    with pytest.raises(hybridsim.Error, match="already holds a run"):
+        hybridsim.train(config, out="run", progress=False)
+
+
+def test_simulated_samples_are_those_that_are_written(run: hybridsim.Run, tmp_path: Path) -> None:
+    asked = dict(action="lunge", frames=2, device="flex", progress=False)
+    samples = hybridsim.simulate(run.best, **asked)
+    made = hybridsim.simulate(run.best, out=tmp_path / "made", **asked)
+    assert samples.dtype == np.complex64 and samples.shape == made.radar.shape and samples.shape[0] == 2
+    assert np.array_equal(samples, made.samples())
+    assert made.labels == {"action": "lunge"} and (tmp_path / "made" / "range_doppler.png").is_file()
+
+
+def test_the_parts_of_a_simulation_add_up(run: hybridsim.Run) -> None:
+    asked = dict(action="lunge", frames=1, device="flex", progress=False)
+    whole = hybridsim.simulate(run.best, **asked)
+    parts = sum(hybridsim.simulate(run.best, only=part, **asked) for part in ("direct", "indirect", "noise"))
+    assert np.allclose(whole, parts, atol=1e-4 * np.abs(whole).max())
+
+
+def test_a_recording_is_simulated_again(run: hybridsim.Run, recording: hybridsim.Recording) -> None:
+    samples = hybridsim.simulate(run.best, recording=recording, frames=2, device="flex", progress=False)
+    assert samples.shape[0] == 2
+    with pytest.raises(hybridsim.Error, match="the motion lasts 5 frames"):
+        hybridsim.simulate(run.best, recording=recording, frames=6, device="flex", progress=False)
+    with pytest.raises(hybridsim.Error, match="expected one of motion, action and recording"):
+        hybridsim.simulate(run.best, progress=False)
+
+
+def test_a_diagnosis_says_what_its_report_says(recording: hybridsim.Recording, tmp_path: Path) -> None:
+    settings = {"diagnosis.epochs": 0, "diagnosis.limits": False}
+    report = hybridsim.diagnose(recording, out=tmp_path / "why", set=settings, progress=False)
+    assert report.data == json.loads(report.json.read_text()) and report.verdict == report.data["verdict"]
+    assert report.html.is_file() and report.checkpoint is None
+    assert report.sentence and isinstance(report.effects, list)

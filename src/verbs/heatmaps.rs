@@ -1,0 +1,108 @@
+//! The heatmaps that verbs draw of a recording, measured or simulated.
+
+use std::path::Path;
+
+use num_complex::Complex32;
+
+use crate::{
+    error::{Error, Result},
+    heatmap::{Analysis, Gate, HeatmapConfig, Map, Samples, Scan, StaticRemoval, remove_static},
+    metrics::DbWindow,
+    pictures,
+    radar::Radar,
+};
+
+/// Decibels that a picture shows below its strongest cell.
+const SHOWN_DB: f64 = 60.0;
+
+/// One heatmap of a recording.
+pub struct Heatmap {
+    /// Such as `range_doppler`.
+    pub name: &'static str,
+    pub title: &'static str,
+    /// Power, linear.
+    pub map: Map,
+}
+
+/// A trained simulator speaks for one radar; the number of frames is free.
+pub fn same_radar(folder: &Path, found: &Radar, trained: &Radar) -> Result<()> {
+    if found.is_same_board(trained) {
+        return Ok(());
+    }
+    Err(Error::field(folder.join("recording.toml"), "radar", "another radar", "that of the checkpoint")
+        .with_hint("train on a recording of this radar first; `hybridsim check` shows both"))
+}
+
+/// Draws heatmaps of recordings of one radar.
+pub struct Pictures {
+    radar: Radar,
+    analysis: Analysis,
+    heatmap: HeatmapConfig,
+}
+
+impl Pictures {
+    pub fn new(radar: &Radar, heatmap: &HeatmapConfig) -> Self {
+        Self { radar: radar.clone(), analysis: Analysis::new(radar, heatmap), heatmap: heatmap.clone() }
+    }
+
+    /// Pictures of one recording, `[frame, tx, rx, loop, sample]`.
+    pub fn show(&mut self, folder: &Path, samples: &[Complex32]) -> Result<()> {
+        for Heatmap { name, title, map } in self.maps(samples) {
+            let map = self.db(&map, &map);
+            pictures::heatmap(&folder.join(format!("{name}.png")), title, &map, window(&map))?;
+        }
+        Ok(())
+    }
+
+    /// Pictures of a measured recording, its simulation and their difference.
+    pub fn compare(&mut self, folder: &Path, measured: &[Complex32], simulated: &[Complex32]) -> Result<()> {
+        for (Heatmap { name, title, map: measured }, simulated) in self.maps(measured).into_iter().zip(self.maps(simulated)) {
+            let (measured, simulated) = (self.db(&measured, &measured), self.db(&simulated.map, &measured));
+            pictures::comparison(&folder.join(format!("{name}.png")), title, &measured, &simulated, window(&measured))?;
+        }
+        Ok(())
+    }
+
+    /// Decibels of a power map, with the floor of the settings below the strongest cell of another.
+    pub fn db(&self, map: &Map, reference: &Map) -> Map {
+        map.db(self.heatmap.floor_amplitude(reference.max().sqrt()))
+    }
+
+    /// Power of every heatmap of these samples, `[frame, tx, rx, loop, sample]`. Those over time need two frames, those over
+    /// azimuth two antenna pairs.
+    pub fn maps(&self, samples: &[Complex32]) -> Vec<Heatmap> {
+        let [_, tx, rx, loops, length] = self.radar.dims();
+        let frames = samples.len() / (tx * rx * loops * length);
+        let dims = [frames, tx, rx, loops, length];
+        let still = Samples::new(samples, dims);
+        let moving = remove_static(still, StaticRemoval::Loops);
+        let moving = Samples::new(&moving, dims);
+        let middle = frames / 2;
+        let everywhere = Gate::default();
+        let scan = Scan::azimuth(60.0, 2.0);
+        let mut maps = Vec::new();
+        let mut add = |name, title, map| maps.push(Heatmap { name, title, map });
+        add("range_doppler", "Range-Doppler, middle frame", self.analysis.range_doppler(still.frame(middle)));
+        add(
+            "range_doppler_moving",
+            "Range-Doppler, middle frame, static removed",
+            self.analysis.range_doppler(moving.frame(middle)),
+        );
+        if tx * rx > 1 {
+            let map = self.analysis.range_angle(moving.frame(middle), &scan, &everywhere);
+            add("range_azimuth", "Range-azimuth, middle frame, static removed", map);
+        }
+        if frames > 1 {
+            add("time_doppler", "Time-Doppler, static removed", self.analysis.time_doppler(moving, &everywhere));
+            add("time_range", "Time-range, static removed", self.analysis.time_range(moving, &everywhere));
+            if tx * rx > 1 {
+                add("time_azimuth", "Time-azimuth, static removed", self.analysis.time_angle(moving, &scan, &everywhere));
+            }
+        }
+        maps
+    }
+}
+
+pub(super) fn window(map_db: &Map) -> DbWindow {
+    DbWindow::below(map_db.max(), SHOWN_DB)
+}

@@ -1,0 +1,55 @@
+//! The verbs without a terminal: what the program and the Python module do alike.
+//!
+//! A verb asks whether what it is given can be, works, and tells what happens through [`Tell`]; it prints nothing. Whoever listens
+//! may end the work by unwinding (`std::panic::resume_unwind`): what is unfinished is dropped on the way, so that nothing
+//! half-written stays.
+
+pub mod diagnose;
+pub mod heatmaps;
+pub mod notes;
+pub mod plausible;
+pub mod record;
+pub mod report;
+pub mod scores;
+pub mod simulate;
+pub mod simulated;
+pub mod train;
+
+use std::path::Path;
+
+use crate::{
+    data::{Claim, atomic},
+    error::Result,
+    training,
+};
+
+/// What a verb tells while it works.
+pub enum Told<'a> {
+    /// What was assumed, or is odd about what was given.
+    Note(&'a str),
+    /// Work of so many steps begins.
+    Begun {
+        what: &'a str,
+        steps: usize,
+    },
+    /// So many of its steps are done.
+    Done(usize),
+    /// What is done now.
+    Line(&'a str),
+    /// The folder that a training run is kept in from here on, and how many epochs it is to have.
+    Run {
+        folder: &'a Path,
+        epochs: usize,
+    },
+    Training(&'a training::Event),
+}
+
+/// Who hears it.
+pub type Tell<'a> = dyn FnMut(Told<'_>) + 'a;
+
+/// A folder that results are added to, made and tried before the work; nobody else works there until this is dropped.
+pub fn claimed(folder: &Path) -> Result<Claim> {
+    let claim = Claim::take(folder)?;
+    atomic::sweep(folder);
+    Ok(claim)
+}

@@ -1,0 +1,46 @@
+//! Making a recording from settings.
+
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use super::{Tell, Told, plausible};
+use crate::{
+    data::{Recording, hex},
+    error::Result,
+    plausibility::Sources,
+    recorder::{self, RecorderConfig},
+};
+
+/// The recording of these settings, made if it is not there yet: its folder in `runs/recordings` is named after
+/// their hash. `config_path`: where the settings were read, which relative paths start from.
+///
+/// # Errors
+/// As [`make`].
+pub fn recorded(config: &RecorderConfig, config_path: &Path, as_stated: bool, tell: &mut Tell<'_>) -> Result<PathBuf> {
+    let text = toml::to_string(config).expect("settings are plain data");
+    let digest = Sha256::digest(format!("{} {text}", env!("CARGO_PKG_VERSION")));
+    let folder = Path::new("runs/recordings").join(hex(&digest[..6]));
+    if !folder.is_dir() {
+        make(config, config_path, &folder, as_stated, tell)?;
+    }
+    Ok(folder)
+}
+
+/// Records into `folder`, which appears when it is complete.
+///
+/// # Errors
+/// Settings that describe no world, or one that cannot be; a folder that cannot be written.
+pub fn make(
+    config: &RecorderConfig,
+    config_path: &Path,
+    folder: &Path,
+    as_stated: bool,
+    tell: &mut Tell<'_>,
+) -> Result<Recording> {
+    let settings_folder = config_path.parent().unwrap_or(Path::new(""));
+    let world = config.world(settings_folder)?;
+    plausible::scene(Some(&world.radar), Some(&world.room), world.person.as_ref(), &Sources::one(config_path), as_stated, tell)?;
+    tell(Told::Begun { what: "recording", steps: world.radar.frames });
+    recorder::record_to(config, settings_folder, folder, &mut |done, _| tell(Told::Done(done)))
+}

@@ -1,0 +1,66 @@
+//! Scores as text for people and as JSON for programs.
+
+use std::fmt::Write;
+
+use serde_json::json;
+
+use crate::{
+    evaluation::{Evaluation, ScoreSummary, SequenceSummary, over_sequences},
+    lpips::Network,
+};
+
+/// One recording's scores.
+pub fn of_frames(found: &Evaluation) -> String {
+    let Evaluation { frames, span_db, .. } = found;
+    let title =
+        format!("{frames} frames, decibels from {span_db:.0} dB below the strongest cell, mean ± standard deviation over frames");
+    table(&title, [&found.global, &found.moving, &found.person], found.lpips)
+}
+
+/// The scores of several recordings.
+pub fn of_sequences(found: &SequenceSummary) -> String {
+    let SequenceSummary { sequences, frames, .. } = found;
+    let title = match sequences {
+        1 => format!("1 sequence of {frames} frames: too few for an interval"),
+        _ => format!("{sequences} sequences, {frames} frames, mean ± half of its 95 % interval over sequences (Student's t)"),
+    };
+    table(&title, [&found.global, &found.moving, &found.person], found.lpips)
+}
+
+fn table(title: &str, regions: [&Option<ScoreSummary>; 3], network: Option<Network>) -> String {
+    let mut text = format!("  {title}\n");
+    for (name, scores) in ["all cells", "static removed", "person's cells"].into_iter().zip(regions) {
+        let line = match scores {
+            Some(ScoreSummary { psnr_db, ssim, mean_absolute_error_db, lpips }) => {
+                let lpips = lpips.map(|lpips| format!("   LPIPS {lpips:.3}")).unwrap_or_default();
+                format!("PSNR {psnr_db:.2} dB   SSIM {ssim:.3}   mean error {mean_absolute_error_db:.2} dB{lpips}")
+            }
+            None => "not available".into(),
+        };
+        writeln!(text, "  {name:<15} {line}").expect("text grows");
+    }
+    match network {
+        Some(network) => {
+            writeln!(text, "  LPIPS           as seen by {}; the person's is of the box around the cells", network.name())
+        }
+        None => writeln!(text, "  LPIPS           not available: it needs a network's weights (--lpips)"),
+    }
+    .expect("text grows");
+    text
+}
+
+/// All recordings by name, and the means over them.
+pub fn json(evaluations: &[(String, Evaluation)]) -> String {
+    let recordings: serde_json::Map<String, serde_json::Value> = evaluations
+        .iter()
+        .map(|(name, evaluation)| (name.clone(), serde_json::to_value(evaluation).expect("plain data")))
+        .collect();
+    let together = summary(evaluations);
+    let found = json!({ "recordings": recordings, "over_sequences": together });
+    serde_json::to_string_pretty(&found).expect("plain data")
+}
+
+pub fn summary(evaluations: &[(String, Evaluation)]) -> Option<SequenceSummary> {
+    let evaluations: Vec<Evaluation> = evaluations.iter().map(|(_, evaluation)| evaluation.clone()).collect();
+    over_sequences(&evaluations)
+}

@@ -1,0 +1,119 @@
+//! Fitting the simulator to recordings: a run folder from a config.
+
+use std::path::{Path, PathBuf};
+
+use burn::tensor::Device;
+
+use super::{Tell, Told, claimed, notes, plausible, record, report::RunReport};
+use crate::{
+    config::Config,
+    data::{atomic, files},
+    error::{Error, Result},
+    evaluation::Evaluation,
+    training::{checkpoint::Progress, load_recordings, load_recordings_as_stated, refine},
+};
+
+/// What to begin, or to go on with.
+pub enum Start<'a> {
+    /// The experiment of a config file, changed by `--set key=value`. Without `out` the run is kept in `runs/<config>`, or the
+    /// next `runs/<config>-N` that is free.
+    Config { path: &'a Path, sets: &'a [String], out: Option<&'a Path> },
+    /// A run folder that was interrupted; `sets` must be empty where it holds a checkpoint.
+    Resume { run: &'a Path, sets: &'a [String] },
+}
+
+/// A run that is done.
+pub struct Trained {
+    pub folder: PathBuf,
+    pub progress: Progress,
+    /// Of the best checkpoint on the held-out frames, by recording folder.
+    pub evaluations: Vec<(PathBuf, Evaluation)>,
+}
+
+/// Trains, and leaves a run folder: config.toml (resolved), metrics.json, pictures, report.md, and the checkpoints `best` and
+/// `last`.
+///
+/// # Errors
+/// A config, recordings or checkpoints that cannot be used; a run folder that holds a run, or that cannot be written.
+pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, tell: &mut Tell<'_>) -> Result<Trained> {
+    // Before anything in it is looked at.
+    let resumed = match start {
+        Start::Resume { run, .. } => Some(claimed(run)?),
+        Start::Config { .. } => None,
+    };
+    let (config_path, run_folder, sets, resume) = match *start {
+        Start::Resume { run, sets } => {
+            atomic::recover(run.join("last"))?;
+            (run.join("config.toml"), run.to_path_buf(), sets, Some(run.join("last")).filter(|last| last.is_dir()))
+        }
+        Start::Config { path, sets, out } => {
+            (path.to_path_buf(), out.map_or_else(|| fresh_run_folder(path), Path::to_path_buf), sets, None)
+        }
+    };
+    if resume.is_some() && !sets.is_empty() {
+        return Err(Error::Usage {
+            message: "--set: a resumed run keeps the settings it was started with".into(),
+            hint: Some("start a new run with other settings, or edit nothing and leave --set out".into()),
+        });
+    }
+    let mut config = Config::read(&config_path, sets)?;
+    if resume.is_none() && run_folder.join("last").is_dir() {
+        return Err(Error::Usage {
+            message: format!("{}: already holds a run", run_folder.display()),
+            hint: Some("continue it with --resume, or choose another folder with --out".into()),
+        });
+    }
+    let _claim = resumed.map_or_else(|| claimed(&run_folder), Ok)?;
+    if config.data.recordings.is_empty() {
+        let recorded = record::recorded(config.record(&config_path)?, &config_path, as_stated, tell)?;
+        config.data.recordings = vec![recorded];
+    }
+    absolute(&mut config.data.recordings)?;
+    absolute(config.training.start_from.as_mut_slice())?;
+    for recording in &config.data.recordings {
+        plausible::folder(recording, as_stated, tell)?;
+    }
+    let config_toml = config.to_toml();
+    atomic::write_text(run_folder.join("config.toml"), &config_toml)?;
+    tell(Told::Run { folder: &run_folder, epochs: config.training.epochs });
+
+    let started = std::time::Instant::now();
+    let load = if as_stated { load_recordings_as_stated } else { load_recordings };
+    let recordings = load(&config.data.recordings, &config.simulator)?;
+    recordings.iter().flat_map(notes::of).for_each(|note| tell(Told::Note(&note)));
+    let trainer = config.trainer(&recordings, &config_toml, &run_folder, devices)?;
+    let outcome = trainer.run(resume.as_deref(), &mut |event| tell(Told::Training(&event)))?;
+
+    let refined = refine::read(&run_folder)?;
+    let recordings =
+        recordings.into_iter().map(|recording| Ok(refine::refined(recording, &refined)?.0)).collect::<Result<Vec<_>>>()?;
+    let report = RunReport {
+        refined: &refined,
+        folder: &run_folder,
+        config: &config,
+        recordings: &recordings,
+        progress: &outcome.progress,
+        device: &devices[0],
+        seconds: started.elapsed().as_secs_f64(),
+    };
+    let evaluations = report.write()?;
+    Ok(Trained { folder: run_folder, progress: outcome.progress, evaluations })
+}
+
+/// `runs/<config>`, or the next `runs/<config>-N` that is free.
+fn fresh_run_folder(config: &Path) -> PathBuf {
+    let stem = config.file_stem().map_or("run".into(), |stem| stem.to_string_lossy().into_owned());
+    std::iter::once(stem.clone())
+        .chain((2..).map(|count| format!("{stem}-{count}")))
+        .map(|name| Path::new("runs").join(name))
+        .find(|folder| !folder.exists())
+        .expect("one of endlessly many names is free")
+}
+
+/// The resolved config must find its recordings from wherever a later command runs.
+fn absolute(paths: &mut [PathBuf]) -> Result<()> {
+    for path in paths {
+        *path = files::absolute(&*path)?;
+    }
+    Ok(())
+}
