@@ -223,8 +223,10 @@ fn a_mask_is_read_as_bool_or_bytes_and_refused_in_another_shape() {
     }
     let file = folder.path().join("recording.toml");
     let plain: String = fs::read_to_string(&file).unwrap();
-    let without_person: Vec<&str> =
-        plain.lines().filter(|line| !["body =", "motion ="].iter().any(|key| line.starts_with(key))).collect();
+    let without_person: Vec<&str> = plain
+        .lines()
+        .filter(|line| !["body =", "motion =", "vertices =", "faces =", "pose_times ="].iter().any(|key| line.starts_with(key)))
+        .collect();
     let plain = without_person.join("\n").replace("[files]", "[files]\nvalid = \"valid.npy\"");
     fs::write(&file, &plain).unwrap();
     let write = |kind: &str, shape: &str, values: &[u8]| {

@@ -98,7 +98,8 @@ impl Hdf5 {
         let is_matlab = file.read_exact(&mut start).is_ok() && &start == b"MATLAB";
         // What is read at once is a frame: no more than what any honest compression makes of the file.
         let most = usize::try_from(size.saturating_mul(1040)).unwrap_or(usize::MAX);
-        let options = OpenOptions::default().with_max_read_bytes(most).with_max_chunk_bytes(most);
+        let options: OpenOptions = Default::default();
+        let options = options.with_max_read_bytes(most).with_max_chunk_bytes(most);
         let mut datasets = vec![];
         FileStorage::from_file(file)
             .and_then(|storage| Hdf5File::from_storage_with_options(Arc::new(storage), options))
