@@ -285,7 +285,7 @@ fn nothing_whole_is_nothing_imported() {
     let (folder, bin) = captured(CFG, |words| {
         (0..FRAMES).for_each(|frame| words[frame * LOOPS * CHIRP + 300 * frame..][..PACKET].fill(0));
     });
-    let draft = capture::draft(opened(&bin), &folder.path().join("out"), Default::default()).unwrap();
+    let draft = capture::draft(opened(&bin), &folder.path().join("out"), Default::default(), &mut |_, _| ()).unwrap();
     assert!(draft.findings.iter().any(|finding| !finding.ok && finding.kind == Kind::Lost && !finding.chirps.is_empty()));
     let error = draft.publish(false).unwrap_err();
     assert!(error.to_string().contains("lost chirps in every frame"), "{error}");
@@ -364,7 +364,7 @@ fn real_captures_are_what_they_are_stated_to_be() {
         let folder = tempfile::tempdir().unwrap();
         let stated = Stated { board: board.map(String::from), ..Stated::default() };
         let capture = capture::open(&[source], &stated).unwrap();
-        let draft = capture::draft(capture, &folder.path().join("out"), Default::default()).unwrap();
+        let draft = capture::draft(capture, &folder.path().join("out"), Default::default(), &mut |_, _| ()).unwrap();
         assert!(draft.findings.iter().all(|finding| finding.ok), "{:#?}", draft.findings);
         draft.publish(false).unwrap();
     }
