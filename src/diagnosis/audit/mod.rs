@@ -59,9 +59,8 @@ impl From<Finding> for Check {
 const RETURN: f64 = 20.0;
 /// Share of the samples at the ends of the range from which on nothing can be restored.
 const SATURATED: f64 = 0.3;
-/// Fewest samples of a chirp, and fewest chirps of a transmitter in a frame, that say anything.
+/// Fewest samples of a chirp that say anything.
 const FEWEST_SAMPLES: usize = 16;
-const FEWEST_LOOPS: usize = 2;
 
 /// All checks. `origin_m`: of the motion, where it has one.
 pub fn audit(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<Check> {
@@ -106,12 +105,9 @@ pub fn is_silent(check: &Check) -> bool {
 
 /// Why nothing can be said about a recording, if so.
 pub fn undecidable(evidence: &Evidence, checks: &[Check]) -> Option<String> {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    if samples < FEWEST_SAMPLES || loops < FEWEST_LOOPS {
-        return Some(format!(
-            "too little: {samples} samples a chirp and {loops} loops a frame, where {FEWEST_SAMPLES} and {FEWEST_LOOPS} are the \
-             least that say anything"
-        ));
+    let samples = evidence.cube.dims[4];
+    if samples < FEWEST_SAMPLES {
+        return Some(format!("too little: {samples} samples a chirp, where {FEWEST_SAMPLES} are the least that say anything"));
     }
     if let Some(bad) = checks.iter().find(|check| check.check == "channels" && !check.ok) {
         return Some(format!("a channel holds no signal: {}", bad.found));

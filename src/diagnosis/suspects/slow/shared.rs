@@ -398,3 +398,88 @@ fn candidate(evidence: &Evidence, course: &Course, shared: &Shared) -> Candidate
         correction: candidates::correction(evidence, shared.part, deviation, spent),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::radar::Radar;
+
+    #[test]
+    fn bessel_function_of_order_zero() {
+        // Abramowitz and Stegun, table 9.8: e^-x I0(x).
+        for (x, scaled) in
+            [(0.1, 0.907_100_93), (1.0, 0.465_759_61), (3.0, 0.243_000_35), (5.0, 0.183_540_81), (10.0, 0.127_833_34)]
+        {
+            assert!((log_bessel_0(x) - x - f64::ln(scaled)).abs() < 1e-6, "{x}");
+        }
+        assert_eq!(log_bessel_0(0.0), 0.0);
+    }
+
+    /// Static returns at several ranges, of which those beyond the first turn by `phase` of the time.
+    fn evidence(gap_s: f64, seed: u64, phase: impl Fn(f64) -> f64, own: impl Fn(f64, usize) -> f64) -> Evidence {
+        let mut radar = Radar { samples_per_chirp: 96, loops_per_frame: 16, ..Radar::small(24) };
+        radar.frame_period_s = radar.loops_per_frame as f64 * radar.loop_period_s() + gap_s;
+        let clock = radar.clone();
+        let bins = [3.0, 11.0, 20.0, 27.0, 34.0, 43.0, 52.0];
+        Evidence::in_noise(radar, seed, move |[frame, channel, index, n]| {
+            let time_s = clock.chirp_time_s(frame, 0, index);
+            let range = |(i, bin): (usize, &f64)| {
+                let turn = if i == 0 { 0.0 } else { phase(time_s) } + own(time_s, i);
+                Complex64::from_polar(20.0 / (1 + i) as f64, TAU * bin * n as f64 / 96.0 + turn + (i * channel) as f64)
+            };
+            bins.iter().enumerate().map(range).sum()
+        })
+    }
+
+    #[test]
+    fn a_course_comes_back_from_its_spectrum() {
+        for gap_s in [0.0, 0.02] {
+            let course = Course::of(&evidence(gap_s, 1, |_| 0.0, |_, _| 0.0));
+            assert_eq!(course.even, gap_s == 0.0);
+            let values: Vec<f64> = (0..24 * 16).map(|i| (0.3 * i as f64).sin() + 0.2 * ((i / 16) as f64).cos()).collect();
+            let spectrum = course.spectrum(&values);
+            assert_eq!(spectrum.len(), course.frequencies_hz().len());
+            // What is left out holds nothing a second time.
+            let once = course.back(&spectrum);
+            let twice = course.back(&course.spectrum(&once));
+            assert!(once.iter().zip(&twice).all(|(a, b)| (a - b).abs() < 1e-9));
+            let square = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
+            let of_spectrum = 2.0 * spectrum.iter().map(Complex64::norm_sqr).sum::<f64>();
+            assert!((square(&once) - of_spectrum).abs() < 1e-9 * of_spectrum);
+        }
+    }
+
+    /// Every range by a course of its own, far stronger at one.
+    fn own(time_s: f64, range: usize) -> f64 {
+        0.05 * (1.0 + 10.0 * f64::from(u8::from(range == 1))) * (TAU * (7.0 + 1.7 * range as f64) * time_s + range as f64).sin()
+    }
+
+    #[test]
+    fn a_phase_that_most_ranges_share_is_found_beside_what_moves_by_itself() {
+        // No single line: three that are no multiples of one another.
+        let shakes = |time_s: f64| 0.1 * [31.0, 37.7, 44.1].iter().map(|f| (TAU * f * time_s).sin()).sum::<f64>();
+        for gap_s in [0.0, 0.02] {
+            let found = find(&evidence(gap_s, 2, shakes, own)).expect("a shared phase");
+            assert_eq!(found.id, Some("radar_vibration"), "{}", found.statement);
+            assert!(found.p_value < 1e-6 && found.gain > 13.0, "{} {}", found.p_value, found.gain);
+        }
+        // Slower than the recording, it is a drift, which has no name.
+        let duration_s = 24.0 * 16.0 * evidence(0.0, 1, |_| 0.0, own).radar.loop_period_s();
+        let drifts = |time_s: f64| 0.4 * time_s / duration_s;
+        let found = find(&evidence(0.0, 2, drifts, |_, _| 0.0)).expect("a drift");
+        assert!(found.id.is_none() && found.p_value < 1e-6, "{}", found.statement);
+    }
+
+    #[test]
+    fn ranges_that_vary_each_for_itself_share_nothing() {
+        for seed in 0..12 {
+            for gap_s in [0.0, 0.02] {
+                let p_value = |evidence: &Evidence| find(evidence).map_or(1.0, |found| found.p_value);
+                assert!(p_value(&evidence(gap_s, seed, |_| 0.0, |_, _| 0.0)) > 1e-3, "{seed}");
+                assert!(p_value(&evidence(gap_s, seed, |_| 0.0, own)) > 1e-3, "{seed}");
+            }
+        }
+    }
+}
