@@ -7,6 +7,10 @@
 //! over the uniform law) has a mean of one then, and so has the product of bets in which each may depend on those before it: its
 //! inverse is a p-value (Ville's inequality; Shafer, Testing by betting, Journal of the Royal Statistical Society A 184, 2021). No
 //! course in time, no spectrum of the noise and no threshold is assumed.
+//!
+//! Phases of neighbouring frequencies hang together where a course jumps from its end to its beginning: what is slow is taken out
+//! first, and a sine tapers the rest, under which frequencies two apart are independent. Both halves of the frequencies then bet with
+//! half of their winnings' logarithm (Cauchy and Schwarz: the mean of the root of a product is one at most).
 
 use std::sync::Arc;
 
@@ -31,11 +35,16 @@ const BINS_PER_VALUE: f64 = 2.0;
 const SHARES: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
 /// What a range would gain (nats) if it shared everything, for its silence to tell anything: as in `field`.
 const TELLING_GAIN: f64 = 10.0;
-/// Turns during the recording below which a course is a drift: as in `sway`.
-const SLOWEST_TURNS: f64 = 1.5;
+/// Half turns up to which a course is slow: what turns less than one and a half times during a recording is a drift (as in `sway`).
+const SLOW: usize = 3;
+/// Interleaved sets of frequencies, each of which is independent under the taper.
+const SETS: f64 = 2.0;
+/// First frequency of a stretch, in turns: slower ones are taken out.
+const FIRST: usize = SLOW.div_ceil(2);
 
-/// The deviation of a group of ranges, as a spectrum over slow time.
+/// The deviation of a group of ranges, as a course and as a spectrum over slow time.
 struct Spectrum {
+    course: Vec<f64>,
     values: Vec<Complex64>,
     /// Of the noise in each of them.
     variance: f64,
@@ -49,9 +58,8 @@ struct Shared {
     /// Ranges that share it, and those that could tell.
     sharing: usize,
     telling: usize,
-    /// Its spectrum, and of each value how much more than noise it is.
-    values: Vec<Complex64>,
-    ratios: Vec<f64>,
+    /// Those that share it, as places in the spectra.
+    members: Vec<usize>,
 }
 
 pub fn find(evidence: &Evidence) -> Option<Candidate> {
@@ -65,7 +73,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
         .flatten()
         .reduce(|phase, delay| if delay.log_bets > phase.log_bets + UNDECIDED { delay } else { phase })?;
     // A bet is won by two ranges that hang together; all returns are concerned where most that can tell have it.
-    (2 * best.sharing > best.telling && best.log_bets > 0.0).then(|| candidate(evidence, &course, &best))
+    (2 * best.sharing > best.telling && best.log_bets > 0.0).then(|| candidate(evidence, &course, &deviations, &best))
 }
 
 /// Deviations of groups of ranges from their mean over time, relative to it, `[frame · loops + loop]`, with the noise's variance.
@@ -137,55 +145,57 @@ impl Course {
         Self { frames, loops, even, frame_s, loop_s }
     }
 
-    /// Unitary: white noise keeps its variance. Means over the whole and mirrored frequencies are left out.
-    fn spectrum(&self, course: &[f64]) -> Vec<Complex64> {
-        let half = |course: Vec<f64>, scale: f64| -> Vec<Complex64> {
-            let count = course.len();
-            let mut values: Vec<Complex64> = course.into_iter().map(Complex64::from).collect();
-            FftPlanner::new().plan_fft(count, FftDirection::Forward).process(&mut values);
-            values[1..count.div_ceil(2)].iter().map(|value| value * scale).collect()
-        };
+    /// Stretches of even sampling, slow parts taken out of each: all chirps, or the frames' means (scaled to a chirp's noise) and each
+    /// frame about its own.
+    fn stretches(&self, course: &[f64]) -> Vec<Vec<f64>> {
         if self.even {
-            return half(course.to_vec(), (course.len() as f64).sqrt().recip());
+            return vec![without_slow(course)];
         }
-        let means: Vec<f64> =
-            course.chunks_exact(self.loops).map(|frame| frame.iter().sum::<f64>() / self.loops as f64).collect();
-        let mut values = half(means.clone(), (self.loops as f64 / self.frames as f64).sqrt());
-        for (frame, mean) in course.chunks_exact(self.loops).zip(means) {
-            values.extend(half(frame.iter().map(|value| value - mean).collect(), (self.loops as f64).sqrt().recip()));
-        }
-        values
+        let root = (self.loops as f64).sqrt();
+        let means: Vec<f64> = course.chunks_exact(self.loops).map(|frame| frame.iter().sum::<f64>() / root).collect();
+        let within = course.chunks_exact(self.loops).map(without_slow);
+        std::iter::once(without_slow(&means)).chain(within).collect()
     }
 
-    /// The course that has such a spectrum.
-    fn back(&self, values: &[Complex64]) -> Vec<f64> {
-        let whole = |half: &[Complex64], count: usize, scale: f64| -> Vec<f64> {
-            let mut all = vec![Complex64::ZERO; count];
-            for (k, value) in half.iter().enumerate() {
-                (all[k + 1], all[count - 1 - k]) = (*value, value.conj());
-            }
-            FftPlanner::new().plan_fft(count, FftDirection::Inverse).process(&mut all);
-            all.into_iter().map(|value| value.re * scale).collect()
+    /// The spectrum of each stretch under a taper, one after the other; white noise keeps its variance.
+    fn spectrum(&self, course: &[f64]) -> Vec<Complex64> {
+        let of_stretch = |stretch: Vec<f64>| {
+            let count = stretch.len();
+            let taper = |i: usize| (2.0 / count as f64).sqrt() * (std::f64::consts::PI * (i as f64 + 0.5) / count as f64).sin();
+            let mut values: Vec<Complex64> =
+                stretch.into_iter().enumerate().map(|(i, value)| Complex64::from(value * taper(i))).collect();
+            FftPlanner::new().plan_fft(count, FftDirection::Forward).process(&mut values);
+            values.into_iter().take(count.div_ceil(2)).skip(FIRST)
         };
-        let count = self.frames * self.loops;
-        if self.even {
-            return whole(values, count, (count as f64).sqrt().recip());
+        self.stretches(course).into_iter().flat_map(of_stretch).collect()
+    }
+
+    /// What of a course in white noise of a variance is no noise, by Wiener's filter.
+    fn denoised(&self, course: &[f64], variance: f64) -> Vec<f64> {
+        let mut stretches = self.stretches(course);
+        for stretch in &mut stretches {
+            let count = stretch.len();
+            let mut values: Vec<Complex64> = stretch.iter().copied().map(Complex64::from).collect();
+            let mut planner = FftPlanner::new();
+            planner.plan_fft(count, FftDirection::Forward).process(&mut values);
+            for value in &mut values {
+                let ratio = (value.norm_sqr() / (count as f64 * variance) - 1.0).max(0.0);
+                *value *= statistics::kept(ratio) / count as f64;
+            }
+            planner.plan_fft(count, FftDirection::Inverse).process(&mut values);
+            stretch.iter_mut().zip(values).for_each(|(own, value)| *own = value.re);
         }
-        let (of_means, within) = values.split_at(self.frames.div_ceil(2) - 1);
-        let means = whole(of_means, self.frames, ((self.loops * self.frames) as f64).sqrt().recip());
-        let each = self.loops.div_ceil(2) - 1;
-        (0..self.frames)
-            .flat_map(|frame| {
-                let own = whole(&within[frame * each..][..each], self.loops, (self.loops as f64).sqrt().recip());
-                let mean = means[frame];
-                own.into_iter().map(move |value| mean + value)
-            })
-            .collect()
+        if self.even {
+            return stretches.swap_remove(0);
+        }
+        let root = (self.loops as f64).sqrt();
+        let (means, within) = (&stretches[0], &stretches[1..]);
+        means.iter().zip(within).flat_map(|(mean, frame)| frame.iter().map(move |value| mean / root + value)).collect()
     }
 
     /// Frequency (Hz) of each value of a spectrum.
     fn frequencies_hz(&self) -> Vec<f64> {
-        let half = |count: usize, period_s: f64| (1..count.div_ceil(2)).map(move |k| k as f64 / (count as f64 * period_s));
+        let half = |count: usize, period_s: f64| (FIRST..count.div_ceil(2)).map(move |k| k as f64 / (count as f64 * period_s));
         if self.even {
             return half(self.frames * self.loops, self.loop_s).collect();
         }
@@ -198,6 +208,19 @@ impl Course {
     }
 }
 
+/// What is left of a stretch once its slowest cosines are away (a type-II transform: they have no jump at the ends).
+fn without_slow(stretch: &[f64]) -> Vec<f64> {
+    let count = stretch.len();
+    let mut left = stretch.to_vec();
+    for k in 0..=SLOW.min(count - 1) {
+        let cosine = |i: usize| (std::f64::consts::PI * k as f64 * (i as f64 + 0.5) / count as f64).cos();
+        let square: f64 = (0..count).map(|i| cosine(i).powi(2)).sum();
+        let along = left.iter().enumerate().map(|(i, value)| value * cosine(i)).sum::<f64>() / square;
+        left.iter_mut().enumerate().for_each(|(i, value)| *value -= along * cosine(i));
+    }
+    left
+}
+
 /// Of all groups, surest first; of a phase in proportion to the delay per second of it.
 fn spectra(deviations: &Deviations, course: &Course, part: Part) -> Vec<Spectrum> {
     let of_group = |(group, values, variance): &(Group, Vec<Complex64>, f64)| {
@@ -205,7 +228,7 @@ fn spectra(deviations: &Deviations, course: &Course, part: Part) -> Vec<Spectrum
         let phases: Vec<f64> = values.iter().map(|value| value.im / lever).collect();
         // Half of a complex variance is in the phase; both parts of a phase's spectrum have half of that each.
         let variance = 0.5 * variance / (lever * lever);
-        Spectrum { values: course.spectrum(&phases), variance }
+        Spectrum { values: course.spectrum(&phases), course: phases, variance }
     };
     let mut spectra: Vec<Spectrum> = deviations.par_iter().map(of_group).collect();
     spectra.sort_by(|a, b| a.variance.total_cmp(&b.variance));
@@ -238,8 +261,8 @@ fn shared(spectra: &[Spectrum], part: Part) -> Option<Shared> {
     let of_first = |first: usize| {
         let mut reference = Reference { sum: vec![Complex64::ZERO; spectra[first].values.len()], information: 0.0 };
         reference.add(&spectra[first]);
-        let (mut log_bets, mut sharing, mut telling) = (0.0, 0, 0);
-        for spectrum in spectra.iter().enumerate().filter(|(index, _)| *index != first).map(|(_, spectrum)| spectrum) {
+        let (mut log_bets, mut sharing, mut telling, mut members) = (0.0, 0, 0, vec![first]);
+        for (index, spectrum) in spectra.iter().enumerate().filter(|(index, _)| *index != first) {
             let (won, most) = bet(&reference, spectrum);
             log_bets += won;
             if most > TELLING_GAIN {
@@ -248,11 +271,10 @@ fn shared(spectra: &[Spectrum], part: Part) -> Option<Shared> {
             }
             if won > 0.0 {
                 reference.add(spectrum);
+                members.push(index);
             }
         }
-        let all: Vec<(Complex64, f64)> = (0..reference.sum.len()).map(|index| reference.value(index)).collect();
-        let (values, ratios) = all.into_iter().unzip();
-        Shared { part, log_bets, sharing, telling, values, ratios }
+        Shared { part, log_bets, sharing, telling, members }
     };
     let all: Vec<Shared> = (0..count).into_par_iter().map(of_first).collect();
     let log_bets = log_sum(all.iter().map(|shared| shared.log_bets)) - (count as f64).ln();
@@ -272,10 +294,10 @@ fn bet(reference: &Reference, spectrum: &Spectrum) -> (f64, f64) {
         if concentration > 0.0 {
             let along = (value * foretold.conj()).re / (value.norm() * foretold.norm());
             for (sum, share) in returns.iter_mut().zip(SHARES) {
-                *sum += share * concentration * along - log_bessel_0(share * concentration);
+                *sum += (share * concentration * along - log_bessel_0(share * concentration)) / SETS;
             }
         }
-        most += foretold.norm_sqr() / variance;
+        most += foretold.norm_sqr() / variance / SETS;
     }
     (log_sum(returns.into_iter()) - (returns.len() as f64).ln(), most)
 }
@@ -307,18 +329,6 @@ fn log_bessel_0(x: f64) -> f64 {
     x - 0.5 * x.ln() + polynomial(3.75 / x, &terms).ln()
 }
 
-/// Share of a course's power that its slowest cosines have, up to so many turns (a type-II transform has no jump at the ends).
-fn slow_share(course: &[f64]) -> f64 {
-    let count = course.len() as f64;
-    let most = (2.0 * SLOWEST_TURNS) as usize;
-    let along = |k: usize| {
-        let cosine = |i: usize| (std::f64::consts::PI * k as f64 * (i as f64 + 0.5) / count).cos();
-        course.iter().enumerate().map(|(i, value)| value * cosine(i)).sum::<f64>().powi(2) * 2.0 / count
-    };
-    let all: f64 = course.iter().map(|value| value * value).sum();
-    (1..=most).map(along).sum::<f64>() / all.max(f64::MIN_POSITIVE)
-}
-
 /// Frequencies below which a quarter, half and three quarters of a spectrum's power lie.
 fn quartiles(frequencies_hz: &[f64], values: &[Complex64]) -> [f64; 3] {
     let mut powers: Vec<(f64, f64)> = frequencies_hz.iter().copied().zip(values.iter().map(Complex64::norm_sqr)).collect();
@@ -335,17 +345,21 @@ fn quartiles(frequencies_hz: &[f64], values: &[Complex64]) -> [f64; 3] {
     })
 }
 
-fn candidate(evidence: &Evidence, course: &Course, shared: &Shared) -> Candidate {
-    let values: Vec<Complex64> =
-        shared.values.iter().zip(&shared.ratios).map(|(v, ratio)| v * statistics::kept(*ratio)).collect();
-    let phases = course.back(&values);
-    let rms = (phases.iter().map(|phase| phase * phase).sum::<f64>() / phases.len() as f64).sqrt();
-    let slow = slow_share(&phases);
+fn candidate(evidence: &Evidence, course: &Course, deviations: &Deviations, shared: &Shared) -> Candidate {
+    let spectra = spectra(deviations, course, shared.part);
+    let members: Vec<&Spectrum> = shared.members.iter().map(|&index| &spectra[index]).collect();
+    let information: f64 = members.iter().map(|member| member.variance.recip()).sum();
+    let count = course.frames * course.loops;
+    let mean = |i: usize| members.iter().map(|member| member.course[i] / member.variance).sum::<f64>() / information;
+    let phases = course.denoised(&(0..count).map(mean).collect::<Vec<f64>>(), information.recip());
+    let rms = (phases.iter().map(|phase| phase * phase).sum::<f64>() / count as f64).sqrt();
+    let values = course.spectrum(&phases);
+    let ratios = values.iter().map(|value| value.norm_sqr() * information);
+    let spent = statistics::learned(ratios.collect::<Vec<f64>>().into_iter()) * values.len() as f64 / count as f64;
     let [low_hz, frequency_hz, high_hz] = quartiles(&course.frequencies_hz(), &values);
     let width_hz = (0.5 * (high_hz - low_hz)).max(0.5 / course.duration_s());
     let loops = course.loops;
     let deviation: Deviation = Arc::new(move |[frame, _, index]| phases[frame * loops + index]);
-    let spent = statistics::learned(shared.ratios.iter().copied()) * shared.ratios.len() as f64 / (course.frames * loops) as f64;
     let ranges = format!("{} of the {} ranges that can tell share it", shared.sharing, shared.telling);
     let (id, estimates, statement) = if shared.part == Part::Delay {
         let at_3_m = rms * candidates::stated_delay_s();
@@ -356,13 +370,6 @@ fn candidate(evidence: &Evidence, course: &Course, shared: &Shared) -> Candidate
                 "The phase of the static returns varies in proportion to their delay, by {at_3_m:.4} rad (standard deviation) at 3 m; {ranges}."
             ),
         )
-    } else if slow > 0.5 {
-        let text = format!(
-            "The phase of the static returns drifts over the {:.1} s of the recording, by {rms:.4} rad (standard deviation), at all ranges \
-             alike; {ranges}.",
-            course.duration_s()
-        );
-        (None, vec![], text)
     } else {
         let metres = evidence.radar.wavelength_m() / (4.0 * std::f64::consts::PI);
         let amplitude_m = std::f64::consts::SQRT_2 * rms * metres;
@@ -434,21 +441,25 @@ mod tests {
     }
 
     #[test]
-    fn a_course_comes_back_from_its_spectrum() {
+    fn noise_keeps_its_variance_under_the_taper_and_a_line_is_left_of_it() {
         for gap_s in [0.0, 0.02] {
-            let course = Course::of(&evidence(gap_s, 1, |_| 0.0, |_, _| 0.0));
+            let noise = evidence(gap_s, 1, |_| 0.0, |_, _| 0.0);
+            let course = Course::of(&noise);
             assert_eq!(course.even, gap_s == 0.0);
-            let values: Vec<f64> = (0..24 * 16).map(|i| (0.3 * i as f64).sin() + 0.2 * ((i / 16) as f64).cos()).collect();
-            let spectrum = course.spectrum(&values);
-            assert_eq!(spectrum.len(), course.frequencies_hz().len());
-            // What is left out holds nothing a second time.
-            let once = course.back(&spectrum);
-            let twice = course.back(&course.spectrum(&once));
-            assert!(once.iter().zip(&twice).all(|(a, b)| (a - b).abs() < 1e-9));
-            let square = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
-            let of_spectrum = 2.0 * spectrum.iter().map(Complex64::norm_sqr).sum::<f64>();
-            assert!((square(&once) - of_spectrum).abs() < 1e-9 * of_spectrum);
+            let white: Vec<f64> = noise.cube.samples.iter().step_by(96 * 2).take(24 * 16).map(|value| value.re).collect();
+            let mean = white.iter().sum::<f64>() / white.len() as f64;
+            let variance = white.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / white.len() as f64;
+            let values = course.spectrum(&white);
+            assert_eq!(values.len(), course.frequencies_hz().len());
+            let power = values.iter().map(Complex64::norm_sqr).sum::<f64>() / values.len() as f64;
+            assert!((power / variance - 1.0).abs() < 0.3, "{power} of {variance}");
+            let line = |i: usize| 0.8 * (TAU * 0.19 * i as f64).sin();
+            let loud: Vec<f64> = (0..24 * 16).map(|i| line(i) + 0.1 * white[i] / variance.sqrt()).collect();
+            let left = course.denoised(&loud, 0.01);
+            let off = left.iter().enumerate().map(|(i, value)| (value - line(i)).powi(2)).sum::<f64>() / left.len() as f64;
+            assert!(off < 0.05, "{off}");
         }
+        assert!(without_slow(&(0..50).map(f64::from).collect::<Vec<f64>>()).iter().all(|left| left.abs() < 0.4));
     }
 
     /// Every range by a course of its own, far stronger at one.
@@ -465,11 +476,10 @@ mod tests {
             assert_eq!(found.id, Some("radar_vibration"), "{}", found.statement);
             assert!(found.p_value < 1e-6 && found.gain > 13.0, "{} {}", found.p_value, found.gain);
         }
-        // Slower than the recording, it is a drift, which has no name.
+        // Slower than the recording, it is a drift, which other laws tell.
         let duration_s = 24.0 * 16.0 * evidence(0.0, 1, |_| 0.0, own).radar.loop_period_s();
         let drifts = |time_s: f64| 0.4 * time_s / duration_s;
-        let found = find(&evidence(0.0, 2, drifts, |_, _| 0.0)).expect("a drift");
-        assert!(found.id.is_none() && found.p_value < 1e-6, "{}", found.statement);
+        assert!(find(&evidence(0.0, 2, drifts, |_, _| 0.0)).is_none_or(|found| found.p_value > 1e-3));
     }
 
     #[test]
@@ -479,6 +489,10 @@ mod tests {
                 let p_value = |evidence: &Evidence| find(evidence).map_or(1.0, |found| found.p_value);
                 assert!(p_value(&evidence(gap_s, seed, |_| 0.0, |_, _| 0.0)) > 1e-3, "{seed}");
                 assert!(p_value(&evidence(gap_s, seed, |_| 0.0, own)) > 1e-3, "{seed}");
+                // Each drifts away by itself, to either side.
+                let away =
+                    |time_s: f64, range: usize| 2.0 * time_s * (1.0 + range as f64) * if range % 2 == 0 { 1.0 } else { -1.0 };
+                assert!(p_value(&evidence(gap_s, seed, |_| 0.0, away)) > 1e-3, "{seed}");
             }
         }
     }
