@@ -20,8 +20,10 @@ from ._errors import Error, FileError, MissingFileError, Note
 from ._progress import Progress
 from ._recording import Recording, read
 from ._types import Axis, Check, Finding, Heatmap, Poses, Radar, Report, Run
+from ._verbs.align import align
 from ._verbs.check import check
 from ._verbs.diagnose import diagnose
+from ._verbs.export import export
 from ._verbs.heatmaps import heatmaps
 from ._verbs.import_ import import_
 from ._verbs.record import record
@@ -46,8 +48,10 @@ __all__ = [
     "Report",
     "Run",
     "Windows",
+    "align",
     "check",
     "diagnose",
+    "export",
     "heatmaps",
     "import_",
     "read",

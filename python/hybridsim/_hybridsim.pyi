@@ -66,4 +66,14 @@ def diagnose(
     as_stated: bool,
     tell: Tell,
 ) -> tuple[str, str]: ...
+def align(recording: str, out: str, lag_s: float, frames: int, apply: bool, tell: Tell) -> str: ...
+def export(
+    sources: list[str],
+    target: str,
+    out: str,
+    board: str | None,
+    split_by: str | None,
+    sets: list[str],
+    tell: Tell,
+) -> tuple[int, int]: ...
 def abandon() -> None: ...

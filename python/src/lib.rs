@@ -16,8 +16,10 @@ mod _hybridsim {
     use crate::buffer::Numbers;
     #[pymodule_export]
     use crate::verbs::{
+        align::align,
         check::check,
         diagnose::diagnose,
+        export::export,
         heatmaps::heatmaps,
         import::import,
         read::{Recording, read},

@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Common, progress::Progress};
+use super::{Common, progress::Shown};
 use crate::{
-    data::atomic::AtomicFolder,
     error::Result,
-    export::{Dataset, ExportConfig, Target, write_dataset},
-    import::capture::boards::Board,
+    export::Target,
+    verbs::{self, export::Export},
 };
 
 #[derive(Args)]
@@ -32,25 +31,18 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
-    let config = ExportConfig::new(&common.set)?;
-    let board = arguments.board.as_deref().map(Board::named).transpose()?;
-    let folder = AtomicFolder::create(&arguments.out)?;
-    let dataset = Dataset::open(&arguments.sources, arguments.to, board, config, arguments.split_by.clone())?;
-    let progress = Progress::new("exporting", dataset.frames(), common.quiet);
-    let written = write_dataset(&dataset, folder.path(), &mut |done, name| {
-        progress.set(done);
-        progress.message(name.to_string());
-    });
-    progress.finish();
-    let notes = written?;
-    folder.finish()?;
-    for note in notes {
-        remark!("note: {note}");
-    }
-    let count = match dataset.shards.len() {
-        1 => "1 recording".to_string(),
-        count => format!("{count} recordings"),
+    let what = Export {
+        sources: &arguments.sources,
+        target: arguments.to,
+        board: arguments.board.as_deref(),
+        split_by: arguments.split_by.clone(),
+        sets: &common.set,
+        out: &arguments.out,
     };
-    say!("{count}, {} frames as {}: {}", dataset.frames(), dataset.target.name, arguments.out.display());
+    let mut shown = Shown::new(common.quiet);
+    let [recordings, frames] = verbs::export::export(&what, &mut |told| shown.show(told))?;
+    shown.finish();
+    let recordings = if recordings == 1 { "1 recording".to_string() } else { format!("{recordings} recordings") };
+    say!("{recordings}, {frames} frames as {}: {}", arguments.to.name, arguments.out.display());
     Ok(())
 }

@@ -4,7 +4,9 @@
 //! may end the work by unwinding (`std::panic::resume_unwind`): what is unfinished is dropped on the way, so that nothing
 //! half-written stays.
 
+pub mod align;
 pub mod diagnose;
+pub mod export;
 pub mod heatmaps;
 pub mod notes;
 pub mod plausible;

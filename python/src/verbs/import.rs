@@ -5,7 +5,6 @@ use std::{collections::BTreeMap, path::PathBuf};
 use hybridsim::{
     data::atomic::AtomicFolder,
     import::capture::{self, Layout, Stated},
-    integrity,
     verbs::{Told, plausible},
 };
 use pyo3::prelude::*;
@@ -37,12 +36,13 @@ pub fn import(
         AtomicFolder::create(&out).map(drop)?;
         let capture = capture::open(&sources, &stated)?;
         tell(Told::Begun { what: "importing", steps: capture.radar.frames });
-        let recording = capture::import(capture, &out, labels, &mut |done, _| tell(Told::Done(done)))?;
-        recording.notes.iter().for_each(|note| tell(Told::Note(note)));
-        plausible::recording(&recording, as_stated, tell)?;
-        for finding in integrity::inspect(&recording, recording.radar.frames)?.iter().filter(|finding| !finding.ok) {
-            tell(Told::Note(&format!("damaged: {}", finding.found)));
+        let draft = capture::draft(capture, &out, labels, &mut |done, _| tell(Told::Done(done)))?;
+        plausible::recording(draft.recording(), as_stated, tell)?;
+        for finding in draft.findings.iter().filter(|finding| !finding.ok) {
+            tell(Told::Note(&format!("{}: {}", finding.name(), finding.found)));
         }
+        let recording = draft.publish(as_stated)?;
+        recording.notes.iter().for_each(|note| tell(Told::Note(note)));
         Ok(recording.notes.clone())
     })
 }

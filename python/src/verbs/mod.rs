@@ -1,7 +1,9 @@
 //! A verb, a file.
 
+pub mod align;
 pub mod check;
 pub mod diagnose;
+pub mod export;
 pub mod heatmaps;
 pub mod import;
 pub mod read;

@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from .. import _hybridsim
+from .._progress import Teller, Watcher
+from .._recording import Recording
+from .._types import Settings, StrPath, sets
+
+
+def export(
+    sources: Recording | StrPath | Sequence[Recording | StrPath],
+    to: str,
+    out: StrPath,
+    *,
+    board: str | None = None,
+    split_by: str | None = None,
+    set: Settings = (),
+    progress: Watcher = True,
+) -> Path:
+    """Writes recordings in the layouts of others.
+
+    Args:
+        sources: a recording, its folder, a folder of recordings or of a site; or several of them.
+        to: ``npz``, ``hdf5``, ``dca1000``, ``rover``, ``maps`` or ``points``.
+        out: folder for the files; must be new or empty. They appear together or not at all.
+        board: the board that is imitated, such as ``IWR6843ISK``: its lanes, and its numbers of the transmitters.
+        split_by: a label, such as ``subject``, by whose values recordings are divided into train, validation and test.
+        set: changes of settings, such as ``{"points.false_alarm_rate": 1e-4}``.
+        progress: ``True``, ``False``, or a function of :class:`hybridsim.Progress`.
+
+    Returns:
+        ``out``.
+
+    Raises:
+        hybridsim.Error: a recording that cannot be read, or that the layout cannot hold; unknown settings, boards or labels.
+    """
+    several = [sources] if isinstance(sources, (Recording, str, os.PathLike)) else list(sources)
+    folders = [os.fspath(source.folder if isinstance(source, Recording) else source) for source in several]
+    with Teller(progress) as tell:
+        _hybridsim.export(folders, to, os.fspath(out), board, split_by, sets(set), tell)
+    return Path(out)
