@@ -95,10 +95,11 @@ pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>
         Box::new(numbers::Numbers::new(numbers::BYTE_ORDER)),
         Box::new(numbers::Numbers::new(numbers::SIGN)),
         Box::new(shift::Shift::new(schedule)),
+        // Chirps in the order of firing repeat as a longer loop does: the special case first.
+        Box::new(transmitters::Transmitters::new(schedule)),
         Box::new(period::Period::new(schedule)),
         Box::new(start::Start::new(schedule)),
         Box::new(boundary::Boundary::new(schedule)),
-        Box::new(transmitters::Transmitters::new(schedule)),
         Box::new(words::Words::new(schedule)),
         Box::new(iq_order::IqOrder::new(schedule)),
     ];

@@ -56,13 +56,13 @@ mod tests {
         let mut reader = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(&path).unwrap())).read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         let width = reader.next_frame(&mut pixels).unwrap().width;
-        let row = TITLE_HEIGHT + CAPTION_HEIGHT + 10 + (PANEL.1 - CAPTION_HEIGHT - 72) / 2;
-        // White where the line is.
-        let white = |left: u32| {
-            let columns = left + 200..left + 600;
-            (row - 12..row + 12)
-                .any(|y| columns.clone().all(|x| pixels[((y * width + x) * 3) as usize..][..3].iter().all(|value| *value > 200)))
+        // White where the line is, and the map's colour above and below.
+        let is = |left: u32, y: u32, wanted: fn(u8) -> bool| {
+            (left + 300..left + 500).all(|x| pixels[((y * width + x) * 3) as usize..][..3].iter().all(|value| wanted(*value)))
         };
+        let (light, dark): (fn(u8) -> bool, fn(u8) -> bool) = (|value| value > 200, |value| value < 150);
+        let rows = TITLE_HEIGHT + CAPTION_HEIGHT + 20..TITLE_HEIGHT + PANEL.1 - 20;
+        let white = |left: u32| rows.clone().any(|y| is(left, y, light) && is(left, y - 10, dark) && is(left, y + 10, dark));
         assert!(!white(0) && white(PANEL.0));
     }
 }

@@ -70,19 +70,18 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let known = |candidate: &Candidate| candidate.id.is_some_and(|id| evidence.accepted.contains(&id));
     let tells = |candidate: &Candidate| candidate.p_value < PASSED_ON && candidate.gain > LEAST_GAIN && !known(candidate);
     let of_all = |found: Candidate| Candidate { p_value: statistics::corrected(found.p_value, LOOKS), ..found };
-    // Where nobody is tracked, what the ranges share needs no law in time to be told.
-    let untracked = evidence.body.is_none();
-    let shared = untracked.then(|| shared::find(evidence)).flatten().map(of_all).filter(tells);
+    // Where nobody is tracked and no law in time holds, what most ranges share is told without one.
+    let shared = || evidence.body.is_none().then(|| shared::find(evidence)).flatten().map(of_all).filter(tells);
     let Some(field) = Field::new(evidence) else {
         // No range stands still: nothing does, or returns from many directions swing.
-        return shared.or_else(|| sway::find(evidence).map(of_all).filter(tells)).into_iter().collect();
+        return shared().or_else(|| sway::find(evidence).map(of_all).filter(tells)).into_iter().collect();
     };
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     let frame_s = evidence.radar.frame_duration_s();
     // Of a few parameters, and those that are free in every chirp.
     let (mut found, mut free): (Vec<Found>, Vec<Found>) = (vec![], vec![]);
     for part in [Part::Gain, Part::Phase, Part::Delay, Part::Boresight] {
-        if part == Part::Boresight && evidence.room.is_none() || part != Part::Gain && shared.is_some() {
+        if part == Part::Boresight && evidence.room.is_none() {
             continue;
         }
         let series = field.series(part, |_| true);
@@ -138,6 +137,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         }
         list.retain(|Found { candidate, .. }| tells(candidate));
     }
+    let is_turn =
+        |found: &&Found| [Part::Phase, Part::Delay].map(candidates::behaves_like).contains(&found.candidate.behaves_like);
+    let shared = if found.iter().chain(&free).any(|found| is_turn(&found)) { None } else { shared() };
     // One cause shows in several looks. A law of few parameters wins where it explains nearly as much as what is free in
     // every chirp (over the noise alone: a background that makes a law unsure is part of what is free in every chirp), and a name
     // where it explains nearly as much as what has none.

@@ -145,25 +145,25 @@ impl Course {
         Self { frames, loops, even, frame_s, loop_s }
     }
 
-    /// Stretches of even sampling, slow parts taken out of each: all chirps, or the frames' means (scaled to a chirp's noise) and each
-    /// frame about its own.
+    /// Stretches of even sampling: all chirps, or the frames' means (scaled to a chirp's noise) and each frame about its own.
     fn stretches(&self, course: &[f64]) -> Vec<Vec<f64>> {
         if self.even {
-            return vec![without_slow(course)];
+            return vec![course.to_vec()];
         }
         let root = (self.loops as f64).sqrt();
         let means: Vec<f64> = course.chunks_exact(self.loops).map(|frame| frame.iter().sum::<f64>() / root).collect();
-        let within = course.chunks_exact(self.loops).map(without_slow);
-        std::iter::once(without_slow(&means)).chain(within).collect()
+        let within = course.chunks_exact(self.loops).zip(&means);
+        let within: Vec<Vec<f64>> = within.map(|(frame, mean)| frame.iter().map(|value| value - mean / root).collect()).collect();
+        std::iter::once(means).chain(within).collect()
     }
 
-    /// The spectrum of each stretch under a taper, one after the other; white noise keeps its variance.
+    /// The spectrum of each stretch without what is slow in it, under a taper; white noise keeps its variance.
     fn spectrum(&self, course: &[f64]) -> Vec<Complex64> {
         let of_stretch = |stretch: Vec<f64>| {
             let count = stretch.len();
             let taper = |i: usize| (2.0 / count as f64).sqrt() * (std::f64::consts::PI * (i as f64 + 0.5) / count as f64).sin();
-            let mut values: Vec<Complex64> =
-                stretch.into_iter().enumerate().map(|(i, value)| Complex64::from(value * taper(i))).collect();
+            let left = without_slow(&stretch).into_iter().enumerate();
+            let mut values: Vec<Complex64> = left.map(|(i, value)| Complex64::from(value * taper(i))).collect();
             FftPlanner::new().plan_fft(count, FftDirection::Forward).process(&mut values);
             values.into_iter().take(count.div_ceil(2)).skip(FIRST)
         };
@@ -352,8 +352,9 @@ fn candidate(evidence: &Evidence, course: &Course, deviations: &Deviations, shar
     let count = course.frames * course.loops;
     let mean = |i: usize| members.iter().map(|member| member.course[i] / member.variance).sum::<f64>() / information;
     let phases = course.denoised(&(0..count).map(mean).collect::<Vec<f64>>(), information.recip());
-    let rms = (phases.iter().map(|phase| phase * phase).sum::<f64>() / count as f64).sqrt();
     let values = course.spectrum(&phases);
+    // A spectrum has one of two sides.
+    let rms = (2.0 * values.iter().map(Complex64::norm_sqr).sum::<f64>() / count as f64).sqrt();
     let ratios = values.iter().map(|value| value.norm_sqr() * information);
     let spent = statistics::learned(ratios.collect::<Vec<f64>>().into_iter()) * values.len() as f64 / count as f64;
     let [low_hz, frequency_hz, high_hz] = quartiles(&course.frequencies_hz(), &values);
@@ -410,6 +411,10 @@ fn candidate(evidence: &Evidence, course: &Course, deviations: &Deviations, shar
 mod tests {
     use std::f64::consts::TAU;
 
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
     use super::*;
     use crate::radar::Radar;
 
@@ -443,18 +448,16 @@ mod tests {
     #[test]
     fn noise_keeps_its_variance_under_the_taper_and_a_line_is_left_of_it() {
         for gap_s in [0.0, 0.02] {
-            let noise = evidence(gap_s, 1, |_| 0.0, |_, _| 0.0);
-            let course = Course::of(&noise);
+            let course = Course::of(&evidence(gap_s, 1, |_| 0.0, |_, _| 0.0));
             assert_eq!(course.even, gap_s == 0.0);
-            let white: Vec<f64> = noise.cube.samples.iter().step_by(96 * 2).take(24 * 16).map(|value| value.re).collect();
-            let mean = white.iter().sum::<f64>() / white.len() as f64;
-            let variance = white.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / white.len() as f64;
+            let mut random = ChaCha8Rng::seed_from_u64(7);
+            let white: Vec<f64> = (0..24 * 16).map(|_| StandardNormal.sample(&mut random)).collect();
             let values = course.spectrum(&white);
             assert_eq!(values.len(), course.frequencies_hz().len());
             let power = values.iter().map(Complex64::norm_sqr).sum::<f64>() / values.len() as f64;
-            assert!((power / variance - 1.0).abs() < 0.3, "{power} of {variance}");
+            assert!((power - 1.0).abs() < 0.3, "{power}");
             let line = |i: usize| 0.8 * (TAU * 0.19 * i as f64).sin();
-            let loud: Vec<f64> = (0..24 * 16).map(|i| line(i) + 0.1 * white[i] / variance.sqrt()).collect();
+            let loud: Vec<f64> = (0..24 * 16).map(|i| line(i) + 0.1 * white[i]).collect();
             let left = course.denoised(&loud, 0.01);
             let off = left.iter().enumerate().map(|(i, value)| (value - line(i)).powi(2)).sum::<f64>() / left.len() as f64;
             assert!(off < 0.05, "{off}");
