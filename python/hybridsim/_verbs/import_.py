@@ -16,6 +16,8 @@ def import_(
     config: StrPath | Iterable[StrPath] = (),
     board: str | None = None,
     layout: str | None = None,
+    variable: str | None = None,
+    preset: str | None = None,
     profile: int | None = None,
     subframe: int | None = None,
     tx: int | None = None,
@@ -27,12 +29,15 @@ def import_(
     """Turns a capture of a radar board into a recording.
 
     Args:
-        sources: ``adc_data.bin`` files of one DCA1000 capture in their order, a folder of the Infineon SDK, or a ``.npy`` array.
+        sources: ``adc_data.bin`` files of one DCA1000 capture in their order, a folder of the Infineon SDK, or an array
+            (``.npy``, ``.npz``, ``.mat``, ``.h5``).
         out: folder of the recording, which must not exist yet, or be empty. It appears when it is complete.
         config: what describes the radar: ``.mmwave.json``, ``.setup.json`` or ``.cfg`` of TI, or TOML with ``[radar]``.
         board: whose antenna positions are then known, such as ``"IWR6843ISK"``.
         layout: the order of an array's axes, outer to inner, of frame, tx, rx, loop, chirp, sample, iq; such as
             ``"frame loop rx sample"``.
+        variable: which array of a container (``.npz``, ``.mat``, HDF5), or ``"RE,IM"`` for two of real numbers.
+        preset: a public data set by its name, whose layout and radar are then known.
         profile: which chirp profile, where a frame has several.
         subframe: which subframe of an advanced frame.
         tx: keep the chirps of one transmitter alone.
@@ -54,6 +59,8 @@ def import_(
             paths(config),
             board,
             layout,
+            variable,
+            preset,
             profile,
             subframe,
             tx,

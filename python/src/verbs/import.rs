@@ -21,6 +21,8 @@ pub fn import(
     configs: Vec<PathBuf>,
     board: Option<String>,
     layout: Option<String>,
+    variable: Option<String>,
+    preset: Option<String>,
     profile: Option<usize>,
     subframe: Option<usize>,
     tx: Option<usize>,
@@ -30,7 +32,7 @@ pub fn import(
     tell: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<String>> {
     let layout = layout.map(|text| Layout::parse(&text)).transpose().map_err(|error| raised(py, &error))?;
-    let stated = Stated { configs, board, layout, profile, subframe, tx, sets };
+    let stated = Stated { configs, board, layout, variable, preset, profile, subframe, tx, sets };
     run(py, tell, move |tell| {
         // What cannot be written is said before anything is read.
         AtomicFolder::create(&out).map(drop)?;

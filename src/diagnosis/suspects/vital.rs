@@ -83,8 +83,6 @@ struct Reflector {
     phase: Vec<f64>,
     /// Of what is left in each cell, over the training frames.
     variance: Vec<f64>,
-    /// Power of the change that it explains, over the noise.
-    explained: f64,
 }
 
 fn one(evidence: &Evidence) -> Option<Candidate> {
@@ -115,8 +113,11 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     // A neighbour may be the cleaner circle: where other parts of the body are not at the same range.
     let fits: Vec<Reflector> =
         near.filter(|&bin| change[bin] > 10.0).filter_map(|bin| reflector(&data, &mean, bin, training)).collect();
-    // A short arc of a large circle fits whatever hardly changes: what counts is how much of the change is explained.
-    let best = fits.into_iter().max_by(|a, b| a.explained.total_cmp(&b.explained))?;
+    let share = |r: &Reflector| {
+        let left: f64 = r.variance.iter().sum();
+        r.amplitude.iter().map(|a| a.norm_sqr()).sum::<f64>() / left
+    };
+    let best = fits.into_iter().max_by(|a, b| share(a).total_cmp(&share(b)))?;
     let times: Vec<f64> = evidence.starts_s.clone();
     let rhythm = rhythm(&times, &best.phase, training, held_out);
     let metres = evidence.radar.wavelength_m() / (4.0 * PI);
@@ -263,24 +264,21 @@ fn reflector(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize]) 
             still[i] = mean[cell] - amplitude[i] * centre;
         }
     }
-    let count = training.len() as f64;
-    let left: Vec<f64> = cells
+    let variance = cells
         .iter()
         .enumerate()
         .map(|(i, &cell)| {
-            let of_frame = |&f: &usize| (data.values[f][cell] - still[i] - amplitude[i] * turned[f]).norm_sqr();
-            training.iter().map(of_frame).sum::<f64>() / count
+            let left: f64 =
+                training.iter().map(|&f| (data.values[f][cell] - still[i] - amplitude[i] * turned[f]).norm_sqr()).sum();
+            (left / training.len() as f64).max(data.noise[i])
         })
         .collect();
-    let changed = |cell: usize| training.iter().map(|&f| (data.values[f][cell] - mean[cell]).norm_sqr()).sum::<f64>() / count;
-    let explained = (cells.iter().enumerate()).map(|(i, &cell)| (changed(cell) - left[i]) * weight[i]).sum();
-    let variance = left.iter().zip(&data.noise).map(|(left, noise)| left.max(*noise)).collect();
     let mut phase: Vec<f64> = turned.iter().map(|t| t.arg()).collect();
     for frame in 1..phase.len() {
         let jump = phase[frame] - phase[frame - 1];
         phase[frame] -= TAU * (jump / TAU).round();
     }
-    Some(Reflector { cells, still, amplitude, phase, variance, explained })
+    Some(Reflector { cells, still, amplitude, phase, variance })
 }
 
 /// Centre of the circle through a cell's values (Kåsa's least squares).

@@ -498,8 +498,9 @@ mod tests {
                 assert!(p_value(&evidence(gap_s, seed, |_| 0.0, |_, _| 0.0)) > 1e-3, "{seed}");
                 assert!(p_value(&evidence(gap_s, seed, |_| 0.0, own)) > 1e-3, "{seed}");
                 // Each drifts away by itself, to either side.
-                let away =
-                    |time_s: f64, range: usize| 2.0 * time_s * (1.0 + range as f64) * if range % 2 == 0 { 1.0 } else { -1.0 };
+                let away = |time_s: f64, range: usize| {
+                    2.0 * time_s * (1.0 + range as f64) * if range.is_multiple_of(2) { 1.0 } else { -1.0 }
+                };
                 assert!(p_value(&evidence(gap_s, seed, |_| 0.0, away)) > 1e-3, "{seed}");
             }
         }
