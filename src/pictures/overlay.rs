@@ -57,13 +57,13 @@ mod tests {
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         let width = reader.next_frame(&mut pixels).unwrap().width;
         // White where the line is, and the map's colour above and below.
-        let is = |left: u32, y: u32, wanted: std::ops::Range<u8>| {
+        let is = |left: u32, y: u32, wanted: std::ops::RangeInclusive<u8>| {
             (left + 300..left + 500)
                 .all(|x| pixels[((y * width + x) * 3) as usize..][..3].iter().all(|value| wanted.contains(value)))
         };
         let rows = TITLE_HEIGHT + CAPTION_HEIGHT + 20..TITLE_HEIGHT + PANEL.1 - 20;
         let white =
-            |left: u32| rows.clone().any(|y| is(left, y, 200..255) && is(left, y - 10, 0..150) && is(left, y + 10, 0..150));
+            |left: u32| rows.clone().any(|y| is(left, y, 200..=255) && is(left, y - 10, 0..=150) && is(left, y + 10, 0..=150));
         assert!(!white(0) && white(PANEL.0));
     }
 }

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use hybridsim::{
     data::atomic::AtomicFolder,
-    import::capture::{self, Layout, Stated},
+    import::capture::{self, Layout, Preset, Stated},
     verbs::{Told, plausible},
 };
 use pyo3::prelude::*;
@@ -32,6 +32,7 @@ pub fn import(
     tell: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<String>> {
     let layout = layout.map(|text| Layout::parse(&text)).transpose().map_err(|error| raised(py, &error))?;
+    let preset = preset.map(|name| Preset::named(&name)).transpose().map_err(|error| raised(py, &error))?;
     let stated = Stated { configs, board, layout, variable, preset, profile, subframe, tx, sets };
     run(py, tell, move |tell| {
         // What cannot be written is said before anything is read.
