@@ -15,7 +15,15 @@ use hybridsim::{
 fn training_on_a_planted_recording_lowers_its_loss() {
     let Some(shared) = support::shared("") else { return };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/recording.toml");
-    let sets = ["training.epochs=6", "simulator.room.patches=400", "training.validation_fraction=0.7"].map(String::from);
+    // So few steps need long ones.
+    let sets = [
+        "training.epochs=6",
+        "simulator.room.patches=400",
+        "training.validation_fraction=0.7",
+        "training.learning_rate=3e-3",
+        "training.final_learning_rate=3e-4",
+    ]
+    .map(String::from);
     let mut config = Config::read(&path, &sets).unwrap();
     config.data.recordings = vec![shared.join("recordings/planted/p1")];
     let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
