@@ -107,7 +107,10 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let hums = accepted.behaves_like == fluctuation::HUMS && !apart(around, candidate.place.range_m);
     let shaken = vibrates && (turns || is_path(candidate)) || hums && is_path(candidate);
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
-    let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside;
+    // A course from frame to frame that has no name is modelled roughly: what is left of it turns all returns, too.
+    let drifts = accepted.id.is_none() && TURNS[..2].contains(&accepted.behaves_like);
+    let of_drift = drifts && candidate.behaves_like == accepted.behaves_like;
+    let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside || of_drift;
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it
     // and among its images, and what a part may carry, the last resort, is never sure there.
     let timed = accepted.place.stage == "timing";

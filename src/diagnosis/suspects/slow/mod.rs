@@ -137,9 +137,10 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         }
         list.retain(|Found { candidate, .. }| tells(candidate));
     }
-    let is_turn =
-        |found: &&Found| [Part::Phase, Part::Delay].map(candidates::behaves_like).contains(&found.candidate.behaves_like);
-    let shared = if found.iter().chain(&free).any(|found| is_turn(&found)) { None } else { shared() };
+    let is_sure = |found: &Found| found.unsure.is_none_or(|(_, p_value)| p_value < SURE);
+    let of_phase = [Part::Phase, Part::Delay].map(candidates::behaves_like);
+    let holds = |found: &Found| of_phase.contains(&found.candidate.behaves_like) && is_sure(found);
+    let shared = if found.iter().chain(&free).any(holds) { None } else { shared() };
     // One cause shows in several looks. A law of few parameters wins where it explains nearly as much as what is free in
     // every chirp (over the noise alone: a background that makes a law unsure is part of what is free in every chirp), and a name
     // where it explains nearly as much as what has none.
