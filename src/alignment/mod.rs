@@ -2,9 +2,9 @@
 //! recording itself, with intervals, or that it cannot be told.
 //!
 //! A body's motion says how ranges and velocities change, the radar saw them change; a placement is judged by how likely the moving cells
-//! of the recording are under the power that the placed body would send ([`likelihood`]: the law by which the diagnosis compares displaced
-//! bodies, with the phases between channels). [`coarse`] looks everywhere on a grid, [`climb`] goes to the maximum, [`chance`] says how
-//! well frames in a wrong order fit, and [`verdict`] what may be said.
+//! of the recording are under the power that the placed body would send (`likelihood`: the law by which the diagnosis compares displaced
+//! bodies, with the phases between channels). `coarse` looks everywhere on a grid, `climb` goes to the maximum, `chance` says how
+//! well frames in a wrong order fit, and `verdict` what may be said.
 
 mod chance;
 mod climb;
