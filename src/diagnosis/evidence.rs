@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use rustfft::{Fft, FftDirection, FftPlanner};
 
 use super::codes::{self, Component};
+use super::course::Course;
 use super::cube::{Cube, Loaded, Split};
 use super::denoised;
 use super::finding::{Undo, Volume};
@@ -41,6 +42,8 @@ pub struct Evidence {
     pub accepted: Vec<&'static str>,
     /// What of it undid a fixed law of the samples, oldest first.
     pub(super) inverses: Vec<(Undo, Volume)>,
+    /// Phases over time of what was accepted, oldest first.
+    pub courses: Vec<Arc<Course>>,
     pub extremes: [f64; 2],
     /// Of the raw samples; none where they are no whole numbers.
     pub codes: Option<Arc<Vec<Component>>>,
@@ -65,6 +68,7 @@ impl Evidence {
             body,
             accepted: vec![],
             inverses: vec![],
+            courses: vec![],
             extremes,
             codes,
             noise: OnceLock::new(),

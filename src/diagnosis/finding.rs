@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::course::Course;
 use super::cube::Cube;
 use super::prediction::BodyPrediction;
 use super::statistics::chi2_tail;
@@ -112,10 +113,23 @@ pub enum Correction {
     /// Undone in the samples by a law with numbers that the training frames gave, or with a prior for those that they did not: what is
     /// held out is foretold by it as it is.
     Inverse(Undo, Volume),
+    /// Another correction, after which the phase over time of what it concerned is known.
+    Followed(Box<Correction>, Arc<Course>),
     /// Changes what is predicted of the body.
     Body(Arc<dyn Fn(&mut BodyPrediction) + Send + Sync>),
     /// Explains power where it was not expected: (frame, doppler, range) masks are kept by whoever needs them.
     None,
+}
+
+impl Correction {
+    /// What it changes in the samples.
+    pub fn undo(&self) -> Option<&Undo> {
+        match self {
+            Self::Samples(undo) | Self::Inverse(undo, _) => Some(undo),
+            Self::Followed(correction, _) => correction.undo(),
+            Self::Body(_) | Self::None => None,
+        }
+    }
 }
 
 /// A curve to draw, such as a filter's response.
@@ -235,6 +249,26 @@ impl std::fmt::Debug for Candidate {
             self.estimates.iter().map(|e| (e.name, &e.values)).collect::<Vec<_>>(),
             self.statement
         )
+    }
+}
+
+/// Something without a name or numbers: for tests.
+#[cfg(test)]
+pub(crate) fn nameless(behaves_like: &'static str) -> Candidate {
+    Candidate {
+        id: None,
+        behaves_like,
+        estimates: vec![],
+        choice: None,
+        place: Place::at("receiver"),
+        p_value: 0.0,
+        gain: 1.0,
+        errs_alike: false,
+        look_alikes: vec![],
+        statement: String::new(),
+        curve: None,
+        energy: 0.0,
+        correction: Correction::None,
     }
 }
 

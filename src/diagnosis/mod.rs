@@ -8,6 +8,7 @@
 pub mod audit;
 pub mod codes;
 pub mod config;
+mod course;
 pub mod cube;
 pub mod denoised;
 mod estimated;
@@ -32,6 +33,7 @@ pub mod support;
 pub mod suspects;
 
 pub use config::DiagnosisConfig;
+pub use course::{Course, Of};
 pub use cube::{Cube, Split};
 pub use evidence::Evidence;
 pub use finding::{Candidate, Correction, Estimate, Place, Volume};

@@ -107,9 +107,11 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let hums = accepted.behaves_like == fluctuation::HUMS && !apart(around, candidate.place.range_m);
     let shaken = vibrates && (turns || is_path(candidate)) || hums && is_path(candidate);
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
-    // A course from frame to frame that has no name is modelled roughly: what is left of it turns all returns, too.
+    // A course from frame to frame that has no name is modelled roughly: what is left of it turns all returns, too, and the strongest
+    // as if it moved.
     let drifts = accepted.id.is_none() && TURNS[..2].contains(&accepted.behaves_like);
-    let of_drift = drifts && candidate.behaves_like == accepted.behaves_like;
+    let slow_path = is_path(candidate) && candidate.id.is_none();
+    let of_drift = drifts && (candidate.behaves_like == accepted.behaves_like || slow_path);
     let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside || of_drift;
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it
     // and among its images, and what a part may carry, the last resort, is never sure there.
@@ -160,21 +162,8 @@ mod tests {
     use crate::diagnosis::Place;
 
     fn of(id: Option<&'static str>, behaves_like: &'static str, gain: f64) -> Candidate {
-        Candidate {
-            id,
-            behaves_like,
-            estimates: vec![],
-            choice: None,
-            place: Place::at("scene"),
-            p_value: 0.0,
-            gain,
-            errs_alike: false,
-            look_alikes: vec![],
-            statement: String::new(),
-            curve: None,
-            energy: 0.0,
-            correction: Correction::None,
-        }
+        let place = Place::at("scene");
+        Candidate { id, gain, place, ..crate::diagnosis::finding::nameless(behaves_like) }
     }
 
     #[test]

@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use super::config::DiagnosisConfig;
+use super::course::Of;
 use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
@@ -53,6 +54,9 @@ const NEARLY: f64 = 0.8;
 
 /// What is named even where products of the signal with itself lie everywhere.
 const WHATEVER_THE_SIGNAL: [&str; 2] = ["iq_imbalance", "adc_saturation"];
+
+/// What never changes and may be a return or added behind the mixer: what turns all returns tells, and goes first.
+const ADDED: [&str; 3] = ["tx_leakage", "dc_offset", "static_reflector"];
 
 /// Stages of the signal's chain at which everything that is received is changed.
 const UPSTREAM: [&str; 2] = ["waveform", "receiver"];
@@ -230,6 +234,12 @@ fn upstream<'a>(
     best: &'a (usize, Candidate),
     passing: &[&'a (usize, Candidate)],
 ) -> &'a (usize, Candidate) {
+    let turns_all = |(_, candidate): &&&(usize, Candidate)| matches!(&candidate.correction, Correction::Followed(_, course) if course.of == Of::All);
+    if ADDED.iter().any(|id| best.1.id == Some(id))
+        && let Some(course) = passing.iter().filter(turns_all).max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))
+    {
+        return course;
+    }
     if best.1.id == Some("tx_leakage") {
         // What the chirp makes of the room's returns never changes either, and a leakage is free in every channel: it is none where
         // nothing is left of it.
@@ -367,20 +377,28 @@ impl Evidence {
             // Where paths were cut out there is not even noise left.
             next.noise = self.noise.clone();
         }
-        match &candidate.correction {
-            Correction::Samples(undo) => undo(&mut next.cube),
+        next.correct(&candidate.correction);
+        next.accepted.push(candidate.id.unwrap_or(candidate.behaves_like));
+        next
+    }
+
+    fn correct(&mut self, correction: &Correction) {
+        match correction {
+            Correction::Samples(undo) => undo(&mut self.cube),
             Correction::Inverse(undo, volume) => {
-                undo(&mut next.cube);
-                next.inverses.push((undo.clone(), volume.clone()));
+                undo(&mut self.cube);
+                self.inverses.push((undo.clone(), volume.clone()));
+            }
+            Correction::Followed(correction, course) => {
+                self.correct(correction);
+                self.courses.push(course.clone());
             }
             Correction::Body(change) => {
-                if let Some(body) = &mut next.body {
+                if let Some(body) = &mut self.body {
                     change(body);
                 }
             }
             Correction::None => {}
         }
-        next.accepted.push(candidate.id.unwrap_or(candidate.behaves_like));
-        next
     }
 }

@@ -5,6 +5,7 @@ pub mod codes;
 pub mod excess;
 pub mod fluctuation;
 pub mod geometry;
+pub mod orders;
 pub mod paths;
 pub mod receiver;
 pub mod region;
@@ -61,11 +62,13 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect { share: 3.0, trusts_the_place: true, ..Suspect::new("along the chirp", waveform::along::find) },
     Suspect::new("slow time", slow::find),
     Suspect { foretells_all_frames: true, ..Suspect::new("one channel", slow::channels::find) },
+    Suspect::new("chirp's number in its frame", slow::locked::find),
     Suspect::new("single frame", slow::odd_frame::find),
     Suspect { last_in_chain: true, ..Suspect::new("slipped samples", slow::slip::find) },
     Suspect { last_in_chain: true, ..Suspect::new("converter's codes", codes::find) },
     Suspect::new("chirp", waveform::find),
     Suspect::new("vital signs", vital::find),
+    Suspect::new("orders of a phase", orders::find),
     Suspect::new("untracked movers", untracked::find),
     Suspect::new("extra paths", paths::find),
     Suspect { share: 8.0, ..Suspect::new("geometry", geometry::find) },

@@ -8,7 +8,7 @@ use super::beams::{Beams, Look};
 use super::{find, scene::Scene, swing};
 use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::misfit::Misfit;
-use crate::diagnosis::{BodyPrediction, Candidate, Correction, Cube, Evidence, Point, Split};
+use crate::diagnosis::{BodyPrediction, Candidate, Cube, Evidence, Point, Split};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::Room;
 
@@ -114,7 +114,7 @@ fn believed(evidence: &Evidence) -> Vec<Candidate> {
 }
 
 fn corrected(mut evidence: Evidence, found: &Candidate) -> Evidence {
-    if let Correction::Samples(correct) | Correction::Inverse(correct, _) = &found.correction {
+    if let Some(correct) = found.correction.undo() {
         correct(&mut evidence.cube);
     }
     evidence.accepted.extend(found.id);

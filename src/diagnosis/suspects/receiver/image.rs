@@ -187,7 +187,7 @@ fn jackknife(sums: &[Vec<Sums>], training: &[usize]) -> f64 {
 }
 
 /// Gain of Q over I in decibels and error of their right angle in degrees.
-fn imbalance(mu: Complex64) -> (f64, f64) {
+pub fn imbalance(mu: Complex64) -> (f64, f64) {
     // I + jQ' with Q' = g (Q cos φ + I sin φ) is (1 + x*) / 2 s + (1 − x) / 2 s* with x = g e^{−jφ}, so that the image over
     // its parent's conjugate is μ = (1 − x) / (1 + x).
     let x = (Complex64::ONE - mu) / (Complex64::ONE + mu);

@@ -15,3 +15,4 @@ pub mod spur;
 pub mod still;
 pub mod support;
 pub mod wandering;
+pub mod zero_beat;

@@ -9,6 +9,7 @@ use rustfft::FftPlanner;
 
 use super::still::subtract;
 use super::support::{beat_hz, energy, range_m, ranges_m, tone};
+use super::zero_beat::ZeroBeat;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
@@ -229,6 +230,8 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
     let peak_sample = denoised::peak_beside(evidence, |channel, n| Some(term[channel][n]));
     let level_db = 20.0 * (largest / peak_sample.max(1e-300)).log10();
     let resolution = range_m(evidence, rate / samples as f64);
+    let variance = |channel: usize| evidence.noise()[channel] / (loops * evidence.split.training.len()) as f64;
+    let beat = ZeroBeat::new(evidence, &term, variance);
     let channels = still.len();
     Some(Candidate {
         id: Some("tx_leakage"),
@@ -240,7 +243,13 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         gain: gain(evidence, &term),
         errs_alike: false,
         // A still reflector is seen alike by neighbouring receivers.
-        look_alikes: if near_spread > far_spread + 3.0 { vec![] } else { vec!["static_reflector"] },
+        look_alikes: [
+            (near_spread <= far_spread + 3.0, "static_reflector"),
+            (!evidence.is_real() && beat.may_be_constant() && !beat.may_be_leakage(), "dc_offset"),
+        ]
+        .into_iter()
+        .filter_map(|(holds, id)| holds.then_some(id))
+        .collect(),
         statement: format!(
             "a strong return {range:.2} m away that never changes, {:.0} dB above the valley behind it; it differs by \
              {near_spread:.0} dB between the {channels} channels, while the strongest far return ({:.1} m) differs by \

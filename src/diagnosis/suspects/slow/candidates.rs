@@ -11,6 +11,7 @@ use super::lines::Line;
 use super::random::Random;
 use super::settling::Settling;
 use super::undo;
+use crate::diagnosis::course::{Course, Of};
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Volume};
@@ -31,8 +32,10 @@ pub(super) type Deviation = Arc<dyn Fn([usize; 3]) -> f64 + Send + Sync>;
 /// `spent`: nats per chirp on deviations that no law foretells.
 pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, spent: f64) -> Correction {
     let (radar, room) = (evidence.radar.clone(), evidence.room.clone());
+    let known = deviation.clone();
     let undo = move |cube: &mut Cube| {
         let receivers = cube.dims[2];
+        let deviation = &known;
         let of_channel = |[frame, channel, index]: [usize; 3]| deviation([frame, channel / receivers, index]);
         match part {
             Part::Gain => undo::gain(cube, |at| (1.0 + deviation(at)).max(0.05).into()),
@@ -46,7 +49,14 @@ pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, 
     };
     let volume = if part == Part::Gain { Volume::BY_SAMPLE } else { Volume::KEPT };
     let samples = evidence.cube.dims[4] * evidence.cube.dims[2];
-    Correction::Inverse(Arc::new(undo), volume.spent(spent, samples))
+    let [frames, tx, _, loops, _] = evidence.cube.dims;
+    let phase = |i: usize| Complex64::cis(deviation([i / (tx * loops), i / loops % tx, i % loops]));
+    let course = (part == Part::Phase).then(|| Course { of: Of::All, turned: (0..frames * tx * loops).map(phase).collect() });
+    let correction = Correction::Inverse(Arc::new(undo), volume.spent(spent, samples));
+    match course {
+        Some(course) => Correction::Followed(Box::new(correction), Arc::new(course)),
+        None => correction,
+    }
 }
 
 /// Energy that a deviation adds to what stands still.

@@ -9,6 +9,7 @@ pub mod channels;
 pub mod drift;
 pub mod field;
 pub mod lines;
+pub mod locked;
 pub mod odd_frame;
 pub mod random;
 pub mod settling;

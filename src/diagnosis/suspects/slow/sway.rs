@@ -463,7 +463,7 @@ mod tests {
         // Without a room all returns count as if they lay ahead.
         let ahead = 0.3 * evidence.radar.wavelength_m() / (2.0 * TAU);
         assert!((0.7..1.1).contains(&(of("amplitude_m") / ahead)), "{} of {ahead}", of("amplitude_m"));
-        let Correction::Inverse(undo, _) = &found.correction else { panic!() };
+        let undo = found.correction.undo().unwrap();
         undo(&mut evidence.cube);
         let again = find(&evidence.changed());
         assert!(again.as_ref().is_none_or(|again| again.gain < 0.01 * found.gain), "{again:?}");

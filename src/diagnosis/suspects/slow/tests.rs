@@ -9,7 +9,7 @@ use super::field::ahead;
 use super::find;
 use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction, NINETY};
+use crate::diagnosis::finding::{Candidate, NINETY};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::Room;
 
@@ -55,9 +55,7 @@ fn best(evidence: &Evidence) -> Option<Candidate> {
 /// Found and undone, nothing is left to find.
 fn found_once(mut evidence: Evidence) -> Candidate {
     let candidate = best(&evidence).expect("nothing found");
-    let (Correction::Samples(undo) | Correction::Inverse(undo, _)) = &candidate.correction else {
-        panic!("no correction of samples")
-    };
+    let undo = candidate.correction.undo().expect("no correction of samples");
     undo(&mut evidence.cube);
     let again = best(&evidence.changed());
     assert!(again.is_none(), "after {candidate:?} still {again:?}");
@@ -221,7 +219,7 @@ fn one_receiver_that_hops_is_told_from_all_that_drift() {
     let found = super::channels::find(&evidence_hopping);
     assert!(found.len() == 1 && found[0].p_value < 1e-6 && found[0].gain > 10.0, "{found:?}");
     assert_eq!(found[0].place.rx, Some(vec![2]));
-    let Correction::Inverse(undo, _) = &found[0].correction else { panic!("no correction of samples") };
+    let undo = found[0].correction.undo().expect("no correction of samples");
     undo(&mut evidence_hopping.cube);
     let again = super::channels::find(&evidence_hopping.changed());
     assert!(again.iter().all(|c| c.p_value > 5e-4), "{again:?}");

@@ -1,0 +1,106 @@
+//! The image of a still room in an unbalanced quadrature receiver: it turns backwards when all static returns turn.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+
+use super::fit::Fit;
+use crate::diagnosis::cube::Cube;
+use crate::diagnosis::evidence::{Evidence, spectrum};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
+use crate::diagnosis::statistics::{DECIBEL, fisher_tail};
+use crate::diagnosis::suspects::receiver::image::imbalance;
+
+/// Orders of the fit: static returns and what turns backwards.
+const STATIC: usize = 0;
+const BACKWARDS: usize = 2;
+/// Bins to each side that a Hann window's main lobe fills; as many apart, cells are independent.
+const LOBE: usize = 2;
+/// Beat frequencies next to zero, and their images, belong to offsets and leakage.
+const NEAREST: usize = 2 * LOBE;
+
+pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
+    let [_, tx, rx, _, samples] = evidence.cube.dims;
+    if evidence.is_real() || samples < 16 * LOBE || evidence.accepted.contains(&"iq_imbalance") {
+        return None;
+    }
+    let of = |order: usize| -> Vec<Vec<Complex64>> { fit.parts[order].iter().map(|part| spectrum(part)).collect() };
+    let (parents, images) = (of(STATIC), of(BACKWARDS));
+    let error = |channel: usize| evidence.noise()[channel].max(f64::MIN_POSITIVE) / fit.own[channel / rx][BACKWARDS];
+    // Of a receiver, at the image's beat frequency or so many bins beside it: the conjugate's coefficient and its weight.
+    let coefficient = |receiver: usize, beside: usize| {
+        let (mut product, mut weight) = (Complex64::ZERO, 0.0);
+        for channel in (0..tx).map(|t| t * rx + receiver) {
+            for bin in NEAREST..samples - NEAREST {
+                let image = images[channel][(2 * samples - bin + beside) % samples];
+                product += parents[channel][bin] * image / error(channel);
+                weight += parents[channel][bin].norm_sqr() / error(channel);
+            }
+        }
+        (product / weight.max(f64::MIN_POSITIVE), weight)
+    };
+    let power = |beside: usize| -> f64 {
+        let of_receiver = |receiver| coefficient(receiver, beside);
+        (0..rx).map(of_receiver).map(|(mu, weight)| mu.norm_sqr() * weight).sum()
+    };
+    // What a phase that is not quite known leaves of all returns is beside the images as well as at them.
+    let others: Vec<f64> = (LOBE + 1..samples / 4).step_by(LOBE + 1).flat_map(|q| [power(q), power(samples - q)]).collect();
+    let left = (others.iter().sum::<f64>() / others.len() as f64).max(rx as f64);
+    let freedom = 2.0 * rx as f64;
+    let p_value = fisher_tail(power(0) / left, freedom, freedom * others.len() as f64);
+    let found: Vec<(Complex64, f64)> = (0..rx).map(|receiver| coefficient(receiver, 0)).collect();
+    let term: Vec<Vec<Complex64>> = fit.parts[STATIC]
+        .iter()
+        .enumerate()
+        .map(|(channel, part)| part.iter().map(|value| value.conj() * found[channel % rx].0).collect())
+        .collect();
+    let excess = left / rx as f64;
+    let gain = fit.held_out_gain(evidence, BACKWARDS, &term) / excess;
+    if gain <= 0.0 {
+        return None;
+    }
+    let mean =
+        found.iter().map(|(mu, weight)| mu * weight).sum::<Complex64>() / found.iter().map(|(_, weight)| weight).sum::<f64>();
+    // Receivers differ: one number for all errs by their scatter.
+    let scatter = found.iter().map(|(mu, _)| (mu - mean).norm_sqr()).sum::<f64>() / rx as f64;
+    let noise = found.iter().map(|(_, weight)| excess / weight).sum::<f64>() / (rx * rx) as f64;
+    let deviation = (0.5 * (scatter + noise)).sqrt();
+    let (gain_db, phase_deg) = imbalance(mean);
+    let levels: Vec<String> = found.iter().map(|(mu, _)| format!("{:.1}", DECIBEL * mu.norm().ln())).collect();
+    let coefficients: Vec<Complex64> = found.iter().map(|(mu, _)| *mu).collect();
+    let still: f64 = evidence.still().iter().map(|value| value.norm_sqr()).sum();
+    let course = fit.course.clone();
+    Some(Candidate {
+        id: Some("iq_imbalance"),
+        behaves_like: "conjugate image",
+        estimates: vec![
+            Estimate::normal("gain_db", gain_db, 2.0 * DECIBEL * deviation),
+            Estimate::normal("phase_deg", phase_deg, (2.0 * deviation).to_degrees()),
+        ],
+        choice: None,
+        place: Place::at("receiver"),
+        p_value,
+        gain,
+        errs_alike: false,
+        look_alikes: vec![],
+        statement: format!(
+            "everything has a mirror image at the opposite beat frequency, which turns backwards when all static returns turn: {} dB \
+             in the {rx} receivers; on their average Q is {gain_db:.2} dB stronger than I and {phase_deg:.2} degrees off the right angle",
+            levels.join(", ")
+        ),
+        curve: None,
+        energy: mean.norm_sqr() * still * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
+        correction: Correction::Inverse(Arc::new(move |cube| undo(cube, &course.turned, &coefficients)), Volume::BY_SAMPLE),
+    })
+}
+
+/// `s = (y − μ y*) / (1 − |μ|²)` of samples in which static returns were turned back.
+fn undo(cube: &mut Cube, turned: &[Complex64], coefficients: &[Complex64]) {
+    let [_, tx, rx, loops, _] = cube.dims;
+    cube.each_chirp(|[frame, channel, index], chirp| {
+        let back = turned[frame * tx * loops + channel / rx * loops + index].conj();
+        let mu = coefficients[channel % rx];
+        let scale = (1.0 - mu.norm_sqr()).recip();
+        chirp.iter_mut().for_each(|value| *value = (*value - mu * back * back * value.conj()) * scale);
+    });
+}

@@ -1,0 +1,358 @@
+//! What one return, and not all of them, does alike in every frame: a function of the chirp's number in its frame, such as a leakage
+//! that settles or an offset that creeps.
+//!
+//! A frame's chirps about their mean are transformed over the loop's number. Frames are independent draws, so that their scatter tells
+//! what their mean may be by chance, movers included: of a complex normal law, `F |mean|² / scatter` of F frames exceeds x with a
+//! probability of `(1 + x)^{−(F−1)}`, and logarithms of independent probabilities add (Fisher's method).
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+use rustfft::{FftDirection, FftPlanner};
+
+use crate::diagnosis::cube::{Cube, mean_chirp};
+use crate::diagnosis::evidence::{Evidence, hann};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Undo};
+use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
+
+/// Frames whose scatter says something.
+const FEWEST_FRAMES: usize = 4;
+/// p-value from which on a cell has it.
+const SURE: f64 = 1e-3;
+/// Bins to each side that a Hann window's main lobe fills.
+const LOBE: usize = 2;
+/// Power of a static return over the noise of its mean that says what all do.
+const STRONG: f64 = 1e3;
+/// Static returns at so many ranges say what all do; fewer may be the one that differs.
+const FEWEST_RETURNS: usize = 3;
+/// Share of a pattern that a decay must explain for its name: as in `settling`.
+const ENOUGH: f64 = 0.8;
+
+/// Of one channel over the training frames, `[harmonic − 1][bin]`, harmonics of the loop's number.
+struct Channel {
+    mean: Vec<Vec<Complex64>>,
+    scatter: Vec<Vec<f64>>,
+    still: Vec<Complex64>,
+    noise: f64,
+}
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let training = evidence.split.training.len();
+    // Blocks of a long frame are no frames.
+    if evidence.body.is_some() || evidence.split.block_loops.is_some() || loops < 2 || training < FEWEST_FRAMES || samples < 8 {
+        return vec![];
+    }
+    let mut channels: Vec<Channel> =
+        (0..evidence.cube.channels()).into_par_iter().map(|channel| of_channel(evidence, channel)).collect();
+    take_common(&mut channels, evidence.range_bins());
+    strongest(evidence, &channels).into_iter().collect()
+}
+
+/// Harmonics over the loops, `[harmonic][bin]`, of a frame's spectra.
+fn harmonics(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Vec<Complex64>> {
+    let samples = evidence.cube.dims[4];
+    let loops = evidence.cube.dims[3];
+    let bins = evidence.range_bins();
+    let window = hann(samples);
+    let mut spectra: Vec<Complex64> = evidence.cube.channel(frame, channel).to_vec();
+    for chirp in spectra.chunks_exact_mut(samples) {
+        chirp.iter_mut().zip(&window).for_each(|(value, weight)| *value *= weight);
+    }
+    let mut planner = FftPlanner::new();
+    planner.plan_fft(samples, FftDirection::Forward).process(&mut spectra);
+    let over_loops = planner.plan_fft(loops, FftDirection::Forward);
+    let scale = (loops as f64).sqrt().recip();
+    let mut out = vec![vec![Complex64::ZERO; bins]; loops];
+    let mut column = vec![Complex64::ZERO; loops];
+    for bin in 0..bins {
+        (0..loops).for_each(|index| column[index] = spectra[index * samples + bin] * scale);
+        over_loops.process(&mut column);
+        (0..loops).for_each(|harmonic| out[harmonic][bin] = column[harmonic]);
+    }
+    out
+}
+
+/// Harmonics of a time that goes on evenly in a frame, about its middle.
+fn ramp(loops: usize, loop_s: f64) -> Vec<Complex64> {
+    let middle = 0.5 * (loops as f64 - 1.0);
+    let scale = (loops as f64).sqrt().recip();
+    let mut values: Vec<Complex64> = (0..loops).map(|index| Complex64::from((index as f64 - middle) * loop_s * scale)).collect();
+    FftPlanner::new().plan_fft_forward(loops).process(&mut values);
+    values
+}
+
+fn of_channel(evidence: &Evidence, channel: usize) -> Channel {
+    let (loops, bins) = (evidence.cube.dims[3], evidence.range_bins());
+    let (training, starts) = (&evidence.split.training, &evidence.starts_s);
+    let frames: Vec<Vec<Vec<Complex64>>> = training.iter().map(|&frame| harmonics(evidence, frame, channel)).collect();
+    let ramp = ramp(loops, evidence.radar.loop_period_s());
+    let count = training.len();
+    let root = (loops as f64).sqrt();
+    // What goes on from frame to frame changes within a frame, too: that is no function of the loop's number.
+    let slope = |i: usize, bin: usize| {
+        let (before, after) = (i.saturating_sub(1), (i + 1).min(count - 1));
+        let seconds = starts[training[after]] - starts[training[before]];
+        (frames[after][0][bin] - frames[before][0][bin]) / (root * seconds)
+    };
+    let value = |i: usize, harmonic: usize, bin: usize| frames[i][harmonic][bin] - slope(i, bin) * ramp[harmonic];
+    let (mut mean, mut scatter) = (vec![], vec![]);
+    for harmonic in 1..loops {
+        let of_bin = |bin: usize| (0..count).map(|i| value(i, harmonic, bin)).sum::<Complex64>() / count as f64;
+        let means: Vec<Complex64> = (0..bins).map(of_bin).collect();
+        let of_bin = |bin: usize| (0..count).map(|i| (value(i, harmonic, bin) - means[bin]).norm_sqr()).sum::<f64>();
+        scatter.push((0..bins).map(of_bin).collect());
+        mean.push(means);
+    }
+    let still =
+        (0..bins).map(|bin| frames.iter().map(|frame| frame[0][bin]).sum::<Complex64>() / (root * count as f64)).collect();
+    let noise = evidence.noise()[channel] / (loops * count) as f64;
+    Channel { mean, scatter, still, noise }
+}
+
+/// Takes what all static returns do alike out of the means.
+fn take_common(channels: &mut [Channel], bins: usize) {
+    let strong: Vec<(usize, usize)> = (0..channels.len())
+        .flat_map(|channel| (0..bins).map(move |bin| (channel, bin)))
+        .filter(|&(channel, bin)| channels[channel].still[bin].norm_sqr() > STRONG * channels[channel].noise)
+        .collect();
+    let mut ranges: Vec<usize> = strong.iter().map(|place| place.1).collect();
+    ranges.sort_unstable();
+    ranges.dedup();
+    let returns = 1 + ranges.windows(2).filter(|pair| pair[1] - pair[0] > LOBE).count();
+    if ranges.is_empty() || returns < FEWEST_RETURNS {
+        return;
+    }
+    for harmonic in 0..channels[0].mean.len() {
+        let ratios = strong.iter().map(|&(channel, bin)| channels[channel].mean[harmonic][bin] / channels[channel].still[bin]);
+        let (mut real, mut imaginary): (Vec<f64>, Vec<f64>) = ratios.map(|ratio| (ratio.re, ratio.im)).unzip();
+        let common = Complex64::new(median(&mut real), median(&mut imaginary));
+        for channel in channels.iter_mut() {
+            let own = channel.mean[harmonic].iter_mut().zip(&channel.still);
+            own.for_each(|(mean, still)| *mean -= common * still);
+        }
+    }
+}
+
+/// Minus the logarithm of the chance of a cell's means, a sum over harmonics.
+fn unlikely(channel: &Channel, bin: usize, frames: f64) -> f64 {
+    let of = |(mean, scatter): (&Vec<Complex64>, &Vec<f64>)| {
+        let ratio = frames * mean[bin].norm_sqr() / scatter[bin].max(f64::MIN_POSITIVE);
+        (frames - 1.0) * ratio.ln_1p()
+    };
+    channel.mean.iter().zip(&channel.scatter).map(of).sum()
+}
+
+fn strongest(evidence: &Evidence, channels: &[Channel]) -> Option<Candidate> {
+    let (bins, frames) = (evidence.range_bins(), evidence.split.training.len() as f64);
+    let harmonics = channels[0].mean.len() as f64;
+    let cells = (channels.len() * bins) as f64;
+    let chance = |channel: usize, bin: usize| {
+        corrected(mean_power_tail(unlikely(&channels[channel], bin, frames) / harmonics, harmonics), cells)
+    };
+    let all = (0..channels.len()).flat_map(|channel| (0..bins).map(move |bin| (channel, bin)));
+    let (channel, bin) =
+        all.max_by(|&(a, i), &(b, j)| unlikely(&channels[a], i, frames).total_cmp(&unlikely(&channels[b], j, frames)))?;
+    let p_value = chance(channel, bin);
+    if p_value > SURE {
+        return None;
+    }
+    let has: Vec<usize> = (0..channels.len()).filter(|&c| chance(c, bin) < SURE).collect();
+    let gain: f64 = has.iter().map(|&c| held_out_gain(evidence, &channels[c], c, bin)).sum();
+    let of_channel = |&c: &usize| (0..bins).filter(|&bin| chance(c, bin) < SURE).collect();
+    let cells: Vec<Vec<usize>> = has.iter().map(of_channel).collect();
+    let undo = undo(evidence, has.clone(), cells);
+    let candidate = candidate(evidence, &channels[channel], &has, bin, undo);
+    Some(Candidate { p_value, gain, ..candidate })
+}
+
+/// Log-likelihood that held-out frames gain at a cell, by harmonic in the scatter of the training frames.
+fn held_out_gain(evidence: &Evidence, own: &Channel, channel: usize, bin: usize) -> f64 {
+    let frames = evidence.split.training.len() as f64;
+    let of_frame = |&frame: &usize| -> f64 {
+        let values = harmonics(evidence, frame, channel);
+        let better = |harmonic: usize| {
+            let (value, mean) = (values[harmonic + 1][bin], own.mean[harmonic][bin]);
+            let variance = own.scatter[harmonic][bin] / (frames - 1.0);
+            (value.norm_sqr() - (value - mean).norm_sqr()) / variance.max(f64::MIN_POSITIVE)
+        };
+        (0..own.mean.len()).map(better).sum()
+    };
+    evidence.split.held_out.iter().map(of_frame).sum()
+}
+
+/// A cell's mean over the loop's number, about its own mean.
+fn pattern(channel: &Channel, bin: usize) -> Vec<Complex64> {
+    let loops = channel.mean.len() + 1;
+    let harmonics = std::iter::once(Complex64::ZERO).chain(channel.mean.iter().map(|mean| mean[bin]));
+    let mut values: Vec<Complex64> = harmonics.map(|value| value / (loops as f64).sqrt()).collect();
+    FftPlanner::new().plan_fft(loops, FftDirection::Inverse).process(&mut values);
+    values
+}
+
+/// The length, in loops, of the decay that explains most of a pattern, and its share.
+fn decay(pattern: &[Complex64]) -> (f64, f64) {
+    let loops = pattern.len() as f64;
+    let energy: f64 = pattern.iter().map(|value| value.norm_sqr()).sum();
+    let share = |length: f64| {
+        let shape: Vec<f64> = (0..pattern.len()).map(|i| (-(i as f64) / length).exp()).collect();
+        let mean = shape.iter().sum::<f64>() / loops;
+        let along: Complex64 = pattern.iter().zip(&shape).map(|(value, shape)| value * (shape - mean)).sum();
+        along.norm_sqr() / (shape.iter().map(|shape| (shape - mean).powi(2)).sum::<f64>() * energy)
+    };
+    let lengths = (0..=60).map(|i| 0.5 * (2.0 * loops).powf(f64::from(i) / 60.0));
+    lengths.map(|length| (length, share(length))).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((1.0, 0.0))
+}
+
+fn candidate(evidence: &Evidence, own: &Channel, has: &[usize], bin: usize, undo: Undo) -> Candidate {
+    let [frames, tx, rx, loops, samples] = evidence.cube.dims;
+    let values = pattern(own, bin);
+    let (length, share) = decay(&values);
+    let settles = share > ENOUGH && length < loops as f64;
+    let largest = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    // Beat frequencies below zero are what leaks over it.
+    let signed = if !evidence.is_real() && 2 * bin > samples { bin as f64 - samples as f64 } else { bin as f64 };
+    let bin_m = evidence.radar.range_resolution_m();
+    let range = [signed - 1.0, signed + 1.0].map(|bin| bin.max(0.0) * bin_m);
+    let mut receivers: Vec<usize> = has.iter().map(|channel| channel % rx).collect();
+    let mut transmitters: Vec<usize> = has.iter().map(|channel| channel / rx).collect();
+    for list in [&mut receivers, &mut transmitters] {
+        list.sort_unstable();
+        list.dedup();
+    }
+    let course = if settles {
+        format!("settles within each frame: it decays in {length:.1} chirps")
+    } else {
+        "depends on the chirp's number in its frame".into()
+    };
+    // The window's sum, by which amplitudes of samples and of cells differ.
+    let amplitude = largest / hann(samples).iter().sum::<f64>();
+    let statement = format!(
+        "The return at {:.2} m {course}, by up to {amplitude:.2} codes (or units of the recording), alike in all frames, in {} of {} \
+         channels; the other static returns do not.",
+        signed.max(0.0) * bin_m,
+        has.len(),
+        tx * rx,
+    );
+    let number: Vec<f64> = (0..loops).map(|index| index as f64).collect();
+    let series = |name: &str, part: fn(&Complex64) -> f64| (name.into(), number.clone(), values.iter().map(part).collect());
+    Candidate {
+        id: None,
+        behaves_like: if settles { "slow-time settling of one return" } else { "slow-time pattern of one return" },
+        estimates: vec![],
+        choice: None,
+        place: Place {
+            range_m: Some(range),
+            tx: (transmitters.len() < tx).then_some(transmitters),
+            rx: (receivers.len() < rx).then_some(receivers),
+            ..Place::at("receiver")
+        },
+        p_value: 1.0,
+        gain: 0.0,
+        errs_alike: false,
+        look_alikes: vec![],
+        statement,
+        curve: Some(Curve {
+            title: format!("Mean over the frames at {:.2} m", signed.max(0.0) * bin_m),
+            x_label: "chirp of the frame".into(),
+            y_label: "deviation, recording's unit".into(),
+            series: vec![series("real part", |value| value.re), series("imaginary part", |value| value.im)],
+        }),
+        energy: values.iter().map(|value| value.norm_sqr()).sum::<f64>() * (frames * has.len()) as f64,
+        correction: Correction::Samples(undo),
+    }
+}
+
+/// Subtracts the training frames' mean deviation of every chirp of a frame from the frame's mean, at the cells of each channel and as
+/// far around them as the window spreads.
+fn undo(evidence: &Evidence, channels: Vec<usize>, cells: Vec<Vec<usize>>) -> Undo {
+    let training = evidence.split.training.clone();
+    let real = evidence.is_real();
+    Arc::new(move |cube: &mut Cube| {
+        let [_, _, _, loops, samples] = cube.dims;
+        let mut planner = FftPlanner::new();
+        let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
+        let near = |cells: &[usize], k: usize| {
+            let away = |cell: usize| (k + samples - cell).rem_euclid(samples).min((cell + samples - k).rem_euclid(samples));
+            cells.iter().any(|&cell| away(cell) <= LOBE || real && away((samples - cell) % samples) <= LOBE)
+        };
+        let patterns: Vec<Vec<Complex64>> = channels
+            .iter()
+            .zip(&cells)
+            .map(|(&channel, cells)| {
+                let mut mean = vec![Complex64::ZERO; loops * samples];
+                for &frame in &training {
+                    let values = cube.channel(frame, channel);
+                    mean.iter_mut().zip(values).for_each(|(sum, value)| *sum += value / training.len() as f64);
+                }
+                let still = mean_chirp(mean.chunks_exact(samples), samples);
+                for chirp in mean.chunks_exact_mut(samples) {
+                    chirp.iter_mut().zip(&still).for_each(|(value, still)| *value -= still);
+                    forward.process(chirp);
+                    let keep = |k: usize| if near(cells, k) { 1.0 / samples as f64 } else { 0.0 };
+                    chirp.iter_mut().enumerate().for_each(|(k, value)| *value *= keep(k));
+                    inverse.process(chirp);
+                }
+                mean
+            })
+            .collect();
+        cube.each_chirp(|[_, channel, index], chirp| {
+            let Some(place) = channels.iter().position(|&own| own == channel) else { return };
+            let pattern = &patterns[place][index * samples..][..samples];
+            chirp.iter_mut().zip(pattern).for_each(|(value, pattern)| *value -= pattern);
+        });
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::radar::Radar;
+
+    /// Three static returns, of which the first has `own` of the frame and the loop, and all have `all` of the loop.
+    fn evidence(seed: u64, own: impl Fn(usize, usize) -> Complex64, all: impl Fn(usize) -> f64) -> Evidence {
+        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 16, ..Radar::small(12) };
+        Evidence::in_noise(radar, seed, |[frame, channel, index, n]| {
+            let tone = |bin: f64, level: f64| Complex64::from_polar(level, TAU * bin * n as f64 / 64.0 + channel as f64 * bin);
+            let leaks = if channel == 0 { own(frame, index) } else { Complex64::ZERO };
+            (tone(2.0, 50.0) * (Complex64::ONE + leaks) + tone(11.0, 30.0) + tone(20.0, 20.0) + tone(27.0, 30.0))
+                * (1.0 + all(index))
+        })
+    }
+
+    fn settles(index: usize) -> f64 {
+        0.2 * (-(index as f64) / 3.0).exp()
+    }
+
+    #[test]
+    fn a_leakage_that_settles_is_found_in_its_channel_and_then_nothing() {
+        let evidence = evidence(1, |_, index| settles(index).into(), |_| 0.0);
+        let found = find(&evidence).pop().expect("a settling");
+        assert_eq!((found.id, found.behaves_like), (None, "slow-time settling of one return"), "{found:?}");
+        assert!(found.p_value < 1e-9 && found.gain > 20.0, "{found:?}");
+        let bin_m = evidence.radar.range_resolution_m();
+        let [low, high] = found.place.range_m.unwrap();
+        assert!(low < 2.0 * bin_m && 2.0 * bin_m < high, "{low} to {high}");
+        let again = find(&evidence.with(&found));
+        assert!(again.iter().all(|again| again.p_value > 1e-3), "{again:?}");
+    }
+
+    #[test]
+    fn neither_what_all_returns_do_nor_what_goes_on_from_frame_to_frame_nor_a_mover_is_one() {
+        for seed in 2..8 {
+            let common = evidence(seed, |_, _| Complex64::ZERO, settles);
+            let period_s = common.radar.frame_period_s;
+            let time_s = |frame: usize, index: usize| frame as f64 * period_s + index as f64 * common.radar.loop_period_s();
+            let drifts = evidence(seed, |frame, index| (0.3 * time_s(frame, index) / (12.0 * period_s)).into(), |_| 0.0);
+            let moves = evidence(seed, |frame, index| Complex64::cis(TAU * 531.7 * time_s(frame, index)) * 0.3, |_| 0.0);
+            let still = evidence(seed, |_, _| Complex64::ZERO, |_| 0.0);
+            for (what, evidence) in [("common", &common), ("drifts", &drifts), ("moves", &moves), ("still", &still)] {
+                let found = find(evidence);
+                assert!(found.is_empty(), "{what}: {found:?}");
+            }
+        }
+    }
+}

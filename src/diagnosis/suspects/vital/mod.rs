@@ -1,0 +1,180 @@
+//! Breathing and heartbeat of somebody nobody tracked: a return whose phase swings from frame to frame.
+//!
+//! PHYSICS cards T1 and T2. At some range the echo is `c + a exp(jψ(T))`: what stands still there, and what moves by
+//! more or less than a wavelength, ψ = 4π/λ times its displacement. c and a of all channels and of neighbouring ranges
+//! and the common ψ are fitted in turns; ψ is then searched for a rhythm.
+
+mod circle;
+pub mod frames;
+mod rhythm;
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use frames::frames;
+use num_complex::Complex64;
+use rhythm::{BREATHING_HZ, HEART_HZ, rhythm};
+
+use super::region::{Region, remove};
+use crate::diagnosis::course::{Course, Of};
+use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
+use crate::diagnosis::statistics;
+
+/// Displacements of a chest in a breath and in a heartbeat, m.
+const LARGEST_BREATH_M: f64 = 0.03;
+const LARGEST_HEARTBEAT_M: f64 = 0.8e-3;
+const FEWEST_FRAMES: usize = 24;
+/// Nearer ranges belong to leakage and offsets.
+const NEAREST_BIN: usize = 3;
+/// Ranges on each side that may belong to the same reflector.
+const NEIGHBOURS: usize = 1;
+/// Share of the phase's variance that a rhythm must hold.
+const RHYTHMIC: f64 = 0.5;
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    // Of a tracked body the phase is known to millimetres only, which is more than a breath.
+    if evidence.body.is_some() || evidence.cube.dims[0] < FEWEST_FRAMES || evidence.split.block_loops.is_some() {
+        return vec![];
+    }
+    if evidence.accepted.iter().any(|id| ["breathing", "heartbeat"].contains(id)) {
+        return vec![];
+    }
+    one(evidence).into_iter().collect()
+}
+
+fn one(evidence: &Evidence) -> Option<Candidate> {
+    let data = frames(evidence);
+    let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
+    let channels = evidence.cube.channels();
+    let bins = data.bins;
+    let mean: Vec<Complex64> = (0..channels * bins)
+        .map(|i| training.iter().map(|&f| data.values[f][i]).sum::<Complex64>() / training.len() as f64)
+        .collect();
+    // Power of what changes over the noise, by range.
+    let change: Vec<f64> = (0..bins)
+        .map(|bin| {
+            let sum: f64 = (0..channels)
+                .map(|c| {
+                    let i = c * bins + bin;
+                    training.iter().map(|&f| (data.values[f][i] - mean[i]).norm_sqr()).sum::<f64>() / data.noise[c]
+                })
+                .sum();
+            sum / (channels * (training.len() - 1)) as f64
+        })
+        .collect();
+    let strongest = (NEAREST_BIN..bins.saturating_sub(1)).max_by(|&a, &b| change[a].total_cmp(&change[b]))?;
+    if change[strongest] < 10.0 {
+        return None;
+    }
+    let near = strongest.saturating_sub(NEIGHBOURS + 1)..(strongest + NEIGHBOURS + 2).min(bins);
+    let moving: Vec<usize> = near.filter(|&bin| change[bin] > 10.0).collect();
+    let best = circle::common(&data, &mean, &moving, training)?;
+    let times: Vec<f64> = evidence.starts_s.clone();
+    let rhythm = rhythm(&times, &best.phase, training, held_out);
+    let metres = evidence.radar.wavelength_m() / (4.0 * PI);
+    let named = rhythm.as_ref().filter(|r| r.share > RHYTHMIC && r.p_value < 1e-3).and_then(|r| {
+        let (rate, amplitude_m) = (r.frequency_hz, r.amplitude * metres);
+        if (BREATHING_HZ[0]..=BREATHING_HZ[1]).contains(&rate) && amplitude_m < LARGEST_BREATH_M {
+            Some(("breathing", r))
+        } else if (HEART_HZ[0]..=HEART_HZ[1]).contains(&rate) && amplitude_m < LARGEST_HEARTBEAT_M {
+            Some(("heartbeat", r))
+        } else {
+            None
+        }
+    });
+    // A held-out frame lies between two training frames; its phase is between theirs.
+    let gain: f64 = held_out
+        .iter()
+        .map(|&f| {
+            let before = training.iter().rev().find(|&&t| t < f);
+            let after = training.iter().find(|&&t| t > f);
+            let (Some(&b), Some(&a)) = (before, after) else { return 0.0 };
+            let share = (times[f] - times[b]) / (times[a] - times[b]);
+            let turned = Complex64::cis(best.phase[b] + share * (best.phase[a] - best.phase[b]));
+            best.cells
+                .iter()
+                .enumerate()
+                .map(|(i, &cell)| {
+                    let value = data.values[f][cell];
+                    let left = value - best.still[i] - best.amplitude[i] * turned;
+                    ((value - mean[cell]).norm_sqr() - left.norm_sqr()) / best.variance[i]
+                })
+                .sum::<f64>()
+        })
+        .sum();
+    if gain <= 3.0 {
+        return None;
+    }
+    let reach = |mut bin: usize, step: isize| {
+        while change[bin] > 2.0 && bin > NEAREST_BIN && bin + 1 < bins {
+            bin = bin.wrapping_add_signed(step);
+        }
+        bin
+    };
+    let ends = [reach(strongest, -1), reach(strongest, 1)];
+    let bin_m = evidence.radar.range_resolution_m();
+    let range_m = strongest as f64 * bin_m;
+    let displacement: Vec<f64> = best.phase.iter().map(|p| 1e3 * p * metres).collect();
+    let swing = displacement.iter().fold([f64::MAX, f64::MIN], |[low, high], &d| [low.min(d), high.max(d)]);
+    let statement = match named {
+        Some((id, r)) => format!(
+            "At {range_m:.2} m something moves to and fro {:.1} times a minute ({:.3} Hz) by {:.2} mm (amplitude of the \
+             fundamental); {:.0} % of its motion has this rhythm, as {} has.",
+            60.0 * r.frequency_hz,
+            r.frequency_hz,
+            1e3 * r.amplitude * metres,
+            100.0 * r.share,
+            if id == "breathing" { "a breathing chest" } else { "a beating heart" }
+        ),
+        None => format!(
+            "At {range_m:.2} m something moves slowly, over {:.1} mm during the recording, without a rhythm that would show \
+             within its length.",
+            swing[1] - swing[0]
+        ),
+    };
+    // Of the change alone; the rhythm has its own.
+    let changed = statistics::corrected(
+        statistics::mean_power_tail(change[strongest], (channels * (training.len() - 1)) as f64),
+        bins as f64,
+    );
+    let region = Region { range: [ends[0].saturating_sub(1) as f64, (ends[1] + 1) as f64], doppler: [-1.0, 1.0] };
+    let turned = best.phase.iter().map(|&phase| Complex64::cis(phase)).collect();
+    let course = Course { of: Of::Mover { bin: best.bin as f64, amplitude: best.amplitude.clone() }, turned };
+    let training = training.clone();
+    let energy: f64 = change.iter().map(|c| (c - 1.0).max(0.0)).sum::<f64>()
+        * data.noise.iter().sum::<f64>()
+        * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
+    Some(Candidate {
+        id: named.map(|n| n.0),
+        behaves_like: super::paths::PATH_LIKE,
+        estimates: named.map_or(vec![], |(_, r)| {
+            vec![
+                Estimate::normal("rate_hz", r.frequency_hz, r.frequency_deviation_hz),
+                Estimate::normal("amplitude_m", r.amplitude * metres, r.amplitude_deviation * metres),
+            ]
+        }),
+        choice: None,
+        place: Place {
+            range_m: Some([ends[0] as f64 * bin_m, ends[1] as f64 * bin_m]),
+            ..Place::at(if named.is_some() { "body" } else { "scene" })
+        },
+        p_value: named.map_or(changed, |(_, r)| statistics::corrected(r.p_value, 4.0)),
+        gain,
+        errs_alike: true,
+        // A curtain in the wind does the same; so does whatever swings there.
+        look_alikes: if named.is_some() { vec!["moving_reflector"] } else { vec![] },
+        statement,
+        curve: Some(Curve {
+            title: format!("Displacement at {range_m:.2} m"),
+            x_label: "time, s".into(),
+            y_label: "displacement, mm".into(),
+            series: vec![("measured".into(), times, displacement)],
+        }),
+        energy,
+        correction: Correction::Followed(
+            Box::new(Correction::Samples(Arc::new(move |cube| remove(cube, &training, 1, region)))),
+            Arc::new(course),
+        ),
+    })
+}
