@@ -107,11 +107,12 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let hums = accepted.behaves_like == fluctuation::HUMS && !apart(around, candidate.place.range_m);
     let shaken = vibrates && (turns || is_path(candidate)) || hums && is_path(candidate);
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
-    // A course from frame to frame that has no name is modelled roughly: what is left of it turns all returns, too, and the strongest
-    // as if it moved.
+    // A course from frame to frame that has no name is modelled roughly: what is left of it turns all returns, too; where the strongest
+    // seems to move slowly, no other is strong enough to deny it.
     let drifts = accepted.id.is_none() && TURNS[..2].contains(&accepted.behaves_like);
     let slow_path = is_path(candidate) && candidate.id.is_none();
-    let of_drift = drifts && (candidate.behaves_like == accepted.behaves_like || slow_path);
+    let of_drift = drifts && candidate.behaves_like == accepted.behaves_like;
+    let alone = drifts && slow_path;
     let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside || of_drift;
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it
     // and among its images, and what a part may carry, the last resort, is never sure there.
@@ -144,7 +145,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     [
         (roughly || fades || image || unlike, ROUGHLY),
         (bursts || behind || line, 1.0),
-        (hardly || uneven || mixed || cut || products, f64::INFINITY),
+        (hardly || uneven || mixed || cut || products || alone, f64::INFINITY),
         (shaken || rest, SHAKEN),
         (by_chirp || faint, SLIGHTLY),
     ]

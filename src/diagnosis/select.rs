@@ -241,11 +241,12 @@ fn upstream<'a>(
         return course;
     }
     if best.1.id == Some("tx_leakage") {
-        // What the chirp makes of the room's returns never changes either, and a leakage is free in every channel: it is none where
-        // nothing is left of it.
+        // What the chirp makes of the room's returns never changes either, nor does an offset, and a leakage is free in every channel: it
+        // is none where nothing is left of it.
         let left = |evidence: &Evidence| (SUSPECTS[best.0].find)(evidence).iter().any(|candidate| candidate.id == best.1.id);
-        let mut of_the_chirp = passing.iter().filter(|(_, candidate)| candidate.place.stage == "waveform");
-        return of_the_chirp.find(|(_, candidate)| !left(&evidence.with(candidate))).copied().unwrap_or(best);
+        let simpler = |candidate: &Candidate| candidate.place.stage == "waveform" || candidate.id == Some("dc_offset");
+        let mut simpler = passing.iter().filter(|(_, candidate)| simpler(candidate));
+        return simpler.find(|(_, candidate)| !left(&evidence.with(candidate))).copied().unwrap_or(best);
     }
     let others = passing.iter().filter(|(_, candidate)| is_on_all(candidate, evidence));
     let Some(other) = others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| is_echo(&best.1)) else {

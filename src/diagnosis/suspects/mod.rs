@@ -1,5 +1,6 @@
 //! One file per family of effects: each looks at the evidence and says what it has found.
 
+pub mod broadband;
 pub mod carried;
 pub mod codes;
 pub mod excess;
@@ -69,6 +70,7 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect::new("chirp", waveform::find),
     Suspect::new("vital signs", vital::find),
     Suspect::new("orders of a phase", orders::find),
+    Suspect::new("movers of all velocities", broadband::find),
     Suspect::new("untracked movers", untracked::find),
     Suspect::new("extra paths", paths::find),
     Suspect { share: 8.0, ..Suspect::new("geometry", geometry::find) },

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 use super::still::subtract;
-use super::support::{beat_hz, energy, range_m, ranges_m, tone};
+use super::support::{energy, range_m, ranges_m, tone};
 use super::zero_beat::ZeroBeat;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
@@ -25,6 +25,8 @@ const WILD: f64 = 4.0;
 /// rises slowly.
 const ABRUPT: f64 = 10.0;
 const ZERO_PADDING: usize = 4;
+/// Noise, over the signal, that keeps a covariance well conditioned where a recording has none.
+const LEAST_NOISE: f64 = 1e-9;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if ranges_m(evidence).is_some() && !evidence.is_real() || evidence.cube.dims[4] < 16 {
@@ -211,21 +213,10 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
     };
     let (near_spread, far_spread) = (spread(peak), spread(far));
     let range = (peak as f64 * bin_m).max(0.0);
-    // Several short paths over the board: tones half a bin apart, weighted by the window against what is far.
-    let highest = (beat_hz(evidence, range_m(evidence, valley as f64 * rate / long as f64)) / rate * samples as f64).min(10.0);
-    let lowest = -1.0;
-    let count = ((highest - lowest) * 2.0).ceil() as usize;
-    let tones: Vec<Vec<Complex64>> = (0..=count).map(|i| tone((lowest + 0.5 * i as f64) / samples as f64, samples)).collect();
-    let matrix = DMatrix::from_fn(samples, tones.len(), |n, k| tones[k][n] * window[n]).svd(true, true);
-    let term: Vec<Vec<Complex64>> = still
-        .iter()
-        .map(|chirp| {
-            let weighted = DVector::from_fn(samples, |n, _| chirp[n] * window[n]);
-            let cut = 1e-2 * matrix.singular_values.max();
-            let solved = matrix.solve(&weighted, cut).unwrap_or_else(|_| DVector::zeros(tones.len()));
-            (0..samples).map(|n| tones.iter().zip(solved.iter()).map(|(tone, a)| tone[n] * a).sum()).collect()
-        })
-        .collect();
+    let end = valley as f64 / ZERO_PADDING as f64;
+    let part = near_part(&mean, end, white, samples, evidence.is_real())?;
+    let term: Vec<Vec<Complex64>> =
+        still.iter().map(|chirp| (&part * DVector::from_column_slice(chirp)).iter().copied().collect()).collect();
     let largest = term.iter().flatten().map(|value| value.norm()).fold(0.0, f64::max);
     let peak_sample = denoised::peak_beside(evidence, |channel, n| Some(term[channel][n]));
     let level_db = 20.0 * (largest / peak_sample.max(1e-300)).log10();
@@ -261,4 +252,33 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * loops) as f64,
         correction: subtract(term),
     })
+}
+
+/// The part of a still chirp that comes from beat frequencies below `end` (bins), as a matrix on its samples: every beat frequency has a
+/// random amplitude with the power of the spectrum `mean` (zero-padded), so that what is far is told from what is near (Wiener's filter).
+fn near_part(mean: &[f64], end: f64, noise: f64, samples: usize, real: bool) -> Option<DMatrix<Complex64>> {
+    let step = ZERO_PADDING / 2;
+    let total: f64 = mean.iter().step_by(step).sum();
+    let power = mean.iter().sum::<f64>() / mean.len() as f64;
+    let scale = power / total.max(f64::MIN_POSITIVE);
+    // Of two samples by their distance.
+    let (mut near, mut all) = (vec![Complex64::ZERO; samples], vec![Complex64::ZERO; samples]);
+    for (bin, value) in mean.iter().enumerate().step_by(step) {
+        let bins = bin as f64 / ZERO_PADDING as f64;
+        // What is near leaks over zero.
+        let below = samples as f64 - bins;
+        let is_near = bins <= end || below <= if real { end } else { 1.0 };
+        for (distance, turned) in tone(bins / samples as f64, samples).into_iter().enumerate() {
+            all[distance] += turned * (value * scale);
+            if is_near {
+                near[distance] += turned * (value * scale);
+            }
+        }
+    }
+    all[0] += noise.max(LEAST_NOISE * power);
+    let matrix = |of: &[Complex64]| {
+        DMatrix::from_fn(samples, samples, |row, column| if row >= column { of[row - column] } else { of[column - row].conj() })
+    };
+    let (near, all) = (matrix(&near), matrix(&all));
+    Some(near * all.cholesky()?.inverse())
 }

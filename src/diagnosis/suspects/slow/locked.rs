@@ -102,7 +102,9 @@ fn of_channel(evidence: &Evidence, channel: usize) -> Channel {
         let of_bin = |bin: usize| (0..count).map(|i| value(i, harmonic, bin)).sum::<Complex64>() / count as f64;
         let means: Vec<Complex64> = (0..bins).map(of_bin).collect();
         let of_bin = |bin: usize| (0..count).map(|i| (value(i, harmonic, bin) - means[bin]).norm_sqr()).sum::<f64>();
-        scatter.push((0..bins).map(of_bin).collect());
+        // Where something was taken out there is not even noise.
+        let least = (count as f64 - 1.0) * evidence.noise()[channel];
+        scatter.push((0..bins).map(of_bin).map(|sum: f64| sum.max(least)).collect());
         mean.push(means);
     }
     let still =

@@ -1,0 +1,224 @@
+//! Something nobody tracked that moves with all velocities at once, at one range: a fan, a wheel, a curtain in a draught.
+//!
+//! Its power fills every Doppler frequency, so that no velocity stands out. Whatever shakes the oscillator or the radar does that to
+//! static returns, too, but to all of them, in proportion to their power and at most in proportion to their delay's square: static
+//! returns elsewhere that are strong enough must not show it. Noise of the receivers at low beat frequencies is not shared by them; a
+//! return is.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+
+use super::paths::PATH_LIKE;
+use super::region::{Region, remove};
+use crate::diagnosis::evidence::{Evidence, spectrum};
+use crate::diagnosis::finding::{Candidate, Correction, Place};
+use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
+
+/// Doppler bins around zero where a Hann window leaves what stands still.
+const STILL_BINS: usize = 1;
+const FEWEST_LOOPS: usize = 16;
+/// Bins to each side that a Hann window's main lobe fills.
+const LOBE: usize = 2;
+/// Floor over the noise that a static return must have if it were modulated as well, to say by its silence that it is not.
+const TELLING: f64 = 3.0;
+/// Static returns elsewhere that must deny it.
+const FEWEST_DENIALS: usize = 2;
+/// p-value below which receivers share it.
+const SURE: f64 = 1e-3;
+
+/// Powers over the noise by range bin.
+struct Floor {
+    /// Median over velocities, of the training frames.
+    level: Vec<f64>,
+    still: Vec<f64>,
+}
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let loops = evidence.cube.dims[3];
+    if evidence.body.is_some() || loops < FEWEST_LOOPS || evidence.split.held_out.is_empty() {
+        return vec![];
+    }
+    one(evidence).into_iter().collect()
+}
+
+fn moving(loops: usize) -> impl Iterator<Item = usize> {
+    (0..loops).filter(move |&doppler| doppler.min(loops - doppler) > STILL_BINS)
+}
+
+impl Floor {
+    fn of(evidence: &Evidence) -> Self {
+        let [_, _, _, loops, samples] = evidence.cube.dims;
+        let (bins, channels, maps) = (evidence.range_bins(), evidence.cube.channels(), evidence.maps());
+        let training = &evidence.split.training;
+        let cell = |frame: usize, doppler: usize, bin: usize| f64::from(maps[(frame * loops + doppler) * samples + bin]);
+        let mean = |doppler: usize, bin: usize| {
+            training.iter().map(|&frame| cell(frame, doppler, bin)).sum::<f64>() / training.len() as f64
+        };
+        let level =
+            (0..bins).map(|bin| median(&mut moving(loops).map(|doppler| mean(doppler, bin)).collect::<Vec<_>>())).collect();
+        let mut still = vec![0.0; bins];
+        for (channel, chirp) in evidence.still().chunks_exact(samples).enumerate() {
+            let weight = (evidence.noise()[channel].max(f64::MIN_POSITIVE) * channels as f64).recip();
+            still.iter_mut().zip(spectrum(chirp)).for_each(|(sum, value)| *sum += weight * value.norm_sqr());
+        }
+        Self { level, still }
+    }
+
+    /// Whether static returns elsewhere say that what is at a range is there alone.
+    fn is_alone(&self, bin: usize, ends: [usize; 2]) -> bool {
+        let ratio = (self.level[bin] - 1.0) / self.still[bin].max(f64::MIN_POSITIVE);
+        let (mut telling, mut denying) = (0, 0);
+        let mut other = 0;
+        while other < self.level.len() {
+            // A phase of the oscillator grows with the delay at most in proportion.
+            let nearer = ((other as f64 + 1.0) / (bin as f64 + 1.0)).min(1.0).powi(2);
+            let expected = ratio * self.still[other] * nearer;
+            let aside = other + LOBE < ends[0] || other > ends[1] + LOBE;
+            if !aside || expected < TELLING {
+                other += 1;
+                continue;
+            }
+            telling += 1;
+            denying += usize::from(self.level[other] - 1.0 < 0.5 * expected);
+            // Of one return each.
+            other += 2 * LOBE;
+        }
+        denying >= FEWEST_DENIALS && 2 * denying > telling
+    }
+}
+
+fn one(evidence: &Evidence) -> Option<Candidate> {
+    let [frames, _, _, loops, samples] = evidence.cube.dims;
+    let floor = Floor::of(evidence);
+    let (bins, channels) = (evidence.range_bins(), evidence.cube.channels() as f64);
+    let bin = (0..bins).max_by(|&a, &b| floor.level[a].total_cmp(&floor.level[b]))?;
+    let count = evidence.split.training.len() as f64 * channels;
+    // The law of one cell; the median over many has less spread.
+    let p_value = corrected(mean_power_tail(floor.level[bin], count), bins as f64);
+    let above = |bin: usize| mean_power_tail(floor.level[bin], count) < SURE / bins as f64;
+    let first = (0..=bin).rev().take_while(|&bin| above(bin)).last()?;
+    let last = (bin..bins).take_while(|&bin| above(bin)).last()?;
+    if p_value > SURE || !floor.is_alone(bin, [first, last]) || chance_of_independent_receivers(evidence, bin) > SURE {
+        return None;
+    }
+    let maps = evidence.maps();
+    // Exponential laws with the floor's mean, against noise alone.
+    let of_cell = |frame: usize, doppler: usize, bin: usize| {
+        let power = f64::from(maps[(frame * loops + doppler) * samples + bin]);
+        let expected = floor.level[bin].max(1.0);
+        channels * (power * (1.0 - 1.0 / expected) - expected.ln())
+    };
+    let held_out = evidence.split.held_out.iter();
+    let cells =
+        held_out.flat_map(|&frame| moving(loops).flat_map(move |doppler| (first..=last).map(move |bin| (frame, doppler, bin))));
+    let gain: f64 = cells.map(|(frame, doppler, bin)| of_cell(frame, doppler, bin)).sum();
+    let bin_m = evidence.radar.range_resolution_m();
+    let fastest = 0.5 * evidence.radar.velocity_resolution_mps() * loops as f64;
+    let noise: f64 = evidence.noise().iter().sum();
+    let energy = (first..=last).map(|bin| floor.level[bin] - 1.0).sum::<f64>() * noise * (frames * loops) as f64;
+    let half = 0.5 * loops as f64;
+    let region = Region { range: [first as f64 - 0.5, last as f64 + 0.5], doppler: [-half, half] };
+    let training = evidence.split.training.clone();
+    Some(Candidate {
+        id: Some("moving_reflector"),
+        behaves_like: PATH_LIKE,
+        estimates: vec![],
+        choice: None,
+        place: Place {
+            range_m: Some([(first as f64 - 0.5).max(0.0) * bin_m, (last as f64 + 0.5) * bin_m]),
+            velocity_mps: Some([-fastest, fastest]),
+            ..Place::at("scene")
+        },
+        p_value,
+        gain,
+        errs_alike: false,
+        look_alikes: vec![],
+        statement: format!(
+            "At {:.2} m something moves with all velocities at once, up to {fastest:.1} m/s and beyond, {:.0} dB above the noise, while \
+             stronger static returns elsewhere do not: it turns or flutters, and nobody is tracked there.",
+            bin as f64 * bin_m,
+            10.0 * floor.level[bin].log10()
+        ),
+        curve: None,
+        energy,
+        correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, 1, region))),
+    })
+}
+
+/// Chance of what the receivers share at a range if each had noise of its own: of the best pair of channels, whose squared coherence
+/// over n independent cells exceeds c with a probability of `(1 − c)^{n−1}`.
+fn chance_of_independent_receivers(evidence: &Evidence, bin: usize) -> f64 {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let channels = evidence.cube.channels();
+    let mut products = vec![Complex64::ZERO; channels];
+    let mut powers = vec![0.0; channels];
+    let mut count = 0.0;
+    for &frame in &evidence.split.training {
+        let maps: Vec<Vec<Complex64>> = (0..channels).map(|channel| evidence.range_doppler(frame, channel)).collect();
+        // Neighbouring cells of a windowed transform share their noise.
+        for doppler in moving(loops).step_by(LOBE + 1) {
+            let cell = doppler * samples + bin;
+            for (channel, map) in maps.iter().enumerate() {
+                products[channel] += map[cell] * maps[0][cell].conj();
+                powers[channel] += map[cell].norm_sqr();
+            }
+            count += 1.0;
+        }
+    }
+    let chance = |channel: usize| {
+        let coherence = products[channel].norm_sqr() / (powers[channel] * powers[0]).max(f64::MIN_POSITIVE);
+        (1.0 - coherence.min(1.0)).powf(count - 1.0)
+    };
+    (1..channels).map(chance).map(|p| corrected(p, (channels - 1) as f64)).fold(1.0, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::radar::Radar;
+
+    const SAMPLES: usize = 64;
+
+    /// Static returns at four ranges; the nearest, or all, are modulated at random from chirp to chirp, or the receivers have noise of
+    /// their own at its beat frequency.
+    fn evidence(alone: bool, common: f64, noise: f64) -> Evidence {
+        let radar = Radar { samples_per_chirp: SAMPLES, loops_per_frame: 32, ..Radar::small(8) };
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let turns: Vec<f64> = (0..8 * 32).map(|_| random.random::<f64>()).collect();
+        let own: Vec<f64> = (0..64 * 8 * 32).map(|_| random.random::<f64>()).collect();
+        Evidence::in_noise(radar, 3, |[frame, channel, index, n]| {
+            let tone = |bin: f64, level: f64| Complex64::from_polar(level, TAU * bin * n as f64 / SAMPLES as f64);
+            let chirp = frame * 32 + index;
+            let fan = if alone { Complex64::cis(TAU * turns[chirp]) * 0.7 } else { Complex64::ZERO };
+            let all = Complex64::cis(common * (turns[chirp] - 0.5));
+            let noise = tone(5.0, noise) * Complex64::cis(TAU * own[channel * 256 + chirp]);
+            (tone(5.0, 20.0) * (Complex64::ONE + fan) + tone(14.0, 40.0) + tone(22.0, 30.0) + tone(28.0, 25.0)) * all + noise
+        })
+    }
+
+    #[test]
+    fn what_fills_all_velocities_at_one_range_is_a_mover_there_and_then_nothing() {
+        let evidence = evidence(true, 0.0, 0.0);
+        let found = find(&evidence).pop().expect("a fan");
+        assert_eq!(found.id, Some("moving_reflector"));
+        assert!(found.p_value < 1e-9 && found.gain > 100.0, "{found:?}");
+        let bin_m = evidence.radar.range_resolution_m();
+        let [low, high] = found.place.range_m.unwrap();
+        assert!(low < 5.0 * bin_m && 5.0 * bin_m < high && high < 12.0 * bin_m, "{low} to {high}");
+        assert!(find(&evidence.with(&found)).is_empty());
+    }
+
+    #[test]
+    fn neither_an_oscillator_that_shakes_all_returns_nor_noise_of_each_receiver_is_one() {
+        for (common, noise) in [(0.5, 0.0), (0.0, 20.0), (0.0, 0.0)] {
+            let found = find(&evidence(false, common, noise));
+            assert!(found.is_empty(), "{common} {noise}: {found:?}");
+        }
+    }
+}
