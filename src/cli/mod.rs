@@ -259,3 +259,6 @@ fn status(error: &Error) -> u8 {
         _ => 2,
     }
 }
+
+#[cfg(test)]
+mod docs_tests;
