@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, SystemTime};
@@ -52,21 +52,13 @@ pub fn seal(
     shard: Shard,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Commitment> {
-    let published = out.join(match shard.of {
-        1 => "commitment.json".to_string(),
-        of => format!("commitment_{}_of_{of}.json", shard.number),
-    });
-    if published.exists() {
+    if published(out, shard).exists() {
         return Err(Error::Usage {
-            message: format!("{}: is committed to already", published.display()),
+            message: format!("{}: is committed to already", published(out, shard).display()),
             hint: Some("seal into another folder".into()),
         });
     }
-    let sealed = out.join("sealed");
-    create(&sealed)?;
-    create(&out.join("cases"))?;
-    private(&sealed);
-    let secret = settle_secret(&sealed, config, seed, shard)?;
+    let secret = begin(out, &config.to_toml(), seed, shard)?;
     let chosen: Vec<Plan> = plans(config, &secret).into_iter().filter(|plan| shard.holds(plan.index)).collect();
     let (done, leaves) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     chosen.into_par_iter().try_for_each(|plan| -> Result<()> {
@@ -77,18 +69,47 @@ pub fn seal(
         Ok(())
     })?;
     let leaves = leaves.into_inner().expect("all threads are done");
+    commit(out, &config.to_toml(), &secret, shard, leaves)
+}
+
+/// Where a part's commitment is published.
+pub(super) fn published(out: &Path, shard: Shard) -> PathBuf {
+    out.join(match shard.of {
+        1 => "commitment.json".to_string(),
+        of => format!("commitment_{}_of_{of}.json", shard.number),
+    })
+}
+
+/// The folders, and the secret that everything is drawn from. `settings`: what is drawn, which must be the same when it goes on.
+pub(super) fn begin(out: &Path, settings: &str, seed: Option<&str>, shard: Shard) -> Result<Secret> {
+    let sealed = out.join("sealed");
+    create(&sealed)?;
+    create(&out.join("cases"))?;
+    private(&sealed);
+    settle_secret(&sealed, settings, seed, shard)
+}
+
+/// Publishes what commits to the cases of a part.
+pub(super) fn commit(
+    out: &Path,
+    settings: &str,
+    secret: &Secret,
+    shard: Shard,
+    leaves: BTreeMap<String, String>,
+) -> Result<Commitment> {
     let commitment = Commitment {
         format: 1,
         shard: [shard.number, shard.of],
         cases: leaves.len(),
-        config_sha256: sha256(config.to_toml()),
+        config_sha256: sha256(settings),
         executable_sha256: executable_hash()?,
         secret_sha256: sha256(&secret.seed),
         root: merkle_root(&leaves),
         leaves,
     };
     set_time(&out.join("cases"))?;
-    write_text(&published, &format!("{:#}\n", serde_json::to_value(&commitment).expect("plain data")))?;
+    let text = format!("{:#}\n", serde_json::to_value(&commitment).expect("plain data"));
+    write_text(published(out, shard), &text)?;
     Ok(commitment)
 }
 
@@ -114,12 +135,12 @@ fn private(folder: &Path) {
 }
 
 /// The secret of this folder: begun before, given, or new.
-fn settle_secret(sealed: &Path, config: &ChallengeConfig, seed: Option<&str>, shard: Shard) -> Result<Secret> {
+fn settle_secret(sealed: &Path, text: &str, seed: Option<&str>, shard: Shard) -> Result<Secret> {
     let path = sealed.join("secret.toml");
     let settings = sealed.join("config.toml");
     if path.exists() {
         let begun: Secret = read_toml(&path)?;
-        let same_config = files::read_text(&settings).is_ok_and(|text| text == config.to_toml());
+        let same_config = files::read_text(&settings).is_ok_and(|begun| begun == text);
         if !same_config || seed.is_some_and(|seed| Secret::new(Some(seed)) != begun) {
             return Err(Error::Usage {
                 message: format!("{}: was begun with another seed or other settings", sealed.display()),
@@ -135,14 +156,24 @@ fn settle_secret(sealed: &Path, config: &ChallengeConfig, seed: Option<&str>, sh
         });
     }
     let secret = Secret::new(seed);
-    write_text(&settings, &config.to_toml())?;
+    write_text(&settings, text)?;
     write_text(&path, &toml::to_string(&secret).expect("a text"))?;
     Ok(secret)
 }
 
 /// Records one case, unless it is there already, and returns its leaf.
 fn seal_case(config: &ChallengeConfig, mut plan: Plan, secret: &Secret, out: &Path) -> Result<String> {
-    let name = secret.name(plan.index);
+    let index = plan.index;
+    one_case(out, secret, index, |case| {
+        let recorded = record(config, &mut plan)?;
+        write_case(&recorded, case)?;
+        Ok(truth(&plan, &recorded))
+    })
+}
+
+/// Has one case made, unless it is there already, and returns its leaf. `make` fills the folder that it is given and says the truth.
+pub(super) fn one_case(out: &Path, secret: &Secret, index: usize, make: impl FnOnce(&Path) -> Result<Value>) -> Result<String> {
+    let name = secret.name(index);
     let (case, truth_file) = (out.join("cases").join(&name), out.join("sealed").join(format!("{name}.json")));
     if case.is_dir() && truth_file.is_file() {
         return Ok(leaf(&read_json(&truth_file)?, &hash_folder(&case)?));
@@ -150,9 +181,7 @@ fn seal_case(config: &ChallengeConfig, mut plan: Plan, secret: &Secret, out: &Pa
     if case.is_dir() {
         fs::remove_dir_all(&case).map_err(|source| Error::write(&case, source))?;
     }
-    let recorded = record(config, &mut plan)?;
-    write_case(&recorded, &case)?;
-    let sealed = Sealed { salt: secret.salt(plan.index), truth: truth(&plan, &recorded) };
+    let sealed = Sealed { salt: secret.salt(index), truth: make(&case)? };
     write_text(&truth_file, &format!("{:#}\n", serde_json::to_value(&sealed).expect("plain data")))?;
     // As it will be read again: the last digit of a number may not survive being written.
     Ok(leaf(&read_json(&truth_file)?, &hash_folder(&case)?))
@@ -275,6 +304,11 @@ fn write_frames(world: &World, frames: &[IfFrame], case: &Path) -> Result<()> {
         truth: None,
     };
     write_recording(case, &contents, &mut |frame| Ok(frames[frame].clone()))?;
+    set_times(case)
+}
+
+/// Makes a case and its files as old as all others.
+pub(super) fn set_times(case: &Path) -> Result<()> {
     for path in entries(case)? {
         set_time(&path)?;
     }
