@@ -77,7 +77,7 @@ fn strong_effects_are_found_in_a_recording_weak_ones_are_not_and_nothing_is_done
         "--out",
         text(&out),
         "--effects",
-        "spur,dc_offset",
+        "gain_drift,interference",
         "--grades",
         "2",
         "--seed",
@@ -87,7 +87,7 @@ fn strong_effects_are_found_in_a_recording_weak_ones_are_not_and_nothing_is_done
     let told = done(&[&salt[..], &["--most", "1"]].concat());
     assert!(told.contains("1 copies are answered, not all") && !out.join("results.md").exists(), "{told}");
     let told = done(&salt);
-    assert!(told.contains("| spur |"), "{told}");
+    assert!(told.contains("| gain_drift |"), "{told}");
     let result = json(&out.join("dose.json"));
     let rows = result["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 4);

@@ -180,6 +180,11 @@ pub fn waiting(out: &Path, nulls: usize, how: &RunConfig) -> usize {
     how.most.map_or(open, |most| open.min(most))
 }
 
+/// Nulls that have no report yet, whoever is to do them.
+pub fn missing(out: &Path, nulls: usize) -> usize {
+    (0..nulls).filter(|&index| !answered(&folder(out, index))).count()
+}
+
 /// Records and diagnoses the nulls of a part that have no report yet; `progress` hears how many are done.
 ///
 /// # Errors
@@ -251,7 +256,7 @@ pub fn gather(
     how: &RunConfig,
     settings: &DiagnosisConfig,
 ) -> Result<Option<Calibrated>> {
-    if (0..nulls).any(|index| !answered(&folder(out, index))) {
+    if missing(out, nulls) > 0 {
         return Ok(None);
     }
     let (mut reports, mut seeds, mut failures) = (vec![], vec![], vec![]);

@@ -26,6 +26,7 @@ pub mod rules;
 pub mod salt;
 pub mod score;
 pub mod seal;
+mod sealing;
 pub mod secret;
 pub mod surviving;
 pub mod table;

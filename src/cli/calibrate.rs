@@ -49,11 +49,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     progress.finish();
     done?;
     let Some(calibrated) = calibrate::gather(&source, arguments.nulls, &secret, out, &how, &settings)? else {
-        say!(
-            "{} of {} nulls are missing yet: the same command goes on",
-            calibrate::waiting(out, arguments.nulls, &how),
-            arguments.nulls
-        );
+        let missing = calibrate::missing(out, arguments.nulls);
+        say!("{missing} of {} nulls are missing yet: the same command goes on", arguments.nulls);
         return Ok(());
     };
     calibrated.write(out)?;

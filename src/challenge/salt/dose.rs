@@ -173,7 +173,8 @@ impl Dose {
 
     fn table(&self) -> String {
         let mut text = String::from(
-            "| effect | strength | unit | copies | found by name | told without a name | 95 % interval of both | wrong name | unanswered | gain, nats |\n\
+            "| effect | strength | unit | copies | found by name | told without a name | 95 % interval of both \
+             | wrong name | unanswered | gain, nats |\n\
              |---|---|---|---|---|---|---|---|---|---|\n",
         );
         for row in &self.rows {
