@@ -63,7 +63,9 @@ impl Config {
     pub fn read(path: &Path, sets: &[String]) -> Result<Self> {
         let mut config: Self = settings::read_settings(path, sets)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        for path in config.data.recordings.iter_mut().chain(&mut config.training.start_from) {
+        let paths =
+            config.data.recordings.iter_mut().chain(&mut config.training.start_from).chain(&mut config.diagnosis.calibration);
+        for path in paths {
             if path.is_relative() {
                 *path = folder.join(&*path);
             }

@@ -211,7 +211,7 @@ fn files_of_others_are_opened_in_one_place() {
         // A case, file by file, each looked at before; then the answer of its own process.
         "challenge/answer.rs",
         // The time of files that it has just written.
-        "challenge/seal.rs",
+        "challenge/sealing.rs",
         // The program itself.
         "experiments/stage.rs",
     ];

@@ -55,8 +55,8 @@ pub struct Answers {
 
 /// `failure.json`.
 #[derive(Serialize, Deserialize)]
-struct Failure {
-    reason: String,
+pub(super) struct Failure {
+    pub reason: String,
 }
 
 impl Answers {
@@ -89,20 +89,26 @@ impl Answers {
 pub fn run(challenge: &Path, out: &Path, config: &RunConfig, progress: &mut dyn FnMut(usize)) -> Result<Answers> {
     let commitments = Commitment::read_all(challenge)?;
     let names: Vec<&String> = commitments.iter().flat_map(|commitment| commitment.leaves.keys()).collect();
-    fs::create_dir_all(out).map_err(|source| Error::write(out, source))?;
-    let mut done = 0;
-    for name in names.iter().enumerate().filter(|(index, _)| config.shard.holds(*index)).map(|(_, name)| name) {
-        if answered(&out.join(name)) {
-            continue;
-        }
-        if config.most.is_some_and(|most| done >= most) {
-            break;
-        }
-        diagnose(&challenge.join("cases").join(name), &out.join(name), config)?;
-        done += 1;
-        progress(done);
-    }
+    let mine = names.iter().enumerate().filter(|(index, _)| config.shard.holds(*index)).map(|(_, name)| *name);
+    each(mine, challenge, out, config, progress)?;
     gather(&names, out, &commitments, &config.program)
+}
+
+/// Diagnoses those of some cases that have no answer yet.
+pub(super) fn each<'a>(
+    names: impl Iterator<Item = &'a String>,
+    challenge: &Path,
+    out: &Path,
+    config: &RunConfig,
+    progress: &mut dyn FnMut(usize),
+) -> Result<()> {
+    fs::create_dir_all(out).map_err(|source| Error::write(out, source))?;
+    let open = names.filter(|name| !answered(&out.join(name)));
+    for (index, name) in open.take(config.most.unwrap_or(usize::MAX)).enumerate() {
+        diagnose(&challenge.join("cases").join(name), &out.join(name), config)?;
+        progress(index + 1);
+    }
+    Ok(())
 }
 
 /// Cases of this shard that have no answer yet.
@@ -113,7 +119,7 @@ pub fn waiting(challenge: &Path, out: &Path, config: &RunConfig) -> Result<usize
     Ok(config.most.map_or(open, |most| open.min(most)))
 }
 
-fn answered(folder: &Path) -> bool {
+pub(super) fn answered(folder: &Path) -> bool {
     folder.join("report.json").is_file() || folder.join("failure.json").is_file()
 }
 
@@ -183,7 +189,8 @@ fn complaint(status: ExitStatus, stderr: &Path) -> String {
     format!("{status}: {last}")
 }
 
-fn gather(names: &[&String], out: &Path, commitments: &[Commitment], program: &Path) -> Result<Answers> {
+/// Commits to all answers that there are.
+pub(super) fn gather(names: &[&String], out: &Path, commitments: &[Commitment], program: &Path) -> Result<Answers> {
     let (mut reports, mut failures) = (BTreeMap::new(), BTreeMap::new());
     for &name in names {
         let folder = out.join(name);

@@ -106,7 +106,7 @@ fn word(effect: &Value) -> String {
 }
 
 /// Whether a reported effect stands for the true id.
-fn stands_for(reported: &Effect, id: &str) -> bool {
+pub(super) fn stands_for(reported: &Effect, id: &str) -> bool {
     look_alike(&reported.id, id) || reported.indistinguishable_from.iter().any(|other| other == id)
 }
 
@@ -183,7 +183,7 @@ fn stage_fits(found: &str, id: &str, named: &str) -> bool {
     [id, named].into_iter().any(|id| stage(id) == Some(found))
 }
 
-fn numbers(value: &Value) -> Option<Vec<f64>> {
+pub(super) fn numbers(value: &Value) -> Option<Vec<f64>> {
     match value {
         Value::Array(values) => values.iter().map(Value::as_f64).collect(),
         one => one.as_f64().map(|value| vec![value]),

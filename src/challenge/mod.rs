@@ -8,11 +8,12 @@
 //! - [`commitment`]: leaves, their Merkle root, and their verification
 //! - [`answer`]: one process per case, and what it answered
 //! - [`twins`]: the same scenes without their effects, for what a perfect diagnosis would be left with
+//! - [`salt`]: the same with effects put into somebody's recording; [`calibrate`]: what nulls of somebody's radar say
 //! - [`report`], [`judge`], [`psychometric`], [`baselines`], [`table`], [`score`]: reports held against truths
 
 pub mod answer;
 pub mod baselines;
-mod calibration;
+pub mod calibrate;
 pub mod commitment;
 pub mod config;
 pub mod judge;
@@ -22,12 +23,15 @@ pub mod plan;
 pub mod psychometric;
 pub mod report;
 pub mod rules;
+pub mod salt;
 pub mod score;
 pub mod seal;
+mod sealing;
 pub mod secret;
 pub mod surviving;
 pub mod table;
 pub mod twins;
+mod uniformity;
 mod worker;
 
 pub use config::ChallengeConfig;

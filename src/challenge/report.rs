@@ -17,6 +17,11 @@ pub struct Report {
     pub p_value: Option<f64>,
     #[serde(default)]
     pub null: BTreeMap<String, Option<f64>>,
+    /// Smallest p-value of each family of suspects that had something to say.
+    #[serde(default)]
+    pub suspects: BTreeMap<String, f64>,
+    #[serde(default)]
+    pub reason: String,
     pub effects: Vec<Effect>,
     pub unexplained: Vec<Unexplained>,
     #[serde(default)]
@@ -37,6 +42,14 @@ pub struct Effect {
     pub parameters: BTreeMap<String, Parameter>,
     #[serde(rename = "where", default, deserialize_with = "or_default")]
     pub place: Place,
+    #[serde(default, deserialize_with = "or_default")]
+    pub evidence: Evidence,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Evidence {
+    pub held_out_loglik_gain: Option<f64>,
 }
 
 /// Numbers or lists of numbers, as they come.
@@ -65,6 +78,8 @@ pub struct Unexplained {
     pub place: Place,
     #[serde(default)]
     pub behaves_like: String,
+    #[serde(default)]
+    pub held_out_loglik_gain: Option<f64>,
 }
 
 #[derive(Clone, Debug, Deserialize)]

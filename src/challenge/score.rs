@@ -9,7 +9,6 @@ use serde::Serialize;
 
 use super::answer::Answers;
 use super::baselines::{self, Statistics, TEMPLATES, quantile};
-use super::calibration;
 use super::commitment::{Commitment, joint_root, read_json, sha256};
 use super::config::Stratum;
 use super::judge::{Judgement, Truth, judge};
@@ -20,6 +19,7 @@ use super::rules::*;
 use super::seal::measured;
 use super::secret::Secret;
 use super::table::{Aim, Row, markdown, middle, share};
+use super::uniformity;
 use crate::data::atomic::write_text;
 use crate::data::entries::entries;
 use crate::data::{Recording, read_toml};
@@ -251,7 +251,7 @@ fn rows(cases: &[Case], psychometric: Option<Logistic>) -> Vec<Row> {
             Aim::AtLeast(0.95),
         ),
     ];
-    rows.extend(calibration::rows(nulls.iter().filter_map(|case| case.report.as_ref())));
+    rows.extend(uniformity::rows(nulls.iter().filter_map(|case| case.report.as_ref())));
     for (low, high, aim) in [(2.0, 8.0, Aim::None), (8.0, 30.0, Aim::AtLeast(0.8)), (30.0, f64::INFINITY, Aim::AtLeast(0.95))] {
         let within = singles.iter().filter(|case| (low..high).contains(&case.d_prime()));
         let name = if high.is_finite() {

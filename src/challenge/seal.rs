@@ -5,30 +5,25 @@
 //! times of files are equal, and the person's files are those of the scene without its effects.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::{Duration, SystemTime};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::commitment::{Commitment, Sealed, hash_file, hash_folder, leaf, merkle_root, read_json, sha256};
+use super::commitment::Commitment;
 use super::config::{ChallengeConfig, Stratum};
 use super::measure::{Draws, Strength, strength};
 use super::plan::{Plan, plans};
 use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
+use super::sealing::{begin, commit, one_case, published, set_times};
 use super::secret::Secret;
-use crate::data::atomic::write_text;
-use crate::data::entries::entries;
-use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, files, read_toml, write_recording};
+use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, write_recording};
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
 use crate::recorder::{EffectsConfig, ReceiverConfig, Recorder, RecorderConfig, Returns, World};
 
-/// All files of all cases were last changed then (1 January 2026), so that nothing is learned from when.
-const TIME_OF_FILES: u64 = 1_767_225_600;
 /// Attempts at what a kind of case asks for, after which the effect is taken as it is; what it then counts as is decided
 /// by what was measured, not by what was meant.
 const MOST_ATTEMPTS: usize = 4;
@@ -52,21 +47,13 @@ pub fn seal(
     shard: Shard,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Commitment> {
-    let published = out.join(match shard.of {
-        1 => "commitment.json".to_string(),
-        of => format!("commitment_{}_of_{of}.json", shard.number),
-    });
-    if published.exists() {
+    if published(out, shard).exists() {
         return Err(Error::Usage {
-            message: format!("{}: is committed to already", published.display()),
+            message: format!("{}: is committed to already", published(out, shard).display()),
             hint: Some("seal into another folder".into()),
         });
     }
-    let sealed = out.join("sealed");
-    create(&sealed)?;
-    create(&out.join("cases"))?;
-    private(&sealed);
-    let secret = settle_secret(&sealed, config, seed, shard)?;
+    let secret = begin(out, &config.to_toml(), seed, shard)?;
     let chosen: Vec<Plan> = plans(config, &secret).into_iter().filter(|plan| shard.holds(plan.index)).collect();
     let (done, leaves) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     chosen.into_par_iter().try_for_each(|plan| -> Result<()> {
@@ -77,85 +64,17 @@ pub fn seal(
         Ok(())
     })?;
     let leaves = leaves.into_inner().expect("all threads are done");
-    let commitment = Commitment {
-        format: 1,
-        shard: [shard.number, shard.of],
-        cases: leaves.len(),
-        config_sha256: sha256(config.to_toml()),
-        executable_sha256: executable_hash()?,
-        secret_sha256: sha256(&secret.seed),
-        root: merkle_root(&leaves),
-        leaves,
-    };
-    set_time(&out.join("cases"))?;
-    write_text(&published, &format!("{:#}\n", serde_json::to_value(&commitment).expect("plain data")))?;
-    Ok(commitment)
-}
-
-/// Of the program that runs.
-pub fn executable_hash() -> Result<String> {
-    let path = std::env::current_exe().map_err(|source| Error::read("this program", source))?;
-    hash_file(&path)
-}
-
-fn create(folder: &Path) -> Result<()> {
-    fs::create_dir_all(folder).map_err(|source| Error::write(folder, source))
-}
-
-/// For the owner alone, where the system knows owners.
-fn private(folder: &Path) {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        let _ = fs::set_permissions(folder, fs::Permissions::from_mode(0o700));
-    }
-    #[cfg(not(unix))]
-    let _ = folder;
-}
-
-/// The secret of this folder: begun before, given, or new.
-fn settle_secret(sealed: &Path, config: &ChallengeConfig, seed: Option<&str>, shard: Shard) -> Result<Secret> {
-    let path = sealed.join("secret.toml");
-    let settings = sealed.join("config.toml");
-    if path.exists() {
-        let begun: Secret = read_toml(&path)?;
-        let same_config = files::read_text(&settings).is_ok_and(|text| text == config.to_toml());
-        if !same_config || seed.is_some_and(|seed| Secret::new(Some(seed)) != begun) {
-            return Err(Error::Usage {
-                message: format!("{}: was begun with another seed or other settings", sealed.display()),
-                hint: Some("seal into another folder".into()),
-            });
-        }
-        return Ok(begun);
-    }
-    if shard.of > 1 && seed.is_none() {
-        return Err(Error::Usage {
-            message: "shards without a seed would be different challenges".into(),
-            hint: Some("give all shards the same --seed, and keep it secret".into()),
-        });
-    }
-    let secret = Secret::new(seed);
-    write_text(&settings, &config.to_toml())?;
-    write_text(&path, &toml::to_string(&secret).expect("a text"))?;
-    Ok(secret)
+    commit(out, &config.to_toml(), &secret, shard, leaves)
 }
 
 /// Records one case, unless it is there already, and returns its leaf.
 fn seal_case(config: &ChallengeConfig, mut plan: Plan, secret: &Secret, out: &Path) -> Result<String> {
-    let name = secret.name(plan.index);
-    let (case, truth_file) = (out.join("cases").join(&name), out.join("sealed").join(format!("{name}.json")));
-    if case.is_dir() && truth_file.is_file() {
-        return Ok(leaf(&read_json(&truth_file)?, &hash_folder(&case)?));
-    }
-    if case.is_dir() {
-        fs::remove_dir_all(&case).map_err(|source| Error::write(&case, source))?;
-    }
-    let recorded = record(config, &mut plan)?;
-    write_case(&recorded, &case)?;
-    let sealed = Sealed { salt: secret.salt(plan.index), truth: truth(&plan, &recorded) };
-    write_text(&truth_file, &format!("{:#}\n", serde_json::to_value(&sealed).expect("plain data")))?;
-    // As it will be read again: the last digit of a number may not survive being written.
-    Ok(leaf(&read_json(&truth_file)?, &hash_folder(&case)?))
+    let index = plan.index;
+    one_case(out, secret, index, |case| {
+        let recorded = record(config, &mut plan)?;
+        write_case(&recorded, case)?;
+        Ok(truth(&plan, &recorded))
+    })
 }
 
 /// A case in memory.
@@ -275,15 +194,7 @@ fn write_frames(world: &World, frames: &[IfFrame], case: &Path) -> Result<()> {
         truth: None,
     };
     write_recording(case, &contents, &mut |frame| Ok(frames[frame].clone()))?;
-    for path in entries(case)? {
-        set_time(&path)?;
-    }
-    set_time(case)
-}
-
-fn set_time(path: &Path) -> Result<()> {
-    let time = SystemTime::UNIX_EPOCH + Duration::from_secs(TIME_OF_FILES);
-    File::open(path).and_then(|file| file.set_modified(time)).map_err(|source| Error::write(path, source))
+    set_times(case)
 }
 
 fn truth(plan: &Plan, recorded: &Recorded) -> Value {

@@ -1,11 +1,11 @@
-//! `hybridsim challenge seal | run | twins | score`.
+//! `hybridsim challenge seal | run | twins | score | salt | calibrate`.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
 
-use super::{Common, interrupt, progress::Progress};
+use super::{Common, calibrate, interrupt, progress::Progress, salt};
 use crate::{
     challenge::{
         ChallengeConfig,
@@ -32,6 +32,10 @@ enum Step {
     Twins(Twins),
     /// Open the truths, verify them, and hold the reports against them
     Score(Score),
+    /// Plant graded effects into a recording of yours, under a seal, and see what would be found in it
+    Salt(salt::Arguments),
+    /// Record nulls of your own radar, and make the table by which p-values of its recordings are calibrated
+    Calibrate(calibrate::Arguments),
 }
 
 #[derive(Args)]
@@ -92,7 +96,7 @@ struct Score {
 
 /// How cases are diagnosed.
 #[derive(Args)]
-struct How {
+pub(super) struct How {
     /// Only part i of n, such as 2/8
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
@@ -113,6 +117,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         Step::Run(arguments) => answer(arguments, common),
         Step::Twins(arguments) => twins(arguments, common),
         Step::Score(arguments) => score(arguments, common),
+        Step::Salt(arguments) => salt::run(arguments, common),
+        Step::Calibrate(arguments) => calibrate::run(arguments, common),
     }
 }
 
@@ -131,7 +137,7 @@ fn seal(arguments: &Seal, common: &Common) -> Result<()> {
 }
 
 /// A folder that is filled by this process, or by one for each part.
-fn claimed(folder: &Path, shard: Shard, what: &'static str) -> Result<Claim> {
+pub(super) fn claimed(folder: &Path, shard: Shard, what: &'static str) -> Result<Claim> {
     let claim = Claim::part(folder, shard)?;
     atomic::sweep_all(folder);
     interrupt::kept(move || format!("the {what} are kept; go on with: {}", interrupt::typed()));
@@ -152,6 +158,15 @@ impl How {
             most: self.most,
             limit: Duration::from_secs(self.limit),
         })
+    }
+
+    /// The same with settings that those of the user go before, and what may be taken as stated.
+    pub(super) fn config_without(&self, sets: &[&str], common: &Common) -> Result<RunConfig> {
+        let mut config = self.config(common)?;
+        let sets = sets.iter().flat_map(|set| ["--set".to_string(), set.to_string()]);
+        let as_stated = common.as_stated.then(|| "--as-stated".to_string());
+        config.arguments.splice(0..0, sets.chain(as_stated));
+        Ok(config)
     }
 }
 

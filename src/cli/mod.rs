@@ -15,6 +15,7 @@ macro_rules! remark {
 
 mod align;
 mod baseline;
+mod calibrate;
 mod challenge;
 mod check;
 mod compare;
@@ -33,6 +34,7 @@ mod progress;
 mod recognize;
 mod record;
 mod reproduce;
+mod salt;
 mod scores;
 mod site;
 mod train;
@@ -171,7 +173,8 @@ enum Command {
     /// Prove the detective on concealed data: seal, run, score
     ///
     /// `seal` records cases by a secret and commits to their truths; `run` has each diagnosed by a process of its own
-    /// that cannot see them; `score` opens them and holds the reports against them.
+    /// that cannot see them; `score` opens them and holds the reports against them. `salt` plants effects into a recording of yours,
+    /// to see what would be found in it; `calibrate` makes p-values right for your radar.
     Challenge(challenge::Arguments),
     /// Make the paper's experiments again, from nothing to tables
     ///

@@ -1,5 +1,7 @@
 //! Settings of a diagnosis.
 
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -26,6 +28,9 @@ pub struct DiagnosisConfig {
     pub limits: bool,
     /// Of the simulator's training.
     pub seed: u64,
+    /// A table of `hybridsim challenge calibrate`, by which p-values are calibrated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<PathBuf>,
 }
 
 fn short_hash(bytes: &[u8]) -> String {
@@ -34,7 +39,17 @@ fn short_hash(bytes: &[u8]) -> String {
 
 impl Default for DiagnosisConfig {
     fn default() -> Self {
-        Self { alarm: 0.01, gain: 6.0, nameless_gain: 15.0, tie: 4.6, most: 10, epochs: 8, limits: true, seed: 1 }
+        Self {
+            alarm: 0.01,
+            gain: 6.0,
+            nameless_gain: 15.0,
+            tie: 4.6,
+            most: 10,
+            epochs: 8,
+            limits: true,
+            seed: 1,
+            calibration: None,
+        }
     }
 }
 
@@ -55,7 +70,9 @@ impl DiagnosisConfig {
     /// All that decides the answer beside the recording: these settings as text, the program's version and its sources (which hold
     /// every constant and table), and what else had a part, each by its hash; then the hash of all that.
     pub fn fingerprint(&self, more: &[(&str, Vec<u8>)]) -> String {
-        let settings = toml::to_string(self).expect("plain data").replace('\n', "; ");
+        // A table counts by what is in it, which is among the rest, and not by where it lies.
+        let settings = Self { calibration: None, ..self.clone() };
+        let settings = toml::to_string(&settings).expect("plain data").replace('\n', "; ");
         let program = format!("hybridsim {}, sources {}", env!("CARGO_PKG_VERSION"), env!("HYBRIDSIM_SOURCES"));
         let mut text = format!("{}; {program}", settings.trim_end_matches("; "));
         for (name, value) in more {
@@ -77,6 +94,8 @@ mod tests {
         assert!(plain.contains("alarm = 0.01") && plain.contains(env!("HYBRIDSIM_SOURCES")), "{plain}");
         let simulator = |text: &str| config.fingerprint(&[("simulator", text.into())]);
         let other = DiagnosisConfig { tie: 4.7, ..config.clone() }.fingerprint(&[]);
+        let table = DiagnosisConfig { calibration: Some("elsewhere.json".into()), ..config.clone() };
+        assert_eq!(table.fingerprint(&[]), plain);
         let all = [plain.clone(), simulator("a"), simulator("b"), other];
         let hash = |text: &String| text.rsplit_once("(sha256 ").unwrap().1.to_string();
         let hashes: std::collections::BTreeSet<String> = all.iter().map(hash).collect();

@@ -37,6 +37,10 @@ pub struct Loaded {
     pub extremes: [f64; 2],
 }
 
+/// Most frames that are looked at: memory and time stay bounded.
+const MOST_FRAMES: usize = 256;
+/// Most samples in memory (16 bytes each).
+const MOST_SAMPLES: usize = 40_000_000;
 /// Fewest frames (or blocks of loops) that can be split.
 const FEWEST_FRAMES: usize = 4;
 /// Every so many-th frame is held out.
@@ -47,6 +51,12 @@ const FOLDS: usize = 4;
 const MOST_DROPPED: usize = 20;
 /// Fewest loops in a block.
 const FEWEST_LOOPS: usize = 8;
+
+/// How many frames of a radar's recordings are looked at, at most.
+pub fn most_frames(radar: &Radar) -> usize {
+    let per_frame: usize = radar.dims()[1..].iter().product();
+    MOST_FRAMES.min((MOST_SAMPLES / per_frame.max(1)).max(1))
+}
 
 impl Cube {
     pub fn new(dims: [usize; 5], samples: Vec<Complex64>) -> Self {

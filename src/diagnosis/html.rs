@@ -110,6 +110,16 @@ fn anything(page: &mut String, report: &Report) {
         probability(p_value),
         parts.join("; ")
     );
+    if let Some(calibrated) = &report.calibration {
+        let _ = write!(
+            page,
+            "<p>That chance is calibrated: of {} recorded with nothing missing by a radar of this structure, {} looked at least as odd. \
+             Without them it would be {}.</p>",
+            count(calibrated.nulls, "recording"),
+            calibrated.as_odd,
+            probability(calibrated.p_value_raw)
+        );
+    }
 }
 
 fn count(number: usize, what: &str) -> String {

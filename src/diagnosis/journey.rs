@@ -1,8 +1,11 @@
 //! From a recording to a diagnosis: read, audit, explain in rounds, report.
 
+use std::collections::BTreeMap;
+
 use super::audit::{self, Check};
+use super::calibration::Table;
 use super::config::DiagnosisConfig;
-use super::cube::Loaded;
+use super::cube::{Loaded, most_frames};
 use super::evidence::Evidence;
 use super::limits::limits;
 use super::misfit::Misfit;
@@ -20,11 +23,6 @@ use crate::error::{Error, Result};
 use crate::integrity;
 use crate::person::Person;
 use crate::radar::Radar;
-
-/// Most frames that are looked at: memory and time stay bounded.
-const MOST_FRAMES: usize = 256;
-/// Most samples in memory (16 bytes each).
-const MOST_SAMPLES: usize = 40_000_000;
 
 /// The answer, and what pictures of it need.
 pub struct Diagnosis {
@@ -54,8 +52,11 @@ impl Diagnosis {
 pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut dyn FnMut(&str)) -> Result<Diagnosis> {
     let settings = recording.folder.join("recording.toml");
     recording.radar.refuse_falling("radar", "the diagnosis knows no falling ones").map_err(|error| error.in_file(settings))?;
-    let per_frame: usize = recording.radar.dims()[1..].iter().product();
-    let most_frames = MOST_FRAMES.min((MOST_SAMPLES / per_frame.max(1)).max(1));
+    let most_frames = most_frames(&recording.radar);
+    let table = Table::named(config)?;
+    if let (Some(table), Some(path)) = (&table, &config.calibration) {
+        table.check(recording, path)?;
+    }
     let mut notes = recording.notes.clone();
     let stretch = recording.whole_stretch()?;
     if stretch.len() < recording.radar.frames {
@@ -89,6 +90,8 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         probability_nothing_missing: 0.5,
         p_value: None,
         null: Null::default(),
+        calibration: None,
+        suspects: BTreeMap::new(),
         audit: integrity.into_iter().map(Check::from).collect(),
         effects: vec![],
         unexplained: vec![],
@@ -97,7 +100,7 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         located: Location::default(),
         notes,
         simulator: None,
-        settings: config.fingerprint(&[]),
+        settings: config.fingerprint(&table.iter().map(Table::shaping).collect::<Vec<_>>()),
     };
     if let Some(damage) = damage {
         // Physics fitted to what no receiver sent would be a fiction.
@@ -137,7 +140,13 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     }
     report.not_detectable.retain(|limit| report.effects.iter().all(|effect| effect.id != limit.id));
     report.null.suspicion = Some(explanation.suspicion);
+    report.suspects = explanation.suspects.clone();
     report.p_value = report.null.p_value();
+    if let (Some(table), Some(raw)) = (&table, report.p_value) {
+        let calibrated = table.calibrated(raw, &report.suspects);
+        report.p_value = Some(calibrated.p_value());
+        report.calibration = Some(calibrated);
+    }
     let nothing = probability_of_nothing(report.p_value.unwrap_or(1.0));
     report.probability_nothing_missing = match report.verdict {
         Verdict::NoMismatch => 1.0 - 0.5 * (1.0 - nothing),

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::audit::Check;
+use super::calibration::Calibrated;
 use super::cube::Split;
 use super::finding::Place;
 use super::limits::Limit;
@@ -163,6 +164,12 @@ pub struct Report {
     /// What that is made of.
     #[serde(default)]
     pub null: Null,
+    /// What the p-value was before nulls of this radar calibrated it, where they did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<Calibrated>,
+    /// Smallest p-value of each family of suspects that had something to say of the untouched recording.
+    #[serde(default)]
+    pub suspects: BTreeMap<String, f64>,
     pub audit: Vec<Check>,
     pub effects: Vec<Effect>,
     pub unexplained: Vec<Unexplained>,

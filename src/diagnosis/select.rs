@@ -4,6 +4,8 @@
 //! was accepted early may only have mimicked what was found later, so at the end each one is asked to stand again with
 //! all others taken into account.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
 use super::config::DiagnosisConfig;
@@ -13,7 +15,7 @@ use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
 use super::remains::{ROUGHLY, is_by_chirp, is_left_by, is_of_receivers, is_of_remains, is_product, is_rough, is_same};
 use super::suspects::receiver::harmonic;
-use super::suspects::{SUSPECTS, Suspect, excess, paths};
+use super::suspects::{SUSPECTS, Suspect, by_suspect, excess, paths, strongest_suspicion};
 
 impl DiagnosisConfig {
     /// Limit of one suspect's p-value.
@@ -89,6 +91,8 @@ pub struct Explanation {
     pub evidence: Evidence,
     /// Smallest p-value of all suspects on the untouched recording, corrected for their number: a bound.
     pub suspicion: f64,
+    /// Smallest p-value of each suspect that had something to say of it.
+    pub suspects: BTreeMap<String, f64>,
     pub before: Misfit,
     pub after: Misfit,
 }
@@ -99,7 +103,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     let original = evidence;
     let mut current: Option<Evidence> = None;
     let mut accepted: Vec<Accepted> = vec![];
-    let mut suspicion = None;
+    let mut first_heard = None;
     // Candidates of the round before that could still turn out to be the same thing as what was accepted in it.
     let mut pending: Vec<Candidate> = vec![];
     let mut misfit = before;
@@ -112,12 +116,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     for _ in 0..=thresholds.most {
         let evidence = current.as_ref().unwrap_or(&original);
         let found = heard.take().unwrap_or_else(|| suspicions(evidence));
-        suspicion.get_or_insert_with(|| {
-            // The limit of the whole at which the strongest suspicion would just pass.
-            let shares: f64 = SUSPECTS.iter().map(|suspect| suspect.share).sum();
-            let weighted = |(suspect, candidate): &(usize, Candidate)| candidate.p_value * shares / SUSPECTS[*suspect].share;
-            found.iter().map(weighted).fold(1.0, f64::min)
-        });
+        first_heard.get_or_insert_with(|| (strongest_suspicion(&found), by_suspect(&found)));
         // So they do where products were taken out roughly.
         let bent = |effect: &Accepted| effect.candidate.behaves_like == harmonic::QUADRATIC;
         let mixed = evidence.products().mixed().is_some() || accepted.iter().any(bent);
@@ -206,7 +205,8 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     let held_out = original.split.held_out.len() * original.cube.channels() * original.cube.dims[3] * original.range_bins();
     let unseen = accepted.iter().filter(|effect| matches!(effect.candidate.correction, Correction::None));
     after.loglik_per_sample += unseen.map(|effect| effect.candidate.gain).sum::<f64>() / held_out.max(1) as f64;
-    Explanation { accepted, evidence, suspicion: suspicion.unwrap_or(1.0), before, after }
+    let (suspicion, suspects) = first_heard.unwrap_or((1.0, BTreeMap::new()));
+    Explanation { accepted, evidence, suspicion, suspects, before, after }
 }
 
 /// Whether the body is elsewhere, or at another time, than predicted.

@@ -7,12 +7,14 @@ mod confusion;
 mod grid;
 mod heatmap;
 mod overlay;
+mod panels;
 
 pub use chart::{Chart, Series};
 pub use confusion::confusion;
 pub use grid::Grid;
 pub use heatmap::{comparison, heatmap};
 pub use overlay::{Line, overlay};
+pub use panels::{Panel, panels};
 
 use std::{io, path::Path, sync::Once};
 

@@ -10,6 +10,7 @@ use crate::{
     data::{Recording, atomic, files},
     diagnosis::{
         self, Diagnosis,
+        calibration::Table,
         simulate::{Simulated, Start, before_and_after},
     },
     error::{Error, Result},
@@ -97,12 +98,14 @@ fn simulate(
 
 /// What shapes a trained simulator beside the settings of the diagnosis.
 fn shaping(what: &Diagnose<'_>, device: &Device) -> Result<Vec<(&'static str, Vec<u8>)>> {
+    let table = Table::named(&what.config.diagnosis)?;
     let text = |settings: std::result::Result<String, toml::ser::Error>| settings.expect("plain data").into_bytes();
     let mut shaping = vec![
         ("simulator", text(toml::to_string(&what.config.simulator))),
         ("training", text(toml::to_string(&what.config.training))),
         ("device", format!("{device:?}").into_bytes()),
     ];
+    shaping.extend(table.iter().map(Table::shaping));
     if let Some(checkpoint) = what.checkpoint {
         let weights = checkpoint.join(checkpoint::WEIGHTS);
         shaping.push(("checkpoint", files::read(&weights)?));

@@ -2,6 +2,7 @@
 //!
 //! `truth.json`, which practice recordings carry, is written here when a recorder asks for it and never read.
 
+mod altered;
 mod dead;
 mod placement;
 mod samples;

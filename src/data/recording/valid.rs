@@ -45,6 +45,14 @@ impl Valid {
         write_npy(path, &self.dims, Values::Bool(&self.chirps))
     }
 
+    /// Of some frames alone.
+    pub(super) fn of_frames(&self, frames: &[usize]) -> Self {
+        let [all, tx, rx, loops] = self.dims;
+        let length = self.chirps.len() / all;
+        let chirps = frames.iter().flat_map(|frame| &self.chirps[frame * length..(frame + 1) * length]).copied().collect();
+        Self { dims: [frames.len(), tx, rx, loops], chirps }
+    }
+
     /// Whether every chirp of a frame was recorded.
     pub fn is_whole(&self, frame: usize) -> bool {
         let length = self.chirps.len() / self.dims[0];

@@ -87,7 +87,7 @@ fn reopened(target: &AtomicFolder) -> Result<Recording> {
     Ok(Recording { folder: target.target().to_path_buf(), ..Recording::open(target.path())? })
 }
 
-fn write_settings(path: &Path, settings: &RecordingSettings) -> Result<()> {
+pub(super) fn write_settings(path: &Path, settings: &RecordingSettings) -> Result<()> {
     write_text(path, &toml::to_string(settings).expect("settings of plain numbers and texts are TOML"))
 }
 
@@ -122,7 +122,7 @@ pub fn stage_recording(
     if let Some(truth) = contents.truth {
         write_text(target.path().join("truth.json"), &format!("{truth:#}\n"))?;
     }
-    let clipped = write_samples(&target.path().join(&settings.files.samples), contents, frame)?;
+    let clipped = write_samples(&target.path().join(&settings.files.samples), radar, layout, frame)?;
     let clipped = (clipped > 0).then(|| format!("{clipped} samples were beyond int16 and brought to its limits"));
     let recording = reopened(&target)?;
     Ok(StagedRecording { target, recording, clipped })
@@ -163,11 +163,16 @@ fn write_person(target: &AtomicFolder, contents: &RecordingContents) -> Result<F
 }
 
 /// Streams the samples and counts those that were clipped.
-fn write_samples(path: &Path, contents: &RecordingContents, frame: &mut dyn FnMut(usize) -> Result<IfFrame>) -> Result<usize> {
+pub(super) fn write_samples(
+    path: &Path,
+    radar: &Radar,
+    layout: IfLayout,
+    frame: &mut dyn FnMut(usize) -> Result<IfFrame>,
+) -> Result<usize> {
     let write_error = |source| Error::write(path, source);
-    let [frames, tx, rx, loops, samples] = contents.radar.dims();
+    let [frames, tx, rx, loops, samples] = radar.dims();
     let mut file = AtomicFile::create(path)?;
-    file.write_all(&header_bytes(contents.layout.descr(), &contents.layout.shape(contents.radar))).map_err(write_error)?;
+    file.write_all(&header_bytes(layout.descr(), &layout.shape(radar))).map_err(write_error)?;
     let mut clipped = 0;
     for index in 0..frames {
         let frame = frame(index)?;
@@ -175,8 +180,8 @@ fn write_samples(path: &Path, contents: &RecordingContents, frame: &mut dyn FnMu
         if let Some(place) = frame.first_non_finite() {
             return Err(not_finite(path, index, &place));
         }
-        let values = interleaved(&frame, contents.layout);
-        if matches!(contents.layout, IfLayout::Codes | IfLayout::RealCodes) {
+        let values = interleaved(&frame, layout);
+        if matches!(layout, IfLayout::Codes | IfLayout::RealCodes) {
             clipped += values.iter().filter(|value| i16::try_from(value.round() as i32).is_err()).count();
             // The cast saturates.
             let codes: Vec<i16> = values.iter().map(|value| value.round() as i16).collect();

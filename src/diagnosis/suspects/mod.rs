@@ -15,6 +15,8 @@ pub mod untracked;
 pub mod vital;
 pub mod waveform;
 
+use std::collections::BTreeMap;
+
 use super::evidence::Evidence;
 use super::finding::Candidate;
 
@@ -78,3 +80,20 @@ pub const SUSPECTS: &[Suspect] = &[
     carried::SUSPECT,
     Suspect { last_resort: true, ..Suspect::new("excess power", excess::find) },
 ];
+
+/// The limit of the whole at which the strongest suspicion would just pass.
+pub fn strongest_suspicion(found: &[(usize, Candidate)]) -> f64 {
+    let shares: f64 = SUSPECTS.iter().map(|suspect| suspect.share).sum();
+    let weighted = |(suspect, candidate): &(usize, Candidate)| candidate.p_value * shares / SUSPECTS[*suspect].share;
+    found.iter().map(weighted).fold(1.0, f64::min)
+}
+
+/// Smallest p-value of each suspect that has something to say.
+pub fn by_suspect(found: &[(usize, Candidate)]) -> BTreeMap<String, f64> {
+    let mut smallest = BTreeMap::new();
+    for (suspect, candidate) in found {
+        let least = smallest.entry(SUSPECTS[*suspect].name.to_string()).or_insert(1.0f64);
+        *least = least.min(candidate.p_value);
+    }
+    smallest
+}

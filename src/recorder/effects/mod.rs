@@ -8,6 +8,7 @@ mod antenna;
 mod body;
 mod if_filter;
 mod noise;
+mod onto;
 mod outside;
 mod propagation;
 mod receiver;
@@ -24,6 +25,7 @@ use serde::{Deserialize, Serialize};
 
 pub use body::{Physiology, garment_m, reflectivity_db};
 pub use noise::shape as shape_noise;
+pub use onto::{Ground, Onto};
 pub use propagation::{MirrorPlan, Shadow, twice_bounced};
 pub use receiver::Chain;
 pub use scene::{Mover, Stage, Swing, movers, static_points, vibration};

@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rustfft::FftPlanner;
 
@@ -32,18 +33,57 @@ pub fn shape(world: &World, sigma: f64, noise: &mut Signal) {
         }
     }
     if let Some(coloured) = &effects.coloured_noise {
-        colour(&world.radar, coloured.knee_hz, coloured.power, noise);
+        colour(&world.radar, coloured.knee_hz, coloured.power, 1.0, noise);
     }
 }
 
-/// Every chirp's spectrum times √(1 + (knee/f)^power).
-fn colour(radar: &Radar, knee_hz: f64, power: f64, noise: &mut Signal) {
+/// Adds to samples what makes white noise of deviation `sigma` per component, which they hold already, into what the effects make of it.
+/// Equal in law to [`shape`], but for correlated noise: what is there cannot be taken back, so the level rises by 1/(1 − ρ).
+pub fn add(world: &World, sigma: f64, signal: &mut Signal) {
+    let (effects, frame) = (&world.effects, signal.frame);
+    let quadrature = world.radar.sampling == Sampling::Complex;
+    let value = |rng: &mut ChaCha8Rng, deviation: f64| {
+        let mut draw = || -> f64 { StandardNormal.sample(rng) };
+        Complex64::new(draw(), if quadrature { draw() } else { 0.0 }) * deviation
+    };
+    if let Some(correlated) = &effects.correlated_noise {
+        let mut rng = world.random(Draw::Effect { id: super::CORRELATED_NOISE, frame });
+        // What all receivers share is ρ of the whole.
+        let shared = sigma * (correlated.rho / (1.0 - correlated.rho).max(LEAST_OWN)).sqrt();
+        signal.mix_receivers(|_, _, values| {
+            let common = value(&mut rng, shared);
+            values.iter_mut().for_each(|value| *value += common);
+        });
+    }
+    if let Some(impulsive) = &effects.impulsive_noise {
+        let mut rng = world.random(Draw::Effect { id: super::IMPULSIVE_NOISE, frame });
+        let further = sigma * (impulsive.strength * impulsive.strength - 1.0).max(0.0).sqrt();
+        for sample in &mut signal.values {
+            if rng.random::<f64>() < impulsive.rate {
+                *sample += value(&mut rng, further);
+            }
+        }
+    }
+    if let Some(coloured) = &effects.coloured_noise {
+        let mut rng = world.random(Draw::Noise { frame });
+        let mut noise = signal.clone();
+        noise.values.iter_mut().for_each(|sample| *sample = value(&mut rng, sigma));
+        colour(&world.radar, coloured.knee_hz, coloured.power, 0.0, &mut noise);
+        signal.values.iter_mut().zip(noise.values).for_each(|(sample, noise)| *sample += noise);
+    }
+}
+
+/// A receiver's own share of the noise is at least this, so that what is shared stays finite.
+const LEAST_OWN: f64 = 1e-3;
+
+/// Every chirp's spectrum times √(white + (knee/f)^power).
+fn colour(radar: &Radar, knee_hz: f64, power: f64, white: f64, noise: &mut Signal) {
     let count = noise.samples;
     let bin_hz = radar.sample_rate_hz / count as f64;
     let gains: Vec<f64> = (0..count)
         .map(|bin| {
             let frequency = (bin.min(count - bin) as f64).max(0.5) * bin_hz;
-            (1.0 + (knee_hz / frequency).powf(power)).sqrt() / count as f64
+            (white + (knee_hz / frequency).powf(power)).sqrt() / count as f64
         })
         .collect();
     let mut planner = FftPlanner::new();
