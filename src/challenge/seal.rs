@@ -22,7 +22,7 @@ use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
 use super::secret::Secret;
 use crate::data::atomic::write_text;
 use crate::data::entries::entries;
-use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, files, read_toml, write_recording};
+use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, files, program, read_toml, write_recording};
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
 use crate::recorder::{EffectsConfig, ReceiverConfig, Recorder, RecorderConfig, Returns, World};
@@ -62,21 +62,7 @@ pub fn seal(
             hint: Some("seal into another folder".into()),
         });
     }
-    let sealed = out.join("sealed");
-    create(&sealed)?;
-    create(&out.join("cases"))?;
-    private(&sealed);
-    let secret = settle_secret(&sealed, config, seed, shard)?;
-    let chosen: Vec<Plan> = plans(config, &secret).into_iter().filter(|plan| shard.holds(plan.index)).collect();
-    let (done, leaves) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
-    chosen.into_par_iter().try_for_each(|plan| -> Result<()> {
-        let name = secret.name(plan.index);
-        let leaf = seal_case(config, plan, &secret, out)?;
-        leaves.lock().expect("nobody panics while holding it").insert(name, leaf);
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1);
-        Ok(())
-    })?;
-    let leaves = leaves.into_inner().expect("all threads are done");
+    let (secret, leaves) = cases(config, seed, out, shard, progress)?;
     let commitment = Commitment {
         format: 1,
         shard: [shard.number, shard.of],
@@ -92,10 +78,46 @@ pub fn seal(
     Ok(commitment)
 }
 
+/// Makes the folders of a challenge and settles its secret, so that shards of it need no seed.
+///
+/// # Errors
+/// Another seed, or other settings, than those begun with.
+pub fn begin(config: &ChallengeConfig, seed: Option<&str>, out: &Path, shard: Shard) -> Result<Secret> {
+    let sealed = out.join("sealed");
+    create(&sealed)?;
+    create(&out.join("cases"))?;
+    private(&sealed);
+    settle_secret(&sealed, config, seed, shard)
+}
+
+/// Records the cases of a shard that are not there yet, and commits to nothing: who seals the whole later finds them done. The
+/// secret, and the leaves by the cases' names.
+///
+/// # Errors
+/// As [`begin`], and whatever the recorder refuses.
+pub fn cases(
+    config: &ChallengeConfig,
+    seed: Option<&str>,
+    out: &Path,
+    shard: Shard,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<(Secret, BTreeMap<String, String>)> {
+    let secret = begin(config, seed, out, shard)?;
+    let chosen: Vec<Plan> = plans(config, &secret).into_iter().filter(|plan| shard.holds(plan.index)).collect();
+    let (done, leaves) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
+    chosen.into_par_iter().try_for_each(|plan| -> Result<()> {
+        let name = secret.name(plan.index);
+        let leaf = seal_case(config, plan, &secret, out)?;
+        leaves.lock().expect("nobody panics while holding it").insert(name, leaf);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+        Ok(())
+    })?;
+    Ok((secret, leaves.into_inner().expect("all threads are done")))
+}
+
 /// Of the program that runs.
 pub fn executable_hash() -> Result<String> {
-    let path = std::env::current_exe().map_err(|source| Error::read("this program", source))?;
-    hash_file(&path)
+    hash_file(&program::file()?)
 }
 
 fn create(folder: &Path) -> Result<()> {
