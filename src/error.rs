@@ -30,6 +30,9 @@ pub enum Error {
     NonFinite { stage: String, step: usize },
     #[error("no device `{name}` here, available: {available}")]
     Device { name: String, available: String },
+    /// Another process holds the claim to a folder: who waits may have it.
+    #[error("{}: {who}", folder.display())]
+    Busy { folder: PathBuf, who: String },
     #[error("{message}")]
     Usage { message: String, hint: Option<String> },
 }
@@ -92,6 +95,7 @@ impl Error {
                 Some("free some space, or choose another folder with --out; nothing half-written was left".into())
             }
             Self::NonFinite { .. } => Some("lower training.learning_rate, or start again from the last checkpoint".into()),
+            Self::Busy { .. } => Some("wait for it, or choose another folder with --out".into()),
             Self::UnknownKey { .. } => Some("remove the key or correct its name".into()),
             _ => None,
         }

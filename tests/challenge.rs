@@ -61,7 +61,7 @@ fn program(folder: &Path, body: &str) -> RunConfig {
     let path = folder.join("diagnostician");
     fs::write(&path, format!("#!/bin/sh\nmkdir -p \"$4\"\n{body}\n")).unwrap();
     fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
-    RunConfig { program: path, arguments: vec![], shard: Shard::ALL, most: None, limit: Duration::from_secs(20) }
+    RunConfig { program: path, through: vec![], arguments: vec![], shard: Shard::ALL, most: None, limit: Duration::from_secs(20) }
 }
 
 fn silent_report() -> Value {

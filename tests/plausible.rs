@@ -8,7 +8,7 @@ use std::{
 };
 
 use hybridsim::config::Config;
-use hybridsim::data::{Recording, write_body};
+use hybridsim::data::{Recording, Shard, write_body};
 use hybridsim::person::Person;
 use hybridsim::person::procedural::{self, PersonConfig};
 use hybridsim::plausibility::{CodeFacts, Facts, Finding, Kind, findings};
@@ -252,7 +252,7 @@ fn configs_describe_plausible_scenes() {
                 continue;
             }
             let config = SiteConfig::read(&path, &[]).unwrap();
-            for (sequence, found) in implausible(&config, Path::new(&folder), false).unwrap() {
+            for (sequence, found) in implausible(&config, Path::new(&folder), false, Shard::ALL).unwrap() {
                 assert_eq!(refusals(found), [], "{name}: {sequence}");
             }
         } else {

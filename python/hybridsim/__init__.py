@@ -15,11 +15,11 @@ from __future__ import annotations
 import atexit
 from typing import Any
 
-from . import _hybridsim
-from ._errors import Error, FileError, MissingFileError, Note
+from . import _hybridsim, challenge, distributed
+from ._errors import BusyError, Error, FileError, MissingFileError, Note
 from ._progress import Progress
 from ._recording import Recording, read
-from ._types import Axis, Check, Finding, Heatmap, Poses, Radar, Report, Run
+from ._types import Axis, Check, Finding, Heatmap, Poses, Radar, Report, Run, Stage
 from ._verbs.align import align
 from ._verbs.check import check
 from ._verbs.diagnose import diagnose
@@ -27,6 +27,7 @@ from ._verbs.export import export
 from ._verbs.heatmaps import heatmaps
 from ._verbs.import_ import import_
 from ._verbs.record import record
+from ._verbs.reproduce import reproduce, stages
 from ._verbs.simulate import simulate
 from ._verbs.site import site
 from ._verbs.train import train
@@ -34,6 +35,7 @@ from ._windows import Windows
 
 __all__ = [
     "Axis",
+    "BusyError",
     "Check",
     "Error",
     "FileError",
@@ -47,20 +49,26 @@ __all__ = [
     "Recording",
     "Report",
     "Run",
+    "Stage",
     "Windows",
     "align",
+    "challenge",
     "check",
     "diagnose",
+    "distributed",
     "export",
     "heatmaps",
     "import_",
     "read",
     "record",
+    "reproduce",
     "simulate",
     "site",
+    "stages",
     "train",
 ]
 
+_hybridsim.is_library(_hybridsim.__file__)
 # Work that Ctrl-C has left may not have come to its next step.
 atexit.register(_hybridsim.abandon)
 

@@ -46,13 +46,17 @@ class MissingFileError(FileError, FileNotFoundError):
     """A file or folder that is not there."""
 
 
+class BusyError(Error):
+    """Another process works where this one would; whoever waits may go on."""
+
+
 class Note(UserWarning):
     """What was assumed, or is odd about what was given; the work goes on."""
 
 
-def make(message: str, hint: str | None, filename: str | None, number: int | None) -> Error:
+def make(message: str, hint: str | None, filename: str | None, number: int | None, busy: bool) -> Error:
     """The exception of an error of the library."""
     if filename is None:
-        return Error(message, hint)
+        return BusyError(message, hint) if busy else Error(message, hint)
     kind = MissingFileError if number == errno.ENOENT else FileError
     return kind(message, hint, filename, number)

@@ -18,6 +18,13 @@ Settings = Mapping[str, Any] | Iterable[str]
 """Changes of single settings: ``{"training.epochs": 10}``, or ``["training.epochs=10"]``."""
 
 
+Shard = tuple[int, int]
+"""A part of some work: its number, from 1, and how many there are."""
+
+WHOLE: Shard = (1, 1)
+"""All of it."""
+
+
 def sets(settings: Settings) -> list[str]:
     """Settings as the command line's ``--set`` has them."""
     if isinstance(settings, Mapping):
@@ -219,6 +226,23 @@ class Run:
     def last(self) -> Path:
         """The checkpoint of the last epoch."""
         return self.folder / "last"
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of a reproduction.
+
+    Attributes:
+        folder: its name and the hash of all that it depends on; where its results are, below ``out/stages``.
+        parents: the stages that must be done before, by their places in the list.
+        pieces: into how many parts it can be divided; a stage that records a site into its sequences.
+        seconds: how long it took; ``None`` while it is to be done.
+    """
+
+    folder: str
+    parents: list[int]
+    pieces: int
+    seconds: float | None
 
 
 @dataclass(frozen=True)

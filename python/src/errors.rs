@@ -14,7 +14,8 @@ fn make(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
         _ => (None, None),
     };
     let make = py.import("hybridsim._errors")?.getattr("make")?;
-    Ok(PyErr::from_value(make.call1((error.to_string(), error.hint(), path, number))?))
+    let busy = matches!(error, Error::Busy { .. });
+    Ok(PyErr::from_value(make.call1((error.to_string(), error.hint(), path, number, busy))?))
 }
 
 /// Wrong usage, in the class of all others.

@@ -17,6 +17,7 @@ mod _hybridsim {
     #[pymodule_export]
     use crate::verbs::{
         align::align,
+        challenge::{challenge_begin, challenge_run, challenge_score, challenge_seal, challenge_twins},
         check::check,
         diagnose::diagnose,
         export::export,
@@ -24,10 +25,11 @@ mod _hybridsim {
         import::import,
         read::{Recording, read},
         record::record,
+        reproduce::{reproduce, reproduce_stage, stages},
         simulate::simulate,
-        site::{recordings_in, site},
+        site::{recordings_in, site, site_look},
         train::train,
     };
     #[pymodule_export]
-    use crate::work::abandon;
+    use crate::work::{abandon, is_library};
 }

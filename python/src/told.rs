@@ -1,6 +1,6 @@
 //! What a verb tells, on its way from the thread that works to the one that asked.
 
-use hybridsim::{training::Event, verbs::Told};
+use hybridsim::{experiments::Event as Stage, training::Event, verbs::Told};
 use pyo3::{prelude::*, types::PyTuple};
 use serde_json::json;
 
@@ -24,8 +24,9 @@ impl Message {
             Told::Note(text) => vec![Self::Note((*text).into())],
             Told::Begun { what, steps } => vec![Self::Begun { what: (*what).into(), steps: *steps }],
             Told::Done(steps) => vec![Self::Done(*steps)],
-            Told::Line(text) => vec![Self::Line((*text).into())],
-            Told::Run { .. } => vec![],
+            Told::Line(text) | Told::At(text) => vec![Self::Line((*text).into())],
+            Told::Run { .. } | Told::Still => vec![],
+            Told::Stage(event) => of_stage(event),
             Told::Training(event) => of_training(event),
         }
     }
@@ -44,6 +45,17 @@ impl Message {
             [kind.into_pyobject(py)?.into_any(), text.into_pyobject(py)?.into_any(), number.into_pyobject(py)?.into_any()],
         )?)?;
         Ok(())
+    }
+}
+
+fn of_stage(event: &Stage<'_>) -> Vec<Message> {
+    match event {
+        Stage::Stage { index, of, name, .. } => {
+            let begun = (*index == 0).then(|| Message::Begun { what: "stages".into(), steps: *of });
+            begun.into_iter().chain([Message::Line((*name).into()), Message::Done(*index)]).collect()
+        }
+        Stage::Step { .. } => vec![],
+        Stage::Done { name, seconds } => vec![Message::Line(format!("{seconds:.1} s  {name}"))],
     }
 }
 

@@ -3,6 +3,7 @@
 
 use std::{
     panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -12,7 +13,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use hybridsim::{Result, data::unfinished, verbs::Tell};
+use hybridsim::{
+    Result,
+    data::{program, unfinished},
+    verbs::Tell,
+};
 use pyo3::{exceptions::PyRuntimeError, prelude::*};
 
 use crate::{errors::raised, told::Message};
@@ -78,6 +83,12 @@ pub fn run<T: Send + 'static>(
             Err(PyRuntimeError::new_err(format!("a bug in hybridsim: {}", text.unwrap_or("a panic without words"))))
         }
     }
+}
+
+/// Says which file this module was loaded from.
+#[pyfunction]
+pub fn is_library(file: PathBuf) {
+    program::is_library(file);
 }
 
 /// Undoes what is unfinished; called when the interpreter ends, whatever still works then.

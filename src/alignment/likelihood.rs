@@ -241,7 +241,9 @@ pub fn improve(frames: &[&Compared], weights: &mut [f64; WEIGHTS], steps: usize)
             a.iter_mut().zip(b).for_each(|(a, b)| *a = [a[0] + b[0], a[1] + b[1]]);
             a
         };
-        let sums = frames.par_iter().map(|frame| frame.step(weights)).reduce(|| [[0.0; 2]; WEIGHTS], add);
+        // In the order of the frames, whichever thread had which.
+        let of_frames: Vec<_> = frames.par_iter().map(|frame| frame.step(weights)).collect();
+        let sums = of_frames.into_iter().fold([[0.0; 2]; WEIGHTS], add);
         for (weight, [up, down]) in weights.iter_mut().zip(sums) {
             if down > 0.0 {
                 // The square root makes every step safe.

@@ -5,6 +5,7 @@
 //! failed, and the failure stands; who wants it repeated removes its folder.
 
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
@@ -27,6 +28,8 @@ use crate::error::{Error, Result};
 pub struct RunConfig {
     /// Called as `PROGRAM diagnose CASE --out FOLDER --quiet`, then `arguments`.
     pub program: PathBuf,
+    /// What is called in its place, where the program is a library: a command that answers by it.
+    pub through: Vec<OsString>,
     pub arguments: Vec<String>,
     pub shard: Shard,
     /// Cases to diagnose now; those with an answer do not count.
@@ -85,7 +88,8 @@ impl Answers {
     }
 }
 
-/// Diagnoses what has no answer yet and writes `answers.json`. `progress` hears how many are done.
+/// Diagnoses what has no answer yet and writes `answers.json`. `progress` hears how many are done, also while one is at work: whoever
+/// unwinds from it ends that one.
 pub fn run(challenge: &Path, out: &Path, config: &RunConfig, progress: &mut dyn FnMut(usize)) -> Result<Answers> {
     let commitments = Commitment::read_all(challenge)?;
     let names: Vec<&String> = commitments.iter().flat_map(|commitment| commitment.leaves.keys()).collect();
@@ -105,7 +109,7 @@ pub(super) fn each<'a>(
     fs::create_dir_all(out).map_err(|source| Error::write(out, source))?;
     let open = names.filter(|name| !answered(&out.join(name)));
     for (index, name) in open.take(config.most.unwrap_or(usize::MAX)).enumerate() {
-        diagnose(&challenge.join("cases").join(name), &out.join(name), config)?;
+        diagnose(&challenge.join("cases").join(name), &out.join(name), config, &mut || progress(index))?;
         progress(index + 1);
     }
     Ok(())
@@ -123,8 +127,8 @@ pub(super) fn answered(folder: &Path) -> bool {
     folder.join("report.json").is_file() || folder.join("failure.json").is_file()
 }
 
-/// One case in a process of its own; whatever becomes of it is kept in `out`.
-pub fn diagnose(case: &Path, out: &Path, config: &RunConfig) -> Result<()> {
+/// One case in a process of its own; whatever becomes of it is kept in `out`. `meanwhile` is called while it works.
+pub fn diagnose(case: &Path, out: &Path, config: &RunConfig, meanwhile: &mut dyn FnMut()) -> Result<()> {
     let workplace = Scratch::new()?;
     let (copy, answer) = (workplace.path().join("recording"), workplace.path().join("answer"));
     fs::create_dir(&copy).map_err(|source| Error::write(&copy, source))?;
@@ -133,7 +137,7 @@ pub fn diagnose(case: &Path, out: &Path, config: &RunConfig) -> Result<()> {
         let name = file.file_name().expect("an entry of a folder");
         fs::copy(&file, copy.join(name)).map_err(|source| Error::read(&file, source))?;
     }
-    let outcome = start(&copy, &answer, workplace.path(), config)
+    let outcome = start(&copy, &answer, workplace.path(), config, meanwhile)
         .and_then(|()| Report::read(&answer.join("report.json")).map(drop).map_err(|error| format!("bad report: {error}")));
     // What failed because everything is ended has not failed.
     wait_if_ending();
@@ -155,11 +159,19 @@ pub fn diagnose(case: &Path, out: &Path, config: &RunConfig) -> Result<()> {
 }
 
 /// Runs the program; the reason if it did not do its work.
-fn start(copy: &Path, answer: &Path, workplace: &Path, config: &RunConfig) -> std::result::Result<(), String> {
+fn start(
+    copy: &Path,
+    answer: &Path,
+    workplace: &Path,
+    config: &RunConfig,
+    meanwhile: &mut dyn FnMut(),
+) -> std::result::Result<(), String> {
     let complaints = workplace.join("stderr");
     let stderr = fs::File::create(&complaints).map_err(|error| error.to_string())?;
-    let mut command = Command::new(&config.program);
+    let (called, before) = config.through.split_first().map_or((config.program.as_os_str(), &[][..]), |(one, more)| (one, more));
+    let mut command = Command::new(called);
     command
+        .args(before)
         .arg("diagnose")
         .arg(copy)
         .arg("--out")
@@ -174,9 +186,8 @@ fn start(copy: &Path, answer: &Path, workplace: &Path, config: &RunConfig) -> st
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(stderr);
-    let mut worker =
-        Worker::start(&mut command).map_err(|error| format!("{}: cannot be started: {error}", config.program.display()))?;
-    match worker.wait(config.limit).map_err(|error| error.to_string())? {
+    let mut worker = Worker::start(&mut command).map_err(|error| format!("{}: cannot be started: {error}", called.display()))?;
+    match worker.wait(config.limit, meanwhile).map_err(|error| error.to_string())? {
         None => Err(format!("not done after {:.0} s", config.limit.as_secs_f64())),
         Some(status) if status.success() => Ok(()),
         Some(status) => Err(complaint(status, &complaints)),

@@ -207,7 +207,7 @@ pub fn run(
         let workplace = Scratch::new()?;
         let case = workplace.path().join("null");
         source.record(secret, index, &case)?;
-        diagnose(&case, &folder(out, index), how)?;
+        diagnose(&case, &folder(out, index), how, &mut || progress(done))?;
         progress(done + 1);
     }
     Ok(())

@@ -17,7 +17,7 @@ use super::config::{ChallengeConfig, Stratum};
 use super::measure::{Draws, Strength, strength};
 use super::plan::{Plan, plans};
 use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
-use super::sealing::{begin, commit, one_case, published, set_times};
+use super::sealing::{self, commit, one_case, published, set_times};
 use super::secret::Secret;
 use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, write_recording};
 use crate::error::{Error, Result};
@@ -53,7 +53,31 @@ pub fn seal(
             hint: Some("seal into another folder".into()),
         });
     }
-    let secret = begin(out, &config.to_toml(), seed, shard)?;
+    let (secret, leaves) = cases(config, seed, out, shard, progress)?;
+    commit(out, &config.to_toml(), &secret, shard, leaves)
+}
+
+/// Makes the folders of a challenge and settles its secret, so that shards of it need no seed.
+///
+/// # Errors
+/// Another seed, or other settings, than those begun with.
+pub fn begin(config: &ChallengeConfig, seed: Option<&str>, out: &Path, shard: Shard) -> Result<Secret> {
+    sealing::begin(out, &config.to_toml(), seed, shard)
+}
+
+/// Records the cases of a shard that are not there yet, and commits to nothing: who seals the whole later finds them done. The
+/// secret, and the leaves by the cases' names.
+///
+/// # Errors
+/// As [`begin`], and whatever the recorder refuses.
+pub fn cases(
+    config: &ChallengeConfig,
+    seed: Option<&str>,
+    out: &Path,
+    shard: Shard,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<(Secret, BTreeMap<String, String>)> {
+    let secret = begin(config, seed, out, shard)?;
     let chosen: Vec<Plan> = plans(config, &secret).into_iter().filter(|plan| shard.holds(plan.index)).collect();
     let (done, leaves) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     chosen.into_par_iter().try_for_each(|plan| -> Result<()> {
@@ -63,8 +87,7 @@ pub fn seal(
         progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         Ok(())
     })?;
-    let leaves = leaves.into_inner().expect("all threads are done");
-    commit(out, &config.to_toml(), &secret, shard, leaves)
+    Ok((secret, leaves.into_inner().expect("all threads are done")))
 }
 
 /// Records one case, unless it is there already, and returns its leaf.

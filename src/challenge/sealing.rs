@@ -11,7 +11,7 @@ use super::commitment::{Commitment, Sealed, hash_file, hash_folder, leaf, merkle
 use super::secret::Secret;
 use crate::data::atomic::write_text;
 use crate::data::entries::entries;
-use crate::data::{Shard, files, read_toml};
+use crate::data::{Shard, files, program, read_toml};
 use crate::error::{Error, Result};
 
 /// All files of all cases were last changed then (1 January 2026), so that nothing is learned from when.
@@ -54,8 +54,7 @@ pub fn commit(out: &Path, settings: &str, secret: &Secret, shard: Shard, leaves:
 
 /// Of the program that runs.
 pub fn executable_hash() -> Result<String> {
-    let path = std::env::current_exe().map_err(|source| Error::read("this program", source))?;
-    hash_file(&path)
+    hash_file(&program::file()?)
 }
 
 fn create(folder: &Path) -> Result<()> {

@@ -40,7 +40,7 @@ pub fn run(challenge: &Path, answers: &Path, out: &Path, config: &RunConfig, pro
         let workplace = Scratch::new()?;
         let case = workplace.path().join(name);
         record_twin(&truth.settings, &case)?;
-        diagnose(&case, &folder, config)?;
+        diagnose(&case, &folder, config, &mut || progress(done))?;
         done += 1;
         progress(done);
     }

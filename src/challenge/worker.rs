@@ -24,8 +24,8 @@ impl Worker {
         Ok(Self { process, _undo: Undo::by(move || end_group(id)) })
     }
 
-    /// How it ended; `None` if it takes longer than `limit`. Dropping ends it.
-    pub fn wait(&mut self, limit: Duration) -> io::Result<Option<ExitStatus>> {
+    /// How it ended; `None` if it takes longer than `limit`. Dropping ends it. `meanwhile` is called now and then.
+    pub fn wait(&mut self, limit: Duration, meanwhile: &mut dyn FnMut()) -> io::Result<Option<ExitStatus>> {
         let begun = Instant::now();
         loop {
             if let Some(status) = self.process.try_wait()? {
@@ -34,6 +34,7 @@ impl Worker {
             if begun.elapsed() > limit {
                 return Ok(None);
             }
+            meanwhile();
             std::thread::sleep(Duration::from_millis(20));
         }
     }
@@ -96,7 +97,7 @@ mod tests {
         let note = folder.path().join("id");
         let script = format!("sleep 300 & echo $! > '{}.new'; mv '{0}.new' '{0}'; wait", note.display());
         let mut worker = Worker::start(Command::new("sh").args(["-c", &script])).unwrap();
-        assert!(worker.wait(Duration::from_millis(1)).unwrap().is_none());
+        assert!(worker.wait(Duration::from_millis(1), &mut || ()).unwrap().is_none());
         while !note.exists() {
             std::thread::sleep(Duration::from_millis(10));
         }

@@ -5,15 +5,12 @@ use std::time::Duration;
 
 use clap::{Args, Subcommand};
 
-use super::{Common, calibrate, interrupt, progress::Progress, salt};
+use super::{Common, calibrate, interrupt, progress::Shown, salt};
 use crate::{
-    challenge::{
-        ChallengeConfig,
-        answer::{self, RunConfig},
-        score, seal, twins,
-    },
-    data::{Claim, Shard, atomic},
+    challenge::answer::RunConfig,
+    data::{Claim, Shard, atomic, program},
     error::{Error, Result},
+    verbs::{Tell, challenge},
 };
 
 #[derive(Args)]
@@ -123,15 +120,11 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
 }
 
 fn seal(arguments: &Seal, common: &Common) -> Result<()> {
-    let config = ChallengeConfig::read(&arguments.config, &common.set)?;
-    let shard = arguments.shard.unwrap_or(Shard::ALL);
-    let _claim = claimed(&arguments.out, shard, "cases that are sealed")?;
-    let count = (0..config.cases).filter(|&index| shard.holds(index)).count();
-    let progress = Progress::new("sealing", count, common.quiet);
-    let sealed = seal::seal(&config, arguments.seed.as_deref(), &arguments.out, shard, &|done| progress.set(done));
-    progress.finish();
-    let commitment = sealed?;
-    say!("sealed {} cases in {}", commitment.cases, arguments.out.display());
+    kept("cases that are sealed");
+    let Seal { config, out, seed, shard } = arguments;
+    let what = challenge::Seal { config, sets: &common.set, seed: seed.as_deref(), out };
+    let commitment = shown(common, |tell| challenge::commit(&what, shard.unwrap_or(Shard::ALL), tell))?;
+    say!("sealed {} cases in {}", commitment.cases, out.display());
     say!("publish before anybody diagnoses: root {}", commitment.root);
     Ok(())
 }
@@ -140,19 +133,33 @@ fn seal(arguments: &Seal, common: &Common) -> Result<()> {
 pub(super) fn claimed(folder: &Path, shard: Shard, what: &'static str) -> Result<Claim> {
     let claim = Claim::part(folder, shard)?;
     atomic::sweep_all(folder);
-    interrupt::kept(move || format!("the {what} are kept; go on with: {}", interrupt::typed()));
+    kept(what);
     Ok(claim)
+}
+
+/// What stays when a folder's filling is interrupted.
+fn kept(what: &'static str) {
+    interrupt::kept(move || format!("the {what} are kept; go on with: {}", interrupt::typed()));
+}
+
+/// Does a step and shows what it tells.
+fn shown<T>(common: &Common, step: impl FnOnce(&mut Tell<'_>) -> Result<T>) -> Result<T> {
+    let mut shown = Shown::new(common.quiet);
+    let done = step(&mut |told| shown.show(told));
+    shown.finish();
+    done
 }
 
 impl How {
     fn config(&self, common: &Common) -> Result<RunConfig> {
         let program = match &self.program {
             Some(program) => program.canonicalize().map_err(|source| Error::read(program, source))?,
-            None => std::env::current_exe().map_err(|source| Error::read("this program", source))?,
+            None => program::file()?,
         };
         let sets = common.set.iter().flat_map(|set| ["--set".to_string(), set.clone()]);
         Ok(RunConfig {
             program,
+            through: vec![],
             arguments: ["--device".to_string(), common.device.clone()].into_iter().chain(sets).collect(),
             shard: self.shard.unwrap_or(Shard::ALL),
             most: self.most,
@@ -172,11 +179,8 @@ impl How {
 
 fn answer(arguments: &Run, common: &Common) -> Result<()> {
     let config = arguments.how.config(common)?;
-    let _claim = claimed(&arguments.out, config.shard, "answers")?;
-    let progress = Progress::new("diagnosing", answer::waiting(&arguments.challenge, &arguments.out, &config)?, common.quiet);
-    let answers = answer::run(&arguments.challenge, &arguments.out, &config, &mut |done| progress.set(done));
-    progress.finish();
-    let answers = answers?;
+    kept("answers");
+    let answers = shown(common, |tell| challenge::run(&arguments.challenge, &arguments.out, &config, tell))?;
     say!("{} reports, {} failures in {}", answers.reports.len(), answers.failures.len(), arguments.out.display());
     if answers.complete {
         say!("publish before the truths are opened: {}", answers.sha256);
@@ -188,24 +192,18 @@ fn answer(arguments: &Run, common: &Common) -> Result<()> {
 
 fn twins(arguments: &Twins, common: &Common) -> Result<()> {
     let config = arguments.how.config(common)?;
-    let _claim = claimed(&arguments.out, config.shard, "reports of twins")?;
-    let progress = Progress::new("twins", answer::waiting(&arguments.challenge, &arguments.out, &config)?, common.quiet);
-    let done = twins::run(&arguments.challenge, &arguments.answers, &arguments.out, &config, &mut |done| progress.set(done));
-    progress.finish();
-    say!("{} twins diagnosed in {}", done?, arguments.out.display());
+    kept("reports of twins");
+    let Twins { challenge, answers, out, .. } = arguments;
+    let done = shown(common, |tell| challenge::twins(challenge, answers, out, &config, tell))?;
+    say!("{done} twins diagnosed in {}", out.display());
     Ok(())
 }
 
 fn score(arguments: &Score, common: &Common) -> Result<()> {
-    let count = crate::challenge::commitment::Commitment::read_all(&arguments.challenge)?.iter().map(|part| part.cases).sum();
-    let out = arguments.out.clone().unwrap_or_else(|| arguments.answers.join("score"));
-    let _claim = super::claimed(&out)?;
-    let progress = Progress::new("scoring", count, common.quiet);
-    let Score { challenge, answers, twins, measure, .. } = arguments;
-    let scored = score::score(challenge, answers, twins.as_deref(), *measure, &|done| progress.set(done));
-    progress.finish();
-    let scored = scored?;
-    scored.write(&out)?;
+    let Score { challenge, answers, twins, measure, out } = arguments;
+    let out = out.clone().unwrap_or_else(|| answers.join("score"));
+    let what = challenge::Scoring { challenge, answers, twins: twins.as_deref(), measure: *measure, out: &out };
+    let scored = shown(common, |tell| challenge::score(&what, tell))?;
     say!("{}", scored.markdown());
     say!("results: {}", out.join("results.md").display());
     Ok(())

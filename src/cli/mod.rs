@@ -124,7 +124,7 @@ enum Command {
     /// Record a site: several subjects and actions in one room, by one board
     ///
     /// Writes DIR/site.toml (resolved) and a recording folder per sequence. Killed runs go on where they stopped;
-    /// --shard divides the work between processes. All settings are checked before the first sequence is recorded.
+    /// --shard divides the work between processes. All that a process is to record is checked before its first sequence.
     Site(site::Arguments),
     /// Fit the simulator to recordings
     ///

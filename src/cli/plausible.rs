@@ -12,7 +12,6 @@ use crate::{
     plausibility::{Facts, Sources},
     radar::Radar,
     room::Room,
-    site::SiteConfig,
     verbs::plausible,
 };
 
@@ -32,14 +31,6 @@ pub(super) fn scene(
     common: &Common,
 ) -> Result<()> {
     plausible::scene(radar, room, person, sources, common.as_stated, &mut notes)
-}
-
-pub(super) fn site(path: &Path, common: &Common) -> Result<()> {
-    plausible::site(path, common.as_stated, &mut notes)
-}
-
-pub(super) fn sequences(config: &SiteConfig, path: &Path, common: &Common) -> Result<()> {
-    plausible::sequences(config, path, common.as_stated, &mut notes)
 }
 
 pub(super) fn tell(facts: Facts, sources: &Sources, common: &Common) -> Result<()> {

@@ -131,9 +131,12 @@ impl Shown {
             Told::Begun { what, steps } => self.progress = Some(Progress::new(what, steps, self.quiet)),
             Told::Done(steps) => self.progress.iter().for_each(|progress| progress.set(steps)),
             Told::Line(text) => self.progress.iter().for_each(|progress| progress.line(text)),
+            Told::At(text) => self.progress.iter().for_each(|progress| progress.message(text.into())),
             // Whatever was made to train on is made.
             Told::Run { .. } => self.progress.take().into_iter().for_each(Progress::finish),
             Told::Training(event) => self.training.show(event),
+            // A reproduction shows its own.
+            Told::Stage(_) | Told::Still => {}
         }
     }
 
@@ -153,7 +156,7 @@ pub struct StageProgress {
 }
 
 impl StageProgress {
-    pub fn new(stages: usize, quiet: bool) -> Self {
+    pub fn new(quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let bars = MultiProgress::with_draw_target(if quiet || !terminal {
             ProgressDrawTarget::hidden()
@@ -166,11 +169,8 @@ impl StageProgress {
             bar.enable_steady_tick(Duration::from_millis(500));
             bar
         };
-        if !quiet && !terminal {
-            remark!("reproducing: {stages} stages");
-        }
         Self {
-            stages: bar(stages as u64, "stages [{bar:30}] {pos}/{len}  {elapsed} elapsed, {eta} left"),
+            stages: bar(0, "stages [{bar:30}] {pos}/{len}  {elapsed} elapsed, {eta} left"),
             within: bar(0, "       [{bar:30}] {pos}/{len}  {msg}"),
             quiet,
             terminal,
@@ -180,7 +180,11 @@ impl StageProgress {
 
     pub fn show(&mut self, event: &StageEvent) {
         match event {
-            StageEvent::Stage { index, name, known, .. } => {
+            StageEvent::Stage { index, of, name, known } => {
+                if *index == 0 && !self.quiet && !self.terminal {
+                    remark!("reproducing: {of} stages");
+                }
+                self.stages.set_length(*of as u64);
                 self.stages.set_position(*index as u64);
                 self.within.set_position(0);
                 self.within.set_length(0);

@@ -1,14 +1,14 @@
 //! `hybridsim site`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Common, interrupt, plausible, progress::Progress};
+use super::{Common, interrupt, progress::Shown};
 use crate::{
-    data::{Claim, Shard},
+    data::Shard,
     error::Result,
-    site::{self, SiteConfig},
+    verbs::site::{self, Site},
 };
 
 #[derive(Args)]
@@ -24,23 +24,12 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
-    let config = SiteConfig::read(&arguments.config, &common.set)?;
     let shard = arguments.shard.unwrap_or(Shard::ALL);
-    let _claim = Claim::part(&arguments.out, shard)?;
+    let what = Site { config: &arguments.config, sets: &common.set, out: &arguments.out, shard };
     interrupt::kept(|| format!("the recordings that are whole are kept; go on with: {}", interrupt::typed()));
-    let settings_folder = arguments.config.parent().unwrap_or(Path::new(""));
-    plausible::sequences(&config, &arguments.config, common)?;
-    let mut shown = None;
-    let mut show = |done: usize, of: usize, name: &str| {
-        let progress = shown.get_or_insert_with(|| Progress::new("recording", of, common.quiet));
-        progress.set(done);
-        progress.message(name.to_string());
-    };
-    let made = site::record(&config, settings_folder, &arguments.out, shard, &mut show);
-    if let Some(progress) = shown {
-        progress.finish();
-    }
-    let made = made?;
+    let mut shown = Shown::new(common.quiet);
+    let made = site::record(&what, common.as_stated, &mut |told| shown.show(told))?;
+    shown.finish();
     say!("site: {}", arguments.out.display());
     say!("{} of {} sequences: {} recorded, {} kept", made.sequences, made.of, made.recorded, made.kept);
     Ok(())

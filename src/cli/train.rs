@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let sets = &common.set;
     let start = match (&arguments.resume, &arguments.config) {
         (Some(run), _) => Start::Resume { run, sets },
-        (None, Some(path)) => Start::Config { path, sets, out: arguments.out.out.as_deref() },
+        (None, Some(path)) => Start::Config { path, sets, out: arguments.out.out.as_deref(), go_on: false },
         (None, None) => unreachable!("clap asks for one of them"),
     };
     let devices = devices(&common.device)?;

@@ -6,12 +6,18 @@
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use super::Shard;
 use super::atomic::leftovers::{is_linked, lock_name, parent_of};
 use super::files;
 use super::unfinished::Undo;
 use crate::error::{Error, Result};
+
+/// Who lets a claim go, or looks whether its holder is dead, has the lock alone while a file is removed. That is no refusal: a lock
+/// is asked for so often, within half of what a person notices (100 ms: Nielsen, Usability Engineering, 1993, sec. 5.5).
+const ASKED: usize = 5;
+const INSTANT: Duration = Duration::from_millis(10);
 
 /// Held for as long as results are written into a folder.
 #[derive(Debug)]
@@ -56,9 +62,13 @@ impl Claim {
         if shard.of == 1 {
             return Self::take(folder);
         }
+        Self::piece(folder, &format!("part-{}-of-{}", shard.number, shard.of))
+    }
+
+    /// The same of a piece that has a name.
+    pub fn piece(folder: &Path, name: &str) -> Result<Self> {
         let mut claim = Self::of_made(folder)?;
-        let part = format!("part-{}-of-{}", shard.number, shard.of);
-        for (path, kind) in [(lock_name(None), Kind::Shared), (lock_name(Some(part.as_ref())), Kind::Alone)] {
+        for (path, kind) in [(lock_name(None), Kind::Shared), (lock_name(Some(name.as_ref())), Kind::Alone)] {
             let path = folder.join(path);
             if !claim.lock(folder, path.clone(), kind)? {
                 return Err(refusal(folder, &path));
@@ -86,6 +96,7 @@ impl Claim {
     /// False where another process holds it. `folder`: what an error names.
     fn lock(&mut self, folder: &Path, path: PathBuf, kind: Kind) -> Result<bool> {
         let write_error = |source| Error::write(folder, source);
+        let mut asked = 0;
         loop {
             let mut options = File::options();
             let mut file = options.read(true).write(true).create(true).truncate(false).open(&path).map_err(write_error)?;
@@ -94,7 +105,12 @@ impl Claim {
                 Kind::Shared => file.try_lock_shared(),
             };
             if matches!(tried, Err(TryLockError::WouldBlock)) {
-                return Ok(false);
+                asked += 1;
+                if asked == ASKED {
+                    return Ok(false);
+                }
+                std::thread::sleep(INSTANT);
+                continue;
             }
             // Who held it before has removed it since it was opened.
             if !is_linked(&file, &path) {
@@ -137,10 +153,7 @@ fn refusal(folder: &Path, lock: &Path) -> Error {
         Some(id) => format!("another process, number {id}, works here"),
         None => "another process works here".into(),
     };
-    Error::Usage {
-        message: format!("{}: {who}", folder.display()),
-        hint: Some("wait for it, or choose another folder with --out".into()),
-    }
+    Error::Busy { folder: folder.into(), who }
 }
 
 #[cfg(test)]
@@ -154,6 +167,7 @@ mod tests {
         let folder = parent.path().join("run");
         let first = Claim::take(&folder).unwrap();
         let error = Claim::take(&folder).unwrap_err();
+        assert!(matches!(error, Error::Busy { .. }) && error.hint().is_some());
         let expected = format!("{}: another process, number {}, works here", folder.display(), std::process::id());
         assert_eq!(error.to_string(), expected);
         assert!(Claim::try_take(&folder).unwrap().is_none());

@@ -12,6 +12,7 @@ pub mod files;
 mod hex;
 pub mod meshes;
 pub mod motions;
+pub mod program;
 pub mod recording;
 mod scratch;
 pub mod settings;

@@ -113,7 +113,9 @@ impl Misfit {
             };
             (0..channels).map(of_channel).fold(Sums::default(), Sums::and)
         };
-        let sums = recording.split.held_out.par_iter().map(of_frame).reduce(Sums::default, Sums::and);
+        // In the order of the frames, whichever thread had which.
+        let of_frames: Vec<Sums> = recording.split.held_out.par_iter().map(of_frame).collect();
+        let sums = of_frames.into_iter().fold(Sums::default(), Sums::and);
         let cells = sums.cells.max(1) as f64;
         let (db_mse, span) = (sums.squares / cells, 10.0 * sums.peak.max(1.0).log10());
         Self {

@@ -26,6 +26,6 @@ pub mod task;
 pub mod variants;
 
 pub use config::ReproduceConfig;
-pub use plan::{Plan, plan};
-pub use run::{Event, run, run_some};
+pub use plan::{Plan, plan, plan_again};
+pub use run::{Event, run, run_one, run_some};
 pub use stage::Store;

@@ -124,7 +124,31 @@ pub struct Plan {
     pub figures: Vec<(String, usize)>,
 }
 
+impl Stage {
+    /// Into how many pieces its work can be divided ([`super::run_one`]): a site's sequences.
+    ///
+    /// # Errors
+    /// Settings that cannot be a site.
+    pub fn pieces(&self) -> Result<usize> {
+        match &self.task {
+            Task::Site { config, .. } => Ok(site::drawn(config)?.len()),
+            _ => Ok(1),
+        }
+    }
+}
+
 impl Plan {
+    /// The stage of this folder (`NAME-HASH`).
+    ///
+    /// # Errors
+    /// A folder that no stage has.
+    pub fn find(&self, folder: &str) -> Result<usize> {
+        self.stages.iter().position(|stage| stage.key.folder() == folder).ok_or_else(|| Error::Usage {
+            message: format!("{folder}: no stage of this plan"),
+            hint: Some("its settings, or those of a stage that it needs, have changed since the stages were listed".into()),
+        })
+    }
+
     /// The stages whose names begin with one of these, and all that they need, in the plan's order.
     ///
     /// # Errors
@@ -180,9 +204,13 @@ impl Place {
     }
 }
 
+/// The sequences of a site that is not recorded yet.
+type Sequences = dyn Fn(&SiteConfig, &Path) -> Result<Vec<site::Sequence>>;
+
 struct Planner<'a> {
     config: &'a ReproduceConfig,
     root: &'a Path,
+    sequences: &'a Sequences,
     /// Of the files behind LPIPS.
     weights: Option<String>,
     plan: Plan,
@@ -193,8 +221,20 @@ struct Planner<'a> {
 /// # Errors
 /// Sites that cannot be read or split as asked for.
 pub fn plan(config: &ReproduceConfig, root: &Path) -> Result<Plan> {
+    plan_of(config, root, &site::sequences)
+}
+
+/// The same for who has planned it before: whether everybody stays in their room is not asked again.
+///
+/// # Errors
+/// As [`plan`], less that.
+pub fn plan_again(config: &ReproduceConfig, root: &Path) -> Result<Plan> {
+    plan_of(config, root, &|config, _| site::drawn(config))
+}
+
+fn plan_of(config: &ReproduceConfig, root: &Path, sequences: &Sequences) -> Result<Plan> {
     let weights = config.comparison.lpips.as_ref().map(|lpips| digest(&[&lpips.weights, &lpips.heads])).transpose()?;
-    let mut planner = Planner { config, root, weights, plan: Plan::default() };
+    let mut planner = Planner { config, root, weights, sequences, plan: Plan::default() };
     let first = planner.place(FIRST, &config.site)?;
     let second = config.second_room.as_deref().map(|site| planner.place("second_room", site)).transpose()?;
     let scene = config.second_scene.as_ref().map(|scene| planner.place("second_scene", &scene.site)).transpose()?;
@@ -288,7 +328,7 @@ impl Planner<'_> {
         // Posing everybody, as the plan of a site does, is not needed again once they are recorded.
         let takes = match read_record(&folder) {
             Some(_) => takes_in(&folder.join("recordings"))?,
-            None => planned(&config, &settings_folder)?,
+            None => planned((self.sequences)(&config, &settings_folder)?),
         };
         let key = self.plan.stages[stage].key.clone();
         Ok(Place {
@@ -657,12 +697,12 @@ impl MethodStages {
 }
 
 /// The recordings that a site will have, in the order in which [`takes_in`] finds them afterwards: keys depend on it.
-fn planned(config: &SiteConfig, settings_folder: &Path) -> Result<Vec<Take>> {
+fn planned(sequences: Vec<site::Sequence>) -> Vec<Take> {
     let take =
         |sequence: site::Sequence| Take { name: sequence.name, subject: sequence.subject, action: sequence.action.name().into() };
-    let mut takes: Vec<Take> = site::sequences(config, settings_folder)?.into_iter().map(take).collect();
+    let mut takes: Vec<Take> = sequences.into_iter().map(take).collect();
     takes.sort();
-    Ok(takes)
+    takes
 }
 
 /// First digits of the hash of some files.

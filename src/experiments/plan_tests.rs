@@ -24,7 +24,8 @@ fn config() -> ReproduceConfig {
 }
 
 fn planned(config: &ReproduceConfig) -> Plan {
-    let mut planner = Planner { config, root: Path::new("/out"), weights: None, plan: Plan::default() };
+    let mut planner =
+        Planner { config, root: Path::new("/out"), weights: None, sequences: &site::sequences, plan: Plan::default() };
     planner.all(&place("site"), Some(&place("second_room"))).unwrap();
     planner.plan
 }
@@ -79,7 +80,8 @@ fn nothing_is_learned_from_what_it_is_tested_on() {
 #[test]
 fn without_protocols_no_classifier_learns() {
     let config = ReproduceConfig { protocols: vec![], ..config() };
-    let mut planner = Planner { config: &config, root: Path::new("/out"), weights: None, plan: Plan::default() };
+    let mut planner =
+        Planner { config: &config, root: Path::new("/out"), weights: None, sequences: &site::sequences, plan: Plan::default() };
     planner.all(&Place { other_mesh: Some(0), ..place("site") }, None).unwrap();
     assert!(!planner.plan.stages.iter().any(|stage| matches!(stage.task, Task::Recognise { .. })));
 }
@@ -131,7 +133,8 @@ fn adaptations_start_from_ours_and_take_as_many_steps_whatever_the_frames() {
 #[test]
 fn a_second_room_without_the_training_subject_is_refused() {
     let config = config();
-    let mut planner = Planner { config: &config, root: Path::new("/out"), weights: None, plan: Plan::default() };
+    let mut planner =
+        Planner { config: &config, root: Path::new("/out"), weights: None, sequences: &site::sequences, plan: Plan::default() };
     let mut second = place("second_room");
     second.takes.retain(|take| take.subject != "s1");
     let error = planner.all(&place("site"), Some(&second)).unwrap_err().to_string();
@@ -142,7 +145,8 @@ fn a_second_room_without_the_training_subject_is_refused() {
 #[test]
 fn takes_are_planned_in_the_order_in_which_they_are_found() {
     let config = SiteConfig::read(Path::new("configs/site_reproduce_smoke.toml"), &[]).unwrap();
-    let names: Vec<String> = super::planned(&config, Path::new("configs")).unwrap().into_iter().map(|take| take.name).collect();
+    let names: Vec<String> =
+        super::planned(site::sequences(&config, Path::new("configs")).unwrap()).into_iter().map(|take| take.name).collect();
     let mut sorted = names.clone();
     sorted.sort();
     assert!(names == sorted && names.len() == 12, "{names:?}");
@@ -151,7 +155,8 @@ fn takes_are_planned_in_the_order_in_which_they_are_found() {
 #[test]
 fn another_mesh_is_recorded_of_the_compared_subjects_only() {
     let config = config();
-    let mut planner = Planner { config: &config, root: Path::new("/out"), weights: None, plan: Plan::default() };
+    let mut planner =
+        Planner { config: &config, root: Path::new("/out"), weights: None, sequences: &site::sequences, plan: Plan::default() };
     let mut site = SiteConfig { unseen: vec!["s2".into()], again: vec!["s2".into()], ..SiteConfig::default() };
     assert_eq!(planner.other_mesh(FIRST, &site, Path::new("")), None);
     site.record.mesh_error_m = 2e-3;
@@ -178,7 +183,8 @@ fn scene_config() -> ReproduceConfig {
 }
 
 fn planned_further(config: &ReproduceConfig) -> Result<Plan> {
-    let mut planner = Planner { config, root: Path::new("/out"), weights: None, plan: Plan::default() };
+    let mut planner =
+        Planner { config, root: Path::new("/out"), weights: None, sequences: &site::sequences, plan: Plan::default() };
     let first = place("site");
     let trained = planner.all(&first, None)?;
     planner.beyond(&first, Some(&scene()), &trained[&Variant::Ours])?;
@@ -239,7 +245,8 @@ fn an_additional_subject_is_simulated_by_the_full_simulator_alone() {
     let mut config = config();
     config.split.additional = Some("s3".into());
     config.protocols = vec![Protocol::SameMotions];
-    let mut planner = Planner { config: &config, root: Path::new("/out"), weights: None, plan: Plan::default() };
+    let mut planner =
+        Planner { config: &config, root: Path::new("/out"), weights: None, sequences: &site::sequences, plan: Plan::default() };
     planner.all(&place("site"), None).unwrap();
     let plan = planner.plan;
     let of_additional: Vec<&str> =

@@ -9,7 +9,9 @@ use super::plan::{Plan, Stage};
 use super::stage::{Record, Store};
 use super::steps::{Bench, baseline, compare, diagnose, figure, recognise, simulate, site, train};
 use super::task::Task;
-use crate::error::Result;
+use crate::data::Shard;
+use crate::error::{Error, Result};
+use crate::site::record;
 
 /// What happens in a reproduction, for whoever shows it.
 #[derive(Clone, Debug)]
@@ -43,25 +45,66 @@ pub fn run_some(
 ) -> Result<Vec<Record>> {
     let mut bench = Bench::new(devices);
     let of = wanted.len();
-    let mut records = Vec::with_capacity(of);
-    for (index, stage) in wanted.iter().map(|&stage| &plan.stages[stage]).enumerate() {
-        let name = stage.key.name.as_str();
-        let known = store.done(&stage.key);
-        tell(Event::Stage { index, of, name, known: known.is_some() });
-        let record = match known {
-            Some(record) => record,
-            None => {
-                let parents = stage.parents.iter().map(|&parent| plan.stages[parent].key.folder()).collect();
-                let record = store.perform(&stage.key, stage.settings.clone(), parents, &mut |folder| {
-                    work(stage, folder, &mut bench, &mut |done, of| tell(Event::Step { done, of }))
-                })?;
-                tell(Event::Done { name, seconds: record.seconds });
-                record
-            }
-        };
-        records.push(record);
+    wanted.iter().enumerate().map(|(index, &stage)| one(plan, stage, [index, of], store, &mut bench, tell)).collect()
+}
+
+/// One stage, whose parents are done; of a stage that has pieces ([`Stage::pieces`]) also only some, which are kept for whoever
+/// does the stage. Whatever the order and the place in which stages are done, they come out the same.
+///
+/// # Errors
+/// A parent that is not done; pieces of a stage that has none; whatever the stage refuses.
+pub fn run_one(
+    plan: &Plan,
+    stage: usize,
+    pieces: Shard,
+    store: &Store,
+    devices: &[Device],
+    tell: &mut dyn FnMut(Event),
+) -> Result<()> {
+    let Stage { key, task, parents, .. } = &plan.stages[stage];
+    if let Some(&parent) = parents.iter().find(|&&parent| store.done(&plan.stages[parent].key).is_none()) {
+        return Err(Error::Usage {
+            message: format!("{}: needs {}, which is not done", key.folder(), plan.stages[parent].key.folder()),
+            hint: Some("do the stages in the order in which they are listed".into()),
+        });
     }
-    Ok(records)
+    if pieces.of == 1 {
+        return one(plan, stage, [0, 1], store, &mut Bench::new(devices), tell).map(drop);
+    }
+    let Task::Site { config, settings_folder } = task else {
+        return Err(Error::Usage { message: format!("{}: has no pieces", key.folder()), hint: None });
+    };
+    let known = store.done(key).is_some();
+    tell(Event::Stage { index: 0, of: 1, name: &key.name, known });
+    if !known {
+        let (folder, _) = store.begin(key)?;
+        record(config, settings_folder, &folder, pieces, &mut |done, of, _| tell(Event::Step { done, of }))?;
+    }
+    Ok(())
+}
+
+/// Does the stage, the so-manieth of so many, unless it is done.
+fn one(
+    plan: &Plan,
+    stage: usize,
+    [index, of]: [usize; 2],
+    store: &Store,
+    bench: &mut Bench,
+    tell: &mut dyn FnMut(Event),
+) -> Result<Record> {
+    let stage = &plan.stages[stage];
+    let name = stage.key.name.as_str();
+    let known = store.done(&stage.key);
+    tell(Event::Stage { index, of, name, known: known.is_some() });
+    if let Some(record) = known {
+        return Ok(record);
+    }
+    let parents = stage.parents.iter().map(|&parent| plan.stages[parent].key.folder()).collect();
+    let record = store.perform(&stage.key, stage.settings.clone(), parents, &mut |folder| {
+        work(stage, folder, bench, &mut |done, of| tell(Event::Step { done, of }))
+    })?;
+    tell(Event::Done { name, seconds: record.seconds });
+    Ok(record)
 }
 
 fn work(stage: &Stage, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut(usize, usize)) -> Result<()> {

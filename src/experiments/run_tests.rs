@@ -1,3 +1,6 @@
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
 use super::*;
 use crate::experiments::{ReproduceConfig, plan::plan, report, results::collect};
 use crate::person::actions::Action;
@@ -87,6 +90,66 @@ fn a_reproduction_is_done_once_and_what_is_lost_is_made_again_as_it_was() {
     std::fs::remove_dir_all(store.folder(&lost.key)).unwrap();
     assert_eq!(once().0, ["simulate/ours/s4_lunge_1"]);
     assert!(sample(()) == before, "the same samples");
+}
+
+/// Every file below a folder but those that hold times; texts may name the folder.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let unnamed = |bytes| match String::from_utf8(bytes) {
+        Ok(text) => text.replace(folder.to_str().unwrap(), "").into_bytes(),
+        Err(binary) => binary.into_bytes(),
+    };
+    let (mut found, mut folders) = (BTreeMap::new(), vec![folder.to_path_buf()]);
+    while let Some(at) = folders.pop() {
+        for path in std::fs::read_dir(at).unwrap().map(|entry| entry.unwrap().path()) {
+            if path.is_dir() {
+                folders.push(path);
+            } else if !path.ends_with("stage.json") && !path.ends_with("speed.json") {
+                found.insert(path.strip_prefix(folder).unwrap().into(), unnamed(std::fs::read(&path).unwrap()));
+            }
+        }
+    }
+    found
+}
+
+/// One after the other, each as a process of its own would, and always the last of the plan that can be done; its site in pieces.
+#[test]
+fn stages_come_out_the_same_in_any_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let site = folder.path().join("site.toml");
+    let small = "subjects = ['s1', 's4']\nunseen = ['s4']\nagain = ['s4']\nactions = ['lunge', 'arm_swing']\nrepetitions = 1\n\
+        record.frames = 4\nrecord.surface.returns = 'vertices'\nrecord.walls.patch_m = 0.2\n[record.radar]\nsamples_per_chirp = 64\n\
+        loops_per_frame = 16";
+    std::fs::write(&site, small).unwrap();
+    let text = format!("site = {site:?}\nother_mesh = false\n{}", CONFIG.split("[adaptation]").next().unwrap());
+    let config: ReproduceConfig = toml::from_str(&text).unwrap();
+    config.check().unwrap();
+    let [together, apart] = ["together", "apart"].map(|name| folder.path().join(name));
+    let whole = plan(&config, &together).unwrap();
+    run(&whole, &Store::open(&together, "flex").unwrap(), &[Device::flex()], &mut |_| {}).unwrap();
+
+    let plan = crate::experiments::plan_again(&config, &apart).unwrap();
+    let do_one = |stage: usize, pieces: Shard| {
+        let name = format!("{}-{}", plan.stages[stage].key.hash, pieces.number);
+        let store = Store::open_for(&apart, "flex", &name).unwrap();
+        run_one(&plan, stage, pieces, &store, &[Device::flex()], &mut |_| {})
+    };
+    let last = plan.stages.len() - 1;
+    assert!(do_one(last, Shard::ALL).unwrap_err().to_string().contains("which is not done"));
+    assert_eq!(plan.stages[0].pieces().unwrap(), 4);
+    for number in [3, 1, 2] {
+        do_one(0, Shard { number, of: 4 }).unwrap();
+    }
+    let mut open: Vec<usize> = (0..plan.stages.len()).collect();
+    while !open.is_empty() {
+        let ready = |&stage: &usize| plan.stages[stage].parents.iter().all(|parent| !open.contains(parent));
+        let next = open.iter().rposition(ready).unwrap();
+        do_one(open.remove(next), Shard::ALL).unwrap();
+    }
+    assert!(do_one(1, Shard { number: 1, of: 2 }).unwrap_err().to_string().contains("no pieces"));
+    let (one, other) = (files(&together), files(&apart));
+    assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>());
+    let different: Vec<_> = one.keys().filter(|name| one[*name] != other[*name]).collect();
+    assert!(different.is_empty(), "{different:?}");
 }
 
 /// That a training breaks is what the stability is asked for: its stage ends all the same, and says where.

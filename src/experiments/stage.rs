@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::data::{Claim, atomic, files, hex};
+use crate::data::{Claim, atomic, files, hex, program};
 use crate::error::{Error, Result};
 
 const RECORD: &str = "stage.json";
@@ -77,6 +77,15 @@ impl Store {
         Ok(Self { root: root.into(), device: device.into(), program: program(), _claim: claim })
     }
 
+    /// For one stage, or a piece of one, beside other processes that do others.
+    ///
+    /// # Errors
+    /// A folder that cannot be written, or where another process does the same, or wants all of it.
+    pub fn open_for(root: &Path, device: impl Into<String>, piece: &str) -> Result<Self> {
+        let claim = Claim::piece(root, piece)?;
+        Ok(Self { root: root.into(), device: device.into(), program: program(), _claim: claim })
+    }
+
     /// Where the results of a stage are, or will be.
     pub fn folder(&self, key: &Key) -> PathBuf {
         stage_folder(&self.root, key)
@@ -85,6 +94,18 @@ impl Store {
     /// What is known of a stage that is done.
     pub fn done(&self, key: &Key) -> Option<Record> {
         read_record(&self.folder(key))
+    }
+
+    /// The folder that a stage works in, and whether it was begun before.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn begin(&self, key: &Key) -> Result<(PathBuf, bool)> {
+        let unfinished = self.root.join("unfinished").join(key.folder());
+        create(&unfinished)?;
+        let begun = unfinished.join(BEGUN).exists();
+        atomic::write_text(unfinished.join(BEGUN), "")?;
+        Ok((unfinished, begun))
     }
 
     /// Does a stage, unless it is done already: `work` fills the folder that it is given, which holds what an earlier
@@ -99,10 +120,7 @@ impl Store {
         if let Some(record) = self.done(key) {
             return Ok(record);
         }
-        let unfinished = self.root.join("unfinished").join(key.folder());
-        create(&unfinished)?;
-        let resumed = unfinished.join(BEGUN).exists();
-        atomic::write_text(unfinished.join(BEGUN), "")?;
+        let (unfinished, resumed) = self.begin(key)?;
         let started = Instant::now();
         work(&unfinished)?;
         let record = Record {
@@ -130,8 +148,8 @@ impl Store {
 
 /// Which build this is; empty where the program cannot be read.
 fn program() -> String {
-    let bytes = std::env::current_exe().and_then(fs::read).unwrap_or_default();
-    if bytes.is_empty() { String::new() } else { hex(&Sha256::digest(bytes)[..4]) }
+    let bytes = program::file().and_then(files::read);
+    bytes.map_or(String::new(), |bytes| hex(&Sha256::digest(bytes)[..4]))
 }
 
 /// Where a stage's results are below a reproduction's folder.

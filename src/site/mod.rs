@@ -8,5 +8,5 @@ mod plan;
 mod record;
 
 pub use config::{SiteConfig, StyleRanges};
-pub use plan::{Sequence, implausible, sequences};
+pub use plan::{Sequence, drawn, implausible, sequences};
 pub use record::{Site, record};

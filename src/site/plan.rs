@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::config::SiteConfig;
+use crate::data::Shard;
 use crate::error::{Error, Result};
 use crate::person::Placement;
 use crate::person::actions::{self, Action, StyleConfig};
@@ -43,8 +44,13 @@ pub struct Sequence {
 /// # Errors
 /// Settings that cannot be a site, a body that comes nearer to a boundary than `margin_m`, what the recorder refuses.
 pub fn sequences(config: &SiteConfig, settings_folder: &Path) -> Result<Vec<Sequence>> {
+    sequences_for(config, settings_folder, Shard::ALL)
+}
+
+/// The same, where only those of a shard are held against the room.
+pub(super) fn sequences_for(config: &SiteConfig, settings_folder: &Path, shard: Shard) -> Result<Vec<Sequence>> {
     let mut all = drawn(config)?;
-    all.par_iter().try_for_each(|sequence| {
+    all.par_iter().enumerate().filter(|(index, _)| shard.holds(*index)).try_for_each(|(_, sequence)| {
         let world = sequence.recorder.world(settings_folder)?;
         stays_inside(&world, config.margin_m, &sequence.name)
     })?;
@@ -57,11 +63,16 @@ pub fn sequences(config: &SiteConfig, settings_folder: &Path) -> Result<Vec<Sequ
     Ok(all)
 }
 
-/// What is implausible about each sequence, by its name; nothing is recorded for it.
+/// What is implausible about each sequence of a shard, by its name; nothing is recorded for it.
 ///
 /// # Errors
 /// Settings that cannot be a site, what the recorder refuses.
-pub fn implausible(config: &SiteConfig, settings_folder: &Path, as_stated: bool) -> Result<Vec<(String, Vec<Finding>)>> {
+pub fn implausible(
+    config: &SiteConfig,
+    settings_folder: &Path,
+    as_stated: bool,
+    shard: Shard,
+) -> Result<Vec<(String, Vec<Finding>)>> {
     let look = |sequence: &Sequence| -> Result<(String, Vec<Finding>)> {
         let world = sequence.recorder.world(settings_folder)?;
         let body = world.person.as_ref().map(|person| MovingBody::new(person, world.interpolation)).transpose()?;
@@ -69,11 +80,15 @@ pub fn implausible(config: &SiteConfig, settings_folder: &Path, as_stated: bool)
         let facts = Facts { as_stated, ..Facts::new(Some(&world.radar), Some(&world.room), world.person.as_ref(), &pose) };
         Ok((sequence.name.clone(), findings(&facts)))
     };
-    drawn(config)?.par_iter().map(look).collect()
+    let drawn = drawn(config)?;
+    drawn.par_iter().enumerate().filter(|(index, _)| shard.holds(*index)).map(|(_, sequence)| look(sequence)).collect()
 }
 
-/// All sequences as they are drawn, not looked at yet.
-fn drawn(config: &SiteConfig) -> Result<Vec<Sequence>> {
+/// All sequences as they are drawn, not looked at yet, and without the receiver's level.
+///
+/// # Errors
+/// Settings that cannot be a site.
+pub fn drawn(config: &SiteConfig) -> Result<Vec<Sequence>> {
     config.check()?;
     let mut all = Vec::new();
     for subject in &config.subjects {

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::config::SiteConfig;
-use super::plan::{self, Sequence, sequences};
+use super::plan::{self, Sequence, sequences_for};
 use crate::data::atomic::{sweep_all, write_text};
 use crate::data::{Recording, Shard, files};
 use crate::error::{Error, Result};
@@ -38,7 +38,7 @@ struct Job {
 /// `progress` hears how many of how many recordings are done, and the name of the next, at each of its frames.
 ///
 /// # Errors
-/// Whatever [`sequences`] refuses; a recording made with other settings or with labels that are not its name's. All of
+/// Whatever [`super::sequences`] refuses of the shard's sequences; a recording made with other settings or with labels that are not its name's. All of
 /// this before the first is recorded.
 pub fn record(
     config: &SiteConfig,
@@ -47,7 +47,7 @@ pub fn record(
     shard: Shard,
     progress: &mut dyn FnMut(usize, usize, &str),
 ) -> Result<Site> {
-    let all = sequences(config, settings_folder)?;
+    let all = sequences_for(config, settings_folder, shard)?;
     let mine: Vec<&Sequence> = all.iter().enumerate().filter(|(index, _)| shard.holds(*index)).map(|(_, one)| one).collect();
     let mut jobs = Vec::new();
     for sequence in &mine {

@@ -5,6 +5,7 @@
 //! half-written stays.
 
 pub mod align;
+pub mod challenge;
 pub mod diagnose;
 pub mod export;
 pub mod heatmaps;
@@ -12,9 +13,11 @@ pub mod notes;
 pub mod plausible;
 pub mod record;
 pub mod report;
+pub mod reproduce;
 pub mod scores;
 pub mod simulate;
 pub mod simulated;
+pub mod site;
 pub mod train;
 
 use std::path::Path;
@@ -22,7 +25,7 @@ use std::path::Path;
 use crate::{
     data::{Claim, atomic},
     error::Result,
-    training,
+    experiments, training,
 };
 
 /// What a verb tells while it works.
@@ -36,8 +39,14 @@ pub enum Told<'a> {
     },
     /// So many of its steps are done.
     Done(usize),
-    /// What is done now.
+    /// What has just been done, or found.
     Line(&'a str),
+    /// What is done now.
+    At(&'a str),
+    /// Nothing new: whoever wants the work to end may say so.
+    Still,
+    /// Of a reproduction.
+    Stage(&'a experiments::Event<'a>),
     /// The folder that a training run is kept in from here on, and how many epochs it is to have.
     Run {
         folder: &'a Path,

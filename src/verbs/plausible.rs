@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Tell, Told};
 use crate::{
-    data::{Recording, entries::recordings_in},
+    data::{Recording, Shard, entries::recordings_in},
     error::Result,
     person::Person,
     plausibility::{CodeFacts, Facts, Sources, Verdict, findings},
@@ -77,16 +77,16 @@ pub fn scene(
 pub fn site(path: &Path, as_stated: bool, tell: &mut Tell<'_>) -> Result<()> {
     match path.is_dir() {
         true => recordings_in(path)?.iter().try_for_each(|recording| folder(recording, as_stated, tell)),
-        false => sequences(&SiteConfig::read(path, &[])?, path, as_stated, tell),
+        false => sequences(&SiteConfig::read(path, &[])?, path, as_stated, Shard::ALL, tell),
     }
 }
 
-/// The same of all sequences of a site's config, which was read from `path`.
+/// The same of the sequences of a shard of a site's config, which was read from `path`.
 ///
 /// # Errors
 /// Settings that cannot be a site; as [`recording`].
-pub fn sequences(config: &SiteConfig, path: &Path, as_stated: bool, tell: &mut Tell<'_>) -> Result<()> {
-    for (name, findings) in site::implausible(config, path.parent().unwrap_or(Path::new("")), as_stated)? {
+pub fn sequences(config: &SiteConfig, path: &Path, as_stated: bool, shard: Shard, tell: &mut Tell<'_>) -> Result<()> {
+    for (name, findings) in site::implausible(config, path.parent().unwrap_or(Path::new("")), as_stated, shard)? {
         let sources = Sources::one(format!("{} ({name})", path.display()));
         tell_verdict(Verdict::new(findings, &sources, as_stated), tell)?;
     }

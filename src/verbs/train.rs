@@ -16,8 +16,8 @@ use crate::{
 /// What to begin, or to go on with.
 pub enum Start<'a> {
     /// The experiment of a config file, changed by `--set key=value`. Without `out` the run is kept in `runs/<config>`, or the
-    /// next `runs/<config>-N` that is free.
-    Config { path: &'a Path, sets: &'a [String], out: Option<&'a Path> },
+    /// next `runs/<config>-N` that is free. `go_on`: a run of the same settings that is in `out` is continued.
+    Config { path: &'a Path, sets: &'a [String], out: Option<&'a Path>, go_on: bool },
     /// A run folder that was interrupted; `sets` must be empty where it holds a checkpoint.
     Resume { run: &'a Path, sets: &'a [String] },
 }
@@ -36,21 +36,23 @@ pub struct Trained {
 /// # Errors
 /// A config, recordings or checkpoints that cannot be used; a run folder that holds a run, or that cannot be written.
 pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, tell: &mut Tell<'_>) -> Result<Trained> {
-    // Before anything in it is looked at.
-    let resumed = match start {
-        Start::Resume { run, .. } => Some(claimed(run)?),
-        Start::Config { .. } => None,
-    };
-    let (config_path, run_folder, sets, resume) = match *start {
-        Start::Resume { run, sets } => {
-            atomic::recover(run.join("last"))?;
-            (run.join("config.toml"), run.to_path_buf(), sets, Some(run.join("last")).filter(|last| last.is_dir()))
-        }
-        Start::Config { path, sets, out } => {
-            (path.to_path_buf(), out.map_or_else(|| fresh_run_folder(path), Path::to_path_buf), sets, None)
+    let (config_path, run_folder, sets, begun) = match *start {
+        Start::Resume { run, sets } => (run.join("config.toml"), run.to_path_buf(), sets, true),
+        Start::Config { path, sets, out, go_on } => {
+            let folder = out.map_or_else(|| fresh_run_folder(path), Path::to_path_buf);
+            (path.to_path_buf(), folder, sets, go_on)
         }
     };
-    if resume.is_some() && !sets.is_empty() {
+    let (mut resumed, mut resume) = (None, None);
+    if begun {
+        // Before anything in it is looked at.
+        resumed = Some(claimed(&run_folder)?);
+        let last = run_folder.join("last");
+        atomic::recover(&last)?;
+        resume = Some(last).filter(|last| last.is_dir());
+    }
+    let by_config = matches!(start, Start::Config { .. });
+    if resume.is_some() && !by_config && !sets.is_empty() {
         return Err(Error::Usage {
             message: "--set: a resumed run keeps the settings it was started with".into(),
             hint: Some("start a new run with other settings, or edit nothing and leave --set out".into()),
@@ -74,6 +76,9 @@ pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, tell: &mut 
         plausible::folder(recording, as_stated, tell)?;
     }
     let config_toml = config.to_toml();
+    if resume.is_some() && by_config {
+        is_the_same(&run_folder.join("config.toml"), &config_toml)?;
+    }
     atomic::write_text(run_folder.join("config.toml"), &config_toml)?;
     tell(Told::Run { folder: &run_folder, epochs: config.training.epochs });
 
@@ -98,6 +103,18 @@ pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, tell: &mut 
     };
     let evaluations = report.write()?;
     Ok(Trained { folder: run_folder, progress: outcome.progress, evaluations })
+}
+
+/// Refuses to go on with a run of other settings.
+fn is_the_same(file: &Path, settings: &str) -> Result<()> {
+    let found = files::read_text(file)?;
+    let mut pairs = found.lines().zip(settings.lines());
+    let (was, is) = pairs.find(|(was, is)| was != is).unwrap_or(("of another length", "those given now"));
+    match found == settings {
+        true => Ok(()),
+        false => Err(Error::field(file, "the settings", format!("`{was}`"), format!("`{is}`"))
+            .with_hint("train in another folder, or remove this run")),
+    }
 }
 
 /// `runs/<config>`, or the next `runs/<config>-N` that is free.

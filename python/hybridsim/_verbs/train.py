@@ -13,6 +13,7 @@ def train(
     *,
     out: StrPath | None = None,
     resume: StrPath | None = None,
+    go_on: bool = False,
     set: Settings = (),
     device: str = "auto",
     as_stated: bool = False,
@@ -24,6 +25,7 @@ def train(
         config: the experiment, a TOML file such as ``configs/quickstart.toml``. It names recordings, or has a ``[record]`` section.
         out: run folder; ``runs/<config>``, or the next free name, by default.
         resume: a run folder that was interrupted, in place of a config. Ctrl-C keeps the checkpoint of the last whole epoch.
+        go_on: a run of the same settings that is in ``out`` already is continued; of others it is refused.
         set: changes of settings, such as ``{"training.epochs": 10}``.
         device: ``flex``, ``ndarray``, ``wgpu``, ``cuda:0``, ``auto``, or several with commas between.
         as_stated: take what is stated, however implausible.
@@ -33,6 +35,6 @@ def train(
         hybridsim.Error: settings or recordings that cannot be used; a loss that became NaN.
     """
     with Teller(progress) as tell:
-        about = _hybridsim.train(path(config), path(resume), path(out), sets(set), device, as_stated, tell)
+        about = _hybridsim.train(path(config), path(resume), path(out), sets(set), go_on, device, as_stated, tell)
     found = json.loads(about)
     return Run(**{**found, "folder": Path(found["folder"])})

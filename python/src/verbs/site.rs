@@ -1,44 +1,56 @@
 //! Recording a site: several subjects and actions in one room.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use hybridsim::{
-    data::{Claim, Shard, entries},
-    site::{SiteConfig, record},
-    verbs::{Told, plausible},
+    data::{Shard, entries},
+    verbs::site::{Site, look, record, recordings},
 };
 use pyo3::prelude::*;
 
-use crate::{errors::raised, work::run};
+use crate::{
+    errors::{raised, usage},
+    work::run,
+};
 
-/// Records all sequences of a site's config into `out`; what is there already is kept.
+/// Records the sequences of a shard (number and count, from 1) of a site's config into `out`; what is there already is kept. The
+/// shard's recordings.
 #[pyfunction]
 pub fn site(
+    py: Python<'_>,
+    config: PathBuf,
+    out: PathBuf,
+    shard: (usize, usize),
+    sets: Vec<String>,
+    as_stated: bool,
+    tell: &Bound<'_, PyAny>,
+) -> PyResult<Vec<PathBuf>> {
+    let shard = part(py, shard)?;
+    run(py, tell, move |tell| {
+        let what = Site { config: &config, sets: &sets, out: &out, shard };
+        record(&what, as_stated, tell)?;
+        recordings(&what)
+    })
+}
+
+/// Looks at all sequences of a site and records nothing: their recordings, in the order of the shards.
+#[pyfunction]
+pub fn site_look(
     py: Python<'_>,
     config: PathBuf,
     out: PathBuf,
     sets: Vec<String>,
     as_stated: bool,
     tell: &Bound<'_, PyAny>,
-) -> PyResult<()> {
-    run(py, tell, move |tell| {
-        let settings = SiteConfig::read(&config, &sets)?;
-        let _claim = Claim::part(&out, Shard::ALL)?;
-        plausible::sequences(&settings, &config, as_stated, tell)?;
-        let folder = config.parent().unwrap_or(Path::new(""));
-        let (mut begun, mut at_hand) = (false, String::new());
-        let mut hear = |done: usize, of: usize, name: &str| {
-            if !std::mem::replace(&mut begun, true) {
-                tell(Told::Begun { what: "recording", steps: of });
-            }
-            if name != at_hand {
-                at_hand = name.into();
-                tell(Told::Line(name));
-            }
-            tell(Told::Done(done));
-        };
-        record(&settings, folder, &out, Shard::ALL, &mut hear).map(drop)
-    })
+) -> PyResult<Vec<PathBuf>> {
+    run(py, tell, move |tell| look(&Site { config: &config, sets: &sets, out: &out, shard: Shard::ALL }, as_stated, tell))
+}
+
+/// A part of some work.
+pub fn part(py: Python<'_>, (number, of): (usize, usize)) -> PyResult<Shard> {
+    format!("{number}/{of}")
+        .parse()
+        .map_err(|reason| usage(py, format!("`shard` is ({number}, {of}): {reason}"), "write (i, n), such as (2, 8)"))
 }
 
 /// The recordings in a folder, in the order of their names.

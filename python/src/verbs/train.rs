@@ -21,14 +21,15 @@ pub fn train(
     resume: Option<PathBuf>,
     out: Option<PathBuf>,
     sets: Vec<String>,
+    go_on: bool,
     device: String,
     as_stated: bool,
     tell: &Bound<'_, PyAny>,
 ) -> PyResult<String> {
     run(py, tell, move |tell| {
         let start = match (&config, &resume) {
-            (Some(path), None) => Start::Config { path, sets: &sets, out: out.as_deref() },
-            (None, Some(run)) if out.is_none() => Start::Resume { run, sets: &sets },
+            (Some(path), None) => Start::Config { path, sets: &sets, out: out.as_deref(), go_on },
+            (None, Some(run)) if out.is_none() && !go_on => Start::Resume { run, sets: &sets },
             _ => {
                 return Err(Error::Usage {
                     message: "what is to be trained: expected a config, or a run to resume alone".into(),

@@ -65,7 +65,7 @@ pub fn background(recording: &Recording, ground: &Ground, out: &Path, how: &RunC
         let case = workplace.path().join("recording");
         let all: Vec<usize> = (0..recording.frames()).collect();
         recording.write_altered(&case, &all, layout(recording, Some(ground)), &mut |frame| recording.frame(frame))?;
-        answer::diagnose(&case, &folder, how)?;
+        answer::diagnose(&case, &folder, how, &mut || ())?;
     }
     let unanswered = |reason: String| Error::Usage {
         message: format!("{}: its own diagnosis gives no answer: {reason}", recording.folder.display()),

@@ -2,6 +2,7 @@ use super::*;
 use crate::person::actions::Action;
 use crate::radar::Radar;
 use crate::recorder::{RadarChoice, Recorder, RecorderConfig, Returns};
+use crate::site::sequences;
 
 /// Two subjects, two actions, two frames of a tiny radar.
 fn tiny() -> SiteConfig {

@@ -88,7 +88,8 @@ impl Ground<'_> {
     pub fn gain(&self, swing: Swing, frames: &[usize]) -> f64 {
         let power = swing.log_power.exp();
         let of_frame = |&frame: &usize| self.gain_at(frame, self.place(swing.law, frame), swing.sine, power);
-        frames.par_iter().map(of_frame).sum()
+        // In the order of the frames, whichever thread had which.
+        frames.par_iter().map(of_frame).collect::<Vec<f64>>().into_iter().sum()
     }
 
     pub fn gain_at(&self, frame: usize, place: (f64, f64), sine: f64, power: f64) -> f64 {

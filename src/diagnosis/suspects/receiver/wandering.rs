@@ -243,7 +243,7 @@ fn has_opposite(evidence: &Evidence, slow: &[f64], fast: f64, tone: &[Complex64]
     };
     let frames = &evidence.split.training;
     let count = (frames.len() * channels) as f64;
-    mean_power_tail(frames.par_iter().map(power).sum::<f64>() / count, count) < OPPOSITE
+    mean_power_tail(frames.par_iter().map(power).collect::<Vec<f64>>().into_iter().sum::<f64>() / count, count) < OPPOSITE
 }
 
 /// Of each chirp, the amplitude at a beat frequency under a Hann window, without their mean.
