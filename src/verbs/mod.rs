@@ -8,6 +8,7 @@ pub mod align;
 pub mod diagnose;
 pub mod export;
 pub mod heatmaps;
+pub mod import;
 pub mod notes;
 pub mod plausible;
 pub mod record;
