@@ -103,7 +103,8 @@ impl Index {
         let times = self.times.as_ref().filter(|times| times.len() > 2)?;
         let mut steps = times.windows(2).map(|pair| pair[1].checked_sub(pair[0])).collect::<Option<Vec<u64>>>()?;
         steps.sort_unstable();
-        let period = steps[steps.len() / 2];
+        // Gaps are longer, so that of two the shorter one counts.
+        let period = steps[(steps.len() - 1) / 2];
         (period > 0).then(|| times.iter().map(|time| (time - times[0]).saturating_add(period / 2) / period).collect())
     }
 }

@@ -6,8 +6,13 @@
 use std::fs::File;
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use hdf5_pure::{CompoundMember, Dataset, Datatype, DatatypeByteOrder, Error as Hdf5Error, Group, ReadSeekSource};
+use hdf5_reader::error::{Error as Hdf5Error, Result as Hdf5Result};
+use hdf5_reader::group::Group;
+use hdf5_reader::{
+    ByteOrder, Dataset, Datatype, FileStorage, H5Type, Hdf5File, OpenOptions, SliceInfo, SliceInfoElem, dtype_element_size,
+};
 
 use super::{Container, Entry, Laid, Plane, opened};
 use crate::data::arrays::{Kind, Stored};
@@ -20,8 +25,6 @@ const MATLAB_BLOCK: usize = 512;
 const DEEPEST: usize = 8;
 /// Bytes of one number that are kept: a complex128.
 const WIDEST: usize = 16;
-/// Deflate cannot make data smaller than this; who claims more is lying.
-const BEST_COMPRESSION: u64 = 1040;
 
 /// Whether a file is HDF5, from its first bytes.
 pub(super) fn is_hdf5(path: &Path) -> Result<bool> {
@@ -31,47 +34,58 @@ pub(super) fn is_hdf5(path: &Path) -> Result<bool> {
     Ok(start.starts_with(SIGNATURE) || start.get(MATLAB_BLOCK..).is_some_and(|rest| rest == SIGNATURE))
 }
 
-/// The parts of a number: where each begins within it, and how it lies there. None of what is no number.
-fn parts(kind: &Datatype) -> Option<Vec<(usize, Stored)>> {
-    let stored = |kind: Kind, size: u32, order: DatatypeByteOrder| match order {
-        DatatypeByteOrder::LittleEndian => Some(Stored { kind, bytes: size as usize, big_endian: false }),
-        DatatypeByteOrder::BigEndian => Some(Stored { kind, bytes: size as usize, big_endian: true }),
-        _ => None,
-    };
-    match kind {
-        Datatype::FixedPoint { size, byte_order, layout } => {
-            Some(vec![(0, stored(if layout.signed { Kind::Int } else { Kind::Unsigned }, *size, *byte_order)?)])
+/// The bytes of one number, as they are stored.
+#[derive(Clone)]
+struct Cell([u8; WIDEST]);
+
+impl H5Type for Cell {
+    fn hdf5_type() -> Datatype {
+        Datatype::FixedPoint { size: WIDEST as u8, signed: false, byte_order: ByteOrder::LittleEndian }
+    }
+
+    fn from_bytes(bytes: &[u8], dtype: &Datatype) -> Hdf5Result<Self> {
+        let width = dtype_element_size(dtype)?;
+        match bytes.get(..width).filter(|_| width <= WIDEST) {
+            Some(own) => {
+                let mut cell = [0; WIDEST];
+                cell[..width].copy_from_slice(own);
+                Ok(Self(cell))
+            }
+            None => Err(Hdf5Error::InvalidData(format!("a number of {width} bytes in {}", bytes.len()))),
         }
-        Datatype::FloatingPoint { size, byte_order, .. } => Some(vec![(0, stored(Kind::Float, *size, *byte_order)?)]),
-        Datatype::Compound { size, members } if members.len() == 2 && *size as usize <= WIDEST => {
-            let part = |member: &CompoundMember| match &parts(&member.datatype)?[..] {
-                [(0, stored)] if member.byte_offset as usize + stored.bytes <= *size as usize => {
-                    Some((member.byte_offset as usize, *stored))
+    }
+
+    fn element_size(dtype: &Datatype) -> usize {
+        dtype_element_size(dtype).unwrap_or(WIDEST)
+    }
+}
+
+/// The parts of a number: where each begins within it, and how it lies there. None of what is no number.
+fn parts(dtype: &Datatype) -> Option<Vec<(usize, Stored)>> {
+    let stored =
+        |kind: Kind, size: u8, order: ByteOrder| Stored { kind, bytes: size.into(), big_endian: order == ByteOrder::BigEndian };
+    match dtype {
+        Datatype::FixedPoint { size, signed, byte_order } => {
+            Some(vec![(0, stored(if *signed { Kind::Int } else { Kind::Unsigned }, *size, *byte_order))])
+        }
+        Datatype::FloatingPoint { size, byte_order } => Some(vec![(0, stored(Kind::Float, *size, *byte_order))]),
+        Datatype::Compound { size, fields } if fields.len() == 2 && *size as usize <= WIDEST => {
+            let part = |field: &hdf5_reader::CompoundField| match &parts(&field.datatype)?[..] {
+                [(0, stored)] if field.byte_offset as usize + stored.bytes <= *size as usize => {
+                    Some((field.byte_offset as usize, *stored))
                 }
                 _ => None,
             };
-            members.iter().map(part).collect()
+            fields.iter().map(part).collect()
         }
         _ => None,
     }
 }
 
-/// A data set of numbers.
-struct Found {
-    name: String,
-    shape: Vec<u64>,
-    /// Bytes of one number, and its parts.
-    width: usize,
-    parts: Vec<(usize, Stored)>,
-    dataset: Dataset,
-}
-
 pub(super) struct Hdf5 {
     path: PathBuf,
-    datasets: Vec<Found>,
+    datasets: Vec<(String, Dataset)>,
     is_matlab: bool,
-    /// Bytes that are read at once at most: what any honest compression makes of the file.
-    most: u64,
 }
 
 impl Hdf5 {
@@ -82,33 +96,46 @@ impl Hdf5 {
         let (mut file, size) = opened(path)?;
         let mut start = [0; 6];
         let is_matlab = file.read_exact(&mut start).is_ok() && &start == b"MATLAB";
+        // What is read at once is a frame: no more than what any honest compression makes of the file.
+        let most = usize::try_from(size.saturating_mul(1040)).unwrap_or(usize::MAX);
+        let options: OpenOptions = Default::default();
+        let options = options.with_max_read_bytes(most).with_max_chunk_bytes(most);
         let mut datasets = vec![];
-        let source = ReadSeekSource::new(file).map_err(|error| damaged(path, "header", &error.into()))?;
-        hdf5_pure::File::from_source(source)
-            .and_then(|file| collect(&file.root(), "", DEEPEST, &mut datasets))
+        FileStorage::from_file(file)
+            .and_then(|storage| Hdf5File::from_storage_with_options(Arc::new(storage), options))
+            .and_then(|file| collect(&file.root_group()?, "", DEEPEST, &mut datasets))
             .map_err(|error| damaged(path, "arrays", &error))?;
-        Ok(Self { path: path.into(), datasets, is_matlab, most: size.saturating_mul(BEST_COMPRESSION) })
+        Ok(Self { path: path.into(), datasets, is_matlab })
     }
 }
 
 fn damaged(path: &Path, field: &str, error: &Hdf5Error) -> Error {
+    if let Hdf5Error::UnsupportedFilter(filter) = error {
+        return Error::field(
+            path,
+            field,
+            format!("compressed otherwise ({filter})"),
+            "deflate, shuffle, scale-offset or Fletcher32",
+        )
+        .with_hint("write it with one of these: h5repack -f GZIP=4 FILE NEW");
+    }
     Error::field(path, field, format!("damaged or cut off ({error})"), "HDF5 that can be read")
         .with_hint("copy or download the file again")
 }
 
-/// Every data set of numbers in a group and below it, by its path.
-fn collect(group: &Group, above: &str, depth: usize, found: &mut Vec<Found>) -> std::result::Result<(), Hdf5Error> {
-    for name in group.datasets()? {
-        let dataset = group.dataset(&name)?;
-        let (kind, name) = (dataset.datatype()?, format!("{above}{name}"));
-        if let (Some(parts), width) = (parts(&kind), dataset.element_size()? as usize) {
-            found.push(Found { name, shape: dataset.shape()?, width, parts, dataset });
+/// Every dataset of numbers in a group and below it, by its path.
+fn collect(group: &Group, above: &str, depth: usize, found: &mut Vec<(String, Dataset)>) -> Hdf5Result<()> {
+    let (groups, datasets) = group.members()?;
+    for dataset in datasets {
+        if parts(dataset.dtype()).is_some() {
+            found.push((format!("{above}{}", dataset.name().rsplit('/').next().unwrap_or_default()), dataset));
         }
     }
-    for name in group.groups()?.into_iter().filter(|_| depth > 0) {
+    for group in groups.into_iter().filter(|_| depth > 0) {
+        let name = group.name().rsplit('/').next().unwrap_or_default().to_string();
         // MATLAB keeps what its variables refer to in a group of its own.
         if !name.starts_with('#') {
-            collect(&group.group(&name)?, &format!("{above}{name}/"), depth - 1, found)?;
+            collect(&group, &format!("{above}{name}/"), depth - 1, found)?;
         }
     }
     Ok(())
@@ -116,46 +143,36 @@ fn collect(group: &Group, above: &str, depth: usize, found: &mut Vec<Found>) -> 
 
 impl Container for Hdf5 {
     fn entries(&self) -> Vec<Entry> {
-        let shape = |found: &Found| {
-            let mut shape: Vec<usize> = found.shape.iter().map(|&length| length as usize).collect();
+        let shape = |dataset: &Dataset| {
+            let mut shape: Vec<usize> = dataset.shape().iter().map(|&length| length as usize).collect();
             if self.is_matlab {
                 shape.reverse();
             }
             shape
         };
-        self.datasets.iter().map(|found| Entry { name: found.name.clone(), shape: shape(found) }).collect()
+        self.datasets.iter().map(|(name, dataset)| Entry { name: name.clone(), shape: shape(dataset) }).collect()
     }
 
     fn lay_out(&mut self, name: &str, scratch: &Path) -> Result<Laid> {
-        let found = self.datasets.iter().find(|found| found.name == name).expect("a name of the entries");
+        let (_, dataset) = self.datasets.iter().find(|(own, _)| own == name).expect("a name of the entries");
+        let parts = parts(dataset.dtype()).expect("it was looked at");
         let file = |index: usize| scratch.join(format!("{}-{index}.raw", name.replace(['/', '\\'], "_")));
-        let planes: Vec<Plane> = found
-            .parts
-            .iter()
-            .enumerate()
-            .map(|(index, (_, stored))| Plane { file: file(index), start: 0, stored: *stored })
-            .collect();
+        let planes: Vec<Plane> =
+            parts.iter().enumerate().map(|(index, (_, stored))| Plane { file: file(index), start: 0, stored: *stored }).collect();
         let create =
             |plane: &Plane| File::create(&plane.file).map(BufWriter::new).map_err(|source| Error::write(&plane.file, source));
         let mut writers = planes.iter().map(create).collect::<Result<Vec<_>>>()?;
         // One index of the outermost axis at a time.
-        let outermost = found.shape.first().copied().unwrap_or(1);
-        let row = found.shape.iter().skip(1).try_fold(found.width as u64, |all, &length| all.checked_mul(length));
-        let row = row.filter(|row| *row <= self.most).ok_or_else(|| {
-            let found = format!("damaged: rows of {:?} numbers in a file of {} bytes", found.shape, self.most / BEST_COMPRESSION);
-            Error::field(&self.path, name, found, "HDF5 that can be read").with_hint("copy or download the file again")
-        })?;
+        let outermost = dataset.shape().first().copied().unwrap_or(1);
         for index in 0..outermost {
-            let bytes = found.dataset.read_raw_rows(index, 1).map_err(|error| damaged(&self.path, name, &error))?;
-            if bytes.len() as u64 != row {
-                let found = format!("{} bytes in row {index}", bytes.len());
-                return Err(
-                    Error::field(&self.path, name, found, format!("{row} bytes")).with_hint("copy or download the file again")
-                );
+            let mut selection = SliceInfo::all(dataset.ndim());
+            if let Some(first) = selection.selections.first_mut() {
+                *first = SliceInfoElem::Index(index);
             }
-            for number in bytes.chunks_exact(found.width) {
-                for ((offset, stored), writer) in found.parts.iter().zip(&mut writers) {
-                    writer.write_all(&number[*offset..offset + stored.bytes]).map_err(|source| Error::write(scratch, source))?;
+            let cells = dataset.read_slice::<Cell>(&selection).map_err(|error| damaged(&self.path, name, &error))?;
+            for Cell(bytes) in &cells {
+                for ((offset, stored), writer) in parts.iter().zip(&mut writers) {
+                    writer.write_all(&bytes[*offset..offset + stored.bytes]).map_err(|source| Error::write(scratch, source))?;
                 }
             }
         }
