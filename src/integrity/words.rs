@@ -9,7 +9,8 @@
 //! it was sent, whose phase is any, and with words exchanged it has the part j cos ω ((1 − sin ω)|A|² + (1 + sin ω)|B|²) / 4 besides (of tones
 //! at ±(π − ω) the same with the other sign). So its imaginary part, summed over the channels, over the mean power at ±ω has one sign in
 //! nearly all groups: a sign test at an even chance, for either sign. An unbalanced receiver adds as much as its image is, so that only
-//! more than [`IMAGE`] counts. Bonferroni over the three. Where neither the words as read nor the exchanged ones look exchanged, as where
+//! more than [`IMAGE`] counts. Each test has its share of the alarm (weighted
+//! Bonferroni). Where neither the words as read nor the exchanged ones look exchanged, as where
 //! returns fill the whole band alike, nothing can be told.
 
 use num_complex::Complex64;
@@ -26,6 +27,9 @@ const GUARD: usize = 3;
 /// Amplitude of the image of an unbalanced receiver, at most: 20 dB below, as of 1.5 dB and 6 degrees together. `iq_imbalance` of the
 /// diagnosis finds much weaker ones.
 const IMAGE: f64 = 0.1;
+/// Shares of the alarm: of the test by power, and of those by phases of either sign, which are asked where the first says nothing.
+const BY_POWER: f64 = 0.9;
+const BY_PHASES: f64 = 0.05;
 
 pub(super) struct Words {
     schedule: Schedule,
@@ -132,30 +136,30 @@ impl Inspector for Words {
             (0..3).for_each(|test| as_exchanged[test] += usize::from(of_others[test]));
             (far, all, far_after) = (far + away_before, all + whole, far_after + away_after);
         }
-        let log_p = |count: usize| 3f64.ln() + log_binomial_tail(count, groups, 0.5);
+        let log_p = |count: usize, share: f64| log_binomial_tail(count, groups, 0.5) - share.ln();
         let shares = format!(
             "the far half of the spectrum holds {:.1} % of the still energy, and {:.1} % with every second pair of words exchanged",
             100.0 * far / f64::max(all, f64::MIN_POSITIVE),
             100.0 * far_after / f64::max(all, f64::MIN_POSITIVE)
         );
-        let wrong = |count: usize, what: &str| {
+        let wrong = |count: usize, share: f64, what: &str| {
             let found = format!(
                 "{shares}, in {count} of {groups} groups of frequencies {what}: I I Q Q was read as I Q I Q, or the other way round"
             );
-            Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p(count)))
+            Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p(count, share)))
         };
         let [fewer, ..] = as_they_are;
-        if log_p(fewer) < ALARM.ln() {
-            return wrong(fewer, "less");
+        if log_p(fewer, BY_POWER) < ALARM.ln() {
+            return wrong(fewer, BY_POWER, "less");
         }
-        if log_p(as_exchanged[0]) < ALARM.ln() {
+        if log_p(as_exchanged[0], BY_POWER) < ALARM.ln() {
             return Some(Finding::as_stated(CHECK, EXPECTED, shares));
         }
         let [in_step, in_step_exchanged] = [as_they_are, as_exchanged].map(|[_, up, down]| up.max(down));
-        if log_p(in_step) < ALARM.ln() {
-            return wrong(in_step, "a phase that images of exchanged words have");
+        if log_p(in_step, BY_PHASES) < ALARM.ln() {
+            return wrong(in_step, BY_PHASES, "a phase that images of exchanged words have");
         }
-        if log_p(in_step_exchanged) < ALARM.ln() {
+        if log_p(in_step_exchanged, BY_PHASES) < ALARM.ln() {
             return Some(Finding::as_stated(CHECK, EXPECTED, shares));
         }
         Some(Finding::untold(CHECK, EXPECTED, shares))
