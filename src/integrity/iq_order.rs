@@ -7,8 +7,8 @@
 //! joins neighbours. Where far returns are as strong as near ones, nothing can be told.
 //!
 //! An unknown scene may also be open, with far returns alone. But the filter before the converter keeps out what would alias, and so the
-//! last tenth of the band: no return there is the strongest. So something is told only where the strongest still return lies in the first
-//! or the last tenth of the band; far returns alone, as they are or as their mirror image, tell nothing.
+//! last ninth of the band: no return there is the strongest. So something is told only where the strongest still return lies in the first
+//! or the last ninth of the band; far returns alone, as they are or as their mirror image, tell nothing.
 
 use num_complex::{Complex32, Complex64};
 
@@ -23,8 +23,9 @@ const EXPECTED: &str = "still returns at the beat frequencies of the room's rang
 const GUARD: usize = 3;
 /// Bins between pairs that share nothing under a Hann window, whose main lobe is four bins wide.
 const APART: usize = 2;
-/// Share of the sampling rate that the filter before a complex converter passes (TI, data sheet of the AWR2243: 20 MHz of 22.5 Msps).
-const PASSED: f64 = 0.9;
+/// Share of the sampling rate that the filter before a complex converter passes, at most (TI, data sheets: of the AWR2243 20 MHz of
+/// 22.5 Msps, of the IWR6843 10 MHz of 12.5 Msps).
+const PASSED: f64 = 20.0 / 22.5;
 /// A pair counts above this many times the noise: of noise alone, e⁻²⁰.
 const RETURN: f64 = 20.0;
 
