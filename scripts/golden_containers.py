@@ -36,5 +36,21 @@ with h5py.File(FOLDER / "h5py.h5", "w") as file:
     file.create_dataset("radar/re", data=re)
     file.create_dataset("radar/im", data=im)
 
+# Every index of chunks that the library has (one chunk, fixed array, extensible array, B-tree), filters, byte orders and complex types.
+for name, libver in [("latest.h5", "latest"), ("earliest.h5", "earliest")]:
+    with h5py.File(FOLDER / name, "w", libver=libver) as file:
+        file.create_dataset("one_chunk", data=cube, chunks=cube.shape, compression="gzip")
+        file.create_dataset("fixed", data=cube, chunks=(1, 2, 3, 5), compression="gzip", shuffle=True)
+        file.create_dataset("unfiltered", data=cube, chunks=(1, 3, 4, 8))
+        file.create_dataset("growing", data=cube, chunks=(1, 3, 4, 4), maxshape=(None, 3, 4, 8), compression="gzip")
+        file.create_dataset("growing_twice", data=cube, chunks=(1, 2, 4, 4), maxshape=(None, None, 4, 8), compression="gzip")
+        file.create_dataset("checked", data=cube, chunks=(1, 3, 4, 8), fletcher32=True, shuffle=True, compression="gzip")
+        file.create_dataset("lzf", data=cube, chunks=(1, 3, 4, 8), compression="lzf")
+        file.create_dataset("double", data=cube.astype(np.complex128))
+        file.create_dataset("big_endian", data=cube.astype(">c8"), chunks=(1, 3, 4, 8), compression="gzip", shuffle=True)
+        for part, values in [("re", re), ("im", im)]:
+            file.create_dataset(f"scaled/{part}", data=values, chunks=(1, 3, 4, 8), scaleoffset=0)
+            file.create_dataset(f"swapped/{part}", data=values.astype(">i2"))
+
 np.savez(FOLDER / "parts.npz", real=re, imag=im)
 np.savez_compressed(FOLDER / "cube.npz", cube=cube, rate=2e6, names=np.array(["a", "b"]))

@@ -11,7 +11,7 @@ use std::{
 use hybridsim::{
     data::{
         IfFrame, IfLayout, Recording, RecordingContents,
-        arrays::{Array, Npz},
+        arrays::{Array, Npz, Values, write_npy},
         write_recording,
     },
     radar::{Radar, Sampling},
@@ -451,6 +451,40 @@ fn a_trace_of_roverd_has_q_before_i() {
     assert_eq!(fs::read(sensor.join("valid")).unwrap(), [1, 1]);
     assert_eq!(fs::read(sensor.join("ts")).unwrap().len(), 16);
     assert!(out.join("a/config.yaml").is_file());
+}
+
+/// A chirp that was lost is one in every layout that has a place for it.
+#[test]
+fn what_was_lost_is_said_where_there_is_a_place_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let radar = radar(2);
+    let source = record(&folder.path().join("a"), &radar, IfLayout::Codes, &[], code);
+    let [frames, n_tx, n_rx, loops, _] = radar.dims();
+    let mut chirps = vec![true; frames * n_tx * n_rx * loops];
+    let lost = ((n_tx + 2) * n_rx + 1) * loops + 3;
+    chirps[lost] = false;
+    write_npy(source.join("valid.npy"), &[frames, n_tx, n_rx, loops], Values::Bool(&chirps)).unwrap();
+    let settings = source.join("recording.toml");
+    let stated = fs::read_to_string(&settings).unwrap().replace("[files]", "[files]\nvalid = \"valid.npy\"");
+    fs::write(&settings, stated).unwrap();
+    let export = |target: &str| {
+        let out = folder.path().join(target);
+        run(&["export", text(&source), "--to", target, "--out", text(&out), "-q"]);
+        out
+    };
+    assert_eq!(fs::read(export("rover").join("a/radar/valid")).unwrap(), [1, 0]);
+    let axes = [("frame", Some(frames)), ("tx", Some(n_tx)), ("rx", Some(n_rx)), ("loop", Some(loops))];
+    let mut archive = Npz::open(export("npz").join("a.npz")).unwrap();
+    assert_eq!(archive.read::<bool>("valid", &axes).unwrap().values, chirps);
+    let file = hdf5_pure::File::open(export("hdf5").join("a.h5")).unwrap();
+    let bytes: Vec<u8> = chirps.iter().map(|valid| (*valid).into()).collect();
+    assert_eq!(file.dataset("valid").unwrap().read_raw().unwrap(), bytes);
+    for (target, name) in [("maps", "a_maps.npz"), ("points", "a_points.npz")] {
+        let mut archive = Npz::open(export(target).join(name)).unwrap();
+        assert_eq!(archive.read::<bool>("valid", &[("frame", Some(frames))]).unwrap().values, [true, false], "{target}");
+    }
+    let said = run(&["export", text(&source), "--to", "dca1000", "--out", text(&folder.path().join("words"))]);
+    assert!(said.contains("not carried: which chirps were lost"), "{said}");
 }
 
 #[test]

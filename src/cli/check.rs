@@ -112,7 +112,16 @@ fn show(recording: &Recording, common: &Common) -> Result<()> {
 }
 
 /// What is stated of a recording, and whether it can be.
-pub(super) fn tell(recording: &Recording, common: &Common) -> Result<()> {
+fn tell(recording: &Recording, common: &Common) -> Result<()> {
+    describe(recording);
+    for note in &recording.notes {
+        remark!("note: {note}");
+    }
+    plausible::recording(recording, common)
+}
+
+/// What is stated of a recording.
+pub(super) fn describe(recording: &Recording) {
     say!("recording: {}", recording.folder.display());
     show_radar(&recording.radar, recording.room.as_ref());
     match recording.person() {
@@ -128,10 +137,6 @@ pub(super) fn tell(recording: &Recording, common: &Common) -> Result<()> {
         }
         None => say!("  person             none: only what needs no tracked body will work"),
     }
-    for note in &recording.notes {
-        remark!("note: {note}");
-    }
-    plausible::recording(recording, common)
 }
 
 fn show_radar(radar: &Radar, room: Option<&Room>) {

@@ -4,25 +4,33 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use clap::Args;
 
-use super::{Common, check, conventions, conventions::Against, progress::Progress};
+use super::{
+    Common, check, conventions,
+    conventions::Against,
+    progress::{Progress, notes},
+};
 use crate::{
-    data::atomic::AtomicFolder,
     error::{Error, Result},
-    import::capture::{self, Layout, Preset, Stated},
+    import::capture::{Layout, Preset, Stated},
+    verbs::{
+        Tell, Told,
+        import::{Import, Seen, import},
+    },
 };
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// The capture: .bin files of one DCA1000 capture in their order, a folder of the Infineon SDK, or an array (.npy, .npz, .mat, .h5)
+    /// The capture: .bin files of one DCA1000 capture in their order, the folder of a cascade or of the Infineon SDK, or arrays
+    /// (.npy, .npz, .mat, .h5, .bin; several or a folder: a frame each)
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,
-    /// What describes the radar: .mmwave.json, .setup.json or .cfg of TI, or TOML with [radar]; may be repeated
+    /// What describes the radar: .mmwave.json, .setup.json or .cfg of TI, TOML with [radar], or ColoRadar's .txt; may be repeated
     #[arg(long, value_name = "FILE")]
     config: Vec<PathBuf>,
     /// The board, whose antenna positions are then known, such as IWR6843ISK
     #[arg(long, value_name = "NAME")]
     board: Option<String>,
-    /// The order of an array's axes, outer to inner, of frame, tx, rx, loop, chirp, sample, iq
+    /// The order of an array's axes, outer to inner, of frame, tx, rx, loop, chirp, antenna, sample, lane, iq
     #[arg(long, value_name = "AXES")]
     layout: Option<Layout>,
     /// The array of a file that holds several; RE,IM where real and imaginary parts are two arrays
@@ -49,8 +57,6 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
-    // What cannot be written is said before anything is read.
-    AtomicFolder::create(&arguments.out).map(drop)?;
     let stated = Stated {
         configs: arguments.config.clone(),
         board: arguments.board.clone(),
@@ -70,17 +76,19 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         Ok((name.trim().to_string(), text.trim().to_string()))
     });
     let labels = labels.collect::<Result<BTreeMap<_, _>>>()?;
-    let capture = capture::open(&arguments.sources, &stated)?;
-    let progress = Progress::new("importing", capture.radar.frames, common.quiet);
-    let draft = capture::draft(capture, &arguments.out, labels, &mut |done, _| progress.set(done))?;
-    progress.finish();
-    let recording = draft.recording();
-    check::tell(recording, common)?;
+    let what = Import { sources: &arguments.sources, stated: &stated, labels, as_stated: common.as_stated, out: &arguments.out };
     let against = if common.as_stated { Against::Kept } else { Against::Refused };
-    conventions::show(&recording.radar, &draft.findings, against);
-    let told = recording.notes.clone();
-    let recording = draft.publish(common.as_stated)?;
-    recording.notes.iter().filter(|note| !told.contains(note)).for_each(|note| remark!("note: {note}"));
+    let mut show = |seen: Seen<'_>, _: &mut Tell<'_>| match seen {
+        Seen::Written(recording) => check::describe(recording),
+        Seen::Looked(recording, findings) => conventions::show(&recording.radar, findings, against),
+    };
+    let (mut bar, mut length) = (None, 0);
+    let recording = import(what, &mut show, &mut |told| match told {
+        Told::Begun { what, steps } => (bar, length) = (Some(Progress::new(what, steps, common.quiet)), steps),
+        Told::Done(steps) if steps == length => bar.take().into_iter().for_each(Progress::finish),
+        Told::Done(steps) => bar.iter().for_each(|bar| bar.set(steps)),
+        told => notes(told),
+    })?;
     say!("imported: {}", recording.folder.display());
     Ok(())
 }

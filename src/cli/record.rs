@@ -1,13 +1,12 @@
 //! `hybridsim record`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
 use super::{Common, Out, progress::Shown};
 use crate::{
     config::Config,
-    data::atomic::AtomicFolder,
     error::Result,
     verbs::{self, Told},
 };
@@ -23,15 +22,10 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let config = Config::read(&arguments.config, &common.set)?;
     let record = config.record(&arguments.config)?;
-    for note in record.motion_notes(arguments.config.parent().unwrap_or(Path::new("")))? {
-        remark!("note: {note}");
-    }
     let mut shown = Shown::new(common.quiet);
     let mut tell = |told: Told<'_>| shown.show(told);
     let folder = match &arguments.out.out {
         Some(out) => {
-            // What cannot be written is said before anything is worked out.
-            AtomicFolder::create(out).map(drop)?;
             verbs::record::make(record, &arguments.config, out, common.as_stated, &mut tell)?;
             out.clone()
         }

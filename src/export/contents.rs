@@ -20,6 +20,11 @@ pub fn write(source: &mut Source, frames: Range<usize>, mut sink: Box<dyn Sink>,
     let radar = &recording.radar;
     let [_, tx, rx, loops, samples] = radar.dims();
     describe(recording, frames.clone(), &mut *sink)?;
+    if let Some(valid) = recording.valid() {
+        let shape = [frames.len(), tx, rx, loops];
+        let chirps: Vec<bool> = frames.clone().flat_map(|frame| valid.chirps(frame).iter().copied()).collect();
+        sink.array(Layout { name: "valid", axes: "frame tx rx loop", unit: "", shape: &shape }, Values::Bool(&chirps))?;
+    }
     body(recording, frames.clone(), &mut *sink, notes)?;
     let shape = [frames.len(), tx, rx, loops, samples];
     let layout = Layout { name: "samples", axes: "frame tx rx loop sample", unit: "", shape: &shape };
@@ -70,6 +75,15 @@ pub fn texts(recording: &Recording, sink: &mut dyn Sink) -> Result<()> {
 
 pub fn radar_json(radar: &Radar) -> String {
     serde_json::to_string(radar).expect("a radar is plain data")
+}
+
+/// `valid`: whether no chirp of a frame was lost, where that is stated.
+pub fn whole_frames(recording: &Recording, axis: &str, sink: &mut dyn Sink) -> Result<()> {
+    if recording.valid().is_none() {
+        return Ok(());
+    }
+    let whole: Vec<bool> = (0..recording.frames()).map(|frame| recording.is_whole(frame)).collect();
+    sink.array(Layout { name: "valid", axes: axis, unit: "", shape: &[whole.len()] }, Values::Bool(&whole))
 }
 
 /// An array of one axis.

@@ -19,7 +19,7 @@ pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
     let radar = &source.recording.radar;
     let wiring = Wiring::of(radar, source.board, &mut notes)?;
     let described = Described::of(radar, &wiring, &mut notes);
-    notes.extend(not_carried(source.recording, &["room", "body and motion", "labels"]));
+    notes.extend(not_carried(source.recording, &["which chirps were lost", "room", "body and motion", "labels"]));
     let mut codes = Codes::of(source, &mut notes)?;
     let mut files = Files::new(folder, &source.name, &source.config.capture);
     for frame in 0..source.recording.frames() {

@@ -6,7 +6,10 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use hdf5_pure::{AttrValue, CompoundTypeBuilder, Datatype, FileBuilder, make_f32_type, make_f64_type, make_i32_type};
+use hdf5_pure::{
+    AttrValue, CompoundTypeBuilder, Datatype, EnumTypeBuilder, FileBuilder, make_f32_type, make_f64_type, make_i8_type,
+    make_i32_type,
+};
 
 use super::sink::{Layout, Sink};
 use super::{Source, contents};
@@ -82,6 +85,11 @@ impl Sink for Hdf5Sink {
             Values::F32(_) => make_f32_type(),
             Values::F64(_) => make_f64_type(),
             Values::I32(_) => make_i32_type(),
+            // h5py's bool: an enumeration of one byte.
+            Values::Bool(_) => {
+                let truth = EnumTypeBuilder::with_base(make_i8_type()).value("FALSE", 0).value("TRUE", 1);
+                truth.build().expect("two values of one byte")
+            }
             Values::Complex64(_) => {
                 let parts = CompoundTypeBuilder::new().field("r", make_f32_type()).field("i", make_f32_type());
                 parts.build().expect("two fields of four bytes")

@@ -82,6 +82,7 @@ pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
     let mut sink: Box<dyn Sink> = Box::new(NpzSink::create(&folder.join(format!("{}_maps.npz", source.name)))?);
     let starts: Vec<f64> = (0..radar.frames).map(|frame| radar.chirp_time_s(frame, 0, 0)).collect();
     contents::line(&mut *sink, "time_s", "frame", "s", &starts)?;
+    contents::whole_frames(source.recording, "frame", &mut *sink)?;
     contents::line(&mut *sink, "velocity_m_s", "doppler", "m/s", &analysis.velocity_axis().values)?;
     contents::line(&mut *sink, "elevation_deg", "elevation", "deg", &elevations)?;
     contents::line(&mut *sink, "azimuth_deg", "azimuth", "deg", &azimuths)?;

@@ -103,6 +103,7 @@ fn not_carried(recording: &Recording, parts: &[&str]) -> Option<String> {
         "room" => recording.room.is_some(),
         "body and motion" => recording.person().is_some(),
         "labels" => !recording.labels.is_empty(),
+        "which chirps were lost" => recording.valid().is_some(),
         _ => true,
     };
     let left: Vec<&str> = parts.iter().copied().filter(|part| has(part)).collect();

@@ -31,7 +31,7 @@ pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
     }
     let wiring = Wiring { lanes: Lanes { q_first: true, ..wiring.lanes }, ..wiring };
     notes.extend(not_carried(source.recording, &["chirp and antennas but for their resolutions", "room", "body and motion"]));
-    notes.push("every frame is marked valid, and time stamps count from the start of the recording".into());
+    notes.push("time stamps count from the start of the recording".into());
     let trace = folder.join(&source.name);
     let sensor = trace.join("radar");
     std::fs::create_dir_all(&sensor).map_err(|source| Error::write(&sensor, source))?;
@@ -48,7 +48,8 @@ pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
     codes.conclude(&mut notes);
     let times: Vec<f64> = (0..frames).map(|frame| radar.chirp_time_s(frame, 0, 0)).collect();
     write_file(sensor.join("ts"), |file| Values::F64(&times).write_to(file))?;
-    write_file(sensor.join("valid"), |file| std::io::Write::write_all(file, &vec![1; frames]))?;
+    let valid: Vec<u8> = (0..frames).map(|frame| source.recording.is_whole(frame).into()).collect();
+    write_file(sensor.join("valid"), |file| std::io::Write::write_all(file, &valid))?;
     write_text(sensor.join("meta.json"), &meta(radar))?;
     let resolutions = json!({
         "shape": [radar.loops_per_frame, radar.tx_m.len(), radar.rx_m.len(), radar.samples_per_chirp],

@@ -81,8 +81,8 @@ fn lanes(sampling: Sampling, board: Option<&Board>) -> Result<Lanes> {
     let chip = board.map_or("AWR1843", |board| board.name);
     if !["AWR", "IWR"].iter().any(|maker| chip.starts_with(maker)) {
         return Err(Error::Usage {
-            message: format!("--board {chip}: no board of TI"),
-            hint: Some("a DCA1000 captures TI boards only; leave out --board, or export to npz".into()),
+            message: format!("--board {chip}: no board of TI that a DCA1000 captures"),
+            hint: Some("a DCA1000 captures boards of one device of TI only; leave out --board, or export to npz".into()),
         });
     }
     let interleaved = ["12", "14", "22"].contains(&&chip[3..5]);

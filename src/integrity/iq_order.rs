@@ -1,10 +1,14 @@
 //! I and Q exchanged: the samples are the conjugates of what was sent.
 //!
 //! Returns lie at the beat frequencies of their ranges, and those of a pair of frequencies ±f are those of a near and of a far range. In
-//! a room whose size is stated, nothing lies beyond its farthest corner; in an unknown one, returns weaken with range. So over the pairs
+//! a room whose size is stated, nothing lies beyond its farthest corner; in an unknown scene, returns weaken with range. So over the pairs
 //! in which still returns stand out of the noise, and of which not both are within the room, the mean of ln(far / near) is zero at most:
 //! a paired Student test over pairs of the still chirps' spectrum, power summed over the channels. Every second bin counts, as the window
 //! joins neighbours. Where far returns are as strong as near ones, nothing can be told.
+//!
+//! An unknown scene may also be open, with far returns alone. But the filter before the converter keeps out what would alias, and so the
+//! last ninth of the band: no return there is the strongest. So something is told only where the strongest still return lies in the first
+//! or the last ninth of the band; far returns alone, as they are or as their mirror image, tell nothing.
 
 use num_complex::{Complex32, Complex64};
 
@@ -19,6 +23,9 @@ const EXPECTED: &str = "still returns at the beat frequencies of the room's rang
 const GUARD: usize = 3;
 /// Bins between pairs that share nothing under a Hann window, whose main lobe is four bins wide.
 const APART: usize = 2;
+/// Share of the sampling rate that the filter before a complex converter passes, at most (TI, data sheets: of the AWR2243 20 MHz of
+/// 22.5 Msps, of the IWR6843 10 MHz of 12.5 Msps).
+const PASSED: f64 = 20.0 / 22.5;
 /// A pair counts above this many times the noise: of noise alone, e⁻²⁰.
 const RETURN: f64 = 20.0;
 
@@ -71,8 +78,9 @@ impl Inspector for IqOrder {
         let variance = self.noise / (2.0 * self.differences * samples as f64);
         let least = RETURN * self.loops * variance * window_power(samples);
         let power = spectrum(self.sum.chunks_exact(samples), samples);
-        let told: Vec<[f64; 2]> =
-            self.pairs().map(|pair| pair.map(|bin| power[bin])).filter(|pair| pair[0].max(pair[1]) >= least).collect();
+        let of = |pair: [usize; 2]| pair.map(|bin| power[bin]);
+        let pairs: Vec<[usize; 2]> = self.pairs().filter(|pair| of(*pair)[0].max(of(*pair)[1]) >= least).collect();
+        let told: Vec<[f64; 2]> = pairs.iter().map(|pair| of(*pair)).collect();
         let ratios: Vec<f64> = told.iter().map(|[near, far]| (far / near.max(f64::MIN_POSITIVE)).ln()).collect();
         if ratios.len() < 2 {
             return Some(Finding::untold(CHECK, EXPECTED, "still returns stand out of the noise at too few frequencies"));
@@ -80,6 +88,15 @@ impl Inspector for IqOrder {
         let mean_db = 10.0 / std::f64::consts::LN_10 * ratios.iter().sum::<f64>() / ratios.len() as f64;
         let found =
             format!("of {} pairs of beat frequencies with still returns, the far one is {mean_db:+.1} dB stronger", ratios.len());
+        let strongest = pairs.iter().flatten().copied().max_by(|a, b| power[*a].total_cmp(&power[*b])).expect("there are two");
+        let from_edge = strongest.min(samples - strongest) as f64 / samples as f64;
+        if self.schedule.farthest_bin.is_none() && from_edge > 1.0 - PASSED {
+            let why = format!(
+                "{found}, the strongest {:.0} % of the band from its edges: there may be far returns alone",
+                100.0 * from_edge
+            );
+            return Some(Finding::untold(CHECK, EXPECTED, why));
+        }
         let exchanged = student_tail(&ratios);
         if exchanged < ALARM {
             let found = format!("{found}: I and Q are exchanged, or the samples conjugated");
@@ -105,13 +122,18 @@ mod tests {
 
     /// Still returns at so many bins, falling with range, under noise.
     fn seen(schedule: Schedule, bins: std::ops::Range<usize>, sign: f32) -> Finding {
+        of_law(schedule, bins, sign, |bin| 100.0 / bin as f64)
+    }
+
+    /// The same of another law of their amplitudes.
+    fn of_law(schedule: Schedule, bins: std::ops::Range<usize>, sign: f32, law: fn(usize) -> f64) -> Finding {
         let noise = numbers(9, 4 * LOOPS * SAMPLES, -3.0, 3.0);
         let phases = numbers(10, 2 * SAMPLES, 0.0, std::f64::consts::TAU);
         let value = |place: usize| -> Complex64 {
             let (channel, sample) = (place / SAMPLES / LOOPS, place % SAMPLES);
             let tone = |bin: usize| {
                 let phase = std::f64::consts::TAU * (bin * sample) as f64 / SAMPLES as f64 + phases[channel * SAMPLES + bin];
-                Complex64::from_polar(100.0 / bin as f64, phase)
+                Complex64::from_polar(law(bin), phase)
             };
             bins.clone().map(tone).sum::<Complex64>() + Complex64::new(noise[2 * place], noise[2 * place + 1])
         };
@@ -133,6 +155,19 @@ mod tests {
             assert!(exchanged.is_refusal() && exchanged.kind == Kind::Convention, "{exchanged:?}");
             // A falling chirp has the mirror image of its room.
             assert!(seen(Schedule { is_falling: true, ..schedule }, bins, -1.0).ok);
+        }
+    }
+
+    /// Fields, a yard, a car park: far returns alone, which weaken with range or, as of a wall behind a lawn, do not.
+    #[test]
+    fn an_open_scene_with_far_returns_alone_is_not_accused() {
+        for bins in [70..114, 64..100, 100..110] {
+            for sign in [1.0, -1.0] {
+                for law in [|bin: usize| 100.0 / bin as f64, |bin: usize| 1e-2 * bin as f64] {
+                    let open = of_law(SCHEDULE, bins.clone(), sign, law);
+                    assert!(open.ok && !open.told, "{bins:?}, {sign}: {open:?}");
+                }
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! Whether a recording's samples are whole and are what they are stated to be, before any physics is asked: packets of zeros, values
 //! that stand still, copies, a stream that moved, numbers of another byte order or sign, chirps and frames that begin elsewhere,
-//! transmitters that were not separated, words in the wrong order, I and Q exchanged.
+//! transmitters that were not separated, words in the wrong order, devices of a cascade and I and Q exchanged.
 //!
 //! The checks know the converter's stream and the radar's schedule, and where it is stated the size of the room, nothing of a body.
 //! Each has a law that says how often a recording that is as stated would look so; a check fails where that is rarer than [`ALARM`].
@@ -8,6 +8,7 @@
 
 mod boundary;
 mod copies;
+mod devices;
 mod iq_order;
 mod numbers;
 mod period;
@@ -24,7 +25,7 @@ use crate::error::Result;
 use crate::radar::Radar;
 use stream::{Schedule, Stream};
 
-/// Chance that one check fails on a recording that is whole and as stated, at most. Eleven checks at this level add up to about the
+/// Chance that one check fails on a recording that is whole and as stated, at most. Twelve checks at this level add up to about the
 /// family-wise 1 % that a diagnosis allows itself (`diagnosis.alarm`).
 pub const ALARM: f64 = 1e-3;
 
@@ -89,7 +90,7 @@ trait Inspector {
 /// Samples that cannot be read.
 pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>> {
     let schedule = Schedule::of(&recording.radar, recording.room.as_ref());
-    let mut inspectors: [Box<dyn Inspector>; 11] = [
+    let mut inspectors: [Box<dyn Inspector>; 12] = [
         Box::new(runs::Runs::new(schedule)),
         Box::new(copies::Copies::new(schedule)),
         Box::new(numbers::Numbers::new(numbers::BYTE_ORDER)),
@@ -101,6 +102,7 @@ pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>
         Box::new(start::Start::new(schedule)),
         Box::new(boundary::Boundary::new(schedule)),
         Box::new(words::Words::new(schedule)),
+        Box::new(devices::Devices::new(schedule, &recording.radar)),
         Box::new(iq_order::IqOrder::new(schedule)),
     ];
     for index in recording.whole_frames().take(most_frames) {

@@ -9,6 +9,7 @@ pub mod challenge;
 pub mod diagnose;
 pub mod export;
 pub mod heatmaps;
+pub mod import;
 pub mod notes;
 pub mod plausible;
 pub mod record;

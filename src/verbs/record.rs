@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 
 use super::{Tell, Told, plausible};
 use crate::{
-    data::{Recording, hex},
+    data::{Recording, atomic::AtomicFolder, hex},
     error::Result,
     plausibility::Sources,
     recorder::{self, RecorderConfig},
@@ -38,7 +38,10 @@ pub fn make(
     as_stated: bool,
     tell: &mut Tell<'_>,
 ) -> Result<Recording> {
+    // What cannot be written is said before anything is worked out.
+    AtomicFolder::create(folder).map(drop)?;
     let settings_folder = config_path.parent().unwrap_or(Path::new(""));
+    config.motion_notes(settings_folder)?.iter().for_each(|note| tell(Told::Note(note)));
     let world = config.world(settings_folder)?;
     plausible::scene(Some(&world.radar), Some(&world.room), world.person.as_ref(), &Sources::one(config_path), as_stated, tell)?;
     tell(Told::Begun { what: "recording", steps: world.radar.frames });

@@ -3,9 +3,11 @@
 use std::{collections::BTreeMap, path::PathBuf};
 
 use hybridsim::{
-    data::atomic::AtomicFolder,
-    import::capture::{self, Layout, Preset, Stated},
-    verbs::{Told, plausible},
+    import::capture::{Layout, Preset, Stated},
+    verbs::{
+        self, Tell, Told,
+        import::{Import, Seen},
+    },
 };
 use pyo3::prelude::*;
 
@@ -35,17 +37,14 @@ pub fn import(
     let preset = preset.map(|name| Preset::named(&name)).transpose().map_err(|error| raised(py, &error))?;
     let stated = Stated { configs, board, layout, variable, preset, profile, subframe, tx, sets };
     run(py, tell, move |tell| {
-        // What cannot be written is said before anything is read.
-        AtomicFolder::create(&out).map(drop)?;
-        let capture = capture::open(&sources, &stated)?;
-        tell(Told::Begun { what: "importing", steps: capture.radar.frames });
-        let draft = capture::draft(capture, &out, labels, &mut |done, _| tell(Told::Done(done)))?;
-        plausible::recording(draft.recording(), as_stated, tell)?;
-        for finding in draft.findings.iter().filter(|finding| !finding.ok) {
-            tell(Told::Note(&format!("{}: {}", finding.name(), finding.found)));
-        }
-        let recording = draft.publish(as_stated)?;
-        recording.notes.iter().for_each(|note| tell(Told::Note(note)));
-        Ok(recording.notes.clone())
+        let what = Import { sources: &sources, stated: &stated, labels, as_stated, out: &out };
+        let mut show = |seen: Seen<'_>, tell: &mut Tell<'_>| {
+            if let Seen::Looked(_, findings) = seen {
+                for finding in findings.iter().filter(|finding| !finding.ok) {
+                    tell(Told::Note(&format!("{}: {}", finding.name(), finding.found)));
+                }
+            }
+        };
+        verbs::import::import(what, &mut show, tell).map(|recording| recording.notes)
     })
 }

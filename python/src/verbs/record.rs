@@ -1,8 +1,8 @@
 //! Making a recording in the independent world.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use hybridsim::{config::Config, data::atomic::AtomicFolder, verbs};
+use hybridsim::{config::Config, verbs};
 use pyo3::prelude::*;
 
 use crate::work::run;
@@ -20,11 +20,6 @@ pub fn record(
     run(py, tell, move |tell| {
         let settings = Config::read(&config, &sets)?;
         let record = settings.record(&config)?;
-        for note in record.motion_notes(config.parent().unwrap_or(Path::new("")))? {
-            tell(verbs::Told::Note(&note));
-        }
-        // What cannot be written is said before anything is worked out.
-        AtomicFolder::create(&out).map(drop)?;
         verbs::record::make(record, &config, &out, as_stated, tell).map(drop)
     })
 }

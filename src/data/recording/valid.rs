@@ -55,8 +55,13 @@ impl Valid {
 
     /// Whether every chirp of a frame was recorded.
     pub fn is_whole(&self, frame: usize) -> bool {
+        self.chirps(frame).iter().all(|valid| *valid)
+    }
+
+    /// `[tx, rx, loop]` of a frame.
+    pub fn chirps(&self, frame: usize) -> &[bool] {
         let length = self.chirps.len() / self.dims[0];
-        self.chirps[frame * length..(frame + 1) * length].iter().all(|valid| *valid)
+        &self.chirps[frame * length..(frame + 1) * length]
     }
 
     /// Chirps that were lost, counted for every receiver.
@@ -80,6 +85,11 @@ impl Valid {
 }
 
 impl Recording {
+    /// Which chirps were recorded, where it is stated.
+    pub fn valid(&self) -> Option<&Valid> {
+        self.valid.as_ref()
+    }
+
     /// Whether no chirp of a frame was lost.
     pub fn is_whole(&self, frame: usize) -> bool {
         self.valid.as_ref().is_none_or(|valid| valid.is_whole(frame))

@@ -201,6 +201,7 @@ pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
     }
     let times: Vec<f64> = (0..radar.frames).map(|frame| radar.chirp_time_s(frame, 0, 0)).collect();
     contents::line(&mut *sink, "time_s", "time", "s", &times)?;
+    contents::whole_frames(source.recording, "time", &mut *sink)?;
     sink.text("method", &serde_json::to_string(config).expect("settings are plain data"))?;
     contents::texts(source.recording, &mut *sink)?;
     sink.finish()?;

@@ -25,6 +25,9 @@ const RX_LINE: &[[f64; 2]] = &[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]];
 const TX_RAISED: &[[f64; 2]] = &[[0.0, 0.0], [2.0, 1.0], [4.0, 0.0]];
 const PEOPLE_TRACKING: &str = "TI 3D People Tracking, chirp configurations: antGeometry0, antGeometry1, antPhaseRot";
 
+/// Four AWR2243 that share their clocks.
+pub const CASCADE: &str = "MMWCASRFEVM";
+
 /// Every board that is known.
 pub const BOARDS: &[Board] = &[
     raised("IWR1443BOOST", "TI user's guide SWRU518", 77.0e9),
@@ -57,6 +60,47 @@ pub const BOARDS: &[Board] = &[
         inverted_rx: &[1, 2],
     },
     Board {
+        name: CASCADE,
+        source: "TI user's guide SWRU553; TI cascade MATLAB examples of mmWave Studio, module_param.m: TI_Cascade_TX_position_azi, \
+                 TI_Cascade_TX_position_ele, TI_Cascade_RX_position_azi, TI_Cascade_Antenna_DesignFreq",
+        design_frequency_hz: 76.8e9,
+        // Three of the master and of each slave in turn.
+        tx_half_wavelengths: &[
+            [11.0, 6.0],
+            [10.0, 4.0],
+            [9.0, 1.0],
+            [32.0, 0.0],
+            [28.0, 0.0],
+            [24.0, 0.0],
+            [20.0, 0.0],
+            [16.0, 0.0],
+            [12.0, 0.0],
+            [8.0, 0.0],
+            [4.0, 0.0],
+            [0.0, 0.0],
+        ],
+        // Four of the master and of each slave in turn.
+        rx_half_wavelengths: &[
+            [11.0, 0.0],
+            [12.0, 0.0],
+            [13.0, 0.0],
+            [14.0, 0.0],
+            [50.0, 0.0],
+            [51.0, 0.0],
+            [52.0, 0.0],
+            [53.0, 0.0],
+            [46.0, 0.0],
+            [47.0, 0.0],
+            [48.0, 0.0],
+            [49.0, 0.0],
+            [0.0, 0.0],
+            [1.0, 0.0],
+            [2.0, 0.0],
+            [3.0, 0.0],
+        ],
+        inverted_rx: &[],
+    },
+    Board {
         name: "BGT60TR13C",
         source: "Infineon data sheet BGT60TR13C: one transmitter, receivers 1 and 3 side by side, 2 and 3 one above the other",
         design_frequency_hz: 60.75e9,
@@ -82,6 +126,8 @@ const ALIASES: &[(&str, &str)] = &[
     ("IWR6843AOPEVM", "IWR6843AOP"),
     ("IWR6843ISKODS", "IWR6843ODS"),
     ("BGT60UTR11AIP", "BGT60UTR11"),
+    ("MMWCAS", CASCADE),
+    ("MMWCASRF", CASCADE),
 ];
 
 const fn raised(name: &'static str, source: &'static str, design_frequency_hz: f64) -> Board {
@@ -155,8 +201,8 @@ mod tests {
     }
 
     #[test]
-    fn no_two_virtual_antennas_of_a_board_coincide() {
-        for board in BOARDS {
+    fn no_two_virtual_antennas_of_one_device_coincide() {
+        for board in BOARDS.iter().filter(|board| board.name != CASCADE) {
             let mut places: Vec<_> = board
                 .tx_half_wavelengths
                 .iter()
@@ -167,5 +213,19 @@ mod tests {
             places.dedup();
             assert_eq!(places.len(), count, "{}", board.name);
         }
+    }
+    /// Nine transmitters and sixteen receivers in a row make 86 places in a row, of which 144 − 86 are there twice.
+    #[test]
+    fn the_cascade_has_eighty_six_places_in_a_row() {
+        let board = Board::named("MMWCAS-RF-EVM").unwrap();
+        let level = board.tx_half_wavelengths.iter().filter(|tx| tx[1] == 0.0);
+        let sums = level.flat_map(|tx| board.rx_half_wavelengths.iter().map(move |rx| (tx[0] + rx[0]) as i64));
+        let mut places: Vec<i64> = sums.collect();
+        assert_eq!(places.len(), 144);
+        places.sort_unstable();
+        places.dedup();
+        assert_eq!((places.len(), places[0], places[85]), (86, 0, 85));
+        let raised: Vec<f64> = board.tx_half_wavelengths.iter().map(|tx| tx[1]).filter(|height| *height > 0.0).collect();
+        assert_eq!(raised, [6.0, 4.0, 1.0]);
     }
 }

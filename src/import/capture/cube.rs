@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::container::{self, Source};
 use super::layout::{Axis, Layout};
+use super::words::WordArray;
 use crate::data::arrays::Kind;
 use crate::data::{IfFrame, IfLayout};
 use crate::error::{Error, Result};
@@ -12,14 +13,20 @@ use crate::radar::{Radar, Sampling};
 /// Half of an unsigned 16-bit word's range: where a signed word's negative numbers begin.
 const WRAP: f32 = 65536.0;
 
+/// Where the numbers are.
+enum Numbers {
+    Array(Source),
+    Words(WordArray),
+}
+
 /// An array whose axes are known by name. Its samples stay on the disk until a frame is asked for.
 pub struct Cube {
-    source: Source,
+    numbers: Numbers,
     layout: Layout,
-    /// Set by `check`: how many transmitters take turns along an axis of chirps.
+    /// Set by `check`: how many transmitters take turns along an axis of chirps, or share one of antennas.
     transmitters: std::cell::Cell<usize>,
     /// Negative numbers were stored as unsigned words.
-    wrapped: bool,
+    pub wrapped: bool,
 }
 
 impl Cube {
@@ -35,14 +42,40 @@ impl Cube {
         if pairs.is_some_and(|pairs| pairs != 2) || pairs.is_some() && source.is_complex() {
             return Err(source.wrong(source.describe(), "an axis `iq` of length 2 and real numbers"));
         }
-        let mut cube = Self { source, layout, transmitters: 1.into(), wrapped: false };
+        let mut cube = Self { numbers: Numbers::Array(source), layout, transmitters: 1.into(), wrapped: false };
         cube.wrapped = cube.looks_wrapped()?;
         Ok(cube)
     }
 
+    /// Files of nothing but little-endian 16-bit words, frame after frame.
+    pub fn of_words(words: WordArray, layout: Layout) -> Self {
+        Self { numbers: Numbers::Words(words), layout, transmitters: 1.into(), wrapped: false }
+    }
+
+    fn shape(&self) -> &[usize] {
+        match &self.numbers {
+            Numbers::Array(source) => source.shape(),
+            Numbers::Words(words) => &words.shape,
+        }
+    }
+
+    fn describe(&self) -> String {
+        match &self.numbers {
+            Numbers::Array(source) => source.describe(),
+            Numbers::Words(words) => format!("int16 {:?}", words.shape),
+        }
+    }
+
+    fn wrong(&self, found: String, expected: String) -> Error {
+        match &self.numbers {
+            Numbers::Array(source) => source.wrong(found, expected),
+            Numbers::Words(words) => Error::field(words.words.first(), "samples", found, expected),
+        }
+    }
+
     /// The length of an axis, 1 where the array has none.
     pub fn length(&self, axis: Axis) -> usize {
-        self.layout.place(axis).map_or(1, |place| self.source.shape()[place])
+        self.layout.place(axis).map_or(1, |place| self.shape()[place])
     }
 
     pub fn has(&self, axis: Axis) -> bool {
@@ -53,14 +86,23 @@ impl Cube {
         self.length(Axis::Frame)
     }
 
+    /// Samples of a chirp.
+    pub fn samples(&self) -> usize {
+        self.length(Axis::Sample) * self.length(Axis::Lane)
+    }
+
     pub fn sampling(&self) -> Sampling {
-        let complex = self.source.is_complex() || self.has(Axis::Iq);
+        let complex = matches!(&self.numbers, Numbers::Array(source) if source.is_complex()) || self.has(Axis::Iq);
         if complex { Sampling::Complex } else { Sampling::Real }
     }
 
     /// How a recording stores these numbers: whole ones of 16 bits as codes.
     pub fn stored_as(&self) -> IfLayout {
-        match (self.sampling(), self.wrapped || self.source.holds_codes()) {
+        let codes = match &self.numbers {
+            Numbers::Array(source) => source.holds_codes(),
+            Numbers::Words(_) => true,
+        };
+        match (self.sampling(), self.wrapped || codes) {
             (Sampling::Complex, true) => IfLayout::Codes,
             (Sampling::Complex, false) => IfLayout::Complex,
             (Sampling::Real, true) => IfLayout::RealCodes,
@@ -77,17 +119,19 @@ impl Cube {
             Axis::Rx => rx,
             Axis::Loop => loops,
             Axis::Chirp => loops * tx,
-            Axis::Sample => samples,
+            Axis::Antenna => tx * rx,
+            Axis::Sample => samples / self.length(Axis::Lane),
+            Axis::Lane => self.length(Axis::Lane),
             Axis::Iq => 2,
         });
         let expected: Vec<usize> = expected.collect();
-        let covered = self.length(Axis::Chirp) * self.length(Axis::Tx) * self.length(Axis::Loop) == tx * loops;
-        if expected != self.source.shape() || !covered || self.length(Axis::Rx) != rx || self.frames() != frames {
+        let chirps: usize =
+            [Axis::Chirp, Axis::Tx, Axis::Loop, Axis::Rx, Axis::Antenna].map(|axis| self.length(axis)).iter().product();
+        if expected != self.shape() || chirps != tx * rx * loops || self.samples() != samples || self.frames() != frames {
             let what =
                 format!("{expected:?} for {} of {tx} tx, {rx} rx, {loops} loops, {samples} samples", self.layout.describe());
             return Err(self
-                .source
-                .wrong(self.source.describe(), what)
+                .wrong(self.describe(), what)
                 .with_hint("the radar's settings or --layout do not belong to this array"));
         }
         if radar.sampling != self.sampling() {
@@ -102,24 +146,30 @@ impl Cube {
     /// The samples of a frame as `[tx, rx, loop, sample]`.
     pub fn frame(&self, index: usize) -> Result<IfFrame> {
         let (re, im) = self.numbers(index)?;
-        let (n_tx, n_rx, samples) = (self.transmitters.get(), self.length(Axis::Rx), self.length(Axis::Sample));
-        let loops = self.length(Axis::Loop) * self.length(Axis::Chirp) * self.length(Axis::Tx) / n_tx;
+        let n_tx = self.transmitters.get();
+        let n_rx = self.length(Axis::Rx) * self.length(Axis::Antenna) / if self.has(Axis::Antenna) { n_tx } else { 1 };
+        let senders = if self.has(Axis::Antenna) { 1 } else { n_tx };
+        let loops = self.length(Axis::Loop) * self.length(Axis::Chirp) * self.length(Axis::Tx) / senders;
+        let (samples, lanes) = (self.samples(), self.length(Axis::Lane));
         let inner: Vec<Axis> = self.layout.0.iter().copied().filter(|axis| *axis != Axis::Frame).collect();
         let mut strides = vec![1; inner.len()];
         for place in (1..inner.len()).rev() {
             strides[place - 1] = strides[place] * self.length(inner[place]);
         }
         let stride = |axis: Axis| inner.iter().position(|other| *other == axis).map_or(0, |place| strides[place]);
-        let [tx_stride, rx_stride, loop_stride, chirp_stride, sample_stride, iq_stride] =
-            [Axis::Tx, Axis::Rx, Axis::Loop, Axis::Chirp, Axis::Sample, Axis::Iq].map(stride);
         let count = n_tx * n_rx * loops * samples;
         let (mut real, mut imaginary) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for tx in 0..n_tx {
             for rx in 0..n_rx {
                 for index in 0..loops {
-                    let start = tx * tx_stride + rx * rx_stride + index * loop_stride + (index * n_tx + tx) * chirp_stride;
+                    let start = tx * stride(Axis::Tx)
+                        + rx * stride(Axis::Rx)
+                        + (tx * n_rx + rx) * stride(Axis::Antenna)
+                        + index * stride(Axis::Loop)
+                        + (index * n_tx + tx) * stride(Axis::Chirp);
+                    let (sample_stride, lane_stride, iq_stride) = (stride(Axis::Sample), stride(Axis::Lane), stride(Axis::Iq));
                     for sample in 0..samples {
-                        let place = start + sample * sample_stride;
+                        let place = start + sample / lanes * sample_stride + sample % lanes * lane_stride;
                         real.push(re[place]);
                         match &im {
                             Some(im) => imaginary.push(im[place]),
@@ -136,7 +186,10 @@ impl Cube {
 
     /// A frame's numbers in the array's order without its axis of frames; the imaginary parts of complex ones apart.
     fn numbers(&self, frame: usize) -> Result<(Vec<f32>, Option<Vec<f32>>)> {
-        let (mut re, mut im) = self.source.numbers(self.layout.place(Axis::Frame), frame)?;
+        let (mut re, mut im) = match &self.numbers {
+            Numbers::Array(source) => source.numbers(self.layout.place(Axis::Frame), frame)?,
+            Numbers::Words(words) => (words.frame(frame)?, None),
+        };
         for value in re.iter_mut().chain(im.iter_mut().flatten()).filter(|value| self.wrapped && **value >= WRAP / 2.0) {
             *value -= WRAP;
         }
@@ -168,7 +221,7 @@ pub fn half_scale_note(cube: &Cube) -> Result<Option<String>> {
     if cube.wrapped {
         return Ok(Some("numbers up to 65535 are signed words that were stored as unsigned ones: 65535 is read as -1".into()));
     }
-    if cube.source.number().0 != Kind::Unsigned {
+    if !matches!(&cube.numbers, Numbers::Array(source) if source.number().0 == Kind::Unsigned) {
         return Ok(None);
     }
     let (re, _) = cube.numbers(0)?;

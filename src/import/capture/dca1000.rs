@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::schedule::{Selection, TiRadar};
 use super::stream::Words;
-use super::{Capture, Stated, lanes::Lanes, ti_cfg, ti_json};
+use super::{Capture, Stated, cascade, lanes::Lanes, ti_cfg, ti_json};
 use crate::data::entries::entries;
 use crate::data::settings::settings_from_table;
 use crate::data::{IfFrame, IfLayout, files};
@@ -29,7 +29,8 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         [config] => read(config)?,
         _ => unreachable!("descriptions gives one"),
     };
-    let Selection { radar: found, words_per_frame, starts, inverted_rx, notes: more } = radar.select(&stated, &words)?;
+    let Selection { radar: found, words_per_frame, starts, inverted_rx, notes: more } =
+        radar.select(&stated, &|words_per_frame, notes| radar.frames_present(&words, words_per_frame, notes))?;
     notes.extend(more);
     notes.extend(log_beside(&sources[0]));
     let shaped = apply(found, &std::mem::take(&mut stated.sets))?;
@@ -55,6 +56,9 @@ pub fn open_setup(path: &Path, stated: &Stated) -> Result<Capture> {
         stated.configs.extend(setup.config.clone());
     }
     stated.configs.push(path.into());
+    if setup.files.iter().any(|file| cascade::is_part(file)) {
+        return cascade::open(&setup.files, &stated);
+    }
     open(&setup.files, &stated)
 }
 
@@ -66,7 +70,7 @@ fn read(config: &Path) -> Result<TiRadar> {
 }
 
 /// The one file that describes the radar, and the set-up where there is one.
-fn descriptions(source: &Path, stated: &Stated, notes: &mut Vec<String>) -> Result<(Vec<PathBuf>, ti_json::Setup)> {
+pub fn descriptions(source: &Path, stated: &Stated, notes: &mut Vec<String>) -> Result<(Vec<PathBuf>, ti_json::Setup)> {
     let is = |path: &Path, end: &str| path.to_string_lossy().to_lowercase().ends_with(end);
     let mut given = stated.configs.clone();
     if given.is_empty() {

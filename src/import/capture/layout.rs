@@ -13,18 +13,24 @@ pub enum Axis {
     Loop,
     /// Chirps in the order in which they were sent: loops × transmitters.
     Chirp,
+    /// Virtual antennas: transmitters × receivers.
+    Antenna,
     Sample,
+    /// Neighbouring samples that go out side by side, one on each lane: `sample` then counts groups of them.
+    Lane,
     /// I and Q.
     Iq,
 }
 
-const NAMES: [(&str, Axis); 7] = [
+const NAMES: [(&str, Axis); 9] = [
     ("frame", Axis::Frame),
     ("tx", Axis::Tx),
     ("rx", Axis::Rx),
     ("loop", Axis::Loop),
     ("chirp", Axis::Chirp),
+    ("antenna", Axis::Antenna),
     ("sample", Axis::Sample),
+    ("lane", Axis::Lane),
     ("iq", Axis::Iq),
 ];
 
@@ -57,8 +63,12 @@ impl Layout {
         if !axes.contains(&Axis::Sample) {
             return Err(refuse("no axis of samples".into()));
         }
-        if axes.contains(&Axis::Chirp) && (axes.contains(&Axis::Loop) || axes.contains(&Axis::Tx)) {
+        let with = |axis: Axis, others: &[Axis]| axes.contains(&axis) && others.iter().any(|other| axes.contains(other));
+        if with(Axis::Chirp, &[Axis::Loop, Axis::Tx]) {
             return Err(refuse("`chirp` is loops and transmitters together".into()));
+        }
+        if with(Axis::Antenna, &[Axis::Tx, Axis::Rx, Axis::Chirp]) {
+            return Err(refuse("`antenna` is transmitters and receivers together".into()));
         }
         Ok(Self(axes))
     }
@@ -97,7 +107,8 @@ mod tests {
     #[test]
     fn what_is_no_layout_is_refused() {
         for (text, part) in [
-            ("frame antenna sample", "`antenna` is no axis"),
+            ("frame aerial sample", "`aerial` is no axis"),
+            ("frame antenna rx sample", "transmitters and receivers together"),
             ("frame rx rx sample", "stands twice"),
             ("frame rx", "no axis of samples"),
             ("chirp tx sample", "together"),

@@ -2,10 +2,14 @@
 //!
 //! A source says which radar it is of and gives its samples frame by frame; nothing of it is held in memory but the
 //! frame at hand. What had to be assumed is a note. One layout, one file: `dca1000` (TI boards with a DCA1000 capture
-//! card), `infineon` (folders of the Radar SDK and of ifxdaq), `arrays` (arrays of any order of axes, in any file of `container`).
+//! card), `cascade` (four devices on an MMWCAS-DSP-EVM), `infineon` (folders of the Radar SDK and of ifxdaq), `arrays` (arrays of any
+//! order of axes, in any file of `container` or as words alone).
 
 mod arrays;
 pub mod boards;
+mod cascade;
+mod cascade_index;
+mod coloradar;
 mod container;
 mod cube;
 mod dca1000;
@@ -18,6 +22,7 @@ mod schedule;
 mod stream;
 mod ti_cfg;
 mod ti_json;
+mod words;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -73,20 +78,28 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         message: "nothing to import".into(),
         hint: Some("name the capture: adc_data.bin, a folder of the Infineon SDK, or an array".into()),
     })?;
+    let is_laid_out = stated.layout.is_some() || stated.preset.is_some();
     if first.is_dir() {
-        return infineon::open(one(sources)?, stated);
+        let folder = one(sources)?;
+        return match () {
+            () if cascade::is_folder(folder) => cascade::open(sources, stated),
+            () if is_laid_out => arrays::open(sources, stated),
+            () => infineon::open(folder, stated),
+        };
     }
     let extension = first.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
+        Some("bin") if cascade::is_part(first) => cascade::open(sources, stated),
+        Some("bin") if is_laid_out => arrays::open(sources, stated),
         Some("bin") => dca1000::open(sources, stated),
         Some("json") => dca1000::open_setup(one(sources)?, stated),
         Some("npy") if infineon::is_samples(first) => infineon::open(first.parent().unwrap_or(Path::new("")), stated),
-        Some(kind) if container::EXTENSIONS.contains(&kind) => arrays::open(one(sources)?, stated),
+        Some(kind) if container::EXTENSIONS.contains(&kind) => arrays::open(sources, stated),
         other => Err(Error::Usage {
             message: format!("{}: a capture of type `{}`", first.display(), other.unwrap_or("none")),
             hint: Some(
-                "known are .bin or .setup.json (DCA1000), folders with radar.npy and config.json (Infineon), and .npy, .npz, .mat or .h5 \
-                 with --layout"
+                "known are .bin or .setup.json (DCA1000), folders with master_0000_data.bin and so on (cascades) or with radar.npy and \
+                 config.json (Infineon), and .npy, .npz, .mat, .h5 or .bin with --layout or --preset"
                     .into(),
             ),
         }),
@@ -160,6 +173,7 @@ pub fn draft(
         progress(frame, capture.radar.frames);
         (capture.frame)(frame)
     })?;
+    progress(capture.radar.frames, capture.radar.frames);
     staged.recording.notes.splice(0..0, capture.notes);
     let findings = integrity::inspect(&staged.recording, staged.recording.radar.frames)?;
     Ok(Draft { source: capture.source, staged, findings })
@@ -183,7 +197,7 @@ fn one(sources: &[PathBuf]) -> Result<&Path> {
         [source] => Ok(source),
         _ => Err(Error::Usage {
             message: format!("{} sources, expected one", sources.len()),
-            hint: Some("only the files of one DCA1000 capture are joined; import others one by one".into()),
+            hint: Some("only the files of one capture, or the frames of one array, are joined; import others one by one".into()),
         }),
     }
 }

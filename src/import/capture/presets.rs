@@ -18,6 +18,14 @@ pub struct Preset {
     /// Where it says so.
     pub page: String,
     layout: String,
+    /// Which of a file's arrays.
+    pub variable: Option<String>,
+    /// Of words alone: every file is one frame.
+    #[serde(default)]
+    pub frame_files: bool,
+    /// What is to be known besides.
+    #[serde(default)]
+    pub notes: Vec<String>,
     pub board: Option<String>,
     /// Which of the board's transmitters send, in firing order; all where it is absent.
     pub transmitters: Option<Vec<usize>>,
@@ -49,8 +57,14 @@ impl Preset {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+    use std::path::{Path, PathBuf};
+
+    use super::super::layout::Axis;
+    use super::super::{Stated, boards::Board, open};
     use super::*;
-    use crate::import::capture::boards::Board;
+    use crate::data::IfLayout;
+    use crate::data::arrays::{Member, Values, write_npy, write_npz};
 
     #[test]
     fn every_preset_can_be_used_and_says_where_it_comes_from() {
@@ -59,9 +73,177 @@ mod tests {
             assert!(preset.page.starts_with("https://"), "{name}");
             let board = preset.board.as_deref().map(|board| Board::named(board).unwrap());
             for tx in preset.transmitters.iter().flatten() {
-                assert!(board.and_then(|board| board.tx_m(*tx)).is_some(), "{name}");
+                assert!(board.is_none_or(|board| board.tx_m(*tx).is_some()), "{name}");
             }
         }
         assert!(Preset::named("nothing").unwrap_err().hint().unwrap().contains("uw_raw_adc"));
+    }
+
+    const LOOPS: usize = 3;
+    const SAMPLES: usize = 8;
+    const FRAMES: usize = 2;
+
+    /// What a page leaves open, and fewer loops and samples than it states.
+    fn sets(preset: &Preset, tx: usize, rx: usize) -> Vec<String> {
+        let row = |count: usize| (0..count).map(|at| format!("[{at}e-3, 0.0, 0.0]")).collect::<Vec<_>>().join(", ");
+        let missing = [
+            ("start_frequency_hz", "77e9".to_string()),
+            ("slope_hz_per_s", "60e12".into()),
+            ("sample_rate_hz", "4e6".into()),
+            ("chirp_period_s", "60e-6".into()),
+            ("frame_period_s", "0.1".into()),
+            ("tx_m", format!("[{}]", row(tx))),
+            ("rx_m", format!("[{}]", row(rx))),
+        ];
+        let has = |key: &str| preset.radar.contains_key(key) || preset.board.is_some() && key.ends_with("x_m");
+        let mut sets: Vec<String> =
+            missing.iter().filter(|(key, _)| !has(key)).map(|(key, value)| format!("radar.{key}={value}")).collect();
+        sets.push(format!("radar.loops_per_frame={LOOPS}"));
+        sets.push(format!("radar.samples_per_chirp={SAMPLES}"));
+        sets
+    }
+
+    /// The place of a sample's I or Q, told by its number.
+    fn number(place: [usize; 6], of: [usize; 6]) -> f32 {
+        place.iter().zip(of).fold(0, |number, (at, length)| number * length + at) as f32
+    }
+
+    /// Files of a preset's layout, in the types that its data set has; where several are the frames, one for each.
+    fn files(folder: &Path, preset: &Preset, dims: [usize; 4]) -> (Vec<PathBuf>, [usize; 6]) {
+        let layout = preset.layout().unwrap();
+        let [tx, rx, loops, samples] = dims;
+        let of = [FRAMES, tx, rx, loops, samples, 2];
+        let is_words = preset.frame_files || layout.place(Axis::Lane).is_some();
+        let in_pairs = layout.place(Axis::Iq).is_some();
+        let length = |axis: &Axis| match axis {
+            Axis::Frame => FRAMES,
+            Axis::Tx => tx,
+            Axis::Rx => rx,
+            Axis::Loop => loops,
+            Axis::Chirp => loops * tx,
+            Axis::Antenna => tx * rx,
+            Axis::Sample => samples / if layout.place(Axis::Lane).is_some() { 2 } else { 1 },
+            Axis::Lane | Axis::Iq => 2,
+        };
+        let shape: Vec<usize> = layout.0.iter().map(length).collect();
+        let place = |mut rank: usize, file: usize| {
+            let mut at = [file, 0, 0, 0, 0, 0];
+            for (axis, &length) in layout.0.iter().zip(&shape).rev() {
+                let index = rank % length;
+                rank /= length;
+                match axis {
+                    Axis::Frame => at[0] = index,
+                    Axis::Tx => at[1] = index,
+                    Axis::Rx => at[2] = index,
+                    Axis::Loop => at[3] = index,
+                    Axis::Chirp => (at[1], at[3]) = (index % tx, index / tx),
+                    Axis::Antenna => (at[1], at[2]) = (index / rx, index % rx),
+                    Axis::Sample => at[4] += index * length_of_group(&layout),
+                    Axis::Lane => at[4] += index,
+                    Axis::Iq => at[5] = index,
+                }
+            }
+            at
+        };
+        let count: usize = shape.iter().product();
+        let several = if layout.place(Axis::Frame).is_some() { 1 } else { FRAMES };
+        let values = |file: usize, part: usize| -> Vec<f32> {
+            (0..count)
+                .map(|rank| place(rank, file))
+                .map(|mut at| {
+                    at[5] += part;
+                    number(at, of)
+                })
+                .collect()
+        };
+        let mut written = vec![];
+        for file in 0..several {
+            let all = values(file, 0);
+            if is_words {
+                let bytes: Vec<u8> = all.iter().flat_map(|value| (*value as i16).to_le_bytes()).collect();
+                let pieces = if preset.frame_files { FRAMES } else { 1 };
+                for (piece, bytes) in bytes.chunks(bytes.len() / pieces).enumerate() {
+                    let path = folder.join(format!("frame_{}.bin", 9 + piece));
+                    fs::write(&path, bytes).unwrap();
+                    written.push(path);
+                }
+                continue;
+            }
+            let path = folder.join(format!("frame_{}.npy", 9 + file));
+            if in_pairs {
+                write_npy(&path, &shape, Values::F32(&all)).unwrap();
+            } else {
+                let pairs: Vec<_> =
+                    all.iter().zip(values(file, 1)).map(|(&re, im)| num_complex::Complex32::new(re, im)).collect();
+                let values = Values::Complex64(&pairs);
+                if let Some(variable) = &preset.variable {
+                    let path = path.with_extension("npz");
+                    write_npz(&path, &[Member { name: variable, shape: shape.clone(), values }]).unwrap();
+                    written.push(path);
+                    continue;
+                }
+                write_npy(&path, &shape, values).unwrap();
+            }
+            written.push(path);
+        }
+        (written, of)
+    }
+
+    fn length_of_group(layout: &Layout) -> usize {
+        if layout.place(Axis::Lane).is_some() { 2 } else { 1 }
+    }
+
+    #[test]
+    fn a_small_file_of_every_layout_comes_back_sample_by_sample() {
+        for (name, preset) in Preset::all() {
+            let folder = tempfile::tempdir().unwrap();
+            let board = preset.board.as_deref().map(|board| Board::named(board).unwrap());
+            let rx = board.map_or(4, |board| board.rx_half_wavelengths.len());
+            let tx =
+                preset.transmitters.as_ref().map(Vec::len).or(board.map(|board| board.tx_half_wavelengths.len())).unwrap_or(2);
+            let (files, of) = files(folder.path(), &preset, [tx, rx, LOOPS, SAMPLES]);
+            let stated = Stated { sets: sets(&preset, tx, rx), preset: Some(preset.clone()), ..Stated::default() };
+            // Several files by their folder, too.
+            let sources = if files.len() > 1 { vec![folder.path().to_path_buf()] } else { files };
+            let mut capture = open(&sources, &stated).unwrap_or_else(|error| panic!("{name}: {error} {:?}", error.hint()));
+            assert_eq!(capture.radar.dims(), [FRAMES, tx, rx, LOOPS, SAMPLES], "{name}");
+            capture.radar.check("radar").unwrap();
+            for (key, value) in
+                preset.radar.iter().filter(|(key, _)| !["loops_per_frame", "samples_per_chirp"].contains(&key.as_str()))
+            {
+                let table = toml::Table::try_from(&capture.radar).unwrap();
+                assert_eq!(table[key].as_float(), value.as_float(), "{name}: {key}");
+            }
+            let is_words = capture.layout == IfLayout::Codes;
+            assert_eq!(is_words, preset.frame_files || preset.layout.contains("lane"), "{name}");
+            for frame in 0..FRAMES {
+                let found = (capture.frame)(frame).unwrap();
+                for rank in 0..tx * rx * LOOPS * SAMPLES {
+                    let (rest, sample) = (rank / SAMPLES, rank % SAMPLES);
+                    let (rest, index) = (rest / LOOPS, rest % LOOPS);
+                    let place = [frame, rest / rx, rest % rx, index, sample];
+                    let value = found.sample(place[1], place[2], index, sample);
+                    let wanted = [0, 1].map(|part| {
+                        let [a, b, c, d, e] = place;
+                        let wanted = number([a, b, c, d, e, part], of);
+                        if is_words { f32::from(wanted as i16) } else { wanted }
+                    });
+                    assert_eq!([value.re, value.im], wanted, "{name}: {place:?}");
+                }
+            }
+            assert!(capture.notes.iter().any(|note| note.contains(&preset.page)), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_frame_of_another_length_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let preset = Preset::named("coloradar_single_chip").unwrap();
+        let (files, _) = files(folder.path(), &preset, [3, 4, LOOPS, SAMPLES]);
+        let whole = fs::read(&files[1]).unwrap();
+        fs::write(&files[1], &whole[..whole.len() - 2]).unwrap();
+        let stated = Stated { sets: sets(&preset, 3, 4), preset: Some(preset), ..Stated::default() };
+        let error = open(&[folder.path().into()], &stated).err().unwrap();
+        assert!(error.to_string().contains("frame_10.bin") && error.to_string().contains("one frame"), "{error}");
     }
 }

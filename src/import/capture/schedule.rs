@@ -50,6 +50,8 @@ pub struct TiRadar {
     /// `None`: until it is stopped.
     pub frames: Option<usize>,
     pub rx_mask: usize,
+    /// Devices that share the receivers and write a stream of words each.
+    pub devices: usize,
     pub lanes: Lanes,
     pub notes: Vec<String>,
 }
@@ -76,31 +78,34 @@ impl TiRadar {
         (0..16).filter(|rx| self.rx_mask >> rx & 1 == 1).collect()
     }
 
-    /// Words of one whole frame, all profiles and subframes.
-    fn words_per_frame(&self) -> Result<u64> {
-        let n_rx = self.receivers().len();
+    /// Words of one chirp in a stream.
+    fn words_per_chirp(&self, samples: usize) -> usize {
+        self.lanes.words_per_chirp(self.receivers().len() / self.devices, samples)
+    }
+
+    /// Words of one whole frame in a stream, all profiles and subframes.
+    pub fn words_per_frame(&self) -> Result<u64> {
         let mut words = 0;
         for burst in &self.bursts {
             for chirp in &burst.chirps {
-                words += (burst.loops * self.lanes.words_per_chirp(n_rx, self.profile(chirp.profile)?.samples)) as u64;
+                words += (burst.loops * self.words_per_chirp(self.profile(chirp.profile)?.samples)) as u64;
             }
         }
         Ok(words)
     }
 
-    /// Chooses the chirps that make a recording.
+    /// Chooses the chirps that make a recording. `present` says how many whole frames of so many words there are.
     ///
     /// # Errors
     /// Several subframes or profiles and none chosen; chirps at uneven steps; a transmitter that never sends.
-    pub fn select(&self, stated: &Stated, words: &Words) -> Result<Selection> {
+    pub fn select(&self, stated: &Stated, present: &dyn Fn(u64, &mut Vec<String>) -> Result<usize>) -> Result<Selection> {
         let burst_index = self.chosen_burst(stated)?;
         let burst = &self.bursts[burst_index];
         let profile = self.profile(self.chosen_profile(burst, stated)?)?;
-        let n_rx = self.receivers().len();
         let mut before = 0;
         for burst in &self.bursts[..burst_index] {
             for chirp in &burst.chirps {
-                before += burst.loops * self.lanes.words_per_chirp(n_rx, self.profile(chirp.profile)?.samples);
+                before += burst.loops * self.words_per_chirp(self.profile(chirp.profile)?.samples);
             }
         }
         // (start in time, start in words, transmitters) of the chirps that are kept, and the loop's length.
@@ -112,7 +117,7 @@ impl TiRadar {
                 kept.push((time_s, offset, chirp.tx_mask));
             }
             time_s += shape.idle_s + chirp.extra_idle_s + shape.ramp_end_s;
-            offset += self.lanes.words_per_chirp(n_rx, shape.samples);
+            offset += self.words_per_chirp(shape.samples);
         }
         if kept.is_empty() {
             let found = format!("none of the {} chirps of a loop", burst.chirps.len());
@@ -133,7 +138,8 @@ impl TiRadar {
             .collect::<Vec<Vec<u64>>>();
         let words_per_frame = self.words_per_frame()?;
         let mut notes = self.notes.clone();
-        let frames = self.frames_present(words, words_per_frame, &mut notes)?;
+        let frames = present(words_per_frame, &mut notes)?;
+        self.hold_against_ordered(frames, &mut notes);
         let (tx_m, rx_m, inverted_rx) = self.antennas(&masks[..period], stated, profile, &mut notes)?;
         let radar = Radar {
             start_frequency_hz: profile.start_frequency_hz,
@@ -203,8 +209,8 @@ impl TiRadar {
         .with_hint("import each transmitter by itself with --tx 0, --tx 1, …: the chirps of one are evenly spaced"))
     }
 
-    /// Whole frames in the files, which may be fewer than were ordered.
-    fn frames_present(&self, words: &Words, words_per_frame: u64, notes: &mut Vec<String>) -> Result<usize> {
+    /// Whole frames in the files of one stream, which may be fewer than were ordered.
+    pub fn frames_present(&self, words: &Words, words_per_frame: u64, notes: &mut Vec<String>) -> Result<usize> {
         let (frames, rest) = (words.len() / words_per_frame, words.len() % words_per_frame);
         if frames == 0 {
             let found = format!("{} bytes", 2 * words.len());
@@ -220,18 +226,16 @@ impl TiRadar {
                 2 * words_per_frame
             ));
         }
+        Ok(frames as usize)
+    }
+
+    fn hold_against_ordered(&self, frames: usize, notes: &mut Vec<String>) {
         match self.frames {
-            Some(ordered) if (ordered as u64) > frames => {
-                notes.push(format!("{ordered} frames were ordered, {frames} are there"));
-            }
-            Some(ordered) if (ordered as u64) < frames => {
-                notes.push(format!(
-                    "{ordered} frames were ordered, {frames} fit into the files: is the description this capture's?"
-                ));
-            }
+            Some(ordered) if ordered > frames => notes.push(format!("{ordered} frames were ordered, {frames} are there")),
+            Some(ordered) if ordered < frames => notes
+                .push(format!("{ordered} frames were ordered, {frames} fit into the files: is the description this capture's?")),
             _ => {}
         }
-        Ok(frames as usize)
     }
 
     /// Positions of the transmitters in firing order and of the receivers that are on.

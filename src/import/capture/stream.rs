@@ -30,8 +30,18 @@ impl Words {
         Ok(Self { files: files.collect::<Result<_>>()? })
     }
 
+    /// The first so many words of each file.
+    pub fn of(files: Vec<(PathBuf, u64)>) -> Self {
+        Self { files }
+    }
+
     pub fn first(&self) -> &Path {
         &self.files[0].0
+    }
+
+    /// Every file and its words.
+    pub fn lengths(&self) -> impl Iterator<Item = (&Path, u64)> {
+        self.files.iter().map(|(path, words)| (path.as_path(), *words))
     }
 
     /// Words in all files together.

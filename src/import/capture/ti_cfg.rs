@@ -92,6 +92,7 @@ pub fn read_radar(file: &Path) -> Result<TiRadar> {
         frame_period_s,
         frames,
         rx_mask: last("channelCfg")?.count_at(0)?,
+        devices: 1,
         lanes,
         notes,
     })

@@ -8,6 +8,12 @@ use super::json::Json;
 use super::lanes::Lanes;
 use super::schedule::{Burst, Chirp, Profile, TiRadar, check_ramp, sampling_of};
 use crate::error::{Error, Result};
+use crate::radar::Sampling;
+
+/// Devices of a cascade, and transmitters and receivers of each.
+pub const CASCADED: usize = 4;
+const TRANSMITTERS: usize = 3;
+pub const RECEIVERS: usize = 4;
 
 /// What `.setup.json` adds: the device, and which files hold the samples.
 #[derive(Debug, Default)]
@@ -42,7 +48,7 @@ pub fn read_radar(path: &Path) -> Result<TiRadar> {
     let [device] = &devices[..] else {
         let found = format!("{} devices", devices.len());
         return Err(Error::field(path, "mmWaveDevices", found, "one device")
-            .with_hint("cascades of several devices are not read yet; convert to .npy and import with --layout"));
+            .with_hint("the files of a cascade are master_0000_data.bin, slave1_0000_data.bin, …: name their folder"));
     };
     let rf = device.get("rfConfig")?;
     let profiles = profiles(&rf)?;
@@ -51,7 +57,92 @@ pub fn read_radar(path: &Path) -> Result<TiRadar> {
     let lanes = lanes(&rf, &raw)?;
     let rx_mask = rf.get("rlChanCfg_t")?.get("rxChannelEn")?.count()?;
     let notes = profiles.iter().filter_map(|profile| check_ramp(path, profile)).collect();
-    Ok(TiRadar { file: path.into(), profiles, bursts, frame_period_s, frames, rx_mask, lanes, notes })
+    Ok(TiRadar { file: path.into(), profiles, bursts, frame_period_s, frames, rx_mask, devices: 1, lanes, notes })
+}
+
+/// Reads the radar of a cascade: transmitters and receivers are numbered through the devices, master first.
+///
+/// # Errors
+/// As [`read_radar`]; another number of devices, or devices that do not sample alike.
+pub fn read_cascade(path: &Path) -> Result<TiRadar> {
+    let json = Json::read(path)?;
+    let listed = json.get("mmWaveDevices")?;
+    let mut devices = listed.items()?;
+    if devices.len() != CASCADED {
+        let found = format!("{} devices", devices.len());
+        return Err(Error::field(path, "mmWaveDevices", found, format!("{CASCADED}: master, slave 1, slave 2 and slave 3"))
+            .with_hint("the description belongs to another capture"));
+    }
+    let number = |device: &Json| device.find("mmWaveDeviceId").map(|id| id.count()).transpose();
+    let numbers = devices.iter().map(number).collect::<Result<Vec<_>>>()?;
+    if numbers.iter().any(Option::is_some) {
+        let mut order: Vec<usize> = (0..CASCADED).collect();
+        order.sort_by_key(|&at| numbers[at]);
+        if order.iter().enumerate().any(|(id, &at)| numbers[at] != Some(id)) {
+            return Err(listed.wrong("mmWaveDeviceId 0, 1, 2 and 3, each once"));
+        }
+        devices = order.into_iter().map(|at| devices[at].clone()).collect();
+    }
+    let mut whole: Option<TiRadar> = None;
+    for (id, device) in devices.iter().enumerate() {
+        let own = of_cascade(path, device, id)?;
+        match &mut whole {
+            None => whole = Some(own),
+            Some(whole) => joined(whole, &own, &device.get("rfConfig")?, id)?,
+        }
+    }
+    let mut whole = whole.expect("there are four");
+    whole.rx_mask = (1 << (RECEIVERS * CASCADED)) - 1;
+    Ok(whole)
+}
+
+/// One device of a cascade, its transmitters numbered after those of the devices before it.
+fn of_cascade(path: &Path, device: &Json, id: usize) -> Result<TiRadar> {
+    let rf = device.get("rfConfig")?;
+    let profiles = profiles(&rf)?;
+    let (mut bursts, frame_period_s, frames) = frame(&rf)?;
+    for chirp in bursts.iter_mut().flat_map(|burst| &mut burst.chirps) {
+        chirp.tx_mask <<= TRANSMITTERS * id;
+    }
+    let rx = rf.get("rlChanCfg_t")?.get("rxChannelEn")?;
+    if rx.count()? != (1 << RECEIVERS) - 1 {
+        return Err(rx.wrong("0xF: all four receivers of every device"));
+    }
+    let format = rf.get("rlAdcOutCfg_t")?.get("fmt")?;
+    if format.get("b2AdcBits")?.count()? != 2 {
+        return Err(format.get("b2AdcBits")?.wrong("2 (16 bits): samples of 12 and 14 bits are not read"));
+    }
+    if sampling_of(format.get("b2AdcOutFmt")?.count()?) != Some(Sampling::Complex) {
+        return Err(format.get("b2AdcOutFmt")?.wrong("1 or 2 (complex), as cascades are captured"));
+    }
+    let swap = device.find("rawDataCaptureConfig").and_then(|raw| raw.find("rlDevDataFmtCfg_t")?.find("iqSwapSel"));
+    let q_first = swap.map(|swap| swap.count()).transpose()? == Some(1);
+    // Every sample of the four receivers in turn.
+    let lanes = Lanes { count: RECEIVERS, interleaved: true, q_first, sampling: Sampling::Complex };
+    let notes = profiles.iter().filter_map(|profile| check_ramp(path, profile)).collect();
+    let (file, rx_mask) = (path.into(), 0);
+    Ok(TiRadar { file, profiles, bursts, frame_period_s, frames, rx_mask, devices: CASCADED, lanes, notes })
+}
+
+/// Adds a device's transmitters; all else must be as it is.
+fn joined(whole: &mut TiRadar, own: &TiRadar, at: &Json, id: usize) -> Result<()> {
+    let timing = |radar: &TiRadar| {
+        let chirps = |burst: &Burst| burst.chirps.iter().map(|chirp| (chirp.profile, chirp.extra_idle_s)).collect::<Vec<_>>();
+        radar.bursts.iter().map(|burst| (burst.loops, chirps(burst))).collect::<Vec<_>>()
+    };
+    let differ = [
+        ("rlProfiles", whole.profiles != own.profiles),
+        ("rlChirps", timing(whole) != timing(own)),
+        ("rlFrameCfg_t", whole.frame_period_s != own.frame_period_s),
+        ("iqSwapSel", whole.lanes != own.lanes),
+    ];
+    if let Some((what, _)) = differ.iter().find(|(_, differs)| *differs) {
+        let found = format!("another one in device {id} than in device 0");
+        return Err(Error::field(at.file(), *what, found, "devices that sample alike, but for their transmitters"));
+    }
+    let others = own.bursts.iter().flat_map(|burst| &burst.chirps);
+    whole.bursts.iter_mut().flat_map(|burst| &mut burst.chirps).zip(others).for_each(|(all, own)| all.tx_mask |= own.tx_mask);
+    Ok(())
 }
 
 fn profiles(rf: &Json) -> Result<Vec<Profile>> {

@@ -110,6 +110,15 @@ impl Hdf5 {
 }
 
 fn damaged(path: &Path, field: &str, error: &Hdf5Error) -> Error {
+    if let Hdf5Error::UnsupportedFilter(filter) = error {
+        return Error::field(
+            path,
+            field,
+            format!("compressed otherwise ({filter})"),
+            "deflate, shuffle, scale-offset or Fletcher32",
+        )
+        .with_hint("write it with one of these: h5repack -f GZIP=4 FILE NEW");
+    }
     Error::field(path, field, format!("damaged or cut off ({error})"), "HDF5 that can be read")
         .with_hint("copy or download the file again")
 }

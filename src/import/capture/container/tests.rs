@@ -46,6 +46,29 @@ fn every_container_gives_the_same_numbers() {
     assert_eq!(pairs.numbers(Some(0), 1).unwrap().0[..4], [88.0, -42.0, 91.0, -44.0]);
 }
 
+/// What h5py writes as its latest and as its earliest format: chunks by every kind of index, filters, byte orders.
+#[test]
+fn every_way_of_hdf5_gives_the_same_numbers() {
+    for name in ["latest.h5", "earliest.h5"] {
+        for variable in [
+            "one_chunk",
+            "fixed",
+            "unfiltered",
+            "growing",
+            "growing_twice",
+            "checked",
+            "double",
+            "big_endian",
+            "scaled/re,scaled/im",
+            "swapped/re,swapped/im",
+        ] {
+            assert_cube(open(&golden(name), Some(variable), 4), &format!("{name}, {variable}"));
+        }
+        let other = open(&golden(name), Some("lzf"), 4).err().unwrap();
+        assert!(other.to_string().contains("compressed otherwise") && other.hint().unwrap().contains("h5repack"), "{other}");
+    }
+}
+
 #[test]
 fn an_array_that_is_not_there_or_not_alone_is_said_so() {
     let error = |name: &str, variable: Option<&str>, axes| open(&golden(name), variable, axes).err().unwrap();
@@ -72,6 +95,7 @@ fn a_file_that_is_cut_off_anywhere_is_refused() {
         ("v7.mat", "cube"),
         ("v73.mat", "cube"),
         ("h5py.h5", "radar/cube"),
+        ("latest.h5", "growing_twice"),
         ("cube.npz", "cube"),
         ("parts.npz", "real"),
     ] {
@@ -91,9 +115,14 @@ fn a_file_that_is_cut_off_anywhere_is_refused() {
 #[test]
 fn a_file_that_is_damaged_anywhere_does_not_panic() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, variable) in
-        [("v6.mat", "cube"), ("v7.mat", "cube"), ("v73.mat", "cube"), ("h5py.h5", "radar/cube"), ("cube.npz", "cube")]
-    {
+    for (name, variable) in [
+        ("v6.mat", "cube"),
+        ("v7.mat", "cube"),
+        ("v73.mat", "cube"),
+        ("h5py.h5", "radar/cube"),
+        ("latest.h5", "fixed"),
+        ("cube.npz", "cube"),
+    ] {
         let whole = fs::read(golden(name)).unwrap();
         let path = folder.path().join(name);
         for (place, flip) in (0..whole.len()).step_by(29).zip([0xff, 0x01, 0x80].into_iter().cycle()) {

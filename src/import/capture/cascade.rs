@@ -1,0 +1,206 @@
+//! Captures of four cascaded AWR2243: the MMWCAS-RF-EVM on the MMWCAS-DSP-EVM, as mmWave Studio has them captured.
+//!
+//! Every device has files of its own, `master_0000_data.bin` to `slave3_0000_data.bin`, and `_0001_` and so on where a capture is split.
+//! They hold little-endian 16-bit words: chirp by chirp, sample by sample, I and Q of the device's four receivers in turn. Beside each
+//! lies `_idx.bin`, which says how many frames there are.
+//!
+//! Source: TI, "mmWave Studio Cascade user's guide", section 7.3; TI's MATLAB examples of mmWave Studio for the cascade,
+//! `read_ADC_bin_TDA2_separateFiles.m` (the words), `getBinFileNames_withIdx.m` and `getValidNumFrames.m` (the index, see `cascade_index`).
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use toml::Value;
+
+use super::boards::{Board, CASCADE};
+use super::cascade_index::{Index, hold_together};
+use super::schedule::Selection;
+use super::stream::Words;
+use super::ti_json::{CASCADED, RECEIVERS};
+use super::{Capture, Stated, arrays, dca1000, ti_json};
+use crate::data::entries::entries;
+use crate::data::{IfFrame, IfLayout};
+use crate::error::{Error, Result};
+use crate::radar::Radar;
+
+const DEVICES: [&str; CASCADED] = ["master", "slave1", "slave2", "slave3"];
+const END: &str = "_data.bin";
+
+/// Which device's file it is, and which part of the capture; none of what is no such file.
+fn part_of(path: &Path) -> Option<(usize, usize)> {
+    let (device, rest) = path.file_name()?.to_str()?.split_once('_')?;
+    let part = rest.strip_suffix(END).filter(|part| part.len() == 4 && part.bytes().all(|byte| byte.is_ascii_digit()))?;
+    Some((DEVICES.iter().position(|own| *own == device)?, part.parse().ok()?))
+}
+
+/// Whether a file is one of a cascade's.
+pub fn is_part(path: &Path) -> bool {
+    part_of(path).is_some()
+}
+
+/// Whether a folder holds such files.
+pub fn is_folder(folder: &Path) -> bool {
+    entries(folder).is_ok_and(|files| files.iter().any(|file| is_part(file)))
+}
+
+/// Understands a cascade's capture: its folder, one of its files, or all of them.
+///
+/// # Errors
+/// A device or a part that is missing; devices of which one has another number of frames; an index that is not that of its file.
+pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
+    let parts = parts(sources)?;
+    let mut notes = Vec::new();
+    let (configs, _) = dca1000::descriptions(&parts[0][0], stated, &mut notes)?;
+    let mut stated = stated.clone();
+    if stated.board.is_none() {
+        notes.push("no board was named: a cascade of four devices is taken for the MMWCAS-RF-EVM".into());
+        stated.board = Some(CASCADE.into());
+    }
+    let config = &configs[0];
+    if config.extension().is_some_and(|extension| extension == "toml") {
+        let mut radar = radar_of(config, &stated, &mut notes)?;
+        let words_per_frame = (radar.samples_per_chirp * radar.tx_m.len() * radar.loops_per_frame * RECEIVERS * 2) as u64;
+        let (frames, streams) = streams(&parts, words_per_frame, config, &mut notes)?;
+        radar.frames = frames;
+        let chirp = (radar.samples_per_chirp * RECEIVERS * 2) as u64;
+        let senders = radar.tx_m.len() as u64;
+        let start = |index: u64| (0..senders).map(|tx| (index * senders + tx) * chirp).collect();
+        let starts = (0..radar.loops_per_frame as u64).map(start).collect();
+        return Ok(capture(parts, streams, radar, words_per_frame, starts, false, notes));
+    }
+    let radar = ti_json::read_cascade(config)?;
+    let words_per_frame = radar.words_per_frame()?;
+    let (frames, streams) = streams(&parts, words_per_frame, config, &mut notes)?;
+    let Selection { radar: found, words_per_frame, starts, notes: more, .. } = radar.select(&stated, &|_, _| Ok(frames))?;
+    notes.extend(more);
+    let shaped = dca1000::apply(found, &stated.sets)?;
+    Ok(capture(parts, streams, shaped, words_per_frame, starts, radar.lanes.q_first, notes))
+}
+
+fn capture(
+    parts: Vec<[PathBuf; CASCADED]>,
+    streams: [Words; CASCADED],
+    radar: Radar,
+    words_per_frame: u64,
+    starts: Vec<Vec<u64>>,
+    q_first: bool,
+    notes: Vec<String>,
+) -> Capture {
+    let [_, n_tx, n_rx, loops, samples] = radar.dims();
+    let frame = move |index: usize| {
+        let read = |words: &Words| words.read(index as u64 * words_per_frame, words_per_frame as usize);
+        let blocks = streams.iter().map(read).collect::<Result<Vec<_>>>()?;
+        Ok(arrange(&blocks, &starts, [n_tx, n_rx, loops, samples], q_first))
+    };
+    Capture { source: parts[0][0].clone(), radar, layout: IfLayout::Codes, notes, frame: Box::new(frame) }
+}
+
+/// The words of a frame, device by device, as `[tx, rx, loop, sample]`.
+fn arrange(blocks: &[Vec<i16>], starts: &[Vec<u64>], dims: [usize; 4], q_first: bool) -> IfFrame {
+    let [n_tx, n_rx, loops, samples] = dims;
+    let count = n_tx * n_rx * loops * samples;
+    let (mut re, mut im) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    for tx in 0..n_tx {
+        for rx in 0..n_rx {
+            let words = &blocks[rx / RECEIVERS];
+            for chirp in starts.iter().take(loops).map(|starts| starts[tx] as usize) {
+                for sample in 0..samples {
+                    let place = chirp + 2 * (sample * RECEIVERS + rx % RECEIVERS);
+                    re.push(f32::from(words[place + usize::from(q_first)]));
+                    im.push(f32::from(words[place + usize::from(!q_first)]));
+                }
+            }
+        }
+    }
+    IfFrame::new(dims, re, Some(im))
+}
+
+/// The files of all devices, part by part.
+fn parts(sources: &[PathBuf]) -> Result<Vec<[PathBuf; CASCADED]>> {
+    let listed = match sources {
+        [folder] if folder.is_dir() => entries(folder)?,
+        [file] => entries(file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))?,
+        several => several.to_vec(),
+    };
+    let mut found: BTreeMap<usize, [Option<PathBuf>; CASCADED]> = BTreeMap::new();
+    for file in &listed {
+        match part_of(file) {
+            Some((device, part)) => found.entry(part).or_default()[device] = Some(file.clone()),
+            None if sources.len() > 1 && !file.to_string_lossy().ends_with("_idx.bin") => {
+                return Err(Error::field(file, "name", "another file", "the samples of a cascade, such as slave1_0000_data.bin")
+                    .with_hint("name the folder of the capture"));
+            }
+            None => {}
+        }
+    }
+    let folder = listed.iter().find(|file| is_part(file)).and_then(|file| file.parent()).unwrap_or(Path::new("")).to_path_buf();
+    let last = found.keys().next_back().copied().unwrap_or(0);
+    (0..=last)
+        .map(|part| {
+            let mut devices = found.remove(&part).unwrap_or_default();
+            if let Some(missing) = devices.iter().position(Option::is_none) {
+                let name = format!("{}_{part:04}{END}", DEVICES[missing]);
+                return Err(Error::field(folder.join(name), "samples", "missing", "a file of every device and every part")
+                    .with_hint("copy the whole capture: the virtual array needs all four devices"));
+            }
+            Ok(std::array::from_fn(|device| devices[device].take().expect("none is missing")))
+        })
+        .collect()
+}
+
+/// How many frames there are, and every device's words of them.
+fn streams(
+    parts: &[[PathBuf; CASCADED]],
+    words_per_frame: u64,
+    config: &Path,
+    notes: &mut Vec<String>,
+) -> Result<(usize, [Words; CASCADED])> {
+    let (mut frames, mut streams) = (0, [const { Vec::new() }; CASCADED]);
+    for part in parts {
+        let of_devices = part.iter().map(|data| Index::of(data, 2 * words_per_frame, config, notes));
+        let of_devices = of_devices.collect::<Result<Vec<_>>>()?;
+        hold_together(&of_devices, notes)?;
+        frames += of_devices[0].frames;
+        for (stream, index) in streams.iter_mut().zip(of_devices) {
+            stream.push((index.data, index.frames as u64 * words_per_frame));
+        }
+    }
+    if frames == 0 {
+        let expected = format!("at least {} bytes, one frame of {}", 2 * words_per_frame, config.display());
+        return Err(Error::field(&parts[0][0], "samples", "no whole frame", expected)
+            .with_hint("the description belongs to another capture, or the capture was cut off"));
+    }
+    Ok((frames, streams.map(Words::of)))
+}
+
+/// The radar of a TOML file; antennas that it does not state are the board's, in the firing order of mmWave Studio's script for TDM
+/// (`Cascade_Configuration_MIMO.lua`): transmitter 12 first.
+fn radar_of(config: &Path, stated: &Stated, notes: &mut Vec<String>) -> Result<Radar> {
+    let mut table = arrays::table_of(Some(config), &stated.sets)?;
+    let radar = arrays::radar_table(&mut table)?;
+    let board = Board::named(stated.board.as_deref().unwrap_or(CASCADE))?;
+    notes.push(format!("antennas of the {} ({})", board.name, board.source));
+    let rx = (0..RECEIVERS * CASCADED).map_while(|rx| board.rx_m(rx)).collect();
+    radar.entry("rx_m").or_insert_with(|| arrays::rows(rx));
+    if !radar.contains_key("tx_m") {
+        notes.push(
+            "radar.tx_m is not stated: transmitters fire from the board's last to its first, as mmWave Studio's script has it"
+                .into(),
+        );
+        let tx = (0..board.tx_half_wavelengths.len()).rev().filter_map(|tx| board.tx_m(tx)).collect();
+        radar.insert("tx_m".into(), arrays::rows(tx));
+    }
+    radar.insert("frames".into(), Value::Integer(1));
+    if !radar.contains_key("full_scale_codes") {
+        radar.insert("full_scale_codes".into(), Value::Float(f64::from(i16::MAX)));
+    }
+    let radar = arrays::finished(table, config, notes)?;
+    if radar.rx_m.len() != RECEIVERS * CASCADED {
+        return Err(Error::setting("radar.rx_m", format!("{} receivers", radar.rx_m.len()), "16, four a device"));
+    }
+    Ok(radar)
+}
+
+#[cfg(test)]
+#[path = "cascade_tests.rs"]
+mod tests;

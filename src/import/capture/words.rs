@@ -1,0 +1,102 @@
+//! Files of nothing but little-endian 16-bit words, whose axes and lengths are stated.
+
+use std::path::PathBuf;
+
+use super::layout::{Axis, Layout};
+use super::stream::Words;
+use crate::error::{Error, Result};
+
+/// Lanes of a layout with an axis `lane`: two, as boards with one receiver after the other have (SWRA581B).
+const LANES: usize = 2;
+
+/// Lengths that are stated.
+#[derive(Clone, Copy, Debug)]
+pub struct Lengths {
+    pub tx: usize,
+    pub rx: usize,
+    pub loops: usize,
+    pub samples: usize,
+}
+
+/// Words as an array, frames outermost.
+pub struct WordArray {
+    pub words: Words,
+    pub shape: Vec<usize>,
+    /// Words of one frame.
+    block: u64,
+}
+
+impl WordArray {
+    /// The files end to end. `frame_files`: every file is one frame.
+    ///
+    /// # Errors
+    /// Frames that are not outermost; less than a frame; where files are frames, one of another length.
+    pub fn open(
+        files: &[PathBuf],
+        layout: &Layout,
+        lengths: Lengths,
+        frame_files: bool,
+        notes: &mut Vec<String>,
+    ) -> Result<Self> {
+        let refuse = |message: &str| Error::Usage {
+            message: format!("--layout \"{}\": {message}", layout.describe()),
+            hint: Some(
+                "files of words alone are read frame by frame: write `frame` first, such as \"frame loop tx rx sample iq\""
+                    .into(),
+            ),
+        };
+        if layout.place(Axis::Frame).is_some_and(|place| place > 0) {
+            return Err(refuse("frames are not outermost"));
+        }
+        let Lengths { tx, rx, loops, samples } = lengths;
+        let lanes = if layout.place(Axis::Lane).is_some() { LANES } else { 1 };
+        if !samples.is_multiple_of(lanes) {
+            return Err(Error::setting(
+                "radar.samples_per_chirp",
+                samples,
+                format!("a multiple of {lanes}: one sample for each lane"),
+            ));
+        }
+        let length = |axis: &Axis| match axis {
+            Axis::Frame => 1,
+            Axis::Tx => tx,
+            Axis::Rx => rx,
+            Axis::Loop => loops,
+            Axis::Chirp => loops * tx,
+            Axis::Antenna => tx * rx,
+            Axis::Sample => samples / lanes,
+            Axis::Lane => lanes,
+            Axis::Iq => 2,
+        };
+        let mut shape: Vec<usize> = layout.0.iter().map(length).collect();
+        let block = shape.iter().try_fold(1u64, |all, &length| all.checked_mul(length as u64)).unwrap_or(u64::MAX).max(1);
+        let words = Words::open(files)?;
+        if let Some((file, own)) = words.lengths().find(|(_, own)| frame_files && *own != block) {
+            return Err(Error::field(file, "samples", format!("{} bytes", 2 * own), format!("{} bytes, one frame", 2 * block))
+                .with_hint("the radar's settings belong to another capture, or the file is cut off"));
+        }
+        let (frames, rest) = (words.len() / block, words.len() % block);
+        if frames == 0 || layout.place(Axis::Frame).is_none() && words.len() != block {
+            let expected = format!("{} bytes, one frame of {shape:?} words", block.saturating_mul(2));
+            return Err(Error::field(words.first(), "samples", format!("{} bytes", 2 * words.len()), expected)
+                .with_hint("the radar's settings or --layout belong to another capture, or the file is cut off"));
+        }
+        if rest > 0 {
+            notes.push(format!(
+                "{} bytes after the last whole frame are left out: {frames} frames of {} bytes each",
+                2 * rest,
+                2 * block
+            ));
+        }
+        if layout.place(Axis::Frame).is_some() {
+            shape[0] = frames as usize;
+        }
+        Ok(Self { words, shape, block })
+    }
+
+    /// The numbers of a frame.
+    pub fn frame(&self, index: usize) -> Result<Vec<f32>> {
+        let words = self.words.read(index as u64 * self.block, self.block as usize)?;
+        Ok(words.into_iter().map(f32::from).collect())
+    }
+}
