@@ -115,7 +115,7 @@ impl Index {
 /// Another number of frames in one of them, or frames that came at other times.
 pub fn hold_together(devices: &[Index], notes: &mut Vec<String>) -> Result<()> {
     let (master, slaves) = devices.split_first().expect("a cascade has a master");
-    for slave in slaves.iter().filter(|slave| slave.frames != master.frames) {
+    if let Some(slave) = slaves.iter().find(|slave| slave.frames != master.frames) {
         let expected = format!("{}, as in {}", master.frames, master.data.display());
         return Err(Error::field(&slave.data, "frames", slave.frames.to_string(), expected).with_hint(
             "a file is cut off or of another capture, or a device lost frames: those after them do not belong together",
