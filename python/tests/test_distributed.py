@@ -24,8 +24,8 @@ from conftest import SITE
 distributed = pytest.importorskip("distributed")
 
 PATIENCE_S = 60.0
-FRAMES = {"record.frames": 20}
-CASES = {"cases": 4}
+FRAMES = {"record.frames": 12}
+CASES = {"cases": 3}
 DIAGNOSIS: dict[str, Any] = {"diagnosis.epochs": 0, "diagnosis.limits": False}
 
 
@@ -128,7 +128,7 @@ def test_without_a_retry_a_death_is_the_end(site_config: Path, tmp_path: Path) -
                 hybridsim.distributed.site(client, site_config, tmp_path / "site", set=FRAMES)
     # What was done is whole.
     for folder in (tmp_path / "site" / "recordings").glob("[!.]*"):
-        assert len(hybridsim.read(folder)) == 20
+        assert len(hybridsim.read(folder)) == 12
 
 
 def test_who_is_taken_for_dead_is_waited_for(site_config: Path, one_machine: Path, tmp_path: Path) -> None:

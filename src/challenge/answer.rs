@@ -23,10 +23,15 @@ use crate::data::unfinished::wait_if_ending;
 use crate::data::{Scratch, Shard, files};
 use crate::error::{Error, Result};
 
+/// In the folder that a case is diagnosed in: its copy, and what is answered. A report names the recording as it was given: not by a
+/// path that is another one each time.
+const COPY: &str = "recording";
+const ANSWER: &str = "answer";
+
 /// How the cases are to be diagnosed.
 #[derive(Clone, Debug)]
 pub struct RunConfig {
-    /// Called as `PROGRAM diagnose CASE --out FOLDER --quiet`, then `arguments`.
+    /// Called as `PROGRAM diagnose CASE --out FOLDER --quiet`, then `arguments`, in a folder of its own that both paths start from.
     pub program: PathBuf,
     /// What is called in its place, where the program is a library: a command that answers by it.
     pub through: Vec<OsString>,
@@ -130,14 +135,14 @@ pub(super) fn answered(folder: &Path) -> bool {
 /// One case in a process of its own; whatever becomes of it is kept in `out`. `meanwhile` is called while it works.
 pub fn diagnose(case: &Path, out: &Path, config: &RunConfig, meanwhile: &mut dyn FnMut()) -> Result<()> {
     let workplace = Scratch::new()?;
-    let (copy, answer) = (workplace.path().join("recording"), workplace.path().join("answer"));
+    let (copy, answer) = (workplace.path().join(COPY), workplace.path().join(ANSWER));
     fs::create_dir(&copy).map_err(|source| Error::write(&copy, source))?;
     for file in entries(case)? {
         files::require(&file)?;
         let name = file.file_name().expect("an entry of a folder");
         fs::copy(&file, copy.join(name)).map_err(|source| Error::read(&file, source))?;
     }
-    let outcome = start(&copy, &answer, workplace.path(), config, meanwhile)
+    let outcome = start(workplace.path(), config, meanwhile)
         .and_then(|()| Report::read(&answer.join("report.json")).map(drop).map_err(|error| format!("bad report: {error}")));
     // What failed because everything is ended has not failed.
     wait_if_ending();
@@ -159,13 +164,7 @@ pub fn diagnose(case: &Path, out: &Path, config: &RunConfig, meanwhile: &mut dyn
 }
 
 /// Runs the program; the reason if it did not do its work.
-fn start(
-    copy: &Path,
-    answer: &Path,
-    workplace: &Path,
-    config: &RunConfig,
-    meanwhile: &mut dyn FnMut(),
-) -> std::result::Result<(), String> {
+fn start(workplace: &Path, config: &RunConfig, meanwhile: &mut dyn FnMut()) -> std::result::Result<(), String> {
     let complaints = workplace.join("stderr");
     let stderr = fs::File::create(&complaints).map_err(|error| error.to_string())?;
     let (called, before) = config.through.split_first().map_or((config.program.as_os_str(), &[][..]), |(one, more)| (one, more));
@@ -173,9 +172,9 @@ fn start(
     command
         .args(before)
         .arg("diagnose")
-        .arg(copy)
+        .arg(COPY)
         .arg("--out")
-        .arg(answer)
+        .arg(ANSWER)
         .arg("--quiet")
         .args(&config.arguments)
         .current_dir(workplace)
