@@ -12,21 +12,20 @@ use super::answer::{Failure, RunConfig, answered, diagnose};
 use super::commitment::{hash_file, read_json};
 use super::config::Scenes;
 use super::report::Report;
-use super::salt::ground::{ground, sigma};
+use super::salt::ground::ground;
 use super::secret::Secret;
 use super::table::{Aim, Row, markdown, share};
 use super::uniformity;
 use crate::bounds;
 use crate::config::Config;
 use crate::data::atomic::write_text;
-use crate::data::{IfLayout, Recording, RecordingContents, Scratch, write_recording};
+use crate::data::{Recording, RecordingContents, Scratch, Shard, write_recording};
 use crate::diagnosis::DiagnosisConfig;
 use crate::diagnosis::calibration::{Calibration, FORMAT, FalseAlarms, Structure, program};
 use crate::diagnosis::statistics::{binomial_interval, uniform_chance};
 use crate::diagnosis::suspects::SUSPECTS;
 use crate::error::{Error, Result};
 use crate::pictures::{Chart, Series};
-use crate::radar::Sampling;
 use crate::recorder::{EffectsConfig, RadarChoice, ReceiverConfig, Recorder, RecorderConfig, Returns, World};
 use crate::room::Room;
 use crate::text::shown;
@@ -47,7 +46,6 @@ pub struct Source {
     room: bool,
     /// From a recording: how far the body's mesh and the skin are from what is handed out differs from null to null.
     drawn: bool,
-    layout: IfLayout,
     pub structure: Structure,
     /// What was taken from where, in words.
     pub notes: Vec<String>,
@@ -72,7 +70,7 @@ impl Source {
         let notes = if null == *record { vec![] } else { vec!["what the config plants was left out".to_string()] };
         let world = null.world(path.parent().unwrap_or(Path::new("")))?;
         let room = !world.room.boundaries().is_empty();
-        Ok(Self { layout: layout(&world), room, drawn: false, structure: structure(&world, room), world, notes })
+        Ok(Self { room, drawn: false, structure: structure(&world, room), world, notes })
     }
 
     fn of_recording(recording: &Recording) -> Result<Self> {
@@ -80,7 +78,8 @@ impl Source {
         let structure = Structure::of(recording)?;
         let mut radar = recording.radar.clone();
         radar.frames = structure.radar.frames;
-        let (ground, noise) = (ground(recording)?, sigma(recording)?);
+        let ground = ground(recording)?;
+        let noise = ground.sigma;
         let room = recording.room.clone().unwrap_or_else(|| unstated(radar.max_range_m()));
         let receiver = ReceiverConfig { adc: recording.holds_codes(), ..ReceiverConfig::default() };
         let mut world = World { radar: radar.clone(), room, person: recording.person().cloned(), receiver, ..World::default() };
@@ -104,7 +103,7 @@ impl Source {
             );
         }
         let (room, drawn) = (recording.room.is_some(), true);
-        Ok(Self { layout: layout(&world), room, drawn, structure, world, notes })
+        Ok(Self { room, drawn, structure, world, notes })
     }
 
     /// The world of one null.
@@ -124,28 +123,19 @@ impl Source {
 
     fn record(&self, secret: &Secret, index: usize, folder: &Path) -> Result<()> {
         let world = self.null(secret, index);
+        let recorder = Recorder::new(&world)?;
         let contents = RecordingContents {
             radar: &world.radar,
             room: self.room.then_some(&world.room),
             person: world.person.as_ref(),
             body_file: None,
             labels: BTreeMap::new(),
-            layout: self.layout,
+            layout: recorder.layout(),
             truth: None,
         };
-        let recorder = Recorder::new(&world)?;
         let mut frames = recorder.frames();
         write_recording(folder, &contents, &mut |_| frames.next().expect("as many frames as the radar has"))?;
         Ok(())
-    }
-}
-
-fn layout(world: &World) -> IfLayout {
-    match (world.receiver.adc, world.radar.sampling) {
-        (true, Sampling::Complex) => IfLayout::Codes,
-        (true, Sampling::Real) => IfLayout::RealCodes,
-        (false, Sampling::Complex) => IfLayout::Complex,
-        (false, Sampling::Real) => IfLayout::Real,
     }
 }
 
@@ -175,14 +165,18 @@ fn folder(out: &Path, index: usize) -> PathBuf {
 }
 
 /// Nulls of a part that have no report yet.
-pub fn waiting(out: &Path, nulls: usize, how: &RunConfig) -> usize {
-    let open = (0..nulls).filter(|&index| how.shard.holds(index) && !answered(&folder(out, index))).count();
-    how.most.map_or(open, |most| open.min(most))
+fn open(out: &Path, nulls: usize, shard: Shard) -> impl Iterator<Item = usize> + '_ {
+    (0..nulls).filter(move |&index| shard.holds(index) && !answered(&folder(out, index)))
 }
 
-/// Nulls that have no report yet, whoever is to do them.
+/// How many of a part are to be done now.
+pub fn waiting(out: &Path, nulls: usize, how: &RunConfig) -> usize {
+    open(out, nulls, how.shard).take(how.most.unwrap_or(usize::MAX)).count()
+}
+
+/// How many have no report yet, whoever is to do them.
 pub fn missing(out: &Path, nulls: usize) -> usize {
-    (0..nulls).filter(|&index| !answered(&folder(out, index))).count()
+    open(out, nulls, Shard::ALL).count()
 }
 
 /// Records and diagnoses the nulls of a part that have no report yet; `progress` hears how many are done.
@@ -202,8 +196,7 @@ pub fn run(
     }
     bounds::count("nulls", nulls, 1_000_000)?;
     settle(source, secret, out, how)?;
-    let open = (0..nulls).filter(|&index| how.shard.holds(index) && !answered(&folder(out, index)));
-    for (done, index) in open.take(how.most.unwrap_or(usize::MAX)).enumerate() {
+    for (done, index) in open(out, nulls, how.shard).take(how.most.unwrap_or(usize::MAX)).enumerate() {
         let workplace = Scratch::new()?;
         let case = workplace.path().join("null");
         source.record(secret, index, &case)?;

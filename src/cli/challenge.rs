@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 use super::{Common, calibrate, interrupt, progress::Shown, salt};
 use crate::{
     challenge::answer::RunConfig,
-    data::{Claim, Shard, atomic, program},
+    data::{Claim, Shard, program},
     error::{Error, Result},
     verbs::{Tell, challenge},
 };
@@ -129,10 +129,9 @@ fn seal(arguments: &Seal, common: &Common) -> Result<()> {
     Ok(())
 }
 
-/// A folder that is filled by this process, or by one for each part.
+/// A folder that is filled by this process, or by one for each part, and what stays when that is interrupted.
 pub(super) fn claimed(folder: &Path, shard: Shard, what: &'static str) -> Result<Claim> {
-    let claim = Claim::part(folder, shard)?;
-    atomic::sweep_all(folder);
+    let claim = challenge::filled(folder, shard)?;
     kept(what);
     Ok(claim)
 }

@@ -46,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let config = SaltConfig { effects: arguments.effects.clone(), grades: arguments.grades, repeats: arguments.repeats };
     let recording = Recording::open(&arguments.recording)?;
     // What cannot be is said before anything is worked out.
-    let (_, plans) = plan::plans(&config, &recording)?;
+    let plans = plan::plans(&config, &recording)?;
     let _claim = claimed(out, how.shard, "copies and answers")?;
     let ground = ground::ground(&recording)?;
     if how.shard.number == 1 {
@@ -56,10 +56,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         let names: Vec<String> = background?.effects.into_iter().map(|effect| effect.id).collect();
         say!("by itself the recording shows {}", if names.is_empty() { "no effect".into() } else { names.join(", ") });
     }
-    let count = plans.iter().filter(|plan| how.shard.holds(plan.index)).count();
+    let count = plans.1.iter().filter(|plan| how.shard.holds(plan.index)).count();
     let progress = Progress::new("salting", count, common.quiet);
     let seed = arguments.seed.as_deref();
-    let sealed = salt::seal(&recording, &ground, &config, seed, out, how.shard, &|done| progress.set(done));
+    let sealed = salt::seal(&recording, &ground, &plans, seed, out, how.shard, &|done| progress.set(done));
     progress.finish();
     say!("committed to {} copies: root {}", count, sealed?.root);
     let progress = Progress::new("diagnosing", salt::waiting(out, &how)?, common.quiet);

@@ -14,6 +14,11 @@ pub enum Of {
     Mover { bin: f64, amplitude: Vec<Complex64> },
 }
 
+/// 1, e^{jφ} and e^{2jφ} of e^{jφ}.
+pub fn powers(turned: Complex64) -> [Complex64; 3] {
+    [Complex64::ONE, turned, turned * turned]
+}
+
 #[derive(Clone, Debug)]
 pub struct Course {
     pub of: Of,

@@ -258,6 +258,9 @@ impl Evidence {
     }
 }
 
+/// Bins to each side that a Hann window's main lobe fills.
+pub const HANN_LOBE: usize = 2;
+
 /// Periodic Hann window of unit energy.
 pub fn hann(length: usize) -> Vec<f64> {
     let window: Vec<f64> = (0..length).map(|i| (std::f64::consts::PI * (i as f64 + 0.5) / length as f64).sin().powi(2)).collect();

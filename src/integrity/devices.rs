@@ -7,12 +7,12 @@
 //! the coherence, in the order of the channels), Bonferroni over the exchanges. Where no exchange makes them less coherent, nothing can be
 //! told.
 
-use num_complex::{Complex32, Complex64};
+use num_complex::Complex64;
 use rustfft::FftPlanner;
 
+use super::still::{Still, transformed};
 use super::stream::{Schedule, Stream};
 use super::tails::student_tail;
-use super::words::{transformed, window_power};
 use super::{ALARM, Finding, Inspector, Kind};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
@@ -38,12 +38,8 @@ pub(super) struct Devices {
     tx_m: Vec<[f64; 3]>,
     rx_m: Vec<[f64; 3]>,
     wavelength_m: f64,
-    /// Sum of all chirps, `[tx, rx, sample]`, and the loop before.
-    sum: Vec<Complex64>,
-    before: Vec<Complex32>,
-    noise: f64,
-    loops: f64,
-    differences: f64,
+    /// None where it is no cascade.
+    still: Option<Still>,
 }
 
 /// Orders of so many things, the given one first.
@@ -63,8 +59,8 @@ impl Devices {
     pub fn new(schedule: Schedule, radar: &Radar) -> Self {
         let (tx_m, rx_m) = (radar.tx_m.clone(), radar.rx_m.clone());
         let wavelength_m = SPEED_OF_LIGHT / radar.carrier_hz();
-        let sum = vec![Complex64::ZERO; if Self::is_cascade(&rx_m) { schedule.period() } else { 0 }];
-        Self { schedule, tx_m, rx_m, wavelength_m, sum, before: vec![], noise: 0.0, loops: 0.0, differences: 0.0 }
+        let still = Self::is_cascade(&rx_m).then(|| Still::new(schedule));
+        Self { schedule, tx_m, rx_m, wavelength_m, still }
     }
 
     fn is_cascade(rx_m: &[[f64; 3]]) -> bool {
@@ -100,12 +96,11 @@ impl Devices {
     }
 
     /// Spectra of the channels in the bins that count, each bin as strong as any other; none where these are too few.
-    fn spectra(&self) -> Option<Vec<Vec<Complex64>>> {
+    fn spectra(&self, still: &Still) -> Option<Vec<Vec<Complex64>>> {
         let samples = self.schedule.samples;
         let fft = FftPlanner::new().plan_fft_forward(samples);
-        let all: Vec<Vec<Complex64>> = self.sum.chunks_exact(samples).map(|chirp| transformed(&*fft, chirp)).collect();
-        // Of a bin, over all channels; a difference of loops has twice the noise.
-        let noise = self.noise / (2.0 * self.differences * samples as f64) * self.loops * window_power(samples);
+        let all: Vec<Vec<Complex64>> = still.sum.chirps().map(|chirp| transformed(&*fft, chirp)).collect();
+        let noise = still.noise_of_bin();
         let power = |bin: usize| all.iter().map(|own| own[bin].norm_sqr()).sum::<f64>();
         let last = if self.schedule.is_real { samples / 2 } else { samples };
         let counting: Vec<(usize, f64)> = (GUARD..last.saturating_sub(GUARD))
@@ -134,30 +129,20 @@ fn mean_coherence(transforms: &[f64]) -> f64 {
 
 impl Inspector for Devices {
     fn see(&mut self, stream: &Stream) {
-        if self.sum.is_empty() {
-            return;
-        }
-        for samples in stream.loops() {
-            self.sum.iter_mut().zip(samples).for_each(|(sum, v)| *sum += Complex64::new(v.re.into(), v.im.into()));
-            let differences = samples.iter().zip(&self.before).map(|(value, before)| f64::from((value - before).norm_sqr()));
-            self.noise += differences.sum::<f64>();
-            self.differences += f64::from(u8::from(!self.before.is_empty()));
-            self.before = samples.to_vec();
-            self.loops += 1.0;
+        if let Some(still) = &mut self.still {
+            still.see(stream);
         }
     }
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
-        if self.sum.is_empty() {
-            return None;
-        }
+        let still = self.still.as_ref()?;
         let orders = orders(self.rx_m.len() / RECEIVERS);
         let stated = self.pairs(&orders[0]);
-        if stated.len() < FEWEST || self.differences == 0.0 {
+        if stated.len() < FEWEST || !still.shows_noise() {
             let why = "too few virtual antennas of two devices have one place, or one chirp shows no noise";
             return Some(Finding::untold(CHECK, EXPECTED, why));
         }
-        let Some(spectra) = self.spectra() else {
+        let Some(spectra) = self.spectra(still) else {
             return Some(Finding::untold(CHECK, EXPECTED, "still returns stand out of the noise at too few ranges"));
         };
         let as_stated = coherences(&spectra, &stated);

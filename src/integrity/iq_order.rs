@@ -10,11 +10,9 @@
 //! last ninth of the band: no return there is the strongest. So something is told only where the strongest still return lies in the first
 //! or the last ninth of the band; far returns alone, as they are or as their mirror image, tell nothing.
 
-use num_complex::{Complex32, Complex64};
-
+use super::still::{Still, spectrum};
 use super::stream::{Schedule, Stream};
 use super::tails::student_tail;
-use super::words::{spectrum, window_power};
 use super::{ALARM, Finding, Inspector, Kind};
 
 const CHECK: &str = "iq_order";
@@ -31,18 +29,12 @@ const RETURN: f64 = 20.0;
 
 pub(super) struct IqOrder {
     schedule: Schedule,
-    /// Sum of all chirps, `[tx, rx, sample]`, and the loop before.
-    sum: Vec<Complex64>,
-    before: Vec<Complex32>,
-    /// Sum of the squared differences of neighbouring loops, and how many loops and differences there were.
-    noise: f64,
-    loops: f64,
-    differences: f64,
+    still: Still,
 }
 
 impl IqOrder {
     pub fn new(schedule: Schedule) -> Self {
-        Self { schedule, sum: vec![Complex64::ZERO; schedule.period()], before: vec![], noise: 0.0, loops: 0.0, differences: 0.0 }
+        Self { schedule, still: Still::new(schedule) }
     }
 
     /// Near and far bin of each pair that can tell.
@@ -56,28 +48,19 @@ impl IqOrder {
 
 impl Inspector for IqOrder {
     fn see(&mut self, stream: &Stream) {
-        for samples in stream.loops() {
-            self.sum.iter_mut().zip(samples).for_each(|(sum, v)| *sum += Complex64::new(v.re.into(), v.im.into()));
-            let differences = samples.iter().zip(&self.before).map(|(value, before)| f64::from((value - before).norm_sqr()));
-            self.noise += differences.sum::<f64>();
-            self.differences += f64::from(u8::from(!self.before.is_empty()));
-            self.before = samples.to_vec();
-            self.loops += 1.0;
-        }
+        self.still.see(stream);
     }
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
         if self.schedule.is_real {
             return None;
         }
-        if self.differences == 0.0 {
+        if !self.still.shows_noise() {
             return Some(Finding::untold(CHECK, EXPECTED, "one chirp shows no noise to tell returns from"));
         }
         let samples = self.schedule.samples;
-        // Of a sample, over all channels; a difference has twice the noise.
-        let variance = self.noise / (2.0 * self.differences * samples as f64);
-        let least = RETURN * self.loops * variance * window_power(samples);
-        let power = spectrum(self.sum.chunks_exact(samples), samples);
+        let least = RETURN * self.still.noise_of_bin();
+        let power = spectrum(self.still.sum.chirps(), samples);
         let of = |pair: [usize; 2]| pair.map(|bin| power[bin]);
         let pairs: Vec<[usize; 2]> = self.pairs().filter(|pair| of(*pair)[0].max(of(*pair)[1]) >= least).collect();
         let told: Vec<[f64; 2]> = pairs.iter().map(|pair| of(*pair)).collect();
@@ -111,6 +94,8 @@ impl Inspector for IqOrder {
 
 #[cfg(test)]
 mod tests {
+    use num_complex::Complex64;
+
     use super::*;
     use crate::data::IfFrame;
     use crate::support::numbers;

@@ -15,6 +15,7 @@ mod period;
 mod runs;
 mod shift;
 mod start;
+mod still;
 mod stream;
 mod tails;
 mod transmitters;

@@ -14,8 +14,9 @@
 //! returns fill the whole band alike, nothing can be told.
 
 use num_complex::Complex64;
-use rustfft::{Fft, FftPlanner};
+use rustfft::FftPlanner;
 
+use super::still::{Sum, spectrum, transformed};
 use super::stream::{Schedule, Stream};
 use super::tails::log_binomial_tail;
 use super::{ALARM, Finding, Inspector, Kind};
@@ -33,14 +34,12 @@ const BY_PHASES: f64 = 0.05;
 
 pub(super) struct Words {
     schedule: Schedule,
-    /// Sum of all chirps, `[tx, rx, sample]`.
-    sum: Vec<Complex64>,
-    chirps: f64,
+    sum: Sum,
 }
 
 impl Words {
     pub fn new(schedule: Schedule) -> Self {
-        Self { schedule, sum: vec![Complex64::ZERO; schedule.period()], chirps: 0.0 }
+        Self { schedule, sum: Sum::new(schedule) }
     }
 }
 
@@ -49,34 +48,6 @@ fn exchanged(chirp: &[Complex64]) -> Vec<Complex64> {
     let (pairs, rest) = chirp.as_chunks::<2>();
     let swapped = pairs.iter().flat_map(|[a, b]| [Complex64::new(a.re, b.re), Complex64::new(a.im, b.im)]);
     swapped.chain(rest.iter().copied()).collect()
-}
-
-/// Hann's.
-fn window(n: usize, samples: usize) -> f64 {
-    (std::f64::consts::PI * (n as f64 + 0.5) / samples as f64).sin().powi(2)
-}
-
-/// Power of a bin of `spectrum` where every sample has a noise of unit power.
-pub(super) fn window_power(samples: usize) -> f64 {
-    (0..samples).map(|n| window(n, samples).powi(2)).sum()
-}
-
-/// The spectrum of a chirp under a Hann window, without its mean.
-pub(super) fn transformed(fft: &dyn Fft<f64>, chirp: &[Complex64]) -> Vec<Complex64> {
-    let mean = chirp.iter().sum::<Complex64>() / chirp.len() as f64;
-    let mut values: Vec<Complex64> = chirp.iter().enumerate().map(|(n, v)| (v - mean) * window(n, chirp.len())).collect();
-    fft.process(&mut values);
-    values
-}
-
-/// Power over all channels by frequency, under a Hann window, without the mean.
-pub(super) fn spectrum<'a>(chirps: impl Iterator<Item = &'a [Complex64]>, samples: usize) -> Vec<f64> {
-    let fft = FftPlanner::new().plan_fft_forward(samples);
-    let mut power = vec![0.0; samples];
-    for chirp in chirps {
-        power.iter_mut().zip(transformed(&*fft, chirp)).for_each(|(power, value)| *power += value.norm_sqr());
-    }
-    power
 }
 
 /// Imaginary part of X(ω) X(−ω) over the mean power at ±ω, both summed over all channels, by frequency.
@@ -94,12 +65,36 @@ fn products<'a>(chirps: impl Iterator<Item = &'a [Complex64]>, samples: usize) -
     sums.into_iter().map(|(product, power)| product / f64::max(power, f64::MIN_POSITIVE)).collect()
 }
 
+/// What the tests say: the groups in which the words as they are, and the exchanged ones, look exchanged, by power and by phases of either
+/// sign.
+fn judged(groups: usize, as_they_are: [usize; 3], as_exchanged: [usize; 3], shares: String) -> Finding {
+    let log_p = |count: usize, share: f64| log_binomial_tail(count, groups, 0.5) - share.ln();
+    let wrong = |count: usize, share: f64, what: &str| {
+        let found = format!(
+            "{shares}, in {count} of {groups} groups of frequencies {what}: I I Q Q was read as I Q I Q, or the other way round"
+        );
+        Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p(count, share))
+    };
+    let [fewer, ..] = as_they_are;
+    if log_p(fewer, BY_POWER) < ALARM.ln() {
+        return wrong(fewer, BY_POWER, "less");
+    }
+    if log_p(as_exchanged[0], BY_POWER) < ALARM.ln() {
+        return Finding::as_stated(CHECK, EXPECTED, shares);
+    }
+    let [in_step, in_step_exchanged] = [as_they_are, as_exchanged].map(|[_, up, down]| up.max(down));
+    if log_p(in_step, BY_PHASES) < ALARM.ln() {
+        return wrong(in_step, BY_PHASES, "a phase that images of exchanged words have");
+    }
+    if log_p(in_step_exchanged, BY_PHASES) < ALARM.ln() {
+        return Finding::as_stated(CHECK, EXPECTED, shares);
+    }
+    Finding::untold(CHECK, EXPECTED, shares)
+}
+
 impl Inspector for Words {
     fn see(&mut self, stream: &Stream) {
-        for samples in stream.loops() {
-            self.chirps += 1.0;
-            self.sum.iter_mut().zip(samples).for_each(|(sum, v)| *sum += Complex64::new(v.re.into(), v.im.into()));
-        }
+        stream.loops().for_each(|samples| self.sum.add(samples));
     }
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
@@ -108,10 +103,10 @@ impl Inspector for Words {
         if self.schedule.is_real || !samples.is_multiple_of(2) {
             return None;
         }
-        let chirps: Vec<Vec<Complex64>> = self.sum.chunks_exact(samples).map(exchanged).collect();
-        let as_read = spectrum(self.sum.chunks_exact(samples), samples);
+        let chirps: Vec<Vec<Complex64>> = self.sum.chirps().map(exchanged).collect();
+        let as_read = spectrum(self.sum.chirps(), samples);
         let reordered = spectrum(chirps.iter().map(Vec::as_slice), samples);
-        let product = products(self.sum.chunks_exact(samples), samples);
+        let product = products(self.sum.chirps(), samples);
         let exchanged_product = products(chirps.iter().map(Vec::as_slice), samples);
         // Groups in which the words as read and the exchanged ones look exchanged: by power; by phases, of either sign.
         let (mut groups, mut as_they_are, mut as_exchanged) = (0, [0; 3], [0; 3]);
@@ -136,33 +131,12 @@ impl Inspector for Words {
             (0..3).for_each(|test| as_exchanged[test] += usize::from(of_others[test]));
             (far, all, far_after) = (far + away_before, all + whole, far_after + away_after);
         }
-        let log_p = |count: usize, share: f64| log_binomial_tail(count, groups, 0.5) - share.ln();
         let shares = format!(
             "the far half of the spectrum holds {:.1} % of the still energy, and {:.1} % with every second pair of words exchanged",
             100.0 * far / f64::max(all, f64::MIN_POSITIVE),
             100.0 * far_after / f64::max(all, f64::MIN_POSITIVE)
         );
-        let wrong = |count: usize, share: f64, what: &str| {
-            let found = format!(
-                "{shares}, in {count} of {groups} groups of frequencies {what}: I I Q Q was read as I Q I Q, or the other way round"
-            );
-            Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p(count, share)))
-        };
-        let [fewer, ..] = as_they_are;
-        if log_p(fewer, BY_POWER) < ALARM.ln() {
-            return wrong(fewer, BY_POWER, "less");
-        }
-        if log_p(as_exchanged[0], BY_POWER) < ALARM.ln() {
-            return Some(Finding::as_stated(CHECK, EXPECTED, shares));
-        }
-        let [in_step, in_step_exchanged] = [as_they_are, as_exchanged].map(|[_, up, down]| up.max(down));
-        if log_p(in_step, BY_PHASES) < ALARM.ln() {
-            return wrong(in_step, BY_PHASES, "a phase that images of exchanged words have");
-        }
-        if log_p(in_step_exchanged, BY_PHASES) < ALARM.ln() {
-            return Some(Finding::as_stated(CHECK, EXPECTED, shares));
-        }
-        Some(Finding::untold(CHECK, EXPECTED, shares))
+        Some(judged(groups, as_they_are, as_exchanged, shares))
     }
 }
 

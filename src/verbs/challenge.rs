@@ -126,7 +126,7 @@ pub fn score(what: &Scoring<'_>, tell: &mut Tell<'_>) -> Result<Score> {
 }
 
 /// A folder that is filled by this process, or by one for each part.
-fn filled(folder: &Path, shard: Shard) -> Result<Claim> {
+pub fn filled(folder: &Path, shard: Shard) -> Result<Claim> {
     let claim = Claim::part(folder, shard)?;
     atomic::sweep_all(folder);
     Ok(claim)

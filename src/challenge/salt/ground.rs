@@ -62,7 +62,7 @@ pub fn ground(recording: &Recording) -> Result<Ground> {
 }
 
 /// The noise as a diagnosis estimates it, per component.
-pub fn sigma(recording: &Recording) -> Result<f64> {
+fn sigma(recording: &Recording) -> Result<f64> {
     let evidence = Evidence::new(Loaded::read(recording, most_frames(&recording.radar))?, recording.room.clone(), None);
     let noise = evidence.noise();
     let variance = noise.iter().sum::<f64>() / noise.len().max(1) as f64;

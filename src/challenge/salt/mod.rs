@@ -22,7 +22,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-pub use plan::{Plan, SaltConfig};
+pub use plan::{Plan, Resolved, SaltConfig};
 
 use super::answer::{self, Answers, Failure, RunConfig};
 use super::commitment::{Commitment, read_json};
@@ -89,22 +89,21 @@ pub fn background(recording: &Recording, ground: &Ground, out: &Path, how: &RunC
 pub fn seal(
     recording: &Recording,
     ground: &Ground,
-    config: &SaltConfig,
+    (resolved, plans): &(Resolved, Vec<Plan>),
     seed: Option<&str>,
     out: &Path,
     shard: Shard,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Commitment> {
-    let (resolved, plans) = plan::plans(config, recording)?;
-    let settings = toml::to_string(&resolved).expect("plain data");
+    let settings = toml::to_string(resolved).expect("plain data");
     let secret = begin(out, &settings, seed, shard)?;
     if published(out, shard).exists() {
         let mut all = Commitment::read_all(out)?.into_iter();
         return Ok(all.find(|commitment| commitment.shard == [shard.number, shard.of]).expect("it is there"));
     }
     let (done, leaves) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
-    plans.into_par_iter().filter(|plan| shard.holds(plan.index)).try_for_each(|plan| -> Result<()> {
-        let leaf = one_case(out, &secret, plan.index, |case| copy(recording, ground, &plan, &secret, case))?;
+    plans.par_iter().filter(|plan| shard.holds(plan.index)).try_for_each(|plan| -> Result<()> {
+        let leaf = one_case(out, &secret, plan.index, |case| copy(recording, ground, plan, &secret, case))?;
         leaves.lock().expect("nobody panics while holding it").insert(secret.name(plan.index), leaf);
         progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         Ok(())
@@ -145,9 +144,7 @@ fn truth(plan: &Plan, planted: &EffectsConfig, seed: u64) -> Value {
 pub fn answer(out: &Path, how: &RunConfig, progress: &mut dyn FnMut(usize)) -> Result<Answers> {
     let answers = out.join(ANSWERS);
     let commitments = Commitment::read_all(out)?;
-    let mine = |commitment: &&Commitment| commitment.shard == [how.shard.number, how.shard.of];
-    let names = commitments.iter().filter(mine).flat_map(|commitment| commitment.leaves.keys());
-    answer::each(names, out, &answers, how, progress)?;
+    answer::each(mine(&commitments, how.shard), out, &answers, how, progress)?;
     let all: Vec<&String> = commitments.iter().flat_map(|commitment| commitment.leaves.keys()).collect();
     answer::gather(&all, &answers, &commitments, &how.program)
 }
@@ -155,10 +152,14 @@ pub fn answer(out: &Path, how: &RunConfig, progress: &mut dyn FnMut(usize)) -> R
 /// Copies of a part that have no answer yet.
 pub fn waiting(out: &Path, how: &RunConfig) -> Result<usize> {
     let commitments = Commitment::read_all(out)?;
-    let mine = |commitment: &&Commitment| commitment.shard == [how.shard.number, how.shard.of];
-    let names = commitments.iter().filter(mine).flat_map(|commitment| commitment.leaves.keys());
-    let open = names.filter(|name| !answer::answered(&out.join(ANSWERS).join(name))).count();
-    Ok(how.most.map_or(open, |most| open.min(most)))
+    let open = mine(&commitments, how.shard).filter(|name| !answer::answered(&out.join(ANSWERS).join(name)));
+    Ok(open.take(how.most.unwrap_or(usize::MAX)).count())
+}
+
+/// Names of the copies that a part has committed to.
+fn mine(commitments: &[Commitment], shard: Shard) -> impl Iterator<Item = &String> {
+    let own = commitments.iter().filter(move |commitment| commitment.shard == [shard.number, shard.of]);
+    own.flat_map(|commitment| commitment.leaves.keys())
 }
 
 /// Whether all parts are committed to and answered, so that the truths may be opened.

@@ -10,16 +10,12 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::paths::PATH_LIKE;
-use super::region::{Region, remove};
-use crate::diagnosis::evidence::{Evidence, spectrum};
+use super::region::{Region, mean_power, moves, power_gain, remove};
+use crate::diagnosis::evidence::{Evidence, HANN_LOBE, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 
-/// Doppler bins around zero where a Hann window leaves what stands still.
-const STILL_BINS: usize = 1;
 const FEWEST_LOOPS: usize = 16;
-/// Bins to each side that a Hann window's main lobe fills.
-const LOBE: usize = 2;
 /// Floor over the noise that a static return must have if it were modulated as well, to say by its silence that it is not.
 const TELLING: f64 = 3.0;
 /// Static returns elsewhere that must deny it.
@@ -43,18 +39,14 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
 }
 
 fn moving(loops: usize) -> impl Iterator<Item = usize> {
-    (0..loops).filter(move |&doppler| doppler.min(loops - doppler) > STILL_BINS)
+    (0..loops).filter(move |&doppler| moves(doppler, loops))
 }
 
 impl Floor {
     fn of(evidence: &Evidence) -> Self {
         let [_, _, _, loops, samples] = evidence.cube.dims;
-        let (bins, channels, maps) = (evidence.range_bins(), evidence.cube.channels(), evidence.maps());
-        let training = &evidence.split.training;
-        let cell = |frame: usize, doppler: usize, bin: usize| f64::from(maps[(frame * loops + doppler) * samples + bin]);
-        let mean = |doppler: usize, bin: usize| {
-            training.iter().map(|&frame| cell(frame, doppler, bin)).sum::<f64>() / training.len() as f64
-        };
+        let (bins, channels) = (evidence.range_bins(), evidence.cube.channels());
+        let mean = |doppler: usize, bin: usize| mean_power(evidence, &evidence.split.training, doppler * samples + bin);
         let level =
             (0..bins).map(|bin| median(&mut moving(loops).map(|doppler| mean(doppler, bin)).collect::<Vec<_>>())).collect();
         let mut still = vec![0.0; bins];
@@ -74,7 +66,7 @@ impl Floor {
             // A phase of the oscillator grows with the delay at most in proportion.
             let nearer = ((other as f64 + 1.0) / (bin as f64 + 1.0)).min(1.0).powi(2);
             let expected = ratio * self.still[other] * nearer;
-            let aside = other + LOBE < ends[0] || other > ends[1] + LOBE;
+            let aside = other + HANN_LOBE < ends[0] || other > ends[1] + HANN_LOBE;
             if !aside || expected < TELLING {
                 other += 1;
                 continue;
@@ -82,7 +74,7 @@ impl Floor {
             telling += 1;
             denying += usize::from(self.level[other] - 1.0 < 0.5 * expected);
             // Of one return each.
-            other += 2 * LOBE;
+            other += 2 * HANN_LOBE;
         }
         denying >= FEWEST_DENIALS && 2 * denying > telling
     }
@@ -102,17 +94,12 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     if p_value > SURE || !floor.is_alone(bin, [first, last]) || chance_of_independent_receivers(evidence, bin) > SURE {
         return None;
     }
-    let maps = evidence.maps();
-    // Exponential laws with the floor's mean, against noise alone.
-    let of_cell = |frame: usize, doppler: usize, bin: usize| {
-        let power = f64::from(maps[(frame * loops + doppler) * samples + bin]);
-        let expected = floor.level[bin].max(1.0);
-        channels * (power * (1.0 - 1.0 / expected) - expected.ln())
-    };
     let held_out = evidence.split.held_out.iter();
     let cells =
         held_out.flat_map(|&frame| moving(loops).flat_map(move |doppler| (first..=last).map(move |bin| (frame, doppler, bin))));
-    let gain: f64 = cells.map(|(frame, doppler, bin)| of_cell(frame, doppler, bin)).sum();
+    let of_cell =
+        |(frame, doppler, bin): (usize, usize, usize)| power_gain(evidence, frame, doppler * samples + bin, floor.level[bin]);
+    let gain: f64 = cells.map(of_cell).sum();
     let bin_m = evidence.radar.range_resolution_m();
     let fastest = 0.5 * evidence.radar.velocity_resolution_mps() * loops as f64;
     let noise: f64 = evidence.noise().iter().sum();
@@ -157,7 +144,7 @@ fn chance_of_independent_receivers(evidence: &Evidence, bin: usize) -> f64 {
     for &frame in &evidence.split.training {
         let maps: Vec<Vec<Complex64>> = (0..channels).map(|channel| evidence.range_doppler(frame, channel)).collect();
         // Neighbouring cells of a windowed transform share their noise.
-        for doppler in moving(loops).step_by(LOBE + 1) {
+        for doppler in moving(loops).step_by(HANN_LOBE + 1) {
             let cell = doppler * samples + bin;
             for (channel, map) in maps.iter().enumerate() {
                 products[channel] += map[cell] * maps[0][cell].conj();

@@ -11,15 +11,13 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::receiver::wandering;
-use super::region::{Region, joined, remove, run};
+use super::region::{Region, STILL_BINS, joined, mean_power, moves, power_gain, remove, run};
 use crate::diagnosis::evidence::{Evidence, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics;
 
 /// Standard deviation of how high something stands, which receivers in a row do not show, over its range.
 const HEIGHT: f64 = 0.3;
-/// Doppler bins around zero where a Hann window leaves what stands still.
-const STILL_BINS: usize = 1;
 /// Nearer ones belong to leakage, offsets and low-frequency noise.
 const NEAREST_BIN: usize = 3;
 /// Factor by which a mover's cell must exceed the median over velocities.
@@ -48,12 +46,8 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
     let (bins, channels) = (evidence.range_bins(), evidence.cube.channels() as f64);
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     let cells = loops * samples;
-    let maps = evidence.maps();
-    let mean_over = |frames: &[usize], cell: usize| {
-        frames.iter().map(|&f| f64::from(maps[f * cells + cell])).sum::<f64>() / frames.len().max(1) as f64
-    };
-    let moving = |doppler: usize| doppler.min(loops - doppler) > STILL_BINS;
-    let mean: Vec<f64> = (0..cells).map(|cell| mean_over(training, cell)).collect();
+    let moving = |doppler: usize| moves(doppler, loops);
+    let mean: Vec<f64> = (0..cells).map(|cell| mean_power(evidence, training, cell)).collect();
     let mut column: Vec<f64> = vec![];
     // A floor over all velocities is the modulation of something strong, no mover.
     let floor: Vec<f64> = (0..bins)
@@ -99,14 +93,10 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
         let scaled = signed(d) * run as f64;
         (dopplers[0]..=dopplers[1]).contains(&scaled) && (ranges[0]..=ranges[1]).contains(&(r as f64))
     };
-    // Exponential laws with the training's mean power, against noise alone.
     let gain: f64 = (0..cells)
         .filter(|&cell| cell == peak || moving(cell / samples) && inside(cell / samples, cell % samples))
         .flat_map(|cell| held_out.iter().map(move |&f| (f, cell)))
-        .map(|(f, cell)| {
-            let (power, expected) = (f64::from(maps[f * cells + cell]), mean[cell].max(1.0));
-            channels * (power * (1.0 - 1.0 / expected) - expected.ln())
-        })
+        .map(|(f, cell)| power_gain(evidence, f, cell, mean[cell]))
         .sum();
     if gain < 3.0 {
         return None;

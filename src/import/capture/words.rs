@@ -18,6 +18,23 @@ pub struct Lengths {
     pub samples: usize,
 }
 
+impl Lengths {
+    /// Along an axis of one frame.
+    fn of(&self, axis: Axis, lanes: usize) -> usize {
+        match axis {
+            Axis::Frame => 1,
+            Axis::Tx => self.tx,
+            Axis::Rx => self.rx,
+            Axis::Loop => self.loops,
+            Axis::Chirp => self.loops.saturating_mul(self.tx),
+            Axis::Antenna => self.tx.saturating_mul(self.rx),
+            Axis::Sample => self.samples / lanes,
+            Axis::Lane => lanes,
+            Axis::Iq => 2,
+        }
+    }
+}
+
 /// Words as an array, frames outermost.
 pub struct WordArray {
     pub words: Words,
@@ -48,7 +65,7 @@ impl WordArray {
         if layout.place(Axis::Frame).is_some_and(|place| place > 0) {
             return Err(refuse("frames are not outermost"));
         }
-        let Lengths { tx, rx, loops, samples } = lengths;
+        let samples = lengths.samples;
         let lanes = if layout.place(Axis::Lane).is_some() { LANES } else { 1 };
         if !samples.is_multiple_of(lanes) {
             return Err(Error::setting(
@@ -57,23 +74,17 @@ impl WordArray {
                 format!("a multiple of {lanes}: one sample for each lane"),
             ));
         }
-        let length = |axis: &Axis| match axis {
-            Axis::Frame => 1,
-            Axis::Tx => tx,
-            Axis::Rx => rx,
-            Axis::Loop => loops,
-            Axis::Chirp => loops * tx,
-            Axis::Antenna => tx * rx,
-            Axis::Sample => samples / lanes,
-            Axis::Lane => lanes,
-            Axis::Iq => 2,
-        };
-        let mut shape: Vec<usize> = layout.0.iter().map(length).collect();
+        let mut shape: Vec<usize> = layout.0.iter().map(|axis| lengths.of(*axis, lanes)).collect();
         let block = shape.iter().try_fold(1u64, |all, &length| all.checked_mul(length as u64)).unwrap_or(u64::MAX).max(1);
         let words = Words::open(files)?;
         if let Some((file, own)) = words.lengths().find(|(_, own)| frame_files && *own != block) {
-            return Err(Error::field(file, "samples", format!("{} bytes", 2 * own), format!("{} bytes, one frame", 2 * block))
-                .with_hint("the radar's settings belong to another capture, or the file is cut off"));
+            return Err(Error::field(
+                file,
+                "samples",
+                format!("{} bytes", 2 * own),
+                format!("{} bytes, one frame", block.saturating_mul(2)),
+            )
+            .with_hint("the radar's settings belong to another capture, or the file is cut off"));
         }
         let (frames, rest) = (words.len() / block, words.len() % block);
         if frames == 0 || layout.place(Axis::Frame).is_none() && words.len() != block {

@@ -7,8 +7,9 @@ use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::diagnosis::course::Course;
+use crate::diagnosis::course::{Course, powers};
 use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::statistics::fisher_tail;
 
 /// Orders that are fitted together: static returns, what is added, its image.
 pub const ORDERS: usize = 3;
@@ -39,7 +40,7 @@ impl Fit {
         for t in 0..tx {
             let mut gram = Matrix3::<Complex64>::zeros();
             for (frame, index) in training.iter().flat_map(|&frame| (0..loops).map(move |index| (frame, index))) {
-                let row = Vector3::from(orders(phase(frame, t, index)));
+                let row = Vector3::from(powers(phase(frame, t, index).conj()));
                 gram += row.conjugate() * row.transpose();
             }
             let inverse = gram.try_inverse()?;
@@ -52,7 +53,7 @@ impl Fit {
             let mut right = vec![Vector3::<Complex64>::zeros(); samples];
             for &frame in training {
                 for (index, chirp) in evidence.cube.channel(frame, channel).chunks_exact(samples).enumerate() {
-                    let row = Vector3::from(orders(phase(frame, t, index))).conjugate();
+                    let row = Vector3::from(powers(phase(frame, t, index).conj())).conjugate();
                     right.iter_mut().zip(chirp).for_each(|(sum, value)| *sum += row * *value);
                 }
             }
@@ -72,7 +73,7 @@ impl Fit {
 
     /// What of an order in a chirp the lower ones do not foretell.
     fn beside(&self, order: usize, frame: usize, tx: usize, index: usize) -> Complex64 {
-        let all = orders(self.phase(frame, tx, index));
+        let all = powers(self.phase(frame, tx, index).conj());
         let known: Complex64 = (0..order).map(|lower| self.predicted[tx][order - 1][order][lower] * all[lower]).sum();
         all[order] - known
     }
@@ -93,7 +94,7 @@ impl Fit {
             let mut gain = 0.0;
             for &frame in &evidence.split.held_out {
                 for (index, chirp) in evidence.cube.channel(frame, channel).chunks_exact(samples).enumerate() {
-                    let (all, beside) = (orders(self.phase(frame, t, index)), self.beside(order, frame, t, index));
+                    let (all, beside) = (powers(self.phase(frame, t, index).conj()), self.beside(order, frame, t, index));
                     for (n, value) in chirp.iter().enumerate() {
                         let rest = value - (0..order).map(|k| known[k][n] * all[k]).sum::<Complex64>();
                         gain += rest.norm_sqr() - (rest - part[channel][n] * beside).norm_sqr();
@@ -104,11 +105,6 @@ impl Fit {
         };
         (0..self.parts[0].len()).into_par_iter().map(of_channel).sum()
     }
-}
-
-/// 1, e^{−jθ} and e^{−2jθ} of e^{jθ}.
-fn orders(turned: Complex64) -> [Complex64; ORDERS] {
-    [Complex64::ONE, turned.conj(), turned.conj() * turned.conj()]
 }
 
 /// From a Gram matrix of conj(order i) · order j: what the first order says of the others.
@@ -127,4 +123,12 @@ fn first_two(gram: &Matrix3<Complex64>) -> Option<Prediction> {
     let mut shares = Prediction::default();
     (shares[2][0], shares[2][1]) = (found[0], found[1]);
     Some(shares)
+}
+
+/// What is found over the noise in so many complex values, against what is found at other beat frequencies, where a phase that is not
+/// quite known leaves something of all returns: the chance (F-test), and how much more than noise is left.
+pub fn against(found: f64, others: &[f64], values: usize) -> (f64, f64) {
+    let values = values as f64;
+    let left = (others.iter().sum::<f64>() / others.len() as f64).max(values);
+    (fisher_tail(found / left, 2.0 * values, 2.0 * values * others.len() as f64), left / values)
 }

@@ -4,24 +4,22 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::fit::Fit;
+use super::fit::{Fit, against};
 use crate::diagnosis::cube::Cube;
-use crate::diagnosis::evidence::{Evidence, spectrum};
+use crate::diagnosis::evidence::{Evidence, HANN_LOBE, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
-use crate::diagnosis::statistics::{DECIBEL, fisher_tail};
-use crate::diagnosis::suspects::receiver::image::imbalance;
+use crate::diagnosis::statistics::DECIBEL;
+use crate::diagnosis::suspects::receiver::image::{balanced, imbalance};
 
 /// Orders of the fit: static returns and what turns backwards.
 const STATIC: usize = 0;
 const BACKWARDS: usize = 2;
-/// Bins to each side that a Hann window's main lobe fills; as many apart, cells are independent.
-const LOBE: usize = 2;
 /// Beat frequencies next to zero, and their images, belong to offsets and leakage.
-const NEAREST: usize = 2 * LOBE;
+const NEAREST: usize = 2 * HANN_LOBE;
 
 pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     let [_, tx, rx, _, samples] = evidence.cube.dims;
-    if evidence.is_real() || samples < 16 * LOBE || evidence.accepted.contains(&"iq_imbalance") {
+    if evidence.is_real() || samples < 16 * HANN_LOBE || evidence.accepted.contains(&"iq_imbalance") {
         return None;
     }
     let of = |order: usize| -> Vec<Vec<Complex64>> { fit.parts[order].iter().map(|part| spectrum(part)).collect() };
@@ -44,17 +42,15 @@ pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
         (0..rx).map(of_receiver).map(|(mu, weight)| mu.norm_sqr() * weight).sum()
     };
     // What a phase that is not quite known leaves of all returns is beside the images as well as at them.
-    let others: Vec<f64> = (LOBE + 1..samples / 4).step_by(LOBE + 1).flat_map(|q| [power(q), power(samples - q)]).collect();
-    let left = (others.iter().sum::<f64>() / others.len() as f64).max(rx as f64);
-    let freedom = 2.0 * rx as f64;
-    let p_value = fisher_tail(power(0) / left, freedom, freedom * others.len() as f64);
+    let others: Vec<f64> =
+        (HANN_LOBE + 1..samples / 4).step_by(HANN_LOBE + 1).flat_map(|q| [power(q), power(samples - q)]).collect();
+    let (p_value, excess) = against(power(0), &others, rx);
     let found: Vec<(Complex64, f64)> = (0..rx).map(|receiver| coefficient(receiver, 0)).collect();
     let term: Vec<Vec<Complex64>> = fit.parts[STATIC]
         .iter()
         .enumerate()
         .map(|(channel, part)| part.iter().map(|value| value.conj() * found[channel % rx].0).collect())
         .collect();
-    let excess = left / rx as f64;
     let gain = fit.held_out_gain(evidence, BACKWARDS, &term) / excess;
     if gain <= 0.0 {
         return None;
@@ -94,13 +90,12 @@ pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     })
 }
 
-/// `s = (y − μ y*) / (1 − |μ|²)` of samples in which static returns were turned back.
+/// In samples in which static returns were turned back.
 fn undo(cube: &mut Cube, turned: &[Complex64], coefficients: &[Complex64]) {
     let [_, tx, rx, loops, _] = cube.dims;
     cube.each_chirp(|[frame, channel, index], chirp| {
         let back = turned[frame * tx * loops + channel / rx * loops + index].conj();
-        let mu = coefficients[channel % rx];
-        let scale = (1.0 - mu.norm_sqr()).recip();
-        chirp.iter_mut().for_each(|value| *value = (*value - mu * back * back * value.conj()) * scale);
+        let mu = coefficients[channel % rx] * back * back;
+        chirp.iter_mut().for_each(|value| *value = balanced(*value, mu));
     });
 }

@@ -7,35 +7,28 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::fit::Fit;
+use super::fit::{Fit, against};
 use crate::diagnosis::cube::Cube;
-use crate::diagnosis::evidence::{Evidence, spectrum};
+use crate::diagnosis::evidence::{Evidence, HANN_LOBE, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
-use crate::diagnosis::statistics::fisher_tail;
 use crate::diagnosis::suspects::receiver::zero_beat::ZeroBeat;
 
 /// Order of the fit that it has.
 const ADDED: usize = 1;
-/// Bins to each side that a Hann window's main lobe fills; as many apart, cells are independent.
-const LOBE: usize = 2;
 
 pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     let [frames, tx, rx, loops, samples] = evidence.cube.dims;
-    if evidence.is_real() || samples < 8 * LOBE || evidence.accepted.contains(&"dc_offset") {
+    if evidence.is_real() || samples < 8 * HANN_LOBE || evidence.accepted.contains(&"dc_offset") {
         return None;
     }
     let spectra: Vec<Vec<Complex64>> = fit.parts[ADDED].iter().map(|part| spectrum(part)).collect();
     let error = |channel: usize| evidence.noise()[channel].max(f64::MIN_POSITIVE) / fit.own[channel / rx][ADDED];
     let power = |bin: usize| (0..tx * rx).map(|c| spectra[c][bin].norm_sqr() / error(c)).sum::<f64>();
-    // What a phase that is not quite known leaves of all returns, with the noise: at all other beat frequencies.
-    let others: Vec<f64> = (2 * LOBE..samples - 2 * LOBE).step_by(LOBE + 1).map(power).collect();
-    let left = (others.iter().sum::<f64>() / others.len() as f64).max((tx * rx) as f64);
-    let freedom = 2.0 * (tx * rx) as f64;
-    let p_value = fisher_tail(power(0) / left, freedom, freedom * others.len() as f64);
+    let others: Vec<f64> = (2 * HANN_LOBE..samples - 2 * HANN_LOBE).step_by(HANN_LOBE + 1).map(power).collect();
+    let (p_value, excess) = against(power(0), &others, tx * rx);
     let means = |channel: usize| fit.parts[ADDED][channel].iter().sum::<Complex64>() / samples as f64;
     let offsets: Vec<Complex64> = (0..rx).map(|r| (0..tx).map(|t| means(t * rx + r)).sum::<Complex64>() / tx as f64).collect();
     // Errors as what is left says, which is more than the noise.
-    let excess = left / (tx * rx) as f64;
     let deviation = |r: usize| (0.5 * excess * error(r) / (samples * tx) as f64).sqrt();
     let term: Vec<Vec<Complex64>> = (0..tx * rx).map(|channel| vec![offsets[channel % rx]; samples]).collect();
     let gain = fit.held_out_gain(evidence, ADDED, &term) / excess;

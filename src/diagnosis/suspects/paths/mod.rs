@@ -9,7 +9,7 @@ mod ground;
 mod image;
 mod mover;
 mod pendulum;
-mod product;
+pub mod product;
 mod removal;
 mod scene;
 mod steering;

@@ -17,7 +17,7 @@ use crate::diagnosis::suspects::receiver::harmonic;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Volume};
 
 /// Log-likelihood within which two explanations are not told apart.
-const CLOSE: f64 = 4.6;
+pub const CLOSE: f64 = 4.6;
 /// What was measured holds the products already: so often they are taken out of their own template.
 const ROUNDS: usize = 3;
 

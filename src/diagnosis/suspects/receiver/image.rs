@@ -195,10 +195,13 @@ pub fn imbalance(mu: Complex64) -> (f64, f64) {
 }
 
 /// s = (y − μ y*) / (1 − |μ|²).
+pub fn balanced(value: Complex64, mu: Complex64) -> Complex64 {
+    (value - mu * value.conj()) * (1.0 - mu.norm_sqr()).recip()
+}
+
 fn undo(mu: Complex64) -> Correction {
     let undo = move |cube: &mut Cube| {
-        let scale = (1.0 - mu.norm_sqr()).recip();
-        cube.each_chirp(|_, chirp| chirp.iter_mut().for_each(|value| *value = (*value - mu * value.conj()) * scale));
+        cube.each_chirp(|_, chirp| chirp.iter_mut().for_each(|value| *value = balanced(*value, mu)));
     };
     Correction::Inverse(Arc::new(undo), Volume::BY_SAMPLE)
 }

@@ -11,8 +11,9 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use rustfft::{FftDirection, FftPlanner};
 
+use super::settling::{Decay, ENOUGH};
 use crate::diagnosis::cube::{Cube, mean_chirp};
-use crate::diagnosis::evidence::{Evidence, hann};
+use crate::diagnosis::evidence::{Evidence, HANN_LOBE, hann, transform_under};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Undo};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 
@@ -20,14 +21,10 @@ use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 const FEWEST_FRAMES: usize = 4;
 /// p-value from which on a cell has it.
 const SURE: f64 = 1e-3;
-/// Bins to each side that a Hann window's main lobe fills.
-const LOBE: usize = 2;
 /// Power of a static return over the noise of its mean that says what all do.
 const STRONG: f64 = 1e3;
 /// Static returns at so many ranges say what all do; fewer may be the one that differs.
 const FEWEST_RETURNS: usize = 3;
-/// Share of a pattern that a decay must explain for its name: as in `settling`.
-const ENOUGH: f64 = 0.8;
 
 /// Of one channel over the training frames, `[harmonic − 1][bin]`, harmonics of the loop's number.
 struct Channel {
@@ -50,28 +47,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     strongest(evidence, &channels).into_iter().collect()
 }
 
-/// Harmonics over the loops, `[harmonic][bin]`, of a frame's spectra.
-fn harmonics(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Vec<Complex64>> {
-    let samples = evidence.cube.dims[4];
-    let loops = evidence.cube.dims[3];
-    let bins = evidence.range_bins();
-    let window = hann(samples);
-    let mut spectra: Vec<Complex64> = evidence.cube.channel(frame, channel).to_vec();
-    for chirp in spectra.chunks_exact_mut(samples) {
-        chirp.iter_mut().zip(&window).for_each(|(value, weight)| *value *= weight);
-    }
-    let mut planner = FftPlanner::new();
-    planner.plan_fft(samples, FftDirection::Forward).process(&mut spectra);
-    let over_loops = planner.plan_fft(loops, FftDirection::Forward);
-    let scale = (loops as f64).sqrt().recip();
-    let mut out = vec![vec![Complex64::ZERO; bins]; loops];
-    let mut column = vec![Complex64::ZERO; loops];
-    for bin in 0..bins {
-        (0..loops).for_each(|index| column[index] = spectra[index * samples + bin] * scale);
-        over_loops.process(&mut column);
-        (0..loops).for_each(|harmonic| out[harmonic][bin] = column[harmonic]);
-    }
-    out
+/// Harmonics over the loops of a frame's spectra, `[harmonic, bin]` with all bins of the transform.
+fn harmonics(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Complex64> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let slow = vec![(loops as f64).sqrt().recip(); loops];
+    transform_under(evidence.cube.channel(frame, channel), &slow, &hann(samples))
 }
 
 /// Harmonics of a time that goes on evenly in a frame, about its middle.
@@ -84,9 +64,10 @@ fn ramp(loops: usize, loop_s: f64) -> Vec<Complex64> {
 }
 
 fn of_channel(evidence: &Evidence, channel: usize) -> Channel {
-    let (loops, bins) = (evidence.cube.dims[3], evidence.range_bins());
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let bins = evidence.range_bins();
     let (training, starts) = (&evidence.split.training, &evidence.starts_s);
-    let frames: Vec<Vec<Vec<Complex64>>> = training.iter().map(|&frame| harmonics(evidence, frame, channel)).collect();
+    let frames: Vec<Vec<Complex64>> = training.iter().map(|&frame| harmonics(evidence, frame, channel)).collect();
     let ramp = ramp(loops, evidence.radar.loop_period_s());
     let count = training.len();
     let root = (loops as f64).sqrt();
@@ -94,9 +75,9 @@ fn of_channel(evidence: &Evidence, channel: usize) -> Channel {
     let slope = |i: usize, bin: usize| {
         let (before, after) = (i.saturating_sub(1), (i + 1).min(count - 1));
         let seconds = starts[training[after]] - starts[training[before]];
-        (frames[after][0][bin] - frames[before][0][bin]) / (root * seconds)
+        (frames[after][bin] - frames[before][bin]) / (root * seconds)
     };
-    let value = |i: usize, harmonic: usize, bin: usize| frames[i][harmonic][bin] - slope(i, bin) * ramp[harmonic];
+    let value = |i: usize, harmonic: usize, bin: usize| frames[i][harmonic * samples + bin] - slope(i, bin) * ramp[harmonic];
     let (mut mean, mut scatter) = (vec![], vec![]);
     for harmonic in 1..loops {
         let of_bin = |bin: usize| (0..count).map(|i| value(i, harmonic, bin)).sum::<Complex64>() / count as f64;
@@ -107,8 +88,7 @@ fn of_channel(evidence: &Evidence, channel: usize) -> Channel {
         scatter.push((0..bins).map(of_bin).map(|sum: f64| sum.max(least)).collect());
         mean.push(means);
     }
-    let still =
-        (0..bins).map(|bin| frames.iter().map(|frame| frame[0][bin]).sum::<Complex64>() / (root * count as f64)).collect();
+    let still = (0..bins).map(|bin| frames.iter().map(|frame| frame[bin]).sum::<Complex64>() / (root * count as f64)).collect();
     let noise = evidence.noise()[channel] / (loops * count) as f64;
     Channel { mean, scatter, still, noise }
 }
@@ -122,7 +102,7 @@ fn take_common(channels: &mut [Channel], bins: usize) {
     let mut ranges: Vec<usize> = strong.iter().map(|place| place.1).collect();
     ranges.sort_unstable();
     ranges.dedup();
-    let returns = 1 + ranges.windows(2).filter(|pair| pair[1] - pair[0] > LOBE).count();
+    let returns = 1 + ranges.windows(2).filter(|pair| pair[1] - pair[0] > HANN_LOBE).count();
     if ranges.is_empty() || returns < FEWEST_RETURNS {
         return;
     }
@@ -171,11 +151,11 @@ fn strongest(evidence: &Evidence, channels: &[Channel]) -> Option<Candidate> {
 
 /// Log-likelihood that held-out frames gain at a cell, by harmonic in the scatter of the training frames.
 fn held_out_gain(evidence: &Evidence, own: &Channel, channel: usize, bin: usize) -> f64 {
-    let frames = evidence.split.training.len() as f64;
+    let (frames, samples) = (evidence.split.training.len() as f64, evidence.cube.dims[4]);
     let of_frame = |&frame: &usize| -> f64 {
         let values = harmonics(evidence, frame, channel);
         let better = |harmonic: usize| {
-            let (value, mean) = (values[harmonic + 1][bin], own.mean[harmonic][bin]);
+            let (value, mean) = (values[(harmonic + 1) * samples + bin], own.mean[harmonic][bin]);
             let variance = own.scatter[harmonic][bin] / (frames - 1.0);
             (value.norm_sqr() - (value - mean).norm_sqr()) / variance.max(f64::MIN_POSITIVE)
         };
@@ -195,15 +175,12 @@ fn pattern(channel: &Channel, bin: usize) -> Vec<Complex64> {
 
 /// The length, in loops, of the decay that explains most of a pattern, and its share.
 fn decay(pattern: &[Complex64]) -> (f64, f64) {
-    let loops = pattern.len() as f64;
     let energy: f64 = pattern.iter().map(|value| value.norm_sqr()).sum();
     let share = |length: f64| {
-        let shape: Vec<f64> = (0..pattern.len()).map(|i| (-(i as f64) / length).exp()).collect();
-        let mean = shape.iter().sum::<f64>() / loops;
-        let along: Complex64 = pattern.iter().zip(&shape).map(|(value, shape)| value * (shape - mean)).sum();
-        along.norm_sqr() / (shape.iter().map(|shape| (shape - mean).powi(2)).sum::<f64>() * energy)
+        let fit = Decay::fit(pattern, length);
+        fit.amplitude.norm_sqr() * fit.energy / energy
     };
-    let lengths = (0..=60).map(|i| 0.5 * (2.0 * loops).powf(f64::from(i) / 60.0));
+    let lengths = Decay::lengths(pattern.len() as f64);
     lengths.map(|length| (length, share(length))).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((1.0, 0.0))
 }
 
@@ -277,7 +254,7 @@ fn undo(evidence: &Evidence, channels: Vec<usize>, cells: Vec<Vec<usize>>) -> Un
         let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
         let near = |cells: &[usize], k: usize| {
             let away = |cell: usize| (k + samples - cell).rem_euclid(samples).min((cell + samples - k).rem_euclid(samples));
-            cells.iter().any(|&cell| away(cell) <= LOBE || real && away((samples - cell) % samples) <= LOBE)
+            cells.iter().any(|&cell| away(cell) <= HANN_LOBE || real && away((samples - cell) % samples) <= HANN_LOBE)
         };
         let patterns: Vec<Vec<Complex64>> = channels
             .iter()

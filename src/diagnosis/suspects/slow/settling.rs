@@ -33,7 +33,7 @@ pub struct Free {
 }
 
 /// Share of what a free function of the loop gains that a decay must reach.
-const ENOUGH: f64 = 0.8;
+pub const ENOUGH: f64 = 0.8;
 /// And share that it may leave where what it leaves is beyond doubt: a strong pattern shows its shape.
 const LEFT_OVER: f64 = 0.01;
 /// Beyond doubt, nats.
@@ -62,6 +62,29 @@ impl Settling {
     }
 }
 
+/// Least squares of `amplitude · exp(−i / length)`, about the mean over the loops.
+pub struct Decay {
+    pub amplitude: Complex64,
+    /// Mean of the shape, and its energy about that.
+    level: f64,
+    pub energy: f64,
+}
+
+impl Decay {
+    pub fn fit(values: &[Complex64], length: f64) -> Self {
+        let shape: Vec<f64> = (0..values.len()).map(|i| (-(i as f64) / length).exp()).collect();
+        let level = shape.iter().sum::<f64>() / values.len() as f64;
+        let energy: f64 = shape.iter().map(|s| (s - level).powi(2)).sum();
+        let amplitude = values.iter().zip(&shape).map(|(v, s)| v * (s - level)).sum::<Complex64>() / energy;
+        Self { amplitude, level, energy }
+    }
+
+    /// Lengths to be tried, from half a loop in equal ratios.
+    pub fn lengths(longest: f64) -> impl Iterator<Item = f64> {
+        (0..=60).map(move |i| 0.5 * (longest / 0.5).powf(f64::from(i) / 60.0))
+    }
+}
+
 pub fn best(field: &Field, training: &[usize], held_out: &[usize]) -> Option<Settling> {
     let loops = field.loops;
     if loops < 8 {
@@ -85,14 +108,11 @@ pub fn best(field: &Field, training: &[usize], held_out: &[usize]) -> Option<Set
             + parts[1].gain(field, held_out, |_, index, _| model(index).im)
     };
     let fit = |length: f64| {
-        let shape: Vec<f64> = (0..loops).map(|i| (-(i as f64) / length).exp()).collect();
-        let level = shape.iter().sum::<f64>() / loops as f64;
-        let energy: f64 = shape.iter().map(|s| (s - level).powi(2)).sum();
-        let amplitude = values.iter().zip(&shape).map(|(v, s)| v * (s - level)).sum::<Complex64>() / energy;
+        let Decay { amplitude, level, energy } = Decay::fit(&values, length);
         (amplitude, centre - amplitude * level, 0.5 * weight * amplitude.norm_sqr() * energy, energy)
     };
     // Longer than half a frame is a slope.
-    let lengths: Vec<f64> = (0..=60).map(|i| 0.5 * (0.5 * loops as f64 / 0.5).powf(f64::from(i) / 60.0)).collect();
+    let lengths: Vec<f64> = Decay::lengths(0.5 * loops as f64).collect();
     let at = (0..lengths.len()).max_by(|&a, &b| fit(lengths[a]).2.total_cmp(&fit(lengths[b]).2))?;
     let mut length = lengths[at];
     let mut width = 0.05 * length;
