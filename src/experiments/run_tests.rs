@@ -116,10 +116,11 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 fn stages_come_out_the_same_in_any_order() {
     let folder = tempfile::tempdir().unwrap();
     let site = folder.path().join("site.toml");
+    let base = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/site_smoke.toml");
     let small = "subjects = ['s1', 's4']\nunseen = ['s4']\nagain = ['s4']\nactions = ['lunge', 'arm_swing']\nrepetitions = 1\n\
         record.frames = 4\nrecord.surface.returns = 'vertices'\nrecord.walls.patch_m = 0.2\n[record.radar]\nsamples_per_chirp = 64\n\
         loops_per_frame = 16";
-    std::fs::write(&site, small).unwrap();
+    std::fs::write(&site, format!("extends = {base:?}\n{small}")).unwrap();
     let text = format!("site = {site:?}\nother_mesh = false\n{}", CONFIG.split("[adaptation]").next().unwrap());
     let config: ReproduceConfig = toml::from_str(&text).unwrap();
     config.check().unwrap();

@@ -9,18 +9,17 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use crate::diagnosis::course::Course;
+use crate::diagnosis::course::{Course, powers};
 use crate::diagnosis::evidence::{Evidence, hann};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{DECIBEL, corrected, fisher_tail};
 use crate::diagnosis::suspects::paths::PATH_LIKE;
+use crate::diagnosis::suspects::paths::product::CLOSE;
 use crate::diagnosis::suspects::region::{Region, remove};
 use crate::diagnosis::suspects::vital::frames::{Frames, frames};
 
 /// What may lie at twice the range: the second trip, and the harmonic.
 const KINDS: [(&str, bool); 2] = [("object_radar_object", false), ("second_harmonic", true)];
-/// Log-likelihood within which two explanations are not told apart.
-const CLOSE: f64 = 4.6;
 /// Range bins to each side of twice the range: the mean range of a body that moves is between bins.
 const ASIDE: usize = 1;
 
@@ -103,14 +102,9 @@ fn pattern(amplitude: &[Complex64], kind: usize) -> Vec<Complex64> {
     amplitude.iter().map(of).collect()
 }
 
-/// 1, e^{jφ}, e^{2jφ} of e^{jφ}.
-fn orders(turned: Complex64) -> [Complex64; 3] {
-    [Complex64::ONE, turned, turned * turned]
-}
-
 /// Complex least squares of values on the first orders.
 fn solve(turned: &[Complex64], values: &[Complex64], count: usize) -> Option<DVector<Complex64>> {
-    let rows = DMatrix::from_fn(turned.len(), count, |i, k| orders(turned[i])[k]);
+    let rows = DMatrix::from_fn(turned.len(), count, |i, k| powers(turned[i])[k]);
     let adjoint = rows.adjoint();
     (&adjoint * &rows).lu().solve(&(adjoint * DVector::from_column_slice(values)))
 }
@@ -124,7 +118,7 @@ fn along(evidence: &Evidence, data: &Frames, course: &Course, bin: usize, kind: 
     };
     let values: Vec<Complex64> = training.iter().map(|&frame| value(frame)).collect();
     let turned: Vec<Complex64> = training.iter().map(|&frame| course.turned[frame]).collect();
-    let (found, without) = (solve(&turned, &values, 3)?, solve(&turned, &values, 2)?);
+    let found = solve(&turned, &values, 3)?;
     // Order 2 beside the lower ones.
     let second: Vec<Complex64> = turned.iter().map(|turned| turned * turned).collect();
     let known = solve(&turned, &second, 2)?;
@@ -132,21 +126,31 @@ fn along(evidence: &Evidence, data: &Frames, course: &Course, bin: usize, kind: 
         turned.iter().zip(&second).map(|(turned, second)| second - known[0] - known[1] * turned).collect();
     let energy: f64 = beside.iter().map(|b| b.norm_sqr()).sum();
     let left = |i: usize, found: &DVector<Complex64>| {
-        values[i] - found.iter().zip(orders(turned[i])).map(|(factor, order)| factor * order).sum::<Complex64>()
+        values[i] - found.iter().zip(powers(turned[i])).map(|(factor, order)| factor * order).sum::<Complex64>()
     };
     let scores: Vec<Complex64> = (0..values.len()).map(|i| left(i, &found) * beside[i].conj()).collect();
     let (variance, freedom) = long_run_variance(&scores);
     let ratio = (found[2].norm() * energy).powi(2) / variance.max(f64::MIN_POSITIVE);
-    let square = |found: &DVector<Complex64>| (0..values.len()).map(|i| left(i, found).norm_sqr()).sum::<f64>();
-    let floor = values.len() as f64 / power;
+    // In all channels over the noise: what is left without order 2, and what the pattern takes of it.
+    let of_channel = |c: usize| Some(left_of_channel(data, training, &turned, c * data.bins + bin)? / data.noise[c]);
+    let before = (0..data.noise.len()).map(of_channel).sum::<Option<f64>>()?;
+    let after = before - found[2].norm_sqr() * energy * power;
+    let floor = (training.len() * data.noise.len()) as f64;
     Some(Along {
         bin,
         kind,
         factor: found[2],
         deviation: (0.5 * variance).sqrt() / energy.max(f64::MIN_POSITIVE),
         p_value: fisher_tail(ratio, 2.0, freedom),
-        gain: 0.5 * freedom * (square(&without).max(floor) / square(&found).max(floor)).ln(),
+        gain: 0.5 * freedom * (before.max(floor) / after.max(floor)).ln(),
     })
+}
+
+/// What a channel holds at a cell beside orders 0 and 1.
+fn left_of_channel(data: &Frames, training: &[usize], turned: &[Complex64], cell: usize) -> Option<f64> {
+    let values: Vec<Complex64> = training.iter().map(|&frame| data.values[frame][cell]).collect();
+    let found = solve(turned, &values, 2)?;
+    Some(values.iter().zip(turned).map(|(value, turned)| (value - found[0] - found[1] * turned).norm_sqr()).sum())
 }
 
 /// Variance of a sum whose terms are correlated in time, and the degrees of freedom that it is known by: Bartlett's kernel with the
@@ -173,7 +177,7 @@ fn held_out_gain(evidence: &Evidence, data: &Frames, course: &Course, bin: usize
         let values: Vec<Complex64> = training.iter().map(|&frame| data.values[frame][cell]).collect();
         let (with, without) = (solve(&turned, &values, 3)?, solve(&turned, &values, 2)?);
         let left = |frame: usize, found: &DVector<Complex64>| {
-            let predicted: Complex64 = found.iter().zip(orders(course.turned[frame])).map(|(factor, order)| factor * order).sum();
+            let predicted: Complex64 = found.iter().zip(powers(course.turned[frame])).map(|(factor, order)| factor * order).sum();
             (data.values[frame][cell] - predicted).norm_sqr()
         };
         let variance = training.iter().map(|&frame| left(frame, &with)).sum::<f64>() / training.len() as f64;
