@@ -196,7 +196,8 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         return None;
     }
     let best = |range: std::ops::Range<usize>| range.max_by(|&a, &b| mean[a].total_cmp(&mean[b]));
-    let peak = best(0..near)?;
+    // A summit: what rises towards farther ranges is the flank of a return there.
+    let peak = best(0..near).filter(|&peak| mean[peak] >= mean[peak + 1])?;
     let valley_end = (2.5 * NEAR_M / bin_m) as usize;
     let valley = (peak..valley_end.min(last)).min_by(|&a, &b| mean[a].total_cmp(&mean[b]))?;
     let far = best(valley..last)?;
@@ -281,4 +282,31 @@ fn near_part(mean: &[f64], end: f64, noise: f64, samples: usize, real: bool) -> 
     };
     let (near, all) = (matrix(&near), matrix(&all));
     Some(near * all.cholesky()?.inverse())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::radar::Radar;
+
+    /// What is said of a return at a range, beside a far one, in all channels.
+    fn said(near_m: f64) -> Vec<Candidate> {
+        let radar = Radar { samples_per_chirp: 128, ..Radar::small(8) };
+        let resolution = radar.range_resolution_m();
+        let evidence = Evidence::in_noise(radar, 4, |[_, channel, _, n]| {
+            let tone = |range_m: f64, level: f64| Complex64::from_polar(level, TAU * range_m / resolution * n as f64 / 128.0);
+            tone(near_m, 50.0 * (1.0 + channel as f64)) + tone(40.0 * resolution, 30.0)
+        });
+        find(&evidence)
+    }
+
+    #[test]
+    fn what_is_near_leaks_and_the_flank_of_what_lies_behind_does_not() {
+        let found = said(0.1);
+        assert_eq!(found.iter().filter_map(|found| found.id).collect::<Vec<_>>(), ["tx_leakage"]);
+        assert!(found[0].gain > 100.0 && found[0].estimates[0].values[0] < 0.2, "{found:?}");
+        assert!(said(NEAR_M + 0.1).is_empty(), "{:?}", said(NEAR_M + 0.1));
+    }
 }
