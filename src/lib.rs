@@ -51,6 +51,7 @@ pub mod recognition;
 pub mod config;
 // the proof on concealed data
 pub mod challenge;
+pub mod catalogue;
 // the paper's tables, from nothing
 pub mod experiments;
 // what the verbs do, without a terminal

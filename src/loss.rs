@@ -1,4 +1,5 @@
-//! The loss: how far two range-Doppler maps are apart in decibels (ℒ of the paper, sec. 3.4 and supplement 8).
+//! The loss: how far two range-Doppler maps are apart in decibels (ℒ of the paper, sec. 3.4 and supplement 8), or how unlikely the
+//! measured one is under the simulated one.
 
 use burn::tensor::{Tensor, TensorCreationOptions};
 use serde::{Deserialize, Serialize};
@@ -30,6 +31,20 @@ pub enum Scale {
     Db,
     /// The amplitude over that of the recording's strongest cell: what the paper's supplement 8 argues against.
     Linear,
+    /// The law of the measured power P: exponential with mean |s|² + N, the simulated power and the noise's, as of a complex Gaussian
+    /// cell. Its deviance P/μ − ln(P/μ) − 1 (Itakura & Saito 1968) hardly weighs what is below the noise.
+    Likelihood,
+}
+
+impl Scale {
+    /// Of the loss.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Db => "dB²",
+            Self::Linear => "squared shares of the strongest cell",
+            Self::Likelihood => "nats a cell",
+        }
+    }
 }
 
 /// Which maps are compared, and down to which level.
@@ -63,6 +78,8 @@ pub struct DbLoss {
     static_removed: bool,
     floor_amplitude: f64,
     clamp_db: Option<f64>,
+    /// Power of a cell for noise of variance 1 in each component of a sample.
+    noise_gain: f64,
 }
 
 impl DbLoss {
@@ -79,6 +96,11 @@ impl DbLoss {
         if let Some(channel) = config.channels.iter().find(|&&channel| channel >= count) {
             return Err(Error::setting("loss.channels", channel, format!("0 to {}: one for each antenna pair", count - 1)));
         }
+        let exact = config.scale == Scale::Likelihood;
+        if exact && (config.static_removed || config.clamp_db.is_some()) {
+            let expected = "neither `static_removed` nor `clamp_db`: the law is that of all cells, with their noise";
+            return Err(Error::setting("loss.scale", "likelihood", expected));
+        }
         if !(peak_amplitude.is_finite() && peak_amplitude > 0.0) {
             return Err(Error::Usage {
                 message: format!("the recording's strongest cell has amplitude {peak_amplitude}, nothing can be learned from it"),
@@ -94,6 +116,7 @@ impl DbLoss {
             static_removed: config.static_removed,
             floor_amplitude: heatmap.floor_amplitude(peak_amplitude),
             clamp_db: config.clamp_db.map(|clamp| 20.0 * peak_amplitude.log10() + clamp),
+            noise_gain: heatmap.noise_gain(radar),
         })
     }
 
@@ -101,7 +124,12 @@ impl DbLoss {
         &self.transform
     }
 
-    /// The maps that are compared, in decibels; with the linear scale, in amplitudes of the strongest cell.
+    /// Whether the simulation is compared as it is before noise: the noise's power is then an argument of [`Self::deviance`].
+    pub fn is_likelihood(&self) -> bool {
+        self.scale == Scale::Likelihood
+    }
+
+    /// The maps that are compared, in decibels; with the linear scale, in amplitudes of the strongest cell; with the likelihood, ln(power).
     ///
     /// # Shapes
     /// - `signal`: `[frame, tx, rx, loop, sample]`; noise already added
@@ -110,22 +138,10 @@ impl DbLoss {
     /// # Gradient
     /// Flows to `signal`; smooth except at `clamp_db`, below which it is zero.
     pub fn maps_db(&self, signal: Complex<5>) -> Tensor<3> {
-        let [frames, transmitters, receivers, loops, samples] = signal.dims();
-        let count = transmitters * receivers;
-        let mut signal = signal.reshape([frames, count, loops, samples]);
-        if self.channels.len() < count {
-            let chosen = self.channels.iter().map(|&channel| signal.clone().narrow(1, channel, 1)).collect();
-            signal = Complex::cat(chosen, 1);
+        let power = self.power(signal);
+        if self.scale == Scale::Likelihood {
+            return (power + self.floor_amplitude.powi(2).max(LEAST_POWER)).log();
         }
-        if self.static_removed {
-            signal = remove_loop_mean(signal);
-        }
-        let power = self.transform.map(signal).power();
-        let [_, chosen, doppler, range] = power.dims();
-        let power = match self.combine {
-            Combine::Each => power.reshape([frames * chosen, doppler, range]),
-            Combine::Mean => power.mean_dim(1).reshape([frames, doppler, range]),
-        };
         if self.scale == Scale::Linear {
             // The floor keeps the root's gradient finite where there is nothing; a clamp's level is a share of the peak, too.
             let amplitude = ((power + self.floor_amplitude.powi(2)).sqrt()) / self.peak_amplitude;
@@ -141,6 +157,26 @@ impl DbLoss {
         }
     }
 
+    /// `[map, doppler, range]` of `[frame, tx, rx, loop, sample]`.
+    fn power(&self, signal: Complex<5>) -> Tensor<3> {
+        let [frames, transmitters, receivers, loops, samples] = signal.dims();
+        let count = transmitters * receivers;
+        let mut signal = signal.reshape([frames, count, loops, samples]);
+        if self.channels.len() < count {
+            let chosen = self.channels.iter().map(|&channel| signal.clone().narrow(1, channel, 1)).collect();
+            signal = Complex::cat(chosen, 1);
+        }
+        if self.static_removed {
+            signal = remove_loop_mean(signal);
+        }
+        let power = self.transform.map(signal).power();
+        let [_, chosen, doppler, range] = power.dims();
+        match self.combine {
+            Combine::Each => power.reshape([frames * chosen, doppler, range]),
+            Combine::Mean => power.mean_dim(1).reshape([frames, doppler, range]),
+        }
+    }
+
     /// ℒ: mean squared difference over all cells, dB²; with the linear scale, without a unit.
     ///
     /// # Shapes
@@ -152,7 +188,29 @@ impl DbLoss {
     pub fn loss(&self, simulated: Complex<5>, measured_db: Tensor<3>) -> Tensor<1> {
         mean_squared_db(self.maps_db(simulated), measured_db)
     }
+
+    /// Mean deviance of the measured power under an exponential law with mean |simulated|² + noise, nats a cell: its gradient is that of
+    /// the negative log-likelihood.
+    ///
+    /// # Shapes
+    /// - `clean`: `[frame, tx, rx, loop, sample]`, without noise
+    /// - `variance`: `[1]`, of each component of the noise in a sample; `None` without noise
+    /// - `measured`: [`Self::maps_db`] of the recording's same frames, a constant of training
+    ///
+    /// # Gradient
+    /// Flows to `clean` and to `variance`.
+    pub fn deviance(&self, clean: Complex<5>, variance: Option<Tensor<1>>, measured: Tensor<3>) -> Tensor<1> {
+        let mut power = self.power(clean) + self.floor_amplitude.powi(2).max(LEAST_POWER);
+        if let Some(variance) = variance {
+            power = power + (variance * self.noise_gain).reshape([1, 1, 1]);
+        }
+        let ratio = measured - power.log();
+        (ratio.clone().exp() - ratio - 1.0).mean()
+    }
 }
+
+/// Far below any signal, and still a normal f32.
+const LEAST_POWER: f64 = 1e-36;
 
 /// Mean squared difference of two maps of decibels, dB².
 ///
@@ -230,6 +288,50 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn the_likelihood_finds_a_level_in_speckle_and_noise_where_decibels_do_not() {
+        let device = Device::flex();
+        let dims = [1, 1, 1, 64, 64];
+        let radar = Radar { loops_per_frame: 64, samples_per_chirp: 64, tx_m: vec![[0.0; 3]], rx_m: vec![[0.0; 3]], ..radar() };
+        let draw = |seed: u64, scale: f64| {
+            let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+            let values =
+                (0..4096).map(|_| scale * rand_distr::Distribution::<f64>::sample(&rand_distr::StandardNormal, &mut random));
+            let values: Vec<f64> = values.collect();
+            Tensor::<5>::from_data(TensorData::new(values, dims), (&device, DType::F64))
+        };
+        // Signal and noise of equal power; the same law simulates a level that is not known.
+        let measured = Complex::new(draw(1, 2f64.sqrt()), draw(2, 2f64.sqrt()));
+        let best = |value: &dyn Fn(f64) -> f64| {
+            let levels: Vec<f64> = (-60..=60).map(|step| f64::from(step) / 10.0).collect();
+            levels.into_iter().min_by(|a, b| value(*a).total_cmp(&value(*b))).unwrap()
+        };
+        let silent = || Complex::new(draw(3, 0.0), draw(3, 0.0));
+        let scale = |level_db: f64| 10f64.powf(level_db / 20.0);
+        let of = |scale: Scale| {
+            let config = LossConfig { scale, ..Default::default() };
+            DbLoss::new(&radar, &HeatmapConfig::default(), &config, 100.0, (&device, DType::F64)).unwrap()
+        };
+        let exact = of(Scale::Likelihood);
+        let maps = exact.maps_db(measured.clone());
+        let variance =
+            |level_db: f64| Tensor::<1>::from_data(TensorData::from([2.0 * scale(level_db).powi(2)]), (&device, DType::F64));
+        let found = best(&|level| exact.deviance(silent(), Some(variance(level)), maps.clone()).into_scalar::<f64>());
+        assert!(found.abs() < 0.2, "{found} dB");
+        // The mean of the decibels of an exponential is 2.5 dB below those of its mean: Euler's constant in dB.
+        let decibels = of(Scale::Db);
+        let expected = decibels.maps_db(measured).mean().into_scalar::<f64>()
+            - 10.0 * (2.0 * HeatmapConfig::default().noise_gain(&radar)).log10();
+        assert!((expected + 2.5).abs() < 0.2, "{expected} dB");
+    }
+
+    #[test]
+    fn the_likelihood_is_of_all_cells() {
+        let config = LossConfig { scale: Scale::Likelihood, static_removed: true, ..Default::default() };
+        let error = DbLoss::new(&radar(), &HeatmapConfig::default(), &config, 1.0, &Device::flex()).unwrap_err();
+        assert!(error.to_string().contains("static_removed"), "{error}");
+    }
+
+    #[test]
     fn antennas_are_chosen_and_averaged_as_the_settings_say() {
         let device = Device::flex();
         let dims = |config: LossConfig| loss(&config, &device).maps_db(signal(1, &device)).dims();
@@ -256,12 +358,21 @@ pub(crate) mod tests {
             LossConfig { combine: Combine::Mean, channels: vec![1, 2], ..Default::default() },
             LossConfig { clamp_db: Some(-15.0), static_removed: true, ..Default::default() },
             LossConfig { scale: Scale::Linear, ..Default::default() },
+            LossConfig { scale: Scale::Likelihood, ..Default::default() },
         ];
         for config in settings {
             let loss = loss(&config, &device);
             let measured = loss.maps_db(signal(2, &device)).detach();
             let start = noise(1);
-            let value = |re: Tensor<5>| loss.loss(Complex::new(re, tensor(noise(101), &device)), measured.clone());
+            let value = |re: Tensor<5>| {
+                let simulated = Complex::new(re.clone(), tensor(noise(101), &device));
+                // The noise's level may follow the signal.
+                let variance = (re.clone() * re).mean() * 0.1;
+                match loss.is_likelihood() {
+                    true => loss.deviance(simulated, Some(variance), measured.clone()),
+                    false => loss.loss(simulated, measured.clone()),
+                }
+            };
             let tracked = tensor(start.clone(), &device).require_grad();
             let gradients = value(tracked.clone()).backward();
             let found: Vec<f64> = tracked.grad(&gradients).unwrap().into_data().iter::<f64>().collect();

@@ -33,7 +33,7 @@ const FLOORS: [&[&str]; 31] = [
     &["recognition"],
     &["config"],
     &["challenge"],
-    &["experiments"],
+    &["experiments", "catalogue"],
     &["verbs"],
     &["cli"],
 ];

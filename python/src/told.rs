@@ -62,7 +62,7 @@ fn of_stage(event: &Stage<'_>) -> Vec<Message> {
 fn of_training(event: &Event) -> Vec<Message> {
     match event {
         Event::Refined(pose) => vec![Message::Line(pose.line())],
-        Event::Started { steps, first_step, training_frames, validation_frames } => vec![
+        Event::Started { steps, first_step, training_frames, validation_frames, .. } => vec![
             Message::Begun { what: "training".into(), steps: *steps },
             Message::Line(format!("{training_frames} frames to train on, {validation_frames} held out")),
             Message::Done(*first_step),

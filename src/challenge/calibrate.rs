@@ -98,7 +98,7 @@ impl Source {
         )];
         if recording.room.is_none() {
             notes.push(
-                "it states no room: static returns are those of a room within its farthest range, of which nothing is told"
+                "it states no room: static returns are those of walls within its farthest range, which the diagnosis is not given"
                     .into(),
             );
         }
@@ -145,18 +145,18 @@ fn structure(world: &World, room: bool) -> Structure {
     Structure { radar, room, person: world.person.is_some() }
 }
 
-/// The recorder's default room, made smaller where the radar does not reach its corners.
+/// The recorder's default room as far as the radar sees it; where it sees none of it, a wall ahead within its farthest range.
 fn unstated(max_range_m: f64) -> Room {
     let RecorderConfig { room, .. } = RecorderConfig { radar: RadarChoice::Preset("small".into()), ..RecorderConfig::default() };
-    let factor = (WITHIN * max_range_m / room.farthest_m().unwrap_or(max_range_m)).min(1.0);
-    let smaller = |distance: Option<f64>| distance.map(|distance| factor * distance);
+    let farthest = WITHIN * max_range_m;
+    let seen = |distance: Option<f64>| distance.filter(|distance| *distance <= farthest);
     Room {
-        left_m: smaller(room.left_m),
-        right_m: smaller(room.right_m),
-        front_m: smaller(room.front_m),
-        back_m: smaller(room.back_m),
-        floor_m: smaller(room.floor_m),
-        ceiling_m: smaller(room.ceiling_m),
+        left_m: seen(room.left_m),
+        right_m: seen(room.right_m),
+        front_m: room.front_m.map(|front| front.min(farthest)),
+        back_m: seen(room.back_m),
+        floor_m: seen(room.floor_m),
+        ceiling_m: seen(room.ceiling_m),
     }
 }
 

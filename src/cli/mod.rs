@@ -16,6 +16,7 @@ macro_rules! remark {
 mod align;
 mod baseline;
 mod calibrate;
+mod catalogue;
 mod challenge;
 mod check;
 mod compare;
@@ -36,6 +37,7 @@ mod record;
 mod reproduce;
 mod salt;
 mod scores;
+mod shell;
 mod site;
 mod train;
 
@@ -182,6 +184,17 @@ enum Command {
     /// trains classifiers on it. Stages are kept under the hash of all that they depend on: a run that was killed, or
     /// whose config has changed, does only what is missing. Leaves results.md, results.json and adaptation.png.
     Reproduce(reproduce::Arguments),
+    /// List the effects that the library knows, or describe one
+    ///
+    /// What it is, its equation and parameters, its look-alikes and how to separate it from them. With --out, a page an effect
+    /// with the picture of its signature.
+    Effects(catalogue::Arguments),
+    /// Print completions for a shell
+    ///
+    /// bash: hybridsim completions bash > ~/.local/share/bash-completion/completions/hybridsim
+    Completions(shell::Completions),
+    /// Write man pages
+    Man(shell::Man),
 }
 
 /// Where results go.
@@ -218,6 +231,9 @@ pub fn main() -> ExitCode {
         Command::Diagnose(arguments) => diagnose::run(arguments, &cli.common),
         Command::Challenge(arguments) => challenge::run(arguments, &cli.common),
         Command::Reproduce(arguments) => reproduce::run(arguments, &cli.common),
+        Command::Effects(arguments) => catalogue::run(arguments, &cli.common),
+        Command::Completions(arguments) => shell::completions(arguments),
+        Command::Man(arguments) => shell::man(arguments),
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -246,13 +262,18 @@ fn show_usage(error: &clap::Error) {
 /// changing some would change nothing.
 fn refuse_idle_settings(cli: &Cli) -> Result<()> {
     std::env::args_os().skip(1).try_for_each(files::utf8)?;
-    match cli.command {
-        Command::Infer(_) | Command::Evaluate(_) if !cli.common.set.is_empty() => Err(Error::Usage {
-            message: "--set: a checkpoint keeps the settings it was trained with".into(),
-            hint: Some("give --set to train or record".into()),
-        }),
-        _ => Ok(()),
-    }
+    let (message, hint) = match cli.command {
+        _ if cli.common.set.is_empty() => return Ok(()),
+        Command::Infer(_) | Command::Evaluate(_) => {
+            ("--set: a checkpoint keeps the settings it was trained with", "give --set to train or record")
+        }
+        Command::Align(_) => ("--set: align has no settings", "`hybridsim align --help` lists its options"),
+        Command::Effects(_) | Command::Completions(_) | Command::Man(_) => {
+            ("--set: this verb reads no settings", "leave --set out")
+        }
+        _ => return Ok(()),
+    };
+    Err(Error::Usage { message: message.into(), hint: Some(hint.into()) })
 }
 
 /// 1: the work failed; 2: what was asked for cannot be done as asked.

@@ -54,12 +54,14 @@ impl Progress {
 /// Shows the events of a training run.
 pub struct TrainingProgress {
     progress: Option<Progress>,
+    /// Of the loss.
+    unit: &'static str,
     quiet: bool,
 }
 
 impl TrainingProgress {
     pub fn new(quiet: bool) -> Self {
-        Self { progress: None, quiet }
+        Self { progress: None, unit: "", quiet }
     }
 
     pub fn show(&mut self, event: &Event) {
@@ -69,7 +71,8 @@ impl TrainingProgress {
                     remark!("{}", pose.line());
                 }
             }
-            Event::Started { steps, first_step, training_frames, validation_frames } => {
+            Event::Started { steps, first_step, training_frames, validation_frames, unit } => {
+                self.unit = unit;
                 let progress = Progress::new("training", *steps, self.quiet);
                 progress.line(&format!("{training_frames} frames to train on, {validation_frames} held out"));
                 if *first_step > 0 {
@@ -81,13 +84,19 @@ impl TrainingProgress {
             Event::Step { step, loss, .. } => {
                 if let Some(progress) = &self.progress {
                     progress.set(*step);
-                    progress.message(format!("loss {loss:.2} dB^2"));
+                    progress.message(format!("loss {loss:.2} {}", self.unit));
                 }
             }
             Event::Epoch(metrics) => {
                 if let Some(progress) = &self.progress {
-                    let held_out = metrics.validation_loss.map_or(String::new(), |loss| format!(", held out {loss:.2} dB^2"));
-                    progress.line(&format!("epoch {}: loss {:.2} dB^2{held_out}", metrics.epoch + 1, metrics.training_loss));
+                    let held_out =
+                        metrics.validation_loss.map_or(String::new(), |loss| format!(", held out {loss:.2} {}", self.unit));
+                    progress.line(&format!(
+                        "epoch {}: loss {:.2} {}{held_out}",
+                        metrics.epoch + 1,
+                        metrics.training_loss,
+                        self.unit
+                    ));
                 }
             }
             Event::Saved(_) => {}

@@ -184,7 +184,7 @@ impl Loaded {
 }
 
 /// The analytic signal of real chirps.
-fn analytic(values: &[f32], samples: usize) -> Vec<Complex64> {
+pub(super) fn analytic(values: &[f32], samples: usize) -> Vec<Complex64> {
     let mut planner = FftPlanner::new();
     let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
     let mut signal: Vec<Complex64> = values.iter().map(|&value| Complex64::from(f64::from(value))).collect();

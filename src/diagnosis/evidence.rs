@@ -1,6 +1,7 @@
 //! A recording as far as it is explained so far, and what every suspect needs of it.
 
 use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use num_complex::Complex64;
@@ -9,6 +10,8 @@ use rustfft::{Fft, FftDirection, FftPlanner};
 
 use super::codes::{self, Component};
 use super::course::Course;
+#[cfg(test)]
+use super::cube;
 use super::cube::{Cube, Loaded, Split};
 use super::denoised;
 use super::finding::{Undo, Volume};
@@ -103,6 +106,14 @@ impl Evidence {
         if self.is_real() { samples / 2 } else { samples }
     }
 
+    /// Beat frequencies in which white noise is circular and has the same variance in each. Without quadrature, zero and half of the
+    /// sample rate are their own images: there and in the windows' lobes beside them, an analytic signal holds less noise, and what it
+    /// holds is mirrored over the velocity.
+    pub fn noise_bins(&self) -> Range<usize> {
+        let bins = self.range_bins();
+        if self.is_real() { HANN_LOBE.min(bins)..bins.saturating_sub(1).max(HANN_LOBE.min(bins)) } else { 0..bins }
+    }
+
     /// Mean over all chirps of the training frames, `[tx · rx, sample]`: what stands still.
     pub fn still(&self) -> &[Complex64] {
         self.still.get_or_init(|| self.cube.still(&self.split.training))
@@ -122,12 +133,12 @@ impl Evidence {
                         .iter()
                         .flat_map(|&frame| {
                             let map = self.range_doppler(frame, channel);
-                            let bins = self.range_bins();
+                            let bins = self.noise_bins();
                             let samples = self.cube.dims[4];
                             // Neighbours of the zero Doppler hold what the mean could not remove.
                             (0..loops)
                                 .filter(move |&doppler| doppler.min(loops - doppler) > 2 || loops < 8)
-                                .flat_map(move |doppler| (0..bins).map(move |range| doppler * samples + range))
+                                .flat_map(move |doppler| bins.clone().map(move |range| doppler * samples + range))
                                 .map(move |cell| map[cell].norm_sqr())
                                 .collect::<Vec<_>>()
                         })
@@ -242,7 +253,8 @@ impl Evidence {
 
 #[cfg(test)]
 impl Evidence {
-    /// What `signal` says of frame, channel, loop and sample, in white noise of variance 2: for tests.
+    /// What `signal` says of frame, channel, loop and sample, in white noise of variance 2 (the real part alone, where the radar has no
+    /// quadrature): for tests.
     pub fn in_noise(radar: Radar, seed: u64, signal: impl Fn([usize; 4]) -> Complex64) -> Self {
         use rand::SeedableRng;
         use rand_distr::{Distribution, StandardNormal};
@@ -253,7 +265,11 @@ impl Evidence {
             let chirp = i / samples;
             [chirp / (loops * tx * rx), chirp / loops % (tx * rx), chirp % loops, i % samples]
         });
-        let all = places.map(|place| signal(place) + Complex64::new(normal(), normal())).collect();
+        let all: Vec<Complex64> = places.map(|place| signal(place) + Complex64::new(normal(), normal())).collect();
+        let all = match radar.sampling {
+            Sampling::Complex => all,
+            Sampling::Real => cube::analytic(&all.iter().map(|value| value.re as f32).collect::<Vec<f32>>(), samples),
+        };
         Self::new(Loaded::of_samples(radar, all, [-1e3, 1e3]), None, None)
     }
 }

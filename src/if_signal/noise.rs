@@ -108,7 +108,27 @@ impl Noise {
         }
     }
 
-    /// The signal with noise. Its mean amplitude is taken over all of the given tensor: give one frame.
+    /// σ of each component under a signal, `[1]`; `None` without noise. The signal's mean amplitude is taken over all of the given
+    /// tensor: give one frame.
+    ///
+    /// # Gradient
+    /// Flows to the signal through its mean amplitude, and to the learned rate or level.
+    pub fn deviation<const D: usize>(&self, signal: &Complex<D>) -> Option<Tensor<1>> {
+        let dtype = signal.re.dtype();
+        match self.law {
+            NoiseLaw::None => None,
+            NoiseLaw::Constant => Some(match &self.log_level {
+                Some(log_level) => log_level.val().exp().cast(dtype),
+                None => Tensor::from_data(TensorData::from([self.level]).convert_dtype(dtype), (&signal.device(), dtype)),
+            }),
+            NoiseLaw::Learned | NoiseLaw::Fixed => {
+                let rate = self.rate(&signal.device()).expect("this law has a rate").cast(dtype);
+                Some(rate * mean_amplitude(signal.clone()))
+            }
+        }
+    }
+
+    /// The signal with noise of [`Self::deviation`].
     ///
     /// # Shapes
     /// signal and normals (standard, from [`normals`]) alike; any axes.
@@ -117,18 +137,10 @@ impl Noise {
     /// Flows to the signal, also through its mean amplitude, and to the learned rate.
     pub fn add_to<const D: usize>(&self, signal: Complex<D>, normals: Complex<D>) -> Complex<D> {
         assert_eq!(signal.dims(), normals.dims(), "noise: signal {:?}, normals {:?}", signal.dims(), normals.dims());
-        match self.law {
-            NoiseLaw::None => signal,
-            NoiseLaw::Constant => match &self.log_level {
-                Some(log_level) => {
-                    let deviation = log_level.val().exp().cast(signal.re.dtype()).reshape([1; D]);
-                    signal.add(Complex::new(normals.re * deviation.clone(), normals.im * deviation))
-                }
-                None => signal.add(normals.scale_by(self.level)),
-            },
-            NoiseLaw::Learned | NoiseLaw::Fixed => {
-                let rate = self.rate(&signal.device()).expect("this law has a rate").cast(signal.re.dtype());
-                let deviation = (rate * mean_amplitude(signal.clone())).reshape([1; D]);
+        match self.deviation(&signal) {
+            None => signal,
+            Some(deviation) => {
+                let deviation = deviation.reshape([1; D]);
                 signal.add(Complex::new(normals.re * deviation.clone(), normals.im * deviation))
             }
         }

@@ -40,6 +40,8 @@ impl Grid<'_> {
         let (columns, rows) = (self.columns.len() as u32, self.rows.len() as u32);
         let size = (NAMES + columns * (CELL.0 + GAP) + BAR, TITLE + HEADS + rows * (CELL.1 + GAP) + FOOT);
         let colours = Colours::between(self.low, self.high);
+        // Axes that all rows share are said once.
+        let alike = maps.iter().all(|row| axes(&row[0]) == axes(&maps[0][0]));
         save(path, size, |area| {
             let area = under(area, self.title, 26, TITLE)?;
             for (column, name) in self.columns.iter().enumerate() {
@@ -49,7 +51,13 @@ impl Grid<'_> {
             }
             for (row, (name, maps)) in self.rows.iter().zip(maps).enumerate() {
                 let y = HEADS + row as u32 * (CELL.1 + GAP);
-                area.draw_text(name, &letters(18), (8, (y + CELL.1 / 2) as i32 - 9))?;
+                let middle = (y + CELL.1 / 2) as i32;
+                area.draw_text(name, &letters(18), (8, middle - 9))?;
+                if !alike {
+                    let [right, up] = axes(&maps[0]);
+                    area.draw_text(&format!("right: {right}"), &letters(15), (8, middle + 16))?;
+                    area.draw_text(&format!("up: {up}"), &letters(15), (8, middle + 34))?;
+                }
                 for (column, map) in maps.iter().enumerate() {
                     let x = NAMES + column as u32 * (CELL.0 + GAP);
                     draw_cell(&area.clone().shrink((x, y), CELL), map, &colours)?;
@@ -59,12 +67,19 @@ impl Grid<'_> {
                 let height = (rows * (CELL.1 + GAP)).min(2 * (CELL.1 + GAP));
                 draw_bar(&area.clone().shrink((size.0 - BAR, HEADS), (BAR, height)), unit, &colours)?;
             }
-            let (right, up) = (span(&maps[0][0].columns), span(&maps[0][0].rows));
-            let y = (HEADS + rows * (CELL.1 + GAP)) as i32 + 6;
-            area.draw_text(&format!("to the right: {right}; upwards: {up}"), &letters(17), (NAMES as i32, y))?;
+            if alike {
+                let [right, up] = axes(&maps[0][0]);
+                let y = (HEADS + rows * (CELL.1 + GAP)) as i32 + 6;
+                area.draw_text(&format!("to the right: {right}; upwards: {up}"), &letters(17), (NAMES as i32, y))?;
+            }
             Ok(())
         })
     }
+}
+
+/// To the right, and upwards.
+fn axes(map: &Map) -> [String; 2] {
+    [span(&map.columns), span(&map.rows)]
 }
 
 fn span(axis: &Axis) -> String {

@@ -211,6 +211,12 @@ impl Simulator {
         self.noise.add_to(clean, normals)
     }
 
+    /// σ² of each component of the noise that [`Self::with_noise`] adds to a frame, `[1]`, with gradients; `None` without noise. What an
+    /// effect makes of the noise's spectrum is left out.
+    pub fn noise_variance(&self, clean: &Complex<4>) -> Option<Tensor<1>> {
+        self.noise.deviation(clean).map(|deviation| deviation.clone() * deviation)
+    }
+
     /// σ of the noise over the signal's mean amplitude; `None` for a law without a rate.
     pub fn noise_rate(&self) -> Option<f64> {
         Some(f64::from(self.noise.rate(&self.device())?.into_scalar::<f32>()))

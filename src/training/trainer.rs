@@ -36,6 +36,8 @@ pub enum Event {
         first_step: usize,
         training_frames: usize,
         validation_frames: usize,
+        /// Of the loss.
+        unit: &'static str,
     },
     /// `gradient`: the largest absolute derivative of the loss by any number that learns, before clipping.
     Step {
@@ -205,6 +207,7 @@ impl Trainer<'_> {
             first_step: progress.steps_done,
             training_frames: split.training.len(),
             validation_frames: split.validation.len(),
+            unit: self.config.loss.scale.unit(),
         });
         for epoch in progress.epochs_done..self.config.epochs {
             let without_better = epoch.saturating_sub(progress.best_epoch + 1);
@@ -365,7 +368,7 @@ impl Trainer<'_> {
         Ok((GradientsParams::from_module(&mut gradients, simulator), value))
     }
 
-    /// Sum over frames, dB².
+    /// Sum over frames, dB²; with the likelihood, nats a cell.
     fn summed_loss(
         &self,
         simulator: &Simulator,
@@ -383,9 +386,14 @@ impl Trainer<'_> {
             for (FrameId { frame, .. }, seed) in frames {
                 let view = recording.scene.view(*frame)?;
                 let clean = simulator.clean_signal(&recording.scene, &view, &surfaces);
-                let signal = simulator.with_noise(&recording.scene.radar, clean, *seed);
                 let measured = loss.maps_db(one_frame(recording.target(*frame, device)?));
-                let value = loss.loss(one_frame(signal), measured);
+                let value = if loss.is_likelihood() {
+                    let variance = simulator.noise_variance(&clean);
+                    loss.deviance(one_frame(clean), variance, measured)
+                } else {
+                    let signal = simulator.with_noise(&recording.scene.radar, clean, *seed);
+                    loss.loss(one_frame(signal), measured)
+                };
                 sum = Some(match sum {
                     Some(sum) => sum + value,
                     None => value,

@@ -129,7 +129,7 @@ impl RunReport<'_> {
         let chart = Chart {
             title: "Loss".into(),
             x_label: "epoch".into(),
-            y_label: "mean squared difference (dB²)".into(),
+            y_label: format!("loss ({})", self.config.training.loss.scale.unit()),
             series: vec![
                 series("training", &|metrics| Some(metrics.training_loss)),
                 series("held out", &|metrics| metrics.validation_loss),
@@ -163,8 +163,9 @@ impl RunReport<'_> {
     fn write_report(&self, evaluations: &[(PathBuf, Evaluation)], held_out: bool) -> Result<()> {
         let history = &self.progress.history;
         let (first, best) = (&history[0], &history[self.progress.best_epoch]);
+        let unit = self.config.training.loss.scale.unit();
         let mut text = format!(
-            "# Training run\n\n{} epochs; the best was epoch {}: loss {:.2} dB² after {:.2} dB² in the first{}.\n\n",
+            "# Training run\n\n{} epochs; the best was epoch {}: loss {:.2} after {:.2} {unit} in the first{}.\n\n",
             self.progress.epochs_done,
             best.epoch + 1,
             best.score(),

@@ -26,7 +26,7 @@ impl Residual {
         if frames == 0 || size == 0 {
             return None;
         }
-        let (maps, model) = (evidence.maps(), evidence.power());
+        let (maps, model, noise_bins) = (evidence.maps(), evidence.power(), evidence.noise_bins());
         let channels = evidence.cube.channels() as f32;
         let (mut ratio, mut count) = (maps.to_vec(), vec![0.0; maps.len()]);
         for frame in 0..frames {
@@ -36,7 +36,7 @@ impl Residual {
                 let (doppler, range) = (cell / samples, cell % samples);
                 let at = frame * size + cell;
                 let still = loops >= 8 && doppler.min(loops - doppler) <= STILL_BINS;
-                if range >= bins || still || !ratio[at].is_finite() {
+                if !noise_bins.contains(&range) || still || !ratio[at].is_finite() {
                     ratio[at] = 1.0;
                     continue;
                 }

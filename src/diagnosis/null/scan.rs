@@ -235,8 +235,9 @@ impl Cells {
 fn expected(evidence: &Evidence, frame: usize, doppler: usize, cell: usize) -> f32 {
     let loops = evidence.cube.dims[3];
     let still = loops < FEWEST_LOOPS || doppler.min(loops - doppler) <= STILL_BINS;
+    let range = cell % evidence.cube.dims[4];
     match evidence.power() {
-        _ if still => 0.0,
+        _ if still || !evidence.noise_bins().contains(&range) => 0.0,
         Some(model) if model.support(frame)[cell] => 0.0,
         Some(model) => model.expected(frame)[cell],
         None => 1.0,
@@ -265,7 +266,7 @@ mod tests {
 
     use super::*;
     use crate::diagnosis::statistics::uniform_chance;
-    use crate::radar::Radar;
+    use crate::radar::{Radar, Sampling};
 
     fn radar(loops: usize) -> Radar {
         Radar { samples_per_chirp: 32, loops_per_frame: loops, ..Radar::mmmesh(6) }
@@ -287,6 +288,14 @@ mod tests {
         }
         // 17 dB below the noise of a sample.
         assert!(chances(7, 0.2).all < 1e-6, "{:?}", chances(7, 0.2));
+    }
+
+    #[test]
+    fn chances_are_uniform_without_quadrature() {
+        let real = Radar { sampling: Sampling::Real, frames: 60, ..radar(16) };
+        let nulls = (0..60).map(|seed| scan(&Evidence::in_noise(real.clone(), seed, |_| Complex64::ZERO), 1).unwrap().all);
+        let values: Vec<f64> = nulls.collect();
+        assert!(uniform_chance(&values) > 0.02, "{values:?}");
     }
 
     #[test]

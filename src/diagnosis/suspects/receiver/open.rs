@@ -28,6 +28,9 @@ const ZERO_PADDING: usize = 4;
 /// Noise, over the signal, that keeps a covariance well conditioned where a recording has none.
 const LEAST_NOISE: f64 = 1e-9;
 
+/// Level of the test that what is near differs between the channels as reflectors do; customary (Fisher 1925).
+const TELLING: f64 = 0.05;
+
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if ranges_m(evidence).is_some() && !evidence.is_real() || evidence.cube.dims[4] < 16 {
         return vec![];
@@ -213,6 +216,11 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         decibels(high / low.max(1e-300))
     };
     let (near_spread, far_spread) = (spread(peak), spread(far));
+    // Channels differ at a cell where several reflectors interfere, too: what leaks differs more than they do.
+    let reflectors = (valley + 1..last - 1)
+        .filter(|&bin| mean[bin] > mean[bin - 1] && mean[bin] >= mean[bin + 1] && decibels(mean[bin] / white.max(1e-300)) >= 20.0)
+        .map(spread);
+    let as_reflectors = rank_chance(near_spread, reflectors);
     let range = (peak as f64 * bin_m).max(0.0);
     let end = valley as f64 / ZERO_PADDING as f64;
     let part = near_part(&mean, end, white, samples, evidence.is_real())?;
@@ -234,9 +242,8 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         p_value: chi2_tail(2.0 * over_noise * channels as f64, 2.0 * channels as f64),
         gain: gain(evidence, &term),
         errs_alike: false,
-        // A still reflector is seen alike by neighbouring receivers.
         look_alikes: [
-            (near_spread <= far_spread + 3.0, "static_reflector"),
+            (as_reflectors > TELLING, "static_reflector"),
             (!evidence.is_real() && beat.may_be_constant() && !beat.may_be_leakage(), "dc_offset"),
         ]
         .into_iter()
@@ -253,6 +260,12 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * loops) as f64,
         correction: subtract(term),
     })
+}
+
+/// Of a value as large among others of its law: (1 + those as large) / (1 + all) (Phipson & Smyth 2010).
+fn rank_chance(value: f64, others: impl Iterator<Item = f64>) -> f64 {
+    let (as_large, all) = others.fold((1.0, 1.0), |(large, all), other| (large + f64::from(u8::from(other >= value)), all + 1.0));
+    as_large / all
 }
 
 /// The part of a still chirp that comes from beat frequencies below `end` (bins), as a matrix on its samples: every beat frequency has a

@@ -1,0 +1,153 @@
+//! What an effect does to a recording: the same scene without it, with it, and the difference.
+
+use std::path::Path;
+
+use num_complex::Complex32;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
+
+use crate::challenge::library::{Surroundings, graded};
+use crate::data::IfFrame;
+use crate::effects::{EffectInfo, EffectSetting};
+use crate::error::Result;
+use crate::heatmap::{Analysis, Gate, HeatmapConfig, Map, Samples};
+use crate::pictures::Grid;
+use crate::radar::Radar;
+use crate::recorder::effects::listed;
+use crate::recorder::{RadarChoice, Recorder, RecorderConfig, World};
+
+/// Of the scene and of what the effect draws.
+const SEED: u64 = 7;
+/// Below the strongest cell, dB; the noise of the scene lies some 70 dB below its walls.
+const DEPTH_DB: f64 = 80.0;
+
+/// Pictures and settings of a planted effect.
+pub(super) struct Signature {
+    title: String,
+    /// Without, with, and the power of the difference: range and velocity of the middle frame; time and velocity.
+    maps: [Vec<Map>; 2],
+    /// Of the plant, as truth.json has them.
+    settings: Value,
+}
+
+impl Signature {
+    /// None where the recorder has no such effect.
+    ///
+    /// # Errors
+    /// What the recorder refuses.
+    pub(super) fn of(info: &EffectInfo) -> Result<Option<Self>> {
+        let Some(graded) = graded(info.id) else {
+            return Ok(None);
+        };
+        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 32, ..Radar::small(24) };
+        let config = RecorderConfig { radar: RadarChoice::Full(Box::new(radar)), seed: SEED, ..RecorderConfig::default() };
+        let clean = config.world(Path::new(""))?;
+        let at = Surroundings {
+            room: clean.room.clone(),
+            distance_m: config.person.distance_m,
+            frames: clean.radar.frames,
+            receivers: clean.radar.rx_m.len(),
+            max_range_m: clean.radar.max_range_m(),
+            sample_rate_hz: clean.radar.sample_rate_hz,
+        };
+        let mut planted = clean.clone();
+        (graded.add)(&mut planted.effects, graded.strength(1.0), &at, &mut ChaCha8Rng::seed_from_u64(SEED));
+        planted.check()?;
+        let (without, with) = (Recording::of(&clean)?, Recording::of(&planted)?);
+        let columns = [without.samples.clone(), with.samples.clone(), without.difference(&with)];
+        let analysis = Analysis::new(&clean.radar, &HeatmapConfig::default());
+        let middle: Vec<Map> =
+            columns.iter().map(|samples| analysis.range_doppler(without.shaped(samples).frame(clean.radar.frames / 2))).collect();
+        let over_time = columns.iter().map(|samples| analysis.time_doppler(without.shaped(samples), &Gate::default())).collect();
+        let maps = [middle, over_time].map(relative);
+        let settings = listed(&planted).into_iter().next().unwrap_or_default();
+        Ok(Some(Self { title: info.title.into(), maps, settings }))
+    }
+
+    /// What the picture shows, and of what.
+    pub(super) fn caption(&self) -> String {
+        let said = |(name, value): (&String, &Value)| match value {
+            Value::Number(_) | Value::String(_) => Some(format!("{name} = {value}")),
+            Value::Array(values) if values.len() <= 4 && values.iter().all(Value::is_number) => Some(format!("{name} = {value}")),
+            _ => None,
+        };
+        let given: Vec<String> = self
+            .settings
+            .as_object()
+            .into_iter()
+            .flatten()
+            .filter(|(name, _)| !matches!(name.as_str(), "id" | "name"))
+            .filter_map(said)
+            .collect();
+        format!(
+            "Recorded by the independent recorder: a person walks in a room; without the effect, with it, and the difference of the two \
+             recordings, all in dB of the strongest cell without it. Above: the middle frame over range (m) and velocity (m/s); below: power \
+             over time (s) and velocity. Planted: {}.",
+            given.join(", ").replace('"', "")
+        )
+    }
+
+    /// The planted effect as a config states it, as far as the library has the same parameters.
+    pub(super) fn setting(&self, info: &EffectInfo) -> EffectSetting {
+        let mut setting = EffectSetting::neutral(info.id);
+        for parameter in info.parameters {
+            let values: Vec<f64> = match &self.settings[parameter.name] {
+                Value::Number(value) => value.as_f64().into_iter().collect(),
+                Value::Array(values) => values.iter().filter_map(Value::as_f64).collect(),
+                _ => vec![],
+            };
+            if !values.is_empty() && values.iter().all(|value| (parameter.least..=parameter.most).contains(value)) {
+                setting = setting.with(parameter.name, values);
+            }
+        }
+        let choices = [&self.settings["boundary"], &self.settings["body_part"], &self.settings["body_parts"][0]];
+        match choices.into_iter().find_map(Value::as_str) {
+            Some(choice) => setting.choosing(choice),
+            None => setting,
+        }
+    }
+
+    /// Writes the picture as PNG.
+    pub(super) fn save(&self, path: &Path) -> Result<()> {
+        let columns = ["without", "with", "difference"].map(String::from);
+        let rows = ["one frame", "all frames"].map(String::from);
+        let grid = Grid { title: &self.title, columns: &columns, rows: &rows, low: -DEPTH_DB, high: 0.0, unit: Some("dB") };
+        grid.save(path, &self.maps)
+    }
+}
+
+/// In dB of the strongest cell of the first.
+fn relative(maps: Vec<Map>) -> Vec<Map> {
+    let peak = maps[0].max().max(f64::MIN_POSITIVE);
+    let decibels = |power: &f64| 10.0 * (power / peak).max(f64::MIN_POSITIVE).log10();
+    maps.iter().map(|map| map.with_values(map.values.iter().map(decibels).collect())).collect()
+}
+
+/// Samples in units of the transmitted wave, so that recordings with gains of their own can be compared.
+struct Recording {
+    dims: [usize; 5],
+    samples: Vec<Complex32>,
+}
+
+impl Recording {
+    fn of(world: &World) -> Result<Self> {
+        let recorder = Recorder::new(world)?;
+        let scale = recorder.level().gain.recip() as f32;
+        let mut samples = vec![];
+        for frame in recorder.frames() {
+            let IfFrame { re, im, .. } = frame?;
+            let im = im.unwrap_or_else(|| vec![0.0; re.len()]);
+            samples.extend(re.into_iter().zip(im).map(|(re, im)| Complex32::new(re * scale, im * scale)));
+        }
+        Ok(Self { dims: world.radar.dims(), samples })
+    }
+
+    fn difference(&self, other: &Self) -> Vec<Complex32> {
+        self.samples.iter().zip(&other.samples).map(|(without, with)| with - without).collect()
+    }
+
+    fn shaped<'a>(&self, samples: &'a [Complex32]) -> Samples<'a> {
+        Samples::new(samples, self.dims)
+    }
+}
