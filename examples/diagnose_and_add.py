@@ -1,8 +1,7 @@
 """Finds what physics a simulator leaves out of a recording, and adds it.
 
-The script records a person with a radar whose transmitter leaks into its receivers, and asks why a simulator disagrees with
-the recording. It prints what is found, the held-out error of a trained simulator without and with it, and the level in the
-leakage's range cell. The report is FOLDER/why/report.html.
+The script records a person with a radar whose transmitter leaks into its receivers, and diagnoses the recording. It prints
+what is found, the held-out error of a trained simulator without and with it, and the level in the leakage's range cell.
 
     python examples/diagnose_and_add.py [FOLDER]
 """
@@ -16,27 +15,19 @@ import numpy as np
 import hybridsim
 
 ROOT = Path(__file__).resolve().parents[1]
-# The radar, room and simulator of configs/test.toml, with more samples; the leakage is what the simulator is not told about.
+# The scene and simulator of configs/test.toml, with more samples. The simulator is not told of the leakage.
 CONFIG = f"""
 extends = "{ROOT / 'configs/test.toml'}"
 
 [record]
 frames = 8
-
-[record.radar]
-sample_rate_hz = 4.4e6
-samples_per_chirp = 64
-
-[record.surface]
-returns = "vertices"
-
-[record.effects.tx_leakage]
-range_m = 0.09
-relative = 0.3                # of the signal's largest sample
-
+surface.returns = "vertices"
+radar.sample_rate_hz = 4.4e6
+radar.samples_per_chirp = 64
+effects.tx_leakage = {{ range_m = 0.09, relative = 0.3 }}     # 0.3 of the signal's largest sample
 [diagnosis]
 epochs = 6
-limits = false                # how strong the effects can be at most that were not found takes much longer
+limits = false                # true: also how strong can be at most what was not found; takes several times as long
 """
 
 
@@ -45,13 +36,14 @@ def main(folder: Path) -> None:
     (folder / "leakage.toml").write_text(CONFIG)
     recording = hybridsim.record(folder / "leakage.toml", folder / "recording", progress=False)
     report = hybridsim.diagnose(recording, out=folder / "why", config=folder / "leakage.toml", progress=False)
-    print(report.sentence)
+    print(f"{report.sentence}\nreport: {report.html}")
     for effect in report.effects:
-        print(f"found: {effect['id']}", {name: value["value"] for name, value in effect["parameters"].items()})
-    for when, error in report.data["simulator"].items():
-        print(f"held-out error {when}: {error['db_mse']:.2f} dB^2, PSNR {error['psnr_db']:.2f} dB")
+        print(f"found: {effect['id']},", *(f"{name} {value['value']:.3f}" for name, value in effect["parameters"].items()))
+    for name, when in (("without it", "before"), ("with it", "after")):
+        error = report.data["simulator"][when]
+        print(f"held-out error {name}: {error['db_mse']:.2f} dB^2, PSNR {error['psnr_db']:.2f} dB")
 
-    # The checkpoint has the effect in it, for this and every other motion; it can be left out again.
+    # The checkpoint holds the effect, for this and any other motion; `without_effects` leaves it out.
     same = dict(recording=recording, progress=False)
     made = {
         "recorded": recording.samples(),

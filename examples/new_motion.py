@@ -1,6 +1,6 @@
 """A new person and a new motion through the trained model that ships here (models/quickstart); no training.
 
-The script prints the strongest moving cell of one range-Doppler map and leaves the samples as a recording in FOLDER/made.
+The script prints the strongest moving cell of a frame's range-Doppler map.
 
     python examples/new_motion.py [FOLDER]
 """
@@ -27,13 +27,13 @@ def main(folder: Path) -> None:
         action="walk_clockwise",
         body=body,
         distance_m=3.0,
-        frames=FRAME + 1,
+        frames=8,
         out=folder / "made",
         progress=False,
     )
     print("samples:", " x ".join(map(str, recording.radar.shape)), "(frame x tx x rx x loop x sample)")
 
-    # Without the static returns; of one frame.
+    # Of one frame, without its static returns.
     found = hybridsim.heatmaps(recording, frames=[FRAME])["range_doppler_moving"]
     row, column = np.unravel_index(found.values.argmax(), found.values.shape)
     print(
@@ -42,6 +42,7 @@ def main(folder: Path) -> None:
     )
     derived = recording.radar.derived
     print(f"one cell: {derived['range_resolution_m']:.3f} m, {derived['velocity_resolution_mps']:.3f} m/s")
+    print("recording and pictures:", folder / "made")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """A radar of your own, described by its chirp parameters: what it resolves, and what it records of a person who walks.
 
-The script prints the limits that follow from the chirp, and the strongest moving cell of a frame. The recording is in
-FOLDER/recording.
+The script prints the limits that follow from the chirp, and the strongest moving cell of a frame.
 
     python examples/own_radar.py [FOLDER]
 """
@@ -14,7 +13,7 @@ import numpy as np
 
 import hybridsim
 
-# 60 GHz, 2 GHz of sampled bandwidth; two transmitters in turn and two receivers make a row of four virtual antennas.
+# 60 GHz, 2 GHz of sampled bandwidth. Two transmitters in turn and two receivers make a row of four virtual antennas.
 RADAR = """
 [record.radar]
 start_frequency_hz = 60.25e9
@@ -32,7 +31,7 @@ rx_m = [[0.0, 0.0, 0.0], [0.002445, 0.0, 0.0]]
 SCENE = """
 [record.person]
 subject = "s2"
-action = "walk_back_forth"
+action = "walk_clockwise"
 distance_m = 3.0
 
 [record.surface]
@@ -48,10 +47,11 @@ def main(folder: Path) -> None:
     print(f"range resolution: {derived['range_resolution_m']:.4f} m, up to {derived['max_range_m']:.2f} m")
     print(f"velocity resolution: {derived['velocity_resolution_mps']:.4f} m/s, up to {derived['max_velocity_mps']:.3f} m/s")
 
-    # A loop is one chirp of each transmitter: the static returns are its mean over the frame.
+    # Of one frame, without its static returns.
     found = hybridsim.heatmaps(recording, frames=[2])["range_doppler_moving"]
     row, column = np.unravel_index(found.values.argmax(), found.values.shape)
     print(f"strongest moving cell of frame 2: {found.columns.values[column]:.2f} m, {found.rows.values[row]:+.2f} m/s")
+    print("recording:", recording.folder)
 
 
 if __name__ == "__main__":
