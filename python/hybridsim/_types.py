@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _hybridsim
+
 StrPath = str | os.PathLike[str]
 
 Settings = Mapping[str, Any] | Iterable[str]
@@ -86,6 +88,11 @@ class Radar:
     position_m: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
     full_scale_codes: float | None = None
     derived: dict[str, float] = field(default_factory=dict, compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.derived:
+            derived = json.loads(_hybridsim.radar(self._json()))["derived"]
+            object.__setattr__(self, "derived", derived)
 
     @property
     def shape(self) -> tuple[int, int, int, int, int]:

@@ -22,3 +22,9 @@ fn make(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
 pub fn usage(py: Python<'_>, message: impl Into<String>, hint: impl Into<String>) -> PyErr {
     raised(py, &Error::Usage { message: message.into(), hint: Some(hint.into()) })
 }
+
+/// JSON of Python's own making; only a user's own dictionary can be wrong.
+pub fn parsed<T: serde::de::DeserializeOwned>(py: Python<'_>, text: &str, name: &str) -> PyResult<T> {
+    let hint = "its documentation lists what it may hold";
+    serde_json::from_str(text).map_err(|error| usage(py, format!("{name}: {error}"), hint))
+}

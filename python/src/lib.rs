@@ -23,7 +23,7 @@ mod _hybridsim {
         export::export,
         heatmaps::heatmaps,
         import::import,
-        read::{Recording, read},
+        read::{Recording, radar, read},
         record::record,
         reproduce::{reproduce, reproduce_stage, stages},
         simulate::simulate,

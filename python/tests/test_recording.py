@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,15 @@ def test_what_a_recording_says(recording: hybridsim.Recording) -> None:
     assert poses is not None and poses.rotations is not None and poses.translations is not None
     assert poses.rotations.shape == (len(poses.times_s), 24, 3) and poses.translations.shape == (len(poses.times_s), 3)
     assert poses.vertices is None
+
+
+def test_a_radar_of_one_s_own_says_what_follows_and_what_cannot_be(recording: hybridsim.Recording) -> None:
+    settings = asdict(recording.radar)
+    del settings["derived"]
+    own = hybridsim.Radar(**settings)
+    assert own.derived == recording.radar.derived and own == recording.radar
+    with pytest.raises(hybridsim.Error, match="slope_hz_per_s"):
+        replace(own, slope_hz_per_s=0.0, derived={})
 
 
 def test_a_recording_passes_to_other_processes(recording: hybridsim.Recording) -> None:

@@ -1,7 +1,6 @@
 //! Heatmaps of samples.
 
 use hybridsim::{
-    Error,
     heatmap::{Axis, HeatmapConfig, Map},
     radar::Radar,
     verbs::heatmaps::Pictures,
@@ -11,7 +10,7 @@ use pyo3::{buffer::PyBuffer, prelude::*};
 
 use crate::{
     buffer::{Numbers, complex},
-    errors::{raised, usage},
+    errors::{parsed, raised, usage},
 };
 
 /// Name and unit of an axis, and its values.
@@ -46,17 +45,4 @@ pub fn heatmaps(py: Python<'_>, radar: &str, settings: &str, pairs: PyBuffer<f32
 
 fn named(axis: Axis) -> Named {
     (axis.name, axis.unit, axis.values.into())
-}
-
-/// JSON of Python's own making; only a user's own dictionary can be wrong.
-fn parsed<T: serde::de::DeserializeOwned>(py: Python<'_>, text: &str, name: &str) -> PyResult<T> {
-    serde_json::from_str(text).map_err(|error| {
-        raised(
-            py,
-            &Error::Usage {
-                message: format!("{name}: {error}"),
-                hint: Some("see hybridsim.heatmaps for what it may hold".into()),
-            },
-        )
-    })
 }

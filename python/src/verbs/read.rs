@@ -11,7 +11,10 @@ use num_complex::Complex32;
 use pyo3::{exceptions::PyIndexError, prelude::*};
 use serde_json::{Value, json};
 
-use crate::{buffer::Numbers, errors::raised};
+use crate::{
+    buffer::Numbers,
+    errors::{parsed, raised},
+};
 
 /// An open recording; its samples stay on the disk until they are asked for.
 #[pyclass(frozen)]
@@ -37,6 +40,14 @@ pub fn radar_json(radar: &Radar) -> Value {
             "loop_period_s": radar.loop_period_s(),
         },
     })
+}
+
+/// What a radar's settings (JSON) say and what follows from them, as JSON.
+#[pyfunction]
+pub fn radar(py: Python<'_>, settings: &str) -> PyResult<String> {
+    let radar: Radar = parsed(py, settings, "radar")?;
+    radar.check("radar").map_err(|error| raised(py, &error))?;
+    Ok(radar_json(&radar).to_string())
 }
 
 #[pymethods]

@@ -359,25 +359,26 @@ pub fn walking(seed: u64, turned: impl Fn(usize, f64) -> Complex64, array: &DMat
     use rand::{RngExt, SeedableRng};
     use rand_distr::{Distribution, StandardNormal};
 
-    const RECEIVERS: usize = 4;
-    let radar = four_receivers();
+    let receivers = array.nrows();
+    let mut radar = four_receivers();
+    radar.rx_m.truncate(receivers);
     let wave = TAU / radar.wavelength_m();
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let mut cell = |middle: f64, aside: f64| {
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let [mut expected, mut aslant] = [(); 2].map(|()| DMatrix::zeros(RECEIVERS, RECEIVERS));
-        let mut heard = DVector::from_fn(RECEIVERS, |_, _| Complex64::new(normal(), normal()) * 0.5f64.sqrt());
-        let mut field = DVector::zeros(RECEIVERS);
+        let [mut expected, mut aslant] = [(); 2].map(|()| DMatrix::zeros(receivers, receivers));
+        let mut heard = DVector::from_fn(receivers, |_, _| Complex64::new(normal(), normal()) * 0.5f64.sqrt());
+        let mut field = DVector::zeros(receivers);
         for _ in 0..8 {
             let power: f64 = 10.0;
             let amplitude = Complex64::new(normal(), normal()) * (0.5 * power).sqrt();
             let sine = middle + 0.05 * normal();
-            let from = |sine: f64| DVector::from_fn(RECEIVERS, |rx, _| Complex64::cis(-wave * radar.rx_m[rx][0] * sine));
+            let from = |sine: f64| DVector::from_fn(receivers, |rx, _| Complex64::cis(-wave * radar.rx_m[rx][0] * sine));
             let predicted = from(sine);
             expected += &predicted * predicted.adjoint() * Complex64::from(power);
             aslant += &predicted * predicted.adjoint() * Complex64::from(power * sine);
             let real = from(sine + aside);
-            field += DVector::from_fn(RECEIVERS, |rx, _| amplitude * real[rx] * turned(rx, sine + aside));
+            field += DVector::from_fn(receivers, |rx, _| amplitude * real[rx] * turned(rx, sine + aside));
         }
         heard += array * field;
         Cell { heard: vec![heard], expected, aslant }
@@ -390,7 +391,7 @@ pub fn walking(seed: u64, turned: impl Fn(usize, f64) -> Complex64, array: &DMat
             (0..5).map(|_| Group { cells: group(), place: None }).collect()
         })
         .collect();
-    Cells { radar, frames, noise: vec![1.0; RECEIVERS] }
+    Cells { radar, frames, noise: vec![1.0; receivers] }
 }
 
 #[cfg(test)]

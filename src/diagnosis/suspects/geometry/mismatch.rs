@@ -68,9 +68,11 @@ pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
     let own = phases.iter().map(|[phase, _]| phase * phase).sum::<f64>() / places.iter().map(|x| x * x).sum::<f64>().max(1e-12);
     let of_the_body = bearing.deviation.hypot(BEARING_FLOOR).powi(2);
     let share = own / (own + of_the_body);
+    // Where no other phase can be seen, nothing says whose the direction is: all of it may be theirs.
+    let either = if directions.ncols() > numbers.receivers - 1 { 0.0 } else { bearing.sine.abs() };
     for ([phase, deviation], x) in phases.iter_mut().zip(places) {
         *phase -= share * bearing.sine * x;
-        *deviation = deviation.hypot((share * of_the_body).sqrt() * x);
+        *deviation = deviation.hypot((share * of_the_body).sqrt() * x).hypot(either * x);
     }
     let p_value = corrected(found.p_value, LOOKS);
     let candidate = candidate(evidence, &against_first(&|rx| numbers.gain(rx)), &phases, p_value, found.gain);
@@ -100,9 +102,8 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
         id: Some("channel_mismatch"),
         behaves_like: "channel gain",
         statement: format!(
-            "The receivers differ: against the first, the gains of receivers 1 to {} are {} dB and their phases {}°, which no direction \
-             of the body explains.",
-            receivers - 1,
+            "The receivers differ: against the first, {} {} dB of gain and {}° of phase, which no direction of the body explains.",
+            if receivers == 2 { "the second has".to_string() } else { format!("receivers 1 to {} have", receivers - 1) },
             text(&gains_db, 2),
             text(&phases_deg, 1),
         ),
@@ -126,5 +127,31 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
             }),
             Volume::BY_SAMPLE,
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::channels::Bearing;
+    use super::super::covariance::walking;
+    use super::*;
+    use crate::diagnosis::cube::Loaded;
+
+    #[test]
+    fn the_phase_of_two_receivers_is_left_open_by_as_much_as_the_direction() {
+        let truth: f64 = 0.35;
+        let array = DMatrix::from_diagonal(&DVector::from_vec(vec![Complex64::ONE, Complex64::from_polar(1.25, truth)]));
+        let cells = walking(1, |_, _| Complex64::ONE, &array);
+        let radar = cells.radar.clone();
+        // Half a wavelength apart.
+        let bearing = Bearing { sine: -truth / PI, deviation: 0.003, p_value: 1e-9 };
+        let samples = vec![Complex64::ONE; radar.dims().iter().product()];
+        let evidence = Evidence::new(Loaded::of_samples(radar, samples, [-1.0, 1.0]), None, None);
+        let found = find(&evidence, &Array::new(cells, bearing)).expect("nothing was found").candidate;
+        let [gain, phase] = [&found.estimates[0], &found.estimates[1]];
+        let holds = |estimate: &Estimate, value: f64| estimate.ci90[1][0] <= value && value <= estimate.ci90[1][1];
+        assert!(holds(gain, 20.0 * 1.25f64.log10()) && gain.ci90[1][0] > 1.0, "{gain:?}");
+        assert!(holds(phase, 0.0) && holds(phase, truth.to_degrees()), "{phase:?}");
+        assert!(found.statement.contains("the second has"), "{}", found.statement);
     }
 }
