@@ -13,6 +13,8 @@ assumed is a warning of the class :class:`Note`. While a verb works, other Pytho
 from __future__ import annotations
 
 import atexit
+import os
+import tempfile
 from typing import Any
 
 from . import _hybridsim, challenge, distributed
@@ -32,6 +34,9 @@ from ._verbs.simulate import simulate
 from ._verbs.site import site
 from ._verbs.train import train
 from ._windows import Windows
+
+# Graphics libraries complain on standard error when they look for adapters without it.
+os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
 
 __all__ = [
     "Axis",

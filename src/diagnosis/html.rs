@@ -274,6 +274,12 @@ fn location(page: &mut String, report: &Report, pictures: &Pictures) {
             page.push_str("</table>");
         }
     }
+    if !pictures.profiles.is_empty() {
+        page.push_str(
+            "<p class=\"small\">Significance is of each value alone: of a hundred values of a recording with nothing missing, one \
+             reaches 2.</p>",
+        );
+    }
     for (title, picture) in &pictures.profiles {
         let _ = write!(page, "<p><img alt=\"{}\" src=\"{picture}\">", escape(title));
     }
@@ -404,20 +410,12 @@ impl Pictures {
             }
         }
         let (before, after) = (locate::profiles(&diagnosis.original), locate::profiles(&explanation.evidence));
-        for (before, after) in
-            before.iter().zip(&after).filter(|(before, _)| ["range", "velocity", "frame"].contains(&before.axis))
-        {
-            let series = |name: &str, profile: &locate::Profile| Series {
-                name: name.into(),
-                points: profile.at.iter().zip(&profile.excess_db).map(|(&x, &y)| [x, y]).collect(),
-            };
-            let unit = if before.unit.is_empty() { String::new() } else { format!(" ({})", before.unit) };
-            let mut lines = vec![series("before", before)];
-            lines.extend((!explanation.accepted.is_empty()).then(|| series("with the effects", after)));
-            let title = format!("Power over what is expected, along the {}", before.axis);
-            let x_label = format!("{}{unit}", before.axis);
-            Chart { title: title.clone(), x_label, y_label: "excess (dB)".into(), series: lines }.save(&path)?;
-            pictures.profiles.push((title, address(&path)?));
+        for (before, after) in before.iter().zip(&after).filter(|(before, _)| before.at.len() > 1) {
+            let compared = (!explanation.accepted.is_empty()).then_some(after);
+            for chart in along(before, compared) {
+                chart.save(&path)?;
+                pictures.profiles.push((chart.title, address(&path)?));
+            }
         }
         Ok(pictures)
     }
@@ -425,6 +423,36 @@ impl Pictures {
     fn curve(&self, name: &str) -> Option<&str> {
         self.curves.iter().find(|(known, _)| known == name).map(|(_, picture)| picture.as_str())
     }
+}
+
+/// Along one axis: the excess, where the cells of the maps have that axis; and how unlikely each of its values is under the null.
+fn along(before: &locate::Profile, after: Option<&locate::Profile>) -> Vec<Chart> {
+    let (name, x_label) = match (before.axis, before.unit) {
+        ("sample", _) => ("fast time", "sample of the chirp".to_string()),
+        ("chirp", _) => ("slow time within a frame", "loop of the frame".into()),
+        ("frame", _) => ("slow time", "frame".into()),
+        ("range", unit) => ("beat frequency", format!("range ({unit})")),
+        ("velocity", unit) => ("Doppler frequency", format!("velocity ({unit})")),
+        (axis, _) => (axis, format!("{axis} (channel)")),
+    };
+    let drawn = |title: String, y_label: &str, of: &dyn Fn(&locate::Profile) -> Vec<f64>| {
+        let series = |name: &str, profile: &locate::Profile| Series {
+            name: name.into(),
+            points: profile.at.iter().zip(of(profile)).map(|(&x, y)| [x, y]).collect(),
+        };
+        let mut lines = vec![series("before", before)];
+        lines.extend(after.map(|after| series("with the effects", after)));
+        Chart { title, x_label: x_label.clone(), y_label: y_label.into(), series: lines }
+    };
+    // A product of probabilities may be too small for a number.
+    let significance = |profile: &locate::Profile| profile.p_value.iter().map(|p| -p.max(f64::MIN_POSITIVE).log10()).collect();
+    let mut charts = vec![];
+    if ["range", "velocity", "frame"].contains(&before.axis) {
+        let excess = |profile: &locate::Profile| profile.excess_db.clone();
+        charts.push(drawn(format!("Power over what is expected, along {name}"), "excess (dB)", &excess));
+    }
+    charts.push(drawn(format!("Significance along {name}"), "-log10 of the chance under the null", &significance));
+    charts
 }
 
 fn chart(curve: &Curve) -> Chart {
@@ -468,4 +496,30 @@ fn held_out_maps(evidence: &Evidence, radar: &Radar) -> [Map; 2] {
             .collect();
         Map::new(Axis::clone(&rows), Axis::clone(&columns), values)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use num_complex::Complex64;
+
+    use super::*;
+
+    /// A burst in one sample of every other chirp is nothing along slow time but for its frames, and all along fast time.
+    #[test]
+    fn the_score_is_drawn_along_every_axis_and_shows_where_it_is() {
+        let radar = Radar { samples_per_chirp: 32, ..Radar::small(8) };
+        let evidence = Evidence::in_noise(radar, 5, |[_, _, index, sample]| {
+            Complex64::from(if sample == 11 && index % 2 == 0 { 6.0 } else { 0.0 })
+        });
+        let profiles = locate::profiles(&evidence);
+        let charts: Vec<Chart> =
+            profiles.iter().filter(|profile| profile.at.len() > 1).flat_map(|one| along(one, None)).collect();
+        let titles: Vec<&str> = charts.iter().map(|chart| chart.title.as_str()).collect();
+        for axis in ["fast time", "slow time", "slow time within a frame", "beat frequency", "Doppler frequency", "rx"] {
+            assert!(titles.contains(&format!("Significance along {axis}").as_str()), "{axis}: {titles:?}");
+        }
+        let fast = charts.iter().find(|chart| chart.title == "Significance along fast time").unwrap();
+        let largest = fast.series[0].points.iter().max_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
+        assert!(largest[0] == 11.0 && largest[1] > 10.0, "{largest:?}");
+    }
 }
