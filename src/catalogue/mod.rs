@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use crate::data::atomic::write_text;
 use crate::effects::{self, EffectInfo, Stage};
 use crate::error::{Error, Result};
-use signature::Signature;
+use signature::{Scene, Signature};
 
 /// What begins every page: who changes it by hand loses the change.
 const ORIGIN: &str = "<!-- Written by `hybridsim effects --out docs/effects`. -->\n";
@@ -67,8 +67,9 @@ pub fn described(id: &str) -> Result<String> {
 /// A folder that cannot be written.
 pub fn write(folder: &Path, done: &(dyn Fn() + Sync)) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|source| Error::write(folder, source))?;
+    let scene = Scene::new()?;
     effects::library().par_iter().try_for_each(|info| {
-        let signature = Signature::of(info)?;
+        let signature = scene.signature(info)?;
         if let Some(signature) = &signature {
             signature.save(&folder.join(format!("{}.png", info.id)))?;
         }

@@ -22,6 +22,56 @@ const SEED: u64 = 7;
 /// Below the strongest cell, dB; the noise of the scene lies some 70 dB below its walls.
 const DEPTH_DB: f64 = 80.0;
 
+/// What all effects are planted into, and its recording without any.
+pub(super) struct Scene {
+    world: World,
+    surroundings: Surroundings,
+    without: Recording,
+}
+
+impl Scene {
+    /// A person who walks in a room, before a small radar.
+    ///
+    /// # Errors
+    /// What the recorder refuses.
+    pub(super) fn new() -> Result<Self> {
+        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 32, ..Radar::small(24) };
+        let config = RecorderConfig { radar: RadarChoice::Full(Box::new(radar)), seed: SEED, ..RecorderConfig::default() };
+        let world = config.world(Path::new(""))?;
+        let surroundings = Surroundings {
+            room: world.room.clone(),
+            distance_m: config.person.distance_m,
+            frames: world.radar.frames,
+            receivers: world.radar.rx_m.len(),
+            max_range_m: world.radar.max_range_m(),
+            sample_rate_hz: world.radar.sample_rate_hz,
+        };
+        Ok(Self { without: Recording::of(&world)?, world, surroundings })
+    }
+
+    /// Of an effect at the strongest grade of the sealed challenges; none where the recorder has no such effect.
+    ///
+    /// # Errors
+    /// What the recorder refuses.
+    pub(super) fn signature(&self, info: &EffectInfo) -> Result<Option<Signature>> {
+        let Some(graded) = graded(info.id) else {
+            return Ok(None);
+        };
+        let mut planted = self.world.clone();
+        (graded.add)(&mut planted.effects, graded.strength(1.0), &self.surroundings, &mut ChaCha8Rng::seed_from_u64(SEED));
+        planted.check()?;
+        let (without, with) = (&self.without, Recording::of(&planted)?);
+        let columns = [without.samples.clone(), with.samples.clone(), without.difference(&with)];
+        let radar = &self.world.radar;
+        let analysis = Analysis::new(radar, &HeatmapConfig::default());
+        let frame = |samples: &Vec<Complex32>| analysis.range_doppler(without.shaped(samples).frame(radar.frames / 2));
+        let over_time = |samples: &Vec<Complex32>| analysis.time_doppler(without.shaped(samples), &Gate::default());
+        let maps = [columns.iter().map(frame).collect(), columns.iter().map(over_time).collect()].map(relative);
+        let settings = listed(&planted).into_iter().next().unwrap_or_default();
+        Ok(Some(Signature { title: info.title.into(), maps, settings }))
+    }
+}
+
 /// Pictures and settings of a planted effect.
 pub(super) struct Signature {
     title: String,
@@ -32,39 +82,6 @@ pub(super) struct Signature {
 }
 
 impl Signature {
-    /// None where the recorder has no such effect.
-    ///
-    /// # Errors
-    /// What the recorder refuses.
-    pub(super) fn of(info: &EffectInfo) -> Result<Option<Self>> {
-        let Some(graded) = graded(info.id) else {
-            return Ok(None);
-        };
-        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 32, ..Radar::small(24) };
-        let config = RecorderConfig { radar: RadarChoice::Full(Box::new(radar)), seed: SEED, ..RecorderConfig::default() };
-        let clean = config.world(Path::new(""))?;
-        let at = Surroundings {
-            room: clean.room.clone(),
-            distance_m: config.person.distance_m,
-            frames: clean.radar.frames,
-            receivers: clean.radar.rx_m.len(),
-            max_range_m: clean.radar.max_range_m(),
-            sample_rate_hz: clean.radar.sample_rate_hz,
-        };
-        let mut planted = clean.clone();
-        (graded.add)(&mut planted.effects, graded.strength(1.0), &at, &mut ChaCha8Rng::seed_from_u64(SEED));
-        planted.check()?;
-        let (without, with) = (Recording::of(&clean)?, Recording::of(&planted)?);
-        let columns = [without.samples.clone(), with.samples.clone(), without.difference(&with)];
-        let analysis = Analysis::new(&clean.radar, &HeatmapConfig::default());
-        let middle: Vec<Map> =
-            columns.iter().map(|samples| analysis.range_doppler(without.shaped(samples).frame(clean.radar.frames / 2))).collect();
-        let over_time = columns.iter().map(|samples| analysis.time_doppler(without.shaped(samples), &Gate::default())).collect();
-        let maps = [middle, over_time].map(relative);
-        let settings = listed(&planted).into_iter().next().unwrap_or_default();
-        Ok(Some(Self { title: info.title.into(), maps, settings }))
-    }
-
     /// What the picture shows, and of what.
     pub(super) fn caption(&self) -> String {
         let said = |(name, value): (&String, &Value)| match value {

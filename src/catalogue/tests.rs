@@ -7,33 +7,33 @@ fn docs() -> std::path::PathBuf {
 
 /// `hybridsim effects --out docs/effects` makes them anew.
 #[test]
-fn the_pages_of_the_book_are_those_of_the_library() {
+fn the_pages_of_the_book_are_those_of_the_library_and_their_configs_are_taken() {
     let folder = docs().join("effects");
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap_or_default();
     let summary = std::fs::read_to_string(docs().join("SUMMARY.md")).unwrap();
     assert_eq!(read(INDEX), index());
+    let scene = Scene::new().unwrap();
     for info in effects::library() {
-        let signature = Signature::of(info).unwrap();
-        assert_eq!(read(&format!("{}.md", info.id)), page::markdown(info, signature.as_ref()), "{}", info.id);
+        let signature = scene.signature(info).unwrap();
+        let page = page::markdown(info, signature.as_ref());
+        assert_eq!(read(&format!("{}.md", info.id)), page, "{}", info.id);
         assert_eq!(folder.join(format!("{}.png", info.id)).is_file(), signature.is_some(), "{}", info.id);
         assert!(summary.contains(&format!("(effects/{}.md)", info.id)), "docs/SUMMARY.md leaves out {}", info.id);
+        taken(info.id, &page);
     }
     let pages = std::fs::read_dir(&folder).unwrap().count();
     assert!(pages <= 2 * effects::library().len() + 1, "{pages} files: some are of no effect");
 }
 
-#[test]
-fn a_page_s_config_is_one_that_is_taken() {
-    for info in effects::library() {
-        let page = page::markdown(info, Signature::of(info).unwrap().as_ref());
-        let config = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("effect.toml");
-        std::fs::write(&path, config).unwrap();
-        let config = Config::read(&path, &[]).unwrap_or_else(|error| panic!("{}: {error}", info.id));
-        assert_eq!(config.simulator.effects.len(), 1);
-        config.simulator.effects[0].check("simulator.effects").unwrap_or_else(|error| panic!("{}: {error}", info.id));
-    }
+/// The config of a page says what the library understands.
+fn taken(id: &str, page: &str) {
+    let config = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("effect.toml");
+    std::fs::write(&path, config).unwrap();
+    let config = Config::read(&path, &[]).unwrap_or_else(|error| panic!("{id}: {error}"));
+    assert_eq!(config.simulator.effects.len(), 1, "{id}");
+    config.simulator.effects[0].check("simulator.effects").unwrap_or_else(|error| panic!("{id}: {error}"));
 }
 
 #[test]
