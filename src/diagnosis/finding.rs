@@ -111,7 +111,7 @@ pub enum Correction {
     /// Undone in the samples, of all frames, by what the frames themselves hold: subtracted, for the most part.
     Samples(Undo),
     /// Undone in the samples by a law with numbers that the training frames gave, or with a prior for those that they did not: what is
-    /// held out is foretold by it as it is.
+    /// held out is predicted by it as it is.
     Inverse(Undo, Volume),
     /// Another correction, after which the phase over time of what it concerned is known.
     Followed(Box<Correction>, Arc<Course>),

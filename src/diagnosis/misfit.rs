@@ -59,7 +59,7 @@ impl Misfit {
 
     /// The same with effects taken into account, as likelihood of the same samples as before: `explained` has them undone
     /// or foreseen. Undoing follows each frame's own samples, so what it took out of a held-out frame is no prediction of
-    /// it. It counts as a random signal instead, whose power in a cell is foretold by what was taken out of the channels
+    /// it. It counts as a random signal instead, whose power in a cell is predicted by what was taken out of the channels
     /// before it in the same frame, or on average of the training frames. These laws, that nothing was taken out, and that
     /// nothing is explained weigh the same at first; every frame and channel says which of them holds (Bayes).
     pub fn after(recording: &Evidence, explained: &Evidence) -> Self {

@@ -54,7 +54,7 @@ pub struct Law {
     /// Of κ, complex.
     pub scatter: f64,
     pub p_value: f64,
-    /// Of frames that the others foretell, all in turn.
+    /// Of frames that the others predict, all in turn.
     pub gain: f64,
     pub peak: f64,
 }
@@ -169,7 +169,7 @@ fn judged(product: Product, sums: &[Sums], peak: f64) -> Option<Law> {
     // Frames must agree on it as well as the noise lets expect.
     let scatter = jackknife(sums, &whole).max(variance.sqrt());
     let p_value = corrected(chi2_tail(2.0 * kappa.norm_sqr() / (scatter * scatter), 2.0), 2.0);
-    // Every frame is foretold by those of the other folds.
+    // Every frame is predicted by those of the other folds.
     let of_fold = |parts: [Vec<usize>; 2]| {
         let [rest, fold] = parts.map(|frames| total(frames.into_iter().map(|frame| &sums[frame])));
         let kappa = rest.cross / rest.template.max(f64::MIN_POSITIVE);

@@ -32,10 +32,10 @@ impl DiagnosisConfig {
             None if sure => 0.5 * (self.gain + self.nameless_gain),
             None => self.nameless_gain,
         };
-        // What foretells held-out frames better than it must is as much less likely to be chance: the likelihood's ratio on data that
+        // What predicts held-out frames better than it must is as much less likely to be chance: the likelihood's ratio on data that
         // were not fitted exceeds e^gain by chance with a probability of e^-gain at most. Not where the body's prediction has a part:
-        // what errs in it errs in held-out frames alike; nor where the frames that foretell are those of the p-value.
-        let surplus = untouched && !candidate.errs_alike && !SUSPECTS[suspect].foretells_all_frames;
+        // what errs in it errs in held-out frames alike; nor where the frames that predict are those of the p-value.
+        let surplus = untouched && !candidate.errs_alike && !SUSPECTS[suspect].predicts_all_frames;
         let surplus = if surplus { (candidate.gain - least).exp().clamp(1.0, MOST_SURPLUS) } else { 1.0 };
         candidate.p_value <= self.p_value(suspect) * surplus && candidate.gain >= least && candidate.gain.is_finite()
     }
@@ -262,7 +262,7 @@ fn upstream<'a>(
         return other;
     }
     if evidence.body.is_none() {
-        // Nobody foretells where something moves: it does where it still seems to once what all returns share is undone.
+        // Nobody predicts where something moves: it does where it still seems to once what all returns share is undone.
         let again = (SUSPECTS[best.0].find)(&evidence.with(&other.1));
         let stands = again.iter().any(|found| is_same(&best.1, found) && found.gain > NEARLY * best.1.gain);
         return if stands { best } else { other };

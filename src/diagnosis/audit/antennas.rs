@@ -1,6 +1,6 @@
 //! Which antenna is which, and on which side: left and right, up and down, receivers in reverse, transmitters in another order.
 //!
-//! Where the body moves, the phases of the channels follow from its direction. Every reading of the antennas foretells them; the one that
+//! Where the body moves, the phases of the channels follow from its direction. Every reading of the antennas predicts them; the one that
 //! is stated is held against the others. The measure of a channel is its coherence with the first channel after that phase is taken out:
 //! a constant phase of its own (receivers that differ) does not lower it, but directions that change do where the reading is wrong. With a
 //! coherence γ, a share 1 − γ² of a channel's power is left (Carter, Knapp and Nuttall 1973), so Σ ln((1 − γ²) / (1 − γ'²)) over channels and
@@ -102,7 +102,7 @@ fn compared(evidence: &Evidence, stated: &Reading, others: &[Reading], by_phases
     let Some(best) = wrong.iter().map(|(_, agreement)| strength(agreement)).reduce(f64::max) else {
         return Some(("array phases do not contradict it".into(), true));
     };
-    // Readings that foretell the same phases are told together.
+    // Readings that predict the same phases are told together.
     let told: Vec<String> = wrong
         .iter()
         .filter(|(_, agreement)| strength(agreement) > best - 1e-3)

@@ -90,7 +90,7 @@ impl Fit {
     pub fn against(&self, other: &Fit) -> Comparison {
         let both = self.frames.iter().zip(&other.frames).filter_map(|(own, other)| own.as_ref().zip(other.as_ref()));
         let both: Vec<(&Frame, &Frame)> = both.collect();
-        // Where less is than elsewhere, nothing is foretold.
+        // Where less is than elsewhere, nothing is predicted.
         let means = |[predicted, others]: [Sums; 2]| match predicted.mean() > others.mean() {
             true => [predicted.mean(), others.mean()],
             false => [predicted.plus(others).mean(); 2],

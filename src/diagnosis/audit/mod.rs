@@ -69,7 +69,7 @@ pub fn audit(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<Check> {
     checks.extend(body_in_room::body_in_room(evidence));
     checks.extend(placement::placement(evidence, origin_m));
     if !checks.iter().any(|check| !check.ok && is_convention(check)) {
-        // Phases foretell nothing where the body is not where it is said to be.
+        // Phases predict nothing where the body is not where it is said to be.
         checks.extend(body_direction::body_direction(evidence));
         checks.extend(antennas::sides(evidence));
         checks.extend(antennas::transmitter_order(evidence));

@@ -1,7 +1,7 @@
 //! Something that stirs at one range while the others stay, too little or too slowly to be seen within a frame: a curtain, a plant.
 //!
 //! What it changes need not look across the receivers as all that is at that range does, for it is a part of that. Its course is
-//! judged by how well every frame is foretold by the others.
+//! judged by how well every frame is predicted by the others.
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -31,9 +31,9 @@ struct Change {
     p_value: f64,
     /// Power beyond the noise.
     excess: f64,
-    /// Of all frames, each foretold by the others, nats.
+    /// Of all frames, each predicted by the others, nats.
     gain: f64,
-    /// Weights by which the training frames foretell every frame, of what changes most.
+    /// Weights by which the training frames predict every frame, of what changes most.
     weights: DMatrix<f64>,
 }
 
@@ -104,7 +104,7 @@ fn judged(returns: &Returns, bin: usize, others: &[usize], frames: Frames, (p_va
     let noise: Vec<f64> = (0..parts.len()).map(|frame| 0.5 * returns.variance(frame, bin)).collect();
     let data = Data { series: &beside, numbers: 2.0 * (returns.channels - 1) as f64, noise: &noise };
     let course = Course::new(frames, &data);
-    let gain = course.foretold + own.iter().map(|course| course.foretold).sum::<f64>();
+    let gain = course.predicted + own.iter().map(|course| course.predicted).sum::<f64>();
     let most = own.iter().fold(&course, |most, course| if course.training > most.training { course } else { most });
     Some(Change { bin, p_value, excess, gain, weights: most.weights(frames, &data) })
 }
@@ -157,7 +157,7 @@ fn candidate(
             title: format!("Change {range_m:.2} m away"),
             x_label: "time, s".into(),
             y_label: "share of its largest change".into(),
-            series: vec![("foretold by the training frames".into(), evidence.starts_s.clone(), course)],
+            series: vec![("predicted by the training frames".into(), evidence.starts_s.clone(), course)],
         }),
         energy: stirs.iter().map(power).sum::<f64>() * loops as f64,
         correction: Correction::Samples(Arc::new(move |cube| {

@@ -172,7 +172,7 @@ pub struct Found {
     pub explains_all: bool,
 }
 
-/// Of what is unlikely to be chance, what foretells held-out frames best; what does so nearly as well looks alike. A coupling
+/// Of what is unlikely to be chance, what predicts held-out frames best; what does so nearly as well looks alike. A coupling
 /// comes before any gains and phases where it leaves the receivers alike: few that differ in any other way look like that.
 fn best(mut found: Vec<Found>) -> Option<Candidate> {
     found.retain(|found| found.candidate.p_value < UNEVEN && found.candidate.gain > 0.0);

@@ -38,7 +38,7 @@ pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
 }
 
 /// Receivers that hear only the neighbour on one side, which no coupling of antennas does: it has no name. None where neighbours
-/// that hear one another `alike` foretell held-out frames nearly as well, where the two sides may not differ, or where the receivers
+/// that hear one another `alike` predict held-out frames nearly as well, where the two sides may not differ, or where the receivers
 /// are not alike without it.
 pub fn one_way(evidence: &Evidence, array: &Array, alike: Option<&Found>) -> Option<Found> {
     let either = ["before", "after"].into_iter().enumerate().filter_map(|(index, side)| {

@@ -115,7 +115,7 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
     let Some(best) = (0..fitted.len()).max_by(|&a, &b| gain(&fitted[a]).total_cmp(&gain(&fitted[b]))) else { return vec![] };
     let best_fit = &fitted[best];
     let p_value = p_value(best_fit, &null, training);
-    let held_out = foretold(trial, best_fit, &null) / best_fit.inflation;
+    let held_out = predicted(trial, best_fit, &null) / best_fit.inflation;
     // What may be nothing by its own interval is nothing.
     let nothing = best_fit.value.abs() < 1.645 * deviation(trial, best_fit);
     if p_value > 0.05 || held_out <= 0.0 || nothing {
@@ -230,7 +230,7 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
 
 /// What frames gain that did not tell the change: the held-out ones. Where the motion is known in none of these after a step, the
 /// training frames with the weights of the body as it was.
-fn foretold(trial: &Trial, fit: &Fitted, null: &Score) -> f64 {
+fn predicted(trial: &Trial, fit: &Fitted, null: &Score) -> f64 {
     let held_out = &trial.evidence.split.held_out;
     let Change::Drop { at, .. } = fit.score.change else { return fit.score.gain_over(null, held_out) };
     let known = |frames: &[usize]| -> Vec<usize> {

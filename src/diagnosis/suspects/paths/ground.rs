@@ -178,8 +178,8 @@ impl Ground<'_> {
         swing(climb(numbers(found), gain(numbers(found)), &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], gain, |a, b| a > b).0)
     }
 
-    /// What all frames gain, each foretold by those of the other folds: few held-out ones may all be among the body's returns.
-    pub fn foretold(&self, best: Swing, start_s: f64) -> f64 {
+    /// What all frames gain, each predicted by those of the other folds: few held-out ones may all be among the body's returns.
+    pub fn predicted(&self, best: Swing, start_s: f64) -> f64 {
         let frames = self.scene.frames();
         let length_s = middle_s(self.scene, frames - 1) - start_s;
         folds(frames).map(|[rest, held]| self.gain(self.fitted(best, &rest, length_s).0, &held)).sum()

@@ -134,8 +134,8 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
         laws = [ground.fitted(laws[0], longer, length_s).0, ground.closer(laws[1], longer, length_s)];
     }
     ground.beams.prepare(&split.held_out);
-    let foretold = laws.map(|law| (split.held_out_share() * ground.foretold(law, start_s), law));
-    let (again, best) = foretold.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let predicted = laws.map(|law| (split.held_out_share() * ground.predicted(law, start_s), law));
+    let (again, best) = predicted.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let deviations = ground.deviations(best, &every[..count], middle_s(scene, every[count - 1]) - start_s);
     // What may as well not swing at all, or is always in the cell of what stands still, only flickers.
     let swing_m = best.law[1].hypot(best.law[2]);

@@ -151,14 +151,14 @@ fn a_swinging_stranger_is_found_and_removed() {
 }
 
 #[test]
-fn what_was_taken_out_of_a_channel_counts_as_foretold_by_those_before_it() {
+fn what_was_taken_out_of_a_channel_counts_as_predicted_by_those_before_it() {
     let (with, without) = (evidence(0.0, 1.0), evidence(0.0, 0.0));
     let found = believed(&with);
     let explained = corrected(with.clone(), &found[0]);
     let [before, after, best] = [Misfit::of(&with), Misfit::after(&with, &explained), Misfit::of(&without)];
     let [before, after, best] = [before, after, best].map(|misfit| misfit.loglik_per_sample);
     let recovered = (after - before) / (best - before);
-    // Nobody foretells the first of the two channels; the second costs a little, for its amplitudes are not known.
+    // Nobody predicts the first of the two channels; the second costs a little, for its amplitudes are not known.
     assert!((0.4..0.95).contains(&recovered), "{before} {after} {best}");
 }
 

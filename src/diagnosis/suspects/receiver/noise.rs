@@ -311,7 +311,7 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     if !is_everywhere(evidence, bins, &if alike { equal(rx, rho) } else { found }) {
         return None;
     }
-    // Few held-out frames say little of so many numbers: every frame is foretold by those of the other folds.
+    // Few held-out frames say little of so many numbers: every frame is predicted by those of the other folds.
     let gain: f64 = folds(of_frames.len())
         .map(|parts| {
             let [rest, fold] = parts.map(|frames| sum(&frames));

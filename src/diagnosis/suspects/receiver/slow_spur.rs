@@ -25,9 +25,9 @@ const FINE: usize = 4;
 /// Cells of Doppler by which a tone may be beside the strongest one, and steps in which it is sought.
 const BESIDE: f64 = 1.0;
 const STEPS: usize = 16;
-/// Share of the power there that must go on from frame to frame, and that this must foretell of the held-out frames.
+/// Share of the power there that must go on from frame to frame, and that this must predict of the held-out frames.
 const COHERENT: f64 = 0.95;
-const FORETOLD: f64 = 0.9;
+const PREDICTED: f64 = 0.9;
 /// Range bins that what turns so, and moves, leaves during the recording at least, and up to which share of that a tone may seem to.
 const LEAST_BINS: f64 = 0.8;
 const STAYS: f64 = 0.3;
@@ -98,7 +98,7 @@ pub fn find(evidence: &Evidence) -> Option<SlowSpur> {
     let found: Vec<Tone> = cells.par_iter().map(|&cell| spectra.tone(cell)).collect();
     let Tone { bin, turns, coherence } = found.into_iter().max_by(|a, b| a.coherence.total_cmp(&b.coherence))?;
     let walk = spectra.walk_bins(turns);
-    if coherence < COHERENT || walk < LEAST_BINS || spectra.foretold(turns, bin) < FORETOLD {
+    if coherence < COHERENT || walk < LEAST_BINS || spectra.predicted(turns, bin) < PREDICTED {
         return None;
     }
     // Half of the recording is half of the way.
@@ -228,8 +228,8 @@ impl<'a> Spectra<'a> {
         (1.0 - coherence).clamp(1e-16, 1.0).powi(self.training as i32 - 1)
     }
 
-    /// Share of the held-out frames' power that the training frames' mean foretells.
-    fn foretold(&self, turns: Turns, bin: usize) -> f64 {
+    /// Share of the held-out frames' power that the training frames' mean predicts.
+    fn predicted(&self, turns: Turns, bin: usize) -> f64 {
         let (mut left, mut all) = (0.0, 0.0);
         for channel in self.turned_back(&self.held(turns.per_loop, bin), turns.per_frame) {
             let (training, held_out) = channel.split_at(self.training);

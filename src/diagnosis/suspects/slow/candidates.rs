@@ -29,7 +29,7 @@ pub(super) fn stated_delay_s() -> f64 {
 /// Frame, transmitter and loop to the deviation of that chirp.
 pub(super) type Deviation = Arc<dyn Fn([usize; 3]) -> f64 + Send + Sync>;
 
-/// `spent`: nats per chirp on deviations that no law foretells.
+/// `spent`: nats per chirp on deviations that no law predicts.
 pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, spent: f64) -> Correction {
     let (radar, room) = (evidence.radar.clone(), evidence.room.clone());
     let known = deviation.clone();

@@ -1,9 +1,9 @@
 //! A phase of any course in time that the static returns of most ranges share, where nobody is tracked.
 //!
 //! Without a body whose returns could be set aside, something that moves may be stronger than everything that stands still. So no
-//! mean over the ranges is taken: each range is foretold by the others, frequency by frequency of slow time, and a range that does
+//! mean over the ranges is taken: each range is predicted by the others, frequency by frequency of slow time, and a range that does
 //! not share what they have is left out. Where ranges vary each for itself, the phases of their spectra are independent of one
-//! another and uniform, whatever the spectra's magnitudes are. A bet on each phase (von Mises' law about the one that is foretold,
+//! another and uniform, whatever the spectra's magnitudes are. A bet on each phase (von Mises' law about the one that is predicted,
 //! over the uniform law) has a mean of one then, and so has the product of bets in which each may depend on those before it: its
 //! inverse is a p-value (Ville's inequality; Shafer, Testing by betting, Journal of the Royal Statistical Society A 184, 2021). No
 //! course in time, no spectrum of the noise and no threshold is assumed.
@@ -282,22 +282,22 @@ fn shared(spectra: &[Spectrum], part: Part) -> Option<Shared> {
     Some(Shared { log_bets, ..best })
 }
 
-/// Logarithm of what a bet on a group's phases returns, and of what it would return if the group had what is foretold.
+/// Logarithm of what a bet on a group's phases returns, and of what it would return if the group had what is predicted.
 fn bet(reference: &Reference, spectrum: &Spectrum) -> (f64, f64) {
     let (mut returns, mut most) = ([0.0; SHARES.len() + 1], 0.0);
     for (index, value) in spectrum.values.iter().enumerate() {
         let (known, ratio) = reference.value(index);
         let kept = statistics::kept(ratio);
-        let foretold = known * kept;
+        let predicted = known * kept;
         let variance = spectrum.variance + kept / reference.information;
-        let concentration = 2.0 * value.norm() * foretold.norm() / variance;
+        let concentration = 2.0 * value.norm() * predicted.norm() / variance;
         if concentration > 0.0 {
-            let along = (value * foretold.conj()).re / (value.norm() * foretold.norm());
+            let along = (value * predicted.conj()).re / (value.norm() * predicted.norm());
             for (sum, share) in returns.iter_mut().zip(SHARES) {
                 *sum += (share * concentration * along - log_bessel_0(share * concentration)) / SETS;
             }
         }
-        most += foretold.norm_sqr() / variance / SETS;
+        most += predicted.norm_sqr() / variance / SETS;
     }
     (log_sum(returns.into_iter()) - (returns.len() as f64).ln(), most)
 }
