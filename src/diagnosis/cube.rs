@@ -102,8 +102,8 @@ pub fn mean_chirp<'a>(chirps: impl Iterator<Item = &'a [Complex64]>, samples: us
     mean
 }
 
-/// Frames of the others and of its own, fold by fold: where few held-out ones would say little, every part is predicted by the rest.
-/// Every so many-th frame is in one.
+/// Frames of the others and of its own, fold by fold: where few held-out ones would say little, every part is predicted by the
+/// rest. Every so many-th frame is in one.
 pub fn folds(frames: usize) -> impl Iterator<Item = [Vec<usize>; 2]> {
     (0..FOLDS).map(move |fold| {
         let (own, others) = (0..frames).partition(|frame| frame % FOLDS == fold);

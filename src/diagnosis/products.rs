@@ -264,7 +264,7 @@ mod tests {
     #[test]
     fn what_drives_a_strong_compression_is_found_by_secants() {
         let first = Law { product: Product::Cube, kappa: (-0.2).into(), scatter: 0.01, p_value: 0.0, gain: 1.0, peak: 1.0 };
-        // Undone by too much, the signal shows far less of it: steps without secants would swing about.
+        // Undone by too much, the signal shows far less of it: steps without secants would oscillate.
         let found = |law: Law| Some(Law { kappa: -0.2 - 1.2 * (law.kappa + 0.3 * law.kappa * law.kappa), ..first });
         let law = driven(first, found).unwrap();
         let same = found(law).unwrap();

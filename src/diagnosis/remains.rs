@@ -16,7 +16,7 @@ const SLIGHTLY: f64 = 0.01;
 
 /// What a radar that vibrates leaves: turns of what stands still that are not quite undone, and their sidebands, up to this share of
 /// its gain (which counts what is left).
-const TURNS: [&str; 3] = ["slow-time phase", "delay-proportional phase", fluctuation::STIRS];
+const TURNS: [&str; 3] = ["slow-time phase", "delay-proportional phase", fluctuation::FLUCTUATES];
 const SHAKEN: f64 = 0.5;
 const FADING: &str = "slow-time gain";
 
@@ -102,10 +102,10 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // turns change how much is received.
     let vibrates = accepted.id == Some("radar_vibration");
     let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
-    // So of one return that swings, which reaches a little beyond its ranges.
+    // So of one return that is modulated, which reaches a little beyond its ranges.
     let around = accepted.place.range_m.map(|[near, far]| [near - NEAR_M, far + NEAR_M]);
-    let hums = accepted.behaves_like == fluctuation::HUMS && !apart(around, candidate.place.range_m);
-    let shaken = vibrates && (turns || is_path(candidate)) || hums && is_path(candidate);
+    let modulated = accepted.behaves_like == fluctuation::IS_MODULATED && !apart(around, candidate.place.range_m);
+    let shaken = vibrates && (turns || is_path(candidate)) || modulated && is_path(candidate);
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     // A course from frame to frame that has no name is modelled roughly: what is left of it turns all returns, too; where the strongest
     // seems to move slowly, no other is strong enough to deny it.

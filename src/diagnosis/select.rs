@@ -32,9 +32,9 @@ impl DiagnosisConfig {
             None if sure => 0.5 * (self.gain + self.nameless_gain),
             None => self.nameless_gain,
         };
-        // What predicts held-out frames better than it must is as much less likely to be chance: the likelihood's ratio on data that
-        // were not fitted exceeds e^gain by chance with a probability of e^-gain at most. Not where the body's prediction has a part:
-        // what errs in it errs in held-out frames alike; nor where the frames that predict are those of the p-value.
+        // What predicts held-out frames better than it must is as much less likely to be chance: the likelihood's ratio on data
+        // that were not fitted exceeds e^gain by chance with a probability of e^-gain at most. Not where the body's prediction has
+        // a part: what errs in it errs in held-out frames alike; nor where the frames that predict are those of the p-value.
         let surplus = untouched && !candidate.errs_alike && !SUSPECTS[suspect].predicts_all_frames;
         let surplus = if surplus { (candidate.gain - least).exp().clamp(1.0, MOST_SURPLUS) } else { 1.0 };
         candidate.p_value <= self.p_value(suspect) * surplus && candidate.gain >= least && candidate.gain.is_finite()

@@ -1,9 +1,9 @@
 //! Chirps that begin elsewhere than is stated: a header before the first sample, samples that were cut off.
 //!
 //! Between one chirp and the next the signal breaks; within a chirp it goes on. A linear prediction (Burg 1975: forwards and backwards)
-//! of the still chirps predicts what goes on, so its error is largest where chirps begin. Within a chirp that is as stated, noise makes
-//! the error as large at one sample as at any other, and independently in every channel: that the same few samples come first in several
-//! channels has a binomial law, Bonferroni over the samples. Errors across the stated beginning compete, and a
+//! of the still chirps predicts what goes on, so its error is largest where chirps begin. Within a chirp that is as stated, noise
+//! makes the error as large at one sample as at any other, and independently in every channel: that the same few samples come first
+//! in several channels has a binomial law, Bonferroni over the samples. Errors across the stated beginning compete, and a
 //! break within a few samples of it is taken for a transient.
 
 use num_complex::Complex64;
@@ -14,8 +14,8 @@ use super::{ALARM, Finding, Inspector, Kind};
 
 const CHECK: &str = "chirp_start";
 const EXPECTED: &str = "the first sample of a chirp first";
-/// Samples from which the next one is predicted: what is left of the weaker returns is small against a break. A break spoils as many
-/// predictions, of which any may be the worst.
+/// Samples from which the next one is predicted: what is left of the weaker returns is small against a break. A break spoils as
+/// many predictions, of which any may be the worst.
 const ORDER: usize = 4;
 /// Share of a chirp at either end in which what begins or ends with it (a filter that settles, a ramp that is over) may break most.
 const TRANSIENT: usize = 32;

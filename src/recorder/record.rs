@@ -117,14 +117,14 @@ impl Recorder {
     fn received(&self, body: Signal) -> Result<Signal> {
         let (frame, loops) = (body.frame, body.loops);
         let mut signal = self.all_paths(body)?;
-        let swing = vibration(&self.world);
+        let antennas = vibration(&self.world);
         let chirp = super::chirp::Chirp::new(&self.stages.wide);
         let stage = Stage {
             radar: &self.stages.radar,
             chirp: &chirp,
             clock: &self.stages.clock,
             body: self.paths.scatter.as_ref().map(|scatter| &scatter.body),
-            vibration: swing.as_ref(),
+            vibration: antennas.as_ref(),
         };
         self.movers.iter().try_for_each(|mover| mover.add(&stage, &mut signal))?;
         if let (Some([out, back]), Some(effect)) = (&self.board, &self.world.effects.object_radar_object)

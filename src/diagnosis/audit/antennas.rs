@@ -1,12 +1,12 @@
 //! Which antenna is which, and on which side: left and right, up and down, receivers in reverse, transmitters in another order.
 //!
-//! Where the body moves, the phases of the channels follow from its direction. Every reading of the antennas predicts them; the one that
-//! is stated is held against the others. The measure of a channel is its coherence with the first channel after that phase is taken out:
-//! a constant phase of its own (receivers that differ) does not lower it, but directions that change do where the reading is wrong. With a
-//! coherence γ, a share 1 − γ² of a channel's power is left (Carter, Knapp and Nuttall 1973), so Σ ln((1 − γ²) / (1 − γ'²)) over channels and
-//! frames is the log of a likelihood ratio; a frame counts once, however many cells the body fills in it. Where the body stays in one
-//! direction, only the constant phases themselves can tell, which receivers that differ make by chance: they must then agree
-//! with the other reading nearly as a whole, over three channels at least.
+//! Where the body moves, the phases of the channels follow from its direction. Every reading of the antennas predicts them; the one
+//! that is stated is held against the others. The measure of a channel is its coherence with the first channel after that phase is
+//! taken out: a constant phase of its own (receivers that differ) does not lower it, but directions that change do where the
+//! reading is wrong. With a coherence γ, a share 1 − γ² of a channel's power is left (Carter, Knapp and Nuttall 1973), so Σ ln((1 −
+//! γ²) / (1 − γ'²)) over channels and frames is the log of a likelihood ratio; a frame counts once, however many cells the body
+//! fills in it. Where the body stays in one direction, only the constant phases themselves can tell, which receivers that differ
+//! make by chance: they must then agree with the other reading nearly as a whole, over three channels at least.
 
 use num_complex::Complex64;
 

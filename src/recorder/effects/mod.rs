@@ -28,7 +28,7 @@ pub use noise::shape as shape_noise;
 pub use onto::{Ground, Onto};
 pub use propagation::{MirrorPlan, Shadow, twice_bounced};
 pub use receiver::Chain;
-pub use scene::{Mover, Stage, Swing, movers, static_points, vibration};
+pub use scene::{Mover, SinusoidalMotion, Stage, movers, static_points, vibration};
 pub use settings::*;
 pub use signal::Signal;
 pub use stage::{Stages, codes};

@@ -192,10 +192,10 @@ settings! {
     RangeBias { offset_m: f64 [-2.0, 2.0] }
     /// P1: relative to the body's root mean square (without a body: to the peak sample).
     StaticReflector { position_m: [f64; 3] [-100.0, 100.0], amplitude: f64 [0.0, 1.0e3] }
-    /// P2: swings about its place; amplitude as for a static reflector.
+    /// P2: oscillates about its place; amplitude as for a static reflector.
     MovingReflector {
         position_m: [f64; 3] [-100.0, 100.0],
-        /// Direction of the swing; any length.
+        /// Direction of the motion; any length.
         #[serde(default = "along_x")] axis: [f64; 3] [-1.0e3, 1.0e3],
         swing_m: f64 [0.0, 5.0], rate_hz: f64 [0.0, 100.0], amplitude: f64 [0.0, 1.0e3],
     }
@@ -216,7 +216,7 @@ settings! {
     /// P8: something beyond the unambiguous range; amplitude as for a static reflector.
     RangeAlias {
         range_m: f64 [0.0, 200.0], #[serde(default)] azimuth_deg: f64 [-90.0, 90.0], amplitude: f64 [0.0, 1.0e3],
-        /// It may swing along the line of sight.
+        /// It may oscillate along the line of sight.
         #[serde(default)] swing_m: f64 [0.0, 5.0], #[serde(default)] rate_hz: f64 [0.0, 100.0],
     }
     /// T8: the body shadows the room behind it, with the soft edge of the first Fresnel zone.
@@ -268,7 +268,7 @@ pub enum Outside {
     RxMuxSkew { fraction: f64 },
     /// What stands within `radius_m` of a place reflects with the light: 1 + depth · cos.
     LampModulation { position_m: [f64; 3], radius_m: f64, rate_hz: f64, depth: f64 },
-    /// The part of the walls within `radius_m` of a place sways along y.
+    /// The part of the walls within `radius_m` of a place oscillates along y.
     MovingCurtain { position_m: [f64; 3], radius_m: f64, rate_hz: f64, swing_m: f64 },
     /// The oscillator follows the signal: its phase turns by up to `peak_rad` with the strongest beat.
     LoPulling { peak_rad: f64 },

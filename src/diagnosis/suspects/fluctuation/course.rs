@@ -139,13 +139,13 @@ mod tests {
         let (held_out, training): (Vec<usize>, Vec<usize>) = (0..12).partition(|frame| frame % 4 == 2);
         let frames = Frames { times_s: &times_s, training: &training, held_out: &held_out };
         let mut random = ChaCha8Rng::seed_from_u64(5);
-        let mut series = |swing: f64| -> Vec<f64> {
+        let mut series = |amplitude: f64| -> Vec<f64> {
             let noise = |_| -> f64 { StandardNormal.sample(&mut random) };
-            times_s.iter().map(|time| 7.0 + swing * (4.0 * time).sin()).zip((0..12).map(noise)).map(|(a, b)| a + b).collect()
+            times_s.iter().map(|time| 7.0 + amplitude * (4.0 * time).sin()).zip((0..12).map(noise)).map(|(a, b)| a + b).collect()
         };
         let mut gains = vec![];
-        for swing in [0.0, 4.0] {
-            let series = [series(swing), series(swing)];
+        for amplitude in [0.0, 4.0] {
+            let series = [series(amplitude), series(amplitude)];
             let data = Data { series: &series, numbers: 2.0, noise: &[1.0; 12] };
             let course = Course::new(frames, &data);
             gains.push([course.training, course.predicted]);
@@ -153,8 +153,8 @@ mod tests {
             let values = DVector::from_iterator(training.len(), training.iter().map(|&frame| series[0][frame] - 7.0));
             let predicted = weights * values;
             for &frame in &held_out {
-                let wanted = swing * (4.0 * times_s[frame]).sin();
-                assert!((predicted[frame] - wanted).abs() < 1.5, "{swing} {frame}: {} for {wanted}", predicted[frame]);
+                let wanted = amplitude * (4.0 * times_s[frame]).sin();
+                assert!((predicted[frame] - wanted).abs() < 1.5, "{amplitude} {frame}: {} for {wanted}", predicted[frame]);
             }
         }
         assert!(gains[0][0] < 3.0 && gains[0][1] < 1.0, "{gains:?}");

@@ -31,7 +31,8 @@ const PREDICTED: f64 = 0.9;
 /// Range bins that what turns so, and moves, leaves during the recording at least, and up to which share of that a tone may seem to.
 const LEAST_BINS: f64 = 0.8;
 const STAYS: f64 = 0.3;
-/// Chance at which what goes on at the opposite Doppler frequency is none: what is modulated, or swings about its place, has both.
+/// Chance at which what goes on at the opposite Doppler frequency is none: what is modulated, or oscillates about its place, has
+/// both.
 const OPPOSITE: f64 = 1e-3;
 
 /// How a tone turns from loop to loop, and from one frame's beginning to the next.

@@ -117,8 +117,8 @@ fn judged(evidence: &Evidence, steady: &Steady, of_body: Option<&[Vec<Vec<[f64; 
     // What but one half has, such as slow parts of the body, the other one has by chance.
     let patterns = halves.each_ref().map(|half| half.likely(training));
     let p_value = chance(&halves[0], &patterns[1], training).max(chance(&halves[1], &patterns[0], training));
-    // Gains drawn from one law in every frame. Few held-out frames may all have the same one: every frame is predicted by those of the
-    // other folds.
+    // Gains drawn from one law in every frame. Few held-out frames may all have the same one: every frame is predicted by those of
+    // the other folds.
     let seen = |frames: &[usize]| frames.iter().copied().filter(|&f| all.weight[f] > 0.0).collect::<Vec<usize>>();
     let gain = folds(evidence.cube.dims[0]).map(|[rest, fold]| Law::of(&all, &seen(&rest)).gain(&all, &seen(&fold))).sum();
     let variance = Law::of(&all, &seen(training)).variance;

@@ -27,7 +27,7 @@ pub struct Field {
     pub frames: usize,
     pub loops: usize,
     pub groups: Vec<Group>,
-    /// `[frame, loop, group]`, zero where nothing can be said; its imaginary part is an angle where phases swing far.
+    /// `[frame, loop, group]`, zero where nothing can be said; its imaginary part is an angle where phase excursions are large.
     deviation: Vec<Complex64>,
     /// Inverse variance of a complex deviation, `[frame, group]`; zero where nothing can be said.
     weight: Vec<f64>,
@@ -223,8 +223,8 @@ impl Field {
         (sure > SURE).then(|| Complex64::ONE + sum / sure)
     }
 
-    /// Where phases swing far, reads them as angles, and gains as they are without that: a mean over time of what turns is
-    /// shorter than it.
+    /// Where phase excursions are large, reads them as angles, and gains as they are without that: a mean over time of what turns
+    /// is shorter than it.
     fn unroll(&mut self, training: &[usize]) {
         let chirps = training.iter().flat_map(|&frame| (0..self.loops).map(move |index| (frame, index)));
         let common: Vec<Complex64> = chirps.filter_map(|(frame, index)| self.common(frame, index)).collect();

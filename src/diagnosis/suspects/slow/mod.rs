@@ -11,12 +11,12 @@ pub mod field;
 pub mod lines;
 pub mod locked;
 pub mod odd_frame;
+mod platform_vibration;
 pub mod random;
 pub mod settling;
 mod shared;
 pub mod slip;
 pub mod steady;
-mod sway;
 #[cfg(test)]
 mod tests;
 pub mod undo;
@@ -74,8 +74,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // Where nobody is tracked and no law in time holds, what most ranges share is told without one.
     let shared = || evidence.body.is_none().then(|| shared::find(evidence)).flatten().map(of_all).filter(tells);
     let Some(field) = Field::new(evidence) else {
-        // No range stands still: nothing does, or returns from many directions swing.
-        return shared().or_else(|| sway::find(evidence).map(of_all).filter(tells)).into_iter().collect();
+        // No range is static: nothing is, or the phases of returns from many directions oscillate.
+        return shared().or_else(|| platform_vibration::find(evidence).map(of_all).filter(tells)).into_iter().collect();
     };
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     let frame_s = evidence.radar.frame_duration_s();

@@ -35,7 +35,8 @@ const BINS_PER_VALUE: f64 = 2.0;
 const SHARES: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
 /// What a range would gain (nats) if it shared everything, for its silence to tell anything: as in `field`.
 const TELLING_GAIN: f64 = 10.0;
-/// Half turns up to which a course is slow: what turns less than one and a half times during a recording is a drift (as in `sway`).
+/// Half turns up to which a course is slow: what turns less than one and a half times during a recording is a drift (as in
+/// `platform_vibration`).
 const SLOW: usize = 3;
 /// Interleaved sets of frequencies, each of which is independent under the taper.
 const SETS: f64 = 2.0;
@@ -384,8 +385,8 @@ fn candidate(evidence: &Evidence, course: &Course, deviations: &Deviations, shar
             format!(" (or that beside a multiple of {:.2} Hz, the rate of the frames)", course.frame_s.recip())
         };
         let text = format!(
-            "All static returns swing in phase together, by {rms:.4} rad (standard deviation) at {frequency_hz:.2} ± {width_hz:.2} Hz{alias}; \
-             {ranges}: the radar itself vibrates, by {:.1} µm along its boresight (standard deviation).",
+            "The phases of all static returns fluctuate together, by {rms:.4} rad (standard deviation) at {frequency_hz:.2} ± \
+             {width_hz:.2} Hz{alias}; {ranges}: the radar itself vibrates, by {:.1} µm along its boresight (standard deviation).",
             1e6 * rms * metres
         );
         (Some("radar_vibration"), estimates, text)

@@ -1,4 +1,4 @@
-//! A chirp whose frequency swings: paired echoes on both sides of every return, their height in proportion to its delay.
+//! A chirp whose frequency is modulated: paired echoes on both sides of every return, their height in proportion to its delay.
 //!
 //! PHYSICS card W7: a return of delay τ is turned by 2πτ a cos(2π f t + φ), to first order `+ α exp(2πi f t) τx − conj(α)
 //! exp(−2πi f t) τx` with α = iπa exp(iφ). The recording itself is the template; it is looked for only where no return
@@ -179,7 +179,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
         look_alikes: vec![],
         statement: format!(
             "Every return has a pair of faint echoes {:.0} kHz ({:.2} m) before and behind it, higher the farther it is ({:.0} dB at 3 \
-             m): the chirp's frequency swings by {:.1} kHz, {:.0} thousand times a second.",
+             m): the chirp's frequency is modulated by {:.1} kHz, {:.0} thousand times a second.",
             1e-3 * ripple_hz,
             ripple_hz * SPEED_OF_LIGHT / (2.0 * radar.slope_hz_per_s),
             20.0 * stated.max(1e-9).log10(),
