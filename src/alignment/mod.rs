@@ -63,7 +63,7 @@ const ROUNDS: usize = 10;
 /// Widest azimuth that is tried, and the step: a third of what four receivers half a wavelength apart resolve at their best.
 const WIDEST_RAD: f64 = 72.0 * PI / 180.0;
 const AZIMUTH_STEP_RAD: f64 = 4.0 * PI / 180.0;
-/// Where the recording puts its motion; `progress` hears what happens, in plain words.
+/// Where the recording puts its motion; `progress` receives what happens, in plain words.
 ///
 /// # Errors
 /// A recording that cannot be read, is too short or damaged, or has no body with a motion; a motion that has no pose in all of the

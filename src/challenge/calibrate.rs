@@ -179,7 +179,7 @@ pub fn missing(out: &Path, nulls: usize) -> usize {
     open(out, nulls, Shard::ALL).count()
 }
 
-/// Records and diagnoses the nulls of a part that have no report yet; `progress` hears how many are done.
+/// Records and diagnoses the nulls of a part that have no report yet; `progress` receives how many are done.
 ///
 /// # Errors
 /// A folder that was begun with another source or seed; what the recorder refuses.

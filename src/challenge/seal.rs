@@ -36,7 +36,7 @@ const LEAST_D_PRIME: f64 = 1.0;
 /// An undetectable effect is brought to this d′.
 const WEAK_D_PRIME: f64 = 1.0;
 
-/// Seals a challenge into `out`; one that was interrupted goes on. `progress` hears how many cases are done.
+/// Seals a challenge into `out`; one that was interrupted goes on. `progress` receives how many cases are done.
 ///
 /// # Errors
 /// A commitment that is there already, another seed than the one begun with, and whatever the recorder refuses.

@@ -132,7 +132,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let rest = no_single && is_path(candidate);
     let smeared = vibrates || timed || is_by_chirp(accepted) || path_like;
     let uneven = (smeared || is_one_of(accepted, &OF_REMAINS)) && is_of_receivers(candidate);
-    // To undo what receivers hear of one another mixes their noise, and chirps read between their samples have less of it.
+    // To undo a coupling of receivers mixes their noise, and chirps read between their samples have less of it.
     let mixed = is_of_receivers(accepted) && candidate.id == Some("correlated_noise")
         || accepted.id == Some("chirp_nonlinearity") && candidate.id == Some("coloured_noise");
     // Chirps that start at random differ from their neighbours, and go on doing so a little.

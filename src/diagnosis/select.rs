@@ -97,13 +97,13 @@ pub struct Explanation {
     pub after: Misfit,
 }
 
-/// Runs the rounds; `progress` hears what was found.
+/// Runs the rounds; `progress` receives what was found.
 pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut dyn FnMut(&str)) -> Explanation {
     let before = Misfit::of(&evidence);
     let original = evidence;
     let mut current: Option<Evidence> = None;
     let mut accepted: Vec<Accepted> = vec![];
-    let mut first_heard = None;
+    let mut first_suspected = None;
     // Candidates of the round before that could still turn out to be the same thing as what was accepted in it.
     let mut pending: Vec<Candidate> = vec![];
     let mut misfit = before;
@@ -111,12 +111,12 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     let mut refused: Vec<&'static str> = vec![];
     // Names that passed on the untouched recording, and what they gained.
     let mut at_first: Option<Vec<(&'static str, f64)>> = None;
-    // What was heard in a round that only refused a name: nothing has changed since.
-    let mut heard: Option<Vec<(usize, Candidate)>> = None;
+    // What was suspected in a round that only refused a name: nothing has changed since.
+    let mut suspected: Option<Vec<(usize, Candidate)>> = None;
     for _ in 0..=thresholds.most {
         let evidence = current.as_ref().unwrap_or(&original);
-        let found = heard.take().unwrap_or_else(|| suspicions(evidence));
-        first_heard.get_or_insert_with(|| (strongest_suspicion(&found), by_suspect(&found)));
+        let found = suspected.take().unwrap_or_else(|| suspicions(evidence));
+        first_suspected.get_or_insert_with(|| (strongest_suspicion(&found), by_suspect(&found)));
         // So they do where products were taken out roughly.
         let bent = |effect: &Accepted| effect.candidate.behaves_like == harmonic::QUADRATIC;
         let mixed = evidence.products().mixed().is_some() || accepted.iter().any(bent);
@@ -176,7 +176,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         {
             if !SUSPECTS[*suspect].last_in_chain {
                 refused.push(id);
-                heard = Some(found);
+                suspected = Some(found);
                 continue;
             }
             // What the codes themselves show is there, even where it cannot be undone.
@@ -205,7 +205,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     let held_out = original.split.held_out.len() * original.cube.channels() * original.cube.dims[3] * original.range_bins();
     let unseen = accepted.iter().filter(|effect| matches!(effect.candidate.correction, Correction::None));
     after.loglik_per_sample += unseen.map(|effect| effect.candidate.gain).sum::<f64>() / held_out.max(1) as f64;
-    let (suspicion, suspects) = first_heard.unwrap_or((1.0, BTreeMap::new()));
+    let (suspicion, suspects) = first_suspected.unwrap_or((1.0, BTreeMap::new()));
     Explanation { accepted, evidence, suspicion, suspects, before, after }
 }
 

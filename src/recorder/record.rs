@@ -253,7 +253,7 @@ fn board_paths(world: &World, stages: &Stages, level: f64) -> Result<[(Paths, Ra
     Ok([paths(received)?, paths(sent)?])
 }
 
-/// All frames of a world; `progress` hears how many of how many are done.
+/// All frames of a world; `progress` receives how many of how many are done.
 pub fn record(world: &World, progress: &mut dyn FnMut(usize, usize)) -> Result<Vec<IfFrame>> {
     let recorder = Recorder::new(world)?;
     let frames = recorder.frames().enumerate();

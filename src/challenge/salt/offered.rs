@@ -17,8 +17,13 @@ const ADDED: &[&str] = &["additive", "sparse additive", "tone", "excess power", 
 const NONLINEAR: &[&str] = &["non-linear", "quadratic", "conjugate image", "image", "amplitude"];
 const SLOW: &[&str] = &["slow-time", "single frame", "static returns that", "a static return that", "delay-proportional phase"];
 const FAST: &[&str] = &["fast-time", "beat-frequency", "delay-proportional phase"];
-const CHANNEL: &[&str] =
-    &["channel gain", "slow-time gain of one channel", "receivers that hear", "phase between receivers", "direction offset"];
+const CHANNEL: &[&str] = &[
+    "channel gain",
+    "slow-time gain of one channel",
+    "receivers that are coupled",
+    "phase between receivers",
+    "direction offset",
+];
 const NOISE: &[&str] = &["noise", "sparse additive", "excess power"];
 const CODES: &[&str] = &["quantisation", "slipped samples", "single frame", "amplitude", "damaged"];
 

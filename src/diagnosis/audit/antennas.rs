@@ -86,7 +86,7 @@ fn orders(count: usize) -> Vec<Vec<usize>> {
     orders
 }
 
-/// What was found, and whether the stated reading stands. None where nothing of the body is heard.
+/// What was found, and whether the stated reading stands. None where nothing of the body is observed.
 fn compared(evidence: &Evidence, stated: &Reading, others: &[Reading], by_phases: bool) -> Option<(String, bool)> {
     let all: Vec<&Reading> = std::iter::once(stated).chain(others).collect();
     let agreements = agreements(evidence, &all)?;
@@ -102,7 +102,7 @@ fn compared(evidence: &Evidence, stated: &Reading, others: &[Reading], by_phases
     let Some(best) = wrong.iter().map(|(_, agreement)| strength(agreement)).reduce(f64::max) else {
         return Some(("array phases do not contradict it".into(), true));
     };
-    // Readings that predict the same phases are told together.
+    // Readings that predict the same phases are reported together.
     let told: Vec<String> = wrong
         .iter()
         .filter(|(_, agreement)| strength(agreement) > best - 1e-3)

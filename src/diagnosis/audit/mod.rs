@@ -98,7 +98,7 @@ pub fn is_convention(check: &Check) -> bool {
     CONVENTIONS.contains(&check.check.as_str())
 }
 
-/// Whether a body was expected and is heard nowhere.
+/// Whether a body was expected and is observed nowhere.
 pub fn is_silent(check: &Check) -> bool {
     check.check == "body_place" && check.found.contains(placement::SILENT)
 }

@@ -9,15 +9,15 @@ use super::heading::heading;
 use crate::diagnosis::evidence::Evidence;
 use crate::integrity::ALARM;
 
-pub(super) const SILENT: &str = "no body is heard where the motion puts it, nor at other ranges";
+pub(super) const SILENT: &str = "no body is observed where the motion puts it, nor at other ranges";
 /// Least energy over the noise where the motion puts the body, dB: twice what noise alone shows, E₁(1) = 0.22 nats = 0.95 dB (the mean of
 /// the positive part of an exponential variable's logarithm).
 const PRESENT_DB: f64 = 1.9;
 
 /// One check for each kind of reading. Another reading is believed where it has more power, and explains the moving power better than
 /// what is stated and than each effect with a name that would move the body a little (chance at most [`ALARM`] for each check, Bonferroni
-/// over its readings). Where nothing is heard as stated, it must only be heard. Of several that are believed, the one that explains most
-/// is told.
+/// over its readings). Where nothing is observed as stated, it must only be observed. Of several that are believed, the one that
+/// explains most is reported.
 pub(super) fn placement(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<Check> {
     if !moves(evidence) {
         return vec![];
@@ -64,7 +64,8 @@ pub(super) fn placement(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<
     checks
 }
 
-/// Whether a body is heard where it is stated to be, once something was undone; none where another reading of the scene is believed.
+/// Whether a body is observed where it is stated to be, once something was undone; none where another reading of the scene is
+/// believed.
 pub fn body_place(evidence: &Evidence) -> Option<Check> {
     let checks = placement(evidence, None);
     let other_reading = checks.iter().any(|check| !check.ok && check.check != "body_place");

@@ -23,13 +23,13 @@ use super::finding::Candidate;
 /// Somebody who may be to blame.
 pub struct Suspect {
     pub name: &'static str,
-    /// Of the family-wise chance of a false claim, in proportion to all shares. What is as plain as a pikestaff when it
-    /// is there needs little; what errors of the mesh blur needs more.
+    /// Of the family-wise chance of a false claim, in proportion to all shares. What has a high SNR when it is
+    /// there needs little; what errors of the mesh blur needs more.
     pub share: f64,
     pub find: fn(&Evidence) -> Vec<Candidate>,
     /// Looks at the codes as they were recorded: what is corrected happened before and takes nothing back.
     pub last_in_chain: bool,
-    /// Is heard only where nobody else has anything to say.
+    /// Counts only where no other suspect finds anything.
     pub last_resort: bool,
     /// Trusts that the body is where it was predicted: it waits until that is so.
     pub trusts_the_place: bool,

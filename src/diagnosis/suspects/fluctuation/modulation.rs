@@ -464,8 +464,8 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Ca
         look_alikes: vec![],
         statement: format!(
             "The return {range_m:.2} m away is modulated at {frequency_hz:.1} Hz (or at that and a multiple of the \
-             {frame_rate_hz:.1} frames per second), coherently from frame to frame, while the other ranges are constant: a lamp or a \
-             machine is there."
+             {frame_rate_hz:.1} frames per second), coherently from frame to frame, while the other ranges are constant: a lamp or \
+             a machine is there."
         ),
         curve: None,
         energy,

@@ -93,14 +93,14 @@ impl Bearing {
     }
 }
 
-/// What receivers hear of the body.
-pub struct Heard {
+/// What the receivers observe of the body.
+pub struct Observed {
     training: Vec<Sums>,
     held_out: Vec<Sums>,
     pub array: Array,
 }
 
-impl Heard {
+impl Observed {
     /// None for a single receiver, and where the body fills too few cells.
     pub fn new(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction) -> Option<Self> {
         if evidence.radar.rx_m.len() < 2 {
@@ -128,7 +128,7 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     if accepted(slow::channels::BEHAVES_LIKE) || accepted("antenna_position") {
         return vec![];
     }
-    let Some(Heard { training, held_out, array }) = Heard::new(evidence, model, body) else { return vec![] };
+    let Some(Observed { training, held_out, array }) = Observed::new(evidence, model, body) else { return vec![] };
     let bearing = array.bearing;
     if let Some(candidate) = differ(evidence, &array, displaced) {
         return vec![candidate];
@@ -149,15 +149,15 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
 /// The way in which the receivers differ, if they do.
 fn differ(evidence: &Evidence, array: &Array, displaced: bool) -> Option<Candidate> {
     let accepted = |id: &str| evidence.accepted.contains(&id);
-    // What receivers hear in common says nothing of them where the body is not what they hear; and those that differed were
+    // What is common to the receivers says nothing of them where it is not the body's; and those that differed were
     // brought to the first one's, a neighbour's part included.
     let alike = !displaced && !accepted("channel_mismatch");
-    let heard = alike && !accepted("mutual_coupling");
-    let coupled = if heard { coupling::find(evidence, array) } else { None };
+    let may_couple = alike && !accepted("mutual_coupling");
+    let coupled = if may_couple { coupling::find(evidence, array) } else { None };
     let differ = [
         if alike { mismatch::find(evidence, array) } else { None },
         if displaced { None } else { places::find(evidence, array) },
-        if heard { coupling::one_way(evidence, array, coupled.as_ref()) } else { None },
+        if may_couple { coupling::one_way(evidence, array, coupled.as_ref()) } else { None },
         coupled,
     ];
     best(differ.into_iter().flatten().collect())

@@ -1,4 +1,4 @@
-//! Receivers whose gains and phases differ (card C1), told from all that they hear of the body.
+//! Receivers whose gains and phases differ, estimated from all that they observe of the body.
 //!
 //! Phases that grow with the receivers' places are a direction, and might as well be the body's; anything else, and any
 //! difference of gain, cannot be.

@@ -125,7 +125,7 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
         energy: *energy,
         correction: Correction::Inverse(
             Arc::new(move |cube: &mut Cube| remove(cube, kind, factor)),
-            // A product with what other receivers heard turns with them, and stretches nothing on average.
+            // A product with what other receivers observe turns with them, and stretches nothing on average.
             if kind == Kind::Harmonic { Volume::BY_SAMPLE } else { Volume::KEPT },
         ),
     })

@@ -146,7 +146,7 @@ impl Bank {
             let size = values.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt();
             values.into_iter().map(|value| value / size).collect()
         };
-        // A receiver without quadrature hears both signs as one.
+        // A receiver without quadrature does not distinguish the two signs.
         let signs: &[f64] = if evidence.is_real() { &[1.0] } else { &[1.0, -1.0] };
         let between = (0..BETWEEN).map(|step| step as f64 / BETWEEN as f64);
         let sweeps = DURATIONS.iter().flat_map(|&duration| signs.iter().map(move |&sign| (duration, sign)));

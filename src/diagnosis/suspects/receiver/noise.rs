@@ -270,7 +270,7 @@ fn pairs_of(receivers: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..receivers).flat_map(|a| (0..a).map(move |b| (a, b)))
 }
 
-/// Mean over pairs of receivers; what all of them hear alike is real.
+/// Mean over pairs of receivers; what is common to all of them is real.
 fn mean_correlation(correlations: &DMatrix<Complex64>) -> f64 {
     let receivers = correlations.nrows();
     pairs_of(receivers).map(|pair| correlations[pair].re).sum::<f64>() / pairs_of(receivers).count().max(1) as f64
@@ -298,7 +298,8 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     let pairs = (rx * (rx - 1) / 2) as f64;
     let total: f64 = pairs_of(rx).map(|pair| found[pair].norm_sqr()).sum();
     let mean = mean_correlation(&found);
-    // Any correlation of any two; and that of noise from one place, such as a supply, which all receivers hear alike: one number.
+    // Any correlation of any two; and that of noise from one place, such as a supply, which is the same in all receivers: one
+    // number.
     let chances =
         [chi2_tail(2.0 * independent * total, 2.0 * pairs), Normal::standard().sf(mean * (2.0 * independent * pairs).sqrt())];
     let alike = chances[1] < chances[0];
@@ -351,7 +352,7 @@ mod tests {
     use crate::diagnosis::cube::Loaded;
     use crate::radar::Radar;
 
-    /// Noise of four receivers; `shared`: amplitude of what all of them hear, by frame and chirp.
+    /// Noise of four receivers; `shared`: amplitude of what is common to all of them, by frame and chirp.
     fn noise(shared: impl Fn(usize, usize) -> f64) -> Evidence {
         let mut radar = Radar::small(12);
         (radar.loops_per_frame, radar.samples_per_chirp) = (32, 64);

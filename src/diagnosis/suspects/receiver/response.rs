@@ -19,7 +19,7 @@ use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, V
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
 
-/// Tales within this many nats of the best cannot be told from it.
+/// Hypotheses within this many nats of the best are indistinguishable from it.
 const INDISTINGUISHABLE: f64 = 4.6;
 /// Power that a response must let through to be undone in full.
 const LEAST_POWER: f64 = 0.25;
