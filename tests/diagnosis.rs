@@ -51,7 +51,7 @@ fn ids(report: &Report) -> Vec<&str> {
     report.effects.iter().map(|effect| effect.id.as_str()).collect()
 }
 
-/// Named, or among what cannot be told from what was named.
+/// Named, or among what is indistinguishable from what was named.
 fn names(report: &Report, id: &str) -> bool {
     report.effects.iter().any(|effect| effect.id == id || effect.indistinguishable_from.iter().any(|other| other == id))
 }

@@ -1,5 +1,5 @@
 //! Where a tracked body is in the radar's frame, and when: origin, turn about the vertical and start of a recording's motion, from the
-//! recording itself, with intervals, or that it cannot be told.
+//! recording itself, with intervals, or that it cannot be determined.
 //!
 //! A body's motion says how ranges and velocities change, the radar saw them change; a placement is judged by how likely the moving cells
 //! of the recording are under the power that the placed body would send (`likelihood`: the law by which the diagnosis compares displaced

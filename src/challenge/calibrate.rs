@@ -42,7 +42,7 @@ const WITHIN: f64 = 0.9;
 /// What all nulls are recorded from.
 pub struct Source {
     world: World,
-    /// Whether what is diagnosed is told of the room.
+    /// Whether the diagnosis is given the room.
     room: bool,
     /// From a recording: how far the body's mesh and the skin are from what is handed out differs from null to null.
     drawn: bool,
@@ -98,7 +98,7 @@ impl Source {
         )];
         if recording.room.is_none() {
             notes.push(
-                "it states no room: static returns are those of a room within its farthest range, of which nothing is told"
+                "it states no room: static returns are those of a room within its farthest range, which the diagnosis is not given"
                     .into(),
             );
         }

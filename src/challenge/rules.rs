@@ -27,7 +27,7 @@ pub const LOOK_ALIKES: &[&[&str]] = &[
     &["phase_noise", "chirp_start_jitter"],
 ];
 
-/// Effects that are easily taken for one another although a recording can tell them apart; decoys are drawn from these.
+/// Effects that are easily taken for one another although a recording can distinguish them; decoys are drawn from these.
 pub const DECOYS: &[&[&str]] = &[
     &["second_harmonic", "object_radar_object"],
     &["iq_imbalance", "range_alias"],
@@ -88,7 +88,7 @@ pub fn stage(id: &str) -> Option<&'static str> {
     STAGES.iter().find(|(_, ids)| ids.contains(&id)).map(|(stage, _)| *stage)
 }
 
-/// Whether one recording cannot tell the two apart, or they are the same.
+/// Whether one recording cannot distinguish the two, or they are the same.
 pub fn look_alike(a: &str, b: &str) -> bool {
     a == b || LOOK_ALIKES.iter().any(|set| set.contains(&a) && set.contains(&b))
 }

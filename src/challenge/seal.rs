@@ -31,7 +31,7 @@ const MOST_ATTEMPTS: usize = 4;
 const DRAWS: u64 = 4;
 /// And of the noise without the person.
 const EMPTY_DRAWS: u64 = 3;
-/// Where hardly anything survives, how much stronger an effect has to be is not told by it.
+/// Where hardly anything survives, how much stronger an effect has to be is not estimable from it.
 const LEAST_D_PRIME: f64 = 1.0;
 /// An undetectable effect is brought to this d′.
 const WEAK_D_PRIME: f64 = 1.0;
@@ -102,7 +102,7 @@ fn seal_case(config: &ChallengeConfig, mut plan: Plan, secret: &Secret, out: &Pa
 
 /// A case in memory.
 struct Recorded {
-    /// The scene without effects: what everybody is told about it.
+    /// The scene without effects: what everybody is given of it.
     world: World,
     frames: Vec<IfFrame>,
     settings: RecorderConfig,

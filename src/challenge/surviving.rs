@@ -4,7 +4,7 @@
 //! A scene is recorded several times with and without the effect, each time with another draw of the mesh's error, of what
 //! the skin returns where, and of the thermal noise, and again without the person. Only what the effect does in *every* draw
 //! counts: sums go over pairs of different draws (U-statistics), so that what merely becomes another random pattern, as the
-//! return of a moved or delayed body does, counts nothing in the mean; how far so few draws scatter is told by the pairs,
+//! return of a moved or delayed body does, counts nothing in the mean; how far so few draws scatter is estimated from the pairs,
 //! and what is counted is what is sure. Counted are
 //! - what is added where no body is, as the scenes without the person show it: what stands still where it is stronger than
 //!   any amplitude that the room is likely to have there, the rest in every cell of range and Doppler against the covariance

@@ -31,7 +31,7 @@ const STEPS: usize = 20;
 const CONVERGED: f64 = 1e-4;
 
 impl Estimated {
-    /// Step by step from zeros, where no straight line tells it. None where the numbers leave what can be undone.
+    /// Step by step from zeros, where the model is not linear. None where the numbers leave what can be undone.
     ///
     /// `first`: looks as [`Self::new`] takes them, with all numbers zero; `looks`: the same with the numbers at some values.
     pub fn converged(

@@ -163,7 +163,7 @@ pub struct Candidate {
     /// Whether what it rests on (where the motion puts the body, a mesh, a chest) may err in held-out frames as in the others: a gain
     /// beyond the least then says nothing more.
     pub errs_alike: bool,
-    /// Effects that would do the same to this recording, as far as it can tell.
+    /// Effects that would do the same to this recording, as far as it distinguishes them.
     pub look_alikes: Vec<&'static str>,
     /// Plain words with numbers: what was left out, where, how large.
     pub statement: String,
@@ -193,7 +193,7 @@ impl Candidate {
         Self { id: None, look_alikes: vec![], statement, ..self }
     }
 
-    /// As the simulator takes it; `None` for what has no name, and for what its operator cannot be told.
+    /// As the simulator takes it; `None` for what has no name, and for what its operator does not take.
     ///
     /// `reference`: the recording's peak sample, to which levels are relative; `body_rms`: of the body's moving return, to which
     /// amplitudes of reflectors are.

@@ -74,7 +74,7 @@ pub fn lead(report: &Report) -> String {
             let mut text = first(&effect.statement);
             if !effect.indistinguishable_from.is_empty() {
                 let others: Vec<String> = effect.indistinguishable_from.iter().map(|id| title(id).to_lowercase()).collect();
-                let _ = write!(text, " This recording cannot tell it from: {}.", others.join("; "));
+                let _ = write!(text, " This recording cannot distinguish it from: {}.", others.join("; "));
             }
             if report.effects.len() > 1 {
                 let _ = write!(text, " And {} more, below.", count(report.effects.len() - 1, "effect"));
@@ -168,7 +168,12 @@ fn section(page: &mut String, number: usize, effect: &Effect, curve: Option<&str
     } else {
         let names: Vec<String> = effect.indistinguishable_from.iter().map(|id| format!("<code>{}</code>", escape(id))).collect();
         let separate = effect.separate_by.as_deref().unwrap_or("another recording");
-        let _ = write!(page, "<p>This recording cannot tell it from {}. What would: {}.</p>", names.join(", "), escape(separate));
+        let _ = write!(
+            page,
+            "<p>This recording cannot distinguish it from {}. What would: {}.</p>",
+            names.join(", "),
+            escape(separate)
+        );
     }
     let place = place_text(&effect.place);
     if !place.is_empty() {

@@ -114,7 +114,7 @@ impl Products {
 
     /// Square and magnitude squared, if the latter is there and nearly as large: no mere second harmonic and no second
     /// trip. An oscillator that the signal pulls does it, or mixers whose I and Q are bent each on its own. Then nothing
-    /// that stands still, and no tone, can be told from such a product.
+    /// that stands still, and no tone, is distinguishable from such a product.
     pub fn mixed(&self) -> Option<Vec<Law>> {
         let magnitude = self.magnitude.filter(|law| law.p_value < SURELY && law.gain > LEAST_GAIN)?;
         // A receiver that compresses leaves a little of it too.

@@ -243,7 +243,7 @@ impl NotDetectable {
 }
 
 impl Effect {
-    /// Its id, and those that it cannot be told from.
+    /// Its id, and those from which it is indistinguishable.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         std::iter::once(self.id.as_str()).chain(self.indistinguishable_from.iter().map(String::as_str))
     }

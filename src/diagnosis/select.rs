@@ -57,7 +57,7 @@ const NEARLY: f64 = 0.8;
 /// What is named even where products of the signal with itself lie everywhere.
 const WHATEVER_THE_SIGNAL: [&str; 2] = ["iq_imbalance", "adc_saturation"];
 
-/// What never changes and may be a return or added behind the mixer: what turns all returns tells, and goes first.
+/// What never changes and may be a return or added behind the mixer: what turns all returns distinguishes the two, and goes first.
 const ADDED: [&str; 3] = ["tx_leakage", "dc_offset", "static_reflector"];
 
 /// Stages of the signal's chain at which everything that is received is changed.
@@ -66,7 +66,7 @@ const UPSTREAM: [&str; 2] = ["waveform", "receiver"];
 /// What raises the held-out frames' dB error by this factor as it is undone is not what happened.
 const FAR_WORSE: f64 = 1.6;
 
-/// So many paths of one name are told: a person whom nobody tracked is made of many more, and other effects must have their
+/// So many paths of one name are reported: a person whom nobody tracked is made of many more, and other effects must have their
 /// turn.
 const MOST_ALIKE: usize = 6;
 

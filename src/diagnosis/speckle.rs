@@ -1,4 +1,4 @@
-//! What a Gaussian field tells of numbers that change its covariance.
+//! The information that a Gaussian field has of numbers that change its covariance.
 //!
 //! What a cell holds of a moving body is speckle: a complex Gaussian vector (over receivers, or along the chirp) whose covariance
 //! comes from the points in that cell, which are predicted, and from a power that is not. So every cell counts with the

@@ -76,14 +76,14 @@ impl Inspector for Period {
         let is_tried = |shift: &usize| (guard..=samples - guard).contains(&(shift % samples));
         let shifts: Vec<usize> = (rx * samples..self.squares.len()).filter(is_tried).collect();
         let Some(&best) = shifts.iter().max_by(|a, b| square(**a).total_cmp(&square(**b))) else {
-            return Some(Finding::untold(CHECK, EXPECTED, "a chirp is too short"));
+            return Some(Finding::undecided(CHECK, EXPECTED, "a chirp is too short"));
         };
         // A stream that repeats itself exactly leaves nothing: less than a millionth is not told apart.
         let left = |shift: usize| (1.0 - square(shift)).max(1e-6);
         let looks = (loops * self.frames) as f64;
         let tried = (shifts.len() as f64).ln();
         let log_p = tried - looks * (left(period) / left(best)).ln();
-        // Twice a length is as good as the length itself: the shortest peak is told that is no worse than the best one.
+        // Twice a length is as good as the length itself: the shortest peak is reported that is no worse than the best one.
         let is_peak = |shift: usize| square(shift) >= square(shift - 1).max(square((shift + 1).min(self.squares.len() - 1)));
         let is_as_good = |shift: usize| tried - looks * (left(shift) / left(best)).ln() >= ALARM.ln();
         let best = shifts.iter().copied().find(|&shift| is_peak(shift) && is_as_good(shift)).unwrap_or(best);

@@ -138,7 +138,7 @@ impl Inspector for Shift {
             return Some(Finding::as_stated(CHECK, EXPECTED, "they are"));
         };
         let period = self.schedule.period();
-        let told: Vec<String> = self
+        let losses: Vec<String> = self
             .losses
             .iter()
             .map(|loss| {
@@ -151,6 +151,6 @@ impl Inspector for Shift {
             })
             .collect();
         let frames = self.losses.iter().map(|loss| loss.frame).collect();
-        Some(Finding { frames, ..Finding::wrong(Kind::Misread, CHECK, EXPECTED, told.join("; "), likeliest) })
+        Some(Finding { frames, ..Finding::wrong(Kind::Misread, CHECK, EXPECTED, losses.join("; "), likeliest) })
     }
 }

@@ -63,7 +63,7 @@ impl Inspector for Start {
     fn conclude(self: Box<Self>) -> Option<Finding> {
         let samples = self.schedule.samples;
         if samples < 4 * ORDER {
-            return Some(Finding::untold(CHECK, EXPECTED, "a chirp is too short"));
+            return Some(Finding::undecided(CHECK, EXPECTED, "a chirp is too short"));
         }
         // The still stream goes on from channel to channel, and after the last one with the first.
         let at = |place: usize| self.sum[place % self.sum.len()];
@@ -84,7 +84,7 @@ impl Inspector for Start {
         let found =
             format!("the signal breaks most at sample {place} or shortly after it in {count} of {} channels", breaks.len());
         if log_p >= ALARM.ln() {
-            return Some(Finding::untold(CHECK, EXPECTED, found));
+            return Some(Finding::undecided(CHECK, EXPECTED, found));
         }
         let beside = (samples / TRANSIENT).max(2 * ORDER);
         if place < beside || place + beside >= samples {
@@ -128,11 +128,11 @@ mod tests {
     #[test]
     fn a_header_moves_the_break_and_noise_hides_it() {
         let stated = seen(0, 0.5);
-        assert!(stated.ok && stated.told, "{stated:?}");
+        assert!(stated.ok && stated.decided, "{stated:?}");
         // 44 samples of a chirp were cut off: the next one begins 20 samples after the stated beginning.
         let moved = seen(44, 0.5);
         assert!(moved.is_refusal() && (17..=20).any(|place| moved.found.contains(&format!("at sample {place} "))), "{moved:?}");
         let hidden = seen(44, 1000.0);
-        assert!(hidden.ok && !hidden.told, "{hidden:?}");
+        assert!(hidden.ok && !hidden.decided, "{hidden:?}");
     }
 }

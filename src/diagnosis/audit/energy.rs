@@ -138,7 +138,7 @@ pub fn range_and_velocity(point: &Point, radar: &Radar) -> [f64; 2] {
     [range, to.iter().zip(&point.velocity_mps).map(|(x, v)| x * v).sum::<f64>() / range]
 }
 
-/// Whether the body ever moves fast enough to be told from what stands still.
+/// Whether the body ever moves fast enough to be distinguished from static returns.
 pub(super) fn moves(evidence: &Evidence) -> bool {
     let fast = STILL_CELLS * evidence.radar.velocity_resolution_mps();
     let points = evidence.body.iter().flat_map(|body| body.frames.iter().flatten());

@@ -41,10 +41,11 @@ pub(super) fn placement(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<
     let mut checks: Vec<Check> = vec![];
     for reading in readings.chunk_by(|a, b| a.check == b.check) {
         let wrong = believed.filter(|believed| believed.check == reading[0].check);
-        let told = wrong.or_else(|| reading.iter().max_by(by_better)).unwrap_or(&reading[0]);
+        let reported = wrong.or_else(|| reading.iter().max_by(by_better)).unwrap_or(&reading[0]);
         let hint = wrong.map_or(String::new(), |wrong| format!(": {}", wrong.hint));
-        let found = format!("{here_db:.1} dB where the motion puts the body, {:.1} dB {}{hint}", told.fit.level_db(), told.place);
-        checks.push(Check::new(told.check, told.expected, found, wrong.is_none()));
+        let found =
+            format!("{here_db:.1} dB where the motion puts the body, {:.1} dB {}{hint}", reported.fit.level_db(), reported.place);
+        checks.push(Check::new(reported.check, reported.expected, found, wrong.is_none()));
     }
     if believed.is_none()
         && let Some(place) = checks.iter_mut().find(|check| check.check == "body_place")

@@ -33,7 +33,7 @@ struct Law {
 
 const NONE: Law = Law { power: 0.0, slow_s: 0.0 };
 
-/// What the training frames tell of a course.
+/// What the training frames say of a course.
 pub struct Course {
     law: Law,
     /// Gain on the training frames against no course, and of all frames, each predicted by the others, nats.

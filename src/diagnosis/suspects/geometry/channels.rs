@@ -58,7 +58,7 @@ impl Sums {
         self.products[rx * self.receivers() + rx].re
     }
 
-    /// How far aside the body is seen (as a sine), its range, and how much this frame tells of it.
+    /// How far aside the body is seen (as a sine), its range, and how much information this frame has of it.
     pub fn sine(&self, radar: &Radar) -> [f64; 3] {
         let (places, wave) = (along(radar), TAU / radar.wavelength_m());
         let sum = |of: &dyn Fn(usize) -> f64| (1..places.len()).map(|rx| self.cross(rx).norm() * of(rx)).sum::<f64>();
@@ -244,7 +244,7 @@ fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &
     let mut steered = vec![Complex64::ZERO; receivers];
     for (maps, noise) in maps.chunks_exact(receivers).zip(noise.chunks_exact(receivers)) {
         for (index, &cell) in cells.iter().enumerate() {
-            // A cell tells as much as any other about what its receivers have in common, however loud its speckle is.
+            // A cell has as much information as any other about what its receivers have in common, however strong its speckle is.
             let power = (0..receivers).map(|rx| maps[rx][cell].norm_sqr() / noise[rx].max(f64::MIN_POSITIVE)).sum::<f64>()
                 / receivers as f64;
             let weight = 1.0 / ((power + f64::from(LEAST_POWER)) * noise[0].max(f64::MIN_POSITIVE));
@@ -354,7 +354,7 @@ mod tests {
 
     #[test]
     fn receivers_that_differ_are_told_with_their_gains_and_phases() {
-        // Slightly, and so much that no straight line tells it.
+        // Slightly, and so much that it is not linear.
         for scale in [1.0, 4.0] {
             let [gains, phases] =
                 [[0.0, -0.10, 0.06, 0.04], [0.0, 0.06, -0.04, 0.02]].map(|of| of.map(|value: f64| value * scale));

@@ -135,7 +135,8 @@ fn candidate(evidence: &Evidence, strength: Complex64, found: &Estimated) -> Can
         look_alikes: if receivers < 4 { vec!["channel_mismatch"] } else { vec![] },
         statement: format!(
             "Each receiver also receives its neighbours' signals, {:.1} dB below them and {:.0}° ahead: the inner receivers, which \
-             have two neighbours, differ from the outer ones, which have one, in the way that every direction of the body predicts.",
+             have two neighbours, differ from the outer ones, which have one, in the way that every direction of the body \
+             predicts.",
             -level_db,
             strength.arg().to_degrees()
         ),

@@ -228,8 +228,8 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
     Some(Fitted { id: "frame_drop", value: count as f64, deviation: 0.0, floor: 0.0, inflation: STEP_INFLATION, score })
 }
 
-/// What frames gain that did not tell the change: the held-out ones. Where the motion is known in none of these after a step, the
-/// training frames with the weights of the body as it was.
+/// Log-likelihood gain of frames from which the change was not estimated: the held-out ones. Where the motion is known in none of
+/// these after a step, the training frames with the weights of the body as it was.
 fn predicted(trial: &Trial, fit: &Fitted, null: &Score) -> f64 {
     let held_out = &trial.evidence.split.held_out;
     let Change::Drop { at, .. } = fit.score.change else { return fit.score.gain_over(null, held_out) };
@@ -237,9 +237,9 @@ fn predicted(trial: &Trial, fit: &Fitted, null: &Score) -> f64 {
         frames.iter().copied().filter(|&frame| frame < at || fit.score.known[frame]).collect()
     };
     let after = |frames: &[usize]| frames.iter().any(|&frame| frame >= at);
-    let told = known(held_out);
-    if after(&told) || !after(held_out) {
-        return fit.score.gain_over(null, &told);
+    let unseen = known(held_out);
+    if after(&unseen) || !after(held_out) {
+        return fit.score.gain_over(null, &unseen);
     }
     let training = known(&trial.evidence.split.training);
     trial.score(fit.score.change, &training, false).gain_over(null, &training)

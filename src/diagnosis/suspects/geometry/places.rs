@@ -30,7 +30,7 @@ fn candidate(evidence: &Evidence, cells: &Cells, directions: &DMatrix<f64>, foun
     let wave = TAU / radar.wavelength_m();
     let numbers = cells.numbers();
     let along = DVector::from_iterator(radar.rx_m.len(), radar.rx_m.iter().map(|at| at[0] - radar.rx_m[0][0]));
-    // By direction, metres, from the first one; what grows with the places is as well the body's, and nothing of it is told.
+    // By direction, metres, from the first one; what grows with the places is as well the body's, and nothing of it is estimable.
     let places = directions.rows(numbers.place(0), numbers.receivers) / wave;
     let places = DMatrix::from_columns(
         &places

@@ -22,7 +22,7 @@ const SAFETY: f64 = 2.0;
 const BLUR: f64 = 0.2;
 /// Tones weaker than this share of the noise, in a transform, do not count.
 const FAINTEST: f64 = 0.03;
-/// Draws of coloured noise, and fine cells to either side, that tell how much of a tone stays.
+/// Draws of coloured noise, and fine cells to either side, from which it is estimated how much of a tone stays.
 const DRAWS: usize = 4;
 const AROUND: usize = 2;
 /// Least share of the body's mean power that is expected in a beam which looks past it.

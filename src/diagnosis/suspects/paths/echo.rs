@@ -16,7 +16,7 @@ use crate::radar::SPEED_OF_LIGHT;
 
 /// Delays that are tried, half cells of range.
 const MOST_HALF_CELLS: usize = 60;
-/// Nearer than that a copy cannot be told from the windows' main lobe.
+/// Nearer than that a copy is not resolved from the windows' main lobe.
 const LEAST_HALF_CELLS: usize = 4;
 /// A bounce between parts of the body is weaker than the direct return.
 const STRONGEST_COPY: f64 = 0.7;

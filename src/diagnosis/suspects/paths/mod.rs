@@ -83,8 +83,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             let shared = evidence.accepted.contains(&"correlated_noise");
             let motion = (!remains && !shared).then(|| sinusoidal::strongest(&scene)).flatten();
             let least = |mover: &mover::Mover| {
-                let told = mover.power > STRONG && mover::aside(&scene, &mover.track.sightings);
-                if told { LEAST_GAIN } else { LEAST_GAIN_SINUSOIDAL }
+                let distinct = mover.power > STRONG && mover::aside(&scene, &mover.track.sightings);
+                if distinct { LEAST_GAIN } else { LEAST_GAIN_SINUSOIDAL }
             };
             let motion = motion.filter(|motion| motion.mover.gain > least(&motion.mover));
             let over = scene.over_the_body();

@@ -90,7 +90,7 @@ impl Mover {
             let azimuth = sine.clamp(-1.0, 1.0).asin();
             let (x, y) = (mean_m * sine, mean_m * azimuth.cos());
             let at = scene.evidence.radar.position_m;
-            // A line of receivers does not tell the height: as far up or down as it is off here shortens y.
+            // A line of receivers does not resolve the height: as far up or down as it is off here shortens y.
             let height = 0.5;
             estimates.push(Estimate {
                 name: "position_m",

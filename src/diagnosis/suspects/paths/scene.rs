@@ -77,7 +77,7 @@ impl<'a> Scene<'a> {
                 let support = grown(model.support(frame), loops, samples);
                 let lobes = lobes(map, model.support(frame), loops, samples);
                 let taken: Vec<bool> = support.iter().zip(&never).map(|(support, never)| *support || *never).collect();
-                // What other imperfections smear is told where no sidelobes are.
+                // What other imperfections smear is estimated where no sidelobes are.
                 let near = |cell: usize| lobes[cell] * SIDELOBE_SAFETY > SIDELOBE_LEVEL;
                 let reached: Vec<bool> = (0..size).map(|cell| taken[cell] || near(cell)).collect();
                 let floor = floor(map, &reached, &clutter, loops, samples);
@@ -254,7 +254,7 @@ impl<'a> Scene<'a> {
 }
 
 /// The noise's level in each range bin over that of the others, from the quieter of the free cells: where a filter that
-/// was undone ends abruptly, neighbouring bins do not tell.
+/// was undone ends abruptly, neighbouring bins are not informative.
 fn noise_levels(maps: &[f32], taken: &[bool], frames: &[usize], loops: usize, samples: usize, bins: usize) -> Vec<f64> {
     const FEWEST_CELLS: usize = 48;
     let quiet = |range: usize| {

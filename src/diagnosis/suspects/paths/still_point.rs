@@ -13,7 +13,7 @@ use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::{Boundary, Room};
 
-/// Ranges on either side that tell the clutter's mean, cells; those next to the peak belong to it.
+/// Ranges on either side from which the clutter's mean is estimated, cells; those next to the peak belong to it.
 const AROUND: usize = 10;
 const PEAK: usize = 2;
 const FEWEST_AROUND: usize = 8;

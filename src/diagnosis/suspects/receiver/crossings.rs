@@ -63,7 +63,7 @@ pub struct Crossings {
     pub faint: f64,
 }
 
-/// None where there are none, or where they cannot be told.
+/// None where there are none, or where they are not identifiable.
 pub fn find(evidence: &Evidence) -> Option<Crossings> {
     let [frames, transmitters, receivers, loops, _] = evidence.cube.dims;
     if receivers < 2 || loops < FEWEST {

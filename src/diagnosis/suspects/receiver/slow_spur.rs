@@ -1,8 +1,8 @@
 //! A continuous tone whose phase advances so little from chirp to chirp that it stands among what hardly moves (card R12).
 //!
-//! No single frame tells it from a slow limb. But its phase goes on from frame to frame through the whole recording, by one number of
-//! turns a chirp and another one a frame (a frame's period need not be a multiple of a chirp's, and whole turns do not show), and its
-//! beat frequency stays: what turns so evenly and moves would have left its range.
+//! No single frame distinguishes it from a slow limb. But its phase goes on from frame to frame through the whole recording, by one
+//! number of turns a chirp and another one a frame (a frame's period need not be a multiple of a chirp's, and whole turns do not
+//! show), and its beat frequency stays: what turns so evenly and moves would have left its range.
 
 use std::f64::consts::TAU;
 

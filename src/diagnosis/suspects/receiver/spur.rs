@@ -199,7 +199,7 @@ impl<'a> Line<'a> {
         Self { evidence, empty: empty_bins(evidence), residual, fast }
     }
 
-    fn is_told(&self, doppler: usize, range: usize) -> bool {
+    fn is_usable(&self, doppler: usize, range: usize) -> bool {
         let loops = self.evidence.cube.dims[3];
         let leaves = doppler.min(loops - doppler) as f64 > self.fast;
         self.empty[range] || (leaves && self.residual.as_ref().is_some_and(|residual| range < residual.bins))
@@ -208,7 +208,7 @@ impl<'a> Line<'a> {
     /// The strongest line on the cells and half way to the next ones, in the order of [`BETWEEN`], and among how many.
     fn strongest(&self) -> [(Option<Strongest>, usize); BETWEEN.len()] {
         let [_, _, _, loops, samples] = self.evidence.cube.dims;
-        let cells = BETWEEN.map(|between| self.told(between));
+        let cells = BETWEEN.map(|between| self.cells(between));
         let frames = &self.evidence.split.training;
         let powers: Vec<[Vec<f64>; BETWEEN.len()]> = frames.par_iter().map(|&frame| self.powers(frame, &cells)).collect();
         std::array::from_fn(|place| {
@@ -223,12 +223,12 @@ impl<'a> Line<'a> {
         })
     }
 
-    /// Cells about which a line is told, half way to the next ones along the axes marked in `between`.
-    fn told(&self, between: [usize; 2]) -> Vec<[usize; 2]> {
+    /// Cells at which a line is detectable, half way to the next ones along the axes marked in `between`.
+    fn cells(&self, between: [usize; 2]) -> Vec<[usize; 2]> {
         let [_, _, _, loops, samples] = self.evidence.cube.dims;
         (1..loops - between[0])
             .flat_map(|doppler| (0..samples - between[1]).map(move |range| [doppler, range]))
-            .filter(|&cell| neighbours(cell, between).all(|[doppler, range]| self.is_told(doppler, range)))
+            .filter(|&cell| neighbours(cell, between).all(|[doppler, range]| self.is_usable(doppler, range)))
             .collect()
     }
 

@@ -17,9 +17,9 @@ use crate::diagnosis::finding::{Candidate, Correction, Curve, NINETY, Place, Vol
 use crate::diagnosis::statistics::{self, DECIBEL};
 use crate::diagnosis::suspects::geometry;
 
-/// Fewest receivers or transmitters of which one can be told to be odd.
+/// Fewest receivers or transmitters of which one can be identified as odd.
 const FEWEST: usize = 3;
-/// Fewest training frames of which a change can be told.
+/// Fewest training frames from which a change is estimable.
 const FEWEST_FRAMES: usize = 5;
 /// Fewest degrees of freedom of what groups scatter.
 const LEAST_FREEDOM: f64 = 8.0;
@@ -72,7 +72,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let Some(steady) = Steady::new(evidence) else { return vec![] };
     let tried = units.len() as f64;
-    // They tell of receivers only.
+    // They concern receivers only.
     let of_body = if receivers >= FEWEST { geometry::gains(evidence) } else { None };
     let best = units
         .iter()

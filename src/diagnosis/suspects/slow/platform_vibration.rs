@@ -297,9 +297,9 @@ fn amplitude(evidence: &Evidence, cells: &Cells, vibration: &Vibration) -> Optio
     if square <= 0.0 || along.re.abs() > GAIN_LIKE * (of_still * of_pattern).sqrt() {
         return None;
     }
-    let telling: Vec<&(f64, f64, f64)> = groups.iter().filter(|(_, wanted, noise)| square * wanted > 10.0 * noise).collect();
-    let agree = telling.iter().filter(|(shown, wanted, _)| *shown > SHOWN * square * wanted).count();
-    if telling.len() < LEAST_GROUPS || (agree as f64) < AGREEING * telling.len() as f64 {
+    let informative: Vec<&(f64, f64, f64)> = groups.iter().filter(|(_, wanted, noise)| square * wanted > 10.0 * noise).collect();
+    let agree = informative.iter().filter(|(shown, wanted, _)| *shown > SHOWN * square * wanted).count();
+    if informative.len() < LEAST_GROUPS || (agree as f64) < AGREEING * informative.len() as f64 {
         return None;
     }
     // Deviation of the ratio: leave one group out.

@@ -33,8 +33,8 @@ const BINS_PER_VALUE: f64 = 2.0;
 /// Shares of the concentration that a phase would have if a range shared everything: bets are placed on each, and on sharing nothing.
 /// Powers of about three from next to nothing, since what a range adds of its own is not known.
 const SHARES: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
-/// What a range would gain (nats) if it shared everything, for its silence to tell anything: as in `field`.
-const TELLING_GAIN: f64 = 10.0;
+/// What a range would gain (nats) if it shared everything, for its absence to be informative: as in `field`.
+const INFORMATIVE_GAIN: f64 = 10.0;
 /// Half turns up to which a course is slow: what turns less than one and a half times during a recording is a drift (as in
 /// `platform_vibration`).
 const SLOW: usize = 3;
@@ -56,9 +56,9 @@ struct Shared {
     part: Part,
     /// Logarithm of the product of bets.
     log_bets: f64,
-    /// Ranges that share it, and those that could tell.
+    /// Ranges that share it, and those that are informative.
     sharing: usize,
-    telling: usize,
+    informative: usize,
     /// Those that share it, as places in the spectra.
     members: Vec<usize>,
 }
@@ -68,13 +68,14 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let deviations = deviations(evidence)?;
     let part = |part: Part| shared(&spectra(&deviations, &course, part), part);
     let (phase, delay) = (part(Part::Phase), part(Part::Delay));
-    // Where ranges do not tell, what moves the radar goes before what moves its oscillator: it needs no second cause.
+    // Where ranges do not distinguish the two, what moves the radar goes before what moves its oscillator: it needs no second
+    // cause.
     let best = [Some(phase?), delay]
         .into_iter()
         .flatten()
         .reduce(|phase, delay| if delay.log_bets > phase.log_bets + UNDECIDED { delay } else { phase })?;
-    // A bet is won by two ranges that hang together; all returns are concerned where most that can tell have it.
-    (2 * best.sharing > best.telling && best.log_bets > 0.0).then(|| candidate(evidence, &course, &deviations, &best))
+    // A bet is won by two ranges that hang together; all returns are concerned where most that are informative have it.
+    (2 * best.sharing > best.informative && best.log_bets > 0.0).then(|| candidate(evidence, &course, &deviations, &best))
 }
 
 /// Deviations of groups of ranges from their mean over time, relative to it, `[frame · loops + loop]`, with the noise's variance.
@@ -262,12 +263,12 @@ fn shared(spectra: &[Spectrum], part: Part) -> Option<Shared> {
     let of_first = |first: usize| {
         let mut reference = Reference { sum: vec![Complex64::ZERO; spectra[first].values.len()], information: 0.0 };
         reference.add(&spectra[first]);
-        let (mut log_bets, mut sharing, mut telling, mut members) = (0.0, 0, 0, vec![first]);
+        let (mut log_bets, mut sharing, mut informative, mut members) = (0.0, 0, 0, vec![first]);
         for (index, spectrum) in spectra.iter().enumerate().filter(|(index, _)| *index != first) {
             let (won, most) = bet(&reference, spectrum);
             log_bets += won;
-            if most > TELLING_GAIN {
-                telling += 1;
+            if most > INFORMATIVE_GAIN {
+                informative += 1;
                 sharing += usize::from(won > 0.0);
             }
             if won > 0.0 {
@@ -275,7 +276,7 @@ fn shared(spectra: &[Spectrum], part: Part) -> Option<Shared> {
                 members.push(index);
             }
         }
-        Shared { part, log_bets, sharing, telling, members }
+        Shared { part, log_bets, sharing, informative, members }
     };
     let all: Vec<Shared> = (0..count).into_par_iter().map(of_first).collect();
     let log_bets = log_sum(all.iter().map(|shared| shared.log_bets)) - (count as f64).ln();
@@ -362,7 +363,7 @@ fn candidate(evidence: &Evidence, course: &Course, deviations: &Deviations, shar
     let width_hz = (0.5 * (high_hz - low_hz)).max(0.5 / course.duration_s());
     let loops = course.loops;
     let deviation: Deviation = Arc::new(move |[frame, _, index]| phases[frame * loops + index]);
-    let ranges = format!("{} of the {} ranges that can tell share it", shared.sharing, shared.telling);
+    let ranges = format!("{} of the {} informative ranges share it", shared.sharing, shared.informative);
     let (id, estimates, statement) = if shared.part == Part::Delay {
         let at_3_m = rms * candidates::stated_delay_s();
         (
@@ -485,7 +486,7 @@ mod tests {
             assert_eq!(found.id, Some("radar_vibration"), "{}", found.statement);
             assert!(found.p_value < 1e-6 && found.gain > 13.0, "{} {}", found.p_value, found.gain);
         }
-        // Slower than the recording, it is a drift, which other laws tell.
+        // Slower than the recording, it is a drift, which other laws describe.
         let duration_s = 24.0 * 16.0 * evidence(0.0, 1, |_| 0.0, own).radar.loop_period_s();
         let drifts = |time_s: f64| 0.4 * time_s / duration_s;
         assert!(find(&evidence(0.0, 2, drifts, |_, _| 0.0)).is_none_or(|found| found.p_value > 1e-3));

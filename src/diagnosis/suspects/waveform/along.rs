@@ -1,4 +1,4 @@
-//! Gain and frequency that change along the chirp, told by what moves (cards W6 and R9).
+//! Gain and frequency that change along the chirp, estimated from what moves.
 //!
 //! What one Doppler cell holds of the body is speckle along the chirp, too: a Gaussian field over the chirp's parts whose
 //! covariance comes from the ranges of the points in that cell. Parts of the chirp are to ranges what receivers are to
@@ -53,7 +53,7 @@ const LARGE: f64 = 0.5;
 const PEAK: [f64; 3] = [1.0, 1.45, 1.55];
 /// A tilt, a bend, and one that changes.
 const LOOKS: f64 = 3.0;
-/// Beyond, nothing is told: nepers or radian at the chirp's end.
+/// Beyond, nothing is reported: nepers or radian at the chirp's end.
 const LARGEST: f64 = 3.0;
 
 /// The numbers. Logarithm of the gain at the chirp's end that is odd about its middle; radian there, at the body's mean delay, of

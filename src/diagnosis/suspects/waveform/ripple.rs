@@ -128,7 +128,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     if training.iter().all(|s| s.energy() <= 0.0) {
         return None;
     }
-    // Windowed noise is correlated, and so is what leaks: the shifts themselves tell the scale.
+    // Windowed noise is correlated, and so is what leaks: the scale is estimated from the shifts themselves.
     let scale = (statistics::median(&mut scores.clone()) / std::f64::consts::LN_2).max(1.0);
     let best = (0..shifts.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
     // What is highest at the shortest distance is no peak, but a return that reaches farther than it should.
