@@ -109,8 +109,8 @@ pub fn estimates(person: &Person, best: &Maximum) -> BTreeMap<&'static str, Esti
 fn not_identified(number: usize, range_m: f64) -> String {
     match number {
         AZIMUTH => format!(
-            "the antennas do not resolve left and right: the body may stand anywhere on the circle of {range_m:.2} m about the radar, \
-             turned with it; the azimuth as stated was kept"
+            "the antennas do not resolve left and right: the body may stand anywhere on the circle of {range_m:.2} m about the \
+             radar, turned with it; the azimuth as stated was kept"
         ),
         _ => "the antennas lie in one height and resolve no other: the height as stated was kept".into(),
     }

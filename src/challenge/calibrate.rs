@@ -1,7 +1,7 @@
 //! Nulls of somebody's own radar, and the table of what the diagnosis says of them.
 //!
-//! A null is recorded in the recorder's world, with the radar and the size that a config or a recording has, and nothing but what
-//! FORMATS.md calls "nothing missing". Each is diagnosed by a process of its own; what they say becomes `calibration.json`
+//! A null is recorded in the recorder's world, with the radar and the size that a config or a recording has, and nothing
+//! beyond the baseline of docs/diagnosis.md. Each is diagnosed by a process of its own; what they say becomes `calibration.json`
 //! ([`crate::diagnosis::calibration`]), by which the same program ranks the p-values of recordings of that structure.
 
 use std::collections::BTreeMap;

@@ -16,7 +16,7 @@ use crate::recorder::Returns;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stratum {
-    /// Nothing is missing, as FORMATS.md defines it.
+    /// Nothing is missing: no more than the baseline of docs/diagnosis.md.
     Null,
     /// One effect, of a strength between undetectable and obvious.
     Single,

@@ -20,7 +20,7 @@ pub const NINETY: f64 = 1.25 * 1.645;
 /// A parameter of an effect, or a list of them, with 90 % intervals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// As in FORMATS.md's table.
+    /// As in the table of docs/report.md.
     pub name: &'static str,
     pub values: Vec<f64>,
     pub ci90: Vec<[f64; 2]>,
@@ -148,7 +148,7 @@ const LIKELY: f64 = 0.05;
 /// One thing that may have been left out.
 #[derive(Clone)]
 pub struct Candidate {
-    /// As in FORMATS.md; none: outside the library.
+    /// As in docs/report.md; none: outside the library.
     pub id: Option<&'static str>,
     /// "slow-time gain", "additive fast-time", "path-like" and so on.
     pub behaves_like: &'static str,

@@ -1,4 +1,4 @@
-//! `report.json`, as FORMATS.md fixes it, and what of it is words.
+//! `report.json`, as docs/report.md fixes it, and what of it is words.
 
 use std::collections::BTreeMap;
 
@@ -258,7 +258,7 @@ impl Effect {
             (estimate.name.to_string(), Parameter { value, ci90 })
         });
         let mut parameters: BTreeMap<String, Parameter> = parameters.collect();
-        // FORMATS.md counts a boundary and a part of the body among the parameters.
+        // docs/report.md counts a boundary and a part of the body among the parameters.
         for (name, choice) in [("boundary", &candidate.place.boundary), ("body_part", &candidate.place.body_part)] {
             if let Some(choice) = choice {
                 let value = serde_json::Value::from(choice.clone());
@@ -288,7 +288,7 @@ impl Effect {
     }
 }
 
-/// As FORMATS.md writes a stage.
+/// As docs/report.md writes a stage.
 pub fn stage(stage: effects::Stage) -> &'static str {
     use effects::Stage;
     match stage {

@@ -22,7 +22,7 @@ pub struct Recorder {
     world: World,
     stages: Stages,
     paths: Paths,
-    /// The board as a receiver, and as a transmitter (R6).
+    /// The board as a receiver, and as a transmitter (`object_radar_object`).
     board: Option<[(Paths, Radar); 2]>,
     movers: Vec<Mover>,
     /// What amplitudes of added reflectors are relative to.

@@ -93,7 +93,7 @@ impl Surroundings {
         &self.still
     }
 
-    /// I2 and those outside the library that touch the room.
+    /// `radar_vibration`, and the effects outside the library that act on the static clutter.
     fn set_varying(&mut self, world: &World) -> Result<()> {
         if let Some(motion) = vibration(world) {
             let sums =
@@ -181,7 +181,7 @@ impl Surroundings {
         self.chirp.add_static(signal, amplitude, path / SPEED_OF_LIGHT);
     }
 
-    /// What the body takes away, `[tx, rx, sample]`: T8, both ways through the same gap.
+    /// What the body takes away, `[tx, rx, sample]` (`soft_occlusion`), both ways through the same gap.
     pub fn shadowed(&self, shadow: &Shadow) -> Vec<Complex64> {
         let lost = |target: Vector| shadow.visible(target).powi(2) - 1.0;
         let foot = |mirror: &Mirror| {

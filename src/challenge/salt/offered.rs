@@ -156,7 +156,7 @@ mod tests {
         }
         let known = |id: &str| every().any(|graded| graded.id == id);
         assert!(OFFERED.iter().all(|offered| known(offered.id)));
-        // Some ids of FORMATS.md are never drawn.
+        // Some ids of docs/report.md are never drawn.
         assert!(REFUSED.iter().flat_map(|(_, ids)| *ids).all(|id| known(id) || *id == "tdm_phase"));
     }
 

@@ -1,4 +1,4 @@
-//! Conventions and the scene as stated, checked before any physics is named (DIAGNOSIS.md 3.1), one file for each audit. A wrong
+//! Conventions and the scene as stated, checked before any physics is named, one file for each audit. A wrong
 //! convention is reported as that.
 
 mod antennas;

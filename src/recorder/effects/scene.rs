@@ -33,7 +33,7 @@ impl SinusoidalMotion {
     }
 }
 
-/// I2.
+/// `radar_vibration`.
 pub fn vibration(world: &World) -> Option<SinusoidalMotion> {
     let effect = world.effects.radar_vibration.as_ref()?;
     let phase_rad = world.phase(super::RADAR_VIBRATION, 0);
@@ -58,7 +58,7 @@ enum Track {
     Carried(Vec<(usize, f64)>),
 }
 
-/// P2, P8 and what a hand carries. `level` is what their amplitudes are relative to.
+/// `moving_reflector`, `range_alias` and `carried_reflector`. `level` is what their amplitudes are relative to.
 pub fn movers(world: &World, body: Option<&MovingBody>, level: f64) -> Result<Vec<Mover>> {
     let effects = &world.effects;
     let centre = world.radar.centre_m();
@@ -166,7 +166,7 @@ fn along(nodes: &[(f64, Vector)], time_s: f64) -> (Vector, Vector) {
     (value(time_s), velocity)
 }
 
-/// Points that stand still (P1), with their amplitude at 1 m.
+/// Points of `static_reflector`, with their amplitude at 1 m.
 pub fn static_points(effects: &EffectsConfig, centre: Vector, level: f64) -> Vec<(Vector, Complex64)> {
     let amplitude = |point: &super::StaticReflector| point.amplitude * level * distance(point.position_m, centre).powi(2);
     effects.static_reflector.iter().map(|point| (point.position_m, amplitude(point).into())).collect()

@@ -1,4 +1,4 @@
-//! Antennas that stand elsewhere than declared (card C2): the phase between two of them grows with the direction.
+//! Antennas that stand elsewhere than declared: the phase between two of them grows with the direction.
 //!
 //! A displacement that is the same for all antennas shows nowhere, and one in proportion to their places might as well be a body
 //! that is wider or narrower: only the rest is the antennas' own.

@@ -2,7 +2,7 @@
 //!
 //! A body that is seen aside of its place is seen there by a phase that grows along the row of receivers, and stays what it is, or
 //! shrinks, as the body goes farther. A receiver that is sampled later than its neighbour turns all beats, the more the higher they
-//! are: the same phase, but it grows with the range. No id of FORMATS.md names it.
+//! are: the same phase, but it grows with the range. No id of docs/report.md names it.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! The body seen in a mirror: body and one reflection at a boundary (P4, P6), or two (P5).
+//! The body seen in a mirror: body and one reflection at a boundary (`wall_ghost`, `floor_bounce`), or two.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Candidate: something that moves, and not with the body (P2).
+//! Candidate: something that moves, and not with the body (`moving_reflector`).
 
 use std::sync::Arc;
 

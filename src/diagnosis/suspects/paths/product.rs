@@ -1,5 +1,5 @@
-//! Products of the signal with itself: two returns one after the other, object to radar to object (R6), and the second
-//! harmonic of a receiver (R5), which doubles the phase of every receiver where the second trip has that of one arrival.
+//! Products of the signal with itself: two returns one after the other, object to radar to object, and the second
+//! harmonic of a receiver, which doubles the phase of every receiver where the second trip has that of one arrival.
 //! Both lie at the sum of two ranges and two velocities; the measurement without its noise is the best template of either.
 
 use std::sync::Arc;

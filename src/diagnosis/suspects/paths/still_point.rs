@@ -1,4 +1,4 @@
-//! Something that stands still and stands out of the room's clutter (P1): in one range cell, from one direction, in every
+//! A static return that stands out of the static clutter (`static_reflector`): in one range cell, from one direction, in every
 //! frame. What the clutter's own roughness may do is the null: its power in a cell is speckle about the mean of the
 //! ranges around it. Boundaries, edges and corners return more than their surroundings at known ranges, and are left out.
 

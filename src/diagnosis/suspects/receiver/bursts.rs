@@ -1,4 +1,4 @@
-//! Sparse samples that do not belong to their chirp: another radar's crossings and impulses (cards I1, V3).
+//! Sparse samples that do not belong to their chirp: another radar's crossings and impulses.
 //!
 //! What moves between neighbouring chirps of a channel is small, since Doppler turns phases slowly beside white noise:
 //! a chirp less the mean of its two neighbours is mostly noise, and a burst in one chirp stands out by its power.

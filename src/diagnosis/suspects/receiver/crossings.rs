@@ -1,4 +1,4 @@
-//! Crossings of another radar (card I1) that stand out in no single sample: a sweep through the receiver's band within one chirp,
+//! Crossings of another radar that stand out in no single sample: a sweep through the receiver's band within one chirp,
 //! which reaches all receivers from one direction.
 //!
 //! What moves turns slowly from chirp to chirp; a crossing is in one chirp, and so everywhere in Doppler. The band of Doppler in

@@ -1,4 +1,4 @@
-//! Noise that is not white over beat frequency, or not independent between receivers (cards V2, V4).
+//! Noise that is not white over beat frequency, or not independent between receivers.
 //!
 //! Read from cells where neither room nor body can be; low quantiles and a bound on power keep strangers out.
 

@@ -1,4 +1,4 @@
-//! A continuous tone whose phase advances so little from chirp to chirp that it stands among what hardly moves (card R12).
+//! A continuous tone whose phase advances so little from chirp to chirp that it stands among what hardly moves.
 //!
 //! No single frame distinguishes it from a slow limb. But its phase goes on from frame to frame through the whole recording, by one
 //! number of turns a chirp and another one a frame (a frame's period need not be a multiple of a chirp's, and whole turns do not

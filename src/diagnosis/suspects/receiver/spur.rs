@@ -1,5 +1,5 @@
 //! A continuous tone in the intermediate frequency: one beat frequency, one phase advance from chirp to chirp, in all
-//! frames alike (card R12).
+//! frames alike.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

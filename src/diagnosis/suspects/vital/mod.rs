@@ -1,6 +1,6 @@
 //! Breathing and heartbeat of somebody nobody tracked: a return whose phase oscillates from frame to frame.
 //!
-//! PHYSICS cards T1 and T2. At some range the echo is `c + a exp(jψ(T))`: what stands still there, and what moves by
+//! At some range the echo is `c + a exp(jψ(T))`: a static return, and one that moves by
 //! more or less than a wavelength, ψ = 4π/λ times its displacement. c and a of all channels and of neighbouring ranges
 //! and the common ψ are fitted in turns; ψ is then searched for a rhythm.
 

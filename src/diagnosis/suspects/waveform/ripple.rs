@@ -1,6 +1,6 @@
 //! A chirp whose frequency is modulated: paired echoes on both sides of every return, their height in proportion to its delay.
 //!
-//! PHYSICS card W7: a return of delay τ is turned by 2πτ a cos(2π f t + φ), to first order `+ α exp(2πi f t) τx − conj(α)
+//! A return of delay τ is turned by 2πτ a cos(2π f t + φ), to first order `+ α exp(2πi f t) τx − conj(α)
 //! exp(−2πi f t) τx` with α = iπa exp(iφ). The recording itself is the template; it is looked for only where no return
 //! can be: nearer and farther than the room in the static Doppler cells, than the body in the others.
 
