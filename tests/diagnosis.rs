@@ -121,7 +121,7 @@ fn two_effects_of_the_receiver_are_told_apart() {
     close(value(&report, "ramp_edge_transient", "samples"), 2.0, 0.1);
 }
 
-/// Almost all of this person's return is where what stands still was taken out.
+/// Almost all of this person's return is where static clutter was taken out.
 #[test]
 fn receivers_that_differ_are_told_by_a_person_who_hardly_moves() {
     let folder = tempfile::tempdir().unwrap();

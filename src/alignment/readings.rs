@@ -21,7 +21,7 @@ pub struct Readings {
     pub split: Split,
     /// Radar time of the middle of every frame.
     pub middle_s: Vec<f64>,
-    /// Cells away from what stands still, `[doppler, range]`.
+    /// Cells away from static clutter, `[doppler, range]`.
     pub usable: Vec<bool>,
     /// Mean over the channels, `[frame, doppler, range]`.
     power: Vec<f32>,

@@ -152,7 +152,7 @@ fn cannot_tell(found: &Found, gain: &Gain, estimates: &BTreeMap<&'static str, Es
     };
     let informative = best.score.by_frame.iter().filter(|gain| **gain != 0.0).count();
     if informative < 4 {
-        return Some("the person hardly moves: in less than four frames is any part faster than what stands still".into());
+        return Some("the person hardly moves: in less than four frames is any part faster than the static clutter".into());
     }
     if gain.p_value_chance.is_nan() || gain.p_value_chance > ALARM {
         return Some(format!(

@@ -59,7 +59,7 @@ pub fn d_prime(draws: &[Draw], empty: &[Draw], noise: f64) -> f64 {
     squared.sure()
 }
 
-/// Frames, and what stands still in them.
+/// Frames, and static clutter in them.
 struct Parted<'a> {
     frames: &'a Frames,
     /// The mean chirp, `[channel][sample]`.
@@ -79,7 +79,7 @@ impl<'a> Parted<'a> {
         Self { frames, still }
     }
 
-    /// The maps of a frame without what stands still, `[channel][doppler · range]`.
+    /// The maps of a frame without static clutter, `[channel][doppler · range]`.
     fn maps(&self, frame: usize) -> Vec<Vec<Complex64>> {
         let [_, loops, samples] = self.frames.dims;
         let channels = self.frames.values[frame].chunks_exact(loops * samples);

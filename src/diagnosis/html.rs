@@ -67,7 +67,7 @@ pub fn lead(report: &Report) -> String {
         Verdict::Undecided => format!("Nothing can be said about this recording: {}.", report.reason),
         Verdict::Damaged => format!("The recording is damaged: {}.", report.reason),
         Verdict::NoMismatch => {
-            "Nothing was left out that this recording could show: body, static room and noise explain it.".into()
+            "Nothing was left out that this recording could show: body, static clutter and noise explain it.".into()
         }
         Verdict::Explained | Verdict::PartlyExplained => {
             let effect = &report.effects[0];
@@ -207,7 +207,7 @@ fn without_name(page: &mut String, unexplained: &Unexplained, curve: Option<&str
 fn fit(page: &mut String, report: &Report, pictures: &Pictures) {
     let _ = write!(
         page,
-        "<h2>Held-out data, before and after</h2><p>{} are held out: static field, noise and the body's powers \
+        "<h2>Held-out data, before and after</h2><p>{} are held out: static clutter, noise and the body's powers \
          come from the others, and a simulator is trained on those. They are not untouched: a finding stands only where it makes them \
          more probable, and what changes from chirp to chirp or from frame to frame is read in every one of them.</p>",
         held_out(report)

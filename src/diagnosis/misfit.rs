@@ -132,7 +132,7 @@ fn log_sum(values: &[f64]) -> f64 {
     most + values.iter().map(|value| (value - most).exp()).sum::<f64>().ln()
 }
 
-/// What stands still, and the noise.
+/// Static clutter, and the noise.
 struct Baseline {
     /// `[channel][doppler · range]`
     still: Vec<Vec<Complex64>>,
@@ -161,7 +161,7 @@ impl Baseline {
     }
 }
 
-/// The law of a channel's cells: a circular Gaussian about what stands still.
+/// The law of a channel's cells: a circular Gaussian about static clutter.
 struct Law<'a> {
     still: &'a [Complex64],
     variance: f64,

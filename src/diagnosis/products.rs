@@ -206,7 +206,7 @@ fn of_frame<const N: usize>(
                 for doppler in 1..loops {
                     sums.count(found[doppler * samples + range], expected[doppler * samples + range], noise);
                 }
-                // An offset or a leakage is near zero; what stands still elsewhere counts.
+                // An offset or a leakage is near zero; static clutter elsewhere counts.
                 if range > 8 && range + 8 < samples {
                     sums.count(still[range], mean[range], noise / loops as f64);
                 }

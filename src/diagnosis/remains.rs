@@ -14,7 +14,7 @@ pub const ROUGHLY: f64 = 0.1;
 const BY_CHIRP: [&str; 2] = ["phase_noise", "chirp_start_jitter"];
 const SLIGHTLY: f64 = 0.01;
 
-/// What a radar that vibrates leaves: turns of what stands still that are not quite undone, and their sidebands, up to this share of
+/// What a radar that vibrates leaves: turns of static clutter that are not quite undone, and their sidebands, up to this share of
 /// its gain (which counts what is left).
 const TURNS: [&str; 3] = ["slow-time phase", "delay-proportional phase", fluctuation::FLUCTUATES];
 const SHAKEN: f64 = 0.5;

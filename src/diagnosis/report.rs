@@ -201,7 +201,7 @@ impl HeldOut {
     }
 }
 
-/// Energy of what moves in the recording: without what stands still over all frames.
+/// Energy of what moves in the recording: without static clutter over all frames.
 pub fn moving_energy(evidence: &super::Evidence) -> f64 {
     let cube = &evidence.cube;
     let all: Vec<usize> = (0..cube.dims[0]).collect();
@@ -333,7 +333,7 @@ impl Findings {
             }
         }
         let (verdict, reason) = match (effects.is_empty(), unexplained.is_empty()) {
-            (true, true) => (Verdict::NoMismatch, "nothing is significant beyond body, static room and noise".to_string()),
+            (true, true) => (Verdict::NoMismatch, "nothing is significant beyond body, static clutter and noise".to_string()),
             (false, true) => (Verdict::Explained, "every significant mismatch has a name".to_string()),
             (false, false) => (Verdict::PartlyExplained, "some of the mismatch has no name in the library".to_string()),
             (true, false) => {

@@ -1,11 +1,11 @@
 //! Receivers of a cascade's devices exchanged: the file of one slave taken for another's.
 //!
 //! Where two virtual antennas have one place, whatever is far away comes to both with one phase, but for what the channels add: over the
-//! ranges at which still returns stand out of the noise, their spectra are coherent, however many returns there are. Virtual antennas at
-//! other places are so for returns from one direction alone. So the pairs of one place (each channel once, of two devices) are at least as
-//! coherent as those that would have one place if the devices were exchanged: a paired Student test of their Fisher transforms (artanh of
-//! the coherence, in the order of the channels), Bonferroni over the exchanges. Where no exchange makes them less coherent, nothing can be
-//! decided.
+//! ranges at which static returns stand out of the noise, their spectra are coherent, however many returns there are. Virtual
+//! antennas at other places are so for returns from one direction alone. So the pairs of one place (each channel once, of two
+//! devices) are at least as coherent as those that would have one place if the devices were exchanged: a paired Student test of
+//! their Fisher transforms (artanh of the coherence, in the order of the channels), Bonferroni over the exchanges. Where no
+//! exchange makes them less coherent, nothing can be decided.
 
 use num_complex::Complex64;
 use rustfft::FftPlanner;
@@ -143,7 +143,7 @@ impl Inspector for Devices {
             return Some(Finding::undecided(CHECK, EXPECTED, why));
         }
         let Some(spectra) = self.spectra(still) else {
-            return Some(Finding::undecided(CHECK, EXPECTED, "still returns stand out of the noise at too few ranges"));
+            return Some(Finding::undecided(CHECK, EXPECTED, "static returns stand out of the noise at too few ranges"));
         };
         let as_stated = coherences(&spectra, &stated);
         let (mut worst, mut is_decided) = ((1.0, &orders[0], 0.0), true);
@@ -199,8 +199,8 @@ mod tests {
         }
     }
 
-    /// Still returns at these sines of their azimuths, one every second bin, in channels of unknown gains; `order`: whose receivers' samples
-    /// each device's file holds.
+    /// Static returns at these sines of their azimuths, one every second bin, in channels of unknown gains; `order`: whose
+    /// receivers' samples each device's file holds.
     fn seen(sines: &[f64], amplitude: f64, order: [usize; 4]) -> Finding {
         let radar = radar();
         let schedule = Schedule::of(&radar, None);

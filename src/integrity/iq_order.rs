@@ -2,12 +2,12 @@
 //!
 //! Returns lie at the beat frequencies of their ranges, and those of a pair of frequencies ±f are those of a near and of a far range. In
 //! a room whose size is stated, nothing lies beyond its farthest corner; in an unknown scene, returns weaken with range. So over the pairs
-//! in which still returns stand out of the noise, and of which not both are within the room, the mean of ln(far / near) is zero at most:
-//! a paired Student test over pairs of the still chirps' spectrum, power summed over the channels. Every second bin counts, as the window
-//! joins neighbours. Where far returns are as strong as near ones, nothing can be decided.
+//! in which static returns stand out of the noise, and of which not both are within the room, the mean of ln(far / near) is zero at
+//! most: a paired Student test over pairs of the still chirps' spectrum, power summed over the channels. Every second bin counts,
+//! as the window joins neighbours. Where far returns are as strong as near ones, nothing can be decided.
 //!
 //! An unknown scene may also be open, with far returns alone. But the filter before the converter keeps out what would alias, and so the
-//! last ninth of the band: no return there is the strongest. So something is decided only where the strongest still return lies in
+//! last ninth of the band: no return there is the strongest. So something is decided only where the strongest static return lies in
 //! the first or the last ninth of the band; far returns alone, as they are or as their mirror image, decide nothing.
 
 use super::still::{Still, spectrum};
@@ -16,7 +16,7 @@ use super::tails::student_tail;
 use super::{ALARM, Finding, Inspector, Kind};
 
 const CHECK: &str = "iq_order";
-const EXPECTED: &str = "still returns at the beat frequencies of the room's ranges";
+const EXPECTED: &str = "static returns at the beat frequencies of the room's ranges";
 /// Bins beside 0 in which the radar's own leakage and its offset lie under the window.
 const GUARD: usize = 3;
 /// Bins between pairs that share nothing under a Hann window, whose main lobe is four bins wide.
@@ -66,11 +66,13 @@ impl Inspector for IqOrder {
         let powers: Vec<[f64; 2]> = pairs.iter().map(|pair| of(*pair)).collect();
         let ratios: Vec<f64> = powers.iter().map(|[near, far]| (far / near.max(f64::MIN_POSITIVE)).ln()).collect();
         if ratios.len() < 2 {
-            return Some(Finding::undecided(CHECK, EXPECTED, "still returns stand out of the noise at too few frequencies"));
+            return Some(Finding::undecided(CHECK, EXPECTED, "static returns stand out of the noise at too few frequencies"));
         }
         let mean_db = 10.0 / std::f64::consts::LN_10 * ratios.iter().sum::<f64>() / ratios.len() as f64;
-        let found =
-            format!("of {} pairs of beat frequencies with still returns, the far one is {mean_db:+.1} dB stronger", ratios.len());
+        let found = format!(
+            "of {} pairs of beat frequencies with static returns, the far one is {mean_db:+.1} dB stronger",
+            ratios.len()
+        );
         let strongest = pairs.iter().flatten().copied().max_by(|a, b| power[*a].total_cmp(&power[*b])).expect("there are two");
         let from_edge = strongest.min(samples - strongest) as f64 / samples as f64;
         if self.schedule.farthest_bin.is_none() && from_edge > 1.0 - PASSED {
@@ -105,7 +107,7 @@ mod tests {
     const SCHEDULE: Schedule =
         Schedule { tx: 1, rx: 2, loops: LOOPS, samples: SAMPLES, is_real: false, is_falling: false, farthest_bin: None };
 
-    /// Still returns at so many bins, falling with range, under noise.
+    /// Static returns at so many bins, falling with range, under noise.
     fn seen(schedule: Schedule, bins: std::ops::Range<usize>, sign: f32) -> Finding {
         of_law(schedule, bins, sign, |bin| 100.0 / bin as f64)
     }

@@ -1,6 +1,6 @@
 //! Loops of another length than is stated: a description of another capture, another number of samples, receivers or transmitters.
 //!
-//! What stands still repeats itself after one loop, so of all shifts of the stream along itself the one by a loop correlates most
+//! Static clutter repeats itself after one loop, so of all shifts of the stream along itself the one by a loop correlates most
 //! (Cauchy and Schwarz). With a correlation r, a share 1 − r² of the energy is left, so ln((1 − r²) / (1 − r'²)) for every loop is the log
 //! of a likelihood ratio of another length r'; it must exceed the number of lengths that were tried (Bonferroni). A loop counts once, as
 //! all of its samples show one scene. Lengths near whole numbers of chirps are not tried: the receivers of one chirp share its phase, and

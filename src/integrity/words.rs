@@ -5,7 +5,7 @@
 //! min(N, E / 2) after exchanging words that were right, but for what tones of one group have in common; that has either sign alike. If
 //! it holds less in nearly all groups, the words were wrong: a sign test over the groups of the still chirps' mean spectrum.
 //!
-//! Where that says neither, as still returns fill both halves, the phases decide: of tones A at ω and B at −ω the product X(ω)
+//! Where that says neither, as static returns fill both halves, the phases decide: of tones A at ω and B at −ω the product X(ω)
 //! X(−ω) is A B as it was sent, whose phase is any, and with words exchanged it has the part j cos ω ((1 − sin ω)|A|² + (1 + sin
 //! ω)|B|²) / 4 besides (of tones at ±(π − ω) the same with the other sign). So its imaginary part, summed over the channels, over
 //! the mean power at ±ω has one sign in nearly all groups: a sign test at an even chance, for either sign. An unbalanced receiver
@@ -152,7 +152,7 @@ mod tests {
     const SCHEDULE: Schedule =
         Schedule { tx: 1, rx: RX, loops: LOOPS, samples: SAMPLES, is_real: false, is_falling: false, farthest_bin: None };
 
-    /// Still returns of an amplitude at each bin, of other phases in every channel, through a receiver; words exchanged or not.
+    /// Static returns of an amplitude at each bin, of other phases in every channel, through a receiver; words exchanged or not.
     fn seen(amplitude: impl Fn(usize) -> f64, receiver: impl Fn(Complex64) -> Complex64, are_exchanged: bool) -> Finding {
         let noise = numbers(9, 2 * RX * LOOPS * SAMPLES, -3.0, 3.0);
         let phases = numbers(10, RX * SAMPLES, 0.0, std::f64::consts::TAU);

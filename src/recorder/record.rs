@@ -216,7 +216,7 @@ impl Recorder {
         } else if self.paths.scatter.is_some() {
             noise_for_snr(&self.plain_body()?, radar, config.snr_db)
         } else {
-            // Without a body the ratio is to what stands still.
+            // Without a body the ratio is to static clutter.
             let still = self.paths.surroundings.still().chunks_exact(self.stages.wide.samples_per_chirp);
             let window = still.map(|chirp| &chirp[guard..guard + radar.samples_per_chirp]);
             let chirps: Vec<Complex64> = window.flat_map(|chirp| chirp.repeat(radar.loops_per_frame)).collect();

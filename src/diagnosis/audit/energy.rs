@@ -5,7 +5,7 @@ use crate::diagnosis::prediction::Point;
 use crate::diagnosis::statistics::ratio_tail;
 use crate::radar::Radar;
 
-/// Below that many Doppler cells, what stands still leaks.
+/// Below that many Doppler cells, static clutter leaks.
 const STILL_CELLS: f64 = 2.5;
 
 /// Count, sum, and sum of squares of ln power over the noise.

@@ -16,7 +16,7 @@ use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence
 const LEAST_DB: f64 = 8.0;
 /// Share of the whole body's power that a part's skin counts as at least.
 const LEAST_SHARE: f64 = 0.01;
-/// What hardly moves is mostly where what stands still was taken out: how strong it is, its sidelobes do not show.
+/// What hardly moves is mostly where static clutter was taken out: how strong it is, its sidelobes do not show.
 const LEAST_SEEN: f64 = 0.3;
 /// Parts of one body differ: their log-likelihood ratios scatter by so much more than those of one reflectivity.
 const UNEVEN: f64 = 2.0;

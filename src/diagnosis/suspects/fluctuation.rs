@@ -36,7 +36,7 @@ pub const ID: &str = "soft_occlusion";
 pub use fluctuating::BEHAVES_LIKE as FLUCTUATES;
 pub use modulation::BEHAVES_LIKE as IS_MODULATED;
 
-/// What stands still where the body never is.
+/// Static clutter where the body never is.
 struct Free {
     returns: Returns,
     /// The strong returns, which all do the same unless something happens to them.

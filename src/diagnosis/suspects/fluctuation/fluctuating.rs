@@ -151,7 +151,7 @@ fn candidate(
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
-            "What stands still {range_m:.2} m away changes from frame to frame while the other static returns stay, and the body's \
+            "The static return {range_m:.2} m away changes from frame to frame while the other static returns stay, and the body's \
              silhouette alone does not explain it: something moves there, or passes in front of it."
         ),
         curve: Some(Curve {

@@ -1,4 +1,4 @@
-//! What stands still, frame by frame, and what all of it does together.
+//! Static clutter, frame by frame, and what all of it does together.
 
 use num_complex::Complex64;
 

@@ -216,7 +216,7 @@ fn tail(t: f64, freedom: f64) -> f64 {
     if t <= 0.0 { 1.0 } else { StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| 2.0 * law.sf(t)) }
 }
 
-/// None where the body fills too few cells. `still`: power of what stands still, by range.
+/// None where the body fills too few cells. `still`: power of static clutter, by range.
 fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &[f64], frame: usize) -> Option<Sums> {
     let radar = &evidence.radar;
     let (receivers, transmitters) = (radar.rx_m.len(), radar.tx_m.len());

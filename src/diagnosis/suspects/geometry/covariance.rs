@@ -225,7 +225,7 @@ pub fn used(evidence: &Evidence, model: &PowerModel, still: &[f64], frame: usize
     let expected = model.expected(frame);
     let map = &evidence.maps()[frame * model.size()..(frame + 1) * model.size()];
     let samples = evidence.cube.dims[4];
-    // A body that hardly moves is known by what it leaves of itself where what stands still was taken out.
+    // A body that hardly moves is known by what it leaves of itself where static clutter was taken out.
     let of_the_body = |cell: usize| model.usable()[cell] || f64::from(map[cell]) > STILL_LEFT * still[cell % samples];
     let used: Vec<usize> = (0..model.size()).filter(|&cell| expected[cell] > least && of_the_body(cell)).collect();
     (used.len() >= FEWEST_CELLS).then_some(used)

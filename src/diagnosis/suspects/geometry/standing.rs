@@ -1,4 +1,4 @@
-//! What stands still, as the row of receivers sees it: the walls are where the room says, and so are the directions from which
+//! Static clutter, as the row of receivers sees it: the walls are where the room says, and so are the directions from which
 //! returns of every range come.
 
 use std::f64::consts::{PI, TAU};

@@ -17,7 +17,7 @@ pub struct Ghost {
     /// Of all frames, for the p-value; of the held-out ones.
     pub gain_all: f64,
     pub gain: f64,
-    /// The same of cells that move: what stands still and fades is no image of somebody who walks.
+    /// The same of cells that move: static clutter that fades is no image of somebody who walks.
     pub gain_moving: f64,
     /// Held-out frames that gain on their own, of those that could.
     pub agreeing: f64,

@@ -136,7 +136,7 @@ fn fitted(scene: &Scene, clean: &[Vec<Vec<Complex64>>], kind: Kind) -> (Fit, f64
     let mut products: Vec<Vec<Vec<Complex64>>> = clean.par_iter().map(|frame| kind.product(frame)).collect();
     let samples = scene.samples;
     let judge = |products: &[Vec<Vec<Complex64>>]| {
-        // As in the measured maps, what stands still in all frames is left out.
+        // As in the measured maps, static clutter in all frames is left out.
         let still: Vec<Vec<Complex64>> = (0..products[0].len())
             .map(|channel| mean_chirp(products.iter().flat_map(|frame| frame[channel].chunks_exact(samples)), samples))
             .collect();

@@ -221,7 +221,7 @@ fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candi
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
-            "Something stands still {:.2} m away{whereabouts}: all receivers see one direction, {:.0} dB above the clutter of \
+            "A static return {:.2} m away{whereabouts}: all receivers see one direction, {:.0} dB above the clutter of \
              the ranges around it, in every frame, and no boundary, edge or corner of the room is there.",
             peak.range_m,
             10.0 * peak.ratio.log10()

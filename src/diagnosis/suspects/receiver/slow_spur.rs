@@ -70,7 +70,7 @@ pub struct SlowSpur {
 /// What of a tone each frame of a channel holds, `[channel][frame]`.
 type Held = Vec<Vec<Complex64>>;
 
-/// Spectra over the samples of all chirps of some frames, without what stands still.
+/// Spectra over the samples of all chirps of some frames, without static clutter.
 struct Spectra<'a> {
     evidence: &'a Evidence,
     /// That are looked at, those to train on first, and how many these are.
@@ -280,7 +280,7 @@ fn wrapped(turns: f64) -> f64 {
     turns - turns.round()
 }
 
-/// Least squares over the whole recording, beside what stands still, by channel.
+/// Least squares over the whole recording, beside static clutter, by channel.
 pub fn amplitudes(cube: &Cube, starts: &[f64], turns: Turns, fast: f64) -> Vec<Complex64> {
     let [frames, _, _, loops, samples] = cube.dims;
     let phases = turns.of_chirps(starts, loops);

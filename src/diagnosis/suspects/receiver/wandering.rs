@@ -13,7 +13,7 @@ use crate::diagnosis::evidence::{Evidence, hann};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median, normal_tails};
 use crate::diagnosis::suspects::slow::lines::climb;
 
-/// Doppler bins around zero where a Hann window leaves what stands still.
+/// Doppler bins around zero where a Hann window leaves static clutter.
 const STILL_BINS: usize = 2;
 /// Fewest loops and training frames that show a Doppler frequency and a way.
 const FEWEST_LOOPS: usize = 8;
@@ -265,7 +265,7 @@ fn along(chirps: &[Complex64], slow: f64) -> Complex64 {
     chirps.iter().enumerate().map(turned).sum::<Complex64>() / window.iter().sum::<f64>()
 }
 
-/// Of the tone in every frame and channel, `[frame][channel]`, beside what stands still.
+/// Of the tone in every frame and channel, `[frame][channel]`, beside static clutter.
 pub fn amplitudes(cube: &Cube, slow: &[f64], fast: f64) -> Vec<Complex64> {
     let ([frames, _, _, _, samples], channels) = (cube.dims, cube.channels());
     (0..frames * channels)

@@ -59,7 +59,7 @@ pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, 
     }
 }
 
-/// Energy that a deviation adds to what stands still.
+/// Energy that a deviation adds to static clutter.
 fn energy(evidence: &Evidence, field: &Field, part: Part, deviation: &dyn Fn([usize; 3]) -> f64) -> f64 {
     let still: f64 = evidence.still().iter().map(|v| v.norm_sqr()).sum();
     // Phases in proportion to the delay act as much as at the typical delay.

@@ -176,7 +176,7 @@ fn unlike_the_body(field: &Field, part: Part, points: &[Point], training: &[usiz
     let whole = Slow::fit(points, field.frames)?;
     let of =
         |part: Part, only: usize| Slow::fit(&self::points(&field.series(part, |group| group == only), training), field.frames);
-    // Of each range that stands still: what its other component does slowly, and what its own does otherwise than all.
+    // Of each static range: what its other component does slowly, and what its own does otherwise than all.
     let odd: Vec<f64> = (0..field.groups.len())
         .filter_map(|only| {
             let (own, other) = (of(part, only)?, of(part.other(), only)?);

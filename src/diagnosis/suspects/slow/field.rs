@@ -301,7 +301,7 @@ impl Field {
 
     /// The same of a deviation that was read from these ranges chirp by chirp, in which the strongest one finds itself: most of the
     /// others must have most of it, and one of them at least must be informative. The body's ranges are not, while it is there: its
-    /// own still returns move with it.
+    /// own slow returns move with it.
     pub fn shared_by_others(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> bool {
         let mut gains = self.gains(predicted, |place| self.free[place]);
         let strongest = gains.iter().enumerate().max_by(|(_, a), (_, b)| a[1].total_cmp(&b[1])).map(|(index, _)| index);
@@ -407,7 +407,7 @@ fn of_frame(
     let channels = evidence.cube.channels();
     let bins = evidence.range_bins();
     let noise = evidence.noise();
-    // `[channel, loop, bin]`, in units of the noise's deviation, without what stands still.
+    // `[channel, loop, bin]`, in units of the noise's deviation, without static clutter.
     let mut spectra: Vec<Complex64> = Vec::with_capacity(channels * loops * samples);
     for (channel, variance) in noise.iter().enumerate() {
         let scale = 1.0 / variance.sqrt();

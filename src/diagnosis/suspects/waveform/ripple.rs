@@ -21,7 +21,7 @@ use crate::radar::{Radar, SPEED_OF_LIGHT};
 const PADDING: usize = 4;
 /// Half of the window's main lobe down to the noise, bins.
 const LOBE: usize = 3;
-/// Doppler bins about zero that hold what stands still.
+/// Doppler bins about zero that hold static clutter.
 const STILL_BINS: usize = 3;
 /// Metres beyond the body's surface that its own returns may reach.
 const BODY_MARGIN_M: f64 = 0.15;
