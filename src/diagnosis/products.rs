@@ -78,7 +78,7 @@ pub fn without(laws: &[Law], found: Complex64) -> Complex64 {
 
 /// A magnitude squared at least this large beside a square makes it no harmonic.
 const BESIDE: f64 = 0.3;
-/// Least gain on other frames for it, nats.
+/// Least log-likelihood gain on other frames for it, nats.
 const LEAST_GAIN: f64 = 20.0;
 /// Steps by which a distortion is undone: each leaves a part of the last in proportion to how strong the distortion is.
 const STEPS: usize = 6;

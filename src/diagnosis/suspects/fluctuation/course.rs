@@ -36,7 +36,7 @@ const NONE: Law = Law { power: 0.0, slow_s: 0.0 };
 /// What the training frames say of a course.
 pub struct Course {
     law: Law,
-    /// Gain on the training frames against no course, and of all frames, each predicted by the others, nats.
+    /// Log-likelihood gain on the training frames against no course, and of all frames, each predicted by the others, nats.
     pub training: f64,
     pub predicted: f64,
 }

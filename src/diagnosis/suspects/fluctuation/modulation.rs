@@ -283,7 +283,7 @@ impl<'a> Chirps<'a> {
         line
     }
 
-    /// What the training frames' mean gains on the held-out ones, nats.
+    /// Log-likelihood gain of the held-out frames by the training frames' mean, nats.
     fn gain(&self, line: &Line, sidebands: &Sidebands) -> f64 {
         let (training, held_out) = (&self.evidence.split.training, &self.evidence.split.held_out);
         let channels = self.evidence.cube.channels();

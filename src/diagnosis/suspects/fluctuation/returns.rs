@@ -208,7 +208,7 @@ impl Series {
         })
     }
 
-    /// What the courses gain in all frames, each predicted by the others, nats.
+    /// Log-likelihood gain of the courses in all frames, each predicted by the others, nats.
     pub fn gain(&self, frames: Frames) -> f64 {
         self.courses(frames).iter().map(|course| course.predicted).sum()
     }

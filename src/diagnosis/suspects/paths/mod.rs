@@ -29,7 +29,7 @@ pub use still_point::body_rms;
 
 /// A ghost must predict at least this share of the held-out frames that show it.
 const AGREEING: f64 = 0.6;
-/// Least gain on held-out frames that is worth a name, nats.
+/// Least log-likelihood gain on held-out frames that is worth a name, nats.
 const LEAST_GAIN: f64 = 6.0;
 /// Of a track that follows the law of a thing that moves: faint products of two paths come near it.
 const LEAST_GAIN_TRACK: f64 = 12.0;

@@ -33,11 +33,11 @@ use crate::diagnosis::statistics;
 const LOOKS: f64 = 11.0;
 /// Log-likelihood gain (nats) below which nothing is reported.
 const LEAST_GAIN: f64 = 3.0;
-/// Share of the gain that what is simpler, or has a name, needs.
+/// Share of the log-likelihood gain that what is simpler, or has a name, needs.
 const NEARLY: f64 = 0.8;
 /// The same for what a sure name explains over the noise, where what has no name leaves more than noise itself.
 const HALF: f64 = 0.5;
-/// Difference of gains (nats) that decides nothing.
+/// Difference of log-likelihood gains (nats) that decides nothing.
 const UNDECIDED: f64 = 4.6;
 /// Turns of a line in a frame from which on it is distinguishable from a drift.
 const DISTINCT_TURNS: f64 = 0.2;
@@ -51,7 +51,7 @@ struct Found {
     candidate: Candidate,
     /// Of a line on a background that is hardly known: its degrees of freedom, and the p-value that this leaves.
     unsure: Option<(f64, f64)>,
-    /// Gain over the noise alone.
+    /// Log-likelihood gain over the noise alone.
     over_noise: f64,
     /// The same where it is sure; else the candidate's own.
     explained: f64,
