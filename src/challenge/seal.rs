@@ -185,7 +185,7 @@ fn write_case(recorded: &Recorded, case: &Path) -> Result<()> {
     write_frames(&recorded.world, &recorded.frames, case)
 }
 
-/// How strong the effects of a sealed case are by the yardstick of this program: records it again with and without them.
+/// How strong the effects of a sealed case are by the measure of this program: records it again with and without them.
 pub fn measured(settings: &str, case: &Path) -> Result<Strength> {
     let planted = settings_of(settings, case)?;
     let clean = RecorderConfig { effects: EffectsConfig::default(), ..planted.clone() };

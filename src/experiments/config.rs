@@ -1,4 +1,4 @@
-//! What a reproduction is told: which site, who is trained on and who is unseen, which simulators, and how long.
+//! Settings of a reproduction: which site, who is trained on and who is unseen, which simulators, and how long.
 
 use std::path::{Path, PathBuf};
 

@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn the_order_of_the_words_is_told_also_where_returns_fill_both_halves() {
+    fn the_order_of_the_words_is_decided_also_where_returns_fill_both_halves() {
         for amplitude in [room, both_halves] {
             let right = seen(amplitude, |value| value, false);
             assert!(right.ok && right.decided, "{right:?}");

@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_name_is_told_where_it_is_of_the_family_and_new() {
+    fn what_has_no_name_is_detected_where_it_is_of_the_family_and_new() {
         let rest = |like: &str, low: f64| json!([{"behaves_like": like, "where": {"range_m": [low, low + 0.1]}, "held_out_loglik_gain": 20.0}]);
         let background = of(json!([]), rest("additive fast-time", 1.0));
         let detected = judged("dc_offset", of(json!([]), rest("additive fast-time", 3.0)), &background);

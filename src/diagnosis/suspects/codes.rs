@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stuck_bit_is_told_and_a_coarse_converter_is_not() {
+    fn a_stuck_bit_is_detected_and_a_coarse_converter_is_not() {
         let found = find(&evidence(|rx, code| if rx == 1 { code | 8 } else { code }));
         assert!(found.len() == 1 && found[0].p_value < 1e-6 && found[0].gain > 20.0, "{found:?}");
         assert_eq!(found[0].place.rx, Some(vec![1]));

@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn an_echo_among_the_bodys_own_cells_is_told_from_a_body_elsewhere() {
+    fn an_echo_among_the_bodys_own_cells_is_distinguished_from_a_body_elsewhere() {
         let alone = found(&evidence(None));
         assert!(alone.is_none(), "{alone:?}");
         for (echo, id) in [

@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn a_coupling_is_told_with_its_level() {
+    fn a_coupling_is_estimated_with_its_level() {
         for level in [0.05, 0.2] {
             let strength = Complex64::from_polar(level, 1.1);
             let array = DMatrix::from_fn(4, 4, |i: usize, j| match i.abs_diff(j) {

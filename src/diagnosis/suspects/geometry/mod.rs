@@ -30,7 +30,7 @@ const DISPLACED: f64 = 1e-3;
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(model) = evidence.power() else { return vec![] };
     let Some(body) = evidence.body.as_ref() else { return vec![] };
-    // Beside a stranger that outshines the body, the body's place and time are not estimable.
+    // Beside another mover that is stronger than the body, the body's place and time are not estimable.
     let outshone = evidence.accepted.contains(&OVER_THE_BODY);
     let mut found = if outshone { vec![] } else { displaced::find(&Trial::new(evidence, model, body)) };
     let displaced = found.iter().any(|found| found.p_value < DISPLACED && found.gain > 0.0);

@@ -136,7 +136,7 @@ impl Ground<'_> {
     }
 
     /// How unlikely powers are where those of other looks are expected, whatever the tone's in each frame: where it is strong this
-    /// tells its law, as gains that are bounded do not.
+    /// determines its law, as log-likelihood gains that are bounded do not.
     fn contrast(&self, looks: &[Option<Look>], others: &[Option<Look>]) -> f64 {
         let of_frame = |(look, other): (&Option<Look>, &Option<Look>)| match (look, other) {
             (Some(look), Some(other)) => {

@@ -1,4 +1,4 @@
-//! Returns from where neither the body nor static clutter can be: mirror images, strangers that move, echoes.
+//! Returns from where neither the body nor static clutter can be: mirror images, other movers, echoes.
 
 mod bank;
 mod beams;

@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tone_that_goes_on_from_frame_to_frame_is_told_from_what_goes_away() {
+    fn a_tone_that_goes_on_from_frame_to_frame_is_distinguished_from_what_goes_away() {
         let radar = evidence(0.0, 0.0).radar;
         let bins_per_s = |frequency_hz: f64| 0.5 * radar.wavelength_m() * frequency_hz / radar.range_resolution_m();
         // Far enough that what moves leaves its range.

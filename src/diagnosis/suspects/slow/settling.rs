@@ -17,7 +17,8 @@ pub struct Settling {
     pub p_value: f64,
     pub training_gain: f64,
     pub held_out_gain: f64,
-    /// What an amplitude modulation at the mains' frequency gains in training, where its periods fit into the frames': it is then alike in all of them.
+    /// What an amplitude modulation at the mains' frequency gains in training, where its periods fit into the frames': it is then
+    /// alike in all of them.
     pub hum_gain: f64,
     /// What a free function of the loop gains on held-out frames.
     pub free: Free,

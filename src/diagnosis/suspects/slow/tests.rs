@@ -152,7 +152,7 @@ fn a_drift_and_a_step_are_measured() {
 
 /// At some ranges something moves slowly besides, by far more than the noise, and otherwise at each of them.
 #[test]
-fn a_drift_is_told_from_slow_parts_of_a_body() {
+fn a_drift_is_distinguished_from_slow_parts_of_a_body() {
     let radar = Radar::small(1);
     let delay_of_bin = radar.sample_rate_hz / (64.0 * radar.slope_hz_per_s);
     let wandering = |frame: usize, delay_s: f64| {
@@ -205,7 +205,7 @@ fn random_chirps_are_phase_noise_or_jitter() {
 }
 
 #[test]
-fn one_receiver_that_hops_is_told_from_all_that_drift() {
+fn one_receiver_that_hops_is_distinguished_from_all_that_drift() {
     let hopping = |change: bool| {
         let mut evidence = evidence(11, |_, _, _, _| Complex64::ONE);
         evidence.cube.each_chirp(|[frame, channel, _], chirp| {
