@@ -192,7 +192,7 @@ impl ChallengeConfig {
         let nulls = self.shares.null / Stratum::ALL.iter().map(|&stratum| self.shares.of(stratum)).sum::<f64>();
         if nulls.is_nan() || nulls < FEWEST_NULLS {
             return Err(Error::setting("shares.null", format!("{nulls:.2} of all"), format!("at least {FEWEST_NULLS}"))
-                .with_hint("a detective who is never shown innocence proves nothing"));
+                .with_hint("a diagnosis that is never shown a null proves nothing"));
         }
         let scenes = &self.scenes;
         for (key, bounds, low, high) in [

@@ -1,4 +1,4 @@
-//! The detective: where a recording and what the simulator can explain part, what was left out, and how sure that is.
+//! The diagnosis: where a recording and what the simulator can explain part, what was left out, and how sure that is.
 //!
 //! The baseline is that of docs/diagnosis.md: the body's single bounce with free amplitudes, static clutter, thermal noise,
 //! millimetre errors of the mesh, unknown phase and gain. [`Evidence`] is a recording as far as it is explained; every

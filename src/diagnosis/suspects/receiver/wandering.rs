@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn what_keeps_its_range_is_a_tone_and_what_leaves_it_or_swings_is_none() {
+    fn what_keeps_its_range_is_a_tone_and_what_leaves_it_or_oscillates_is_none() {
         let radar = evidence(|_| 0.0, 0.0, false).radar;
         let loops_hz = radar.loop_period_s().recip();
         let wanders = |frame: usize| loops_hz * (0.2 + 0.004 * (frame as f64).sin());

@@ -97,7 +97,7 @@ fn a_common_phase_is_a_vibration_and_one_in_proportion_to_the_delay_is_none() {
 }
 
 #[test]
-fn a_phase_that_swings_far_is_read_as_an_angle() {
+fn a_large_phase_excursion_is_read_as_an_angle() {
     let sinusoid = |t: f64| 1.3 * (std::f64::consts::TAU * 83.0 * t).sin();
     let evidence = evidence(5, |t, _, _, _| Complex64::cis(sinusoid(t)));
     let metres = evidence.radar.wavelength_m() / (4.0 * std::f64::consts::PI);
