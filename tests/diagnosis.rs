@@ -51,7 +51,7 @@ fn ids(report: &Report) -> Vec<&str> {
     report.effects.iter().map(|effect| effect.id.as_str()).collect()
 }
 
-/// Named, or among what cannot be told from what was named.
+/// Named, or among what is indistinguishable from what was named.
 fn names(report: &Report, id: &str) -> bool {
     report.effects.iter().any(|effect| effect.id == id || effect.indistinguishable_from.iter().any(|other| other == id))
 }
@@ -121,7 +121,7 @@ fn two_effects_of_the_receiver_are_told_apart() {
     close(value(&report, "ramp_edge_transient", "samples"), 2.0, 0.1);
 }
 
-/// Almost all of this person's return is where what stands still was taken out.
+/// Almost all of this person's return is where static clutter was taken out.
 #[test]
 fn receivers_that_differ_are_told_by_a_person_who_hardly_moves() {
     let folder = tempfile::tempdir().unwrap();

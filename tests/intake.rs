@@ -106,7 +106,7 @@ fn a_capture_as_it_is_stated_is_kept_and_the_table_says_so() {
     {
         assert!(table.contains(part), "{part} in {table}");
     }
-    assert!(table.contains("as stated, untold") && !table.contains("refused"), "{table}");
+    assert!(table.contains("as stated, undecided") && !table.contains("refused"), "{table}");
     let (kept, wanted) = (Recording::open(folder.path().join("kept")).unwrap(), Recording::open(recording()).unwrap());
     assert_eq!(kept.frame(5).unwrap(), wanted.frame(5).unwrap());
     // `check` prints the same rows.
@@ -121,9 +121,9 @@ fn a_capture_as_it_is_stated_is_kept_and_the_table_says_so() {
     assert_eq!(rows(&check), rows(&table));
     for finding in integrity::inspect(&kept, FRAMES).unwrap() {
         assert!(finding.ok, "{finding:?}");
-        let told =
+        let decided =
             ["byte_order", "number_format", "loop_length", "chirp_start", "frame_boundary", "integrity_word_order", "iq_order"];
-        assert!(finding.told || !told.contains(&finding.check), "{finding:?}");
+        assert!(finding.decided || !decided.contains(&finding.check), "{finding:?}");
     }
 }
 

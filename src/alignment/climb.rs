@@ -13,7 +13,7 @@ use super::place::{AZIMUTH, CLOCK, COUNT, FACING, HEIGHT, Place, RANGE};
 
 /// Differences, and unit of all steps: seconds, radians, metres, radians, metres. A small part of what a cell or a beam resolves.
 pub const UNIT: [f64; COUNT] = [0.012, 3.0 * PI / 180.0, 0.015, 1.0 * PI / 180.0, 0.03];
-/// Standard deviation of what is known without the recording: keeps what it does not tell from running away.
+/// Standard deviation of what is known without the recording: keeps what it does not determine from running away.
 pub const PRIOR: [f64; COUNT] = [1.0, PI, 3.0, 1.0, 1.0];
 /// Largest step, units.
 const LONGEST: f64 = 6.0;
@@ -30,7 +30,7 @@ pub struct Maximum<'a> {
     pub score: Score,
     /// Of the place's numbers (zero for those that were kept), without floors.
     pub covariance: DMatrix<f64>,
-    /// Frames that tell, less the numbers that were fitted.
+    /// Informative frames, less the numbers that were fitted.
     pub freedom: f64,
 }
 
@@ -131,15 +131,15 @@ impl Slopes {
     /// Covariance of all numbers of a place, and degrees of freedom.
     fn covariance(&self, active: &[usize], training: &[usize]) -> (DMatrix<f64>, f64) {
         let count = active.len();
-        let telling: Vec<&DVector<f64>> =
+        let informative: Vec<&DVector<f64>> =
             training.iter().map(|&frame| &self.scores[frame]).filter(|score| score.amax() > 0.0).collect();
-        let frames = telling.len() as f64;
+        let frames = informative.len() as f64;
         let freedom = (frames - count as f64).max(1.0);
-        let mean = telling.iter().fold(DVector::zeros(count), |sum, score| sum + *score) / frames.max(1.0);
+        let mean = informative.iter().fold(DVector::zeros(count), |sum, score| sum + *score) / frames.max(1.0);
         let mut scatter = DMatrix::zeros(count, count);
         for lag in 0..=LAGS {
             let weight = 1.0 - lag as f64 / (LAGS + 1) as f64;
-            for pair in telling.windows(lag + 1) {
+            for pair in informative.windows(lag + 1) {
                 let (a, b) = (pair[0] - &mean, pair[lag] - &mean);
                 scatter += match lag {
                     0 => &a * a.transpose(),
@@ -173,12 +173,12 @@ fn moved(place: &Place, active: &[usize], units: &DVector<f64>) -> Place {
     Place::of(values)
 }
 
-/// Numbers that a recording may tell at all: directions only across the array's extent.
+/// Numbers that are estimable at all: directions only across the array's extent.
 pub fn active(readings: &super::readings::Readings) -> Vec<usize> {
-    let told = |number: &usize| match *number {
-        AZIMUTH => readings.tells(0),
-        HEIGHT => readings.tells(2),
+    let estimable = |number: &usize| match *number {
+        AZIMUTH => readings.resolves(0),
+        HEIGHT => readings.resolves(2),
         _ => true,
     };
-    [CLOCK, FACING, RANGE, AZIMUTH, HEIGHT].into_iter().filter(told).collect()
+    [CLOCK, FACING, RANGE, AZIMUTH, HEIGHT].into_iter().filter(estimable).collect()
 }

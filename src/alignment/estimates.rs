@@ -1,4 +1,4 @@
-//! Numbers of the report at a maximum of the likelihood, with intervals, or why the recording does not tell them.
+//! Numbers of the report at a maximum of the likelihood, with intervals, or why the recording does not identify them.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use super::climb::{Maximum, UNIT, active};
 use super::coarse::turned_rad;
 use super::fit::Fitter;
 use super::place::{AZIMUTH, CLOCK, COUNT, FACING, HEIGHT, Place, RANGE, stated};
-use super::report::{Estimate, TOLD};
+use super::report::{ESTIMATES, Estimate};
 use crate::person::{BodyModel, Motion, Person, Placement};
 
 /// Standard deviations of what the power model does to a place, by number, as its reflectivities and visibility are rough. On the eight
@@ -63,7 +63,7 @@ pub fn placement(person: &Person, fitter: &Fitter, place: &Place) -> Placement {
     }
 }
 
-/// Numbers of the report at a place, in the order of [`TOLD`].
+/// Numbers of the report at a place, in the order of [`ESTIMATES`].
 pub fn numbers(person: &Person, fitter: &Fitter, place: &Place) -> [f64; 8] {
     let Placement { start_s, origin_m: [x, y, z], .. } = placement(person, fitter, place);
     let heading = fitter.pivot.correction(place).heading_rad;
@@ -83,7 +83,7 @@ pub fn estimates(person: &Person, best: &Maximum) -> BTreeMap<&'static str, Esti
         let side = |step: f64| at(&best.place.with(number, best.place.values()[number] + step * UNIT[number]));
         let (low, high) = (side(-1.0), side(1.0));
         for row in 0..8 {
-            let (change, angle) = (high[row] - low[row], TOLD[row].1 == "degrees");
+            let (change, angle) = (high[row] - low[row], ESTIMATES[row].1 == "degrees");
             let change = if angle { turned_rad(change.to_radians()).to_degrees() } else { change };
             slopes[(row, number)] = change / (2.0 * UNIT[number]);
         }
@@ -96,34 +96,34 @@ pub fn estimates(person: &Person, best: &Maximum) -> BTreeMap<&'static str, Esti
         let half = quantile * covariance[(row, row)].max(0.0).sqrt();
         let missing = NEEDS[row].1.iter().find(|number| !active.contains(number));
         let why_not = match missing {
-            Some(&number) => Some(untold(number, best.place.range_m)),
+            Some(&number) => Some(not_identified(number, best.place.range_m)),
             None => (half.is_nan() || half > WIDEST[row].1).then(|| too_wide(row, half)),
         };
         let ci90 = why_not.is_none().then_some([here[row] - half, here[row] + half]);
         let estimate = Estimate { stated: stated[row], value: here[row], ci90, identified: why_not.is_none(), why_not };
-        (TOLD[row].0, estimate)
+        (ESTIMATES[row].0, estimate)
     };
     (0..8).map(estimate).collect()
 }
 
-fn untold(number: usize, range_m: f64) -> String {
+fn not_identified(number: usize, range_m: f64) -> String {
     match number {
         AZIMUTH => format!(
-            "the antennas tell no left and right: the body may stand anywhere on the circle of {range_m:.2} m about the radar, turned \
-             with it; the azimuth as stated was kept"
+            "the antennas do not resolve left and right: the body may stand anywhere on the circle of {range_m:.2} m about the \
+             radar, turned with it; the azimuth as stated was kept"
         ),
-        _ => "the antennas lie in one height and tell no other: the height as stated was kept".into(),
+        _ => "the antennas lie in one height and resolve no other: the height as stated was kept".into(),
     }
 }
 
 fn too_wide(row: usize, half: f64) -> String {
-    let (name, unit, _) = TOLD[row];
+    let (name, unit, _) = ESTIMATES[row];
     let why = match name {
         "start_s" => "the motion looks alike for so long",
         "rotation_deg" | "facing_deg" => "what moves returns the same at other headings",
-        "range_m" => "ranges are not told",
-        "azimuth_deg" => "the directions of what moves are not told",
-        _ => "it depends on what is not told",
+        "range_m" => "ranges are not resolved",
+        "azimuth_deg" => "the directions of what moves are not resolved",
+        _ => "it depends on what is not identified",
     };
     // Far beyond, the likelihood is flat, and its curvature says nothing.
     if half < 4.0 * WIDEST[row].1 { format!("{why}: ± {half:.2} {unit} (90 %)") } else { why.to_string() }

@@ -1,5 +1,5 @@
 //! Where a tracked body is in the radar's frame, and when: origin, turn about the vertical and start of a recording's motion, from the
-//! recording itself, with intervals, or that it cannot be told.
+//! recording itself, with intervals, or that it cannot be determined.
 //!
 //! A body's motion says how ranges and velocities change, the radar saw them change; a placement is judged by how likely the moving cells
 //! of the recording are under the power that the placed body would send (`likelihood`: the law by which the diagnosis compares displaced
@@ -63,7 +63,7 @@ const ROUNDS: usize = 10;
 /// Widest azimuth that is tried, and the step: a third of what four receivers half a wavelength apart resolve at their best.
 const WIDEST_RAD: f64 = 72.0 * PI / 180.0;
 const AZIMUTH_STEP_RAD: f64 = 4.0 * PI / 180.0;
-/// Where the recording puts its motion; `progress` hears what happens, in plain words.
+/// Where the recording puts its motion; `progress` receives what happens, in plain words.
 ///
 /// # Errors
 /// A recording that cannot be read, is too short or damaged, or has no body with a motion; a motion that has no pose in all of the

@@ -1,4 +1,4 @@
-//! A rigid placement of the motion, in the numbers that a radar tells apart.
+//! A rigid placement of the motion, in the numbers that a radar distinguishes.
 
 use crate::body::PoseCorrection;
 use crate::person::{Person, Placement};

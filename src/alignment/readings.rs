@@ -7,8 +7,8 @@ use crate::diagnosis::{Evidence, Split, power};
 use crate::radar::Radar;
 use crate::room::Room;
 
-/// Shortest extent of the array in wavelengths along which a direction is told: the phase between its ends then turns by a quarter of
-/// a turn from one side to the other.
+/// Shortest extent of the array in wavelengths along which a direction is estimable: the phase between its ends then turns by a
+/// quarter of a turn from one side to the other.
 const APERTURE: f64 = 0.125;
 /// Farthest body where no room says less, metres.
 const FARTHEST_M: f64 = 12.0;
@@ -21,7 +21,7 @@ pub struct Readings {
     pub split: Split,
     /// Radar time of the middle of every frame.
     pub middle_s: Vec<f64>,
-    /// Cells away from what stands still, `[doppler, range]`.
+    /// Cells away from static clutter, `[doppler, range]`.
     pub usable: Vec<bool>,
     /// Mean over the channels, `[frame, doppler, range]`.
     power: Vec<f32>,
@@ -100,7 +100,7 @@ impl Readings {
     }
 
     /// Whether directions along an axis show in the phases between channels.
-    pub fn tells(&self, axis: usize) -> bool {
+    pub fn resolves(&self, axis: usize) -> bool {
         let ends = self
             .channels
             .iter()

@@ -31,7 +31,7 @@ pub struct Estimate {
     /// 90 % interval; none where the number is not identified.
     pub ci90: Option<[f64; 2]>,
     pub identified: bool,
-    /// What the recording cannot tell, in words.
+    /// What is not identifiable from the recording, in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why_not: Option<String>,
 }
@@ -94,8 +94,8 @@ pub struct Alignment {
     pub tracks: [Track; 2],
 }
 
-/// Names of the estimates, in the order in which they are told, with unit and digits.
-pub const TOLD: [(&str, &str, usize); 8] = [
+/// Names of the estimates, in the order in which they are reported, with unit and digits.
+pub const ESTIMATES: [(&str, &str, usize); 8] = [
     ("start_s", "s", 3),
     ("rotation_deg", "degrees", 1),
     ("origin_x_m", "m", 3),
@@ -110,7 +110,7 @@ impl Alignment {
     /// A line for each number.
     pub fn lines(&self) -> String {
         let mut text = String::new();
-        for (name, unit, digits) in TOLD {
+        for (name, unit, digits) in ESTIMATES {
             let Some(estimate) = self.estimates.get(name) else { continue };
             let Estimate { stated, value, ci90, .. } = estimate;
             let _ = match (ci90, &estimate.why_not) {

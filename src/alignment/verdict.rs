@@ -10,7 +10,7 @@ use super::fit::{COHERENCE, Fitter, Score};
 use super::place::{Pivot, stated};
 use super::poses::Poses;
 use super::readings::Readings;
-use super::report::{Alignment, Alternative, Estimate, FORMAT, Gain, TOLD, Verdict};
+use super::report::{Alignment, Alternative, ESTIMATES, Estimate, FORMAT, Gain, Verdict};
 use super::tracks::{self, Track};
 use crate::diagnosis::statistics::ratio_tail;
 use crate::person::Person;
@@ -46,14 +46,14 @@ pub fn alignment(found: &Found, recording: String) -> Alignment {
     let alternatives = best.map_or_else(Vec::new, |best| alternatives(found, best, &estimates));
     let reason = cannot_tell(found, &gain, &estimates);
     let sentence_of = |verdict, as_stated| sentence(verdict, reason.as_deref(), &estimates, alternatives.len(), as_stated);
-    let told = told_apart(estimates.clone(), &alternatives);
+    let identified = told_apart(estimates.clone(), &alternatives);
     let verdict = match (&reason, alternatives.is_empty()) {
         (Some(_), _) => Verdict::CannotTell,
         (None, false) => Verdict::Ambiguous,
         (None, true) => Verdict::Aligned,
     };
     let holds = |estimate: &Estimate| estimate.ci90.is_none_or(|[low, high]| (low..=high).contains(&estimate.stated));
-    let as_stated = verdict == Verdict::Aligned && told.values().all(holds);
+    let as_stated = verdict == Verdict::Aligned && identified.values().all(holds);
     notes.push("the vertical is the radar frame's z, and the motion's own poses and height are taken as they are".into());
     if readings.channels.len() > 1 {
         notes.push("azimuths are those of the array as stated: a phase that grows along the antennas is a direction".into());
@@ -70,7 +70,7 @@ pub fn alignment(found: &Found, recording: String) -> Alignment {
         held_out_frames: readings.split.held_out.clone(),
         stated: stated(found.person),
         motion: best.map_or_else(|| stated(found.person), |best| placement(found.person, &best.fitter, &best.place)),
-        estimates: told,
+        estimates: identified,
         gain,
         alternatives,
         notes,
@@ -109,7 +109,7 @@ fn alternatives(found: &Found, best: &Maximum, estimates: &BTreeMap<&'static str
     let of = |other: &Maximum| {
         let p_value = worse(&best.score, &other.score);
         let values: BTreeMap<&'static str, f64> =
-            TOLD.iter().map(|(name, ..)| *name).zip(numbers(found.person, &other.fitter, &other.place)).collect();
+            ESTIMATES.iter().map(|(name, ..)| *name).zip(numbers(found.person, &other.fitter, &other.place)).collect();
         let apart = estimates.iter().any(|(name, estimate)| {
             // Within one and the same peak, the climbs end within its interval.
             estimate.ci90.is_some_and(|[low, high]| difference(name, values[name], estimate.value).abs() > high - low)
@@ -150,9 +150,9 @@ fn cannot_tell(found: &Found, gain: &Gain, estimates: &BTreeMap<&'static str, Es
              is the recording of this motion?)"
         ));
     };
-    let telling = best.score.by_frame.iter().filter(|gain| **gain != 0.0).count();
-    if telling < 4 {
-        return Some("the person hardly moves: in less than four frames is any part faster than what stands still".into());
+    let informative = best.score.by_frame.iter().filter(|gain| **gain != 0.0).count();
+    if informative < 4 {
+        return Some("the person hardly moves: in less than four frames is any part faster than the static clutter".into());
     }
     if gain.p_value_chance.is_nan() || gain.p_value_chance > ALARM {
         return Some(format!(
@@ -171,7 +171,7 @@ fn cannot_tell(found: &Found, gain: &Gain, estimates: &BTreeMap<&'static str, Es
         return Some("the placement that explains the fitted frames does not explain the others".into());
     }
     let any = estimates.values().any(|estimate| estimate.identified);
-    (!any).then(|| "no number of the placement is told well enough".into())
+    (!any).then(|| "no number of the placement is estimated well enough".into())
 }
 
 /// `estimates`: those of the best placement by itself; `others`: how many explain as much.
@@ -183,7 +183,7 @@ fn sentence(
     as_stated: bool,
 ) -> String {
     if let Some(reason) = reason {
-        return format!("Where the body is cannot be told: {reason}.");
+        return format!("Where the body is cannot be determined: {reason}.");
     }
     let of = |name: &str| estimates.get(name).filter(|estimate| estimate.identified);
     let mut parts = vec![];
@@ -203,13 +203,15 @@ fn sentence(
         let way = if turn.value >= 0.0 { "counter-clockwise" } else { "clockwise" };
         parts.push(format!("it is turned by {:.1} degrees {way}{to_sight}", turn.value.abs()));
     }
-    let told = if parts.is_empty() { "what can be told is below".to_string() } else { parts.join(", ") };
+    let estimated = if parts.is_empty() { "what is identified is below".to_string() } else { parts.join(", ") };
     match verdict {
         Verdict::Ambiguous => {
             let count = others + 1;
-            format!("{count} placements explain the recording equally well: by the likeliest, against what is stated, {told}.")
+            format!(
+                "{count} placements explain the recording equally well: by the likeliest, against what is stated, {estimated}."
+            )
         }
-        _ if as_stated => format!("The recording agrees with the placement as stated: {told}, each within its interval."),
-        _ => format!("The placement as stated is wrong: {told}."),
+        _ if as_stated => format!("The recording agrees with the placement as stated: {estimated}, each within its interval."),
+        _ => format!("The placement as stated is wrong: {estimated}."),
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! The power of the moving person is matched: on static-removed range-Doppler maps, summed over the cells within 20 dB of
 //! the strongest one, of measured and simulated maps each on their own, so that a method whose person is in the wrong cells
-//! is still heard as loud as it should be. What is measured is taken above the noise's floor.
+//! still has the power that it should have. What is measured is taken above the noise's floor.
 
 use num_complex::Complex32;
 

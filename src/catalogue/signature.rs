@@ -12,13 +12,17 @@ use crate::data::IfFrame;
 use crate::effects::{EffectInfo, EffectSetting};
 use crate::error::Result;
 use crate::heatmap::{Analysis, Gate, HeatmapConfig, Map, Samples};
+use crate::person::Placement;
+use crate::person::actions::placement;
 use crate::pictures::Grid;
 use crate::radar::Radar;
-use crate::recorder::effects::listed;
-use crate::recorder::{RadarChoice, Recorder, RecorderConfig, World};
+use crate::recorder::effects::{ClockOffset, listed};
+use crate::recorder::{EffectsConfig, RadarChoice, Recorder, RecorderConfig, World};
 
 /// Of the scene and of what the effect draws.
 const SEED: u64 = 7;
+/// Before the first chirp and after the last the person moves for so long, so that clocks may be wrong and frames lost.
+const SPARE_S: f64 = 0.8;
 /// Below the strongest cell, dB; the noise of the scene lies some 70 dB below its walls.
 const DEPTH_DB: f64 = 80.0;
 
@@ -36,8 +40,12 @@ impl Scene {
     /// What the recorder refuses.
     pub(super) fn new() -> Result<Self> {
         let radar = Radar { samples_per_chirp: 64, loops_per_frame: 32, ..Radar::small(24) };
-        let config = RecorderConfig { radar: RadarChoice::Full(Box::new(radar)), seed: SEED, ..RecorderConfig::default() };
-        let world = config.world(Path::new(""))?;
+        let mut config = RecorderConfig { radar: RadarChoice::Full(Box::new(radar)), seed: SEED, ..RecorderConfig::default() };
+        let floor_m = config.room.floor_m.unwrap_or(1.0);
+        config.person.placement = Some(Placement { start_s: -SPARE_S, ..placement(floor_m, config.person.distance_m) });
+        config.effects.clock_offset = Some(ClockOffset { offset_s: SPARE_S });
+        let mut world = config.world(Path::new(""))?;
+        world.effects = EffectsConfig::default();
         let surroundings = Surroundings {
             room: world.room.clone(),
             distance_m: config.person.distance_m,

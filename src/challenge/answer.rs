@@ -93,8 +93,8 @@ impl Answers {
     }
 }
 
-/// Diagnoses what has no answer yet and writes `answers.json`. `progress` hears how many are done, also while one is at work: whoever
-/// unwinds from it ends that one.
+/// Diagnoses what has no answer yet and writes `answers.json`. `progress` receives how many are done, also while one is at work:
+/// whoever unwinds from it ends that one.
 pub fn run(challenge: &Path, out: &Path, config: &RunConfig, progress: &mut dyn FnMut(usize)) -> Result<Answers> {
     let commitments = Commitment::read_all(challenge)?;
     let names: Vec<&String> = commitments.iter().flat_map(|commitment| commitment.leaves.keys()).collect();

@@ -20,7 +20,7 @@ const MARGIN_BINS: usize = 3;
 /// Most templates that a sparse regression takes together.
 const MOST_ATOMS: usize = 3;
 
-/// Derivatives of the samples by an effect's parameter, at zero, as far as the samples themselves tell them.
+/// Derivatives of the samples by an effect's parameter, at zero, as far as the samples themselves determine them.
 pub const TEMPLATES: [&str; 13] = [
     "dc_offset",
     "tx_leakage",
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn each_kind_of_trace_is_told_by_its_template_and_silence_by_none() {
+    fn each_kind_of_trace_is_identified_by_its_template_and_silence_by_none() {
         let radar = Radar::small(4);
         let bins = outside_bins(&radar, 0.5 * radar.max_range_m());
         let seen = |spoil: &dyn Fn(Complex64, usize) -> Complex64| of_samples(&radar, &bins, &frames(&radar, spoil));

@@ -1,7 +1,7 @@
 //! Nulls of somebody's own radar, and the table of what the diagnosis says of them.
 //!
-//! A null is recorded in the recorder's world, with the radar and the size that a config or a recording has, and nothing but what
-//! FORMATS.md calls "nothing missing". Each is diagnosed by a process of its own; what they say becomes `calibration.json`
+//! A null is recorded in the recorder's world, with the radar and the size that a config or a recording has, and nothing
+//! beyond the baseline of docs/diagnosis.md. Each is diagnosed by a process of its own; what they say becomes `calibration.json`
 //! ([`crate::diagnosis::calibration`]), by which the same program ranks the p-values of recordings of that structure.
 
 use std::collections::BTreeMap;
@@ -42,7 +42,7 @@ const WITHIN: f64 = 0.9;
 /// What all nulls are recorded from.
 pub struct Source {
     world: World,
-    /// Whether what is diagnosed is told of the room.
+    /// Whether the diagnosis is given the room.
     room: bool,
     /// From a recording: how far the body's mesh and the skin are from what is handed out differs from null to null.
     drawn: bool,
@@ -179,7 +179,7 @@ pub fn missing(out: &Path, nulls: usize) -> usize {
     open(out, nulls, Shard::ALL).count()
 }
 
-/// Records and diagnoses the nulls of a part that have no report yet; `progress` hears how many are done.
+/// Records and diagnoses the nulls of a part that have no report yet; `progress` receives how many are done.
 ///
 /// # Errors
 /// A folder that was begun with another source or seed; what the recorder refuses.

@@ -16,7 +16,7 @@ use crate::recorder::Returns;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stratum {
-    /// Nothing is missing, as FORMATS.md defines it.
+    /// Nothing is missing: no more than the baseline of docs/diagnosis.md.
     Null,
     /// One effect, of a strength between undetectable and obvious.
     Single,
@@ -192,7 +192,7 @@ impl ChallengeConfig {
         let nulls = self.shares.null / Stratum::ALL.iter().map(|&stratum| self.shares.of(stratum)).sum::<f64>();
         if nulls.is_nan() || nulls < FEWEST_NULLS {
             return Err(Error::setting("shares.null", format!("{nulls:.2} of all"), format!("at least {FEWEST_NULLS}"))
-                .with_hint("a detective who is never shown innocence proves nothing"));
+                .with_hint("a diagnosis that is never shown a null proves nothing"));
         }
         let scenes = &self.scenes;
         for (key, bounds, low, high) in [

@@ -34,7 +34,7 @@ impl Truth {
         serde_json::from_value(sealed.truth.clone()).map_err(|error| error.to_string())
     }
 
-    /// Ids of FORMATS.md; none for what is outside the library.
+    /// Ids of docs/report.md; none for what is outside the library.
     pub fn ids(&self) -> Vec<Option<&str>> {
         self.effects.iter().map(|effect| effect["name"].as_str()).collect()
     }
@@ -217,7 +217,7 @@ fn at_place(effect: &Value, place: &Place) -> bool {
         && within(frame, &place.frames)
 }
 
-/// What FORMATS.md's parameter says of the recorder's numbers; none where the two are not comparable, because the
+/// What a parameter of docs/report.md is by the recorder's numbers; none where the two are not comparable, because the
 /// report's unit is not fixed (amplitudes, levels of a direct current).
 fn true_value(id: &str, parameter: &str, effect: &Value) -> Option<Vec<f64>> {
     if id == "dc_offset" || parameter == "amplitude" {

@@ -1,6 +1,6 @@
 //! Every effect that can be planted, graded from undetectable to obvious.
 //!
-//! Strengths are those of data sheets and notes (PHYSICS.md) and some thirty decibels below. They are fixed here, before
+//! Strengths are those of data sheets and application notes, and some thirty decibels below. They are fixed here, before
 //! any sealed run; how strong a planted effect came out is measured on the recording itself.
 
 use std::f64::consts::TAU;
@@ -26,7 +26,7 @@ pub struct Surroundings {
 
 /// An effect with the strengths between which it is drawn, log-uniformly.
 pub struct Graded {
-    /// Of FORMATS.md; for what is outside the library, the recorder's word.
+    /// As in docs/report.md; for what is outside the library, the recorder's word.
     pub id: &'static str,
     pub weakest: f64,
     pub strongest: f64,
@@ -259,7 +259,7 @@ pub const MASKED: &[Graded] = &[
     },
 ];
 
-/// What learned amplitudes can take over (DIAGNOSIS.md, table A).
+/// Effects that learned amplitudes can absorb.
 pub const ABSORBED: [&str; 10] = [
     "if_highpass",
     "if_lowpass",
@@ -273,7 +273,7 @@ pub const ABSORBED: [&str; 10] = [
     "chirp_droop",
 ];
 
-/// What no id of FORMATS.md names.
+/// Effects outside the library: no id of docs/report.md names them.
 pub const OUTSIDE: &[Graded] = listed! {
     mains_gain_ripple in outside 3e-4 0.2 |s, at, random| Outside::MainsGainRipple {
         rate_hz: [50.0, 60.0, 100.0, 120.0][random.random_range(0..4)], depth: s

@@ -139,7 +139,7 @@ fn draw(clean: &[IfFrame], planted: &[IfFrame], gain: f64) -> Draw {
     Draw { clean: of(clean), effect: of(effect) }
 }
 
-/// What is left of a channel's frame, `[loop, sample]`, without what stands still within the frame.
+/// What is left of a channel's frame, `[loop, sample]`, without static clutter within the frame.
 fn energy_of_movers(channel: &[Complex64], fast: usize) -> f64 {
     let loops = (channel.len() / fast) as f64;
     let mut mean = vec![Complex64::ZERO; fast];

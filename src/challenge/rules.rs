@@ -18,8 +18,8 @@ pub const RANGE_SLACK_M: f64 = 0.15;
 /// False alarms per recording at which the baselines are calibrated, on the nulls of the set itself.
 pub const BASELINE_FALSE_ALARMS: f64 = 0.02;
 
-/// Effects that the same recording cannot tell apart (R² ≥ 0.9 between their traces: DIAGNOSIS.md, sections 0.6 and
-/// 3.0, PHYSICS.md cards W3, W4, W5, W9, G1, G2, D1′). Naming one of a set names them all.
+/// Effects that one recording cannot distinguish (R² ≥ 0.9 between what they do to its samples). Naming one of a set names them
+/// all.
 pub const LOOK_ALIKES: &[&[&str]] = &[
     &["start_frequency_error", "adc_start_error", "if_delay", "if_lowpass"],
     &["range_bias", "slope_error", "pose_offset"],
@@ -27,7 +27,7 @@ pub const LOOK_ALIKES: &[&[&str]] = &[
     &["phase_noise", "chirp_start_jitter"],
 ];
 
-/// Effects that are easily taken for one another although a recording can tell them apart; decoys are drawn from these.
+/// Effects that are easily taken for one another although a recording can distinguish them; decoys are drawn from these.
 pub const DECOYS: &[&[&str]] = &[
     &["second_harmonic", "object_radar_object"],
     &["iq_imbalance", "range_alias"],
@@ -41,7 +41,7 @@ pub const DECOYS: &[&[&str]] = &[
     &["channel_mismatch", "antenna_position", "mutual_coupling"],
 ];
 
-/// The stage of an effect, as FORMATS.md's table has it.
+/// The stage of an effect, as the table of docs/report.md has it.
 const STAGES: &[(&str, &[&str])] = &[
     (
         "waveform",
@@ -83,12 +83,12 @@ const STAGES: &[(&str, &[&str])] = &[
     ("noise", &["coloured_noise", "impulsive_noise", "correlated_noise"]),
 ];
 
-/// The stage of an id of FORMATS.md; none for what is no such id.
+/// The stage of an id of docs/report.md; none for what is no such id.
 pub fn stage(id: &str) -> Option<&'static str> {
     STAGES.iter().find(|(_, ids)| ids.contains(&id)).map(|(stage, _)| *stage)
 }
 
-/// Whether one recording cannot tell the two apart, or they are the same.
+/// Whether one recording cannot distinguish the two, or they are the same.
 pub fn look_alike(a: &str, b: &str) -> bool {
     a == b || LOOK_ALIKES.iter().any(|set| set.contains(&a) && set.contains(&b))
 }

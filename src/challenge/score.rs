@@ -58,7 +58,7 @@ pub struct Score {
 }
 
 /// Verifies and scores. `twins`: the folder of [`super::twins`], where there is one. `again`: strengths are measured anew, by
-/// the yardstick of this program, and not taken from the truths.
+/// the measure of this program, and not taken from the truths.
 ///
 /// # Errors
 /// Anything that is not as it was committed to; the message names the case.

@@ -31,12 +31,12 @@ const MOST_ATTEMPTS: usize = 4;
 const DRAWS: u64 = 4;
 /// And of the noise without the person.
 const EMPTY_DRAWS: u64 = 3;
-/// Where hardly anything survives, how much stronger an effect has to be is not told by it.
+/// Where hardly anything survives, how much stronger an effect has to be is not estimable from it.
 const LEAST_D_PRIME: f64 = 1.0;
 /// An undetectable effect is brought to this d′.
 const WEAK_D_PRIME: f64 = 1.0;
 
-/// Seals a challenge into `out`; one that was interrupted goes on. `progress` hears how many cases are done.
+/// Seals a challenge into `out`; one that was interrupted goes on. `progress` receives how many cases are done.
 ///
 /// # Errors
 /// A commitment that is there already, another seed than the one begun with, and whatever the recorder refuses.
@@ -102,7 +102,7 @@ fn seal_case(config: &ChallengeConfig, mut plan: Plan, secret: &Secret, out: &Pa
 
 /// A case in memory.
 struct Recorded {
-    /// The scene without effects: what everybody is told about it.
+    /// The scene without effects: what everybody is given of it.
     world: World,
     frames: Vec<IfFrame>,
     settings: RecorderConfig,
@@ -185,7 +185,7 @@ fn write_case(recorded: &Recorded, case: &Path) -> Result<()> {
     write_frames(&recorded.world, &recorded.frames, case)
 }
 
-/// How strong the effects of a sealed case are by the yardstick of this program: records it again with and without them.
+/// How strong the effects of a sealed case are by the measure of this program: records it again with and without them.
 pub fn measured(settings: &str, case: &Path) -> Result<Strength> {
     let planted = settings_of(settings, case)?;
     let clean = RecorderConfig { effects: EffectsConfig::default(), ..planted.clone() };

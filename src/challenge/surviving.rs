@@ -1,12 +1,12 @@
-//! What of an effect survives everything that nobody can know about the body and the room: the d′ of rung E of the
-//! capacity ladder (DIAGNOSIS.md, 0.6), which a millimetre of mesh error and learned reflectivities cannot explain away.
+//! What of an effect survives everything that nobody can know about the body and the room: the d′ of
+//! docs/results.md, which a millimetre of mesh error and learned reflectivities cannot explain away.
 //!
 //! A scene is recorded several times with and without the effect, each time with another draw of the mesh's error, of what
 //! the skin returns where, and of the thermal noise, and again without the person. Only what the effect does in *every* draw
 //! counts: sums go over pairs of different draws (U-statistics), so that what merely becomes another random pattern, as the
-//! return of a moved or delayed body does, counts nothing in the mean; how far so few draws scatter is told by the pairs,
+//! return of a moved or delayed body does, counts nothing in the mean; how far so few draws scatter is estimated from the pairs,
 //! and what is counted is what is sure. Counted are
-//! - what is added where no body is, as the scenes without the person show it: what stands still where it is stronger than
+//! - what is added where no body is, as the scenes without the person show it: static returns where they are stronger than
 //!   any amplitude that the room is likely to have there, the rest in every cell of range and Doppler against the covariance
 //!   that the channels have there with the person. It counts in full beside the body and little beneath it;
 //! - the change of that covariance (power in the cell, phases between the channels), as much as the independent looks at it
@@ -59,7 +59,7 @@ pub fn d_prime(draws: &[Draw], empty: &[Draw], noise: f64) -> f64 {
     squared.sure()
 }
 
-/// Frames, and what stands still in them.
+/// Frames, and static clutter in them.
 struct Parted<'a> {
     frames: &'a Frames,
     /// The mean chirp, `[channel][sample]`.
@@ -79,7 +79,7 @@ impl<'a> Parted<'a> {
         Self { frames, still }
     }
 
-    /// The maps of a frame without what stands still, `[channel][doppler · range]`.
+    /// The maps of a frame without static clutter, `[channel][doppler · range]`.
     fn maps(&self, frame: usize) -> Vec<Vec<Complex64>> {
         let [_, loops, samples] = self.frames.dims;
         let channels = self.frames.values[frame].chunks_exact(loops * samples);

@@ -13,7 +13,7 @@ use super::seal::record_twin;
 use crate::data::Scratch;
 use crate::error::{Error, Result};
 
-/// Diagnoses the twins that have no report yet; `progress` hears how many are done. Returns how many there are.
+/// Diagnoses the twins that have no report yet; `progress` receives how many are done. Returns how many there are.
 pub fn run(challenge: &Path, answers: &Path, out: &Path, config: &RunConfig, progress: &mut dyn FnMut(usize)) -> Result<usize> {
     if !Answers::read(answers)?.complete {
         return Err(Error::Usage {

@@ -6,7 +6,7 @@ use crate::diagnosis::statistics::uniform_chance;
 
 /// Levels at which they are counted.
 const LEVELS: [f64; 5] = [0.01, 0.05, 0.1, 0.5, 0.9];
-/// Least chance of their distance from a uniform law (DIAGNOSIS.md 4.7).
+/// Least chance of their distance from a uniform law.
 const LEAST: f64 = 0.05;
 /// A bound is none of them.
 const BOUND: &str = "suspicion";

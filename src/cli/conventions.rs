@@ -1,7 +1,7 @@
 //! The table of what is stated of a recording's samples, what they say themselves, and what was kept.
 
 use crate::{
-    integrity::{Finding, Kind, never_told},
+    integrity::{Finding, Kind, never_decided},
     radar::Radar,
 };
 
@@ -18,8 +18,8 @@ pub(super) enum Against {
 
 /// One row for each convention on standard output, what is wrong on standard error too.
 pub(super) fn show(radar: &Radar, findings: &[Finding], against: Against) {
-    let untold = never_told(radar);
-    let rows: Vec<[String; 4]> = findings.iter().chain(&untold).map(|finding| row(finding, against)).collect();
+    let undecided = never_decided(radar);
+    let rows: Vec<[String; 4]> = findings.iter().chain(&undecided).map(|finding| row(finding, against)).collect();
     let heads = ["convention", "kept", "stated", "the data say"].map(String::from);
     let width = |column: usize| rows.iter().chain([&heads]).map(|row| row[column].chars().count()).max().unwrap_or(0);
     let [name, kept, stated] = [0, 1, 2].map(width);
@@ -34,8 +34,8 @@ pub(super) fn show(radar: &Radar, findings: &[Finding], against: Against) {
 
 fn row(finding: &Finding, against: Against) -> [String; 4] {
     let kept = match (finding.ok, finding.kind, against) {
-        (true, ..) if finding.told => "as stated",
-        (true, ..) => "as stated, untold",
+        (true, ..) if finding.decided => "as stated",
+        (true, ..) => "as stated, undecided",
         (false, Kind::Lost, Against::Questioned) => "questioned",
         (false, Kind::Lost, _) => "what was lost is left out",
         (false, _, Against::Questioned) => "questioned",

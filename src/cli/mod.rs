@@ -172,7 +172,7 @@ enum Command {
     /// Says what physics was left out, where, how large and how sure, what it cannot tell apart, and how much better
     /// held-out data fit once it is modelled. Writes report.html for people and report.json for programs.
     Diagnose(diagnose::Arguments),
-    /// Prove the detective on concealed data: seal, run, score
+    /// Prove the diagnosis on concealed data: seal, run, score
     ///
     /// `seal` records cases by a secret and commits to their truths; `run` has each diagnosed by a process of its own
     /// that cannot see them; `score` opens them and holds the reports against them. `salt` plants effects into a recording of yours,

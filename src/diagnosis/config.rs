@@ -18,7 +18,7 @@ pub struct DiagnosisConfig {
     pub gain: f64,
     /// The same for what has no name in the library.
     pub nameless_gain: f64,
-    /// Alternatives within so many nats of the best are not told apart.
+    /// Alternatives within so many nats of the best are not distinguished.
     pub tie: f64,
     /// Most effects that are accepted.
     pub most: usize,

@@ -45,7 +45,7 @@ const MOST_SAMPLES: usize = 40_000_000;
 const FEWEST_FRAMES: usize = 4;
 /// Every so many-th frame is held out.
 const HELD_OUT_EVERY: usize = 4;
-/// Parts of the frames, each of which is foretold by the others.
+/// Parts of the frames, each of which is predicted by the others.
 const FOLDS: usize = 4;
 /// At most one loop in so many is dropped by cutting into equal blocks.
 const MOST_DROPPED: usize = 20;
@@ -102,8 +102,8 @@ pub fn mean_chirp<'a>(chirps: impl Iterator<Item = &'a [Complex64]>, samples: us
     mean
 }
 
-/// Frames of the others and of its own, fold by fold: where few held-out ones would say little, every part is foretold by the rest.
-/// Every so many-th frame is in one.
+/// Frames of the others and of its own, fold by fold: where few held-out ones would say little, every part is predicted by the
+/// rest. Every so many-th frame is in one.
 pub fn folds(frames: usize) -> impl Iterator<Item = [Vec<usize>; 2]> {
     (0..FOLDS).map(move |fold| {
         let (own, others) = (0..frames).partition(|frame| frame % FOLDS == fold);

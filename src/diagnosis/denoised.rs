@@ -13,7 +13,7 @@ const SIGNAL: f64 = 12.0;
 /// How well the peak sample is known (standard deviation): it is one sample of the strongest frame's speckle.
 pub const PEAK_DB: f64 = 0.7;
 
-/// What stands still and the range-Doppler cells that stand out, `[loop, sample]` of one frame and channel.
+/// Static clutter and the range-Doppler cells that stand out, `[loop, sample]` of one frame and channel.
 pub fn channel(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Complex64> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let still = &evidence.still()[channel * samples..][..samples];

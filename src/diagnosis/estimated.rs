@@ -20,7 +20,7 @@ pub struct Estimated {
     pub square: f64,
     /// Chance that all are zero.
     pub p_value: f64,
-    /// How much better each fold of the frames is foretold by the others than by zeros, nats; and the part of it that errors of
+    /// How much better each fold of the frames is predicted by the others than by zeros, nats; and the part of it that errors of
     /// the prediction cannot make.
     pub likelihood: f64,
     pub gain: f64,
@@ -31,7 +31,7 @@ const STEPS: usize = 20;
 const CONVERGED: f64 = 1e-4;
 
 impl Estimated {
-    /// Step by step from zeros, where no straight line tells it. None where the numbers leave what can be undone.
+    /// Step by step from zeros, where the model is not linear. None where the numbers leave what can be undone.
     ///
     /// `first`: looks as [`Self::new`] takes them, with all numbers zero; `looks`: the same with the numbers at some values.
     pub fn converged(
@@ -107,9 +107,9 @@ impl Estimated {
         let gain = |[rest, held]: [Vec<usize>; 2]| {
             let of = |part: &[usize]| together(part.iter().flat_map(|&frame| &frames[frame]), count);
             let [rest, held] = [of(&rest), of(&held)];
-            let foretold = rest.information.cholesky()?.solve(&rest.score);
+            let predicted = rest.information.cholesky()?.solve(&rest.score);
             let likelihood = |from: &DVector<f64>| held.score.dot(from) - 0.5 * from.dot(&(&held.information * from));
-            Some((likelihood(&foretold) - likelihood(&-at)) / inflation.max(1.0))
+            Some((likelihood(&predicted) - likelihood(&-at)) / inflation.max(1.0))
         };
         // What errors of the prediction may be is none.
         let own = square / without_floors.max(f64::MIN_POSITIVE);

@@ -114,7 +114,7 @@ impl Evidence {
         if self.is_real() { HANN_LOBE.min(bins)..bins.saturating_sub(1).max(HANN_LOBE.min(bins)) } else { 0..bins }
     }
 
-    /// Mean over all chirps of the training frames, `[tx · rx, sample]`: what stands still.
+    /// Mean over all chirps of the training frames, `[tx · rx, sample]`: static clutter.
     pub fn still(&self) -> &[Complex64] {
         self.still.get_or_init(|| self.cube.still(&self.split.training))
     }
@@ -176,7 +176,7 @@ impl Evidence {
         *self.peak.get_or_init(|| denoised::peak_beside(self, |_, _| Some(Complex64::ZERO)))
     }
 
-    /// A channel of a frame without what stands still, `[loop · sample]`.
+    /// A channel of a frame without static clutter, `[loop · sample]`.
     pub fn moving(&self, frame: usize, channel: usize) -> Vec<Complex64> {
         let samples = self.cube.dims[4];
         let still = &self.still()[channel * samples..][..samples];
@@ -185,7 +185,7 @@ impl Evidence {
     }
 
     /// One frame and channel after the transforms with Hann windows of unit energy (white noise keeps its variance),
-    /// what stands still over the training frames removed: `[doppler, range]`, velocities and ranges in FFT order.
+    /// static clutter over the training frames removed: `[doppler, range]`, velocities and ranges in FFT order.
     pub fn range_doppler(&self, frame: usize, channel: usize) -> Vec<Complex64> {
         transform(&self.moving(frame, channel), self.cube.dims[4])
     }

@@ -20,7 +20,7 @@ pub const NINETY: f64 = 1.25 * 1.645;
 /// A parameter of an effect, or a list of them, with 90 % intervals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// As in FORMATS.md's table.
+    /// As in the table of docs/report.md.
     pub name: &'static str,
     pub values: Vec<f64>,
     pub ci90: Vec<[f64; 2]>,
@@ -111,7 +111,7 @@ pub enum Correction {
     /// Undone in the samples, of all frames, by what the frames themselves hold: subtracted, for the most part.
     Samples(Undo),
     /// Undone in the samples by a law with numbers that the training frames gave, or with a prior for those that they did not: what is
-    /// held out is foretold by it as it is.
+    /// held out is predicted by it as it is.
     Inverse(Undo, Volume),
     /// Another correction, after which the phase over time of what it concerned is known.
     Followed(Box<Correction>, Arc<Course>),
@@ -148,7 +148,7 @@ const LIKELY: f64 = 0.05;
 /// One thing that may have been left out.
 #[derive(Clone)]
 pub struct Candidate {
-    /// As in FORMATS.md; none: outside the library.
+    /// As in docs/report.md; none: outside the library.
     pub id: Option<&'static str>,
     /// "slow-time gain", "additive fast-time", "path-like" and so on.
     pub behaves_like: &'static str,
@@ -163,7 +163,7 @@ pub struct Candidate {
     /// Whether what it rests on (where the motion puts the body, a mesh, a chest) may err in held-out frames as in the others: a gain
     /// beyond the least then says nothing more.
     pub errs_alike: bool,
-    /// Effects that would do the same to this recording, as far as it can tell.
+    /// Effects that would do the same to this recording, as far as it distinguishes them.
     pub look_alikes: Vec<&'static str>,
     /// Plain words with numbers: what was left out, where, how large.
     pub statement: String,
@@ -193,7 +193,7 @@ impl Candidate {
         Self { id: None, look_alikes: vec![], statement, ..self }
     }
 
-    /// As the simulator takes it; `None` for what has no name, and for what its operator cannot be told.
+    /// As the simulator takes it; `None` for what has no name, and for what its operator does not take.
     ///
     /// `reference`: the recording's peak sample, to which levels are relative; `body_rms`: of the body's moving return, to which
     /// amplitudes of reflectors are.

@@ -67,14 +67,14 @@ pub fn lead(report: &Report) -> String {
         Verdict::Undecided => format!("Nothing can be said about this recording: {}.", report.reason),
         Verdict::Damaged => format!("The recording is damaged: {}.", report.reason),
         Verdict::NoMismatch => {
-            "Nothing was left out that this recording could show: body, static room and noise explain it.".into()
+            "Nothing was left out that this recording could show: body, static clutter and noise explain it.".into()
         }
         Verdict::Explained | Verdict::PartlyExplained => {
             let effect = &report.effects[0];
             let mut text = first(&effect.statement);
             if !effect.indistinguishable_from.is_empty() {
                 let others: Vec<String> = effect.indistinguishable_from.iter().map(|id| title(id).to_lowercase()).collect();
-                let _ = write!(text, " This recording cannot tell it from: {}.", others.join("; "));
+                let _ = write!(text, " This recording cannot distinguish it from: {}.", others.join("; "));
             }
             if report.effects.len() > 1 {
                 let _ = write!(text, " And {} more, below.", count(report.effects.len() - 1, "effect"));
@@ -168,7 +168,12 @@ fn section(page: &mut String, number: usize, effect: &Effect, curve: Option<&str
     } else {
         let names: Vec<String> = effect.indistinguishable_from.iter().map(|id| format!("<code>{}</code>", escape(id))).collect();
         let separate = effect.separate_by.as_deref().unwrap_or("another recording");
-        let _ = write!(page, "<p>This recording cannot tell it from {}. What would: {}.</p>", names.join(", "), escape(separate));
+        let _ = write!(
+            page,
+            "<p>This recording cannot distinguish it from {}. What would: {}.</p>",
+            names.join(", "),
+            escape(separate)
+        );
     }
     let place = place_text(&effect.place);
     if !place.is_empty() {
@@ -202,7 +207,7 @@ fn without_name(page: &mut String, unexplained: &Unexplained, curve: Option<&str
 fn fit(page: &mut String, report: &Report, pictures: &Pictures) {
     let _ = write!(
         page,
-        "<h2>Held-out data, before and after</h2><p>{} are held out: static field, noise and the body's powers \
+        "<h2>Held-out data, before and after</h2><p>{} are held out: static clutter, noise and the body's powers \
          come from the others, and a simulator is trained on those. They are not untouched: a finding stands only where it makes them \
          more probable, and what changes from chirp to chirp or from frame to frame is read in every one of them.</p>",
         held_out(report)

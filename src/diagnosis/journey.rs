@@ -45,7 +45,7 @@ impl Diagnosis {
     }
 }
 
-/// Looks at a recording; `progress` hears what happens, in plain words.
+/// Looks at a recording; `progress` receives what happens, in plain words.
 ///
 /// # Errors
 /// A recording that cannot be read, is too short to hold anything out, or whose motion does not cover its frames.
@@ -113,7 +113,7 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         report.reason = reason;
         return Ok(Diagnosis { report, radar, original, explanation: None });
     }
-    heard_again(&original, config, &mut report.audit, progress);
+    observed_again(&original, config, &mut report.audit, progress);
     if let Some(wrong) = report.audit.iter().find(|check| !check.ok && audit::is_convention(check)) {
         // Physics fitted under a wrong convention would only imitate it.
         report.reason =
@@ -156,11 +156,11 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     Ok(Diagnosis { report, radar, original, explanation: Some(explanation) })
 }
 
-/// A body that is not heard may be drowned by what needs no body to be found (a phase noise spreads the room over all velocities): where
-/// it is heard once that is undone, nothing is wrong with the scene.
-fn heard_again(original: &Evidence, config: &DiagnosisConfig, checks: &mut [Check], progress: &mut dyn FnMut(&str)) {
+/// A body that is not observed may be masked by what needs no body to be found (a phase noise spreads the static clutter over all
+/// velocities): where it is observed once that is undone, nothing is wrong with the scene.
+fn observed_again(original: &Evidence, config: &DiagnosisConfig, checks: &mut [Check], progress: &mut dyn FnMut(&str)) {
     let Some(silent) = checks.iter_mut().find(|check| audit::is_silent(check)) else { return };
-    progress("no body is heard: looking for what drowns it");
+    progress("no body is observed: looking for what masks it");
     let mut alone = original.clone();
     alone.body = None;
     let explained = explain(alone.changed(), config, &mut |_| {});
@@ -170,7 +170,7 @@ fn heard_again(original: &Evidence, config: &DiagnosisConfig, checks: &mut [Chec
     let mut restored = explained.evidence;
     restored.body = original.body.clone();
     if let Some(check) = audit::body_place(&restored.changed()).filter(|check| check.ok) {
-        *silent = Check { found: format!("{}; but {} once what drowns it is undone", silent.found, check.found), ..check };
+        *silent = Check { found: format!("{}; but {} once what masks it is undone", silent.found, check.found), ..check };
     }
 }
 

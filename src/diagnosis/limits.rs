@@ -168,14 +168,14 @@ fn salted(evidence: &Evidence, salt: &Salt, strength: f64, reference: f64, thres
     let (cube, added) = put_in(evidence, &setting);
     let mut with = evidence.clone().changed();
     with.cube = cube;
-    let heard = |(index, suspect): (usize, &super::suspects::Suspect)| {
+    let detected = |(index, suspect): (usize, &super::suspects::Suspect)| {
         salt.suspects.contains(&suspect.name)
             && (suspect.find)(&with).iter().any(|candidate| {
                 let named = candidate.id == Some(salt.id) || candidate.look_alikes.contains(&salt.id);
                 named && thresholds.passes(index, candidate, true)
             })
     };
-    SUSPECTS.iter().enumerate().any(heard).then_some(added)
+    SUSPECTS.iter().enumerate().any(detected).then_some(added)
 }
 
 /// The samples with an effect, and the energy that it added.

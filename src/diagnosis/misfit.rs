@@ -59,7 +59,7 @@ impl Misfit {
 
     /// The same with effects taken into account, as likelihood of the same samples as before: `explained` has them undone
     /// or foreseen. Undoing follows each frame's own samples, so what it took out of a held-out frame is no prediction of
-    /// it. It counts as a random signal instead, whose power in a cell is foretold by what was taken out of the channels
+    /// it. It counts as a random signal instead, whose power in a cell is predicted by what was taken out of the channels
     /// before it in the same frame, or on average of the training frames. These laws, that nothing was taken out, and that
     /// nothing is explained weigh the same at first; every frame and channel says which of them holds (Bayes).
     pub fn after(recording: &Evidence, explained: &Evidence) -> Self {
@@ -132,7 +132,7 @@ fn log_sum(values: &[f64]) -> f64 {
     most + values.iter().map(|value| (value - most).exp()).sum::<f64>().ln()
 }
 
-/// What stands still, and the noise.
+/// Static clutter, and the noise.
 struct Baseline {
     /// `[channel][doppler · range]`
     still: Vec<Vec<Complex64>>,
@@ -161,7 +161,7 @@ impl Baseline {
     }
 }
 
-/// The law of a channel's cells: a circular Gaussian about what stands still.
+/// The law of a channel's cells: a circular Gaussian about static clutter.
 struct Law<'a> {
     still: &'a [Complex64],
     variance: f64,

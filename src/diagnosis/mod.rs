@@ -1,6 +1,6 @@
-//! The detective: where a recording and what the simulator can explain part, what was left out, and how sure that is.
+//! The diagnosis: where a recording and what the simulator can explain part, what was left out, and how sure that is.
 //!
-//! The baseline is that of FORMATS.md: the body's single bounce with free amplitudes, a static room, thermal noise,
+//! The baseline is that of docs/diagnosis.md: the body's single bounce with free amplitudes, static clutter, thermal noise,
 //! millimetre errors of the mesh, unknown phase and gain. [`Evidence`] is a recording as far as it is explained; every
 //! suspect looks at it and may return [`Candidate`]s; the best one is accepted, undone in the samples or added to what is
 //! predicted, and all look again, until nobody has anything significant left to say.

@@ -18,7 +18,7 @@ use super::evidence::Evidence;
 use super::prediction::{Point, range_and_velocity};
 use crate::radar::Radar;
 
-/// Doppler bins on either side of zero that hold remains of what stands still.
+/// Doppler bins on either side of zero that hold remains of static clutter.
 pub const STILL_BINS: usize = 2;
 /// Expected power of a part, over the noise, from which on it counts as support.
 const SUPPORT_LEVEL: f32 = 0.1;
@@ -108,7 +108,7 @@ impl PowerModel {
         &self.support[frame]
     }
 
-    /// Cells that mean something, `[doppler, range]`: away from what stands still, and in range of the receiver.
+    /// Cells that mean something, `[doppler, range]`: away from static clutter, and in range of the receiver.
     pub fn usable(&self) -> &[bool] {
         &self.usable
     }
@@ -193,7 +193,7 @@ fn add(map: &mut [f32], template: &Template, weight: f64) {
     }
 }
 
-/// Cells that mean something, `[doppler, range]`: away from what stands still, and in range of the receiver.
+/// Cells that mean something, `[doppler, range]`: away from static clutter, and in range of the receiver.
 pub fn usable(cells: &Cells) -> Vec<bool> {
     let far_from_still = |doppler: usize| cells.loops < 8 || doppler.min(cells.loops - doppler) > STILL_BINS;
     (0..cells.loops * cells.samples)

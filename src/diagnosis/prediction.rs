@@ -180,7 +180,7 @@ fn track(body: &PosedBody, middle_m: &[[f64; 3]], vertices: &[usize], middle_s: 
     Ok(Track::new(middle_s, times_s, displacement_m))
 }
 
-/// Means over the vertices of every part; none where no vertex is told to belong to a part.
+/// Means over the vertices of every part; none where no vertex is stated to belong to a part.
 fn centres(position_m: &[[f64; 3]], velocity_mps: &[[f64; 3]], of_vertex: &[usize], parts: usize) -> Vec<Centre> {
     if of_vertex.len() != position_m.len() {
         return vec![];

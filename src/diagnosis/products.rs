@@ -54,7 +54,7 @@ pub struct Law {
     /// Of κ, complex.
     pub scatter: f64,
     pub p_value: f64,
-    /// Of frames that the others foretell, all in turn.
+    /// Of frames that the others predict, all in turn.
     pub gain: f64,
     pub peak: f64,
 }
@@ -78,7 +78,7 @@ pub fn without(laws: &[Law], found: Complex64) -> Complex64 {
 
 /// A magnitude squared at least this large beside a square makes it no harmonic.
 const BESIDE: f64 = 0.3;
-/// Least gain on other frames for it, nats.
+/// Least log-likelihood gain on other frames for it, nats.
 const LEAST_GAIN: f64 = 20.0;
 /// Steps by which a distortion is undone: each leaves a part of the last in proportion to how strong the distortion is.
 const STEPS: usize = 6;
@@ -114,7 +114,7 @@ impl Products {
 
     /// Square and magnitude squared, if the latter is there and nearly as large: no mere second harmonic and no second
     /// trip. An oscillator that the signal pulls does it, or mixers whose I and Q are bent each on its own. Then nothing
-    /// that stands still, and no tone, can be told from such a product.
+    /// that stands still, and no tone, is distinguishable from such a product.
     pub fn mixed(&self) -> Option<Vec<Law>> {
         let magnitude = self.magnitude.filter(|law| law.p_value < SURELY && law.gain > LEAST_GAIN)?;
         // A receiver that compresses leaves a little of it too.
@@ -169,7 +169,7 @@ fn judged(product: Product, sums: &[Sums], peak: f64) -> Option<Law> {
     // Frames must agree on it as well as the noise lets expect.
     let scatter = jackknife(sums, &whole).max(variance.sqrt());
     let p_value = corrected(chi2_tail(2.0 * kappa.norm_sqr() / (scatter * scatter), 2.0), 2.0);
-    // Every frame is foretold by those of the other folds.
+    // Every frame is predicted by those of the other folds.
     let of_fold = |parts: [Vec<usize>; 2]| {
         let [rest, fold] = parts.map(|frames| total(frames.into_iter().map(|frame| &sums[frame])));
         let kappa = rest.cross / rest.template.max(f64::MIN_POSITIVE);
@@ -206,7 +206,7 @@ fn of_frame<const N: usize>(
                 for doppler in 1..loops {
                     sums.count(found[doppler * samples + range], expected[doppler * samples + range], noise);
                 }
-                // An offset or a leakage is near zero; what stands still elsewhere counts.
+                // An offset or a leakage is near zero; static clutter elsewhere counts.
                 if range > 8 && range + 8 < samples {
                     sums.count(still[range], mean[range], noise / loops as f64);
                 }
@@ -264,7 +264,7 @@ mod tests {
     #[test]
     fn what_drives_a_strong_compression_is_found_by_secants() {
         let first = Law { product: Product::Cube, kappa: (-0.2).into(), scatter: 0.01, p_value: 0.0, gain: 1.0, peak: 1.0 };
-        // Undone by too much, the signal shows far less of it: steps without secants would swing about.
+        // Undone by too much, the signal shows far less of it: steps without secants would oscillate.
         let found = |law: Law| Some(Law { kappa: -0.2 - 1.2 * (law.kappa + 0.3 * law.kappa * law.kappa), ..first });
         let law = driven(first, found).unwrap();
         let same = found(law).unwrap();

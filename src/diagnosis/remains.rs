@@ -14,9 +14,9 @@ pub const ROUGHLY: f64 = 0.1;
 const BY_CHIRP: [&str; 2] = ["phase_noise", "chirp_start_jitter"];
 const SLIGHTLY: f64 = 0.01;
 
-/// What a radar that vibrates leaves: turns of what stands still that are not quite undone, and their sidebands, up to this share of
+/// What a radar that vibrates leaves: turns of static clutter that are not quite undone, and their sidebands, up to this share of
 /// its gain (which counts what is left).
-const TURNS: [&str; 3] = ["slow-time phase", "delay-proportional phase", fluctuation::STIRS];
+const TURNS: [&str; 3] = ["slow-time phase", "delay-proportional phase", fluctuation::FLUCTUATES];
 const SHAKEN: f64 = 0.5;
 const FADING: &str = "slow-time gain";
 
@@ -102,10 +102,10 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // turns change how much is received.
     let vibrates = accepted.id == Some("radar_vibration");
     let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
-    // So of one return that swings, which reaches a little beyond its ranges.
+    // So of one return that is modulated, which reaches a little beyond its ranges.
     let around = accepted.place.range_m.map(|[near, far]| [near - NEAR_M, far + NEAR_M]);
-    let hums = accepted.behaves_like == fluctuation::HUMS && !apart(around, candidate.place.range_m);
-    let shaken = vibrates && (turns || is_path(candidate)) || hums && is_path(candidate);
+    let modulated = accepted.behaves_like == fluctuation::IS_MODULATED && !apart(around, candidate.place.range_m);
+    let shaken = vibrates && (turns || is_path(candidate)) || modulated && is_path(candidate);
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     // A course from frame to frame that has no name is modelled roughly: what is left of it turns all returns, too; where the strongest
     // seems to move slowly, no other is strong enough to deny it.
@@ -132,7 +132,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let rest = no_single && is_path(candidate);
     let smeared = vibrates || timed || is_by_chirp(accepted) || path_like;
     let uneven = (smeared || is_one_of(accepted, &OF_REMAINS)) && is_of_receivers(candidate);
-    // To undo what receivers hear of one another mixes their noise, and chirps read between their samples have less of it.
+    // To undo a coupling of receivers mixes their noise, and chirps read between their samples have less of it.
     let mixed = is_of_receivers(accepted) && candidate.id == Some("correlated_noise")
         || accepted.id == Some("chirp_nonlinearity") && candidate.id == Some("coloured_noise");
     // Chirps that start at random differ from their neighbours, and go on doing so a little.

@@ -1,4 +1,4 @@
-//! `report.json`, as FORMATS.md fixes it, and what of it is words.
+//! `report.json`, as docs/report.md fixes it, and what of it is words.
 
 use std::collections::BTreeMap;
 
@@ -201,7 +201,7 @@ impl HeldOut {
     }
 }
 
-/// Energy of what moves in the recording: without what stands still over all frames.
+/// Energy of what moves in the recording: without static clutter over all frames.
 pub fn moving_energy(evidence: &super::Evidence) -> f64 {
     let cube = &evidence.cube;
     let all: Vec<usize> = (0..cube.dims[0]).collect();
@@ -243,7 +243,7 @@ impl NotDetectable {
 }
 
 impl Effect {
-    /// Its id, and those that it cannot be told from.
+    /// Its id, and those from which it is indistinguishable.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         std::iter::once(self.id.as_str()).chain(self.indistinguishable_from.iter().map(String::as_str))
     }
@@ -258,7 +258,7 @@ impl Effect {
             (estimate.name.to_string(), Parameter { value, ci90 })
         });
         let mut parameters: BTreeMap<String, Parameter> = parameters.collect();
-        // FORMATS.md counts a boundary and a part of the body among the parameters.
+        // docs/report.md counts a boundary and a part of the body among the parameters.
         for (name, choice) in [("boundary", &candidate.place.boundary), ("body_part", &candidate.place.body_part)] {
             if let Some(choice) = choice {
                 let value = serde_json::Value::from(choice.clone());
@@ -288,7 +288,7 @@ impl Effect {
     }
 }
 
-/// As FORMATS.md writes a stage.
+/// As docs/report.md writes a stage.
 pub fn stage(stage: effects::Stage) -> &'static str {
     use effects::Stage;
     match stage {
@@ -333,7 +333,7 @@ impl Findings {
             }
         }
         let (verdict, reason) = match (effects.is_empty(), unexplained.is_empty()) {
-            (true, true) => (Verdict::NoMismatch, "nothing is significant beyond body, static room and noise".to_string()),
+            (true, true) => (Verdict::NoMismatch, "nothing is significant beyond body, static clutter and noise".to_string()),
             (false, true) => (Verdict::Explained, "every significant mismatch has a name".to_string()),
             (false, false) => (Verdict::PartlyExplained, "some of the mismatch has no name in the library".to_string()),
             (true, false) => {

@@ -32,10 +32,10 @@ impl DiagnosisConfig {
             None if sure => 0.5 * (self.gain + self.nameless_gain),
             None => self.nameless_gain,
         };
-        // What foretells held-out frames better than it must is as much less likely to be chance: the likelihood's ratio on data that
-        // were not fitted exceeds e^gain by chance with a probability of e^-gain at most. Not where the body's prediction has a part:
-        // what errs in it errs in held-out frames alike; nor where the frames that foretell are those of the p-value.
-        let surplus = untouched && !candidate.errs_alike && !SUSPECTS[suspect].foretells_all_frames;
+        // What predicts held-out frames better than it must is as much less likely to be chance: the likelihood's ratio on data
+        // that were not fitted exceeds e^gain by chance with a probability of e^-gain at most. Not where the body's prediction has
+        // a part: what errs in it errs in held-out frames alike; nor where the frames that predict are those of the p-value.
+        let surplus = untouched && !candidate.errs_alike && !SUSPECTS[suspect].predicts_all_frames;
         let surplus = if surplus { (candidate.gain - least).exp().clamp(1.0, MOST_SURPLUS) } else { 1.0 };
         candidate.p_value <= self.p_value(suspect) * surplus && candidate.gain >= least && candidate.gain.is_finite()
     }
@@ -57,7 +57,7 @@ const NEARLY: f64 = 0.8;
 /// What is named even where products of the signal with itself lie everywhere.
 const WHATEVER_THE_SIGNAL: [&str; 2] = ["iq_imbalance", "adc_saturation"];
 
-/// What never changes and may be a return or added behind the mixer: what turns all returns tells, and goes first.
+/// What never changes and may be a return or added behind the mixer: what turns all returns distinguishes the two, and goes first.
 const ADDED: [&str; 3] = ["tx_leakage", "dc_offset", "static_reflector"];
 
 /// Stages of the signal's chain at which everything that is received is changed.
@@ -66,7 +66,7 @@ const UPSTREAM: [&str; 2] = ["waveform", "receiver"];
 /// What raises the held-out frames' dB error by this factor as it is undone is not what happened.
 const FAR_WORSE: f64 = 1.6;
 
-/// So many paths of one name are told: a person whom nobody tracked is made of many more, and other effects must have their
+/// So many paths of one name are reported: a person whom nobody tracked is made of many more, and other effects must have their
 /// turn.
 const MOST_ALIKE: usize = 6;
 
@@ -97,13 +97,13 @@ pub struct Explanation {
     pub after: Misfit,
 }
 
-/// Runs the rounds; `progress` hears what was found.
+/// Runs the rounds; `progress` receives what was found.
 pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut dyn FnMut(&str)) -> Explanation {
     let before = Misfit::of(&evidence);
     let original = evidence;
     let mut current: Option<Evidence> = None;
     let mut accepted: Vec<Accepted> = vec![];
-    let mut first_heard = None;
+    let mut first_suspected = None;
     // Candidates of the round before that could still turn out to be the same thing as what was accepted in it.
     let mut pending: Vec<Candidate> = vec![];
     let mut misfit = before;
@@ -111,12 +111,12 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     let mut refused: Vec<&'static str> = vec![];
     // Names that passed on the untouched recording, and what they gained.
     let mut at_first: Option<Vec<(&'static str, f64)>> = None;
-    // What was heard in a round that only refused a name: nothing has changed since.
-    let mut heard: Option<Vec<(usize, Candidate)>> = None;
+    // What was suspected in a round that only refused a name: nothing has changed since.
+    let mut suspected: Option<Vec<(usize, Candidate)>> = None;
     for _ in 0..=thresholds.most {
         let evidence = current.as_ref().unwrap_or(&original);
-        let found = heard.take().unwrap_or_else(|| suspicions(evidence));
-        first_heard.get_or_insert_with(|| (strongest_suspicion(&found), by_suspect(&found)));
+        let found = suspected.take().unwrap_or_else(|| suspicions(evidence));
+        first_suspected.get_or_insert_with(|| (strongest_suspicion(&found), by_suspect(&found)));
         // So they do where products were taken out roughly.
         let bent = |effect: &Accepted| effect.candidate.behaves_like == harmonic::QUADRATIC;
         let mixed = evidence.products().mixed().is_some() || accepted.iter().any(bent);
@@ -176,7 +176,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         {
             if !SUSPECTS[*suspect].last_in_chain {
                 refused.push(id);
-                heard = Some(found);
+                suspected = Some(found);
                 continue;
             }
             // What the codes themselves show is there, even where it cannot be undone.
@@ -205,7 +205,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     let held_out = original.split.held_out.len() * original.cube.channels() * original.cube.dims[3] * original.range_bins();
     let unseen = accepted.iter().filter(|effect| matches!(effect.candidate.correction, Correction::None));
     after.loglik_per_sample += unseen.map(|effect| effect.candidate.gain).sum::<f64>() / held_out.max(1) as f64;
-    let (suspicion, suspects) = first_heard.unwrap_or((1.0, BTreeMap::new()));
+    let (suspicion, suspects) = first_suspected.unwrap_or((1.0, BTreeMap::new()));
     Explanation { accepted, evidence, suspicion, suspects, before, after }
 }
 
@@ -262,7 +262,7 @@ fn upstream<'a>(
         return other;
     }
     if evidence.body.is_none() {
-        // Nobody foretells where something moves: it does where it still seems to once what all returns share is undone.
+        // Nobody predicts where something moves: it does where it still seems to once what all returns share is undone.
         let again = (SUSPECTS[best.0].find)(&evidence.with(&other.1));
         let stands = again.iter().any(|found| is_same(&best.1, found) && found.gain > NEARLY * best.1.gain);
         return if stands { best } else { other };

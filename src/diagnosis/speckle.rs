@@ -1,4 +1,4 @@
-//! What a Gaussian field tells of numbers that change its covariance.
+//! The information that a Gaussian field has of numbers that change its covariance.
 //!
 //! What a cell holds of a moving body is speckle: a complex Gaussian vector (over receivers, or along the chirp) whose covariance
 //! comes from the points in that cell, which are predicted, and from a power that is not. So every cell counts with the
@@ -28,16 +28,16 @@ impl Look {
 
     /// Adds a cell.
     ///
-    /// `shape`: covariance that the body is expected to have, in units of the noise; `heard`: independent draws; `changes`: how
+    /// `shape`: covariance that the body is expected to have, in units of the noise; `observed`: independent draws; `changes`: how
     /// the body's covariance, which comes with the level found, changes with every number.
     pub fn add(
         &mut self,
         shape: DMatrix<Complex64>,
-        heard: &[DVector<Complex64>],
+        observed: &[DVector<Complex64>],
         changes: impl FnOnce(f64, &DMatrix<Complex64>) -> Vec<DMatrix<Complex64>>,
     ) {
         let finite = |value: &Complex64| value.is_finite();
-        if !(shape.iter().all(finite) && heard.iter().flatten().all(finite)) {
+        if !(shape.iter().all(finite) && observed.iter().flatten().all(finite)) {
             return;
         }
         let size = shape.nrows();
@@ -45,10 +45,10 @@ impl Look {
         let powers: Vec<f64> = eigen.eigenvalues.iter().map(|power| power.max(0.0)).collect();
         let axes = &eigen.eigenvectors;
         let mut energies = vec![0.0; size];
-        for heard in heard {
-            (axes.adjoint() * heard).iter().zip(&mut energies).for_each(|(value, energy)| *energy += value.norm_sqr());
+        for observed in observed {
+            (axes.adjoint() * observed).iter().zip(&mut energies).for_each(|(value, energy)| *energy += value.norm_sqr());
         }
-        let count = heard.len() as f64;
+        let count = observed.len() as f64;
         let level = level(&powers, &energies, count);
         let of_powers = |of: &dyn Fn(f64) -> f64| {
             let diagonal = DVector::from_iterator(size, powers.iter().map(|power| Complex64::from(of(level * power))));
@@ -56,7 +56,7 @@ impl Look {
         };
         let inverse = of_powers(&|power| 1.0 / (1.0 + power));
         let changes = changes(level, &of_powers(&|power| power));
-        let weighed: Vec<DVector<Complex64>> = heard.iter().map(|heard| &inverse * heard).collect();
+        let weighed: Vec<DVector<Complex64>> = observed.iter().map(|observed| &inverse * observed).collect();
         let relative: Vec<DMatrix<Complex64>> = changes.iter().map(|change| &inverse * change).collect();
         for (a, change) in changes.iter().enumerate() {
             let seen: f64 = weighed.iter().map(|weighed| weighed.dotc(&(change * weighed)).re).sum();

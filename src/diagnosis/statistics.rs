@@ -39,15 +39,15 @@ pub fn normal_tails(z: f64) -> f64 {
 /// The ratio of the sums of values and their weights, and the probability that it is as much above zero where the values are independent
 /// around zero, with variances in proportion to their weights (ratio estimator; Student's t).
 pub fn ratio_tail(values: &[f64], weights: &[f64]) -> (f64, f64) {
-    let telling: Vec<(f64, f64)> =
+    let informative: Vec<(f64, f64)> =
         values.iter().copied().zip(weights.iter().copied()).filter(|(_, weight)| *weight > 0.0).collect();
-    let all: f64 = telling.iter().map(|(_, weight)| weight).sum();
-    if telling.len() < 2 {
+    let all: f64 = informative.iter().map(|(_, weight)| weight).sum();
+    if informative.len() < 2 {
         return (0.0, 1.0);
     }
-    let ratio = telling.iter().map(|(value, _)| value).sum::<f64>() / all;
-    let freedom = telling.len() as f64 - 1.0;
-    let variance = telling.iter().map(|(value, weight)| (value - ratio * weight).powi(2) / weight).sum::<f64>() / freedom;
+    let ratio = informative.iter().map(|(value, _)| value).sum::<f64>() / all;
+    let freedom = informative.len() as f64 - 1.0;
+    let variance = informative.iter().map(|(value, weight)| (value - ratio * weight).powi(2) / weight).sum::<f64>() / freedom;
     let deviation = (variance / all).sqrt();
     let tail = StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| law.sf(ratio / deviation.max(f64::MIN_POSITIVE)));
     (ratio, tail)

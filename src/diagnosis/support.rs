@@ -1,4 +1,4 @@
-//! Which delays the static room may have, and what of a chirp can come from them.
+//! Which delays static clutter may have, and what of a chirp can come from them.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 use num_complex::Complex64;

@@ -1,4 +1,4 @@
-//! What a reproduction is told: which site, who is trained on and who is unseen, which simulators, and how long.
+//! Settings of a reproduction: which site, who is trained on and who is unseen, which simulators, and how long.
 
 use std::path::{Path, PathBuf};
 
@@ -218,7 +218,7 @@ pub struct ReproduceConfig {
     pub other_mesh: bool,
     #[serde(default = "all_protocols")]
     pub protocols: Vec<Protocol>,
-    /// The action of the training subject whose recording the detective looks at.
+    /// The action of the training subject whose recording is diagnosed.
     #[serde(default = "diagnosed")]
     pub diagnosed_action: String,
     #[serde(default)]

@@ -34,7 +34,7 @@ pub enum Method {
     Variant(Variant),
     /// The same truth recorded again with other noise: no simulator can do better.
     Again,
-    /// The same with another draw of the mesh's error too: nobody who knows the body no better can foretell how its returns
+    /// The same with another draw of the mesh's error too: nobody who knows the body no better can predict how its returns
     /// interfere.
     OtherMesh,
     /// Ours brought to the second room by so many of its frames; with zero, as it was.

@@ -74,7 +74,7 @@ pub struct Results {
     pub pairs: Vec<Pair>,
     pub stability: Vec<StabilityResults>,
     pub figures: Vec<Figure>,
-    /// What the detective said about the diagnosed recording; ids of the effects that were added.
+    /// What the diagnosis said about the diagnosed recording; ids of the effects that were added.
     pub effects: Option<Vec<String>>,
     /// Wall clock by kind of stage, seconds; what was cached counts as it was when it was made.
     pub seconds: BTreeMap<String, f64>,

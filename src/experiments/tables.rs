@@ -120,16 +120,12 @@ pub fn tables(results: &Results) -> String {
     surfaces.extend([BaselineName::MmgpeSurface, BaselineName::Mmgpe].map(Method::ReceiverNoise));
     text += &ablation(results, "Surface: vertices or all of it", "", &surfaces);
     let found = match &results.effects {
-        Some(effects) if effects.is_empty() => "The detective found nothing that was left out.".into(),
+        Some(effects) if effects.is_empty() => "`diagnose` found nothing that was left out.".into(),
         Some(effects) => format!("Found in one training recording: {}.", effects.join(", ")),
         None => String::new(),
     };
-    text += &ablation(
-        results,
-        "With the effects that the detective found",
-        &found,
-        &variants(&[Variant::WithEffects, Variant::Ours]),
-    );
+    text +=
+        &ablation(results, "With the effects that `diagnose` found", &found, &variants(&[Variant::WithEffects, Variant::Ours]));
     text += &further::second_scene(results);
     text += &second_room(results);
     text += &speed(results);

@@ -30,7 +30,7 @@ pub enum Variant {
     LinearLoss,
     /// The surface as it is, in place of the mesh's vertices.
     DenseSurface,
-    /// Ours, with what the detective found in one training recording.
+    /// Ours, with what the diagnosis found in one training recording.
     WithEffects,
 }
 

@@ -36,7 +36,7 @@ pub fn unit(azimuth_deg: f64, elevation_deg: f64) -> [f64; 3] {
     [level * east, level * ahead, up]
 }
 
-/// The samples of a frame `[tx, rx, loop, sample]`, without what stands still in it where that is not wanted.
+/// The samples of a frame `[tx, rx, loop, sample]`, without static clutter in it where that is not wanted.
 pub fn samples(source: &Source, frame: usize, without_static: bool) -> Result<Vec<Complex32>> {
     let samples = measured_frame(source.recording, frame)?;
     let [_, tx, rx, loops, length] = source.recording.radar.dims();

@@ -110,7 +110,7 @@ impl Dataset {
 }
 
 /// Writes a data set into a folder that is there: a recording's files alone, or `NAME/` for every recording with `labels.csv` and
-/// `card.md`. `progress` hears how many frames are done, and of which recording. The notes name the recordings that they are of.
+/// `card.md`. `progress` receives how many frames are done, and of which recording. The notes name the recordings that they are of.
 ///
 /// # Errors
 /// What the target refuses, samples that cannot be read, files that cannot be written.

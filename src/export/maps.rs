@@ -111,7 +111,7 @@ pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
     }
     for (axis, what, count) in [(0, "azimuth", azimuths.len()), (2, "elevation", elevations.len())] {
         if count > 1 && aperture_m(radar, axis) == 0.0 {
-            notes.push(format!("the antennas do not tell {what}: all of its cells are equal"));
+            notes.push(format!("the antennas do not resolve {what}: all of its cells are equal"));
         }
     }
     Ok(notes)

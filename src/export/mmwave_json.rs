@@ -21,7 +21,7 @@ pub struct Described {
 }
 
 impl Described {
-    /// The notes say what cannot be told.
+    /// The notes say what cannot be expressed.
     pub fn of(radar: &Radar, wiring: &Wiring, notes: &mut Vec<String>) -> Self {
         let window_s = radar.adc_start_s + radar.samples_per_chirp as f64 / radar.sample_rate_hz;
         // The chip's times are in steps of 10 ns.

@@ -40,7 +40,7 @@ pub struct Source<'a> {
     /// The board that is imitated, where one was named.
     pub board: Option<&'static Board>,
     pub config: &'a ExportConfig,
-    /// Hears how many frames are done.
+    /// Receives how many frames are done.
     pub progress: &'a mut dyn FnMut(usize),
 }
 

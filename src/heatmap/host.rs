@@ -41,9 +41,9 @@ impl<'a> Samples<'a> {
 pub enum StaticRemoval {
     #[default]
     None,
-    /// The mean over the loops of each frame: what stands still for a frame.
+    /// The mean over the loops of each frame: static clutter for a frame.
     Loops,
-    /// The mean over all loops of all frames: what stands still for the recording.
+    /// The mean over all loops of all frames: static clutter for the recording.
     Frames,
 }
 

@@ -78,7 +78,7 @@ impl Inspector for Boundary {
         if log_binomial_tail(between, after.len(), 0.5) < ALARM.ln() {
             return Some(Finding::as_stated(CHECK, EXPECTED, found));
         }
-        Some(Finding::untold(CHECK, EXPECTED, found))
+        Some(Finding::undecided(CHECK, EXPECTED, found))
     }
 }
 
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn frames_that_begin_late_are_found_and_what_settles_is_not_accused() {
         let stated = seen(0, 0.0);
-        assert!(stated.ok && stated.told, "{stated:?}");
+        assert!(stated.ok && stated.decided, "{stated:?}");
         let late = seen(3, 0.0);
         assert!(late.is_refusal() && late.found.contains("between the loops 4 and 5"), "{late:?}");
         assert!(seen(0, 0.7).ok, "{:?}", seen(0, 0.7));

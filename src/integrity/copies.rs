@@ -1,8 +1,8 @@
 //! Chirps and frames that are there twice: a buffer that was read again.
 //!
 //! The law: noise makes a sample equal to that of the next chirp as often as it does between neighbouring chirps of this recording
-//! (rule of succession), and a copy needs all samples of a chirp to be so. Without noise a still scene repeats itself, and nothing is
-//! found.
+//! (rule of succession), and a copy needs all samples of a chirp to be so. Without noise a static scene repeats itself, and nothing
+//! is found.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hasher};

@@ -1,11 +1,11 @@
 //! Receivers of a cascade's devices exchanged: the file of one slave taken for another's.
 //!
 //! Where two virtual antennas have one place, whatever is far away comes to both with one phase, but for what the channels add: over the
-//! ranges at which still returns stand out of the noise, their spectra are coherent, however many returns there are. Virtual antennas at
-//! other places are so for returns from one direction alone. So the pairs of one place (each channel once, of two devices) are at least as
-//! coherent as those that would have one place if the devices were exchanged: a paired Student test of their Fisher transforms (artanh of
-//! the coherence, in the order of the channels), Bonferroni over the exchanges. Where no exchange makes them less coherent, nothing can be
-//! told.
+//! ranges at which static returns stand out of the noise, their spectra are coherent, however many returns there are. Virtual
+//! antennas at other places are so for returns from one direction alone. So the pairs of one place (each channel once, of two
+//! devices) are at least as coherent as those that would have one place if the devices were exchanged: a paired Student test of
+//! their Fisher transforms (artanh of the coherence, in the order of the channels), Bonferroni over the exchanges. Where no
+//! exchange makes them less coherent, nothing can be decided.
 
 use num_complex::Complex64;
 use rustfft::FftPlanner;
@@ -140,13 +140,13 @@ impl Inspector for Devices {
         let stated = self.pairs(&orders[0]);
         if stated.len() < FEWEST || !still.shows_noise() {
             let why = "too few virtual antennas of two devices have one place, or one chirp shows no noise";
-            return Some(Finding::untold(CHECK, EXPECTED, why));
+            return Some(Finding::undecided(CHECK, EXPECTED, why));
         }
         let Some(spectra) = self.spectra(still) else {
-            return Some(Finding::untold(CHECK, EXPECTED, "still returns stand out of the noise at too few ranges"));
+            return Some(Finding::undecided(CHECK, EXPECTED, "static returns stand out of the noise at too few ranges"));
         };
         let as_stated = coherences(&spectra, &stated);
-        let (mut worst, mut is_told) = ((1.0, &orders[0], 0.0), true);
+        let (mut worst, mut is_decided) = ((1.0, &orders[0], 0.0), true);
         for order in &orders[1..] {
             let exchanged = coherences(&spectra, &self.pairs(order));
             let gains: Vec<f64> = exchanged.iter().zip(&as_stated).map(|(other, own)| other - own).collect();
@@ -157,7 +157,7 @@ impl Inspector for Devices {
             if chance < worst.0 {
                 worst = (chance, order, mean_coherence(&exchanged));
             }
-            is_told &= student_tail(&gains.iter().map(|gain| -gain).collect::<Vec<_>>()) < ALARM;
+            is_decided &= student_tail(&gains.iter().map(|gain| -gain).collect::<Vec<_>>()) < ALARM;
         }
         let chance = worst.0 * (orders.len() - 1) as f64;
         let own = mean_coherence(&as_stated);
@@ -169,10 +169,10 @@ impl Inspector for Devices {
             );
             return Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, chance.ln()));
         }
-        if is_told {
+        if is_decided {
             return Some(Finding::as_stated(CHECK, EXPECTED, found));
         }
-        Some(Finding::untold(CHECK, EXPECTED, format!("{found}, and no less if devices were exchanged")))
+        Some(Finding::undecided(CHECK, EXPECTED, format!("{found}, and no less if devices were exchanged")))
     }
 }
 
@@ -199,8 +199,8 @@ mod tests {
         }
     }
 
-    /// Still returns at these sines of their azimuths, one every second bin, in channels of unknown gains; `order`: whose receivers' samples
-    /// each device's file holds.
+    /// Static returns at these sines of their azimuths, one every second bin, in channels of unknown gains; `order`: whose
+    /// receivers' samples each device's file holds.
     fn seen(sines: &[f64], amplitude: f64, order: [usize; 4]) -> Finding {
         let radar = radar();
         let schedule = Schedule::of(&radar, None);
@@ -231,7 +231,7 @@ mod tests {
     #[test]
     fn files_in_their_places_are_so_and_exchanged_ones_are_named() {
         let right = seen(&ROOM, 10.0, [0, 1, 2, 3]);
-        assert!(right.ok && right.told, "{right:?}");
+        assert!(right.ok && right.decided, "{right:?}");
         for order in [[0, 2, 1, 3], [1, 0, 2, 3], [3, 1, 2, 0], [0, 2, 3, 1]] {
             let exchanged = seen(&ROOM, 10.0, order);
             assert!(exchanged.is_refusal() && exchanged.found.contains(&format!("receivers of {order:?}")), "{exchanged:?}");
@@ -243,7 +243,7 @@ mod tests {
         for (sines, amplitude) in [(&[0.3; 6][..], 10.0), (&[][..], 0.0)] {
             for order in [[0, 1, 2, 3], [0, 2, 1, 3]] {
                 let finding = seen(sines, amplitude, order);
-                assert!(finding.ok && !finding.told, "{finding:?}");
+                assert!(finding.ok && !finding.decided, "{finding:?}");
             }
         }
     }

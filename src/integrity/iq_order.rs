@@ -2,13 +2,13 @@
 //!
 //! Returns lie at the beat frequencies of their ranges, and those of a pair of frequencies ±f are those of a near and of a far range. In
 //! a room whose size is stated, nothing lies beyond its farthest corner; in an unknown scene, returns weaken with range. So over the pairs
-//! in which still returns stand out of the noise, and of which not both are within the room, the mean of ln(far / near) is zero at most:
-//! a paired Student test over pairs of the still chirps' spectrum, power summed over the channels. Every second bin counts, as the window
-//! joins neighbours. Where far returns are as strong as near ones, nothing can be told.
+//! in which static returns stand out of the noise, and of which not both are within the room, the mean of ln(far / near) is zero at
+//! most: a paired Student test over pairs of the still chirps' spectrum, power summed over the channels. Every second bin counts,
+//! as the window joins neighbours. Where far returns are as strong as near ones, nothing can be decided.
 //!
 //! An unknown scene may also be open, with far returns alone. But the filter before the converter keeps out what would alias, and so the
-//! last ninth of the band: no return there is the strongest. So something is told only where the strongest still return lies in the first
-//! or the last ninth of the band; far returns alone, as they are or as their mirror image, tell nothing.
+//! last ninth of the band: no return there is the strongest. So something is decided only where the strongest static return lies in
+//! the first or the last ninth of the band; far returns alone, as they are or as their mirror image, decide nothing.
 
 use super::still::{Still, spectrum};
 use super::stream::{Schedule, Stream};
@@ -16,7 +16,7 @@ use super::tails::student_tail;
 use super::{ALARM, Finding, Inspector, Kind};
 
 const CHECK: &str = "iq_order";
-const EXPECTED: &str = "still returns at the beat frequencies of the room's ranges";
+const EXPECTED: &str = "static returns at the beat frequencies of the room's ranges";
 /// Bins beside 0 in which the radar's own leakage and its offset lie under the window.
 const GUARD: usize = 3;
 /// Bins between pairs that share nothing under a Hann window, whose main lobe is four bins wide.
@@ -37,7 +37,7 @@ impl IqOrder {
         Self { schedule, still: Still::new(schedule) }
     }
 
-    /// Near and far bin of each pair that can tell.
+    /// Near and far bin of each informative pair.
     fn pairs(&self) -> impl Iterator<Item = [usize; 2]> {
         let Schedule { samples, is_falling, farthest_bin, .. } = self.schedule;
         let outside = move |far: usize| farthest_bin.is_none_or(|farthest| far as f64 > farthest + GUARD as f64);
@@ -56,21 +56,23 @@ impl Inspector for IqOrder {
             return None;
         }
         if !self.still.shows_noise() {
-            return Some(Finding::untold(CHECK, EXPECTED, "one chirp shows no noise to tell returns from"));
+            return Some(Finding::undecided(CHECK, EXPECTED, "one chirp shows no noise to separate returns from"));
         }
         let samples = self.schedule.samples;
         let least = RETURN * self.still.noise_of_bin();
         let power = spectrum(self.still.sum.chirps(), samples);
         let of = |pair: [usize; 2]| pair.map(|bin| power[bin]);
         let pairs: Vec<[usize; 2]> = self.pairs().filter(|pair| of(*pair)[0].max(of(*pair)[1]) >= least).collect();
-        let told: Vec<[f64; 2]> = pairs.iter().map(|pair| of(*pair)).collect();
-        let ratios: Vec<f64> = told.iter().map(|[near, far]| (far / near.max(f64::MIN_POSITIVE)).ln()).collect();
+        let powers: Vec<[f64; 2]> = pairs.iter().map(|pair| of(*pair)).collect();
+        let ratios: Vec<f64> = powers.iter().map(|[near, far]| (far / near.max(f64::MIN_POSITIVE)).ln()).collect();
         if ratios.len() < 2 {
-            return Some(Finding::untold(CHECK, EXPECTED, "still returns stand out of the noise at too few frequencies"));
+            return Some(Finding::undecided(CHECK, EXPECTED, "static returns stand out of the noise at too few frequencies"));
         }
         let mean_db = 10.0 / std::f64::consts::LN_10 * ratios.iter().sum::<f64>() / ratios.len() as f64;
-        let found =
-            format!("of {} pairs of beat frequencies with still returns, the far one is {mean_db:+.1} dB stronger", ratios.len());
+        let found = format!(
+            "of {} pairs of beat frequencies with static returns, the far one is {mean_db:+.1} dB stronger",
+            ratios.len()
+        );
         let strongest = pairs.iter().flatten().copied().max_by(|a, b| power[*a].total_cmp(&power[*b])).expect("there are two");
         let from_edge = strongest.min(samples - strongest) as f64 / samples as f64;
         if self.schedule.farthest_bin.is_none() && from_edge > 1.0 - PASSED {
@@ -78,7 +80,7 @@ impl Inspector for IqOrder {
                 "{found}, the strongest {:.0} % of the band from its edges: there may be far returns alone",
                 100.0 * from_edge
             );
-            return Some(Finding::untold(CHECK, EXPECTED, why));
+            return Some(Finding::undecided(CHECK, EXPECTED, why));
         }
         let exchanged = student_tail(&ratios);
         if exchanged < ALARM {
@@ -86,7 +88,7 @@ impl Inspector for IqOrder {
             return Some(Finding::wrong(Kind::Convention, CHECK, EXPECTED, found, exchanged.ln()));
         }
         if student_tail(&ratios.iter().map(|ratio| -ratio).collect::<Vec<_>>()) >= ALARM {
-            return Some(Finding::untold(CHECK, EXPECTED, found));
+            return Some(Finding::undecided(CHECK, EXPECTED, found));
         }
         Some(Finding::as_stated(CHECK, EXPECTED, found))
     }
@@ -105,7 +107,7 @@ mod tests {
     const SCHEDULE: Schedule =
         Schedule { tx: 1, rx: 2, loops: LOOPS, samples: SAMPLES, is_real: false, is_falling: false, farthest_bin: None };
 
-    /// Still returns at so many bins, falling with range, under noise.
+    /// Static returns at so many bins, falling with range, under noise.
     fn seen(schedule: Schedule, bins: std::ops::Range<usize>, sign: f32) -> Finding {
         of_law(schedule, bins, sign, |bin| 100.0 / bin as f64)
     }
@@ -135,7 +137,7 @@ mod tests {
             [(SCHEDULE, 2..60), (Schedule { farthest_bin: Some(60.0), ..SCHEDULE }, 2..60), (SCHEDULE, 2..110)]
         {
             let right = seen(schedule, bins.clone(), 1.0);
-            assert!(right.ok && right.told, "{right:?}");
+            assert!(right.ok && right.decided, "{right:?}");
             let exchanged = seen(schedule, bins.clone(), -1.0);
             assert!(exchanged.is_refusal() && exchanged.kind == Kind::Convention, "{exchanged:?}");
             // A falling chirp has the mirror image of its room.
@@ -150,7 +152,7 @@ mod tests {
             for sign in [1.0, -1.0] {
                 for law in [|bin: usize| 100.0 / bin as f64, |bin: usize| 1e-2 * bin as f64] {
                     let open = of_law(SCHEDULE, bins.clone(), sign, law);
-                    assert!(open.ok && !open.told, "{bins:?}, {sign}: {open:?}");
+                    assert!(open.ok && !open.decided, "{bins:?}, {sign}: {open:?}");
                 }
             }
         }
@@ -159,8 +161,8 @@ mod tests {
     #[test]
     fn noise_and_a_room_up_to_the_last_bin_tell_nothing() {
         let noise = seen(SCHEDULE, 0..0, 1.0);
-        assert!(noise.ok && !noise.told, "{noise:?}");
+        assert!(noise.ok && !noise.decided, "{noise:?}");
         let full = seen(Schedule { farthest_bin: Some(126.0), ..SCHEDULE }, 2..126, -1.0);
-        assert!(full.ok && !full.told, "{full:?}");
+        assert!(full.ok && !full.decided, "{full:?}");
     }
 }

@@ -51,8 +51,8 @@ pub struct Finding {
     /// Plain words: what, and in which frames, loops and samples.
     pub found: String,
     pub ok: bool,
-    /// Whether the samples can say anything here; where not, `ok` is true and `found` says why not.
-    pub told: bool,
+    /// Whether the samples decide anything here; where not, `ok` is true and `found` says why not.
+    pub decided: bool,
     /// Frames that are damaged; empty where nothing is, or where all are.
     pub frames: Vec<usize>,
     /// Chirps that were lost or repeated: frame, transmitter, receiver, loop.
@@ -64,11 +64,11 @@ pub struct Finding {
 impl Finding {
     fn as_stated(check: &'static str, expected: &'static str, found: impl Into<String>) -> Self {
         let (frames, chirps) = (vec![], vec![]);
-        Self { check, kind: Kind::Lost, expected, found: found.into(), ok: true, told: true, frames, chirps, p_value: None }
+        Self { check, kind: Kind::Lost, expected, found: found.into(), ok: true, decided: true, frames, chirps, p_value: None }
     }
 
-    fn untold(check: &'static str, expected: &'static str, why: impl std::fmt::Display) -> Self {
-        Self { told: false, ..Self::as_stated(check, expected, format!("cannot be told: {why}")) }
+    fn undecided(check: &'static str, expected: &'static str, why: impl std::fmt::Display) -> Self {
+        Self { decided: false, ..Self::as_stated(check, expected, format!("undecided: {why}")) }
     }
 
     fn wrong(kind: Kind, check: &'static str, expected: &'static str, found: String, log_p: f64) -> Self {
@@ -85,7 +85,7 @@ trait Inspector {
 
 /// Looks at the first frames of a recording, at most so many; those with lost chirps are left out.
 ///
-/// The checks come in the order in which one rests on another: of samples that were misread, nothing later is told.
+/// The checks come in the order in which one rests on another: of samples that were misread, nothing later is decided.
 ///
 /// # Errors
 /// Samples that cannot be read.
@@ -116,23 +116,23 @@ pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>
         let name = misread[first].name();
         let rests = later.iter_mut().filter(|finding| finding.kind != Kind::Lost || finding.ok);
         rests.for_each(|finding| {
-            *finding = Finding::untold(finding.check, finding.expected, format!("first the {name} must be right"))
+            *finding = Finding::undecided(finding.check, finding.expected, format!("first the {name} must be right"))
         });
     }
     Ok(findings)
 }
 
-/// Conventions that samples alone never tell, for tables of all that is stated.
-pub fn never_told(radar: &Radar) -> Vec<Finding> {
-    let body = "a body whose motion is known tells it (`hybridsim diagnose`)";
-    let mut untold = vec![
-        Finding::untold("adc_start", "radar.adc_start_s", "it turns every return by a constant phase"),
-        Finding::untold("doppler_sign", "a receding body has a positive Doppler frequency", body),
+/// Conventions that samples alone never decide, for tables of all that is stated.
+pub fn never_decided(radar: &Radar) -> Vec<Finding> {
+    let body = "a body whose motion is known decides it (`hybridsim diagnose`)";
+    let mut undecided = vec![
+        Finding::undecided("adc_start", "radar.adc_start_s", "it turns every return by a constant phase"),
+        Finding::undecided("doppler_sign", "a receding body has a positive Doppler frequency", body),
     ];
     if radar.tx_m.len() > 1 {
-        untold.push(Finding::untold("tx_order", "transmitters fire in the order of tx_m", body));
+        undecided.push(Finding::undecided("tx_order", "transmitters fire in the order of tx_m", body));
     }
-    untold
+    undecided
 }
 
 impl Finding {

@@ -14,7 +14,7 @@ use super::{ALARM, Finding, Inspector, Kind};
 /// Another reading of a code.
 struct Reading {
     check: &'static str,
-    told: &'static str,
+    description: &'static str,
     /// Codes between these two can be read so.
     span: [i32; 2],
     read: fn(i32) -> i32,
@@ -28,31 +28,31 @@ pub(super) const SIGN: &str = "number_format";
 const READINGS: [Reading; 5] = [
     Reading {
         check: BYTE_ORDER,
-        told: "the bytes of every word are exchanged",
+        description: "the bytes of every word are exchanged",
         span: WORD,
         read: |code| i32::from((code as i16).swap_bytes()),
     },
     Reading {
         check: SIGN,
-        told: "unsigned words (offset binary) were read as signed ones",
+        description: "unsigned words (offset binary) were read as signed ones",
         span: WORD,
         read: |code| i32::from(code as i16 ^ i16::MIN),
     },
     Reading {
         check: SIGN,
-        told: "signed words were read as unsigned ones",
+        description: "signed words were read as unsigned ones",
         span: [0, 65535],
         read: |code| i32::from(code as u16 as i16),
     },
     Reading {
         check: SIGN,
-        told: "signed words of 12 bits were read without their sign",
+        description: "signed words of 12 bits were read without their sign",
         span: [0, 4095],
         read: |code| code << 20 >> 20,
     },
     Reading {
         check: SIGN,
-        told: "signed words of 14 bits were read without their sign",
+        description: "signed words of 14 bits were read without their sign",
         span: [0, 16383],
         read: |code| code << 18 >> 18,
     },
@@ -123,7 +123,7 @@ impl Inspector for Numbers {
     fn conclude(self: Box<Self>) -> Option<Finding> {
         let Self { check, expected, extremes: [low, high], .. } = *self;
         if !self.are_codes {
-            return Some(Finding::untold(check, expected, "the samples are no 16-bit codes"));
+            return Some(Finding::undecided(check, expected, "the samples are no 16-bit codes"));
         }
         let is_possible = |reading: &Reading| reading.span[0] <= low && high <= reading.span[1];
         let own = READINGS
@@ -133,11 +133,11 @@ impl Inspector for Numbers {
         let own: Vec<(&Reading, [usize; 2])> = own.collect();
         let log_p = |[smoothest, of]: [usize; 2]| (own.len() as f64).ln() + log_binomial_tail(smoothest, of, 0.5);
         let Some((reading, counts)) = own.iter().min_by(|a, b| log_p(a.1).total_cmp(&log_p(b.1))) else {
-            return Some(Finding::untold(check, expected, "every other reading is as smooth"));
+            return Some(Finding::undecided(check, expected, "every other reading is as smooth"));
         };
         let [smoothest, of] = counts;
         if log_p(*counts) < ALARM.ln() {
-            let found = format!("{}: read so, {smoothest} of {of} chirps are smoothest", reading.told);
+            let found = format!("{}: read so, {smoothest} of {of} chirps are smoothest", reading.description);
             return Some(Finding::wrong(Kind::Misread, check, expected, found, log_p(*counts)));
         }
         let empty = self.bits.trailing_zeros();
@@ -174,7 +174,7 @@ mod tests {
         for amplitude in [0.0, 50.0, 900.0, 30000.0] {
             for check in [BYTE_ORDER, SIGN] {
                 let finding = seen(check, amplitude, |code| code);
-                assert!(finding.ok && finding.told, "{amplitude}: {finding:?}");
+                assert!(finding.ok && finding.decided, "{amplitude}: {finding:?}");
             }
         }
         let shifted = seen(SIGN, 900.0, |code| 16 * code);

@@ -1,6 +1,6 @@
 //! Loops of another length than is stated: a description of another capture, another number of samples, receivers or transmitters.
 //!
-//! What stands still repeats itself after one loop, so of all shifts of the stream along itself the one by a loop correlates most
+//! Static clutter repeats itself after one loop, so of all shifts of the stream along itself the one by a loop correlates most
 //! (Cauchy and Schwarz). With a correlation r, a share 1 − r² of the energy is left, so ln((1 − r²) / (1 − r'²)) for every loop is the log
 //! of a likelihood ratio of another length r'; it must exceed the number of lengths that were tried (Bonferroni). A loop counts once, as
 //! all of its samples show one scene. Lengths near whole numbers of chirps are not tried: the receivers of one chirp share its phase, and
@@ -76,14 +76,14 @@ impl Inspector for Period {
         let is_tried = |shift: &usize| (guard..=samples - guard).contains(&(shift % samples));
         let shifts: Vec<usize> = (rx * samples..self.squares.len()).filter(is_tried).collect();
         let Some(&best) = shifts.iter().max_by(|a, b| square(**a).total_cmp(&square(**b))) else {
-            return Some(Finding::untold(CHECK, EXPECTED, "a chirp is too short"));
+            return Some(Finding::undecided(CHECK, EXPECTED, "a chirp is too short"));
         };
         // A stream that repeats itself exactly leaves nothing: less than a millionth is not told apart.
         let left = |shift: usize| (1.0 - square(shift)).max(1e-6);
         let looks = (loops * self.frames) as f64;
         let tried = (shifts.len() as f64).ln();
         let log_p = tried - looks * (left(period) / left(best)).ln();
-        // Twice a length is as good as the length itself: the shortest peak is told that is no worse than the best one.
+        // Twice a length is as good as the length itself: the shortest peak is reported that is no worse than the best one.
         let is_peak = |shift: usize| square(shift) >= square(shift - 1).max(square((shift + 1).min(self.squares.len() - 1)));
         let is_as_good = |shift: usize| tried - looks * (left(shift) / left(best)).ln() >= ALARM.ln();
         let best = shifts.iter().copied().find(|&shift| is_peak(shift) && is_as_good(shift)).unwrap_or(best);

@@ -1,10 +1,11 @@
 //! A stream that moved: a packet was lost, and what came after it closed the gap.
 //!
-//! What stands still repeats itself from loop to loop, so the stream of one loop equals that of the loops before it but for noise and
-//! what moves; after a loss it equals them turned by the length of the gap. Both are held against each other where the still returns
-//! stand out of the rest (weights by frequency, which a turn leaves as they are), with a free gain: a likelihood ratio of Gaussian
-//! rests. All samples of a chirp count as one, as one thing that moves may be in all of them, so the ratio is that of so many channels:
-//! it must exceed the number of loops and turns that were tried (Bonferroni), summed over loops in a row that agree about the turn.
+//! Static clutter repeats itself from loop to loop, so the stream of one loop equals that of the loops before it but for noise and
+//! what moves; after a loss it equals them turned by the length of the gap. Both are held against each other where the static
+//! returns stand out of the rest (weights by frequency, which a turn leaves as they are), with a free gain: a likelihood ratio of
+//! Gaussian rests. All samples of a chirp count as one, as one thing that moves may be in all of them, so the ratio is that of so
+//! many channels: it must exceed the number of loops and turns that were tried (Bonferroni), summed over loops in a row that agree
+//! about the turn.
 //!
 //! After a loss nothing else is new: the turned loop leaves no more than the loops before it did. A body that begins to move leaves more
 //! at every turn, whichever is the best of them, and is learned as noise.
@@ -138,7 +139,7 @@ impl Inspector for Shift {
             return Some(Finding::as_stated(CHECK, EXPECTED, "they are"));
         };
         let period = self.schedule.period();
-        let told: Vec<String> = self
+        let losses: Vec<String> = self
             .losses
             .iter()
             .map(|loss| {
@@ -151,6 +152,6 @@ impl Inspector for Shift {
             })
             .collect();
         let frames = self.losses.iter().map(|loss| loss.frame).collect();
-        Some(Finding { frames, ..Finding::wrong(Kind::Misread, CHECK, EXPECTED, told.join("; "), likeliest) })
+        Some(Finding { frames, ..Finding::wrong(Kind::Misread, CHECK, EXPECTED, losses.join("; "), likeliest) })
     }
 }

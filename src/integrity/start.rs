@@ -1,9 +1,9 @@
 //! Chirps that begin elsewhere than is stated: a header before the first sample, samples that were cut off.
 //!
 //! Between one chirp and the next the signal breaks; within a chirp it goes on. A linear prediction (Burg 1975: forwards and backwards)
-//! of the still chirps foretells what goes on, so its error is largest where chirps begin. Within a chirp that is as stated, noise makes
-//! the error as large at one sample as at any other, and independently in every channel: that the same few samples come first in several
-//! channels has a binomial law, Bonferroni over the samples. Errors across the stated beginning compete, and a
+//! of the still chirps predicts what goes on, so its error is largest where chirps begin. Within a chirp that is as stated, noise
+//! makes the error as large at one sample as at any other, and independently in every channel: that the same few samples come first
+//! in several channels has a binomial law, Bonferroni over the samples. Errors across the stated beginning compete, and a
 //! break within a few samples of it is taken for a transient.
 
 use num_complex::Complex64;
@@ -14,8 +14,8 @@ use super::{ALARM, Finding, Inspector, Kind};
 
 const CHECK: &str = "chirp_start";
 const EXPECTED: &str = "the first sample of a chirp first";
-/// Samples from which the next one is foretold: what is left of the weaker returns is small against a break. A break spoils as many
-/// predictions, of which any may be the worst.
+/// Samples from which the next one is predicted: what is left of the weaker returns is small against a break. A break spoils as
+/// many predictions, of which any may be the worst.
 const ORDER: usize = 4;
 /// Share of a chirp at either end in which what begins or ends with it (a filter that settles, a ramp that is over) may break most.
 const TRANSIENT: usize = 32;
@@ -32,7 +32,7 @@ impl Start {
     }
 }
 
-/// Coefficients that foretell a sample from the `ORDER` before it, by Burg's method.
+/// Coefficients that predict a sample from the `ORDER` before it, by Burg's method.
 fn prediction(chirp: &[Complex64]) -> Vec<Complex64> {
     let (mut forward, mut backward) = (chirp.to_vec(), chirp.to_vec());
     let mut filter = vec![Complex64::ONE];
@@ -63,7 +63,7 @@ impl Inspector for Start {
     fn conclude(self: Box<Self>) -> Option<Finding> {
         let samples = self.schedule.samples;
         if samples < 4 * ORDER {
-            return Some(Finding::untold(CHECK, EXPECTED, "a chirp is too short"));
+            return Some(Finding::undecided(CHECK, EXPECTED, "a chirp is too short"));
         }
         // The still stream goes on from channel to channel, and after the last one with the first.
         let at = |place: usize| self.sum[place % self.sum.len()];
@@ -84,7 +84,7 @@ impl Inspector for Start {
         let found =
             format!("the signal breaks most at sample {place} or shortly after it in {count} of {} channels", breaks.len());
         if log_p >= ALARM.ln() {
-            return Some(Finding::untold(CHECK, EXPECTED, found));
+            return Some(Finding::undecided(CHECK, EXPECTED, found));
         }
         let beside = (samples / TRANSIENT).max(2 * ORDER);
         if place < beside || place + beside >= samples {
@@ -128,11 +128,11 @@ mod tests {
     #[test]
     fn a_header_moves_the_break_and_noise_hides_it() {
         let stated = seen(0, 0.5);
-        assert!(stated.ok && stated.told, "{stated:?}");
+        assert!(stated.ok && stated.decided, "{stated:?}");
         // 44 samples of a chirp were cut off: the next one begins 20 samples after the stated beginning.
         let moved = seen(44, 0.5);
         assert!(moved.is_refusal() && (17..=20).any(|place| moved.found.contains(&format!("at sample {place} "))), "{moved:?}");
         let hidden = seen(44, 1000.0);
-        assert!(hidden.ok && !hidden.told, "{hidden:?}");
+        assert!(hidden.ok && !hidden.decided, "{hidden:?}");
     }
 }

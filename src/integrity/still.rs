@@ -1,4 +1,4 @@
-//! What stands still in a stream: the sum of all its loops, and the noise that neighbouring loops differ by.
+//! Static clutter in a stream: the sum of all its loops, and the noise that neighbouring loops differ by.
 
 use num_complex::{Complex32, Complex64};
 use rustfft::{Fft, FftPlanner};

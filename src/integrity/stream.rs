@@ -42,7 +42,7 @@ impl Schedule {
         self.tx * self.rx
     }
 
-    /// Samples of one loop over all transmitters and receivers: a still scene repeats itself with this period.
+    /// Samples of one loop over all transmitters and receivers: a static scene repeats itself with this period.
     pub fn period(&self) -> usize {
         self.channels() * self.samples
     }

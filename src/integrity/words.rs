@@ -5,13 +5,13 @@
 //! min(N, E / 2) after exchanging words that were right, but for what tones of one group have in common; that has either sign alike. If
 //! it holds less in nearly all groups, the words were wrong: a sign test over the groups of the still chirps' mean spectrum.
 //!
-//! Where that says neither, as still returns fill both halves, the phases tell: of tones A at ω and B at −ω the product X(ω) X(−ω) is A B as
-//! it was sent, whose phase is any, and with words exchanged it has the part j cos ω ((1 − sin ω)|A|² + (1 + sin ω)|B|²) / 4 besides (of tones
-//! at ±(π − ω) the same with the other sign). So its imaginary part, summed over the channels, over the mean power at ±ω has one sign in
-//! nearly all groups: a sign test at an even chance, for either sign. An unbalanced receiver adds as much as its image is, so that only
-//! more than [`IMAGE`] counts. Each test has its share of the alarm (weighted
+//! Where that says neither, as static returns fill both halves, the phases decide: of tones A at ω and B at −ω the product X(ω)
+//! X(−ω) is A B as it was sent, whose phase is any, and with words exchanged it has the part j cos ω ((1 − sin ω)|A|² + (1 + sin
+//! ω)|B|²) / 4 besides (of tones at ±(π − ω) the same with the other sign). So its imaginary part, summed over the channels, over
+//! the mean power at ±ω has one sign in nearly all groups: a sign test at an even chance, for either sign. An unbalanced receiver
+//! adds as much as its image is, so that only more than [`IMAGE`] counts. Each test has its share of the alarm (weighted
 //! Bonferroni). Where neither the words as read nor the exchanged ones look exchanged, as where
-//! returns fill the whole band alike, nothing can be told.
+//! returns fill the whole band alike, nothing can be decided.
 
 use num_complex::Complex64;
 use rustfft::FftPlanner;
@@ -89,7 +89,7 @@ fn judged(groups: usize, as_they_are: [usize; 3], as_exchanged: [usize; 3], shar
     if log_p(in_step_exchanged, BY_PHASES) < ALARM.ln() {
         return Finding::as_stated(CHECK, EXPECTED, shares);
     }
-    Finding::untold(CHECK, EXPECTED, shares)
+    Finding::undecided(CHECK, EXPECTED, shares)
 }
 
 impl Inspector for Words {
@@ -152,7 +152,7 @@ mod tests {
     const SCHEDULE: Schedule =
         Schedule { tx: 1, rx: RX, loops: LOOPS, samples: SAMPLES, is_real: false, is_falling: false, farthest_bin: None };
 
-    /// Still returns of an amplitude at each bin, of other phases in every channel, through a receiver; words exchanged or not.
+    /// Static returns of an amplitude at each bin, of other phases in every channel, through a receiver; words exchanged or not.
     fn seen(amplitude: impl Fn(usize) -> f64, receiver: impl Fn(Complex64) -> Complex64, are_exchanged: bool) -> Finding {
         let noise = numbers(9, 2 * RX * LOOPS * SAMPLES, -3.0, 3.0);
         let phases = numbers(10, RX * SAMPLES, 0.0, std::f64::consts::TAU);
@@ -187,10 +187,10 @@ mod tests {
     }
 
     #[test]
-    fn the_order_of_the_words_is_told_also_where_returns_fill_both_halves() {
+    fn the_order_of_the_words_is_decided_also_where_returns_fill_both_halves() {
         for amplitude in [room, both_halves] {
             let right = seen(amplitude, |value| value, false);
-            assert!(right.ok && right.told, "{right:?}");
+            assert!(right.ok && right.decided, "{right:?}");
             let wrong = seen(amplitude, |value| value, true);
             assert!(wrong.is_refusal() && wrong.kind == Kind::Misread, "{wrong:?}");
         }
@@ -207,7 +207,7 @@ mod tests {
         for amplitude in [room, both_halves] {
             for receiver in receivers {
                 let right = seen(amplitude, receiver, false);
-                assert!(right.ok && right.told, "{right:?}");
+                assert!(right.ok && right.decided, "{right:?}");
             }
         }
     }
@@ -218,7 +218,7 @@ mod tests {
         for amplitude in amplitudes {
             for are_exchanged in [false, true] {
                 let finding = seen(amplitude, |value| value, are_exchanged);
-                assert!(finding.ok && !finding.told, "{finding:?}");
+                assert!(finding.ok && !finding.decided, "{finding:?}");
             }
         }
     }

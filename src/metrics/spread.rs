@@ -29,7 +29,7 @@ impl Spread {
         Some(Self { interval, ..spread })
     }
 
-    /// Of numbers that depend on each other: how sure their mean is cannot be told. `None` without any.
+    /// Of numbers that depend on each other: how sure their mean is cannot be estimated. `None` without any.
     pub fn of_correlated(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let values: Vec<f64> = values.into_iter().collect();
         let count = values.len();

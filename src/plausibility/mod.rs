@@ -119,7 +119,7 @@ pub fn findings(facts: &Facts) -> Vec<Finding> {
     all
 }
 
-/// What is to be told of findings, line by line; or the first refusal, with the others among the lines before it.
+/// What is to be reported of findings, line by line; or the first refusal, with the others among the lines before it.
 pub struct Verdict {
     pub notes: Vec<String>,
     pub refusal: Option<Error>,

@@ -54,7 +54,7 @@ pub struct Radar {
 }
 
 impl Radar {
-    /// Frequency at the first sample (f_c in FORMATS: f₀ + S · adc_start).
+    /// Frequency at the first sample (f_c of docs/conventions.md: f₀ + S · `adc_start_s`).
     pub fn carrier_hz(&self) -> f64 {
         self.start_frequency_hz + self.slope_hz_per_s * self.adc_start_s
     }

@@ -1,4 +1,4 @@
-//! What recognition may be told.
+//! Settings of recognition.
 
 use std::path::Path;
 

@@ -32,7 +32,7 @@ pub struct Window {
     pub start: usize,
 }
 
-/// The maps of a recording: power over velocity, range and azimuth, frame by frame, without what stands still within
+/// The maps of a recording: power over velocity, range and azimuth, frame by frame, without static clutter within
 /// a frame, in decibels below the recording's own strongest cell. One frame is in memory per thread.
 ///
 /// # Errors

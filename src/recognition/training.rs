@@ -13,7 +13,7 @@ use super::maps::{Sequence, Window, cut, windows};
 use super::network::Network;
 use crate::error::{Error, Result};
 
-/// Trains a network on all windows of the sequences; `progress` hears the epochs done and the last one's mean loss
+/// Trains a network on all windows of the sequences; `progress` receives the epochs done and the last one's mean loss
 /// (cross-entropy, nats). Equal seeds give equal networks. `device` is a plain one; gradients are its autodiff's.
 ///
 /// # Errors

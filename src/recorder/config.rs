@@ -105,8 +105,7 @@ impl Default for ActorConfig {
     }
 }
 
-/// Everything that `hybridsim record` can be told. The default is a baseline recording: nothing but what FORMATS.md
-/// calls "nothing missing".
+/// All settings of `hybridsim record`. The default is a baseline recording: nothing beyond the baseline of docs/diagnosis.md.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecorderConfig {

@@ -11,7 +11,7 @@ use crate::data::{IfFrame, IfLayout};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
 
-/// All of this belongs to the baseline of FORMATS.md.
+/// All of this belongs to the baseline of docs/diagnosis.md.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReceiverConfig {

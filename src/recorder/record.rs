@@ -22,7 +22,7 @@ pub struct Recorder {
     world: World,
     stages: Stages,
     paths: Paths,
-    /// The board as a receiver, and as a transmitter (R6).
+    /// The board as a receiver, and as a transmitter (`object_radar_object`).
     board: Option<[(Paths, Radar); 2]>,
     movers: Vec<Mover>,
     /// What amplitudes of added reflectors are relative to.
@@ -117,14 +117,14 @@ impl Recorder {
     fn received(&self, body: Signal) -> Result<Signal> {
         let (frame, loops) = (body.frame, body.loops);
         let mut signal = self.all_paths(body)?;
-        let swing = vibration(&self.world);
+        let antennas = vibration(&self.world);
         let chirp = super::chirp::Chirp::new(&self.stages.wide);
         let stage = Stage {
             radar: &self.stages.radar,
             chirp: &chirp,
             clock: &self.stages.clock,
             body: self.paths.scatter.as_ref().map(|scatter| &scatter.body),
-            vibration: swing.as_ref(),
+            vibration: antennas.as_ref(),
         };
         self.movers.iter().try_for_each(|mover| mover.add(&stage, &mut signal))?;
         if let (Some([out, back]), Some(effect)) = (&self.board, &self.world.effects.object_radar_object)
@@ -216,7 +216,7 @@ impl Recorder {
         } else if self.paths.scatter.is_some() {
             noise_for_snr(&self.plain_body()?, radar, config.snr_db)
         } else {
-            // Without a body the ratio is to what stands still.
+            // Without a body the ratio is to static clutter.
             let still = self.paths.surroundings.still().chunks_exact(self.stages.wide.samples_per_chirp);
             let window = still.map(|chirp| &chirp[guard..guard + radar.samples_per_chirp]);
             let chirps: Vec<Complex64> = window.flat_map(|chirp| chirp.repeat(radar.loops_per_frame)).collect();
@@ -253,7 +253,7 @@ fn board_paths(world: &World, stages: &Stages, level: f64) -> Result<[(Paths, Ra
     Ok([paths(received)?, paths(sent)?])
 }
 
-/// All frames of a world; `progress` hears how many of how many are done.
+/// All frames of a world; `progress` receives how many of how many are done.
 pub fn record(world: &World, progress: &mut dyn FnMut(usize, usize)) -> Result<Vec<IfFrame>> {
     let recorder = Recorder::new(world)?;
     let frames = recorder.frames().enumerate();

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::amplitude::{Laws, View};
 use super::body::MovingBody;
 use super::chirp::Chirp;
-use super::effects::{Clock, Swing};
+use super::effects::{Clock, SinusoidalMotion};
 use super::lanes::{BLOCK, ChirpWeights, Lanes, NODES, NodeShares};
 use super::mirror::Mirror;
 use super::range_grid::{RangeGrid, ToneWeights};
@@ -39,7 +39,7 @@ pub struct Scatter {
     pub limits: [usize; 6],
     pub clock: Clock,
     /// Of the antennas.
-    pub vibration: Option<Swing>,
+    pub vibration: Option<SinusoidalMotion>,
     chirp: Chirp,
     grid: RangeGrid,
 }
@@ -109,7 +109,7 @@ impl Scatter {
 
     /// Where the vibration has moved the antennas.
     fn shake(&self, time_s: f64) -> Vector {
-        self.vibration.map_or([0.0; 3], |swing| swing.position(time_s))
+        self.vibration.map_or([0.0; 3], |motion| motion.position(time_s))
     }
 
     fn chirps(&self) -> usize {

@@ -1,6 +1,6 @@
-//! What stands still, or nearly: rough walls, the walls' mirror image of the radar, furniture.
+//! Static clutter, still or nearly so: rough walls, the walls' mirror image of the radar, furniture.
 //!
-//! All of it is summed once per recording. Where it stirs by less than a wavelength, a few sums at chosen displacements
+//! All of it is summed once per recording. Where it moves by less than a wavelength, a few sums at chosen displacements
 //! are interpolated.
 
 use std::f64::consts::{PI, TAU};
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::amplitude::Laws;
 use super::chirp::Chirp;
-use super::effects::{Clock, OUTSIDE, Outside, Shadow, Signal, Swing, vibration};
+use super::effects::{Clock, OUTSIDE, Outside, Shadow, Signal, SinusoidalMotion, vibration};
 use super::mirror::Mirror;
 use super::vector::{Vector, add, distance, dot, scale, subtract, unit};
 use super::world::{Draw, World};
@@ -27,7 +27,7 @@ struct Echo {
     amplitude: Complex64,
 }
 
-/// Displacements, in parts of the largest, at which a stirring signal is summed.
+/// Displacements, in parts of the largest, at which the signal of a moving part is summed.
 const NODES: [f64; 5] = [-1.0, -0.6, 0.0, 0.6, 1.0];
 
 /// Everything static, ready for any chirp.
@@ -41,17 +41,17 @@ pub struct Surroundings {
     wall: super::material::Material,
     /// `[tx, rx, sample]`
     still: Vec<Complex64>,
-    stirring: Vec<Stirring>,
+    varying: Vec<Varying>,
 }
 
 /// A part that changes from chirp to chirp, as sums `[tx, rx, sample]` with a weight for every time.
-enum Stirring {
+enum Varying {
     /// One sum per displacement of [`NODES`].
-    Swaying {
-        swing: Swing,
+    Moving {
+        motion: SinusoidalMotion,
         sums: Vec<Vec<Complex64>>,
     },
-    Blinking {
+    Modulated {
         rate_hz: f64,
         phase_rad: f64,
         depth: f64,
@@ -81,24 +81,24 @@ impl Surroundings {
             mirrors,
             wall: world.walls.material,
             still: vec![],
-            stirring: vec![],
+            varying: vec![],
         };
         all.still = all.sum(|_| 1.0, |_| 1.0, [0.0; 3], [0.0; 3]);
-        all.stir(world)?;
+        all.set_varying(world)?;
         Ok(all)
     }
 
-    /// `[tx, rx, sample]` while nothing stirs.
+    /// `[tx, rx, sample]` while nothing moves.
     pub fn still(&self) -> &[Complex64] {
         &self.still
     }
 
-    /// I2 and those outside the library that touch the room.
-    fn stir(&mut self, world: &World) -> Result<()> {
-        if let Some(swing) = vibration(world) {
+    /// `radar_vibration`, and the effects outside the library that act on the static clutter.
+    fn set_varying(&mut self, world: &World) -> Result<()> {
+        if let Some(motion) = vibration(world) {
             let sums =
-                NODES.map(|node| difference(self.sum(|_| 1.0, |_| 1.0, scale(swing.amplitude_m, node), [0.0; 3]), &self.still));
-            self.stirring.push(Stirring::Swaying { swing, sums: sums.to_vec() });
+                NODES.map(|node| difference(self.sum(|_| 1.0, |_| 1.0, scale(motion.amplitude_m, node), [0.0; 3]), &self.still));
+            self.varying.push(Varying::Moving { motion, sums: sums.to_vec() });
         }
         for (entry, effect) in world.effects.outside.iter().enumerate() {
             let phase_rad = world.phase(OUTSIDE + entry as u64, 0);
@@ -106,15 +106,15 @@ impl Surroundings {
                 Outside::LampModulation { position_m, radius_m, rate_hz, depth } => {
                     let near = self.near(entry, position_m, radius_m)?;
                     let sum = self.sum(near, |_| 0.0, [0.0; 3], [0.0; 3]);
-                    self.stirring.push(Stirring::Blinking { rate_hz, phase_rad, depth, sum });
+                    self.varying.push(Varying::Modulated { rate_hz, phase_rad, depth, sum });
                 }
                 Outside::MovingCurtain { position_m, radius_m, rate_hz, swing_m } => {
                     let near = self.near(entry, position_m, radius_m)?;
-                    let swing = Swing { amplitude_m: [0.0, swing_m, 0.0], rate_hz, phase_rad };
+                    let motion = SinusoidalMotion { amplitude_m: [0.0, swing_m, 0.0], rate_hz, phase_rad };
                     let rest = self.sum(near, |_| 0.0, [0.0; 3], [0.0; 3]);
-                    let at = |node: f64| self.sum(near, |_| 0.0, [0.0; 3], scale(swing.amplitude_m, node));
+                    let at = |node: f64| self.sum(near, |_| 0.0, [0.0; 3], scale(motion.amplitude_m, node));
                     let sums = NODES.map(|node| difference(at(node), &rest)).to_vec();
-                    self.stirring.push(Stirring::Swaying { swing, sums });
+                    self.varying.push(Varying::Moving { motion, sums });
                 }
                 _ => {}
             }
@@ -181,7 +181,7 @@ impl Surroundings {
         self.chirp.add_static(signal, amplitude, path / SPEED_OF_LIGHT);
     }
 
-    /// What the body takes away, `[tx, rx, sample]`: T8, both ways through the same gap.
+    /// What the body takes away, `[tx, rx, sample]` (`soft_occlusion`), both ways through the same gap.
     pub fn shadowed(&self, shadow: &Shadow) -> Vec<Complex64> {
         let lost = |target: Vector| shadow.visible(target).powi(2) - 1.0;
         let foot = |mirror: &Mirror| {
@@ -199,7 +199,7 @@ impl Surroundings {
             for index in 0..loops {
                 let time_s = clock.ramp_s(&self.radar, frame, tx, index) + self.chirp.middle_s;
                 let mut parts: Vec<(f64, &[Complex64])> = vec![(1.0, &self.still)];
-                self.stirring.iter().for_each(|stirring| stirring.parts(time_s, &mut parts));
+                self.varying.iter().for_each(|varying| varying.parts(time_s, &mut parts));
                 if let Some([first, last]) = shadows {
                     let share = index as f64 / self.radar.loops_per_frame as f64;
                     parts.extend([(1.0 - share, first.as_slice()), (share, last.as_slice())]);
@@ -216,14 +216,14 @@ impl Surroundings {
     }
 }
 
-impl Stirring {
+impl Varying {
     fn parts<'a>(&'a self, time_s: f64, parts: &mut Vec<(f64, &'a [Complex64])>) {
         match self {
-            Self::Blinking { rate_hz, phase_rad, depth, sum } => {
+            Self::Modulated { rate_hz, phase_rad, depth, sum } => {
                 parts.push((depth * (TAU * rate_hz * time_s + phase_rad).cos(), sum));
             }
-            Self::Swaying { swing, sums } => {
-                let at = (TAU * swing.rate_hz * time_s + swing.phase_rad).sin();
+            Self::Moving { motion, sums } => {
+                let at = (TAU * motion.rate_hz * time_s + motion.phase_rad).sin();
                 for (node, sum) in NODES.iter().zip(sums) {
                     let others = NODES.iter().filter(|other| *other != node);
                     parts.push((others.map(|other| (at - other) / (node - other)).product(), sum));

@@ -7,7 +7,7 @@ use super::surface::Returns;
 use super::world::World;
 use crate::room::Boundary;
 
-/// The effects of a world, in the terms of FORMATS.md: nothing but the baseline gives an empty list.
+/// The effects of a world, in the terms of docs/report.md: nothing but the baseline gives an empty list.
 pub fn truth(world: &World, action: Option<&str>) -> Value {
     let mut effects = vec![];
     for wall in world.image_walls() {

@@ -65,7 +65,7 @@ pub struct Reflector {
     pub rcs_m2: f64,
 }
 
-/// What is recorded. `World::empty` has nothing in it; `Default` is the baseline of FORMATS.md without a person.
+/// What is recorded. `World::empty` has nothing in it; `Default` is the baseline of docs/diagnosis.md without a person.
 #[derive(Clone, Debug)]
 pub struct World {
     pub radar: Radar,

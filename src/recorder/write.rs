@@ -15,7 +15,7 @@ use crate::error::Result;
 pub type Labels = BTreeMap<String, String>;
 
 /// Records what `config` describes into `out` and opens it. Relative paths in `config` start at `settings_folder`;
-/// `progress` hears how many of how many frames are done, from 0 on.
+/// `progress` receives how many of how many frames are done, from 0 on.
 pub fn record_to(
     config: &RecorderConfig,
     settings_folder: &Path,
@@ -74,10 +74,10 @@ mod tests {
         };
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("null");
-        let mut heard = vec![];
+        let mut received = vec![];
         let labels = Labels::from([("action".into(), "glide".into())]);
-        let recording = write_world(&world, labels, &out, &mut |done, of| heard.push((done, of))).unwrap();
-        assert_eq!(heard, [(0, 2), (1, 2), (2, 2)]);
+        let recording = write_world(&world, labels, &out, &mut |done, of| received.push((done, of))).unwrap();
+        assert_eq!(received, [(0, 2), (1, 2), (2, 2)]);
         assert_eq!((recording.layout(), &recording.room), (IfLayout::Codes, &Some(world.room.clone())));
         assert_eq!(recording.labels["action"], "glide");
         // What is handed out is the undisplaced body.

@@ -41,7 +41,7 @@ pub enum Grazing {
     /// over a few of it when the surface turns away, instead of jumping.
     #[default]
     Smooth,
-    /// The formula to the end: f_r as long as both sides see the front, nothing after. No gradient tells of that edge.
+    /// The formula to the end: f_r as long as both sides see the front, nothing after. That edge has no gradient.
     Paper,
 }
 
@@ -62,7 +62,7 @@ impl From<Response> for Law {
 /// Where [`Grazing::Smooth`] rounds cosines off.
 const ROUNDED_BELOW: f64 = 0.01;
 
-/// Cosines below this are not told from zero in f32; [`Grazing::Paper`] divides by no smaller one.
+/// Cosines below this are indistinguishable from zero in f32; [`Grazing::Paper`] divides by no smaller one.
 const LEAST_COSINE: f64 = 1e-6;
 
 /// Added to squared lengths and to α² (whose smallest useful value is 4e-4).

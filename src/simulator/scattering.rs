@@ -164,7 +164,7 @@ impl Simulator {
         })
     }
 
-    /// `[rx, chirp, sample]` of every transmitter, stacked; what stands still has one chirp and is repeated.
+    /// `[rx, chirp, sample]` of every transmitter, stacked; a static signal has one chirp and is repeated.
     pub(super) fn transmitters(&self, scene: &Scene, signal: impl Fn(usize, &Device) -> Option<Complex<3>>) -> Complex<4> {
         let device = self.device();
         let [_, tx, rx, loops, samples] = scene.radar.dims();

@@ -1,4 +1,4 @@
-//! What a site may be told.
+//! Settings of a site.
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -55,7 +55,7 @@ pub(super) fn sequences_for(config: &SiteConfig, settings_folder: &Path, shard: 
         stays_inside(&world, config.margin_m, &sequence.name)
     })?;
     if config.record.receiver.level.is_none() {
-        // Another draw of the mesh is heard by the same receiver.
+        // Another draw of the mesh is recorded by the same receiver.
         let first = RecorderConfig { redraw: 0, ..all[0].recorder.clone() };
         let level = Recorder::new(&first.world(settings_folder)?)?.level();
         all.iter_mut().for_each(|sequence| sequence.recorder.receiver.level = Some(level));

@@ -35,7 +35,7 @@ struct Job {
 /// `again`, `settings/…/<name>.toml` with each recording's resolved settings, and `site.toml`.
 ///
 /// Recordings that are there are kept if their settings agree; sequences may be added to a site, never changed.
-/// `progress` hears how many of how many recordings are done, and the name of the next, at each of its frames.
+/// `progress` receives how many of how many recordings are done, and the name of the next, at each of its frames.
 ///
 /// # Errors
 /// Whatever [`super::sequences`] refuses of the shard's sequences; a recording made with other settings or with labels that are not its name's. All of

@@ -155,7 +155,7 @@ fn told_here<T: Send>(tell: &mut Tell<'_>, work: impl FnOnce(&(dyn Fn(usize) + S
             })
         };
         let worker = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, told).expect("a thread can be started");
-        let heard = catch_unwind(AssertUnwindSafe(|| {
+        let received = catch_unwind(AssertUnwindSafe(|| {
             loop {
                 match receiver.recv_timeout(LOOK) {
                     Ok(done) => tell(Told::Done(done)),
@@ -164,9 +164,9 @@ fn told_here<T: Send>(tell: &mut Tell<'_>, work: impl FnOnce(&(dyn Fn(usize) + S
                 }
             }
         }));
-        ended.store(heard.is_err(), Ordering::Relaxed);
+        ended.store(received.is_err(), Ordering::Relaxed);
         let worked = worker.join();
-        let unwound: std::result::Result<T, Box<dyn Any + Send>> = heard.and(worked);
+        let unwound: std::result::Result<T, Box<dyn Any + Send>> = received.and(worked);
         unwound.unwrap_or_else(|reason| resume_unwind(reason))
     })
 }
@@ -179,17 +179,17 @@ mod tests {
 
     #[test]
     fn what_many_threads_do_is_told_in_one_and_ends_when_it_unwinds() {
-        let (mut heard, here) = (0, thread::current().id());
+        let (mut received, here) = (0, thread::current().id());
         let sum = told_here(
             &mut |told| {
                 assert_eq!(thread::current().id(), here);
                 if let Told::Done(done) = told {
-                    heard += done;
+                    received += done;
                 }
             },
             |progress| (1..=100usize).into_par_iter().inspect(|&done| progress(done)).sum::<usize>(),
         );
-        assert_eq!((sum, heard), (5050, 5050));
+        assert_eq!((sum, received), (5050, 5050));
 
         let begun = std::sync::atomic::AtomicUsize::new(0);
         let caught = catch_unwind(AssertUnwindSafe(|| {

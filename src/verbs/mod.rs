@@ -56,7 +56,7 @@ pub enum Told<'a> {
     Training(&'a training::Event),
 }
 
-/// Who hears it.
+/// Who receives it.
 pub type Tell<'a> = dyn FnMut(Told<'_>) + 'a;
 
 /// A folder that results are added to, made and tried before the work; nobody else works there until this is dropped.

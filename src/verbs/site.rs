@@ -30,7 +30,7 @@ pub fn record(what: &Site<'_>, as_stated: bool, tell: &mut Tell<'_>) -> Result<s
     let _claim = Claim::part(what.out, what.shard)?;
     plausible::sequences(&config, what.config, as_stated, what.shard, tell)?;
     let (mut begun, mut at_hand) = (false, String::new());
-    let mut hear = |done: usize, of: usize, name: &str| {
+    let mut progress = |done: usize, of: usize, name: &str| {
         if !std::mem::replace(&mut begun, true) {
             tell(Told::Begun { what: "recording", steps: of });
         }
@@ -40,7 +40,7 @@ pub fn record(what: &Site<'_>, as_stated: bool, tell: &mut Tell<'_>) -> Result<s
         }
         tell(Told::Done(done));
     };
-    site::record(&config, what.config.parent().unwrap_or(Path::new("")), what.out, what.shard, &mut hear)
+    site::record(&config, what.config.parent().unwrap_or(Path::new("")), what.out, what.shard, &mut progress)
 }
 
 /// Looks at all sequences, and records nothing: what would be refused is refused, what is odd is told. Their recordings, in

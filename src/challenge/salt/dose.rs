@@ -31,7 +31,7 @@ pub struct Dose {
     /// What the recording shows by itself: ids, and how what has no name behaves.
     pub background: Vec<String>,
     pub rows: Vec<Row>,
-    /// Per effect, where some copies were told and others not.
+    /// Per effect, where some copies were detected and others not.
     pub curves: Vec<Curve>,
     /// What this recording cannot be given, and why.
     pub refused: Vec<[String; 2]>,
@@ -52,9 +52,9 @@ pub struct Row {
     pub wrong: usize,
     /// Without a report, or undecided.
     pub unanswered: usize,
-    /// Clopper and Pearson's 95 % for the share that was found or told.
+    /// Clopper and Pearson's 95 % for the share that was detected.
     pub interval: [f64; 2],
-    /// Median over the copies that were found or told, nats.
+    /// Log-likelihood gain, median over the copies that were detected, nats.
     pub gain: Option<f64>,
 }
 
@@ -64,7 +64,7 @@ pub struct Curve {
     pub effect: String,
     /// Against log₁₀ of the strength.
     pub logistic: Logistic,
-    /// Strength at which half are found or told.
+    /// Strength at which half are detected.
     pub half: f64,
 }
 
@@ -83,7 +83,8 @@ struct Salt {
 }
 
 impl Outcome {
-    fn told(&self) -> bool {
+    /// By name or without one.
+    fn detected(&self) -> bool {
         self.found || self.nameless
     }
 }
@@ -159,10 +160,10 @@ impl Dose {
             self.answers,
             self.table()
         );
-        text.push_str("\n![Share found or told over the strength](dose.png)\n");
+        text.push_str("\n![Share detected over the strength](dose.png)\n");
         for curve in &self.curves {
             let unit = offered(&curve.effect).map_or("", |offered| offered.unit);
-            let _ = write!(text, "\n- `{}`: half are found or told at {} {unit}", curve.effect, number(curve.half));
+            let _ = write!(text, "\n- `{}`: half are detected at {} {unit}", curve.effect, number(curve.half));
         }
         text.push_str("\n\n### Not planted\n\n");
         for [id, reason] in &self.refused {
@@ -173,7 +174,7 @@ impl Dose {
 
     fn table(&self) -> String {
         let mut text = String::from(
-            "| effect | strength | unit | copies | found by name | told without a name | 95 % interval of both \
+            "| effect | strength | unit | copies | found by name | detected without a name | 95 % interval of both \
              | wrong name | unanswered | gain, nats |\n\
              |---|---|---|---|---|---|---|---|---|---|\n",
         );
@@ -215,7 +216,8 @@ impl Row {
     /// Of copies of one effect and grade.
     fn of(outcomes: &[Outcome]) -> Self {
         let count = |of: fn(&Outcome) -> bool| outcomes.iter().filter(|outcome| of(outcome)).count();
-        let mut gains: Vec<f64> = outcomes.iter().filter(|outcome| outcome.told()).filter_map(|outcome| outcome.gain).collect();
+        let mut gains: Vec<f64> =
+            outcomes.iter().filter(|outcome| outcome.detected()).filter_map(|outcome| outcome.gain).collect();
         let first = &outcomes[0];
         Self {
             effect: first.effect.clone(),
@@ -227,7 +229,7 @@ impl Row {
             nameless: count(|outcome| outcome.nameless),
             wrong: count(|outcome| !outcome.wrong.is_empty()),
             unanswered: count(|outcome| outcome.failure.is_some() || outcome.verdict == "undecided"),
-            interval: binomial_interval(count(Outcome::told), outcomes.len(), 0.95),
+            interval: binomial_interval(count(Outcome::detected), outcomes.len(), 0.95),
             gain: (!gains.is_empty()).then(|| median(&mut gains)),
         }
     }
@@ -235,7 +237,7 @@ impl Row {
 
 impl Curve {
     fn of(outcomes: &[Outcome]) -> Option<Self> {
-        let points: Vec<(f64, bool)> = outcomes.iter().map(|outcome| (outcome.strength.log10(), outcome.told())).collect();
+        let points: Vec<(f64, bool)> = outcomes.iter().map(|outcome| (outcome.strength.log10(), outcome.detected())).collect();
         let logistic = Logistic::fit(&points).filter(|law| law.slope > 0.0)?;
         let half = 10f64.powf(logistic.level(0.5));
         half.is_finite().then(|| Self { effect: outcomes[0].effect.clone(), logistic, half })

@@ -39,7 +39,7 @@ impl Extent {
 /// Reads all samples.
 ///
 /// # Errors
-/// Samples that cannot be read, or too few to tell noise from signal.
+/// Samples that cannot be read, or too few to separate noise from signal.
 pub fn ground(recording: &Recording) -> Result<Ground> {
     let mut extent = Extent { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2], sum: [0.0; 2], count: 0.0 };
     for frame in 0..recording.frames() {

@@ -82,7 +82,7 @@ pub fn background(recording: &Recording, ground: &Ground, out: &Path, how: &RunC
     }
 }
 
-/// Makes the copies of a part and commits to them; what is there already stays. `progress` hears how many are done.
+/// Makes the copies of a part and commits to them; what is there already stays. `progress` receives how many are done.
 ///
 /// # Errors
 /// A folder that was begun with another recording, other effects or another seed.

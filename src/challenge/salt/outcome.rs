@@ -22,13 +22,13 @@ pub struct Outcome {
     pub found: bool,
     /// The effect's own id, if it was found.
     pub exact: bool,
-    /// Not named, but told: something of its family that the background lacks.
+    /// Not named, but detected: something of its family that the background lacks.
     pub nameless: bool,
     /// Names that neither it nor the background has.
     pub wrong: Vec<String>,
     /// What else has no name and is not in the background.
     pub other_nameless: Vec<String>,
-    /// What held-out frames gain by what was found or told, nats.
+    /// Log-likelihood gain of the held-out frames by what was detected, nats.
     pub gain: Option<f64>,
 }
 
@@ -80,7 +80,7 @@ pub fn outcome(planted: &Planted, report: &Result<Report, String>, background: &
         }
     }
     if report.verdict == "damaged" {
-        // Its integrity is all that is told of it then.
+        // Its integrity is all that is known of it then.
         match family.contains(&"damaged") {
             true => outcome.nameless = true,
             false => outcome.wrong.push("damaged".into()),
@@ -197,11 +197,11 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_name_is_told_where_it_is_of_the_family_and_new() {
+    fn what_has_no_name_is_detected_where_it_is_of_the_family_and_new() {
         let rest = |like: &str, low: f64| json!([{"behaves_like": like, "where": {"range_m": [low, low + 0.1]}, "held_out_loglik_gain": 20.0}]);
         let background = of(json!([]), rest("additive fast-time", 1.0));
-        let told = judged("dc_offset", of(json!([]), rest("additive fast-time", 3.0)), &background);
-        assert!(told.nameless && !told.found && told.gain == Some(20.0));
+        let detected = judged("dc_offset", of(json!([]), rest("additive fast-time", 3.0)), &background);
+        assert!(detected.nameless && !detected.found && detected.gain == Some(20.0));
         assert!(!judged("dc_offset", of(json!([]), rest("additive fast-time", 1.05)), &background).nameless);
         let other = judged("dc_offset", of(json!([]), rest("slow-time gain", 3.0)), &background);
         assert!(!other.nameless && other.other_nameless == ["slow-time gain"]);

@@ -93,8 +93,9 @@ const STANDS: f64 = 0.5;
 
 /// The axis along which the person stands, and why it was chosen. `expected`: what the format or the rest pose says.
 ///
-/// A person is up from the feet to the head; upside down is a camera's frame. Who lies is told from a file with
-/// another axis by the floor: the lowest joint of a person keeps its height along gravity, and along no other axis.
+/// A person is up from the feet to the head; upside down is a camera's frame. A person who lies is distinguished
+/// from a file with another axis by the floor: the lowest joint of a person keeps its height along gravity, and along no other
+/// axis.
 pub fn find_up(figures: &[Figure], expected: UpAxis) -> (UpAxis, String) {
     let body = |figure: &Figure| (figure.head - figure.feet).try_normalize(1e-9).unwrap_or_default();
     let mean = figures.iter().map(body).sum::<Point>() / figures.len().max(1) as f64;
@@ -144,7 +145,7 @@ fn joints(rest: &[[f64; 3]], parents: &[Option<usize>], pose: &[[f64; 3]]) -> Ve
     places
 }
 
-/// Whether joints have the meaning that standing is told by.
+/// Whether joints have the meaning from which standing is recognised.
 fn is_smpl(model: &BodyModel) -> bool {
     super::layout::names(model.parents.len()).is_some()
 }

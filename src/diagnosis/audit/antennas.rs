@@ -1,12 +1,12 @@
 //! Which antenna is which, and on which side: left and right, up and down, receivers in reverse, transmitters in another order.
 //!
-//! Where the body moves, the phases of the channels follow from its direction. Every reading of the antennas foretells them; the one that
-//! is stated is held against the others. The measure of a channel is its coherence with the first channel after that phase is taken out:
-//! a constant phase of its own (receivers that differ) does not lower it, but directions that change do where the reading is wrong. With a
-//! coherence γ, a share 1 − γ² of a channel's power is left (Carter, Knapp and Nuttall 1973), so Σ ln((1 − γ²) / (1 − γ'²)) over channels and
-//! frames is the log of a likelihood ratio; a frame counts once, however many cells the body fills in it. Where the body stays in one
-//! direction, only the constant phases themselves can tell, which receivers that differ make by chance: they must then agree
-//! with the other reading nearly as a whole, over three channels at least.
+//! Where the body moves, the phases of the channels follow from its direction. Every reading of the antennas predicts them; the one
+//! that is stated is held against the others. The measure of a channel is its coherence with the first channel after that phase is
+//! taken out: a constant phase of its own (receivers that differ) does not lower it, but directions that change do where the
+//! reading is wrong. With a coherence γ, a share 1 − γ² of a channel's power is left (Carter, Knapp and Nuttall 1973), so Σ ln((1 −
+//! γ²) / (1 − γ'²)) over channels and frames is the log of a likelihood ratio; a frame counts once, however many cells the body
+//! fills in it. Where the body stays in one direction, only the constant phases themselves decide, which receivers that differ
+//! make by chance: they must then agree with the other reading nearly as a whole, over three channels at least.
 
 use num_complex::Complex64;
 
@@ -29,7 +29,7 @@ const MOST_TRANSMITTERS: usize = 4;
 
 /// How the antennas may be meant.
 struct Reading {
-    told: &'static str,
+    description: &'static str,
     /// Antenna of each transmitter's slot, and of each receiver's lane.
     tx: Vec<usize>,
     rx: Vec<usize>,
@@ -47,12 +47,12 @@ struct Agreement {
 /// Left and right, up and down.
 pub(super) fn sides(evidence: &Evidence) -> Option<Check> {
     let [_, transmitters, receivers, ..] = evidence.cube.dims;
-    let stated = Reading { told: "", tx: (0..transmitters).collect(), rx: (0..receivers).collect(), mirrored: None };
+    let stated = Reading { description: "", tx: (0..transmitters).collect(), rx: (0..receivers).collect(), mirrored: None };
     let backwards: Vec<usize> = (0..receivers).rev().collect();
     let readings = [
-        Reading { told: "the receivers in reverse order", rx: backwards, tx: stated.tx.clone(), mirrored: None },
-        Reading { told: "left and right exchanged", mirrored: Some(0), tx: stated.tx.clone(), rx: stated.rx.clone() },
-        Reading { told: "up and down exchanged", mirrored: Some(2), tx: stated.tx.clone(), rx: stated.rx.clone() },
+        Reading { description: "the receivers in reverse order", rx: backwards, tx: stated.tx.clone(), mirrored: None },
+        Reading { description: "left and right exchanged", mirrored: Some(0), tx: stated.tx.clone(), rx: stated.rx.clone() },
+        Reading { description: "up and down exchanged", mirrored: Some(2), tx: stated.tx.clone(), rx: stated.rx.clone() },
     ];
     let (found, ok) = compared(evidence, &stated, &readings, true)?;
     Some(Check::new("sides", "antennas and body on the sides as stated", found, ok))
@@ -66,7 +66,7 @@ pub(super) fn transmitter_order(evidence: &Evidence) -> Option<Check> {
         return None;
     }
     let rx: Vec<usize> = (0..receivers).collect();
-    let mut readings = orders(transmitters).into_iter().map(|tx| Reading { told: "", tx, rx: rx.clone(), mirrored: None });
+    let mut readings = orders(transmitters).into_iter().map(|tx| Reading { description: "", tx, rx: rx.clone(), mirrored: None });
     let stated = readings.next()?;
     let others: Vec<Reading> = readings.collect();
     let (found, ok) = compared(evidence, &stated, &others, transmitters > 2)?;
@@ -86,7 +86,7 @@ fn orders(count: usize) -> Vec<Vec<usize>> {
     orders
 }
 
-/// What was found, and whether the stated reading stands. None where nothing of the body is heard.
+/// What was found, and whether the stated reading stands. None where nothing of the body is observed.
 fn compared(evidence: &Evidence, stated: &Reading, others: &[Reading], by_phases: bool) -> Option<(String, bool)> {
     let all: Vec<&Reading> = std::iter::once(stated).chain(others).collect();
     let agreements = agreements(evidence, &all)?;
@@ -102,16 +102,16 @@ fn compared(evidence: &Evidence, stated: &Reading, others: &[Reading], by_phases
     let Some(best) = wrong.iter().map(|(_, agreement)| strength(agreement)).reduce(f64::max) else {
         return Some(("array phases do not contradict it".into(), true));
     };
-    // Readings that foretell the same phases are told together.
-    let told: Vec<String> = wrong
+    // Readings that predict the same phases are reported together.
+    let names: Vec<String> = wrong
         .iter()
         .filter(|(_, agreement)| strength(agreement) > best - 1e-3)
-        .map(|(reading, _)| match reading.told {
+        .map(|(reading, _)| match reading.description {
             "" => format!("the order {:?}", reading.tx),
-            told => told.into(),
+            description => description.into(),
         })
         .collect();
-    Some((format!("array phases fit {} (coherence {best:.2}, as stated {:.2})", told.join(", or "), strength(as_is)), false))
+    Some((format!("array phases fit {} (coherence {best:.2}, as stated {:.2})", names.join(", or "), strength(as_is)), false))
 }
 
 /// Mean coherence.

@@ -6,8 +6,8 @@ use super::{Check, RETURN};
 use crate::diagnosis::evidence::{Evidence, spectrum};
 use crate::diagnosis::statistics::median;
 
-/// A channel whose strongest return is weaker than the middle channel's by this much hears nothing.
-const DEAF_DB: f64 = 20.0;
+/// A channel whose strongest return is weaker than the middle channel's by this much has no signal.
+const NO_SIGNAL_DB: f64 = 20.0;
 
 /// Power of a channel's strongest static return over the noise of its mean.
 pub(super) fn strongest_still(evidence: &Evidence, channel: usize) -> f64 {
@@ -44,13 +44,13 @@ pub(super) fn channels(evidence: &Evidence) -> Vec<Check> {
     if bad.is_empty() {
         let returns: Vec<f64> = (0..evidence.cube.channels()).map(|channel| strongest_still(evidence, channel)).collect();
         let middle = median(&mut returns.clone());
-        let deaf = |&channel: &usize| {
-            returns[channel] < RETURN && 10.0 * (middle / returns[channel].max(f64::MIN_POSITIVE)).log10() > DEAF_DB
+        let no_signal = |&channel: &usize| {
+            returns[channel] < RETURN && 10.0 * (middle / returns[channel].max(f64::MIN_POSITIVE)).log10() > NO_SIGNAL_DB
         };
-        bad.extend((0..returns.len()).filter(deaf).map(|channel| format!("{} holds nothing but noise", name(channel))));
+        bad.extend((0..returns.len()).filter(no_signal).map(|channel| format!("{} holds nothing but noise", name(channel))));
     }
     let found = if bad.is_empty() { "all channels vary".into() } else { bad.join(", ") };
-    vec![Check::new("channels", "no channel is constant, missing or deaf", found, bad.is_empty())]
+    vec![Check::new("channels", "no channel is constant, missing or without signal", found, bad.is_empty())]
 }
 
 /// Share of the sampled components that lie at the recording's extremes.

@@ -5,7 +5,7 @@ use crate::diagnosis::prediction::Point;
 use crate::diagnosis::statistics::ratio_tail;
 use crate::radar::Radar;
 
-/// Below that many Doppler cells, what stands still leaks.
+/// Below that many Doppler cells, static clutter leaks.
 const STILL_CELLS: f64 = 2.5;
 
 /// Count, sum, and sum of squares of ln power over the noise.
@@ -90,7 +90,7 @@ impl Fit {
     pub fn against(&self, other: &Fit) -> Comparison {
         let both = self.frames.iter().zip(&other.frames).filter_map(|(own, other)| own.as_ref().zip(other.as_ref()));
         let both: Vec<(&Frame, &Frame)> = both.collect();
-        // Where less is than elsewhere, nothing is foretold.
+        // Where less is than elsewhere, nothing is predicted.
         let means = |[predicted, others]: [Sums; 2]| match predicted.mean() > others.mean() {
             true => [predicted.mean(), others.mean()],
             false => [predicted.plus(others).mean(); 2],
@@ -138,7 +138,7 @@ pub fn range_and_velocity(point: &Point, radar: &Radar) -> [f64; 2] {
     [range, to.iter().zip(&point.velocity_mps).map(|(x, v)| x * v).sum::<f64>() / range]
 }
 
-/// Whether the body ever moves fast enough to be told from what stands still.
+/// Whether the body ever moves fast enough to be distinguished from static returns.
 pub(super) fn moves(evidence: &Evidence) -> bool {
     let fast = STILL_CELLS * evidence.radar.velocity_resolution_mps();
     let points = evidence.body.iter().flat_map(|body| body.frames.iter().flatten());

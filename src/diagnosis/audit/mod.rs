@@ -1,4 +1,4 @@
-//! Conventions and the scene as stated, checked before any physics is named (DIAGNOSIS.md 3.1), one file for each audit. A wrong
+//! Conventions and the scene as stated, checked before any physics is named, one file for each audit. A wrong
 //! convention is reported as that.
 
 mod antennas;
@@ -69,7 +69,7 @@ pub fn audit(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<Check> {
     checks.extend(body_in_room::body_in_room(evidence));
     checks.extend(placement::placement(evidence, origin_m));
     if !checks.iter().any(|check| !check.ok && is_convention(check)) {
-        // Phases foretell nothing where the body is not where it is said to be.
+        // Phases predict nothing where the body is not where it is said to be.
         checks.extend(body_direction::body_direction(evidence));
         checks.extend(antennas::sides(evidence));
         checks.extend(antennas::transmitter_order(evidence));
@@ -98,7 +98,7 @@ pub fn is_convention(check: &Check) -> bool {
     CONVENTIONS.contains(&check.check.as_str())
 }
 
-/// Whether a body was expected and is heard nowhere.
+/// Whether a body was expected and is observed nowhere.
 pub fn is_silent(check: &Check) -> bool {
     check.check == "body_place" && check.found.contains(placement::SILENT)
 }

@@ -9,15 +9,15 @@ use super::heading::heading;
 use crate::diagnosis::evidence::Evidence;
 use crate::integrity::ALARM;
 
-pub(super) const SILENT: &str = "no body is heard where the motion puts it, nor at other ranges";
+pub(super) const SILENT: &str = "no body is observed where the motion puts it, nor at other ranges";
 /// Least energy over the noise where the motion puts the body, dB: twice what noise alone shows, E₁(1) = 0.22 nats = 0.95 dB (the mean of
 /// the positive part of an exponential variable's logarithm).
 const PRESENT_DB: f64 = 1.9;
 
 /// One check for each kind of reading. Another reading is believed where it has more power, and explains the moving power better than
 /// what is stated and than each effect with a name that would move the body a little (chance at most [`ALARM`] for each check, Bonferroni
-/// over its readings). Where nothing is heard as stated, it must only be heard. Of several that are believed, the one that explains most
-/// is told.
+/// over its readings). Where nothing is observed as stated, it must only be observed. Of several that are believed, the one that
+/// explains most is reported.
 pub(super) fn placement(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<Check> {
     if !moves(evidence) {
         return vec![];
@@ -41,10 +41,11 @@ pub(super) fn placement(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<
     let mut checks: Vec<Check> = vec![];
     for reading in readings.chunk_by(|a, b| a.check == b.check) {
         let wrong = believed.filter(|believed| believed.check == reading[0].check);
-        let told = wrong.or_else(|| reading.iter().max_by(by_better)).unwrap_or(&reading[0]);
+        let reported = wrong.or_else(|| reading.iter().max_by(by_better)).unwrap_or(&reading[0]);
         let hint = wrong.map_or(String::new(), |wrong| format!(": {}", wrong.hint));
-        let found = format!("{here_db:.1} dB where the motion puts the body, {:.1} dB {}{hint}", told.fit.level_db(), told.place);
-        checks.push(Check::new(told.check, told.expected, found, wrong.is_none()));
+        let found =
+            format!("{here_db:.1} dB where the motion puts the body, {:.1} dB {}{hint}", reported.fit.level_db(), reported.place);
+        checks.push(Check::new(reported.check, reported.expected, found, wrong.is_none()));
     }
     if believed.is_none()
         && let Some(place) = checks.iter_mut().find(|check| check.check == "body_place")
@@ -64,7 +65,8 @@ pub(super) fn placement(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<
     checks
 }
 
-/// Whether a body is heard where it is stated to be, once something was undone; none where another reading of the scene is believed.
+/// Whether a body is observed where it is stated to be, once something was undone; none where another reading of the scene is
+/// believed.
 pub fn body_place(evidence: &Evidence) -> Option<Check> {
     let checks = placement(evidence, None);
     let other_reading = checks.iter().any(|check| !check.ok && check.check != "body_place");

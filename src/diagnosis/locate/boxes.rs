@@ -73,12 +73,12 @@ pub fn strongest(evidence: &Evidence, residual: &Residual) -> Option<Strongest> 
     }
     let mean = sum / count;
     // Held-out frames may have less of it, at even odds.
-    let foretold = SHARES.map(|share| {
+    let predicted = SHARES.map(|share| {
         let mean = 1.0 + share * (mean - 1.0);
         held_sum * (1.0 - 1.0 / mean) - held_count * mean.ln()
     });
-    let most = foretold.into_iter().fold(f64::NEG_INFINITY, f64::max);
-    let gain = most + (foretold.map(|gain| (gain - most).exp()).iter().sum::<f64>() / SHARES.len() as f64).ln();
+    let most = predicted.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let gain = most + (predicted.map(|gain| (gain - most).exp()).iter().sum::<f64>() / SHARES.len() as f64).ln();
     let p_value = corrected(mean_power_tail(mean, count.max(0.1)), tried);
     Some(Strongest { region: region(evidence, residual, &Cells::new(&evidence.radar), &found), p_value, gain })
 }

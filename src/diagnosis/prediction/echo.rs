@@ -1,4 +1,5 @@
-//! The body seen a second time, by a longer way: in a mirror (P4, P5, P6), or after a bounce between its own parts (T9).
+//! The body seen a second time, by a longer way: in a mirror (`wall_ghost`, `floor_bounce`), or after a bounce between its own
+//! parts (`body_multibounce`).
 
 use std::f64::consts::TAU;
 

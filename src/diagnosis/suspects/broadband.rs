@@ -16,8 +16,8 @@ use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 
 const FEWEST_LOOPS: usize = 16;
-/// Floor over the noise that a static return must have if it were modulated as well, to say by its silence that it is not.
-const TELLING: f64 = 3.0;
+/// Floor over the noise that a static return must have if it were modulated as well, for its absence to show that it is not.
+const INFORMATIVE: f64 = 3.0;
 /// Static returns elsewhere that must deny it.
 const FEWEST_DENIALS: usize = 2;
 /// p-value below which receivers share it.
@@ -60,23 +60,23 @@ impl Floor {
     /// Whether static returns elsewhere say that what is at a range is there alone.
     fn is_alone(&self, bin: usize, ends: [usize; 2]) -> bool {
         let ratio = (self.level[bin] - 1.0) / self.still[bin].max(f64::MIN_POSITIVE);
-        let (mut telling, mut denying) = (0, 0);
+        let (mut informative, mut denying) = (0, 0);
         let mut other = 0;
         while other < self.level.len() {
             // A phase of the oscillator grows with the delay at most in proportion.
             let nearer = ((other as f64 + 1.0) / (bin as f64 + 1.0)).min(1.0).powi(2);
             let expected = ratio * self.still[other] * nearer;
             let aside = other + HANN_LOBE < ends[0] || other > ends[1] + HANN_LOBE;
-            if !aside || expected < TELLING {
+            if !aside || expected < INFORMATIVE {
                 other += 1;
                 continue;
             }
-            telling += 1;
+            informative += 1;
             denying += usize::from(self.level[other] - 1.0 < 0.5 * expected);
             // Of one return each.
             other += 2 * HANN_LOBE;
         }
-        denying >= FEWEST_DENIALS && 2 * denying > telling
+        denying >= FEWEST_DENIALS && 2 * denying > informative
     }
 }
 

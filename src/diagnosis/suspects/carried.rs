@@ -16,11 +16,11 @@ use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence
 const LEAST_DB: f64 = 8.0;
 /// Share of the whole body's power that a part's skin counts as at least.
 const LEAST_SHARE: f64 = 0.01;
-/// What hardly moves is mostly where what stands still was taken out: how strong it is, its sidelobes do not tell.
+/// What hardly moves is mostly where static clutter was taken out: how strong it is, its sidelobes do not show.
 const LEAST_SEEN: f64 = 0.3;
 /// Parts of one body differ: their log-likelihood ratios scatter by so much more than those of one reflectivity.
 const UNEVEN: f64 = 2.0;
-/// Standard deviation of the amplitude, as a share: a level that other parts tell.
+/// Standard deviation of the amplitude, as a share: a level that is estimated from other parts.
 const LEVEL_ERROR: f64 = 0.25;
 /// Share of the best part's gain from which on another may carry it as well.
 const NEARLY: f64 = 0.9;
@@ -164,7 +164,7 @@ fn candidate(
     let beside = if others.is_empty() {
         String::new()
     } else {
-        format!(" (or at {}, as far as ranges and velocities tell)", others.join(", "))
+        format!(" (or at {}, as far as ranges and velocities resolve)", others.join(", "))
     };
     Candidate {
         id: Some("carried_reflector"),

@@ -15,7 +15,7 @@ use crate::diagnosis::statistics;
 
 /// The signal's deviation in units of the bit's value from which on the bit must be fair.
 const FAR_BELOW: f64 = 8.0;
-/// Least deviation of a bit's share from one half that is told.
+/// Least deviation of a bit's share from one half that is detected.
 const LEAST_BIAS: f64 = 0.05;
 /// How much of that the same bit may deviate elsewhere.
 const ELSEWHERE: f64 = 0.3;
@@ -90,7 +90,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
                     .filter(|(other, _)| other.channel != component.channel)
                     .filter_map(|(_, s)| s.as_ref())
             };
-            // A bit that is not far below the signal tells only by never changing at all.
+            // A bit that is not far below the signal shows only by never changing at all.
             let elsewhere = match (own.fair, own.share) {
                 (true, _) => ELSEWHERE,
                 (false, 0.0 | 1.0) => ELSEWHERE_STUCK,
@@ -99,7 +99,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             if bias < LEAST_BIAS || others().next().is_none() || others().any(|s| (s.share - 0.5).abs() > elsewhere * bias) {
                 continue;
             }
-            // A stuck bit does not tell how far codes repeat; the other channels do.
+            // A stuck bit does not show how far codes repeat; the other channels do.
             let repeated = others().map(|s| s.repeated).fold(own.repeated, f64::max);
             let z = 2.0 * bias * (own.count / repeated).sqrt();
             let p_value = statistics::corrected(statistics::normal_tails(z), tried);
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stuck_bit_is_told_and_a_coarse_converter_is_not() {
+    fn a_stuck_bit_is_detected_and_a_coarse_converter_is_not() {
         let found = find(&evidence(|rx, code| if rx == 1 { code | 8 } else { code }));
         assert!(found.len() == 1 && found[0].p_value < 1e-6 && found[0].gain > 20.0, "{found:?}");
         assert_eq!(found[0].place.rx, Some(vec![1]));

@@ -1,16 +1,16 @@
-//! Static returns that change while others stay: one that swings at one frequency (`hum`), one behind the body that changes from
-//! frame to frame because the body's shadow falls on it (card T7), and whatever stirs itself (`stirring`).
+//! Static returns that change while others are constant: one that is modulated at one frequency (`modulation`), one behind the body
+//! that changes from frame to frame because the body's shadow falls on it, and whatever moves itself (`fluctuating`).
 //!
 //! Of the latter two: what all static returns do together (gain, phase, a phase in proportion to the delay) is somebody else's
 //! affair and is taken from the other returns, frame by frame. Only ranges beyond the body's reach are looked at, where nothing
 //! moves within a frame; a shadow must keep the pattern that the return has across the receivers.
 
 mod course;
-mod hum;
+mod fluctuating;
+mod modulation;
 mod returns;
 mod silhouette;
-mod stirring;
-mod swings;
+mod sinusoid;
 
 use std::sync::Arc;
 
@@ -33,10 +33,10 @@ const FEWEST_STRONG: usize = 5;
 /// What either finds at most by chance.
 const LEAST_LIKELY: f64 = 0.01;
 pub const ID: &str = "soft_occlusion";
-pub use hum::BEHAVES_LIKE as HUMS;
-pub use stirring::BEHAVES_LIKE as STIRS;
+pub use fluctuating::BEHAVES_LIKE as FLUCTUATES;
+pub use modulation::BEHAVES_LIKE as IS_MODULATED;
 
-/// What stands still where the body never is.
+/// Static clutter where the body never is.
 struct Free {
     returns: Returns,
     /// The strong returns, which all do the same unless something happens to them.
@@ -78,13 +78,13 @@ impl Free {
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let known = [STIRS, ID].iter().any(|id| evidence.accepted.contains(id));
+    let known = [FLUCTUATES, ID].iter().any(|id| evidence.accepted.contains(id));
     let by_frame = if known {
         None
     } else {
-        Free::new(evidence).and_then(|free| shadow(evidence, &free).or_else(|| stirring::find(evidence, &free)))
+        Free::new(evidence).and_then(|free| shadow(evidence, &free).or_else(|| fluctuating::find(evidence, &free)))
     };
-    by_frame.into_iter().chain(hum::find(evidence)).collect()
+    by_frame.into_iter().chain(modulation::find(evidence)).collect()
 }
 
 fn frames(evidence: &Evidence) -> Frames<'_> {

@@ -23,18 +23,18 @@ use super::finding::Candidate;
 /// Somebody who may be to blame.
 pub struct Suspect {
     pub name: &'static str,
-    /// Of the family-wise chance of a false claim, in proportion to all shares. What is as plain as a pikestaff when it
-    /// is there needs little; what errors of the mesh blur needs more.
+    /// Of the family-wise chance of a false claim, in proportion to all shares. What has a high SNR when it is
+    /// there needs little; what errors of the mesh blur needs more.
     pub share: f64,
     pub find: fn(&Evidence) -> Vec<Candidate>,
     /// Looks at the codes as they were recorded: what is corrected happened before and takes nothing back.
     pub last_in_chain: bool,
-    /// Is heard only where nobody else has anything to say.
+    /// Counts only where no other suspect finds anything.
     pub last_resort: bool,
     /// Trusts that the body is where it was predicted: it waits until that is so.
     pub trusts_the_place: bool,
-    /// Has every frame foretold by the others: what it gains says nothing that its p-value, of the same frames, does not.
-    pub foretells_all_frames: bool,
+    /// Has every frame predicted by the others: what it gains says nothing that its p-value, of the same frames, does not.
+    pub predicts_all_frames: bool,
 }
 
 impl Suspect {
@@ -46,7 +46,7 @@ impl Suspect {
             last_in_chain: false,
             last_resort: false,
             trusts_the_place: false,
-            foretells_all_frames: false,
+            predicts_all_frames: false,
         }
     }
 }
@@ -56,15 +56,15 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect::new("still field", receiver::still::find),
     Suspect::new("still field, room unknown", receiver::open::find),
     Suspect::new("quadrature image", receiver::image::find),
-    Suspect { foretells_all_frames: true, ..Suspect::new("non-linear receiver", receiver::harmonic::find) },
+    Suspect { predicts_all_frames: true, ..Suspect::new("non-linear receiver", receiver::harmonic::find) },
     Suspect { last_in_chain: true, ..Suspect::new("converter's rail", receiver::rail::find) },
     Suspect::new("spur", receiver::spur::find),
     Suspect::new("bursts", receiver::bursts::find),
-    Suspect { foretells_all_frames: true, ..Suspect::new("noise", receiver::noise::find) },
+    Suspect { predicts_all_frames: true, ..Suspect::new("noise", receiver::noise::find) },
     // Three questions, which a body's speckle blurs.
     Suspect { share: 3.0, trusts_the_place: true, ..Suspect::new("along the chirp", waveform::along::find) },
     Suspect::new("slow time", slow::find),
-    Suspect { foretells_all_frames: true, ..Suspect::new("one channel", slow::channels::find) },
+    Suspect { predicts_all_frames: true, ..Suspect::new("one channel", slow::channels::find) },
     Suspect::new("chirp's number in its frame", slow::locked::find),
     Suspect::new("single frame", slow::odd_frame::find),
     Suspect { last_in_chain: true, ..Suspect::new("slipped samples", slow::slip::find) },

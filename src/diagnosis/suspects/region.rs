@@ -13,7 +13,7 @@ pub struct Region {
     pub doppler: [f64; 2],
 }
 
-/// Doppler bins around zero where a Hann window leaves what stands still.
+/// Doppler bins around zero where a Hann window leaves static clutter.
 pub const STILL_BINS: usize = 1;
 
 /// Whether a Doppler bin is none of those.
@@ -77,7 +77,7 @@ pub fn run(evidence: &Evidence) -> usize {
     if evidence.cube.dims[0].is_multiple_of(run) { run } else { 1 }
 }
 
-/// Consecutive frames of one channel as one, `[loop, sample]`, less what stands still over the training frames of this
+/// Consecutive frames of one channel as one, `[loop, sample]`, less static clutter over the training frames of this
 /// cube.
 pub fn joined(cube: &Cube, still: &[Complex64], frames: std::ops::Range<usize>, channel: usize) -> Vec<Complex64> {
     let samples = cube.dims[4];
@@ -88,7 +88,7 @@ pub fn joined(cube: &Cube, still: &[Complex64], frames: std::ops::Range<usize>, 
         .collect()
 }
 
-/// Subtracts from every run of frames what deviates, within the region, from what stands still over the training frames.
+/// Subtracts from every run of frames what deviates, within the region, from static clutter over the training frames.
 /// That is the mean of the cube at hand: other things that stand still may have been taken away or may not.
 pub fn remove(cube: &mut Cube, training: &[usize], run: usize, region: Region) {
     let [frames, _, _, loops, samples] = cube.dims;

@@ -1,4 +1,4 @@
-//! Movers of a recording in which nobody is tracked: power in the range-Doppler maps away from what stands still.
+//! Movers of a recording in which nobody is tracked: power in the range-Doppler maps away from static clutter.
 //!
 //! Whether something moves is judged frame by frame. Where it is and how fast is then read from the longest stretch without
 //! a gap, because blocks of a long frame resolve velocities poorly; two people who pass one another at one range differ in
@@ -150,7 +150,7 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
     })
 }
 
-/// Runs of frames transformed as one, what stands still removed; cells are signed Doppler bins and range bins.
+/// Runs of frames transformed as one, static clutter removed; cells are signed Doppler bins and range bins.
 struct Stretch {
     loops: usize,
     samples: usize,

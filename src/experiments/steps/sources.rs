@@ -1,4 +1,4 @@
-//! Where everything starts: measured recordings, and what the detective finds in one of them.
+//! Where everything starts: measured recordings, and what the diagnosis finds in one of them.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ pub fn site(config: &SiteConfig, settings_folder: &Path, folder: &Path, step: &m
     site::record(config, settings_folder, folder, Shard::ALL, &mut |done, of, _| step(done, of)).map(drop)
 }
 
-/// What the detective finds: for people and programs, and as settings of a simulator.
+/// What the diagnosis finds: for people and programs, and as settings of a simulator.
 pub fn diagnose(recording: &Path, config: &DiagnosisConfig, folder: &Path, step: &mut dyn FnMut(usize, usize)) -> Result<()> {
     let recording = Recording::open(recording)?;
     let mut told = 0;

@@ -10,7 +10,7 @@ const PER_BEAM: f64 = 4.0;
 /// Most directions of a grid along one angle.
 const MOST: usize = 361;
 
-/// A grid of directions. An angle that the array cannot tell is 0.
+/// A grid of directions. An angle that the array does not resolve is 0.
 pub struct Search {
     azimuths_deg: Vec<f64>,
     elevations_deg: Vec<f64>,

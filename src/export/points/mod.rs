@@ -213,7 +213,7 @@ pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
     )];
     for (axis, what) in [(0, "azimuth"), (2, "elevation")] {
         if aperture_m(radar, axis) == 0.0 {
-            notes.push(format!("the antennas do not tell {what}: it is taken to be 0"));
+            notes.push(format!("the antennas do not resolve {what}: it is taken to be 0"));
         }
     }
     Ok(notes)

@@ -243,7 +243,7 @@ fn files_that_were_exchanged_between_devices_are_refused_by_their_samples() {
         draft.findings.iter().find(|finding| finding.check == "devices").unwrap().clone()
     };
     let right = look("right");
-    assert!(right.ok && right.told, "{right:?}");
+    assert!(right.ok && right.decided, "{right:?}");
     let file = |device: &str| folder.path().join(format!("{device}_0000_data.bin"));
     fs::rename(file("slave1"), file("other")).unwrap();
     fs::rename(file("slave2"), file("slave1")).unwrap();

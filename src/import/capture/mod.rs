@@ -152,8 +152,8 @@ impl Draft {
     }
 }
 
-/// Writes a capture under a temporary name and asks its samples whether they are what they are stated to be. `progress` hears how
-/// many of how many frames are done.
+/// Writes a capture under a temporary name and asks its samples whether they are what they are stated to be. `progress` receives
+/// how many of how many frames are done.
 pub fn draft(
     mut capture: Capture,
     folder: &Path,

@@ -103,7 +103,7 @@ mod tests {
         sets
     }
 
-    /// The place of a sample's I or Q, told by its number.
+    /// The place of a sample's I or Q, given by its number.
     fn number(place: [usize; 6], of: [usize; 6]) -> f32 {
         place.iter().zip(of).fold(0, |number, (at, length)| number * length + at) as f32
     }

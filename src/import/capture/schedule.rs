@@ -191,7 +191,7 @@ impl TiRadar {
         }
     }
 
-    /// Refuses chirps that a recording's even steps cannot tell.
+    /// Refuses chirps that a recording's even steps cannot express.
     fn even(&self, kept: &[(f64, usize, usize)], loop_s: f64) -> Result<()> {
         let step_s = loop_s / kept.len() as f64;
         let uneven = kept.iter().enumerate().find(|(index, chirp)| {

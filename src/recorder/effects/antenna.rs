@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::radar::Radar;
 use crate::recorder::world::World;
 
-/// C1 and C4.
+/// `channel_mismatch` and `mutual_coupling`.
 #[derive(Clone, Debug)]
 pub struct Channels {
     /// `[rx]` or `[tx · rx]`; empty: none.

@@ -13,7 +13,7 @@ use crate::recorder::world::World;
 #[derive(Clone, Debug, Default)]
 pub struct Physiology {
     swells: Vec<Swell>,
-    /// Rotation and translation in the radar frame (G1).
+    /// Rotation and translation in the radar frame (`pose_offset`).
     stands: Option<([[f64; 3]; 3], Vector)>,
 }
 
@@ -30,7 +30,7 @@ struct Swell {
 }
 
 impl Physiology {
-    /// Both T1 and T2 need to know which vertices are the trunk; `rest` is the rest pose `[vertex, xyz]`.
+    /// Both `breathing` and `heartbeat` need to know which vertices are the trunk; `rest` is the rest pose `[vertex, xyz]`.
     pub fn new(world: &World, person: &Person, rest: &[Vector]) -> Result<Self> {
         let effects = &world.effects;
         let mut swells = vec![];
@@ -103,14 +103,14 @@ fn joint(name: &str, key: &str) -> Result<usize> {
     })
 }
 
-/// Decibels that T4 adds, `[vertex]`.
+/// Decibels that `part_reflectivity` adds, `[vertex]`.
 pub fn reflectivity_db(effects: &EffectsConfig, person: &Person) -> Result<Option<Vec<f64>>> {
     let Some(part) = &effects.part_reflectivity else { return Ok(None) };
     let weights = part_weights(person, &[&part.body_part], "effects.part_reflectivity.body_part")?;
     Ok(Some(weights.into_iter().map(|weight| weight * part.db).collect()))
 }
 
-/// One-way extra path under a garment (T3), `[vertex]`, metres.
+/// One-way extra path under a garment (`clothing_delay`), `[vertex]`, metres.
 pub fn garment_m(effects: &EffectsConfig, person: &Person) -> Result<Option<Vec<f64>>> {
     let Some(cloth) = &effects.clothing_delay else { return Ok(None) };
     let weights = part_weights(person, &cloth.body_parts, "effects.clothing_delay.body_parts")?;

@@ -12,7 +12,7 @@ use crate::radar::Radar;
 /// The analogue signal is followed at this multiple of the sample rate.
 const FINER: usize = 16;
 
-/// R7 and R8.
+/// `if_highpass` and `if_lowpass`.
 #[derive(Clone, Debug)]
 pub struct IfFilter {
     sections: Vec<Section>,

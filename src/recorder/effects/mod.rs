@@ -1,4 +1,4 @@
-//! What a recording may hold beyond the baseline: every effect id of FORMATS.md that has a physical cause, and some
+//! What a recording may hold beyond the baseline: every effect id of docs/report.md that has a physical cause, and some
 //! that no id names.
 //!
 //! The signal meets them in this order: scene, paths, oscillator, antennas, IF filter, nonlinearity, what is added,
@@ -28,7 +28,7 @@ pub use noise::shape as shape_noise;
 pub use onto::{Ground, Onto};
 pub use propagation::{MirrorPlan, Shadow, twice_bounced};
 pub use receiver::Chain;
-pub use scene::{Mover, Stage, Swing, movers, static_points, vibration};
+pub use scene::{Mover, SinusoidalMotion, Stage, movers, static_points, vibration};
 pub use settings::*;
 pub use signal::Signal;
 pub use stage::{Stages, codes};
@@ -59,7 +59,7 @@ pub fn is_noise(id: u64) -> bool {
 /// The table `[effects]`: a sub-table per effect id, off where absent.
 macro_rules! effects {
     ($($field:ident: $kind:ident),*; $($list:ident: $item:ident),*) => {
-        /// Every effect of a recording, each switched by its table. The names are the ids of FORMATS.md.
+        /// Every effect of a recording, each switched by its table. The names are the ids of docs/report.md.
         #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields, default)]
         pub struct EffectsConfig {

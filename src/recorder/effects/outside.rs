@@ -1,4 +1,4 @@
-//! What no id of FORMATS.md names, in the receiver and the converter.
+//! What no id of docs/report.md names, in the receiver and the converter.
 
 use std::f64::consts::TAU;
 

@@ -55,7 +55,7 @@ fn a_shared_converter_skews_and_mixes_and_remembers() {
 }
 
 #[test]
-fn the_room_blinks_and_sways_where_it_is_told_to() {
+fn static_returns_are_modulated_and_move_where_stated() {
     let place = |effect: fn([f64; 3], f64) -> Outside, at: [f64; 3]| with(effect(at, 0.5));
     let lamp = |position_m, radius_m| Outside::LampModulation { position_m, radius_m, rate_hz: 100.0, depth: 0.2 };
     let world = place(lamp, POINT_M);

@@ -31,7 +31,7 @@ pub struct Chain {
     spurs: Vec<Complex64>,
 }
 
-/// One crossing of another radar's chirp (I1).
+/// One crossing of another radar's chirp (`interference`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Burst {
     pub frame: usize,
@@ -65,7 +65,7 @@ pub fn bursts(world: &World) -> Vec<Burst> {
         .collect()
 }
 
-/// Offsets of R2, `[rx]`, relative to the peak sample.
+/// Offsets of `dc_offset`, `[rx]`, relative to the peak sample.
 pub fn offsets(world: &World) -> Vec<Complex64> {
     let Some(effect) = &world.effects.dc_offset else { return vec![] };
     let mut rng = world.random(Draw::Effect { id: super::DC_OFFSET, frame: 0 });
@@ -73,7 +73,7 @@ pub fn offsets(world: &World) -> Vec<Complex64> {
     world.radar.rx_m.iter().map(|_| Complex64::new(around(effect.i), around(effect.q))).collect()
 }
 
-/// Leakage of R1, `[tx, rx]`, relative to the peak sample.
+/// Leakage of `tx_leakage`, `[tx, rx]`, relative to the peak sample.
 pub fn leakage(world: &World) -> Vec<Complex64> {
     let Some(effect) = &world.effects.tx_leakage else { return vec![] };
     let mut rng = world.random(Draw::Effect { id: super::TX_LEAKAGE, frame: 0 });

@@ -16,13 +16,13 @@ use crate::recorder::world::World;
 
 /// A sinusoidal motion.
 #[derive(Clone, Copy, Debug)]
-pub struct Swing {
+pub struct SinusoidalMotion {
     pub amplitude_m: Vector,
     pub rate_hz: f64,
     pub phase_rad: f64,
 }
 
-impl Swing {
+impl SinusoidalMotion {
     pub fn position(&self, time_s: f64) -> Vector {
         scale(self.amplitude_m, (TAU * self.rate_hz * time_s + self.phase_rad).sin())
     }
@@ -33,11 +33,11 @@ impl Swing {
     }
 }
 
-/// I2.
-pub fn vibration(world: &World) -> Option<Swing> {
+/// `radar_vibration`.
+pub fn vibration(world: &World) -> Option<SinusoidalMotion> {
     let effect = world.effects.radar_vibration.as_ref()?;
     let phase_rad = world.phase(super::RADAR_VIBRATION, 0);
-    Some(Swing { amplitude_m: [0.0, effect.amplitude_m, 0.0], rate_hz: effect.frequency_hz, phase_rad })
+    Some(SinusoidalMotion { amplitude_m: [0.0, effect.amplitude_m, 0.0], rate_hz: effect.frequency_hz, phase_rad })
 }
 
 /// A point reflector with its own motion.
@@ -50,22 +50,22 @@ pub struct Mover {
 
 #[derive(Clone, Debug)]
 enum Track {
-    Swinging {
+    Oscillating {
         rest_m: Vector,
-        swing: Swing,
+        motion: SinusoidalMotion,
     },
     /// Weights of the vertices, `[(vertex, weight)]`.
     Carried(Vec<(usize, f64)>),
 }
 
-/// P2, P8 and what a hand carries. `level` is what their amplitudes are relative to.
+/// `moving_reflector`, `range_alias` and `carried_reflector`. `level` is what their amplitudes are relative to.
 pub fn movers(world: &World, body: Option<&MovingBody>, level: f64) -> Result<Vec<Mover>> {
     let effects = &world.effects;
     let centre = world.radar.centre_m();
     let at = |rest_m: Vector, axis: Vector, swing_m: f64, rate_hz: f64, phase_rad: f64, amplitude: f64| {
         let amplitude_m = scale(axis, swing_m / length(axis).max(1e-300));
         Mover {
-            place: Track::Swinging { rest_m, swing: Swing { amplitude_m, rate_hz, phase_rad } },
+            place: Track::Oscillating { rest_m, motion: SinusoidalMotion { amplitude_m, rate_hz, phase_rad } },
             amplitude: amplitude * level * distance(rest_m, centre).powi(2),
         }
     };
@@ -110,7 +110,7 @@ pub struct Stage<'a> {
     pub chirp: &'a Chirp,
     pub clock: &'a Clock,
     pub body: Option<&'a MovingBody>,
-    pub vibration: Option<&'a Swing>,
+    pub vibration: Option<&'a SinusoidalMotion>,
 }
 
 impl Mover {
@@ -134,10 +134,10 @@ impl Mover {
         for (Place { tx, rx, index }, chirp) in signal.chirps_mut() {
             let time_s = stage.clock.ramp_s(stage.radar, frame, tx, index) + stage.chirp.middle_s;
             let (position, velocity) = match &self.place {
-                Track::Swinging { rest_m, swing } => (add(*rest_m, swing.position(time_s)), swing.velocity(time_s)),
+                Track::Oscillating { rest_m, motion } => (add(*rest_m, motion.position(time_s)), motion.velocity(time_s)),
                 Track::Carried(_) => along(&nodes, time_s),
             };
-            let shake = stage.vibration.map_or([0.0; 3], |swing| swing.position(time_s));
+            let shake = stage.vibration.map_or([0.0; 3], |motion| motion.position(time_s));
             let leg = |antenna: Vector| {
                 let away = subtract(position, add(antenna, shake));
                 let range = length(away).max(1e-6);
@@ -166,7 +166,7 @@ fn along(nodes: &[(f64, Vector)], time_s: f64) -> (Vector, Vector) {
     (value(time_s), velocity)
 }
 
-/// Points that stand still (P1), with their amplitude at 1 m.
+/// Points of `static_reflector`, with their amplitude at 1 m.
 pub fn static_points(effects: &EffectsConfig, centre: Vector, level: f64) -> Vec<(Vector, Complex64)> {
     let amplitude = |point: &super::StaticReflector| point.amplitude * level * distance(point.position_m, centre).powi(2);
     effects.static_reflector.iter().map(|point| (point.position_m, amplitude(point).into())).collect()

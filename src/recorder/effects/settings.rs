@@ -1,4 +1,4 @@
-//! The settings of `[effects]`: one optional table per effect id of FORMATS.md, and `outside` for what no id names.
+//! The settings of `[effects]`: one optional table per effect id of docs/report.md, and `outside` for what no id names.
 //!
 //! Numbers carry their bounds, so that a mistake is named before anything is recorded. "Relative" means relative to the
 //! peak sample of the recording without effects.
@@ -89,44 +89,44 @@ fn along_x() -> [f64; 3] {
 settings! {
     // Waveform
 
-    /// W3: the ramp starts at f₀ (1 + relative).
+    /// The ramp starts at f₀ (1 + relative).
     StartFrequencyError { relative: f64 [-0.05, 0.05] }
-    /// W4: the ADC window opens later than stated.
+    /// The ADC window opens later than stated.
     AdcStartError { offset_s: f64 [-5.0e-6, 5.0e-6] }
-    /// W5: the ramp climbs by S (1 + relative).
+    /// The ramp climbs by S (1 + relative).
     SlopeError { relative: f64 [-0.2, 0.2] }
-    /// W6: a smooth quadratic and cubic error of the frequency over the ADC window, with this peak.
+    /// A smooth quadratic and cubic error of the frequency over the ADC window, with this peak.
     ChirpNonlinearity { peak_hz: f64 [-2.0e7, 2.0e7] }
-    /// W7: a periodic error of the frequency, deviation · cos(2π ripple t), alike in all chirps.
+    /// A periodic error of the frequency, deviation · cos(2π ripple t), alike in all chirps.
     ChirpRipple { deviation_hz: f64 [0.0, 5.0e6], ripple_hz: f64 [1.0e4, 2.0e6] }
-    /// W8: a random error of the frequency per chirp, as the phase it causes at 3 m, root mean square.
+    /// A random error of the frequency per chirp, as the phase it causes at 3 m, root mean square.
     PhaseNoise {
         per_chirp_rad: f64 [0.0, 1.0],
         /// Another one per frame.
         #[serde(default)] per_frame_rad: f64 [0.0, 1.0],
     }
-    /// W9: each ramp starts late by either nothing or this.
+    /// Each ramp starts late by either nothing or this.
     ChirpStartJitter { jitter_s: f64 [0.0, 1.0e-7] }
 
     // Receiver
 
-    /// R1: a short path from transmitters to receivers on the board, `relative` to the peak sample.
+    /// A short path from transmitters to receivers on the board, `relative` to the peak sample.
     TxLeakage {
         range_m: f64 [0.0, 1.0], relative: f64 [0.0, 100.0],
         /// Standard deviation of its level between channels.
         #[serde(default)] spread_db: f64 [0.0, 20.0],
     }
-    /// R2: relative to the peak sample; every receiver has its own within a third around it.
+    /// Relative to the peak sample; every receiver has its own within a third around it.
     DcOffset { i: f64 [-10.0, 10.0], q: f64 [-10.0, 10.0] }
-    /// R3: Q is stronger than I, and not at a right angle to it.
+    /// Q is stronger than I, and not at a right angle to it.
     IqImbalance { gain_db: f64 [-6.0, 6.0], phase_deg: f64 [-30.0, 30.0] }
-    /// R4: the part of its amplitude that the peak sample loses, by −κ|s|²s.
+    /// The part of its amplitude that the peak sample loses, by −κ|s|²s.
     Compression { level: f64 [0.0, 0.33] }
-    /// R4: the peak sample over the ADC's rail; above 1 it clips.
+    /// The peak sample over the ADC's rail; above 1 it clips.
     AdcSaturation { level: f64 [0.1, 20.0] }
-    /// R5: + κ s², of the peak sample relative to itself.
+    /// Adds κ s², of the peak sample relative to itself.
     SecondHarmonic { level_db: f64 [-120.0, 0.0] }
-    /// R7: `order` equal first-order sections.
+    /// `order` equal first-order sections.
     IfHighpass {
         corner_hz: f64 [1.0e3, 5.0e6],
         #[serde(default = "first_order")] order: usize [1.0, 4.0],
@@ -135,25 +135,25 @@ settings! {
         /// A multiplication of each chirp's DFT instead of a filter in time.
         #[serde(default)] circular: bool,
     }
-    /// R8: one pole.
+    /// One pole.
     IfLowpass { corner_hz: f64 [1.0e5, 1.0e9] }
     /// The intermediate frequency reaches the ADC late.
     IfDelay { delay_s: f64 [0.0, 2.0e-6] }
-    /// R9: the power falls by this over the ADC window, linearly in decibels.
+    /// The power falls by this over the ADC window, linearly in decibels.
     ChirpDroop { db: f64 [-20.0, 20.0] }
     /// A transient, alike in all chirps of a receiver, in the last samples of each, relative to the peak sample.
     RampEdgeTransient { samples: usize [1.0, 64.0], level_db: f64 [-120.0, 40.0] }
     /// The first chirps of each frame are weaker by `depth`, recovering over `chirps`.
     ChirpSettling { depth: f64 [0.0, 1.0], chirps: f64 [0.1, 1000.0] }
-    /// W10: the gain changes by this over the recording, linearly in decibels.
+    /// The gain changes by this over the recording, linearly in decibels.
     GainDrift { db: f64 [-20.0, 20.0] }
-    /// R12: a continuous tone at the intermediate frequency, relative to the peak sample.
+    /// A continuous tone at the intermediate frequency, relative to the peak sample.
     Spur {
         frequency_hz: f64 [-1.0e8, 1.0e8], level_db: f64 [-120.0, 40.0],
         /// It starts each chirp with the same phase.
         #[serde(default)] coherent: bool,
     }
-    /// I1: crossings of another radar's chirps, in so many chirps of the recording.
+    /// Crossings of another radar's chirps, in so many chirps of the recording.
     Interference {
         bursts: usize [1.0, 100000.0],
         /// To the peak sample.
@@ -164,87 +164,87 @@ settings! {
 
     // Antenna
 
-    /// C1: per receiver, or per channel with the receivers of the first transmitter first.
+    /// Per receiver, or per channel with the receivers of the first transmitter first.
     ChannelMismatch { gain_db: Vec<f64> [-20.0, 20.0], phase_deg: Vec<f64> [-360.0, 360.0] }
-    /// C2: per receiver, along x.
+    /// Per receiver, along x.
     AntennaPosition { offset_m: Vec<f64> [-0.1, 0.1] }
-    /// C3: power gain cos^q of every antenna.
+    /// Power gain cos^q of every antenna.
     AntennaPattern { exponent: f64 [0.0, 40.0] }
-    /// C4: of each receiver in its neighbours.
+    /// Of each receiver in its neighbours.
     MutualCoupling { level_db: f64 [-120.0, -3.0] }
 
     // Timing
 
-    /// G2: the body is recorded this much later in its motion than the radar's clock says.
+    /// The body is recorded this much later in its motion than the radar's clock says.
     ClockOffset { offset_s: f64 [-2.0, 2.0] }
-    /// G3: the motion's clock runs faster by this.
+    /// The motion's clock runs faster by this.
     ClockDrift { relative: f64 [-0.1, 0.1] }
-    /// G4: before frame `at`, so many frames are lost.
+    /// Before frame `at`, so many frames are lost.
     FrameDrop { at: usize [1.0, 1.0e9], count: usize [1.0, 1000.0] }
-    /// G5: each next transmitter fires this much later than its slot says.
+    /// Each next transmitter fires this much later than its slot says.
     TdmPhase { slot_s: f64 [-1.0e-2, 1.0e-2] }
 
     // Scene
 
-    /// G1: the body stands elsewhere: turned about the radar's vertical axis, then moved.
+    /// The body stands elsewhere: turned about the radar's vertical axis, then moved.
     PoseOffset { offset_m: [f64; 3] [-3.0, 3.0], #[serde(default)] yaw_deg: f64 [-90.0, 90.0] }
-    /// D1': a delay in the radar's hardware, as a range.
+    /// A delay in the radar's hardware, as a range.
     RangeBias { offset_m: f64 [-2.0, 2.0] }
-    /// P1: relative to the body's root mean square (without a body: to the peak sample).
+    /// Relative to the body's root mean square (without a body: to the peak sample).
     StaticReflector { position_m: [f64; 3] [-100.0, 100.0], amplitude: f64 [0.0, 1.0e3] }
-    /// P2: swings about its place; amplitude as for a static reflector.
+    /// Oscillates about its place; amplitude as for a static reflector.
     MovingReflector {
         position_m: [f64; 3] [-100.0, 100.0],
-        /// Direction of the swing; any length.
+        /// Direction of the motion; any length.
         #[serde(default = "along_x")] axis: [f64; 3] [-1.0e3, 1.0e3],
         swing_m: f64 [0.0, 5.0], rate_hz: f64 [0.0, 100.0], amplitude: f64 [0.0, 1.0e3],
     }
     /// A thing that moves with a joint of the body; amplitude as for a static reflector.
     CarriedReflector { body_part: String, amplitude: f64 [0.0, 1.0e3] }
-    /// I2: of the radar along its boresight.
+    /// Of the radar along its boresight.
     RadarVibration { amplitude_m: f64 [0.0, 1.0e-3], frequency_hz: f64 [0.0, 5.0e3] }
 
     // Propagation
 
-    /// P4 and, with `order` 2, P5: a wall that mirrors the body; its reflection coefficient.
+    /// A wall that mirrors the body; its reflection coefficient.
     WallGhost { boundary: Boundary, coefficient: f64 [-1.0, 1.0], #[serde(default = "first_order")] order: usize [1.0, 2.0] }
-    /// P6: two-ray propagation over the floor, both legs.
+    /// Two-ray propagation over the floor, both legs.
     FloorBounce { coefficient: f64 [-1.0, 1.0] }
-    /// R6: the board sends the scene's return into the scene again: `coefficient` is the second bounce over the first
+    /// The board sends the scene's return into the scene again: `coefficient` is the second bounce over the first
     /// where the first has the peak sample's level.
     ObjectRadarObject { coefficient: f64 [0.0, 1.0] }
-    /// P8: something beyond the unambiguous range; amplitude as for a static reflector.
+    /// Something beyond the unambiguous range; amplitude as for a static reflector.
     RangeAlias {
         range_m: f64 [0.0, 200.0], #[serde(default)] azimuth_deg: f64 [-90.0, 90.0], amplitude: f64 [0.0, 1.0e3],
-        /// It may swing along the line of sight.
+        /// It may oscillate along the line of sight.
         #[serde(default)] swing_m: f64 [0.0, 5.0], #[serde(default)] rate_hz: f64 [0.0, 100.0],
     }
-    /// T8: the body shadows the room behind it, with the soft edge of the first Fresnel zone.
+    /// The body shadows the room behind it, with the soft edge of the first Fresnel zone.
     SoftOcclusion {
         /// Width of the edge over that of the first Fresnel zone.
         #[serde(default = "unit")] width: f64 [0.05, 10.0],
     }
-    /// T9: the body's return once more, from `extra_m` farther.
+    /// The body's return once more, from `extra_m` farther.
     BodyMultibounce { extra_m: f64 [0.0, 5.0], #[serde(default = "third")] coefficient: f64 [-1.0, 1.0] }
 
     // Body
 
-    /// T1: the trunk's surface swells along its normals, ± amplitude.
+    /// The trunk's surface swells along its normals, ± amplitude.
     Breathing { rate_hz: f64 [0.0, 5.0], amplitude_m: f64 [0.0, 0.05] }
-    /// T2: the chest's front beats, twice per period in quick succession.
+    /// The chest's front beats, twice per period in quick succession.
     Heartbeat { rate_hz: f64 [0.0, 10.0], amplitude_m: f64 [0.0, 0.01] }
-    /// T3: one-way extra path of what a garment covers.
+    /// One-way extra path of what a garment covers.
     ClothingDelay { extra_m: f64 [0.0, 0.05], #[serde(default = "torso")] body_parts: Vec<String> }
-    /// T4: of the parts that belong to a joint.
+    /// Of the parts that belong to a joint.
     PartReflectivity { body_part: String, db: f64 [-60.0, 40.0] }
 
     // Noise
 
-    /// V2: density 1 + (knee/f)^power.
+    /// Density 1 + (knee/f)^power.
     ColouredNoise { knee_hz: f64 [0.0, 1.0e8], power: f64 [0.0, 4.0] }
-    /// V3: with this probability a sample's noise is `strength` times as strong.
+    /// With this probability a sample's noise is `strength` times as strong.
     ImpulsiveNoise { rate: f64 [0.0, 1.0], strength: f64 [1.0, 1.0e4] }
-    /// V4: the correlation between receivers.
+    /// The correlation between receivers.
     CorrelatedNoise { rho: f64 [0.0, 1.0] }
 }
 
@@ -256,7 +256,7 @@ fn third() -> f64 {
     0.3
 }
 
-/// An effect that no id of FORMATS.md names.
+/// An effect that no id of docs/report.md names.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Outside {
@@ -268,7 +268,7 @@ pub enum Outside {
     RxMuxSkew { fraction: f64 },
     /// What stands within `radius_m` of a place reflects with the light: 1 + depth · cos.
     LampModulation { position_m: [f64; 3], radius_m: f64, rate_hz: f64, depth: f64 },
-    /// The part of the walls within `radius_m` of a place sways along y.
+    /// The part of the walls within `radius_m` of a place oscillates along y.
     MovingCurtain { position_m: [f64; 3], radius_m: f64, rate_hz: f64, swing_m: f64 },
     /// The oscillator follows the signal: its phase turns by up to `peak_rad` with the strongest beat.
     LoPulling { peak_rad: f64 },

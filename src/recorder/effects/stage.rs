@@ -69,7 +69,7 @@ impl Stages {
         self.wide.adc_start_s
     }
 
-    /// T9: the body's return once more, delayed.
+    /// `body_multibounce`: the body's return once more, delayed.
     pub fn multibounce(&self, effects: &EffectsConfig, body: &mut Signal) {
         let Some(bounce) = &effects.body_multibounce else { return };
         let delay_s = 2.0 * bounce.extra_m / SPEED_OF_LIGHT;

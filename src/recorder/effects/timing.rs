@@ -30,7 +30,7 @@ impl Clock {
         radar.chirp_time_s(frame + skipped, tx, index) + tx as f64 * self.slot_s
     }
 
-    /// Time of the motion at a radar time (G2, G3).
+    /// Time of the motion at a radar time (`clock_offset`, `clock_drift`).
     pub fn motion_s(&self, time_s: f64) -> f64 {
         time_s * (1.0 + self.drift) + self.offset_s
     }

@@ -32,7 +32,7 @@ pub fn listed(world: &World) -> Vec<Value> {
     entries
 }
 
-/// What an effect drew, and its parameters in the other terms of FORMATS.md.
+/// What an effect drew, and its parameters in the terms of docs/report.md.
 fn drawn(world: &World, id: &str, index: usize) -> Value {
     let (effects, radar) = (&world.effects, &world.radar);
     let in_db = |factor: f64| 20.0 * factor.max(1e-300).log10();

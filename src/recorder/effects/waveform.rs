@@ -15,7 +15,8 @@ use crate::recorder::world::{Draw, World};
 /// Range at which phase noise is stated.
 const STATED_M: f64 = 3.0;
 
-/// The radar as it really is: W3, W4, W5, the delay of the IF (which opens the window earlier), and C2.
+/// The radar as it really is: errors of start frequency, ADC start and slope, the delay of the IF (which opens the window earlier),
+/// and displaced antennas.
 pub fn true_radar(radar: &Radar, effects: &EffectsConfig) -> Radar {
     let mut radar = radar.clone();
     radar.start_frequency_hz *= 1.0 + effects.start_frequency_error.as_ref().map_or(0.0, |e| e.relative);

@@ -33,12 +33,12 @@ struct Law {
 
 const NONE: Law = Law { power: 0.0, slow_s: 0.0 };
 
-/// What the training frames tell of a course.
+/// What the training frames say of a course.
 pub struct Course {
     law: Law,
-    /// Gain on the training frames against no course, and of all frames, each foretold by the others, nats.
+    /// Log-likelihood gain on the training frames against no course, and of all frames, each predicted by the others, nats.
     pub training: f64,
-    pub foretold: f64,
+    pub predicted: f64,
 }
 
 impl Course {
@@ -52,10 +52,10 @@ impl Course {
             .flat_map(|strength| SLOW_FRAMES.map(|slow| Law { power: strength * strength, slow_s: slow * frame_s }));
         let best = laws.map(|law| (law, of(law, frames.training) - none)).max_by(|a, b| a.1.total_cmp(&b.1));
         let (law, training) = best.filter(|(_, gain)| *gain > 0.0).unwrap_or((NONE, 0.0));
-        Self { law, training, foretold: frames.foretold(law, data) - frames.foretold(NONE, data) }
+        Self { law, training, predicted: frames.predicted(law, data) - frames.predicted(NONE, data) }
     }
 
-    /// Weights by which the training frames foretell every frame, `[frame, training frame]`.
+    /// Weights by which the training frames predict every frame, `[frame, training frame]`.
     pub fn weights(&self, frames: Frames, data: &Data) -> DMatrix<f64> {
         let (count, known) = (frames.times_s.len(), frames.training.len());
         let Some(inverse) = frames.covariance(self.law, data, frames.training).and_then(Cholesky::new) else {
@@ -108,7 +108,7 @@ impl Frames<'_> {
     }
 
     /// Log-likelihood of every frame, given all others.
-    fn foretold(&self, law: Law, data: &Data) -> f64 {
+    fn predicted(&self, law: Law, data: &Data) -> f64 {
         let all: Vec<usize> = (0..self.times_s.len()).collect();
         let Some(cholesky) = self.covariance(law, data, &all).and_then(Cholesky::new) else { return f64::NEG_INFINITY };
         let inverse = cholesky.inverse();
@@ -134,27 +134,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_slow_is_foretold_and_noise_is_not() {
+    fn what_is_slow_is_predicted_and_noise_is_not() {
         let times_s: Vec<f64> = (0..12).map(|frame| 0.1 * f64::from(frame)).collect();
         let (held_out, training): (Vec<usize>, Vec<usize>) = (0..12).partition(|frame| frame % 4 == 2);
         let frames = Frames { times_s: &times_s, training: &training, held_out: &held_out };
         let mut random = ChaCha8Rng::seed_from_u64(5);
-        let mut series = |swing: f64| -> Vec<f64> {
+        let mut series = |amplitude: f64| -> Vec<f64> {
             let noise = |_| -> f64 { StandardNormal.sample(&mut random) };
-            times_s.iter().map(|time| 7.0 + swing * (4.0 * time).sin()).zip((0..12).map(noise)).map(|(a, b)| a + b).collect()
+            times_s.iter().map(|time| 7.0 + amplitude * (4.0 * time).sin()).zip((0..12).map(noise)).map(|(a, b)| a + b).collect()
         };
         let mut gains = vec![];
-        for swing in [0.0, 4.0] {
-            let series = [series(swing), series(swing)];
+        for amplitude in [0.0, 4.0] {
+            let series = [series(amplitude), series(amplitude)];
             let data = Data { series: &series, numbers: 2.0, noise: &[1.0; 12] };
             let course = Course::new(frames, &data);
-            gains.push([course.training, course.foretold]);
+            gains.push([course.training, course.predicted]);
             let weights = course.weights(frames, &data);
             let values = DVector::from_iterator(training.len(), training.iter().map(|&frame| series[0][frame] - 7.0));
-            let foretold = weights * values;
+            let predicted = weights * values;
             for &frame in &held_out {
-                let wanted = swing * (4.0 * times_s[frame]).sin();
-                assert!((foretold[frame] - wanted).abs() < 1.5, "{swing} {frame}: {} for {wanted}", foretold[frame]);
+                let wanted = amplitude * (4.0 * times_s[frame]).sin();
+                assert!((predicted[frame] - wanted).abs() < 1.5, "{amplitude} {frame}: {} for {wanted}", predicted[frame]);
             }
         }
         assert!(gains[0][0] < 3.0 && gains[0][1] < 1.0, "{gains:?}");

@@ -1,4 +1,4 @@
-//! What stands still, frame by frame, and what all of it does together.
+//! Static clutter, frame by frame, and what all of it does together.
 
 use num_complex::Complex64;
 
@@ -208,9 +208,9 @@ impl Series {
         })
     }
 
-    /// What the courses gain in all frames, each foretold by the others, nats.
+    /// Log-likelihood gain of the courses in all frames, each predicted by the others, nats.
     pub fn gain(&self, frames: Frames) -> f64 {
-        self.courses(frames).iter().map(|course| course.foretold).sum()
+        self.courses(frames).iter().map(|course| course.predicted).sum()
     }
 
     /// Whether the share of a return that is seen past the body, `[frame]`, explains the change, also in frames that the

@@ -58,7 +58,7 @@ impl Sums {
         self.products[rx * self.receivers() + rx].re
     }
 
-    /// How far aside the body is seen (as a sine), its range, and how much this frame tells of it.
+    /// How far aside the body is seen (as a sine), its range, and how much information this frame has of it.
     pub fn sine(&self, radar: &Radar) -> [f64; 3] {
         let (places, wave) = (along(radar), TAU / radar.wavelength_m());
         let sum = |of: &dyn Fn(usize) -> f64| (1..places.len()).map(|rx| self.cross(rx).norm() * of(rx)).sum::<f64>();
@@ -93,14 +93,14 @@ impl Bearing {
     }
 }
 
-/// What receivers hear of the body.
-pub struct Heard {
+/// What the receivers observe of the body.
+pub struct Observed {
     training: Vec<Sums>,
     held_out: Vec<Sums>,
     pub array: Array,
 }
 
-impl Heard {
+impl Observed {
     /// None for a single receiver, and where the body fills too few cells.
     pub fn new(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction) -> Option<Self> {
         if evidence.radar.rx_m.len() < 2 {
@@ -128,7 +128,7 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     if accepted(slow::channels::BEHAVES_LIKE) || accepted("antenna_position") {
         return vec![];
     }
-    let Some(Heard { training, held_out, array }) = Heard::new(evidence, model, body) else { return vec![] };
+    let Some(Observed { training, held_out, array }) = Observed::new(evidence, model, body) else { return vec![] };
     let bearing = array.bearing;
     if let Some(candidate) = differ(evidence, &array, displaced) {
         return vec![candidate];
@@ -149,15 +149,15 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
 /// The way in which the receivers differ, if they do.
 fn differ(evidence: &Evidence, array: &Array, displaced: bool) -> Option<Candidate> {
     let accepted = |id: &str| evidence.accepted.contains(&id);
-    // What receivers hear in common says nothing of them where the body is not what they hear; and those that differed were
+    // What is common to the receivers says nothing of them where it is not the body's; and those that differed were
     // brought to the first one's, a neighbour's part included.
     let alike = !displaced && !accepted("channel_mismatch");
-    let heard = alike && !accepted("mutual_coupling");
-    let coupled = if heard { coupling::find(evidence, array) } else { None };
+    let may_couple = alike && !accepted("mutual_coupling");
+    let coupled = if may_couple { coupling::find(evidence, array) } else { None };
     let differ = [
         if alike { mismatch::find(evidence, array) } else { None },
         if displaced { None } else { places::find(evidence, array) },
-        if heard { coupling::one_way(evidence, array, coupled.as_ref()) } else { None },
+        if may_couple { coupling::one_way(evidence, array, coupled.as_ref()) } else { None },
         coupled,
     ];
     best(differ.into_iter().flatten().collect())
@@ -172,7 +172,7 @@ pub struct Found {
     pub explains_all: bool,
 }
 
-/// Of what is unlikely to be chance, what foretells held-out frames best; what does so nearly as well looks alike. A coupling
+/// Of what is unlikely to be chance, what predicts held-out frames best; what does so nearly as well looks alike. A coupling
 /// comes before any gains and phases where it leaves the receivers alike: few that differ in any other way look like that.
 fn best(mut found: Vec<Found>) -> Option<Candidate> {
     found.retain(|found| found.candidate.p_value < UNEVEN && found.candidate.gain > 0.0);
@@ -216,7 +216,7 @@ fn tail(t: f64, freedom: f64) -> f64 {
     if t <= 0.0 { 1.0 } else { StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| 2.0 * law.sf(t)) }
 }
 
-/// None where the body fills too few cells. `still`: power of what stands still, by range.
+/// None where the body fills too few cells. `still`: power of static clutter, by range.
 fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &[f64], frame: usize) -> Option<Sums> {
     let radar = &evidence.radar;
     let (receivers, transmitters) = (radar.rx_m.len(), radar.tx_m.len());
@@ -244,7 +244,7 @@ fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &
     let mut steered = vec![Complex64::ZERO; receivers];
     for (maps, noise) in maps.chunks_exact(receivers).zip(noise.chunks_exact(receivers)) {
         for (index, &cell) in cells.iter().enumerate() {
-            // A cell tells as much as any other about what its receivers have in common, however loud its speckle is.
+            // A cell has as much information as any other about what its receivers have in common, however strong its speckle is.
             let power = (0..receivers).map(|rx| maps[rx][cell].norm_sqr() / noise[rx].max(f64::MIN_POSITIVE)).sum::<f64>()
                 / receivers as f64;
             let weight = 1.0 / ((power + f64::from(LEAST_POWER)) * noise[0].max(f64::MIN_POSITIVE));
@@ -354,7 +354,7 @@ mod tests {
 
     #[test]
     fn receivers_that_differ_are_told_with_their_gains_and_phases() {
-        // Slightly, and so much that no straight line tells it.
+        // Slightly, and so much that it is not linear.
         for scale in [1.0, 4.0] {
             let [gains, phases] =
                 [[0.0, -0.10, 0.06, 0.04], [0.0, 0.06, -0.04, 0.02]].map(|of| of.map(|value: f64| value * scale));
@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn a_coupling_is_told_with_its_level() {
+    fn a_coupling_is_estimated_with_its_level() {
         for level in [0.05, 0.2] {
             let strength = Complex64::from_polar(level, 1.1);
             let array = DMatrix::from_fn(4, 4, |i: usize, j| match i.abs_diff(j) {

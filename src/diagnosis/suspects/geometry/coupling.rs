@@ -1,4 +1,4 @@
-//! Receivers that hear their neighbours (card C4): the inner ones have two of them, the outer ones one.
+//! Mutual coupling of neighbouring receivers: the inner ones have two neighbours, the outer ones one.
 
 use std::sync::Arc;
 
@@ -20,15 +20,15 @@ const STRONGEST: f64 = 0.5;
 /// that a coupling makes with a probability of 1 %.
 const BY_CHANCE: f64 = 0.1;
 
-/// What a receiver hears of the one before it and of the one after it.
-type Heard = [Complex64; 2];
+/// Coupling into a receiver from the one before it and from the one after it.
+type Coupling = [Complex64; 2];
 
 /// The coupling of all neighbours alike.
 pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
-    let (found, heard) = estimate(array, &[&[0, 2], &[1, 3]])?;
-    let mut candidate = candidate(evidence, heard[0], &found);
+    let (found, coupling) = estimate(array, &[&[0, 2], &[1, 3]])?;
+    let mut candidate = candidate(evidence, coupling[0], &found);
     let before = mismatch::left(array, &array.looks).map_or(0.0, |before| before.square);
-    let after = mismatch::left(array, &looks_alone(array, heard)?);
+    let after = mismatch::left(array, &looks_alone(array, coupling)?);
     // Any receivers may look like that by chance, if not to the last digit.
     if after.as_ref().is_some_and(|after| after.square > BY_CHANCE * before) {
         candidate.look_alikes.push("channel_mismatch");
@@ -37,15 +37,15 @@ pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
     Some(Found { candidate, likelihood: found.likelihood, explains_all })
 }
 
-/// Receivers that hear only the neighbour on one side, which no coupling of antennas does: it has no name. None where neighbours
-/// that hear one another `alike` foretell held-out frames nearly as well, where the two sides may not differ, or where the receivers
-/// are not alike without it.
+/// Receivers that are coupled to the neighbour on one side only, which no coupling of antennas does: it has no name. None where
+/// neighbours that are coupled to one another `alike` predict held-out frames nearly as well, where the two sides may not differ,
+/// or where the receivers are not alike without it.
 pub fn one_way(evidence: &Evidence, array: &Array, alike: Option<&Found>) -> Option<Found> {
     let either = ["before", "after"].into_iter().enumerate().filter_map(|(index, side)| {
-        let (found, heard) = estimate(array, &[&[2 * index], &[2 * index + 1]])?;
-        Some((side, heard[index], found, heard))
+        let (found, coupling) = estimate(array, &[&[2 * index], &[2 * index + 1]])?;
+        Some((side, coupling[index], found, coupling))
     });
-    let (side, strength, found, heard) = either.max_by(|a, b| a.2.likelihood.total_cmp(&b.2.likelihood))?;
+    let (side, strength, found, coupling) = either.max_by(|a, b| a.2.likelihood.total_cmp(&b.2.likelihood))?;
     if alike.is_some_and(|alike| alike.likelihood > found.likelihood - AS_WELL) {
         return None;
     }
@@ -55,58 +55,58 @@ pub fn one_way(evidence: &Evidence, array: &Array, alike: Option<&Found>) -> Opt
         number if number == part + 2 => -1.0,
         _ => 0.0,
     });
-    let after = mismatch::left(array, &looks_alone(array, heard)?);
+    let after = mismatch::left(array, &looks_alone(array, coupling)?);
     if both.chance(&difference) > UNEVEN || after.is_some_and(|after| after.p_value < UNEVEN) {
         return None;
     }
     let neighbours = candidate(evidence, strength, &found);
     let candidate = Candidate {
         id: None,
-        behaves_like: "receivers that hear the neighbour on one side",
+        behaves_like: "receivers that are coupled to the neighbour on one side",
         statement: format!(
-            "Each receiver also hears the one {side} it, {:.1} dB below, and not the one on its other side: neighbours that couple \
-             would hear one another alike.",
+            "Each receiver also receives the signal of the one {side} it, {:.1} dB below its own, and not that of the one on \
+             its other side: antennas that couple would do so alike to both sides.",
             -20.0 * strength.norm().log10()
         ),
         energy: 0.5 * neighbours.energy,
-        correction: uncoupled(evidence.radar.rx_m.len(), heard),
+        correction: uncoupled(evidence.radar.rx_m.len(), coupling),
         look_alikes: vec![],
         ..neighbours
     };
     Some(Found { candidate, likelihood: found.likelihood, explains_all: false })
 }
 
-/// `shared`: for every number that is sought, the parts of [`Numbers::heard`](super::covariance::Numbers::heard) that it is.
-fn estimate(array: &Array, shared: &[&[usize]]) -> Option<(Estimated, Heard)> {
+/// `shared`: for every number that is sought, the parts of [`Numbers::coupling`](super::covariance::Numbers::coupling) that it is.
+fn estimate(array: &Array, shared: &[&[usize]]) -> Option<(Estimated, Coupling)> {
     let numbers = array.cells.numbers();
-    // Of two receivers, each hears the other.
+    // Of two receivers, each has one neighbour.
     if numbers.receivers < 3 {
         return None;
     }
     let mut directions = DMatrix::zeros(numbers.count(), shared.len());
     for (column, parts) in shared.iter().enumerate() {
-        parts.iter().for_each(|&part| directions[(numbers.heard(part), column)] = 1.0);
+        parts.iter().for_each(|&part| directions[(numbers.coupling(part), column)] = 1.0);
     }
-    let heard = |at: &DVector<f64>| -> Heard {
+    let coupling = |at: &DVector<f64>| -> Coupling {
         let all = &directions * at;
-        [0, 2].map(|part| Complex64::new(all[numbers.heard(part)], all[numbers.heard(part + 1)]))
+        [0, 2].map(|part| Complex64::new(all[numbers.coupling(part)], all[numbers.coupling(part + 1)]))
     };
-    // As much for what all hear alike, however many numbers that is.
+    // As much for a coupling that is alike for all, however many numbers that is.
     let floors: Vec<f64> = shared.iter().map(|parts| FLOOR * (2.0 / parts.len() as f64).sqrt()).collect();
     let found = Estimated::converged(&array.looks, &directions, &floors, |at| {
-        if at.norm() > STRONGEST { None } else { looks_alone(array, heard(at)) }
+        if at.norm() > STRONGEST { None } else { looks_alone(array, coupling(at)) }
     })?;
-    let heard = heard(&found.values);
-    Some((found, heard))
+    let coupling = coupling(&found.values);
+    Some((found, coupling))
 }
 
-/// What is left of the receivers' looks without what they heard of one another. None where that cannot be told.
-fn looks_alone(array: &Array, heard: Heard) -> Option<Vec<Vec<Look>>> {
-    Some(array.looks_after(&alone(array.cells.numbers().receivers, heard)?))
+/// What is left of the receivers' looks without their coupling. None where that is not estimable.
+fn looks_alone(array: &Array, coupling: Coupling) -> Option<Vec<Vec<Look>>> {
+    Some(array.looks_after(&alone(array.cells.numbers().receivers, coupling)?))
 }
 
-/// What makes of what receivers heard what they would have heard alone. None where that cannot be told.
-fn alone(receivers: usize, [before, after]: Heard) -> Option<DMatrix<Complex64>> {
+/// What makes of the coupled signals of the receivers those without coupling. None where that is singular.
+fn alone(receivers: usize, [before, after]: Coupling) -> Option<DMatrix<Complex64>> {
     let coupled = DMatrix::from_fn(receivers, receivers, |row, column| match row as isize - column as isize {
         0 => Complex64::ONE,
         1 => before,
@@ -134,8 +134,9 @@ fn candidate(evidence: &Evidence, strength: Complex64, found: &Estimated) -> Can
         // Of three receivers only the middle one is odd.
         look_alikes: if receivers < 4 { vec!["channel_mismatch"] } else { vec![] },
         statement: format!(
-            "Each receiver also hears its neighbours, {:.1} dB below them and {:.0}° ahead: the inner receivers, which have two \
-             neighbours, differ from the outer ones, which have one, in the way that every direction of the body predicts.",
+            "Each receiver also receives its neighbours' signals, {:.1} dB below them and {:.0}° ahead: the inner receivers, which \
+             have two neighbours, differ from the outer ones, which have one, in the way that every direction of the body \
+             predicts.",
             -level_db,
             strength.arg().to_degrees()
         ),
@@ -145,23 +146,23 @@ fn candidate(evidence: &Evidence, strength: Complex64, found: &Estimated) -> Can
     }
 }
 
-fn uncoupled(receivers: usize, heard: Heard) -> Correction {
+fn uncoupled(receivers: usize, coupling: Coupling) -> Correction {
     // Of the real and the imaginary part.
-    let stretched = alone(receivers, heard).map_or(0.0, |inverse| 2.0 * inverse.determinant().norm().ln() / receivers as f64);
-    Correction::Inverse(Arc::new(move |cube| undo(cube, heard)), Volume { alike: stretched, ..Volume::KEPT })
+    let stretched = alone(receivers, coupling).map_or(0.0, |inverse| 2.0 * inverse.determinant().norm().ln() / receivers as f64);
+    Correction::Inverse(Arc::new(move |cube| undo(cube, coupling)), Volume { alike: stretched, ..Volume::KEPT })
 }
 
-/// Solves for what the receivers would have heard alone.
-fn undo(cube: &mut Cube, heard: Heard) {
+/// Solves for the signals without coupling.
+fn undo(cube: &mut Cube, coupling: Coupling) {
     let [_, _, receivers, loops, samples] = cube.dims;
-    let Some(inverse) = alone(receivers, heard) else { return };
+    let Some(inverse) = alone(receivers, coupling) else { return };
     let length = loops * samples;
-    let mut heard = vec![Complex64::ZERO; receivers];
+    let mut received = vec![Complex64::ZERO; receivers];
     for block in cube.samples.chunks_exact_mut(receivers * length) {
         for at in 0..length {
-            heard.iter_mut().enumerate().for_each(|(rx, value)| *value = block[rx * length + at]);
+            received.iter_mut().enumerate().for_each(|(rx, value)| *value = block[rx * length + at]);
             for rx in 0..receivers {
-                block[rx * length + at] = heard.iter().enumerate().map(|(other, value)| inverse[(rx, other)] * value).sum();
+                block[rx * length + at] = received.iter().enumerate().map(|(other, value)| inverse[(rx, other)] * value).sum();
             }
         }
     }

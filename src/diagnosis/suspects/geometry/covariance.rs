@@ -1,8 +1,8 @@
-//! What the receivers hear of the body in common, cell by cell, and how an array that is not as declared changes that.
+//! What the receivers observe of the body in common, cell by cell, and how an array that is not as declared changes that.
 //!
 //! What a cell of range and Doppler holds of the body is speckle: a Gaussian field over the receivers whose covariance comes
 //! from the directions of the points in that cell, which are predicted, and from a power that is not. Where these points lie
-//! close together the receivers hear nearly the same, and what an array changes shows in the little that they do not have in
+//! close together the receivers observe nearly the same, and what an array changes shows in the little that they do not have in
 //! common. So every cell counts with the information that its own covariance has (scores and Fisher's information of a
 //! complex Gaussian law), not like any other.
 
@@ -21,7 +21,7 @@ use crate::radar::Radar;
 
 /// Expected power over the noise, noise included, from which on a cell is used.
 const LEAST_POWER: f32 = 3.0;
-/// Share of what stands still that may be left at low Doppler when it was taken out.
+/// Share of the static returns that may be left at low Doppler when they were taken out.
 const STILL_LEFT: f64 = 1e-3;
 /// Fewest cells of a frame.
 const FEWEST_CELLS: usize = 10;
@@ -30,11 +30,11 @@ const GROUP_CELLS: usize = 8;
 const MOST_GROUPS: usize = 6;
 /// Ranges that what hardly moves is taken together of.
 const STILL_RANGES: usize = 2;
-/// Share of a cell's power that every receiver hears for itself: what the prediction does not know of the directions.
+/// Share of a cell's power that is independent from receiver to receiver: what the prediction does not know of the directions.
 const OWN_SHARE: f64 = 0.005;
 
 /// The numbers that an array may differ by, one after the other: logarithmic gains, phases, and displacements along x in radian per
-/// unit of the sine, of every receiver; real and imaginary part of what each hears of the one before it, and of the one after it.
+/// unit of the sine, of every receiver; real and imaginary part of the coupling from the one before, and from the one after.
 #[derive(Clone, Copy, Debug)]
 pub struct Numbers {
     pub receivers: usize,
@@ -58,7 +58,7 @@ impl Numbers {
     }
 
     /// Of the one before, then of the one after; real, then imaginary part.
-    pub fn heard(self, part: usize) -> usize {
+    pub fn coupling(self, part: usize) -> usize {
         3 * self.receivers + part
     }
 
@@ -83,8 +83,8 @@ impl Numbers {
         DMatrix::from_columns(&changes)
     }
 
-    /// Orthonormal directions among some kinds of these numbers, each told by its first one, that no such change has a part in.
-    /// `[number, direction]`, one kind after the other.
+    /// Orthonormal directions among some kinds of these numbers, each identified by its first one, that no such change has a part
+    /// in. `[number, direction]`, one kind after the other.
     pub fn own(self, radar: &Radar, kinds: &[usize]) -> DMatrix<f64> {
         let of_the_body = self.of_the_body(radar);
         let columns: Vec<DVector<f64>> = kinds
@@ -129,7 +129,7 @@ pub struct Group {
 #[derive(Clone, Debug)]
 pub struct Cell {
     /// By transmitter, `[rx]`.
-    pub heard: Vec<DVector<Complex64>>,
+    pub observed: Vec<DVector<Complex64>>,
     /// What the body is expected to have, `[rx, rx]`, the second one conjugated.
     pub expected: DMatrix<Complex64>,
     /// The same, every point weighted with the sine of its direction.
@@ -153,7 +153,7 @@ impl Array {
         Self { cells, bearing, back, looks }
     }
 
-    /// What undoes a difference between receivers, `[rx, rx]`, applied to what they heard.
+    /// What undoes a difference between receivers, `[rx, rx]`, applied to what they observed.
     pub fn looks_after(&self, undo: &DMatrix<Complex64>) -> Vec<Vec<Look>> {
         self.cells.looks(&(&self.back * undo))
     }
@@ -168,7 +168,7 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// `still`: power of what stands still, by range.
+    /// `still`: power of the static returns, by range.
     pub fn new(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &[f64]) -> Self {
         let radar = &evidence.radar;
         let noise = evidence.noise();
@@ -189,7 +189,7 @@ impl Cells {
         Numbers { receivers: self.radar.rx_m.len() }
     }
 
-    /// By frame and group, after what the receivers heard was multiplied by a matrix `[rx, rx]`.
+    /// By frame and group, after what the receivers observed was multiplied by a matrix `[rx, rx]`.
     pub fn looks(&self, undo: &DMatrix<Complex64>) -> Vec<Vec<Look>> {
         let of_the_body = self.numbers().of_the_body(&self.radar);
         // What the matrix makes of independent noise has neighbours in common; that is little.
@@ -225,7 +225,7 @@ pub fn used(evidence: &Evidence, model: &PowerModel, still: &[f64], frame: usize
     let expected = model.expected(frame);
     let map = &evidence.maps()[frame * model.size()..(frame + 1) * model.size()];
     let samples = evidence.cube.dims[4];
-    // A body that hardly moves is known by what it leaves of itself where what stands still was taken out.
+    // A body that hardly moves is known by what it leaves of itself where static clutter was taken out.
     let of_the_body = |cell: usize| model.usable()[cell] || f64::from(map[cell]) > STILL_LEFT * still[cell % samples];
     let used: Vec<usize> = (0..model.size()).filter(|&cell| expected[cell] > least && of_the_body(cell)).collect();
     (used.len() >= FEWEST_CELLS).then_some(used)
@@ -275,13 +275,13 @@ fn cells(
     }
     let maps: Vec<_> = (0..evidence.cube.channels()).map(|channel| evidence.range_doppler(frame, channel)).collect();
     let scale = 1.0 / noise.max(f64::MIN_POSITIVE).sqrt();
-    let heard = |cell: usize| {
+    let observed = |cell: usize| {
         maps.chunks_exact(receivers).map(|maps| DVector::from_fn(receivers, |rx, _| maps[rx][cell] * scale)).collect()
     };
     let mut parts = [vec![], vec![]];
     for (&cell, [expected, aslant]) in used.iter().zip(sums) {
         let part = usize::from(!model.usable()[cell]);
-        parts[part].push((cell % samples, Cell { heard: heard(cell), expected, aslant }));
+        parts[part].push((cell % samples, Cell { observed: observed(cell), expected, aslant }));
     }
     parts
 }
@@ -304,16 +304,16 @@ fn add(cell: &Cell, undo: &DMatrix<Complex64>, noise: &[f64], numbers: Numbers, 
         let value = cell.expected[(i, j)] * (1.0 - OWN_SHARE) + if i == j { own } else { 0.0 };
         value * (white[i] * white[j])
     });
-    let heard: Vec<DVector<Complex64>> = cell
-        .heard
+    let observed: Vec<DVector<Complex64>> = cell
+        .observed
         .iter()
-        .map(|heard| {
-            let mut heard = undo * heard;
-            heard.iter_mut().zip(&white).for_each(|(value, white)| *value *= *white);
-            heard
+        .map(|observed| {
+            let mut observed = undo * observed;
+            observed.iter_mut().zip(&white).for_each(|(value, white)| *value *= *white);
+            observed
         })
         .collect();
-    look.add(shape, &heard, |level, body| {
+    look.add(shape, &observed, |level, body| {
         let aslant = DMatrix::from_fn(receivers, receivers, |i, j| cell.aslant[(i, j)] * (level * white[i] * white[j]));
         changes(body, &aslant, &white, numbers)
     });
@@ -333,13 +333,13 @@ fn changes(body: &DMatrix<Complex64>, aslant: &DMatrix<Complex64>, white: &[f64]
         array[(rx, rx)] = value;
         by(array)
     };
-    // A receiver farther along x hears what comes from there earlier.
+    // A receiver farther along x receives what comes from there earlier.
     let moved = |rx: usize| {
         DMatrix::from_fn(receivers, receivers, |i, j| {
             aslant[(i, j)] * -Complex64::I * (f64::from(u8::from(i == rx)) - f64::from(u8::from(j == rx)))
         })
     };
-    let hears = |step: isize, value: Complex64| {
+    let coupled = |step: isize, value: Complex64| {
         by(DMatrix::from_fn(receivers, receivers, |i, j| {
             if i as isize == j as isize + step { value * (white[i] / white[j]) } else { Complex64::ZERO }
         }))
@@ -348,12 +348,12 @@ fn changes(body: &DMatrix<Complex64>, aslant: &DMatrix<Complex64>, white: &[f64]
         .map(|rx| alone(rx, Complex64::ONE))
         .chain((0..receivers).map(|rx| alone(rx, Complex64::I)))
         .chain((0..receivers).map(moved))
-        .chain([1, -1].into_iter().flat_map(|step| [hears(step, Complex64::ONE), hears(step, Complex64::I)]))
+        .chain([1, -1].into_iter().flat_map(|step| [coupled(step, Complex64::ONE), coupled(step, Complex64::I)]))
         .collect()
 }
 
 /// A body that walks across in front of four receivers half a wavelength apart, a little beside where it is predicted. What comes
-/// from a sine reaches a receiver `turned`, and the receivers hear `array` times that.
+/// from a sine reaches a receiver `turned`, and the receivers observe `array` times that.
 #[cfg(test)]
 pub fn walking(seed: u64, turned: impl Fn(usize, f64) -> Complex64, array: &DMatrix<Complex64>) -> Cells {
     use rand::{RngExt, SeedableRng};
@@ -367,7 +367,7 @@ pub fn walking(seed: u64, turned: impl Fn(usize, f64) -> Complex64, array: &DMat
     let mut cell = |middle: f64, aside: f64| {
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
         let [mut expected, mut aslant] = [(); 2].map(|()| DMatrix::zeros(receivers, receivers));
-        let mut heard = DVector::from_fn(receivers, |_, _| Complex64::new(normal(), normal()) * 0.5f64.sqrt());
+        let mut observed = DVector::from_fn(receivers, |_, _| Complex64::new(normal(), normal()) * 0.5f64.sqrt());
         let mut field = DVector::zeros(receivers);
         for _ in 0..8 {
             let power: f64 = 10.0;
@@ -380,8 +380,8 @@ pub fn walking(seed: u64, turned: impl Fn(usize, f64) -> Complex64, array: &DMat
             let real = from(sine + aside);
             field += DVector::from_fn(receivers, |rx, _| amplitude * real[rx] * turned(rx, sine + aside));
         }
-        heard += array * field;
-        Cell { heard: vec![heard], expected, aslant }
+        observed += array * field;
+        Cell { observed: vec![observed], expected, aslant }
     };
     let mut errors = rand_chacha::ChaCha8Rng::seed_from_u64(seed + 1000);
     let frames = (0..12)

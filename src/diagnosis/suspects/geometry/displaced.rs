@@ -115,7 +115,7 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
     let Some(best) = (0..fitted.len()).max_by(|&a, &b| gain(&fitted[a]).total_cmp(&gain(&fitted[b]))) else { return vec![] };
     let best_fit = &fitted[best];
     let p_value = p_value(best_fit, &null, training);
-    let held_out = foretold(trial, best_fit, &null) / best_fit.inflation;
+    let held_out = predicted(trial, best_fit, &null) / best_fit.inflation;
     // What may be nothing by its own interval is nothing.
     let nothing = best_fit.value.abs() < 1.645 * deviation(trial, best_fit);
     if p_value > 0.05 || held_out <= 0.0 || nothing {
@@ -228,18 +228,18 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
     Some(Fitted { id: "frame_drop", value: count as f64, deviation: 0.0, floor: 0.0, inflation: STEP_INFLATION, score })
 }
 
-/// What frames gain that did not tell the change: the held-out ones. Where the motion is known in none of these after a step, the
-/// training frames with the weights of the body as it was.
-fn foretold(trial: &Trial, fit: &Fitted, null: &Score) -> f64 {
+/// Log-likelihood gain of frames from which the change was not estimated: the held-out ones. Where the motion is known in none of
+/// these after a step, the training frames with the weights of the body as it was.
+fn predicted(trial: &Trial, fit: &Fitted, null: &Score) -> f64 {
     let held_out = &trial.evidence.split.held_out;
     let Change::Drop { at, .. } = fit.score.change else { return fit.score.gain_over(null, held_out) };
     let known = |frames: &[usize]| -> Vec<usize> {
         frames.iter().copied().filter(|&frame| frame < at || fit.score.known[frame]).collect()
     };
     let after = |frames: &[usize]| frames.iter().any(|&frame| frame >= at);
-    let told = known(held_out);
-    if after(&told) || !after(held_out) {
-        return fit.score.gain_over(null, &told);
+    let unseen = known(held_out);
+    if after(&unseen) || !after(held_out) {
+        return fit.score.gain_over(null, &unseen);
     }
     let training = known(&trial.evidence.split.training);
     trial.score(fit.score.change, &training, false).gain_over(null, &training)
@@ -271,7 +271,7 @@ fn most_lost(frames: usize) -> usize {
 
 /// A rule of thumb: a ratio of likelihoods of fixed laws would exceed e^x by chance with probability e^-x at most, and the
 /// weights that are fitted here are the same in number with and without the step. On 150 recordings without anything
-/// missing (two sealed sets that had been opened) the largest gain was 1.2 nats; from 30 on this is below 0.01.
+/// missing (two sealed sets that had been opened) the largest log-likelihood gain was 1.2 nats; from 30 on this is below 0.01.
 fn step_p_value(gain: f64, frames: usize) -> f64 {
     ratio_p_value(gain, STEP_INFLATION, (most_lost(frames) * frames).max(1) as f64)
 }

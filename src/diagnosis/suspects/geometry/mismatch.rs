@@ -1,4 +1,4 @@
-//! Receivers whose gains and phases differ (card C1), told from all that they hear of the body.
+//! Receivers whose gains and phases differ, estimated from all that they observe of the body.
 //!
 //! Phases that grow with the receivers' places are a direction, and might as well be the body's; anything else, and any
 //! difference of gain, cannot be.
@@ -21,7 +21,7 @@ const GAIN_FLOOR_DB: f64 = 0.05;
 const PHASE_FLOOR_RAD: f64 = 0.3 * PI / 180.0;
 /// How well the direction of the body is known, as a sine.
 const BEARING_FLOOR: f64 = 0.005;
-/// Beyond, nothing is told.
+/// Beyond, nothing is reported.
 const LARGEST: f64 = 3.0;
 
 /// Gains and phases that no body makes, `[number, direction]`, and what errors of the prediction do to each.

@@ -13,7 +13,7 @@ mod standing;
 mod trial;
 
 use change::Moves;
-use channels::Heard;
+use channels::Observed;
 use trial::Trial;
 
 use nalgebra::DVector;
@@ -30,7 +30,7 @@ const DISPLACED: f64 = 1e-3;
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(model) = evidence.power() else { return vec![] };
     let Some(body) = evidence.body.as_ref() else { return vec![] };
-    // Beside a stranger that outshines the body, the body's place and time cannot be told.
+    // Beside another mover that is stronger than the body, the body's place and time are not estimable.
     let outshone = evidence.accepted.contains(&OVER_THE_BODY);
     let mut found = if outshone { vec![] } else { displaced::find(&Trial::new(evidence, model, body)) };
     let displaced = found.iter().any(|found| found.p_value < DISPLACED && found.gain > 0.0);
@@ -38,18 +38,19 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     found
 }
 
-/// Chance that phases between receivers that are alike, beside directions, look as uneven. None without a body that is heard well enough.
+/// Chance that phases between receivers that are alike, beside directions, look as uneven. None without a body that is observed at
+/// a sufficient SNR.
 pub fn chance(evidence: &Evidence) -> Option<f64> {
-    let Heard { array, .. } = Heard::new(evidence, evidence.power()?, evidence.body.as_ref()?)?;
+    let Observed { array, .. } = Observed::new(evidence, evidence.power()?, evidence.body.as_ref()?)?;
     let directions = array.cells.numbers().own(&evidence.radar, &[array.cells.numbers().phase(0)]);
     let (none, floors) = (DVector::zeros(directions.ncols()), vec![0.0; directions.ncols()]);
     Some(Estimated::new(&array.looks, &none, &directions, &floors)?.p_value)
 }
 
 /// What the moving body's cells say of one receiver's logarithmic gain against the others, `[rx][frame][group]`: values and their
-/// inverse variances. None without a body that is heard.
+/// inverse variances. None without a body that is observed.
 pub fn gains(evidence: &Evidence) -> Option<Vec<Vec<Vec<[f64; 2]>>>> {
-    let Heard { array, .. } = Heard::new(evidence, evidence.power()?, evidence.body.as_ref()?)?;
+    let Observed { array, .. } = Observed::new(evidence, evidence.power()?, evidence.body.as_ref()?)?;
     let numbers = array.cells.numbers();
     let gain = |look: &Look, number: usize| {
         let information = look.information[(number, number)];

@@ -1,4 +1,4 @@
-//! Antennas that stand elsewhere than declared (card C2): the phase between two of them grows with the direction.
+//! Antennas that stand elsewhere than declared: the phase between two of them grows with the direction.
 //!
 //! A displacement that is the same for all antennas shows nowhere, and one in proportion to their places might as well be a body
 //! that is wider or narrower: only the rest is the antennas' own.
@@ -30,7 +30,7 @@ fn candidate(evidence: &Evidence, cells: &Cells, directions: &DMatrix<f64>, foun
     let wave = TAU / radar.wavelength_m();
     let numbers = cells.numbers();
     let along = DVector::from_iterator(radar.rx_m.len(), radar.rx_m.iter().map(|at| at[0] - radar.rx_m[0][0]));
-    // By direction, metres, from the first one; what grows with the places is as well the body's, and nothing of it is told.
+    // By direction, metres, from the first one; what grows with the places is as well the body's, and nothing of it is estimable.
     let places = directions.rows(numbers.place(0), numbers.receivers) / wave;
     let places = DMatrix::from_columns(
         &places

@@ -2,7 +2,7 @@
 //!
 //! A body that is seen aside of its place is seen there by a phase that grows along the row of receivers, and stays what it is, or
 //! shrinks, as the body goes farther. A receiver that is sampled later than its neighbour turns all beats, the more the higher they
-//! are: the same phase, but it grows with the range. No id of FORMATS.md names it.
+//! are: the same phase, but it grows with the range. No id of docs/report.md names it.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -33,7 +33,7 @@ fn fit(frames: &[[f64; 3]], mean_m: f64, power: f64) -> (f64, f64) {
 }
 
 /// The size at the mean range where it grows with the range, the mean range, and what the walls gain by it. `standing`: log-likelihood of
-/// what stands still, by the size at the mean range, that range, and the power of the range with which the sine of everything grows.
+/// static clutter, by the size at the mean range, that range, and the power of the range with which the sine of everything grows.
 fn later(frames: &[[f64; 3]], standing: impl Fn(f64, f64, f64) -> f64) -> Option<(f64, f64, f64)> {
     let weights: f64 = frames.iter().map(|frame| frame[2]).sum();
     let mean_m = frames.iter().map(|[_, range, weight]| range * weight).sum::<f64>() / weights;
@@ -88,7 +88,7 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, gain: f64)
         correction: Correction::Inverse(
             Arc::new({
                 let (radar, still): (Radar, _) = (radar.clone(), evidence.still().to_vec());
-                // Of what moves: what stands still would wrap around the chirps' ends, and how strong it is in every receiver is free.
+                // Of what moves: static clutter would wrap around the chirps' ends, and how strong it is in every receiver is free.
                 let add_still = move |cube: &mut Cube, sign: f64| {
                     let samples = cube.dims[4];
                     cube.each_chirp(|[_, channel, _], chirp| {

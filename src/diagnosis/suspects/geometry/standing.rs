@@ -1,4 +1,4 @@
-//! What stands still, as the row of receivers sees it: the walls are where the room says, and so are the directions from which
+//! Static clutter, as the row of receivers sees it: the walls are where the room says, and so are the directions from which
 //! returns of every range come.
 
 use std::f64::consts::{PI, TAU};
@@ -18,16 +18,16 @@ const SMOOTH: f64 = 0.1;
 const ELSEWHERE: f64 = 0.05;
 /// Bins from one range to the next: windowed neighbours say the same.
 const STEP: usize = 2;
-/// Bins around it from which a range hears.
+/// Bins around it from which power leaks into a range.
 const REACH: f64 = 6.0;
 /// Power over the noise from which on a range is used.
 const LEAST_POWER: f64 = 30.0;
 
-/// One range: what the receivers hear of it, and how it is expected to be alike.
+/// One range: what the receivers observe of it, and how it is expected to be alike.
 struct Cell {
     range_m: f64,
     /// By transmitter.
-    heard: Vec<DVector<Complex64>>,
+    observed: Vec<DVector<Complex64>>,
     /// Inverse of the expected covariance, up to a scale, `[rx, rx]`.
     inverse: DMatrix<Complex64>,
 }
@@ -73,16 +73,16 @@ impl Standing {
                 expected += phases * phases.adjoint() * Complex64::from(power * leaked(at - bin as f64));
             }
             let power = expected.trace().re / receivers as f64;
-            let heard: Vec<DVector<Complex64>> =
+            let observed: Vec<DVector<Complex64>> =
                 (0..transmitters).map(|tx| DVector::from_fn(receivers, |rx, _| spectra[tx * receivers + rx][bin])).collect();
-            let weakest = heard.iter().map(|heard| heard.norm_squared()).fold(f64::INFINITY, f64::min);
+            let weakest = observed.iter().map(|observed| observed.norm_squared()).fold(f64::INFINITY, f64::min);
             if power <= 0.0 || weakest < LEAST_POWER * receivers as f64 * noise {
                 return None;
             }
             let inverse = (expected / Complex64::from(power)
                 + DMatrix::identity(receivers, receivers) * Complex64::from(ELSEWHERE))
             .try_inverse()?;
-            Some(Cell { range_m: bin as f64 * bin_m, heard, inverse })
+            Some(Cell { range_m: bin as f64 * bin_m, observed, inverse })
         };
         Some(Self {
             cells: (STEP..evidence.range_bins().min(samples / 2 + samples / 4)).step_by(STEP).filter_map(cell).collect(),
@@ -93,12 +93,12 @@ impl Standing {
     /// strength is free.
     pub fn log_likelihood(&self, off: impl Fn(f64, usize) -> f64) -> f64 {
         let of_cell = |cell: &Cell| -> f64 {
-            let of_transmitter = |heard: &DVector<Complex64>| {
-                let turned = DVector::from_fn(heard.len(), |rx, _| heard[rx] * Complex64::cis(-off(cell.range_m, rx)));
-                -(heard.len() as f64) * turned.dotc(&(&cell.inverse * &turned)).re.max(f64::MIN_POSITIVE).ln()
+            let of_transmitter = |observed: &DVector<Complex64>| {
+                let turned = DVector::from_fn(observed.len(), |rx, _| observed[rx] * Complex64::cis(-off(cell.range_m, rx)));
+                -(observed.len() as f64) * turned.dotc(&(&cell.inverse * &turned)).re.max(f64::MIN_POSITIVE).ln()
             };
             // Transmitters see the same walls.
-            cell.heard.iter().map(of_transmitter).sum::<f64>() / cell.heard.len().max(1) as f64
+            cell.observed.iter().map(of_transmitter).sum::<f64>() / cell.observed.len().max(1) as f64
         };
         self.cells.iter().map(of_cell).sum()
     }

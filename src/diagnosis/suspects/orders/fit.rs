@@ -71,7 +71,7 @@ impl Fit {
         self.course.turned[frame * self.tx * self.loops + tx * self.loops + index]
     }
 
-    /// What of an order in a chirp the lower ones do not foretell.
+    /// What of an order in a chirp the lower ones do not predict.
     fn beside(&self, order: usize, frame: usize, tx: usize, index: usize) -> Complex64 {
         let all = powers(self.phase(frame, tx, index).conj());
         let known: Complex64 = (0..order).map(|lower| self.predicted[tx][order - 1][order][lower] * all[lower]).sum();

@@ -1,4 +1,4 @@
-//! The image of a still room in an unbalanced quadrature receiver: it turns backwards when all static returns turn.
+//! The image of a static room in an unbalanced quadrature receiver: it turns backwards when all static returns turn.
 
 use std::sync::Arc;
 

@@ -1,8 +1,9 @@
 //! What carries another multiple of a phase than the returns do whose phase it is, where nobody is tracked.
 //!
-//! Once it is known how a phase φ goes over time ([`Course`]), its multiples tell by which way something came:
+//! Once it is known how a phase φ goes over time ([`Course`]), its multiples identify the path of a signal:
 //! a return has order 1; what is added behind the mixer does not turn, order 0; its image in a quadrature receiver turns backwards,
-//! order −1; what went to the thing and back twice turns twice, order 2. Static returns that share a phase tell so what of them is none.
+//! order −1; what went to the thing and back twice turns twice, order 2. Static returns that share a phase
+//! so identify the part of them that is none.
 
 mod fit;
 mod image;

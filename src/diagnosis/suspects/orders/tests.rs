@@ -17,7 +17,8 @@ fn tone(bin: f64, n: usize) -> Complex64 {
     Complex64::cis(TAU * bin * n as f64 / SAMPLES as f64)
 }
 
-/// A still room that turns by a course of about a radian to either side, an offset that does not, and its image; the course is undone and known.
+/// A static room that turns by a course of about a radian to either side, an offset that does not, and its image; the course is
+/// undone and known.
 fn turned(seed: u64, offset: Complex64, image: Complex64) -> Evidence {
     let course = |frame: usize| 0.9 * (TAU * 0.7 * frame as f64 / FRAMES as f64).sin();
     let evidence = Evidence::in_noise(radar(), seed, |[frame, channel, _, n]| {

@@ -49,7 +49,7 @@ pub fn find(evidence: &Evidence, course: &Course, bin: f64, amplitude: &[Complex
     let all: Vec<Along> =
         looks.filter_map(|(bin, kind)| along(evidence, &data, course, bin, kind, &pattern(amplitude, kind))).collect();
     let strongest = all.iter().max_by(|a, b| a.gain.total_cmp(&b.gain))?;
-    // Where receivers do not tell, the way outside goes first: it needs no receiver that bends all else, too.
+    // Where receivers do not distinguish the two, the way outside goes first: it needs no receiver that bends all else, too.
     let as_good = all.iter().filter(|other| other.kind == 0 && strongest.gain - other.gain < CLOSE);
     let best = as_good.max_by(|a, b| a.gain.total_cmp(&b.gain)).unwrap_or(strongest);
     let rival = all.iter().filter(|other| other.kind != best.kind).map(|other| other.gain).fold(f64::NEG_INFINITY, f64::max);

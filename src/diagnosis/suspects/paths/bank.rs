@@ -1,4 +1,4 @@
-//! A bank of swings: what each of them would gain over all frames, from a table of what a tone in every cell gains.
+//! A bank of sinusoidal motions: what each of them would gain over all frames, from a table of what a tone in every cell gains.
 
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
@@ -9,18 +9,18 @@ use super::coloured::FINE;
 use super::pendulum::{Law, at};
 use super::scene::Scene;
 
-/// Energies of the swing in a frame over the noise that are tried: up to those of a body that is near.
+/// Energies of the motion in a frame over the noise that are tried: up to those of a body that is near.
 pub const LEVELS: [f32; 6] = [3.0, 12.0, 60.0, 600.0, 6e3, 6e4];
-/// Rates are tried up to this, as far as every turn has so many frames (with fewer, a swing is but a few places that come again
+/// Rates are tried up to this, as far as every turn has so many frames (with fewer, a motion is but a few places that come again
 /// and again), and from so many steps on.
 const FASTEST_HZ: f64 = 4.0;
 const FRAMES_PER_TURN: f64 = 5.0;
 const FIRST_STEP: usize = 4;
-/// Swings that are tried: the smallest, the ratio to the next, how many.
-const SWINGS: (f64, f64, usize) = (0.02, 1.25, 13);
+/// Excursions that are tried: the smallest, the ratio to the next, how many.
+const EXCURSIONS: (f64, f64, usize) = (0.02, 1.25, 13);
 /// Fewest and most phases that are tried.
 const PHASES: (f64, f64) = (8.0, 48.0);
-/// Doppler bins that a swing must move by.
+/// Doppler bins that a motion must move by.
 pub const LEAST_BINS: f64 = 0.4;
 /// Between two laws of the bank there are so many that differ.
 const BETWEEN: f64 = 16.0;
@@ -30,9 +30,9 @@ const FITTED: usize = 16;
 /// Steps by which the fit closes in.
 const STEPS: usize = 24;
 
-/// A swing with its direction and strength.
+/// A sinusoidal motion with its direction and strength.
 #[derive(Clone, Copy, Debug)]
-pub struct Swing {
+pub struct SinusoidalMotion {
     pub law: Law,
     /// Direction: x over range.
     pub sine: f64,
@@ -40,7 +40,7 @@ pub struct Swing {
     pub log_power: f64,
 }
 
-/// Log-likelihoods gained by a swing's energy in a place, `[frame][beam][doppler · range]` for each level.
+/// Log-likelihoods gained by a motion's energy in a place, `[frame][beam][doppler · range]` for each level.
 pub struct Table {
     pub sines: Vec<f64>,
     pub rows: i64,
@@ -88,15 +88,15 @@ impl Table {
     }
 
     /// The best laws, and how many were tried.
-    pub fn bank(&self, scene: &Scene, length_s: f64) -> (Vec<Swing>, f64) {
+    pub fn bank(&self, scene: &Scene, length_s: f64) -> (Vec<SinusoidalMotion>, f64) {
         let rates: Vec<f64> = rates(scene, length_s).collect();
-        let of_rate = |&rate_hz: &f64| -> (Vec<(f32, Swing)>, f64) {
-            let (mut kept, mut tried): (Vec<(f32, Swing)>, f64) = (vec![], 0.0);
+        let of_rate = |&rate_hz: &f64| -> (Vec<(f32, SinusoidalMotion)>, f64) {
+            let (mut kept, mut tried): (Vec<(f32, SinusoidalMotion)>, f64) = (vec![], 0.0);
             let mut sums = vec![[0.0; LEVELS.len()]; self.columns as usize];
-            for (swing_m, bins) in swings(scene, rate_hz, 1) {
+            for (excursion_m, bins) in excursions(scene, rate_hz, 1) {
                 // Neighbours are two cells of the fine grid apart.
-                let phases = (0.5 * TAU * FINE as f64 * bins.max(swing_m * scene.model.cells.bins_per_m)).ceil();
-                for law in phased([0.0, swing_m, rate_hz], phases.clamp(PHASES.0, PHASES.1) as usize) {
+                let phases = (0.5 * TAU * FINE as f64 * bins.max(excursion_m * scene.model.cells.bins_per_m)).ceil();
+                for law in phased([0.0, excursion_m, rate_hz], phases.clamp(PHASES.0, PHASES.1) as usize) {
                     let places = self.places(scene, law);
                     for beam in 0..self.sines.len() {
                         self.along(&places, beam, &mut sums);
@@ -106,7 +106,8 @@ impl Table {
                             if kept.len() < KEPT || gain > kept[KEPT - 1].0 {
                                 let mean_m = scene.range_m(range as f64 / FINE as f64);
                                 let law = [mean_m, law[1], law[2], rate_hz];
-                                let found = Swing { law, sine: self.sines[beam], log_power: f64::from(LEVELS[level]).ln() };
+                                let found =
+                                    SinusoidalMotion { law, sine: self.sines[beam], log_power: f64::from(LEVELS[level]).ln() };
                                 let at = kept.partition_point(|other| other.0 >= gain);
                                 kept.insert(at, (gain, found));
                                 kept.truncate(KEPT);
@@ -115,35 +116,35 @@ impl Table {
                     }
                 }
             }
-            let climbed = kept.into_iter().map(|(_, swing)| self.climbed(scene, swing, length_s)).collect();
+            let climbed = kept.into_iter().map(|(_, motion)| self.climbed(scene, motion, length_s)).collect();
             (climbed, tried)
         };
         // In one order, so that sums round alike in every run.
-        let of_rates: Vec<(Vec<(f32, Swing)>, f64)> = rates.par_iter().map(of_rate).collect();
+        let of_rates: Vec<(Vec<(f32, SinusoidalMotion)>, f64)> = rates.par_iter().map(of_rate).collect();
         let tried: f64 = of_rates.iter().map(|rate| rate.1).sum();
-        let mut best: Vec<(f32, Swing)> = of_rates.into_iter().flat_map(|rate| rate.0).collect();
+        let mut best: Vec<(f32, SinusoidalMotion)> = of_rates.into_iter().flat_map(|rate| rate.0).collect();
         best.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut chosen: Vec<(f32, Swing)> = vec![];
-        for (gain, swing) in best {
+        let mut chosen: Vec<(f32, SinusoidalMotion)> = vec![];
+        for (gain, motion) in best {
             // Several climbs end on one summit.
             if chosen.len() < FITTED && chosen.iter().all(|other| (other.0 - gain).abs() > 1e-3) {
-                chosen.push((gain, swing));
+                chosen.push((gain, motion));
             }
         }
-        (chosen.into_iter().map(|(_, swing)| swing).collect(), tried * BETWEEN * LEVELS.len() as f64)
+        (chosen.into_iter().map(|(_, motion)| motion).collect(), tried * BETWEEN * LEVELS.len() as f64)
     }
 
     /// Moved as long as that helps, then by less.
-    fn climbed(&self, scene: &Scene, swing: Swing, length_s: f64) -> (f32, Swing) {
-        let beam = self.sines.iter().position(|sine| *sine == swing.sine).unwrap_or(0);
+    fn climbed(&self, scene: &Scene, motion: SinusoidalMotion, length_s: f64) -> (f32, SinusoidalMotion) {
+        let beam = self.sines.iter().position(|sine| *sine == motion.sine).unwrap_or(0);
         let gain = |law: Law| self.gain(&self.places(scene, law), beam);
-        let start = gain(swing.law);
-        let widths = widths(scene, swing.law, length_s);
-        let (law, (gain, level)) = climb(swing.law, start, &widths, gain, |a, b| a.0 > b.0);
-        (gain, Swing { law, log_power: f64::from(LEVELS[level]).ln(), ..swing })
+        let start = gain(motion.law);
+        let widths = widths(scene, motion.law, length_s);
+        let (law, (gain, level)) = climb(motion.law, start, &widths, gain, |a, b| a.0 > b.0);
+        (gain, SinusoidalMotion { law, log_power: f64::from(LEVELS[level]).ln(), ..motion })
     }
 
-    /// The best power that comes at one range and one Doppler in every frame, near a swing's ranges, and how many were tried: what
+    /// The best power that comes at one range and one Doppler in every frame, near a motion's ranges, and how many were tried: what
     /// is not steady about a thing that stands still, which never moves.
     pub fn standing(&self, ranges: RangeInclusive<i64>) -> Option<(Standing, f64)> {
         let places = |doppler: i64, range: i64| vec![(doppler, range); self.times_s.len()];
@@ -184,19 +185,19 @@ fn strongest_level(sums: &Gains) -> (f32, usize) {
     best
 }
 
-/// Laws of all rates and every second swing about one range, in the fewest phases.
+/// Laws of all rates and every second excursion about one range, in the fewest phases.
 pub fn laws(scene: &Scene, mean_m: f64, length_s: f64) -> Vec<Law> {
     let of_rate = |rate_hz: f64| {
-        swings(scene, rate_hz, 2).flat_map(move |(swing_m, _)| phased([mean_m, swing_m, rate_hz], PHASES.0 as usize))
+        excursions(scene, rate_hz, 2).flat_map(move |(excursion_m, _)| phased([mean_m, excursion_m, rate_hz], PHASES.0 as usize))
     };
     rates(scene, length_s).flat_map(of_rate).collect()
 }
 
-/// Laws of one mean, swing and rate, in so many phases.
-fn phased([mean_m, swing_m, rate_hz]: [f64; 3], phases: usize) -> impl Iterator<Item = Law> {
+/// Laws of one mean, excursion and rate, in so many phases.
+fn phased([mean_m, excursion_m, rate_hz]: [f64; 3], phases: usize) -> impl Iterator<Item = Law> {
     (0..phases).map(move |phase| {
         let (sine, cosine) = (TAU * phase as f64 / phases as f64).sin_cos();
-        [mean_m, swing_m * sine, swing_m * cosine, rate_hz]
+        [mean_m, excursion_m * sine, excursion_m * cosine, rate_hz]
     })
 }
 
@@ -206,21 +207,21 @@ fn rates(scene: &Scene, length_s: f64) -> impl Iterator<Item = f64> + use<> {
     (FIRST_STEP..=(fastest_hz / step_hz) as usize).map(move |step| step as f64 * step_hz)
 }
 
-/// Every so many-th swing, with the Doppler bins by which it moves, as far as these can be told.
-fn swings(scene: &Scene, rate_hz: f64, every: usize) -> impl Iterator<Item = (f64, f64)> + use<> {
+/// Every so many-th excursion, with the Doppler bins by which it moves, as far as these are unambiguous.
+fn excursions(scene: &Scene, rate_hz: f64, every: usize) -> impl Iterator<Item = (f64, f64)> + use<> {
     let (per_m, most) = (TAU * rate_hz, 0.5 * scene.loops as f64);
     let doppler_per_mps = scene.model.cells.doppler_per_mps;
-    (0..SWINGS.2)
+    (0..EXCURSIONS.2)
         .step_by(every)
-        .map(|step| SWINGS.0 * SWINGS.1.powi(step as i32))
-        .map(move |swing_m| (swing_m, per_m * swing_m * doppler_per_mps))
+        .map(|step| EXCURSIONS.0 * EXCURSIONS.1.powi(step as i32))
+        .map(move |excursion_m| (excursion_m, per_m * excursion_m * doppler_per_mps))
         .filter(move |(_, bins)| (LEAST_BINS..most).contains(bins))
 }
 
 /// First steps of mean, sine, cosine and rate.
 pub fn widths(scene: &Scene, law: Law, length_s: f64) -> Law {
-    let swing = law[1].hypot(law[2]);
-    [0.5 * scene.range_m(1.0), 0.2 * swing, 0.2 * swing, 0.05 / length_s]
+    let excursion = law[1].hypot(law[2]);
+    [0.5 * scene.range_m(1.0), 0.2 * excursion, 0.2 * excursion, 0.05 / length_s]
 }
 
 /// One number after another is moved as long as that helps, then by less.

@@ -22,7 +22,7 @@ const SAFETY: f64 = 2.0;
 const BLUR: f64 = 0.2;
 /// Tones weaker than this share of the noise, in a transform, do not count.
 const FAINTEST: f64 = 0.03;
-/// Draws of coloured noise, and fine cells to either side, that tell how much of a tone stays.
+/// Draws of coloured noise, and fine cells to either side, from which it is estimated how much of a tone stays.
 const DRAWS: usize = 4;
 const AROUND: usize = 2;
 /// Least share of the body's mean power that is expected in a beam which looks past it.
@@ -34,11 +34,11 @@ pub struct Beams<'a> {
     /// Beams: x over range.
     pub sines: Vec<f64>,
     frames: Vec<Option<Frame>>,
-    /// What stands still, `[channel · samples + sample]`.
+    /// Static clutter, `[channel · samples + sample]`.
     still: Vec<Complex64>,
     /// Mean power of the body's tones that is left in that, in a sample over the noise, by range.
     rest: Vec<f64>,
-    /// Power of what stands still over the noise of a frame's map, by range.
+    /// Power of static clutter over the noise of a frame's map, by range.
     clutter: Vec<f64>,
     /// The body's points in every frame with the power that each is expected to have in the peak.
     body: Vec<Vec<(Point, f64)>>,
@@ -202,7 +202,7 @@ impl<'a> Beams<'a> {
             .collect();
         let share = share(&coloured, rows, all, frame);
         let mut expected = self.expected(frame, &share);
-        // What stands still is not the same in every frame where the receiver is not.
+        // Static clutter is not the same in every frame where the receiver is not.
         self.raise_what_stands(&whitened, &share, &mut expected);
         Frame { whitened, share, expected }
     }
@@ -233,7 +233,7 @@ impl<'a> Beams<'a> {
         power
     }
 
-    /// What stands still, `[channel · samples + sample]`: the mean over the training frames, at every range of those most in
+    /// Static clutter, `[channel · samples + sample]`: the mean over the training frames, at every range of those most in
     /// which the body is elsewhere; and the power of the body that is left in it.
     fn what_stands(&self) -> (Vec<Complex64>, Vec<f64>) {
         let evidence = self.scene.evidence;

@@ -1,5 +1,5 @@
-//! Echoes of the measured body itself, in cells where nothing else can be: a delayed copy of its return (T9). At high
-//! signal-to-noise the measurement is the best prediction of the signal, phases included.
+//! Echoes of the measured body itself, in cells where nothing else can be: a delayed copy of its return (`body_multibounce`). At
+//! high signal-to-noise the measurement is the best prediction of the signal, phases included.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::radar::SPEED_OF_LIGHT;
 
 /// Delays that are tried, half cells of range.
 const MOST_HALF_CELLS: usize = 60;
-/// Nearer than that a copy cannot be told from the windows' main lobe.
+/// Nearer than that a copy is not resolved from the windows' main lobe.
 const LEAST_HALF_CELLS: usize = 4;
 /// A bounce between parts of the body is weaker than the direct return.
 const STRONGEST_COPY: f64 = 0.7;
@@ -81,7 +81,7 @@ pub fn matches(scene: &Scene, template: impl Fn(usize, usize) -> Vec<Complex64> 
         .collect()
 }
 
-/// T9: the body once more, a fixed way later.
+/// `body_multibounce`: the body once more, a fixed way later.
 pub fn multibounce(scene: &Scene, tried: f64) -> Option<Candidate> {
     // Products of the signal with itself repeat the body, too.
     if scene.evidence.accepted.contains(&harmonic::QUADRATIC) {

@@ -1,4 +1,4 @@
-//! The body seen in a mirror: body and one reflection at a boundary (P4, P6), or two (P5).
+//! The body seen in a mirror: body and one reflection at a boundary (`wall_ghost`, `floor_bounce`), or two.
 
 use rayon::prelude::*;
 
@@ -17,7 +17,7 @@ pub struct Ghost {
     /// Of all frames, for the p-value; of the held-out ones.
     pub gain_all: f64,
     pub gain: f64,
-    /// The same of cells that move: what stands still and fades is no image of somebody who walks.
+    /// The same of cells that move: static clutter that fades is no image of somebody who walks.
     pub gain_moving: f64,
     /// Held-out frames that gain on their own, of those that could.
     pub agreeing: f64,

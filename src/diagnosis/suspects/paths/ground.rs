@@ -1,9 +1,9 @@
-//! What a swing gains over the frames of a recording: fitted where its power in every frame is bounded in its say, sharpened where
-//! it is strong.
+//! What a sinusoidal motion gains over the frames of a recording: fitted where its power in every frame is bounded in its say,
+//! sharpened where it is strong.
 
 use rayon::prelude::*;
 
-use super::bank::{Gains, LEVELS, Swing, Table, around, climb, laws, widths};
+use super::bank::{Gains, LEVELS, SinusoidalMotion, Table, around, climb, laws, widths};
 use super::beams::{Beams, Look};
 use super::mover::middle_s;
 use super::pendulum::{Law, at};
@@ -20,8 +20,8 @@ const STRAY: f64 = 0.05;
 const STRAY_POWER: f64 = 30.0;
 /// Log-likelihood of a look from which on its say is bounded.
 const MOST_NATS: f64 = 12.0;
-/// Logarithm of the power over what is expected, mean over the frames, that the same swing has more at another range: side lobes are
-/// weaker by more.
+/// Logarithm of the power over what is expected, mean over the frames, that the same motion has more at another range: side lobes
+/// are weaker by more.
 pub const STRONGER: f64 = 1.0;
 /// Laws of all rates from which the one that stands out most is sought.
 const SHARPENED: usize = 6;
@@ -85,9 +85,9 @@ impl Ground<'_> {
         self.scene.model.cells.place(range_m, velocity)
     }
 
-    pub fn gain(&self, swing: Swing, frames: &[usize]) -> f64 {
-        let power = swing.log_power.exp();
-        let of_frame = |&frame: &usize| self.gain_at(frame, self.place(swing.law, frame), swing.sine, power);
+    pub fn gain(&self, motion: SinusoidalMotion, frames: &[usize]) -> f64 {
+        let power = motion.log_power.exp();
+        let of_frame = |&frame: &usize| self.gain_at(frame, self.place(motion.law, frame), motion.sine, power);
         // In the order of the frames, whichever thread had which.
         frames.par_iter().map(of_frame).collect::<Vec<f64>>().into_iter().sum()
     }
@@ -103,40 +103,40 @@ impl Ground<'_> {
         [mean(&|look| (look.power / look.expected).ln_1p()), mean(&|look| look.power.max(1e-9).ln())]
     }
 
-    /// The same swing at another range, where it is the stronger by far in proportion to what is expected there: none where its
+    /// The same motion at another range, where it is the stronger by far in proportion to what is expected there: none where its
     /// own range is the best one.
-    pub fn stronger_elsewhere(&self, swing: Swing, frames: &[usize]) -> Option<Swing> {
-        let strength = |swing: Swing| self.strength(frames, |frame| self.place(swing.law, frame), swing.sine);
+    pub fn stronger_elsewhere(&self, motion: SinusoidalMotion, frames: &[usize]) -> Option<SinusoidalMotion> {
+        let strength = |motion: SinusoidalMotion| self.strength(frames, |frame| self.place(motion.law, frame), motion.sine);
         let step_m = self.scene.range_m(1.0) / 2.0;
         let at = |step: usize| {
-            let mut moved = swing;
+            let mut moved = motion;
             moved.law[0] = step as f64 * step_m;
             let [ratio, log_power] = strength(moved);
-            (ratio, Swing { log_power, ..moved })
+            (ratio, SinusoidalMotion { log_power, ..moved })
         };
-        let own = strength(swing)[0];
-        let ranges: Vec<(f64, Swing)> = (1..2 * self.scene.samples).into_par_iter().map(at).collect();
+        let own = strength(motion)[0];
+        let ranges: Vec<(f64, SinusoidalMotion)> = (1..2 * self.scene.samples).into_par_iter().map(at).collect();
         let best = ranges.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
         (best.0 > own + STRONGER).then_some(best.1)
     }
 
-    /// The best swing near a first guess, and its gain.
-    pub fn fitted(&self, guess: Swing, frames: &[usize], length_s: f64) -> (Swing, f64) {
+    /// The best motion near a first guess, and its gain.
+    pub fn fitted(&self, guess: SinusoidalMotion, frames: &[usize], length_s: f64) -> (SinusoidalMotion, f64) {
         let [mean, sine, cosine, rate] = widths(self.scene, guess.law, length_s);
         let widths = [0.5 * mean, 0.5 * sine, 0.5 * cosine, 0.5 * rate, 0.1, 0.5];
-        let gain = |now: [f64; 6]| self.gain(swing(now), frames);
+        let gain = |now: [f64; 6]| self.gain(motion(now), frames);
         let start = numbers(guess);
         let (found, gain) = climb(start, gain(start), &widths, gain, |a, b| a > b);
-        (swing(found), gain)
+        (motion(found), gain)
     }
 
-    /// Looks at a swing, one in every frame.
-    fn looks(&self, swing: Swing, frames: &[usize]) -> Vec<Option<Look>> {
-        frames.par_iter().map(|&frame| self.beams.look(frame, self.place(swing.law, frame), swing.sine)).collect()
+    /// Looks at a motion, one in every frame.
+    fn looks(&self, motion: SinusoidalMotion, frames: &[usize]) -> Vec<Option<Look>> {
+        frames.par_iter().map(|&frame| self.beams.look(frame, self.place(motion.law, frame), motion.sine)).collect()
     }
 
     /// How unlikely powers are where those of other looks are expected, whatever the tone's in each frame: where it is strong this
-    /// tells its law, as gains that are bounded do not.
+    /// determines its law, as log-likelihood gains that are bounded do not.
     fn contrast(&self, looks: &[Option<Look>], others: &[Option<Look>]) -> f64 {
         let of_frame = |(look, other): (&Option<Look>, &Option<Look>)| match (look, other) {
             (Some(look), Some(other)) => {
@@ -148,65 +148,65 @@ impl Ground<'_> {
         looks.iter().zip(others).map(of_frame).sum()
     }
 
-    /// The swing near another one that stands out most. What is expected is that at the other one: where little is, a tone's side
+    /// The motion near another one that stands out most. What is expected is that at the other one: where little is, a tone's side
     /// lobes stand out more than the tone does where much is.
-    pub fn closer(&self, near: Swing, frames: &[usize], length_s: f64) -> Swing {
+    pub fn closer(&self, near: SinusoidalMotion, frames: &[usize], length_s: f64) -> SinusoidalMotion {
         let [mean, sine, cosine, rate] = widths(self.scene, near.law, length_s);
         let there = self.looks(near, frames);
-        let contrast = |now: [f64; 6]| self.contrast(&self.looks(swing(now), frames), &there);
+        let contrast = |now: [f64; 6]| self.contrast(&self.looks(motion(now), frames), &there);
         let start = numbers(near);
         let widths = [0.5 * mean, 0.5 * sine, 0.5 * cosine, 0.5 * rate, 0.1, 0.0];
-        swing(climb(start, contrast(start), &widths, contrast, |a, b| a > b).0)
+        motion(climb(start, contrast(start), &widths, contrast, |a, b| a > b).0)
     }
 
-    /// The swing about the same range that stands out most, of any rate.
-    pub fn sharpened(&self, best: Swing, frames: &[usize], length_s: f64) -> Swing {
-        let contrast = |swing: Swing| {
-            let looks = self.looks(swing, frames);
+    /// The motion about the same range that stands out most, of any rate.
+    pub fn sharpened(&self, best: SinusoidalMotion, frames: &[usize], length_s: f64) -> SinusoidalMotion {
+        let contrast = |motion: SinusoidalMotion| {
+            let looks = self.looks(motion, frames);
             self.contrast(&looks, &looks)
         };
-        let laws = laws(self.scene, best.law[0], length_s).into_iter().map(|law| Swing { law, ..best });
-        let mut starts: Vec<(Swing, f64)> = laws.map(|swing| (swing, contrast(swing))).collect();
+        let laws = laws(self.scene, best.law[0], length_s).into_iter().map(|law| SinusoidalMotion { law, ..best });
+        let mut starts: Vec<(SinusoidalMotion, f64)> = laws.map(|motion| (motion, contrast(motion))).collect();
         starts.sort_by(|a, b| b.1.total_cmp(&a.1));
         starts.truncate(SHARPENED);
         let starts = starts.into_iter().map(|(start, _)| start).chain([best]);
         let closer = starts.map(|start| self.closer(self.closer(start, frames, length_s), frames, length_s));
-        let closer = closer.map(|swing| (swing, contrast(swing)));
+        let closer = closer.map(|motion| (motion, contrast(motion)));
         let found = closer.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(best, |found| found.0);
         // How strong it is in all frames alike.
-        let gain = |now: [f64; 6]| self.gain(swing(now), frames);
-        swing(climb(numbers(found), gain(numbers(found)), &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], gain, |a, b| a > b).0)
+        let gain = |now: [f64; 6]| self.gain(motion(now), frames);
+        motion(climb(numbers(found), gain(numbers(found)), &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], gain, |a, b| a > b).0)
     }
 
-    /// What all frames gain, each foretold by those of the other folds: few held-out ones may all be among the body's returns.
-    pub fn foretold(&self, best: Swing, start_s: f64) -> f64 {
+    /// What all frames gain, each predicted by those of the other folds: few held-out ones may all be among the body's returns.
+    pub fn predicted(&self, best: SinusoidalMotion, start_s: f64) -> f64 {
         let frames = self.scene.frames();
         let length_s = middle_s(self.scene, frames - 1) - start_s;
         folds(frames).map(|[rest, held]| self.gain(self.fitted(best, &rest, length_s).0, &held)).sum()
     }
 
-    /// Of mean, swing, rate and direction: half of where the likelihood has fallen to that of a 90 % interval's ends, the
+    /// Of mean, excursion, rate and direction: half of where the likelihood has fallen to that of a 90 % interval's ends, the
     /// others fitted again.
-    pub fn deviations(&self, best: Swing, frames: &[usize], length_s: f64) -> [f64; 4] {
-        let swing_m = best.law[1].hypot(best.law[2]);
-        let first = [0.1 * self.scene.range_m(1.0), 0.05 * swing_m, 0.01 / length_s, 0.01];
-        let most = [2.0 * self.scene.range_m(1.0), swing_m, 0.5 / length_s, 0.5];
-        let moved = |axis: usize, step: f64| -> Swing {
-            let mut swing = best;
+    pub fn deviations(&self, best: SinusoidalMotion, frames: &[usize], length_s: f64) -> [f64; 4] {
+        let excursion_m = best.law[1].hypot(best.law[2]);
+        let first = [0.1 * self.scene.range_m(1.0), 0.05 * excursion_m, 0.01 / length_s, 0.01];
+        let most = [2.0 * self.scene.range_m(1.0), excursion_m, 0.5 / length_s, 0.5];
+        let moved = |axis: usize, step: f64| -> SinusoidalMotion {
+            let mut motion = best;
             match axis {
-                0 => swing.law[0] += step,
-                1 => [1, 2].into_iter().for_each(|part| swing.law[part] *= 1.0 + step / swing_m),
-                2 => swing.law[3] += step,
-                _ => swing.sine += step,
+                0 => motion.law[0] += step,
+                1 => [1, 2].into_iter().for_each(|part| motion.law[part] *= 1.0 + step / excursion_m),
+                2 => motion.law[3] += step,
+                _ => motion.sine += step,
             }
-            swing
+            motion
         };
         let there = self.looks(best, frames);
         let most_likely = self.contrast(&there, &there);
         let profile = |axis: usize, step: f64| -> f64 {
             let start = moved(axis, step);
             let contrast = |now: [f64; 6]| {
-                let mut free = swing(now);
+                let mut free = motion(now);
                 // The one that is asked for stays.
                 match axis {
                     0 => free.law[0] = start.law[0],
@@ -248,10 +248,10 @@ fn gamma_ratio(tail: f64, looks: f64) -> f64 {
     ln_gamma(tail + looks) - ln_gamma(tail) - ln_gamma(looks) + looks * (looks / tail).ln()
 }
 
-fn numbers(Swing { law: [mean, sine, cosine, rate], sine: direction, log_power }: Swing) -> [f64; 6] {
+fn numbers(SinusoidalMotion { law: [mean, sine, cosine, rate], sine: direction, log_power }: SinusoidalMotion) -> [f64; 6] {
     [mean, sine, cosine, rate, direction, log_power]
 }
 
-fn swing([mean, sine, cosine, rate, direction, log_power]: [f64; 6]) -> Swing {
-    Swing { law: [mean, sine, cosine, rate], sine: direction.clamp(-1.0, 1.0), log_power }
+fn motion([mean, sine, cosine, rate, direction, log_power]: [f64; 6]) -> SinusoidalMotion {
+    SinusoidalMotion { law: [mean, sine, cosine, rate], sine: direction.clamp(-1.0, 1.0), log_power }
 }

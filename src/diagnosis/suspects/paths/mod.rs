@@ -1,4 +1,4 @@
-//! Returns from where neither the body nor the static room can be: mirror images, strangers that move, echoes.
+//! Returns from where neither the body nor static clutter can be: mirror images, other movers, echoes.
 
 mod bank;
 mod beams;
@@ -12,9 +12,9 @@ mod pendulum;
 pub mod product;
 mod removal;
 mod scene;
+mod sinusoidal;
 mod steering;
 mod still_point;
-mod swing;
 mod track;
 
 #[cfg(test)]
@@ -29,13 +29,13 @@ pub use still_point::body_rms;
 
 /// A ghost must predict at least this share of the held-out frames that show it.
 const AGREEING: f64 = 0.6;
-/// Least gain on held-out frames that is worth a name, nats.
+/// Least log-likelihood gain on held-out frames that is worth a name, nats.
 const LEAST_GAIN: f64 = 6.0;
 /// Of a track that follows the law of a thing that moves: faint products of two paths come near it.
 const LEAST_GAIN_TRACK: f64 = 12.0;
-/// Of a swing that no single frame shows: where the body is not quite where it should be, something near it comes close to one, and
-/// faint images do. What is strong among the body's returns, and comes from aside, is neither.
-const LEAST_GAIN_SWING: f64 = 8.0;
+/// Of a sinusoidal motion that no single frame shows: where the body is not quite where it should be, something near it comes close
+/// to one, and faint images do. What is strong among the body's returns, and comes from aside, is neither.
+const LEAST_GAIN_SINUSOIDAL: f64 = 8.0;
 const STRONG: f64 = 100.0;
 /// Of a track that follows no law of motion: remains of a strong path that was taken out look like that.
 const LEAST_GAIN_UNNAMED: f64 = 25.0;
@@ -81,15 +81,15 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             let remains = LEAVE_REMAINS.iter().any(|id| evidence.accepted.contains(id));
             // Noise that receivers share comes from one direction, as if something were there.
             let shared = evidence.accepted.contains(&"correlated_noise");
-            let swing = (!remains && !shared).then(|| swing::strongest(&scene)).flatten();
+            let motion = (!remains && !shared).then(|| sinusoidal::strongest(&scene)).flatten();
             let least = |mover: &mover::Mover| {
-                let told = mover.power > STRONG && mover::aside(&scene, &mover.track.sightings);
-                if told { LEAST_GAIN } else { LEAST_GAIN_SWING }
+                let distinct = mover.power > STRONG && mover::aside(&scene, &mover.track.sightings);
+                if distinct { LEAST_GAIN } else { LEAST_GAIN_SINUSOIDAL }
             };
-            let swing = swing.filter(|swing| swing.mover.gain > least(&swing.mover));
+            let motion = motion.filter(|motion| motion.mover.gain > least(&motion.mover));
             let over = scene.over_the_body();
             // What single frames show needs no law.
-            found.extend(over_the_body(&over).or_else(|| swing.map(|swing| swinging(&swing, &over))));
+            found.extend(over_the_body(&over).or_else(|| motion.map(|motion| moves_sinusoidally(&motion, &over))));
         }
     }
     let again = |id: &str| evidence.accepted.contains(&id);
@@ -108,9 +108,9 @@ fn over_the_body(scene: &Scene) -> Option<Candidate> {
     (mover.gain > LEAST_GAIN_UNNAMED).then(|| Candidate { behaves_like: OVER_THE_BODY, ..found })
 }
 
-/// A swing; without a name it is what has no law either.
-fn swinging(swing: &swing::Found, scene: &Scene) -> Candidate {
-    let found = swing.candidate(scene, TRIED);
+/// A sinusoidal motion; without a name it is what has no law either.
+fn moves_sinusoidally(motion: &sinusoidal::Found, scene: &Scene) -> Candidate {
+    let found = motion.candidate(scene, TRIED);
     if found.id.is_some() { found } else { Candidate { behaves_like: OVER_THE_BODY, ..found } }
 }
 

@@ -1,4 +1,4 @@
-//! Candidate: something that moves, and not with the body (P2).
+//! Candidate: something that moves, and not with the body (`moving_reflector`).
 
 use std::sync::Arc;
 
@@ -14,10 +14,10 @@ use crate::diagnosis::{Candidate, Correction, Estimate, Place};
 const CELL_ERROR: f64 = 0.12;
 /// A sighting so much weaker than the others is noise or a sidelobe on the way.
 const CHANCE_SHARE: f64 = 0.03;
-/// A thing that swings farther is no fan, curtain or pendulum: it has no name.
-pub const WIDEST_SWING_M: f64 = 0.5;
-/// A swing leaves less than this share of the velocities' variance.
-const SWING_LEAVES: f64 = 0.15;
+/// A thing that moves farther to either side is no fan, curtain or pendulum: it has no name.
+pub const LARGEST_EXCURSION_M: f64 = 0.5;
+/// A sinusoidal motion leaves less than this share of the velocities' variance.
+const SINUSOID_LEAVES: f64 = 0.15;
 
 /// A track that is judged: how far it predicts frames that it was not fitted to.
 pub struct Mover {
@@ -56,7 +56,7 @@ impl Mover {
             .sum();
         let id = if pendulum.is_some() { Some("moving_reflector") } else { named(scene, &track.sightings) };
         let id = id.map(|id| if outside(scene, &track.sightings) { "range_alias" } else { id });
-        // Where the body is, what moves with it has the same law: only a swing to one side of it is told.
+        // Where the body is, what moves with it has the same law: only a sinusoidal motion to one side of it is identified.
         let id = id.filter(|_| !scene.over_body || (pendulum.is_some() && aside(scene, &track.sightings)));
         let unlike = if scene.over_body {
             "far stronger than the body can be at that range and velocity"
@@ -90,7 +90,7 @@ impl Mover {
             let azimuth = sine.clamp(-1.0, 1.0).asin();
             let (x, y) = (mean_m * sine, mean_m * azimuth.cos());
             let at = scene.evidence.radar.position_m;
-            // A line of receivers does not tell the height: as far up or down as it is off here shortens y.
+            // A line of receivers does not resolve the height: as far up or down as it is off here shortens y.
             let height = 0.5;
             estimates.push(Estimate {
                 name: "position_m",
@@ -113,15 +113,15 @@ impl Mover {
         let motion = match &whole {
             Some(fit) => {
                 estimates.push(Estimate::normal("rate_hz", fit.rate_hz, fit.deviations[2].max(0.005)));
-                let swing = fit.swing_m();
-                let error = 1.645 * fit.deviations[1].max(0.03 * swing);
+                let excursion = fit.excursion_m();
+                let error = 1.645 * fit.deviations[1].max(0.03 * excursion);
                 // Only the part along the line of sight is seen.
                 estimates.push(Estimate {
                     name: "swing_m",
-                    values: vec![swing],
-                    ci90: vec![[swing - error, 1.1 * swing + error]],
+                    values: vec![excursion],
+                    ci90: vec![[excursion - error, 1.1 * excursion + error]],
                 });
-                format!("swings by ±{:.0} mm along the line of sight {:.2} times a second", 1e3 * swing, fit.rate_hz)
+                format!("oscillates by ±{:.0} mm along the line of sight {:.2} times a second", 1e3 * excursion, fit.rate_hz)
             }
             None => format!("moves between {:.2} and {:.2} m", ranges[0], ranges[1]),
         };
@@ -262,10 +262,10 @@ fn fit(scene: &Scene, sightings: &[Sighting]) -> Option<Pendulum> {
     let cells = &scene.model.cells;
     let errors = [CELL_ERROR / cells.bins_per_m, CELL_ERROR / cells.doppler_per_mps];
     Pendulum::fit(sightings, &times, errors, scene.loops as f64 / cells.doppler_per_mps)
-        .filter(|fit| fit.left < SWING_LEAVES && fit.swing_m() < WIDEST_SWING_M)
+        .filter(|fit| fit.left < SINUSOID_LEAVES && fit.excursion_m() < LARGEST_EXCURSION_M)
 }
 
-/// What a frame should show: the swing, or the way between the neighbouring sightings, blurred by what it may be off.
+/// What a frame should show: the sinusoidal motion, or the way between the neighbouring sightings, blurred by what it may be off.
 fn template(scene: &Scene, frame: usize, pendulum: Option<&Pendulum>, training: &[Sighting]) -> Template {
     let point = |range: f64, velocity: f64, power: f64| (range, velocity, power);
     let cells = &scene.model.cells;

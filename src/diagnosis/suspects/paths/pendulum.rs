@@ -1,8 +1,8 @@
-//! A sinusoidal radial motion through sightings: mean range, swing and rate.
+//! A sinusoidal radial motion through sightings: mean range, excursion and rate.
 
 use super::track::Sighting;
 
-/// Highest rate that is tried; faster swings blur within a frame.
+/// Highest rate that is tried; faster ones blur within a frame.
 const FASTEST_HZ: f64 = 8.0;
 
 /// range(t) = mean + sine · sin(ω t) + cosine · cos(ω t).
@@ -14,7 +14,7 @@ pub struct Pendulum {
     pub rate_hz: f64,
     /// Share of the velocities' variance that the motion leaves.
     pub left: f64,
-    /// Standard deviations of mean, swing and rate.
+    /// Standard deviations of mean, excursion and rate.
     pub deviations: [f64; 3],
 }
 
@@ -29,7 +29,7 @@ pub fn at([mean_m, sine_m, cosine_m, rate_hz]: Law, time_s: f64) -> (f64, f64) {
 }
 
 impl Pendulum {
-    pub fn swing_m(&self) -> f64 {
+    pub fn excursion_m(&self) -> f64 {
         self.sine_m.hypot(self.cosine_m)
     }
 
@@ -39,7 +39,7 @@ impl Pendulum {
     }
 
     /// Least squares on ranges and velocities with their errors; velocities wrap around `span_mps` (twice the greatest
-    /// unambiguous one). None with too few sightings, or where the motion is no swing.
+    /// unambiguous one). None with too few sightings, or where the motion is not sinusoidal.
     pub fn fit(sightings: &[Sighting], times_s: &[f64], errors: [f64; 2], span_mps: f64) -> Option<Self> {
         if sightings.len() < 8 {
             return None;
@@ -65,18 +65,18 @@ impl Pendulum {
         // Errors as large as they turn out to be.
         let scale = (chi2 / freedom).max(1.0).sqrt();
         let count = sightings.len() as f64;
-        let swing = sine_m.hypot(cosine_m).max(1e-6);
+        let excursion = sine_m.hypot(cosine_m).max(1e-6);
         let omega = std::f64::consts::TAU * rate;
-        let swing_error = scale / (0.5 * count * (errors[0].powi(-2) + (omega / errors[1]).powi(2))).sqrt();
-        // The phase at both ends is as uncertain as the swing is in proportion.
-        let rate_error = swing_error / swing * 12f64.sqrt() / (std::f64::consts::TAU * length_s);
+        let excursion_error = scale / (0.5 * count * (errors[0].powi(-2) + (omega / errors[1]).powi(2))).sqrt();
+        // The phase at both ends is as uncertain as the excursion is in proportion.
+        let rate_error = excursion_error / excursion * 12f64.sqrt() / (std::f64::consts::TAU * length_s);
         Some(Self {
             mean_m,
             sine_m,
             cosine_m,
             rate_hz: rate,
             left: chi2 / still.max(1e-12),
-            deviations: [scale * errors[0] / count.sqrt(), swing_error, rate_error],
+            deviations: [scale * errors[0] / count.sqrt(), excursion_error, rate_error],
         })
     }
 }
@@ -160,18 +160,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_swing_is_found_though_its_velocity_wraps() {
-        let (rate, swing, mean) = (1.7, 0.3, 3.2);
+    fn a_sinusoidal_motion_is_found_though_its_velocity_wraps() {
+        let (rate, excursion, mean) = (1.7, 0.3, 3.2);
         let times: Vec<f64> = (0..20).map(|i| 0.1 * f64::from(i)).collect();
         let sightings: Vec<Sighting> = times
             .iter()
             .enumerate()
             .map(|(frame, time)| {
                 let angle = std::f64::consts::TAU * rate * time + 0.7;
-                let velocity: f64 = std::f64::consts::TAU * rate * swing * angle.cos();
+                let velocity: f64 = std::f64::consts::TAU * rate * excursion * angle.cos();
                 Sighting {
                     frame,
-                    range_m: mean + swing * angle.sin() + 0.003 * f64::from(frame as u32 % 3),
+                    range_m: mean + excursion * angle.sin() + 0.003 * f64::from(frame as u32 % 3),
                     velocity_mps: velocity - 5.0 * (velocity / 5.0).round(),
                     power: 100.0,
                     sine: None,
@@ -179,7 +179,7 @@ mod tests {
             })
             .collect();
         let fit = Pendulum::fit(&sightings, &times, [0.01, 0.02], 5.0).unwrap();
-        assert!((fit.rate_hz - rate).abs() < 0.01 && (fit.swing_m() - swing).abs() < 0.01, "{fit:?}");
+        assert!((fit.rate_hz - rate).abs() < 0.01 && (fit.excursion_m() - excursion).abs() < 0.01, "{fit:?}");
         assert!((fit.mean_m - mean).abs() < 0.01 && fit.left < 0.1);
         assert!(Pendulum::fit(&sightings[..5], &times, [0.01, 0.02], 5.0).is_none());
     }

@@ -1,5 +1,5 @@
-//! Products of the signal with itself: two returns one after the other, object to radar to object (R6), and the second
-//! harmonic of a receiver (R5), which doubles the phase of every receiver where the second trip has that of one arrival.
+//! Products of the signal with itself: two returns one after the other, object to radar to object, and the second
+//! harmonic of a receiver, which doubles the phase of every receiver where the second trip has that of one arrival.
 //! Both lie at the sum of two ranges and two velocities; the measurement without its noise is the best template of either.
 
 use std::sync::Arc;
@@ -125,7 +125,7 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
         energy: *energy,
         correction: Correction::Inverse(
             Arc::new(move |cube: &mut Cube| remove(cube, kind, factor)),
-            // A product with what other receivers heard turns with them, and stretches nothing on average.
+            // A product with what other receivers observe turns with them, and stretches nothing on average.
             if kind == Kind::Harmonic { Volume::BY_SAMPLE } else { Volume::KEPT },
         ),
     })
@@ -136,7 +136,7 @@ fn fitted(scene: &Scene, clean: &[Vec<Vec<Complex64>>], kind: Kind) -> (Fit, f64
     let mut products: Vec<Vec<Vec<Complex64>>> = clean.par_iter().map(|frame| kind.product(frame)).collect();
     let samples = scene.samples;
     let judge = |products: &[Vec<Vec<Complex64>>]| {
-        // As in the measured maps, what stands still in all frames is left out.
+        // As in the measured maps, static clutter in all frames is left out.
         let still: Vec<Vec<Complex64>> = (0..products[0].len())
             .map(|channel| mean_chirp(products.iter().flat_map(|frame| frame[channel].chunks_exact(samples)), samples))
             .collect();

@@ -11,7 +11,7 @@ const LEAST: f64 = 1e-3;
 const MOST_CELLS: usize = 300;
 
 /// Subtracts from a frame's moving part the smallest signal that empties the cells `[doppler · samples + range]`, in
-/// every channel. `still` is `[channel, sample]`, what stands still.
+/// every channel. `still` is `[channel, sample]`, static clutter.
 pub fn empty_cells(cube: &mut Cube, still: &[Complex64], frame: usize, cells: &[usize]) {
     let cells = &cells[..cells.len().min(MOST_CELLS)];
     if cells.is_empty() {

@@ -8,7 +8,7 @@ use crate::diagnosis::locate::{BODY_FACTOR, CELLS_PER_VALUE};
 use crate::diagnosis::power::{PowerModel, Template};
 use crate::diagnosis::statistics::median;
 
-/// Doppler bins around zero in which what stands still leaves remains wherever the body was in some frame.
+/// Doppler bins around zero in which static clutter leaves remains wherever the body was in some frame.
 pub const STILL_BINS: i64 = 2;
 /// Cells by which the body's support grows along Doppler: accelerations within a frame.
 const DOPPLER_MARGIN: i64 = 2;
@@ -77,7 +77,7 @@ impl<'a> Scene<'a> {
                 let support = grown(model.support(frame), loops, samples);
                 let lobes = lobes(map, model.support(frame), loops, samples);
                 let taken: Vec<bool> = support.iter().zip(&never).map(|(support, never)| *support || *never).collect();
-                // What other imperfections smear is told where no sidelobes are.
+                // What other imperfections smear is estimated where no sidelobes are.
                 let near = |cell: usize| lobes[cell] * SIDELOBE_SAFETY > SIDELOBE_LEVEL;
                 let reached: Vec<bool> = (0..size).map(|cell| taken[cell] || near(cell)).collect();
                 let floor = floor(map, &reached, &clutter, loops, samples);
@@ -187,7 +187,7 @@ impl<'a> Scene<'a> {
         Template { cells, power }
     }
 
-    /// The part of a template whose Doppler is not that of what stands still.
+    /// The part of a template whose Doppler is not that of static clutter.
     pub fn moving(&self, template: &Template) -> Template {
         let moves = |cell: u32| {
             let doppler = cell as usize / self.samples;
@@ -254,7 +254,7 @@ impl<'a> Scene<'a> {
 }
 
 /// The noise's level in each range bin over that of the others, from the quieter of the free cells: where a filter that
-/// was undone ends abruptly, neighbouring bins do not tell.
+/// was undone ends abruptly, neighbouring bins are not informative.
 fn noise_levels(maps: &[f32], taken: &[bool], frames: &[usize], loops: usize, samples: usize, bins: usize) -> Vec<f64> {
     const FEWEST_CELLS: usize = 48;
     let quiet = |range: usize| {
@@ -333,7 +333,7 @@ fn visited_ranges(model: &PowerModel, frames: usize, loops: usize, samples: usiz
     visited
 }
 
-/// Power of what stands still over the noise of one frame's map, by range, mean over channels.
+/// Power of static clutter over the noise of one frame's map, by range, mean over channels.
 pub fn still_power(evidence: &Evidence) -> Vec<f64> {
     let samples = evidence.cube.dims[4];
     let count = evidence.cube.channels() as f64;

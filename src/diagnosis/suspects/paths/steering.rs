@@ -21,7 +21,7 @@ pub fn wave(radar: &Radar) -> f64 {
     TAU * (radar.carrier_hz() + 0.5 * radar.bandwidth_hz()) / SPEED_OF_LIGHT
 }
 
-/// Extent of the receivers along x; none where they tell no direction.
+/// Extent of the receivers along x; none where they resolve no direction.
 pub fn aperture_m(radar: &Radar) -> Option<f64> {
     let ends = radar.rx_m.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| [low.min(at[0]), high.max(at[0])]);
     Some(ends[1] - ends[0]).filter(|aperture| radar.rx_m.len() > 1 && *aperture > 0.0)

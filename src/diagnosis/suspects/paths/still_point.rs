@@ -1,4 +1,4 @@
-//! Something that stands still and stands out of the room's clutter (P1): in one range cell, from one direction, in every
+//! A static return that stands out of the static clutter (`static_reflector`): in one range cell, from one direction, in every
 //! frame. What the clutter's own roughness may do is the null: its power in a cell is speckle about the mean of the
 //! ranges around it. Boundaries, edges and corners return more than their surroundings at known ranges, and are left out.
 
@@ -13,7 +13,7 @@ use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::{Boundary, Room};
 
-/// Ranges on either side that tell the clutter's mean, cells; those next to the peak belong to it.
+/// Ranges on either side from which the clutter's mean is estimated, cells; those next to the peak belong to it.
 const AROUND: usize = 10;
 const PEAK: usize = 2;
 const FEWEST_AROUND: usize = 8;
@@ -221,7 +221,7 @@ fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candi
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
-            "Something stands still {:.2} m away{whereabouts}: all receivers see one direction, {:.0} dB above the clutter of \
+            "A static return {:.2} m away{whereabouts}: all receivers see one direction, {:.0} dB above the clutter of \
              the ranges around it, in every frame, and no boundary, edge or corner of the room is there.",
             peak.range_m,
             10.0 * peak.ratio.log10()

@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::beams::{Beams, Look};
-use super::{find, scene::Scene, swing};
+use super::{find, scene::Scene, sinusoidal};
 use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::misfit::Misfit;
 use crate::diagnosis::{BodyPrediction, Candidate, Cube, Evidence, Point, Split};
@@ -35,12 +35,12 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Body walking away, with a mirror on the right, a swinging stranger before it, or neither.
+/// Body walking away, with a mirror on the right, an oscillating stranger before it, or neither.
 fn evidence(mirror: f64, stranger: f64) -> Evidence {
     made(mirror, stranger, 1.0)
 }
 
-/// `centre_m`: about which the stranger swings.
+/// `centre_m`: about which the stranger oscillates.
 fn made(mirror: f64, stranger: f64, centre_m: f64) -> Evidence {
     let mut radar = Radar { samples_per_chirp: 64, loops_per_frame: 64, frames: FRAMES, ..Radar::mmmesh(FRAMES) };
     radar.tx_m.truncate(1);
@@ -140,7 +140,7 @@ fn a_mirror_on_the_right_is_found_and_removed() {
 }
 
 #[test]
-fn a_swinging_stranger_is_found_and_removed() {
+fn an_oscillating_stranger_is_found_and_removed() {
     let evidence = evidence(0.0, 1.0);
     let found = believed(&evidence);
     assert_eq!((found.len(), found[0].id), (1, Some("moving_reflector")), "{found:?}");
@@ -151,51 +151,54 @@ fn a_swinging_stranger_is_found_and_removed() {
 }
 
 #[test]
-fn what_was_taken_out_of_a_channel_counts_as_foretold_by_those_before_it() {
+fn what_was_taken_out_of_a_channel_counts_as_predicted_by_those_before_it() {
     let (with, without) = (evidence(0.0, 1.0), evidence(0.0, 0.0));
     let found = believed(&with);
     let explained = corrected(with.clone(), &found[0]);
     let [before, after, best] = [Misfit::of(&with), Misfit::after(&with, &explained), Misfit::of(&without)];
     let [before, after, best] = [before, after, best].map(|misfit| misfit.loglik_per_sample);
     let recovered = (after - before) / (best - before);
-    // Nobody foretells the first of the two channels; the second costs a little, for its amplitudes are not known.
+    // Nobody predicts the first of the two channels; the second costs a little, for its amplitudes are not known.
     assert!((0.4..0.95).contains(&recovered), "{before} {after} {best}");
 }
 
 #[test]
-fn a_swing_among_the_bodys_returns_is_found_by_its_law() {
+fn a_sinusoidal_motion_among_the_bodys_returns_is_found_by_its_law() {
     let among = made(0.0, 2.0, 2.2);
     let scene = Scene::new(&among).unwrap();
-    let found = swing::strongest(&scene).unwrap().mover;
+    let found = sinusoidal::strongest(&scene).unwrap().mover;
     let fit = found.pendulum.unwrap();
     assert!((fit.rate_hz - 0.8).abs() < 0.08 && (fit.mean_m - 2.2).abs() < 0.1, "{fit:?}");
-    assert!((fit.swing_m() - 0.12).abs() < 0.012, "{fit:?}");
+    assert!((fit.excursion_m() - 0.12).abs() < 0.012, "{fit:?}");
     assert!(found.gain > 6.0 && found.track.p_value < 1e-3, "{} {}", found.gain, found.track.p_value);
     let alone = evidence(0.0, 0.0);
-    let nothing = swing::strongest(&Scene::new(&alone).unwrap());
+    let nothing = sinusoidal::strongest(&Scene::new(&alone).unwrap());
     assert!(nothing.is_none_or(|found| found.mover.track.p_value > 0.01 || found.mover.gain < 6.0));
 }
 
 #[test]
-fn a_swing_too_weak_for_any_single_frame_is_found_by_all_of_them() {
+fn a_sinusoidal_motion_too_weak_for_any_single_frame_is_found_by_all_of_them() {
     // In a frame 8 times the energy of the noise in one cell, of which there are thousands.
     let weak = made(0.0, 0.044, 1.0);
     let scene = Scene::new(&weak).unwrap();
-    let found = swing::strongest(&scene).unwrap().mover;
+    let found = sinusoidal::strongest(&scene).unwrap().mover;
     let fit = found.pendulum.unwrap();
     assert_eq!(found.id, Some("moving_reflector"));
-    assert!((fit.rate_hz - 0.8).abs() < 0.1 && (fit.swing_m() - 0.12).abs() < 0.04 && (fit.mean_m - 1.0).abs() < 0.1, "{fit:?}");
+    assert!(
+        (fit.rate_hz - 0.8).abs() < 0.1 && (fit.excursion_m() - 0.12).abs() < 0.04 && (fit.mean_m - 1.0).abs() < 0.1,
+        "{fit:?}"
+    );
     let near = |sighting: &super::track::Sighting| (1.0..40.0).contains(&sighting.power);
     assert!(found.gain > 6.0 && found.track.p_value < 1e-4 && found.track.sightings.iter().all(near), "{}", found.track.p_value);
 }
 
 #[test]
-fn no_swing_is_sought_in_noise_that_receivers_share() {
+fn no_sinusoidal_motion_is_sought_in_noise_that_receivers_share() {
     let mut weak = made(0.0, 0.044, 1.0);
-    let swings = |evidence: &Evidence| find(evidence).iter().any(|found| found.id == Some("moving_reflector"));
-    assert!(swings(&weak));
+    let oscillates = |evidence: &Evidence| find(evidence).iter().any(|found| found.id == Some("moving_reflector"));
+    assert!(oscillates(&weak));
     weak.accepted.push("correlated_noise");
-    assert!(!swings(&weak));
+    assert!(!oscillates(&weak));
 }
 
 #[test]
@@ -217,7 +220,7 @@ fn away_from_the_body_looks_are_those_of_noise_and_where_it_is_a_tone_must_be_st
 
 #[test]
 fn something_far_stronger_than_the_body_is_seen_where_the_body_is() {
-    // It swings where the body walks, 20 dB above all of it.
+    // It oscillates where the body walks, 20 dB above all of it.
     let found = believed(&made(0.0, 60.0, 2.2));
     assert!(found.iter().any(|found| found.behaves_like.starts_with(super::PATH_LIKE) && found.gain > 100.0), "{found:?}");
 }

@@ -1,4 +1,4 @@
-//! Sparse samples that do not belong to their chirp: another radar's crossings and impulses (cards I1, V3).
+//! Sparse samples that do not belong to their chirp: another radar's crossings and impulses.
 //!
 //! What moves between neighbouring chirps of a channel is small, since Doppler turns phases slowly beside white noise:
 //! a chirp less the mean of its two neighbours is mostly noise, and a burst in one chirp stands out by its power.
@@ -80,7 +80,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         let unforeseen = stencil_noise(burst.chirp, loops);
         gain += energy / (unforeseen * evidence.noise()[burst.channel]).max(1e-300) - powers.len() as f64;
     }
-    // Few bursts may all be in training frames. Each is judged by what its neighbours foretell, in whatever frame it is: the
+    // Few bursts may all be in training frames. Each is judged by what its neighbours predict, in whatever frame it is: the
     // gain is what held-out frames would show in the mean over which of them are held out.
     gain *= evidence.split.held_out_share();
     if gain <= 0.0 {
@@ -131,7 +131,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
 }
 
 /// How unlikely it is that a sample is hit, and by so much, where another would have had noise: each burst's samples are measured
-/// in its own frame, and foretold by the training frames' rate and mean power only.
+/// in its own frame, and predicted by the training frames' rate and mean power only.
 fn spread(evidence: &Evidence, bursts: &[Burst], powers: &[Vec<f64>]) -> Vec<OfSample> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let hits = || bursts.iter().zip(powers);
@@ -172,7 +172,7 @@ fn neighbours(chirp: usize, loops: usize) -> [usize; 2] {
     }
 }
 
-/// What its neighbours foretell of a chirp, by sample: at the ends a straight line is continued, in the middle it is halved.
+/// What its neighbours predict of a chirp, by sample: at the ends a straight line is continued, in the middle it is halved.
 fn weights(chirp: usize, loops: usize) -> [f64; 2] {
     if chirp == 0 || chirp + 1 == loops { [2.0, -1.0] } else { [0.5, 0.5] }
 }

@@ -1,4 +1,4 @@
-//! Crossings of another radar (card I1) that stand out in no single sample: a sweep through the receiver's band within one chirp,
+//! Crossings of another radar that stand out in no single sample: a sweep through the receiver's band within one chirp,
 //! which reaches all receivers from one direction.
 //!
 //! What moves turns slowly from chirp to chirp; a crossing is in one chirp, and so everywhere in Doppler. The band of Doppler in
@@ -63,7 +63,7 @@ pub struct Crossings {
     pub faint: f64,
 }
 
-/// None where there are none, or where they cannot be told.
+/// None where there are none, or where they are not identifiable.
 pub fn find(evidence: &Evidence) -> Option<Crossings> {
     let [frames, transmitters, receivers, loops, _] = evidence.cube.dims;
     if receivers < 2 || loops < FEWEST {
@@ -146,7 +146,7 @@ impl Bank {
             let size = values.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt();
             values.into_iter().map(|value| value / size).collect()
         };
-        // A receiver without quadrature hears both signs as one.
+        // A receiver without quadrature does not distinguish the two signs.
         let signs: &[f64] = if evidence.is_real() { &[1.0] } else { &[1.0, -1.0] };
         let between = (0..BETWEEN).map(|step| step as f64 / BETWEEN as f64);
         let sweeps = DURATIONS.iter().flat_map(|&duration| signs.iter().map(move |&sign| (duration, sign)));

@@ -107,7 +107,7 @@ mod tests {
         let wrong = |chirp: &[Complex64], of: Range<usize>| {
             chirp[of.clone()].iter().zip(&tones[of]).map(|(a, b)| (a - b).norm_sqr()).sum::<f64>()
         };
-        // Through the window, the ends tell little.
+        // Through the window, the ends say little.
         let (all, middle) = (0..samples, samples / 4..3 * samples / 4);
         // the upper half of the spectrum holds nothing but the tones' skirts
         let empty: Vec<bool> = (0..samples).map(|bin| (20..60).contains(&bin)).collect();

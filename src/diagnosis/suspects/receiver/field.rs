@@ -1,4 +1,4 @@
-//! What stands still where nothing can stand: the frames' mean chirps, projected on the directions of fast time that the
+//! What is static where nothing can stand: the frames' mean chirps, projected on the directions of fast time that the
 //! room's delays do not reach, and linear models of what is there.
 
 use nalgebra::{DMatrix, DVector};

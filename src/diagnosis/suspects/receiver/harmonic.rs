@@ -1,4 +1,4 @@
-//! Non-linear receivers: the second harmonic s + κ s² and compression s − κ |s|² s (cards R5, R4).
+//! Non-linear receivers: the second harmonic s + κ s² and compression s − κ |s|² s.
 //!
 //! What was measured is the best prediction of what drives them: see [`Products`](crate::diagnosis::products::Products).
 

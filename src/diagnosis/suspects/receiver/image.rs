@@ -1,4 +1,4 @@
-//! The image of an unbalanced quadrature receiver: s + μ s*, with μ the same for everything at any time (card R3).
+//! The image of an unbalanced quadrature receiver: s + μ s*, with μ the same for everything at any time.
 //!
 //! What moves far enough has its mirror image, −beat frequency and −Doppler, in cells where nothing else is. There, the
 //! conjugate of the parent cell predicts amplitude and phase of the image but for one complex number.

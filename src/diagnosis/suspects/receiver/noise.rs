@@ -1,6 +1,6 @@
-//! Noise that is not white over beat frequency, or not independent between receivers (cards V2, V4).
+//! Noise that is not white over beat frequency, or not independent between receivers.
 //!
-//! Read from cells where neither room nor body can be; low quantiles and a bound on power keep strangers out.
+//! Read from cells where neither room nor body can be; low quantiles and a bound on power keep movers out.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -16,8 +16,8 @@ use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale, medi
 
 /// Cells of a Hann-windowed map per independent one, with reserve for the quantile's inefficiency.
 const SHARED: f64 = 4.0;
-/// A cell's power over the noise, beyond which it is a stranger's.
-const STRANGER: f64 = 8.0;
+/// A cell's power over the noise, beyond which it is a mover's.
+const MOVER: f64 = 8.0;
 
 /// How well a real noise follows the law, as a logarithm's deviation.
 const LAW: f64 = 0.05;
@@ -26,11 +26,11 @@ const LAW: f64 = 0.05;
 /// and 1/6, and their products by the square of that.
 const PER_PRODUCT: f64 = 35.0 / 18.0;
 
-/// Least correlation: far below a hundredth it is nobody's business, and strangers' tails begin to count.
+/// Least correlation: far below a hundredth it does not matter, and the tails of movers begin to count.
 const LEAST_RHO: f64 = 0.005;
 
 /// Share of the correlation that the middle one of all Doppler rows, of all beat frequencies, and of all frames must have:
-/// what a stranger's side lobes or some bursts share lies in a few of them.
+/// what a mover's side lobes or some bursts share lies in a few of them.
 const EVERYWHERE: f64 = 0.4;
 
 /// Cells that are looked at.
@@ -175,7 +175,7 @@ fn climb(likelihood: impl Fn([f64; 2]) -> f64, first: [f64; 2]) -> Top {
     Top { at, height, deviations: [deviation(bb), deviation(aa)] }
 }
 
-/// Whitened by each channel's own power; cells with a stranger in any channel are left out.
+/// Whitened by each channel's own power; cells with a mover in any channel are left out.
 fn cells(evidence: &Evidence, frame: usize, bins: &[usize]) -> Cells {
     let [_, _, rx, loops, samples] = evidence.cube.dims;
     // Where nothing is, nothing leaks over Doppler: all chirps count alike.
@@ -186,7 +186,7 @@ fn cells(evidence: &Evidence, frame: usize, bins: &[usize]) -> Cells {
     for &bin in bins {
         for doppler in 3..loops - 2 {
             let at = doppler * samples + bin;
-            let ordinary = (0..rx).all(|c| maps[c][at].norm_sqr() < STRANGER * evidence.noise()[c]);
+            let ordinary = (0..rx).all(|c| maps[c][at].norm_sqr() < MOVER * evidence.noise()[c]);
             if ordinary {
                 (0..rx).for_each(|c| cells.values[c].push(maps[c][at] / evidence.noise()[c].max(1e-300).sqrt()));
                 cells.places.push([bin, doppler]);
@@ -270,7 +270,7 @@ fn pairs_of(receivers: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..receivers).flat_map(|a| (0..a).map(move |b| (a, b)))
 }
 
-/// Mean over pairs of receivers; what all of them hear alike is real.
+/// Mean over pairs of receivers; what is common to all of them is real.
 fn mean_correlation(correlations: &DMatrix<Complex64>) -> f64 {
     let receivers = correlations.nrows();
     pairs_of(receivers).map(|pair| correlations[pair].re).sum::<f64>() / pairs_of(receivers).count().max(1) as f64
@@ -298,7 +298,8 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     let pairs = (rx * (rx - 1) / 2) as f64;
     let total: f64 = pairs_of(rx).map(|pair| found[pair].norm_sqr()).sum();
     let mean = mean_correlation(&found);
-    // Any correlation of any two; and that of noise from one place, such as a supply, which all receivers hear alike: one number.
+    // Any correlation of any two; and that of noise from one place, such as a supply, which is the same in all receivers: one
+    // number.
     let chances =
         [chi2_tail(2.0 * independent * total, 2.0 * pairs), Normal::standard().sf(mean * (2.0 * independent * pairs).sqrt())];
     let alike = chances[1] < chances[0];
@@ -311,7 +312,7 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     if !is_everywhere(evidence, bins, &if alike { equal(rx, rho) } else { found }) {
         return None;
     }
-    // Few held-out frames say little of so many numbers: every frame is foretold by those of the other folds.
+    // Few held-out frames say little of so many numbers: every frame is predicted by those of the other folds.
     let gain: f64 = folds(of_frames.len())
         .map(|parts| {
             let [rest, fold] = parts.map(|frames| sum(&frames));
@@ -351,7 +352,7 @@ mod tests {
     use crate::diagnosis::cube::Loaded;
     use crate::radar::Radar;
 
-    /// Noise of four receivers; `shared`: amplitude of what all of them hear, by frame and chirp.
+    /// Noise of four receivers; `shared`: amplitude of what is common to all of them, by frame and chirp.
     fn noise(shared: impl Fn(usize, usize) -> f64) -> Evidence {
         let mut radar = Radar::small(12);
         (radar.loops_per_frame, radar.samples_per_chirp) = (32, 64);

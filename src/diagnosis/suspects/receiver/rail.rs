@@ -1,4 +1,4 @@
-//! The converter's rail: components pile up at one value (card R4).
+//! The converter's rail: components pile up at one value.
 
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! The response of the intermediate frequency to beat frequency: filters and delays.
 //!
-//! A filter that acts on each chirp of finite length reshapes the tails that the still scene's tones have outside the
+//! A filter that acts on each chirp of finite length reshapes the tails that the static scene's tones have outside the
 //! room's delays: what is measured must lie in H · U, with U the space of the room's tones. No knowledge of the scene
 //! inside is needed. A filter that starts from rest leaves a decaying transient at the chirp's beginning instead.
 
@@ -19,7 +19,7 @@ use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, V
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
 
-/// Tales within this many nats of the best cannot be told from it.
+/// Hypotheses within this many nats of the best are indistinguishable from it.
 const INDISTINGUISHABLE: f64 = 4.6;
 /// Power that a response must let through to be undone in full.
 const LEAST_POWER: f64 = 0.25;
@@ -226,7 +226,7 @@ fn described(shape: Shape, value: f64, error: f64) -> (Vec<Estimate>, String) {
     }
 }
 
-/// The still scene as a Gaussian process: tones over the room's delays with the density that is measured.
+/// The static scene as a Gaussian process: tones over the room's delays with the density that is measured.
 ///
 /// A response that takes tails away is seen by their absence, which needs how strong they should have been.
 struct Process {
@@ -323,7 +323,7 @@ fn decay(turns_per_sample: f64, power: i32, samples: usize, amplitude: f64) -> V
         .collect()
 }
 
-/// What the still scene can look like behind the response.
+/// What the static scene can look like behind the response.
 fn space(field: &Field, shape: Shape, value: f64, rate: f64) -> Vec<Vec<Complex64>> {
     let inside = &field.support.inside;
     let samples = inside[0].len();

@@ -1,8 +1,8 @@
-//! A continuous tone whose phase advances so little from chirp to chirp that it stands among what hardly moves (card R12).
+//! A continuous tone whose phase advances so little from chirp to chirp that it stands among what hardly moves.
 //!
-//! No single frame tells it from a slow limb. But its phase goes on from frame to frame through the whole recording, by one number of
-//! turns a chirp and another one a frame (a frame's period need not be a multiple of a chirp's, and whole turns do not show), and its
-//! beat frequency stays: what turns so evenly and moves would have left its range.
+//! No single frame distinguishes it from a slow limb. But its phase goes on from frame to frame through the whole recording, by one
+//! number of turns a chirp and another one a frame (a frame's period need not be a multiple of a chirp's, and whole turns do not
+//! show), and its beat frequency stays: what turns so evenly and moves would have left its range.
 
 use std::f64::consts::TAU;
 
@@ -25,13 +25,14 @@ const FINE: usize = 4;
 /// Cells of Doppler by which a tone may be beside the strongest one, and steps in which it is sought.
 const BESIDE: f64 = 1.0;
 const STEPS: usize = 16;
-/// Share of the power there that must go on from frame to frame, and that this must foretell of the held-out frames.
+/// Share of the power there that must go on from frame to frame, and that this must predict of the held-out frames.
 const COHERENT: f64 = 0.95;
-const FORETOLD: f64 = 0.9;
+const PREDICTED: f64 = 0.9;
 /// Range bins that what turns so, and moves, leaves during the recording at least, and up to which share of that a tone may seem to.
 const LEAST_BINS: f64 = 0.8;
 const STAYS: f64 = 0.3;
-/// Chance at which what goes on at the opposite Doppler frequency is none: what is modulated, or swings about its place, has both.
+/// Chance at which what goes on at the opposite Doppler frequency is none: what is modulated, or oscillates about its place, has
+/// both.
 const OPPOSITE: f64 = 1e-3;
 
 /// How a tone turns from loop to loop, and from one frame's beginning to the next.
@@ -69,7 +70,7 @@ pub struct SlowSpur {
 /// What of a tone each frame of a channel holds, `[channel][frame]`.
 type Held = Vec<Vec<Complex64>>;
 
-/// Spectra over the samples of all chirps of some frames, without what stands still.
+/// Spectra over the samples of all chirps of some frames, without static clutter.
 struct Spectra<'a> {
     evidence: &'a Evidence,
     /// That are looked at, those to train on first, and how many these are.
@@ -98,7 +99,7 @@ pub fn find(evidence: &Evidence) -> Option<SlowSpur> {
     let found: Vec<Tone> = cells.par_iter().map(|&cell| spectra.tone(cell)).collect();
     let Tone { bin, turns, coherence } = found.into_iter().max_by(|a, b| a.coherence.total_cmp(&b.coherence))?;
     let walk = spectra.walk_bins(turns);
-    if coherence < COHERENT || walk < LEAST_BINS || spectra.foretold(turns, bin) < FORETOLD {
+    if coherence < COHERENT || walk < LEAST_BINS || spectra.predicted(turns, bin) < PREDICTED {
         return None;
     }
     // Half of the recording is half of the way.
@@ -228,8 +229,8 @@ impl<'a> Spectra<'a> {
         (1.0 - coherence).clamp(1e-16, 1.0).powi(self.training as i32 - 1)
     }
 
-    /// Share of the held-out frames' power that the training frames' mean foretells.
-    fn foretold(&self, turns: Turns, bin: usize) -> f64 {
+    /// Share of the held-out frames' power that the training frames' mean predicts.
+    fn predicted(&self, turns: Turns, bin: usize) -> f64 {
         let (mut left, mut all) = (0.0, 0.0);
         for channel in self.turned_back(&self.held(turns.per_loop, bin), turns.per_frame) {
             let (training, held_out) = channel.split_at(self.training);
@@ -279,7 +280,7 @@ fn wrapped(turns: f64) -> f64 {
     turns - turns.round()
 }
 
-/// Least squares over the whole recording, beside what stands still, by channel.
+/// Least squares over the whole recording, beside static clutter, by channel.
 pub fn amplitudes(cube: &Cube, starts: &[f64], turns: Turns, fast: f64) -> Vec<Complex64> {
     let [frames, _, _, loops, samples] = cube.dims;
     let phases = turns.of_chirps(starts, loops);
@@ -322,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tone_that_goes_on_from_frame_to_frame_is_told_from_what_goes_away() {
+    fn a_tone_that_goes_on_from_frame_to_frame_is_distinguished_from_what_goes_away() {
         let radar = evidence(0.0, 0.0).radar;
         let bins_per_s = |frequency_hz: f64| 0.5 * radar.wavelength_m() * frequency_hz / radar.range_resolution_m();
         // Far enough that what moves leaves its range.

@@ -1,5 +1,5 @@
 //! A continuous tone in the intermediate frequency: one beat frequency, one phase advance from chirp to chirp, in all
-//! frames alike (card R12).
+//! frames alike.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::diagnosis::{Cube, Evidence, denoised};
 const LEFT_OVER: f64 = 0.2;
 /// Standard deviations by which noise may add to that.
 const CHANCE: f64 = 2.0;
-/// Coherence (squared) of what stands still at other ranges with its line there, from which on the line is its sideband.
+/// Coherence (squared) of static clutter at other ranges with its line there, from which on the line is its sideband.
 const SIDEBAND: f64 = 0.15;
 /// Samples in which its frequencies are looked for.
 const SEARCHED: usize = 1 << 17;
@@ -199,7 +199,7 @@ impl<'a> Line<'a> {
         Self { evidence, empty: empty_bins(evidence), residual, fast }
     }
 
-    fn is_told(&self, doppler: usize, range: usize) -> bool {
+    fn is_usable(&self, doppler: usize, range: usize) -> bool {
         let loops = self.evidence.cube.dims[3];
         let leaves = doppler.min(loops - doppler) as f64 > self.fast;
         self.empty[range] || (leaves && self.residual.as_ref().is_some_and(|residual| range < residual.bins))
@@ -208,7 +208,7 @@ impl<'a> Line<'a> {
     /// The strongest line on the cells and half way to the next ones, in the order of [`BETWEEN`], and among how many.
     fn strongest(&self) -> [(Option<Strongest>, usize); BETWEEN.len()] {
         let [_, _, _, loops, samples] = self.evidence.cube.dims;
-        let cells = BETWEEN.map(|between| self.told(between));
+        let cells = BETWEEN.map(|between| self.cells(between));
         let frames = &self.evidence.split.training;
         let powers: Vec<[Vec<f64>; BETWEEN.len()]> = frames.par_iter().map(|&frame| self.powers(frame, &cells)).collect();
         std::array::from_fn(|place| {
@@ -223,12 +223,12 @@ impl<'a> Line<'a> {
         })
     }
 
-    /// Cells about which a line is told, half way to the next ones along the axes marked in `between`.
-    fn told(&self, between: [usize; 2]) -> Vec<[usize; 2]> {
+    /// Cells at which a line is detectable, half way to the next ones along the axes marked in `between`.
+    fn cells(&self, between: [usize; 2]) -> Vec<[usize; 2]> {
         let [_, _, _, loops, samples] = self.evidence.cube.dims;
         (1..loops - between[0])
             .flat_map(|doppler| (0..samples - between[1]).map(move |range| [doppler, range]))
-            .filter(|&cell| neighbours(cell, between).all(|[doppler, range]| self.is_told(doppler, range)))
+            .filter(|&cell| neighbours(cell, between).all(|[doppler, range]| self.is_usable(doppler, range)))
             .collect()
     }
 
@@ -328,7 +328,7 @@ fn around(evidence: &Evidence, (slow, fast): (f64, f64), amplitudes: &[Complex64
     Around { before, after, deviation }
 }
 
-/// Whether what stands still at other ranges has the same line, in proportion to what it is: then everything is modulated.
+/// Whether static clutter at other ranges has the same line, in proportion to what it is: then everything is modulated.
 fn is_sideband(evidence: &Evidence, slow: f64, fast: f64) -> bool {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let window = hann(loops);
@@ -338,7 +338,7 @@ fn is_sideband(evidence: &Evidence, slow: f64, fast: f64) -> bool {
     let still: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(spectrum).collect();
     let line = |frame: usize, channel: usize| {
         let mut line = vec![Complex64::ZERO; samples];
-        // The window's side lobes of what stands still are in proportion to it, too.
+        // The window's side lobes of static clutter are in proportion to it, too.
         for (chirp, values) in evidence.moving(frame, channel).chunks_exact(samples).enumerate() {
             let turn = Complex64::cis(-TAU * slow * chirp as f64) * window[chirp];
             line.iter_mut().zip(values).for_each(|(sum, value)| *sum += value * turn);
@@ -366,7 +366,7 @@ fn tone(slow: f64, fast: f64, chirp: usize, sample: usize) -> Complex64 {
     Complex64::cis(TAU * (slow * chirp as f64 + fast * sample as f64))
 }
 
-/// Least squares of the tone in every frame and channel, `[frame][channel]`, once what stands still is away.
+/// Least squares of the tone in every frame and channel, `[frame][channel]`, once static clutter is away.
 fn amplitudes_of(cube: &Cube, slow: f64, fast: f64) -> Vec<Complex64> {
     let [frames, _, _, _, samples] = cube.dims;
     let channels = cube.channels();
@@ -447,7 +447,7 @@ mod tests {
         let alternating = |chirp: usize| if chirp.is_multiple_of(2) { 1.02 } else { 0.98 };
         let modulated = Evidence::in_noise(radar.clone(), 3, |[_, _, chirp, n]| still(n) * alternating(chirp));
         assert!(is_sideband(&modulated, slow, fast));
-        // Near what stands still, whose side lobes are no sidebands, and far from it.
+        // Near static clutter, whose side lobes are no sidebands, and far from it.
         for slow in [4.4 / 32.0, slow] {
             let spur = Evidence::in_noise(radar.clone(), 4, |[_, _, chirp, n]| still(n) + 0.6 * tone(slow, fast, chirp, n));
             assert!(!is_sideband(&spur, slow, fast), "{slow}");

@@ -1,7 +1,7 @@
 //! Additive fields that stand still outside the delays of the room: offsets, leakage, transients at the chirps' edges.
 //!
 //! Elements are chosen one after the other by their log-likelihood on the training frames less the Bayesian information
-//! criterion's penalty, together with the images that non-linear receivers make of the still scene (which belong to
+//! criterion's penalty, together with the images that non-linear receivers make of the static scene (which belong to
 //! other suspects, but must not be taken for a leakage). Named elements are believed only if all together explain most
 //! of what a free field does.
 
@@ -97,7 +97,7 @@ fn penalty(field: &Field) -> f64 {
     1.5 * field.freedom().ln().max(4.0)
 }
 
-/// What non-linear receivers make of the still scene, `[channel][sample]`.
+/// What non-linear receivers make of the static scene, `[channel][sample]`.
 struct Images {
     conjugate: Vec<Vec<Complex64>>,
     square: Vec<Vec<Complex64>>,
@@ -438,7 +438,7 @@ fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, gain: f64) -> O
         look_alikes: vec![],
         statement: format!(
             "every chirp holds something that never changes at beat frequencies where the room ({:.1} to {:.1} m) has nothing, \
-             {power_db:.1} dB to all that stands still; no effect of the library explains its shape",
+             {power_db:.1} dB to all static clutter; no effect of the library explains its shape",
             field.support.low_m, field.support.high_m
         ),
         curve: None,

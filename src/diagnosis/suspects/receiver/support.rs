@@ -1,8 +1,8 @@
-//! Where in beat frequency the still scene can be, and the directions of fast time in which it cannot be.
+//! Where in beat frequency the static scene can be, and the directions of fast time in which it cannot be.
 //!
 //! Tones between two beat frequencies span, over N samples, a space of about N · bandwidth / sample rate dimensions; its
 //! best orthonormal basis are the discrete prolate spheroidal sequences (Slepian 1978). Beyond that number their share λ
-//! of energy within the band falls fast: there, a static room and a body leave λ times their density and thermal noise.
+//! of energy within the band falls fast: there, static clutter and a body leave λ times their density and thermal noise.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +23,7 @@ const MOST_SAMPLES: usize = 512;
 /// The scene's density may exceed its mean over the band by this.
 const UNEVEN: f64 = 10.0;
 
-/// Fast-time directions of the still scene's beat frequencies, `[direction][sample]`, orthogonal.
+/// Fast-time directions of the static scene's beat frequencies, `[direction][sample]`, orthogonal.
 pub struct Support {
     /// Where the scene exceeds the noise, of unit length.
     pub inside: Vec<Vec<Complex64>>,

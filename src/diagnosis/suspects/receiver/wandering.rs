@@ -1,7 +1,7 @@
 //! A tone that keeps its beat frequency while its Doppler frequency says that it moves, where nobody is tracked.
 //!
 //! What moves leaves its range, by the integral of its velocity; a frequency that wanders from frame to frame beside the chirps does
-//! not. A return that swings about its place has both Doppler frequencies, and a tone has one.
+//! not. A return that oscillates about its place has both Doppler frequencies, and a tone has one.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +13,7 @@ use crate::diagnosis::evidence::{Evidence, hann};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median, normal_tails};
 use crate::diagnosis::suspects::slow::lines::climb;
 
-/// Doppler bins around zero where a Hann window leaves what stands still.
+/// Doppler bins around zero where a Hann window leaves static clutter.
 const STILL_BINS: usize = 2;
 /// Fewest loops and training frames that show a Doppler frequency and a way.
 const FEWEST_LOOPS: usize = 8;
@@ -265,7 +265,7 @@ fn along(chirps: &[Complex64], slow: f64) -> Complex64 {
     chirps.iter().enumerate().map(turned).sum::<Complex64>() / window.iter().sum::<f64>()
 }
 
-/// Of the tone in every frame and channel, `[frame][channel]`, beside what stands still.
+/// Of the tone in every frame and channel, `[frame][channel]`, beside static clutter.
 pub fn amplitudes(cube: &Cube, slow: &[f64], fast: f64) -> Vec<Complex64> {
     let ([frames, _, _, _, samples], channels) = (cube.dims, cube.channels());
     (0..frames * channels)
@@ -279,23 +279,23 @@ mod tests {
     use super::*;
     use crate::radar::Radar;
 
-    /// A wall, and something at a range that turns by a frequency (Hz, of each frame) and goes away by bins per second; `swings`: turns to
-    /// and fro instead.
-    fn evidence(frequency_hz: impl Fn(usize) -> f64, bins_per_s: f64, swings: bool) -> Evidence {
+    /// A wall, and something at a range that turns by a frequency (Hz, of each frame) and goes away by bins per second;
+    /// `oscillates`: its phase is sinusoidal instead.
+    fn evidence(frequency_hz: impl Fn(usize) -> f64, bins_per_s: f64, oscillates: bool) -> Evidence {
         let mut radar = Radar { samples_per_chirp: 64, loops_per_frame: 32, ..Radar::small(16) };
         radar.frame_period_s = 0.1;
         let clock = radar.clone();
         Evidence::in_noise(radar, 3, |[frame, rx, index, n]| {
             let (time_s, within_s) = (clock.chirp_time_s(frame, 0, index), clock.chirp_time_s(0, 0, index));
             let turns = frequency_hz(frame) * within_s + 0.37 * frame as f64;
-            let phase = if swings { 1.0 * (TAU * turns).sin() } else { TAU * turns };
+            let phase = if oscillates { 1.0 * (TAU * turns).sin() } else { TAU * turns };
             let wall = Complex64::cis(TAU * 20.0 * n as f64 / 64.0) * 50.0;
             wall + Complex64::cis(TAU * (12.3 + bins_per_s * time_s) * n as f64 / 64.0 + phase + rx as f64) * 2.0
         })
     }
 
     #[test]
-    fn what_keeps_its_range_is_a_tone_and_what_leaves_it_or_swings_is_none() {
+    fn what_keeps_its_range_is_a_tone_and_what_leaves_it_or_oscillates_is_none() {
         let radar = evidence(|_| 0.0, 0.0, false).radar;
         let loops_hz = radar.loop_period_s().recip();
         let wanders = |frame: usize| loops_hz * (0.2 + 0.004 * (frame as f64).sin());

@@ -29,7 +29,7 @@ pub(super) fn stated_delay_s() -> f64 {
 /// Frame, transmitter and loop to the deviation of that chirp.
 pub(super) type Deviation = Arc<dyn Fn([usize; 3]) -> f64 + Send + Sync>;
 
-/// `spent`: nats per chirp on deviations that no law foretells.
+/// `spent`: nats per chirp on deviations that no law predicts.
 pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, spent: f64) -> Correction {
     let (radar, room) = (evidence.radar.clone(), evidence.room.clone());
     let known = deviation.clone();
@@ -59,7 +59,7 @@ pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, 
     }
 }
 
-/// Energy that a deviation adds to what stands still.
+/// Energy that a deviation adds to static clutter.
 fn energy(evidence: &Evidence, field: &Field, part: Part, deviation: &dyn Fn([usize; 3]) -> f64) -> f64 {
     let still: f64 = evidence.still().iter().map(|v| v.norm_sqr()).sum();
     // Phases in proportion to the delay act as much as at the typical delay.
@@ -119,8 +119,8 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
             None,
             vec![],
             format!(
-                "The gain of the whole receiver swings by {:.2} % (amplitude) at {hertz}{harmonics}, at all ranges and in all \
-                 channels alike: as mains ripple on a supply would do it.",
+                "The gain of the whole receiver is modulated by {:.2} % (amplitude) at {hertz}{harmonics}, at all ranges and in \
+                 all channels alike: as mains ripple on a supply would do it.",
                 100.0 * amplitude
             ),
             "receiver",
@@ -138,8 +138,8 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
                     Estimate::normal("frequency_hz", line.frequency_hz, line.frequency_deviation_hz),
                 ],
                 format!(
-                    "All static returns swing in phase together, by {:.3} rad at {hertz}{harmonics}, {where_}: the radar itself \
-                     vibrates by {:.1} µm along its boresight.",
+                    "The phases of all static returns oscillate together, by {:.3} rad at {hertz}{harmonics}, {where_}: the radar \
+                     itself vibrates by {:.1} µm along its boresight.",
                     amplitude,
                     1e6 * amplitude * metres
                 ),
@@ -150,8 +150,8 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
             None,
             vec![],
             format!(
-                "The phase of every return swings at {hertz}{harmonics} in proportion to its delay, by {:.4} rad at {STATED_AT_M} \
-                 m: the local oscillator's frequency swings by {:.0} Hz.",
+                "The phase of every return oscillates at {hertz}{harmonics} in proportion to its delay, by {:.4} rad at \
+                 {STATED_AT_M} m: the local oscillator's frequency is modulated by {:.0} Hz.",
                 amplitude * stated_delay_s(),
                 amplitude / (2.0 * PI)
             ),

@@ -1,8 +1,8 @@
 //! One receiver or transmitter whose gain changes from frame to frame while the others stay.
 //!
 //! The complex gain of the static returns, relative to that of the other channels, is estimated in every frame and in
-//! groups of ranges without movers; and so is the gain of what a receiver hears of the body against what the others hear. A gain is
-//! the same at all ranges: each of two halves of all that is heard must show what the other one shows.
+//! groups of ranges without movers; and so is the gain of what a receiver observes of the body against what the others do. A gain
+//! is the same at all ranges: each of two halves of all observations must show what the other one shows.
 
 use std::iter::repeat;
 use std::sync::Arc;
@@ -17,9 +17,9 @@ use crate::diagnosis::finding::{Candidate, Correction, Curve, NINETY, Place, Vol
 use crate::diagnosis::statistics::{self, DECIBEL};
 use crate::diagnosis::suspects::geometry;
 
-/// Fewest receivers or transmitters of which one can be told to be odd.
+/// Fewest receivers or transmitters of which one can be identified as odd.
 const FEWEST: usize = 3;
-/// Fewest training frames of which a change can be told.
+/// Fewest training frames from which a change is estimable.
 const FEWEST_FRAMES: usize = 5;
 /// Fewest degrees of freedom of what groups scatter.
 const LEAST_FREEDOM: f64 = 8.0;
@@ -72,7 +72,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let Some(steady) = Steady::new(evidence) else { return vec![] };
     let tried = units.len() as f64;
-    // They tell of receivers only.
+    // They concern receivers only.
     let of_body = if receivers >= FEWEST { geometry::gains(evidence) } else { None };
     let best = units
         .iter()
@@ -92,12 +92,12 @@ struct Judged {
     variance: f64,
 }
 
-/// `of_body`: gains of what is heard of the body, `[rx][frame][group]`, with inverse variances.
+/// `of_body`: gains of what is observed of the body, `[rx][frame][group]`, with inverse variances.
 fn judged(evidence: &Evidence, steady: &Steady, of_body: Option<&[Vec<Vec<[f64; 2]>>]>, unit: Axis) -> Option<Judged> {
     let training = &evidence.split.training;
     let mut relative = Relative::new(steady, evidence.cube.dims[2], unit, training);
     if let (Axis::Receiver(rx), Some(of_body)) = (unit, of_body) {
-        relative.hear(&of_body[rx], training);
+        relative.add_body(&of_body[rx], training);
     }
     let all = relative.series(training, |_| true)?;
     // The nearer and the farther half of what the groups know.
@@ -117,8 +117,8 @@ fn judged(evidence: &Evidence, steady: &Steady, of_body: Option<&[Vec<Vec<[f64; 
     // What but one half has, such as slow parts of the body, the other one has by chance.
     let patterns = halves.each_ref().map(|half| half.likely(training));
     let p_value = chance(&halves[0], &patterns[1], training).max(chance(&halves[1], &patterns[0], training));
-    // Gains drawn from one law in every frame. Few held-out frames may all have the same one: every frame is foretold by those of the
-    // other folds.
+    // Gains drawn from one law in every frame. Few held-out frames may all have the same one: every frame is predicted by those of
+    // the other folds.
     let seen = |frames: &[usize]| frames.iter().copied().filter(|&f| all.weight[f] > 0.0).collect::<Vec<usize>>();
     let gain = folds(evidence.cube.dims[0]).map(|[rest, fold]| Law::of(&all, &seen(&rest)).gain(&all, &seen(&fold))).sum();
     let variance = Law::of(&all, &seen(training)).variance;
@@ -221,9 +221,9 @@ impl Relative {
         Self { members, value, weight, groups, freedom: 0.0 }.weighed(training)
     }
 
-    /// Adds groups of what is heard of the body, `[frame][group]`: logarithmic gains, which may all be off by the same, with their
-    /// inverse variances.
-    fn hear(&mut self, of_body: &[Vec<[f64; 2]>], training: &[usize]) {
+    /// Adds groups of what is observed of the body, `[frame][group]`: logarithmic gains, which may all be off by the same, with
+    /// their inverse variances.
+    fn add_body(&mut self, of_body: &[Vec<[f64; 2]>], training: &[usize]) {
         let groups = of_body.iter().map(Vec::len).max().unwrap_or(0);
         let of_frame = |gains: &Vec<[f64; 2]>| gains.iter().copied().chain(repeat([0.0; 2])).take(groups).collect::<Vec<_>>();
         let (value, weight) = of_body.iter().flat_map(of_frame).map(|[gain, weight]| (Complex64::from(gain), weight)).unzip();
@@ -408,11 +408,11 @@ mod tests {
         };
         for (apart, weight) in [(0.05, 100.0), (0.5, 1.0)] {
             let mut relative = relative();
-            relative.hear(&body(apart), &training);
+            relative.add_body(&body(apart), &training);
             assert_eq!((relative.groups, relative.freedom), (3, 16.0));
             assert!((relative.weight[1] - weight).abs() < 1e-9, "{}", relative.weight[1]);
-            let heard = relative.series(&training, |group| group > 0).expect("six frames");
-            assert!(heard.value.iter().zip(hops).all(|(value, hop)| (value - hop).norm() < 1e-9), "{:?}", heard.value);
+            let observed = relative.series(&training, |group| group > 0).expect("six frames");
+            assert!(observed.value.iter().zip(hops).all(|(value, hop)| (value - hop).norm() < 1e-9), "{:?}", observed.value);
         }
     }
 }

@@ -170,13 +170,13 @@ pub fn best(field: &Field, part: Part, series: &Series, training: &[usize], held
 
 /// Probability of a drift that moves the training frames' scatter by `scatter` (with `freedom` parameters), were it the body's
 /// slow parts: these turn at random in every range, so that they change its gain as much as its phase, and each range
-/// otherwise than the next. None where too few ranges tell.
+/// otherwise than the next. None where too few ranges are informative.
 fn unlike_the_body(field: &Field, part: Part, points: &[Point], training: &[usize], scatter: f64, freedom: f64) -> Option<f64> {
     const FEWEST_RANGES: f64 = 2.0;
     let whole = Slow::fit(points, field.frames)?;
     let of =
         |part: Part, only: usize| Slow::fit(&self::points(&field.series(part, |group| group == only), training), field.frames);
-    // Of each range that stands still: what its other component does slowly, and what its own does otherwise than all.
+    // Of each static range: what its other component does slowly, and what its own does otherwise than all.
     let odd: Vec<f64> = (0..field.groups.len())
         .filter_map(|only| {
             let (own, other) = (of(part, only)?, of(part.other(), only)?);
@@ -184,13 +184,13 @@ fn unlike_the_body(field: &Field, part: Part, points: &[Point], training: &[usiz
         })
         .collect();
     let (sum, squares) = (odd.iter().sum::<f64>(), odd.iter().map(|e| e * e).sum::<f64>());
-    let telling = sum * sum / squares;
-    if telling.is_nan() || telling < FEWEST_RANGES {
+    let effective = sum * sum / squares;
+    if effective.is_nan() || effective < FEWEST_RANGES {
         return None;
     }
     let (degree, count) = (DEGREE as f64, odd.len() as f64);
     let usual = (sum / (degree * (2.0 * count - 1.0))).max(1.0);
-    Some(fisher_tail(scatter / freedom / usual, freedom, degree * (2.0 * telling - 1.0)))
+    Some(fisher_tail(scatter / freedom / usual, freedom, degree * (2.0 * effective - 1.0)))
 }
 
 /// What some ranges do slowly in the training frames: a polynomial of degree [`DEGREE`].

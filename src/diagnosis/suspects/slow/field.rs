@@ -27,7 +27,7 @@ pub struct Field {
     pub frames: usize,
     pub loops: usize,
     pub groups: Vec<Group>,
-    /// `[frame, loop, group]`, zero where nothing can be said; its imaginary part is an angle where phases swing far.
+    /// `[frame, loop, group]`, zero where nothing can be said; its imaginary part is an angle where phase excursions are large.
     deviation: Vec<Complex64>,
     /// Inverse variance of a complex deviation, `[frame, group]`; zero where nothing can be said.
     weight: Vec<f64>,
@@ -76,8 +76,8 @@ const CLEAN: f64 = 1.25;
 const ASIDE: f64 = 0.03;
 /// Bins beside the body that are not free of it.
 const MARGIN: usize = 2;
-/// What a range would gain (nats) by a deviation that it shares, for its silence to tell anything.
-const TELLING_GAIN: f64 = 10.0;
+/// What a range would gain (nats) by a deviation that it shares, for its absence to be informative.
+const INFORMATIVE_GAIN: f64 = 10.0;
 
 /// Share that is uncertain of an amplitude along the boresight: how much returns from where is not known.
 pub const PATTERN: f64 = 0.2;
@@ -130,9 +130,10 @@ pub fn ahead(room: Option<&Room>, range_m: f64) -> f64 {
     if all > 0.0 { sum / all } else { 1.0 }
 }
 
-/// Whether most ranges, as [`Field::told`] has them, gain more than a share of what they could; nothing contradicts where none tells.
-fn most_have(told: &[[f64; 2]], share: f64) -> bool {
-    2 * told.iter().filter(|[gain, most]| *gain > share * most).count() > told.len() || told.is_empty()
+/// Whether most ranges, as [`Field::gains`] has them, gain more than a share of what they could; nothing contradicts where none is
+/// informative.
+fn most_have(gains: &[[f64; 2]], share: f64) -> bool {
+    2 * gains.iter().filter(|[gain, most]| *gain > share * most).count() > gains.len() || gains.is_empty()
 }
 
 impl Field {
@@ -223,8 +224,8 @@ impl Field {
         (sure > SURE).then(|| Complex64::ONE + sum / sure)
     }
 
-    /// Where phases swing far, reads them as angles, and gains as they are without that: a mean over time of what turns is
-    /// shorter than it.
+    /// Where phase excursions are large, reads them as angles, and gains as they are without that: a mean over time of what turns
+    /// is shorter than it.
     fn unroll(&mut self, training: &[usize]) {
         let chirps = training.iter().flat_map(|&frame| (0..self.loops).map(move |index| (frame, index)));
         let common: Vec<Complex64> = chirps.filter_map(|(frame, index)| self.common(frame, index)).collect();
@@ -295,22 +296,22 @@ impl Field {
     /// Whether most of the ranges that could contradict a deviation share it: one that is far stronger than the others (a
     /// body that stands still for a while) must not speak for all. `predicted` gives it for frame, loop and group.
     pub fn shared(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> bool {
-        most_have(&self.told(predicted, |_| true), 0.0)
+        most_have(&self.gains(predicted, |_| true), 0.0)
     }
 
     /// The same of a deviation that was read from these ranges chirp by chirp, in which the strongest one finds itself: most of the
-    /// others must have most of it, and one of them at least must tell anything. The body's ranges do not, while it is there: its own
-    /// still returns move with it.
+    /// others must have most of it, and one of them at least must be informative. The body's ranges are not, while it is there: its
+    /// own slow returns move with it.
     pub fn shared_by_others(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> bool {
-        let mut told = self.told(predicted, |place| self.free[place]);
-        let strongest = told.iter().enumerate().max_by(|(_, a), (_, b)| a[1].total_cmp(&b[1])).map(|(index, _)| index);
-        strongest.map(|index| told.swap_remove(index));
-        !told.is_empty() && most_have(&told, 0.5)
+        let mut gains = self.gains(predicted, |place| self.free[place]);
+        let strongest = gains.iter().enumerate().max_by(|(_, a), (_, b)| a[1].total_cmp(&b[1])).map(|(index, _)| index);
+        strongest.map(|index| gains.swap_remove(index));
+        !gains.is_empty() && most_have(&gains, 0.5)
     }
 
-    /// What ranges gain by a deviation, and what they would if all of it were theirs (nats): those that tell anything of it. `wanted`:
+    /// What ranges gain by a deviation, and what they would if all of it were theirs (nats): the informative ones. `wanted`:
     /// of frame · groups + group.
-    fn told(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64, wanted: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
+    fn gains(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64, wanted: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
         let of_group = |(g, group): (usize, &Group)| {
             let (mut gain, mut most) = (0.0, 0.0);
             for frame in (0..self.frames).filter(|frame| wanted(frame * self.groups.len() + g)) {
@@ -323,7 +324,7 @@ impl Field {
             }
             [gain, most]
         };
-        self.groups.iter().enumerate().map(of_group).filter(|[_, most]| *most > TELLING_GAIN).collect()
+        self.groups.iter().enumerate().map(of_group).filter(|[_, most]| *most > INFORMATIVE_GAIN).collect()
     }
 
     fn moments(&self, weights: &[f64]) -> [f64; 3] {
@@ -406,7 +407,7 @@ fn of_frame(
     let channels = evidence.cube.channels();
     let bins = evidence.range_bins();
     let noise = evidence.noise();
-    // `[channel, loop, bin]`, in units of the noise's deviation, without what stands still.
+    // `[channel, loop, bin]`, in units of the noise's deviation, without static clutter.
     let mut spectra: Vec<Complex64> = Vec::with_capacity(channels * loops * samples);
     for (channel, variance) in noise.iter().enumerate() {
         let scale = 1.0 / variance.sqrt();

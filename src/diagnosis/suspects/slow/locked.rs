@@ -1,9 +1,9 @@
 //! What one return, and not all of them, does alike in every frame: a function of the chirp's number in its frame, such as a leakage
 //! that settles or an offset that creeps.
 //!
-//! A frame's chirps about their mean are transformed over the loop's number. Frames are independent draws, so that their scatter tells
-//! what their mean may be by chance, movers included: of a complex normal law, `F |mean|² / scatter` of F frames exceeds x with a
-//! probability of `(1 + x)^{−(F−1)}`, and logarithms of independent probabilities add (Fisher's method).
+//! A frame's chirps about their mean are transformed over the loop's number. Frames are independent draws, so that their scatter
+//! shows what their mean may be by chance, movers included: of a complex normal law, `F |mean|² / scatter` of F frames exceeds x
+//! with a probability of `(1 + x)^{−(F−1)}`, and logarithms of independent probabilities add (Fisher's method).
 
 use std::sync::Arc;
 

@@ -11,12 +11,12 @@ pub mod field;
 pub mod lines;
 pub mod locked;
 pub mod odd_frame;
+mod platform_vibration;
 pub mod random;
 pub mod settling;
 mod shared;
 pub mod slip;
 pub mod steady;
-mod sway;
 #[cfg(test)]
 mod tests;
 pub mod undo;
@@ -31,16 +31,16 @@ use crate::diagnosis::statistics;
 /// Kinds of looks that share one p-value: three parts, each for lines, drifts and randomness, a radar that vibrates, and
 /// settling.
 const LOOKS: f64 = 11.0;
-/// Gain (nats) below which nothing is worth telling.
+/// Log-likelihood gain (nats) below which nothing is reported.
 const LEAST_GAIN: f64 = 3.0;
-/// Share of the gain that what is simpler, or has a name, needs.
+/// Share of the log-likelihood gain that what is simpler, or has a name, needs.
 const NEARLY: f64 = 0.8;
 /// The same for what a sure name explains over the noise, where what has no name leaves more than noise itself.
 const HALF: f64 = 0.5;
-/// Difference of gains (nats) that decides nothing.
+/// Difference of log-likelihood gains (nats) that decides nothing.
 const UNDECIDED: f64 = 4.6;
-/// Turns of a line in a frame that tell it from a drift.
-const TELLING_TURNS: f64 = 0.2;
+/// Turns of a line in a frame from which on it is distinguishable from a drift.
+const DISTINCT_TURNS: f64 = 0.2;
 /// p-value below which a law that a background makes unsure is sure.
 const SURE: f64 = 1e-3;
 /// p-value below which a candidate is passed on.
@@ -51,7 +51,7 @@ struct Found {
     candidate: Candidate,
     /// Of a line on a background that is hardly known: its degrees of freedom, and the p-value that this leaves.
     unsure: Option<(f64, f64)>,
-    /// Gain over the noise alone.
+    /// Log-likelihood gain over the noise alone.
     over_noise: f64,
     /// The same where it is sure; else the candidate's own.
     explained: f64,
@@ -69,13 +69,13 @@ impl From<Candidate> for Found {
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let known = |candidate: &Candidate| candidate.id.is_some_and(|id| evidence.accepted.contains(&id));
-    let tells = |candidate: &Candidate| candidate.p_value < PASSED_ON && candidate.gain > LEAST_GAIN && !known(candidate);
+    let reported = |candidate: &Candidate| candidate.p_value < PASSED_ON && candidate.gain > LEAST_GAIN && !known(candidate);
     let of_all = |found: Candidate| Candidate { p_value: statistics::corrected(found.p_value, LOOKS), ..found };
-    // Where nobody is tracked and no law in time holds, what most ranges share is told without one.
-    let shared = || evidence.body.is_none().then(|| shared::find(evidence)).flatten().map(of_all).filter(tells);
+    // Where nobody is tracked and no law in time holds, what most ranges share is reported without one.
+    let shared = || evidence.body.is_none().then(|| shared::find(evidence)).flatten().map(of_all).filter(reported);
     let Some(field) = Field::new(evidence) else {
-        // No range stands still: nothing does, or returns from many directions swing.
-        return shared().or_else(|| sway::find(evidence).map(of_all).filter(tells)).into_iter().collect();
+        // No range is static: nothing is, or the phases of returns from many directions oscillate.
+        return shared().or_else(|| platform_vibration::find(evidence).map(of_all).filter(reported)).into_iter().collect();
     };
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     let frame_s = evidence.radar.frame_duration_s();
@@ -104,7 +104,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             let candidate = candidates::of_line(evidence, &field, part, &line);
             let unsure = line.freedom.map(unsure);
             let sure = unsure.is_none_or(|(_, p_value)| p_value < SURE);
-            let within_frames = line.frequency_hz * frame_s > TELLING_TURNS;
+            let within_frames = line.frequency_hz * frame_s > DISTINCT_TURNS;
             let over_noise = line.background * candidate.gain;
             let explained = if sure && within_frames { over_noise } else { candidate.gain };
             found.push(Found { explained, over_noise, candidate, unsure, loud: line.background > lines::LOUD, within_frames });
@@ -136,7 +136,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         for Found { candidate, .. } in list.iter_mut() {
             candidate.p_value = statistics::corrected(candidate.p_value, LOOKS);
         }
-        list.retain(|Found { candidate, .. }| tells(candidate));
+        list.retain(|Found { candidate, .. }| reported(candidate));
     }
     let is_sure = |found: &Found| found.unsure.is_none_or(|(_, p_value)| p_value < SURE);
     let of_phase = [Part::Phase, Part::Delay].map(candidates::behaves_like);
@@ -149,7 +149,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if found.is_empty() || most(&found) < NEARLY * most(&free) {
         found.append(&mut free);
     }
-    // Of another kind it wins only where the recording cannot tell.
+    // Of another kind it wins only where the recording cannot decide.
     let named = found.iter().filter(|found| found.candidate.id.is_some());
     let names: Vec<(&str, f64, bool)> =
         named.map(|found| (found.candidate.behaves_like, found.explained, found.loud && found.within_frames)).collect();

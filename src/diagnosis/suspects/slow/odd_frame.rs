@@ -1,6 +1,6 @@
 //! One frame of one channel that is not like the others: samples that slipped, a frame that was written over.
 //!
-//! What stands still is alike in all frames. Movers leave remains in it, which all channels of a frame share in power,
+//! Static clutter is alike in all frames. Movers leave remains in it, which all channels of a frame share in power,
 //! range by range; so the odd one stands out from its frame's other channels, by more than any other does. A frame is
 //! all there is of it, so its even chirps propose and its odd chirps judge.
 

@@ -15,7 +15,7 @@ pub struct Random {
     pub p_value: f64,
     pub held_out_gain: f64,
     /// Of that, what chirps show beside a straight line through their frame: what is random from chirp to chirp loses nothing by it, and
-    /// what swings slowly nearly all.
+    /// what fluctuates slowly nearly all.
     pub gain_within: f64,
     /// Two values instead of a bell: their distance, its error, the share of the upper one, and the held-out gain.
     pub two: Option<Two>,
@@ -206,11 +206,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_random_from_chirp_to_chirp_keeps_its_power_beside_a_line_and_what_swings_slowly_does_not() {
+    fn what_is_random_from_chirp_to_chirp_keeps_its_power_beside_a_line_and_what_fluctuates_slowly_does_not() {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let mut left = |swing: f64, noise: f64| {
-            let chirp = |i: usize| (0.03 * i as f64).sin() * swing + noise * normal();
+        let mut left = |amplitude: f64, noise: f64| {
+            let chirp = |i: usize| (0.03 * i as f64).sin() * amplitude + noise * normal();
             let series = Series { value: (0..64 * 32).map(chirp).collect(), weight: vec![1.0; 64], loops: 32 };
             let power = |series: &Series| series.value.iter().map(|value| value * value).sum::<f64>();
             power(&within_frames(&series)) / power(&series)

@@ -17,7 +17,8 @@ pub struct Settling {
     pub p_value: f64,
     pub training_gain: f64,
     pub held_out_gain: f64,
-    /// What a hum of the mains gains in training, where its periods fit into the frames': it is then alike in all of them.
+    /// What an amplitude modulation at the mains' frequency gains in training, where its periods fit into the frames': it is then
+    /// alike in all of them.
     pub hum_gain: f64,
     /// What a free function of the loop gains on held-out frames.
     pub free: Free,
@@ -38,15 +39,15 @@ pub const ENOUGH: f64 = 0.8;
 const LEFT_OVER: f64 = 0.01;
 /// Beyond doubt, nats.
 const PLAIN: f64 = 50.0;
-/// Frequencies at which supplies and lamps hum.
+/// Frequencies at which supplies and lamps modulate amplitudes.
 const MAINS_HZ: [f64; 8] = [50.0, 60.0, 100.0, 120.0, 200.0, 240.0, 300.0, 360.0];
-/// Turns that a hum may drift over the recording and still look alike in all frames.
+/// Turns that such a modulation may drift over the recording and still look alike in all frames.
 const LOCKED_TURNS: f64 = 0.25;
 /// What is over within a chirp is no decay that was seen: the first chirp may lack what each leaves to the next.
 const FEWEST_LOOPS: f64 = 0.5;
 
 impl Settling {
-    /// Whether this is a decay, and not the best decay for something else: a hum that is locked to the frames, say.
+    /// Whether this is a decay, and not the best decay for something else: a modulation that is locked to the frames, say.
     pub fn is_named(&self) -> bool {
         let rest = self.free.held_out_gain - self.held_out_gain;
         self.held_out_gain > ENOUGH * self.free.held_out_gain

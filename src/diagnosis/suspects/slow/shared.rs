@@ -1,9 +1,9 @@
 //! A phase of any course in time that the static returns of most ranges share, where nobody is tracked.
 //!
 //! Without a body whose returns could be set aside, something that moves may be stronger than everything that stands still. So no
-//! mean over the ranges is taken: each range is foretold by the others, frequency by frequency of slow time, and a range that does
+//! mean over the ranges is taken: each range is predicted by the others, frequency by frequency of slow time, and a range that does
 //! not share what they have is left out. Where ranges vary each for itself, the phases of their spectra are independent of one
-//! another and uniform, whatever the spectra's magnitudes are. A bet on each phase (von Mises' law about the one that is foretold,
+//! another and uniform, whatever the spectra's magnitudes are. A bet on each phase (von Mises' law about the one that is predicted,
 //! over the uniform law) has a mean of one then, and so has the product of bets in which each may depend on those before it: its
 //! inverse is a p-value (Ville's inequality; Shafer, Testing by betting, Journal of the Royal Statistical Society A 184, 2021). No
 //! course in time, no spectrum of the noise and no threshold is assumed.
@@ -33,9 +33,10 @@ const BINS_PER_VALUE: f64 = 2.0;
 /// Shares of the concentration that a phase would have if a range shared everything: bets are placed on each, and on sharing nothing.
 /// Powers of about three from next to nothing, since what a range adds of its own is not known.
 const SHARES: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
-/// What a range would gain (nats) if it shared everything, for its silence to tell anything: as in `field`.
-const TELLING_GAIN: f64 = 10.0;
-/// Half turns up to which a course is slow: what turns less than one and a half times during a recording is a drift (as in `sway`).
+/// What a range would gain (nats) if it shared everything, for its absence to be informative: as in `field`.
+const INFORMATIVE_GAIN: f64 = 10.0;
+/// Half turns up to which a course is slow: what turns less than one and a half times during a recording is a drift (as in
+/// `platform_vibration`).
 const SLOW: usize = 3;
 /// Interleaved sets of frequencies, each of which is independent under the taper.
 const SETS: f64 = 2.0;
@@ -55,9 +56,9 @@ struct Shared {
     part: Part,
     /// Logarithm of the product of bets.
     log_bets: f64,
-    /// Ranges that share it, and those that could tell.
+    /// Ranges that share it, and those that are informative.
     sharing: usize,
-    telling: usize,
+    informative: usize,
     /// Those that share it, as places in the spectra.
     members: Vec<usize>,
 }
@@ -67,13 +68,14 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let deviations = deviations(evidence)?;
     let part = |part: Part| shared(&spectra(&deviations, &course, part), part);
     let (phase, delay) = (part(Part::Phase), part(Part::Delay));
-    // Where ranges do not tell, what moves the radar goes before what moves its oscillator: it needs no second cause.
+    // Where ranges do not distinguish the two, what moves the radar goes before what moves its oscillator: it needs no second
+    // cause.
     let best = [Some(phase?), delay]
         .into_iter()
         .flatten()
         .reduce(|phase, delay| if delay.log_bets > phase.log_bets + UNDECIDED { delay } else { phase })?;
-    // A bet is won by two ranges that hang together; all returns are concerned where most that can tell have it.
-    (2 * best.sharing > best.telling && best.log_bets > 0.0).then(|| candidate(evidence, &course, &deviations, &best))
+    // A bet is won by two ranges that hang together; all returns are concerned where most that are informative have it.
+    (2 * best.sharing > best.informative && best.log_bets > 0.0).then(|| candidate(evidence, &course, &deviations, &best))
 }
 
 /// Deviations of groups of ranges from their mean over time, relative to it, `[frame · loops + loop]`, with the noise's variance.
@@ -261,12 +263,12 @@ fn shared(spectra: &[Spectrum], part: Part) -> Option<Shared> {
     let of_first = |first: usize| {
         let mut reference = Reference { sum: vec![Complex64::ZERO; spectra[first].values.len()], information: 0.0 };
         reference.add(&spectra[first]);
-        let (mut log_bets, mut sharing, mut telling, mut members) = (0.0, 0, 0, vec![first]);
+        let (mut log_bets, mut sharing, mut informative, mut members) = (0.0, 0, 0, vec![first]);
         for (index, spectrum) in spectra.iter().enumerate().filter(|(index, _)| *index != first) {
             let (won, most) = bet(&reference, spectrum);
             log_bets += won;
-            if most > TELLING_GAIN {
-                telling += 1;
+            if most > INFORMATIVE_GAIN {
+                informative += 1;
                 sharing += usize::from(won > 0.0);
             }
             if won > 0.0 {
@@ -274,7 +276,7 @@ fn shared(spectra: &[Spectrum], part: Part) -> Option<Shared> {
                 members.push(index);
             }
         }
-        Shared { part, log_bets, sharing, telling, members }
+        Shared { part, log_bets, sharing, informative, members }
     };
     let all: Vec<Shared> = (0..count).into_par_iter().map(of_first).collect();
     let log_bets = log_sum(all.iter().map(|shared| shared.log_bets)) - (count as f64).ln();
@@ -282,22 +284,22 @@ fn shared(spectra: &[Spectrum], part: Part) -> Option<Shared> {
     Some(Shared { log_bets, ..best })
 }
 
-/// Logarithm of what a bet on a group's phases returns, and of what it would return if the group had what is foretold.
+/// Logarithm of what a bet on a group's phases returns, and of what it would return if the group had what is predicted.
 fn bet(reference: &Reference, spectrum: &Spectrum) -> (f64, f64) {
     let (mut returns, mut most) = ([0.0; SHARES.len() + 1], 0.0);
     for (index, value) in spectrum.values.iter().enumerate() {
         let (known, ratio) = reference.value(index);
         let kept = statistics::kept(ratio);
-        let foretold = known * kept;
+        let predicted = known * kept;
         let variance = spectrum.variance + kept / reference.information;
-        let concentration = 2.0 * value.norm() * foretold.norm() / variance;
+        let concentration = 2.0 * value.norm() * predicted.norm() / variance;
         if concentration > 0.0 {
-            let along = (value * foretold.conj()).re / (value.norm() * foretold.norm());
+            let along = (value * predicted.conj()).re / (value.norm() * predicted.norm());
             for (sum, share) in returns.iter_mut().zip(SHARES) {
                 *sum += (share * concentration * along - log_bessel_0(share * concentration)) / SETS;
             }
         }
-        most += foretold.norm_sqr() / variance / SETS;
+        most += predicted.norm_sqr() / variance / SETS;
     }
     (log_sum(returns.into_iter()) - (returns.len() as f64).ln(), most)
 }
@@ -361,7 +363,7 @@ fn candidate(evidence: &Evidence, course: &Course, deviations: &Deviations, shar
     let width_hz = (0.5 * (high_hz - low_hz)).max(0.5 / course.duration_s());
     let loops = course.loops;
     let deviation: Deviation = Arc::new(move |[frame, _, index]| phases[frame * loops + index]);
-    let ranges = format!("{} of the {} ranges that can tell share it", shared.sharing, shared.telling);
+    let ranges = format!("{} of the {} informative ranges share it", shared.sharing, shared.informative);
     let (id, estimates, statement) = if shared.part == Part::Delay {
         let at_3_m = rms * candidates::stated_delay_s();
         (
@@ -384,8 +386,8 @@ fn candidate(evidence: &Evidence, course: &Course, deviations: &Deviations, shar
             format!(" (or that beside a multiple of {:.2} Hz, the rate of the frames)", course.frame_s.recip())
         };
         let text = format!(
-            "All static returns swing in phase together, by {rms:.4} rad (standard deviation) at {frequency_hz:.2} ± {width_hz:.2} Hz{alias}; \
-             {ranges}: the radar itself vibrates, by {:.1} µm along its boresight (standard deviation).",
+            "The phases of all static returns fluctuate together, by {rms:.4} rad (standard deviation) at {frequency_hz:.2} ± \
+             {width_hz:.2} Hz{alias}; {ranges}: the radar itself vibrates, by {:.1} µm along its boresight (standard deviation).",
             1e6 * rms * metres
         );
         (Some("radar_vibration"), estimates, text)
@@ -484,7 +486,7 @@ mod tests {
             assert_eq!(found.id, Some("radar_vibration"), "{}", found.statement);
             assert!(found.p_value < 1e-6 && found.gain > 13.0, "{} {}", found.p_value, found.gain);
         }
-        // Slower than the recording, it is a drift, which other laws tell.
+        // Slower than the recording, it is a drift, which other laws describe.
         let duration_s = 24.0 * 16.0 * evidence(0.0, 1, |_| 0.0, own).radar.loop_period_s();
         let drifts = |time_s: f64| 0.4 * time_s / duration_s;
         assert!(find(&evidence(0.0, 2, drifts, |_, _| 0.0)).is_none_or(|found| found.p_value > 1e-3));

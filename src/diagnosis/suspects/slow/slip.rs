@@ -22,7 +22,7 @@ use crate::diagnosis::suspects::receiver::{
     support::{dot, energy},
 };
 
-/// Fewest frames, loops and samples that tell a slip.
+/// Fewest frames, loops and samples from which a slip is estimable.
 const FEWEST: [usize; 3] = [4, 4, 32];
 /// Farthest slip, in samples and as a share of a chirp.
 const MOST_SAMPLES: usize = 16;
@@ -94,8 +94,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }]
 }
 
-/// By how many samples a frame's mean chirps lag behind those of the frame before (0: none is told), and the gain of that for one
-/// value.
+/// By how many samples a frame's mean chirps lag behind those of the frame before (0: none is detected), and the gain of that for
+/// one value.
 fn step(before: &[[Vec<Complex64>; 2]], after: &[[Vec<Complex64>; 2]], noise: &[f64], reach: usize) -> (i64, f64) {
     let inner = reach..before[0][0].len() - reach;
     let over_channels = |of: &dyn Fn(usize) -> f64| -> f64 { (0..before.len()).map(|at| of(at) / noise[at].max(1e-300)).sum() };

@@ -1,4 +1,4 @@
-//! What stands still within a frame, from frame to frame: spectra of the frames' mean chirps.
+//! Static clutter within a frame, from frame to frame: spectra of the frames' mean chirps.
 
 use num_complex::Complex64;
 use rayon::prelude::*;

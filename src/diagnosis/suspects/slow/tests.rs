@@ -88,18 +88,18 @@ fn a_ripple_of_the_gain_has_no_name_but_a_frequency() {
 
 #[test]
 fn a_common_phase_is_a_vibration_and_one_in_proportion_to_the_delay_is_none() {
-    let swing = |t: f64| (std::f64::consts::TAU * 83.0 * t).sin();
-    let found = found_once(evidence(2, |t, _, _, _| Complex64::cis(0.05 * swing(t))));
+    let sinusoid = |t: f64| (std::f64::consts::TAU * 83.0 * t).sin();
+    let found = found_once(evidence(2, |t, _, _, _| Complex64::cis(0.05 * sinusoid(t))));
     assert_eq!(found.id, Some("radar_vibration"));
     within(&found, "frequency_hz", 83.0);
-    let found = found_once(evidence(3, |t, _, _, delay| Complex64::cis(2.5e6 * delay * swing(t))));
+    let found = found_once(evidence(3, |t, _, _, delay| Complex64::cis(2.5e6 * delay * sinusoid(t))));
     assert_eq!((found.id, found.behaves_like), (None, "delay-proportional phase"));
 }
 
 #[test]
-fn a_phase_that_swings_far_is_read_as_an_angle() {
-    let swing = |t: f64| 1.3 * (std::f64::consts::TAU * 83.0 * t).sin();
-    let evidence = evidence(5, |t, _, _, _| Complex64::cis(swing(t)));
+fn a_large_phase_excursion_is_read_as_an_angle() {
+    let sinusoid = |t: f64| 1.3 * (std::f64::consts::TAU * 83.0 * t).sin();
+    let evidence = evidence(5, |t, _, _, _| Complex64::cis(sinusoid(t)));
     let metres = evidence.radar.wavelength_m() / (4.0 * std::f64::consts::PI);
     let found = found_once(evidence);
     assert_eq!(found.id, Some("radar_vibration"));
@@ -112,11 +112,11 @@ fn a_phase_that_swings_far_is_read_as_an_angle() {
 #[test]
 fn a_phase_that_grows_towards_the_boresight_is_a_vibration() {
     let room = Room { left_m: Some(1.5), right_m: Some(1.5), floor_m: Some(1.0), ..Room::default() };
-    let swing = |t: f64, delay_s: f64| {
+    let sinusoid = |t: f64, delay_s: f64| {
         let cosine = ahead(Some(&room), 0.5 * SPEED_OF_LIGHT * delay_s);
         Complex64::cis(0.1 * cosine * (std::f64::consts::TAU * 27.0 * t).sin())
     };
-    let mut evidence = evidence(21, |t, _, _, delay_s| swing(t, delay_s));
+    let mut evidence = evidence(21, |t, _, _, delay_s| sinusoid(t, delay_s));
     evidence.room = Some(room.clone());
     let found = found_once(evidence.changed());
     assert_eq!(found.id, Some("radar_vibration"));
@@ -152,7 +152,7 @@ fn a_drift_and_a_step_are_measured() {
 
 /// At some ranges something moves slowly besides, by far more than the noise, and otherwise at each of them.
 #[test]
-fn a_drift_is_told_from_slow_parts_of_a_body() {
+fn a_drift_is_distinguished_from_slow_parts_of_a_body() {
     let radar = Radar::small(1);
     let delay_of_bin = radar.sample_rate_hz / (64.0 * radar.slope_hz_per_s);
     let wandering = |frame: usize, delay_s: f64| {
@@ -205,7 +205,7 @@ fn random_chirps_are_phase_noise_or_jitter() {
 }
 
 #[test]
-fn one_receiver_that_hops_is_told_from_all_that_drift() {
+fn one_receiver_that_hops_is_distinguished_from_all_that_drift() {
     let hopping = |change: bool| {
         let mut evidence = evidence(11, |_, _, _, _| Complex64::ONE);
         evidence.cube.each_chirp(|[frame, channel, _], chirp| {

@@ -1,6 +1,6 @@
-//! Breathing and heartbeat of somebody nobody tracked: a return whose phase swings from frame to frame.
+//! Breathing and heartbeat of somebody nobody tracked: a return whose phase oscillates from frame to frame.
 //!
-//! PHYSICS cards T1 and T2. At some range the echo is `c + a exp(jψ(T))`: what stands still there, and what moves by
+//! At some range the echo is `c + a exp(jψ(T))`: a static return, and one that moves by
 //! more or less than a wavelength, ψ = 4π/λ times its displacement. c and a of all channels and of neighbouring ranges
 //! and the common ψ are fitted in turns; ψ is then searched for a rhythm.
 
@@ -116,7 +116,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let bin_m = evidence.radar.range_resolution_m();
     let range_m = strongest as f64 * bin_m;
     let displacement: Vec<f64> = best.phase.iter().map(|p| 1e3 * p * metres).collect();
-    let swing = displacement.iter().fold([f64::MAX, f64::MIN], |[low, high], &d| [low.min(d), high.max(d)]);
+    let extent = displacement.iter().fold([f64::MAX, f64::MIN], |[low, high], &d| [low.min(d), high.max(d)]);
     let statement = match named {
         Some((id, r)) => format!(
             "At {range_m:.2} m something moves to and fro {:.1} times a minute ({:.3} Hz) by {:.2} mm (amplitude of the \
@@ -130,7 +130,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
         None => format!(
             "At {range_m:.2} m something moves slowly, over {:.1} mm during the recording, without a rhythm that would show \
              within its length.",
-            swing[1] - swing[0]
+            extent[1] - extent[0]
         ),
     };
     // Of the change alone; the rhythm has its own.
@@ -162,7 +162,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
         p_value: named.map_or(changed, |(_, r)| statistics::corrected(r.p_value, 4.0)),
         gain,
         errs_alike: true,
-        // A curtain in the wind does the same; so does whatever swings there.
+        // A curtain in the wind does the same; so does whatever oscillates there.
         look_alikes: if named.is_some() { vec!["moving_reflector"] } else { vec![] },
         statement,
         curve: Some(Curve {

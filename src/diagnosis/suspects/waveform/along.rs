@@ -1,4 +1,4 @@
-//! Gain and frequency that change along the chirp, told by what moves (cards W6 and R9).
+//! Gain and frequency that change along the chirp, estimated from what moves.
 //!
 //! What one Doppler cell holds of the body is speckle along the chirp, too: a Gaussian field over the chirp's parts whose
 //! covariance comes from the ranges of the points in that cell. Parts of the chirp are to ranges what receivers are to
@@ -36,7 +36,7 @@ const LEAST_SAMPLES: usize = 4;
 const LEAST_POWER: f64 = 3.0;
 /// Groups of a frame's Doppler cells that errors are taken from, at most.
 const MOST_GROUPS: usize = 6;
-/// Share of a cell's power that every part hears for itself: what the prediction does not know of the ranges.
+/// Share of a cell's power that is independent from part to part: what the prediction does not know of the ranges.
 const OWN_SHARE: f64 = 0.005;
 /// What errors of the prediction look like: logarithm of the gain at the chirp's end, and radian there.
 const TILT_FLOOR: f64 = 0.1 / (2.0 * DECIBEL);
@@ -53,7 +53,7 @@ const LARGE: f64 = 0.5;
 const PEAK: [f64; 3] = [1.0, 1.45, 1.55];
 /// A tilt, a bend, and one that changes.
 const LOOKS: f64 = 3.0;
-/// Beyond, nothing is told: nepers or radian at the chirp's end.
+/// Beyond, nothing is reported: nepers or radian at the chirp's end.
 const LARGEST: f64 = 3.0;
 
 /// The numbers. Logarithm of the gain at the chirp's end that is odd about its middle; radian there, at the body's mean delay, of
@@ -92,7 +92,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     found.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, candidate)| candidate).into_iter().collect()
 }
 
-/// Chance that a body whose gain and phase nothing changes along the chirp looks as uneven. None without a body that is heard well enough.
+/// Chance that a body whose gain and phase nothing changes along the chirp looks as uneven. None without a body that is observed at
+/// a sufficient SNR.
 pub fn chance(evidence: &Evidence) -> Option<f64> {
     if evidence.is_real() {
         return None;
@@ -110,7 +111,7 @@ fn directions(numbers: &[usize]) -> DMatrix<f64> {
 /// A Doppler cell of a frame.
 struct Cell {
     /// By channel, over the chirp's parts, in units of the noise, turned back by the mean range.
-    heard: Vec<DVector<Complex64>>,
+    observed: Vec<DVector<Complex64>>,
     /// Covariance that is expected of two parts by their distance.
     expected: Vec<Complex64>,
     /// Mean delay over the body's.
@@ -189,8 +190,8 @@ impl Chirps {
             let x = self.along(part);
             Complex64::from_polar((-tilt * x).exp(), -bend * cell.delay * legendre(2, x))
         });
-        let heard: Vec<DVector<Complex64>> = cell.heard.iter().map(|heard| heard.component_mul(&undo)).collect();
-        look.add(shape, &heard, |_, body| {
+        let observed: Vec<DVector<Complex64>> = cell.observed.iter().map(|observed| observed.component_mul(&undo)).collect();
+        look.add(shape, &observed, |_, body| {
             let by = |degree: usize, size: f64, gain: bool| {
                 let at = |part: usize| size * legendre(degree, self.along(part));
                 DMatrix::from_fn(self.parts, self.parts, |i, j| {
@@ -363,7 +364,7 @@ fn cells(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: 
     };
     let used: Vec<usize> =
         (0..loops).filter(|&doppler| model.usable()[doppler * samples] && mean(&shares[doppler]).0 > LEAST_POWER).collect();
-    let mut heard: Vec<Vec<DVector<Complex64>>> = vec![vec![]; used.len()];
+    let mut observed: Vec<Vec<DVector<Complex64>>> = vec![vec![]; used.len()];
     let window = hann(loops);
     let fft = FftPlanner::new().plan_fft_forward(loops);
     let middles: Vec<f64> = used.iter().map(|&doppler| mean(&shares[doppler]).1).collect();
@@ -373,19 +374,19 @@ fn cells(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: 
     for channel in 0..evidence.cube.channels() {
         let moving = evidence.moving(frame, channel);
         let scale = 1.0 / (evidence.noise()[channel].max(f64::MIN_POSITIVE) * length as f64).sqrt();
-        heard.iter_mut().for_each(|heard| heard.push(DVector::zeros(parts)));
+        observed.iter_mut().for_each(|observed| observed.push(DVector::zeros(parts)));
         for sample in 0..parts * length {
             let mut slow: Vec<Complex64> = (0..loops).map(|i| moving[i * samples + sample] * (window[i] * scale)).collect();
             fft.process(&mut slow);
             let part = place(sample / length, parts);
-            for (((heard, &doppler), middle), tilt) in heard.iter_mut().zip(&used).zip(&middles).zip(&tilts) {
+            for (((observed, &doppler), middle), tilt) in observed.iter_mut().zip(&used).zip(&middles).zip(&tilts) {
                 let back = Complex64::from_polar((-tilt * part).exp(), -TAU * middle * sample as f64 / samples as f64);
-                heard[channel][sample / length] += slow[doppler] * back;
+                observed[channel][sample / length] += slow[doppler] * back;
             }
         }
     }
     let bins_to_delay = radar.sample_rate_hz / (samples as f64 * radar.slope_hz_per_s);
-    let of = |((heard, &doppler), middle): ((Vec<DVector<Complex64>>, &usize), &f64)| {
+    let of = |((observed, &doppler), middle): ((Vec<DVector<Complex64>>, &usize), &f64)| {
         let mut expected = vec![Complex64::ZERO; parts];
         for (bins, power) in &shares[doppler] {
             // Phase from part to part, and what is left of the sum over a part.
@@ -394,9 +395,9 @@ fn cells(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: 
             let power = power * if half.abs() < 1e-6 { 1.0 } else { (half.sin() / half).powi(2) };
             expected.iter_mut().enumerate().for_each(|(apart, sum)| *sum += Complex64::from_polar(power, turn * apart as f64));
         }
-        Cell { heard, expected, delay: middle * bins_to_delay }
+        Cell { observed, expected, delay: middle * bins_to_delay }
     };
-    heard.into_iter().zip(&used).zip(&middles).map(of).collect()
+    observed.into_iter().zip(&used).zip(&middles).map(of).collect()
 }
 
 /// Reads a chirp earlier by so many samples each: by polynomials through its neighbours, fewer near the ends.
@@ -449,8 +450,8 @@ mod tests {
                     field += DVector::from_fn(PARTS, |part, _| amplitude * Complex64::cis((turn + 0.02) * part as f64));
                 }
                 let noise = DVector::from_fn(PARTS, |_, _| Complex64::new(normal(), normal()) * f64::sqrt(0.5));
-                let heard = DVector::from_fn(PARTS, |part, _| field[part] * changed(frame, place(part, PARTS)) + noise[part]);
-                Cell { heard: vec![heard], expected, delay: 1.0 }
+                let observed = DVector::from_fn(PARTS, |part, _| field[part] * changed(frame, place(part, PARTS)) + noise[part]);
+                Cell { observed: vec![observed], expected, delay: 1.0 }
             };
             chirps.frames.push((0..5).map(|_| (0..2).map(|_| cell()).collect()).collect());
         }

@@ -1,6 +1,6 @@
-//! A chirp whose frequency swings: paired echoes on both sides of every return, their height in proportion to its delay.
+//! A chirp whose frequency is modulated: paired echoes on both sides of every return, their height in proportion to its delay.
 //!
-//! PHYSICS card W7: a return of delay τ is turned by 2πτ a cos(2π f t + φ), to first order `+ α exp(2πi f t) τx − conj(α)
+//! A return of delay τ is turned by 2πτ a cos(2π f t + φ), to first order `+ α exp(2πi f t) τx − conj(α)
 //! exp(−2πi f t) τx` with α = iπa exp(iφ). The recording itself is the template; it is looked for only where no return
 //! can be: nearer and farther than the room in the static Doppler cells, than the body in the others.
 
@@ -21,7 +21,7 @@ use crate::radar::{Radar, SPEED_OF_LIGHT};
 const PADDING: usize = 4;
 /// Half of the window's main lobe down to the noise, bins.
 const LOBE: usize = 3;
-/// Doppler bins about zero that hold what stands still.
+/// Doppler bins about zero that hold static clutter.
 const STILL_BINS: usize = 3;
 /// Metres beyond the body's surface that its own returns may reach.
 const BODY_MARGIN_M: f64 = 0.15;
@@ -128,7 +128,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     if training.iter().all(|s| s.energy() <= 0.0) {
         return None;
     }
-    // Windowed noise is correlated, and so is what leaks: the shifts themselves tell the scale.
+    // Windowed noise is correlated, and so is what leaks: the scale is estimated from the shifts themselves.
     let scale = (statistics::median(&mut scores.clone()) / std::f64::consts::LN_2).max(1.0);
     let best = (0..shifts.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
     // What is highest at the shortest distance is no peak, but a return that reaches farther than it should.
@@ -179,7 +179,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
         look_alikes: vec![],
         statement: format!(
             "Every return has a pair of faint echoes {:.0} kHz ({:.2} m) before and behind it, higher the farther it is ({:.0} dB at 3 \
-             m): the chirp's frequency swings by {:.1} kHz, {:.0} thousand times a second.",
+             m): the chirp's frequency is modulated by {:.1} kHz, {:.0} thousand times a second.",
             1e-3 * ripple_hz,
             ripple_hz * SPEED_OF_LIGHT / (2.0 * radar.slope_hz_per_s),
             20.0 * stated.max(1e-9).log10(),

@@ -1,15 +1,16 @@
-//! A thing that swings, too weak or too much among the body's returns to be seen in one frame: its frames together follow one
-//! law. Every swing is tried on what tones explain of each frame (a bank), the best ones are fitted and judged by all frames.
+//! A thing that moves sinusoidally, too weak or too much among the body's returns to be seen in one frame: its frames together
+//! follow one law. Every sinusoidal motion is tried on what tones explain of each frame (a bank), the best ones are fitted and
+//! judged by all frames.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::bank::{LEAST_BINS, Standing, Swing};
+use super::bank::{LEAST_BINS, SinusoidalMotion, Standing};
 use super::beams::Beams;
 use super::ground::{DEVIATIONS, Ground, STRONGER};
-use super::mover::{Mover, WIDEST_SWING_M, middle_s};
+use super::mover::{LARGEST_EXCURSION_M, Mover, middle_s};
 use super::pendulum::{Pendulum, at};
 use super::scene::Scene;
 use super::track::{Sighting, Track};
@@ -21,17 +22,17 @@ const MOST_SAMPLES: usize = 1 << 21;
 const MOST_FRAMES: usize = 48;
 const LONGEST_S: f64 = 10.0;
 const FEWEST_FRAMES: usize = 8;
-/// Share of a swing's gain from which on something that stands still explains it.
+/// Share of a motion's gain from which on a static return explains it.
 const NEARLY: f64 = 0.6;
-/// Cells of the fine grid beside a swing's ranges where what stands still may be taken for it.
+/// Cells of the fine grid beside a motion's ranges where a static return may be taken for it.
 const BESIDE: i64 = 4;
 /// A body's point so close in Doppler and range (cells: a clock that is a little off moves a limb by as much) and
-/// in direction is where the swing is (x over range).
+/// in direction is where the motion is (x over range).
 const NEAR: [f64; 2] = [2.0, 1.5];
 const SAME_DIRECTION: f64 = 0.35;
-/// Share of the variance of a swing's ranges that those of the body leave, below which it goes where the body goes.
+/// Share of the variance of a motion's ranges that those of the body leave, below which it goes where the body goes.
 const PARALLEL: f64 = 0.3;
-/// What chance does more often is no swing.
+/// What chance does more often is no motion.
 const LEAST_LIKELY: f64 = 1e-2;
 pub struct Found {
     pub mover: Mover,
@@ -88,22 +89,22 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
     ground.beams.prepare(&held_out);
     let table = ground.table(&training);
     let (guesses, tried) = table.bank(scene, length_s);
-    let judged = |guess: Swing| {
-        let (swing, gain) = ground.fitted(guess, &training, length_s);
-        (swing, gain, ground.gain(swing, &held_out))
+    let judged = |guess: SinusoidalMotion| {
+        let (motion, gain) = ground.fitted(guess, &training, length_s);
+        (motion, gain, ground.gain(motion, &held_out))
     };
     let fits = guesses.iter().map(|guess| judged(*guess));
     let mut found = fits.max_by(|a, b| (a.1 + a.2).total_cmp(&(b.1 + b.2)))?;
-    // Beside the body the side lobes of what swings within it say more than it says there itself.
+    // Beside the body the side lobes of what oscillates within it say more than it says there itself.
     if let Some(stronger) = ground.stronger_elsewhere(found.0, &training) {
         found = Some(judged(stronger)).filter(|other| other.2 > 0.0).unwrap_or(found);
     }
     let (best, gain, again) = found;
     // A likelihood ratio is large by chance no more often than its inverse says: that of all frames, one of all that were tried.
-    // Where something that stands still is not steady, it must be beaten.
+    // Where a static return is not steady, it must be beaten.
     let ranges = table.places(scene, best.law).into_iter().map(|place| place.1);
     let ranges = ranges.clone().min()? - BESIDE..=ranges.max()? + BESIDE;
-    // Where it stands out from what swings it is no side lobe of that.
+    // Where it stands out from what oscillates it is no side lobe of that.
     let outstands = |standing: &Standing| {
         ground.strength(&training, |_| standing.place, standing.sine)[0] + STRONGER
             > ground.strength(&training, |frame| ground.place(best.law, frame), best.sine)[0]
@@ -116,13 +117,13 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
     if again <= 0.0
         || standing.0 > NEARLY * (gain + again)
         || p_value > LEAST_LIKELY
-        || best.law[1].hypot(best.law[2]) > WIDEST_SWING_M
+        || best.law[1].hypot(best.law[2]) > LARGEST_EXCURSION_M
     {
         return None;
     }
-    // Two laws: the one that its bounded gains tell, and the one that stands out most.
+    // Two laws: the one that its bounded gains favour, and the one that stands out most.
     let mut laws = [best, ground.sharpened(best, &training, length_s)];
-    // A long recording tells the rate better than a part of it, which must not be off by a turn at once.
+    // A long recording gives a more precise rate than a part of it, which must not be off by a turn at once.
     let (every, mut count) = (&split.training, training.len());
     if count < every.len() {
         let all: Vec<usize> = (0..scene.frames()).collect();
@@ -134,13 +135,13 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
         laws = [ground.fitted(laws[0], longer, length_s).0, ground.closer(laws[1], longer, length_s)];
     }
     ground.beams.prepare(&split.held_out);
-    let foretold = laws.map(|law| (split.held_out_share() * ground.foretold(law, start_s), law));
-    let (again, best) = foretold.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let predicted = laws.map(|law| (split.held_out_share() * ground.predicted(law, start_s), law));
+    let (again, best) = predicted.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let deviations = ground.deviations(best, &every[..count], middle_s(scene, every[count - 1]) - start_s);
-    // What may as well not swing at all, or is always in the cell of what stands still, only flickers.
-    let swing_m = best.law[1].hypot(best.law[2]);
-    let bins = TAU * best.law[3] * swing_m * scene.model.cells.doppler_per_mps;
-    if DEVIATIONS * deviations[1] > swing_m || bins.max(swing_m * scene.model.cells.bins_per_m) < LEAST_BINS {
+    // What may as well not move at all, or is always in the cell of a static return, only fluctuates.
+    let excursion_m = best.law[1].hypot(best.law[2]);
+    let bins = TAU * best.law[3] * excursion_m * scene.model.cells.doppler_per_mps;
+    if DEVIATIONS * deviations[1] > excursion_m || bins.max(excursion_m * scene.model.cells.bins_per_m) < LEAST_BINS {
         return None;
     }
     let named = !ground.moves_with_the_body(best);
@@ -165,30 +166,31 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
         gain: again,
         power: power / 2.25,
         sine_error: Some(deviations[3]),
-        unlike: "its frames follow one swing, which nothing else around it does",
+        unlike: "its frames follow one sinusoidal motion, which nothing else around it does",
     };
     Some(Found { mover, tones: ground.tones(best) })
 }
 
 impl Ground<'_> {
-    /// Whether some point of the body is where the swing is in the frames that show most of it, so that it may be a limb whose
-    /// returns are stronger than expected; or the swing goes where the body goes, so that it may be the body seen in another way.
-    fn moves_with_the_body(&self, swing: Swing) -> bool {
+    /// Whether some point of the body is where the motion is in the frames that show most of it, so that it may be a limb whose
+    /// returns are stronger than expected; or the motion goes where the body goes, so that it may be the body seen in another way.
+    fn moves_with_the_body(&self, motion: SinusoidalMotion) -> bool {
         let evidence = self.scene.evidence;
         let Some(body) = &evidence.body else { return false };
         let centre = evidence.radar.centre_m();
         let near = |&frame: &usize| {
-            let (doppler, range) = self.place(swing.law, frame);
+            let (doppler, range) = self.place(motion.law, frame);
             body.frames[frame].iter().any(|point: &Point| {
                 let (range_m, velocity) = range_and_velocity(&evidence.radar, point.position_m, point.velocity_mps);
                 let place = self.scene.model.cells.place(range_m, velocity);
                 let sine = (point.position_m[0] - centre[0]) / range_m.max(1e-6);
                 (place.0 - doppler).abs() < NEAR[0]
                     && (place.1 - range).abs() < NEAR[1]
-                    && (sine - swing.sine).abs() < SAME_DIRECTION
+                    && (sine - motion.sine).abs() < SAME_DIRECTION
             })
         };
-        let shown = |frame: usize| self.gain_at(frame, self.place(swing.law, frame), swing.sine, swing.log_power.exp()).max(0.0);
+        let shown =
+            |frame: usize| self.gain_at(frame, self.place(motion.law, frame), motion.sine, motion.log_power.exp()).max(0.0);
         let shown: Vec<f64> = (0..self.scene.frames()).map(shown).collect();
         let with: f64 = (0..self.scene.frames()).filter(near).map(|frame| shown[frame]).sum();
         let all: f64 = shown.iter().sum();
@@ -198,25 +200,25 @@ impl Ground<'_> {
                     let range_m = range_and_velocity(&evidence.radar, point.position_m, point.velocity_mps).0;
                     (sum + power * range_m, weight + power)
                 });
-                (weight > 0.0).then(|| [at(swing.law, middle_s(self.scene, frame)).0, sum / weight])
+                (weight > 0.0).then(|| [at(motion.law, middle_s(self.scene, frame)).0, sum / weight])
             })
             .collect();
         let spread = |values: &dyn Fn(&[f64; 2]) -> f64| -> f64 {
             let mean = ranges.iter().map(values).sum::<f64>() / ranges.len().max(1) as f64;
             ranges.iter().map(|range| (values(range) - mean).powi(2)).sum()
         };
-        2.0 * with > all || spread(&|[swing, body]| swing - body) < PARALLEL * spread(&|[swing, _]| *swing)
+        2.0 * with > all || spread(&|[motion, body]| motion - body) < PARALLEL * spread(&|[motion, _]| *motion)
     }
 
     /// Most probable amplitudes, given that they are as strong as fitted.
-    fn tones(&self, swing: Swing) -> Vec<Tone> {
-        let power = swing.log_power.exp();
+    fn tones(&self, motion: SinusoidalMotion) -> Vec<Tone> {
+        let power = motion.log_power.exp();
         (0..self.scene.frames())
             .filter_map(|frame| {
-                let place = self.place(swing.law, frame);
-                let look = self.beams.look(frame, place, swing.sine)?;
+                let place = self.place(motion.law, frame);
+                let look = self.beams.look(frame, place, motion.sine)?;
                 let sure = power / (power + look.expected);
-                let amplitudes = self.beams.tone(frame, place, swing.sine)?.into_iter().map(|value| value * sure).collect();
+                let amplitudes = self.beams.tone(frame, place, motion.sine)?.into_iter().map(|value| value * sure).collect();
                 Some(Tone { frame, place, amplitudes })
             })
             .collect()

@@ -1,7 +1,8 @@
-//! Something that stirs at one range while the others stay, too little or too slowly to be seen within a frame: a curtain, a plant.
+//! Something that fluctuates at one range while the others are constant, too little or too slowly to be seen within a frame: a
+//! curtain, a plant.
 //!
 //! What it changes need not look across the receivers as all that is at that range does, for it is a part of that. Its course is
-//! judged by how well every frame is foretold by the others.
+//! judged by how well every frame is predicted by the others.
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -31,9 +32,9 @@ struct Change {
     p_value: f64,
     /// Power beyond the noise.
     excess: f64,
-    /// Of all frames, each foretold by the others, nats.
+    /// Of all frames, each predicted by the others, nats.
     gain: f64,
-    /// Weights by which the training frames foretell every frame, of what changes most.
+    /// Weights by which the training frames predict every frame, of what changes most.
     weights: DMatrix<f64>,
 }
 
@@ -55,7 +56,7 @@ pub fn find(evidence: &Evidence, free: &Free) -> Option<Candidate> {
     let patch = patch(&looks, best.bin);
     let all = judged.iter().filter(|change| patch.contains(&change.bin)).map(|change| change.gain).sum::<f64>() / BINS_PER_VALUE;
     let gain = evidence.split.held_out_share() * best.gain.max(all);
-    // What stirs must not count among what the others are compared with.
+    // What fluctuates must not count among what the others are compared with.
     let others: Vec<usize> =
         strong.iter().copied().filter(|bin| !patch.contains(bin) && bin.abs_diff(best.bin) >= SPACING).collect();
     let of = |bin: usize| significance(returns, bin, &others, frames).map_or(0.0, |(_, excess)| excess.max(0.0));
@@ -104,7 +105,7 @@ fn judged(returns: &Returns, bin: usize, others: &[usize], frames: Frames, (p_va
     let noise: Vec<f64> = (0..parts.len()).map(|frame| 0.5 * returns.variance(frame, bin)).collect();
     let data = Data { series: &beside, numbers: 2.0 * (returns.channels - 1) as f64, noise: &noise };
     let course = Course::new(frames, &data);
-    let gain = course.foretold + own.iter().map(|course| course.foretold).sum::<f64>();
+    let gain = course.predicted + own.iter().map(|course| course.predicted).sum::<f64>();
     let most = own.iter().fold(&course, |most, course| if course.training > most.training { course } else { most });
     Some(Change { bin, p_value, excess, gain, weights: most.weights(frames, &data) })
 }
@@ -119,7 +120,7 @@ fn candidate(
 ) -> Candidate {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let deviations = deviations(evidence, patch);
-    let stirs: Vec<Vec<Complex64>> = (change.weights.row_iter())
+    let fluctuations: Vec<Vec<Complex64>> = (change.weights.row_iter())
         .map(|weights| {
             let mut sum = vec![Complex64::ZERO; deviations[0].len()];
             for (weight, deviation) in weights.iter().zip(&deviations) {
@@ -129,11 +130,11 @@ fn candidate(
         })
         .collect();
     let power = |values: &Vec<Complex64>| values.iter().map(|value| value.norm_sqr()).sum::<f64>();
-    let largest = stirs.iter().max_by(|a, b| power(a).total_cmp(&power(b))).cloned().unwrap_or_default();
-    let shown = |stir: &Vec<Complex64>| -> f64 {
-        stir.iter().zip(&largest).map(|(a, b)| (a * b.conj()).re).sum::<f64>() / power(&largest).max(f64::MIN_POSITIVE)
+    let largest = fluctuations.iter().max_by(|a, b| power(a).total_cmp(&power(b))).cloned().unwrap_or_default();
+    let shown = |fluctuation: &Vec<Complex64>| -> f64 {
+        fluctuation.iter().zip(&largest).map(|(a, b)| (a * b.conj()).re).sum::<f64>() / power(&largest).max(f64::MIN_POSITIVE)
     };
-    let course: Vec<f64> = stirs.iter().map(shown).collect();
+    let course: Vec<f64> = fluctuations.iter().map(shown).collect();
     let range_m = change.bin as f64 * bin_m;
     Candidate {
         id: None,
@@ -150,20 +151,20 @@ fn candidate(
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
-            "What stands still {range_m:.2} m away changes from frame to frame while the other static returns stay, and the body's \
-             silhouette alone does not explain it: something stirs there, or passes in front of it."
+            "The static return {range_m:.2} m away changes from frame to frame while the other static returns stay, and the body's \
+             silhouette alone does not explain it: something moves there, or passes in front of it."
         ),
         curve: Some(Curve {
             title: format!("Change {range_m:.2} m away"),
             x_label: "time, s".into(),
             y_label: "share of its largest change".into(),
-            series: vec![("foretold by the training frames".into(), evidence.starts_s.clone(), course)],
+            series: vec![("predicted by the training frames".into(), evidence.starts_s.clone(), course)],
         }),
-        energy: stirs.iter().map(power).sum::<f64>() * loops as f64,
+        energy: fluctuations.iter().map(power).sum::<f64>() * loops as f64,
         correction: Correction::Samples(Arc::new(move |cube| {
             cube.each_chirp(|[frame, channel, _], chirp| {
-                let stir = &stirs[frame][channel * samples..][..samples];
-                chirp.iter_mut().zip(stir).for_each(|(value, stir)| *value -= stir);
+                let fluctuation = &fluctuations[frame][channel * samples..][..samples];
+                chirp.iter_mut().zip(fluctuation).for_each(|(value, change)| *value -= change);
             });
         })),
     }

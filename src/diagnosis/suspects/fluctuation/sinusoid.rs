@@ -1,4 +1,4 @@
-//! A swing at one frequency, told from what is constant during a frame.
+//! A sinusoid of one frequency, separated from what is constant during a frame.
 
 use std::f64::consts::TAU;
 
@@ -7,18 +7,18 @@ use num_complex::Complex64;
 
 /// The cosine and the sine of a frequency in the chirps of the training frames, each without its frame's mean: short frames see so
 /// little of a turn that these are not orthogonal.
-pub struct Swings<'a> {
+pub struct Sinusoid<'a> {
     pub training: &'a [usize],
-    /// Of the cosine and the sine over all frames: what is seen of a turn may always be the same part of it, whose mean is as well what
-    /// stands still.
+    /// Of the cosine and the sine over all frames: what is seen of a turn may always be the same part of it, whose mean is then
+    /// part of the static return.
     pub means: [f64; 2],
     /// `[frame · loop]`
     pub basis: Vec<[f64; 2]>,
     inverse: Matrix2<f64>,
 }
 
-impl<'a> Swings<'a> {
-    /// Frames' middles, and loops relative to them. None where the two cannot be told apart.
+impl<'a> Sinusoid<'a> {
+    /// Frames' middles, and loops relative to them. None where cosine and sine are not separately estimable.
     pub fn new(training: &'a [usize], middles_s: &[f64], loops_s: &[f64], frequency_hz: f64) -> Option<Self> {
         let mut means = [0.0; 2];
         let mut basis = vec![];

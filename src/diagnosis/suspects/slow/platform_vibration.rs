@@ -1,4 +1,4 @@
-//! A radar that moves to and fro before returns from many directions: each range cell's phasor is a sum over directions,
+//! Platform vibration before returns from many directions: each range cell's phasor is a sum over directions,
 //! which change by different amounts, so that what the cells share is not their deviation but its course in time. One
 //! sinusoid with a pattern over channels and ranges that is free, in cells where the body cannot be.
 
@@ -38,7 +38,7 @@ const DETERMINED: f64 = 0.05;
 /// Teeth of the comb of aliases to either side, and by how much less (nats) one may explain that is not told apart.
 const TEETH: i32 = 4;
 const ALIAS_GAIN: f64 = 4.6;
-/// Nothing that holds a radar swings faster, and far enough to be seen.
+/// No mount of a radar vibrates faster with an amplitude that is measurable.
 const HIGHEST_HZ: f64 = 300.0;
 /// Harmonics that are taken out again.
 const HARMONICS: usize = 3;
@@ -58,7 +58,7 @@ struct Cells {
 }
 
 /// A sinusoid cos(2π f t + θ) with a pattern.
-struct Sway {
+struct Vibration {
     frequency_hz: f64,
     phase: f64,
     /// `[channel · bins + bin]` with its inverse variance, of the free cells; none where the body was in most frames.
@@ -124,7 +124,7 @@ impl Cells {
     }
 
     /// Of cells that `kept` says.
-    fn fit(&self, frames: &[usize], frequency_hz: f64, kept: impl Fn(usize) -> bool + Sync) -> Sway {
+    fn fit(&self, frames: &[usize], frequency_hz: f64, kept: impl Fn(usize) -> bool + Sync) -> Vibration {
         let of_cell = |cell| if kept(cell) { self.sums(frames, cell, frequency_hz) } else { Sums::default() };
         let sums: Vec<Sums> = (0..self.still.len()).into_par_iter().map(of_cell).map(Sums::centred).collect();
         let known: Vec<&Sums> = sums.iter().filter(|sums| sums.determinant() > DETERMINED).collect();
@@ -144,7 +144,7 @@ impl Cells {
         // Noise alone has one unit in each of two courses in time.
         let (count, both) = (known.len() as f64, known.iter().map(|sums| sums.both()).sum::<f64>());
         let likeness = (top - count) / (both - 2.0 * count).max(f64::MIN_POSITIVE);
-        Sway { frequency_hz, phase, pattern, gain: top / BINS_PER_VALUE, values: count / BINS_PER_VALUE, likeness }
+        Vibration { frequency_hz, phase, pattern, gain: top / BINS_PER_VALUE, values: count / BINS_PER_VALUE, likeness }
     }
 
     /// Those that suffice for a search.
@@ -156,13 +156,13 @@ impl Cells {
         kept
     }
 
-    /// Log-likelihood that some frames gain by a sway, over what is left of their own power along it.
-    fn held_out(&self, frames: &[usize], sway: &Sway) -> f64 {
+    /// Log-likelihood that some frames gain by a vibration, over what is left of their own power along it.
+    fn held_out(&self, frames: &[usize], vibration: &Vibration) -> f64 {
         let (mut gain, mut left, mut count) = (0.0, 0.0, 0.0);
-        for (cell, pattern) in sway.pattern.iter().enumerate() {
+        for (cell, pattern) in vibration.pattern.iter().enumerate() {
             let Some((pattern, _)) = pattern else { continue };
-            let sums = self.sums(frames, cell, sway.frequency_hz);
-            let (q, n) = sums.along(sway.phase);
+            let sums = self.sums(frames, cell, vibration.frequency_hz);
+            let (q, n) = sums.along(vibration.phase);
             if n <= 0.0 {
                 continue;
             }
@@ -256,27 +256,27 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     // Of those that the short frames cannot tell apart, the slowest.
     let alike = teeth.into_iter().chain([first]).filter(|tooth| tooth.1 > top - ALIAS_GAIN);
     let (frequency, top) = alike.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let sway = cells.fit(training, frequency, |_| true);
-    let found = cells.held_out(held_out, &sway);
-    let p_value = corrected(chi2_tail(2.0 * sway.gain, 2.0 * sway.values), 4.0 * (highest - lowest) * duration_s);
-    if found <= 0.0 || sway.likeness < LIKENESS {
+    let vibration = cells.fit(training, frequency, |_| true);
+    let found = cells.held_out(held_out, &vibration);
+    let p_value = corrected(chi2_tail(2.0 * vibration.gain, 2.0 * vibration.values), 4.0 * (highest - lowest) * duration_s);
+    if found <= 0.0 || vibration.likeness < LIKENESS {
         return None;
     }
-    let (radians, deviation) = amplitude(evidence, &cells, &sway)?;
+    let (radians, deviation) = amplitude(evidence, &cells, &vibration)?;
     let curvature = (2.0 * top - gain(frequency - 0.1 * step) - gain(frequency + 0.1 * step)) / (0.1 * step).powi(2);
     let frequency_deviation = if curvature > 0.0 { curvature.sqrt().recip() } else { step };
-    Some(candidate(evidence, &cells, &sway, [radians, deviation, frequency_deviation], (p_value, found)))
+    Some(candidate(evidence, &cells, &vibration, [radians, deviation, frequency_deviation], (p_value, found)))
 }
 
 /// Of the phase along the boresight (rad), with its sign, and its deviation; none where the ranges do not share it.
-fn amplitude(evidence: &Evidence, cells: &Cells, sway: &Sway) -> Option<(f64, f64)> {
+fn amplitude(evidence: &Evidence, cells: &Cells, vibration: &Vibration) -> Option<(f64, f64)> {
     let bin_m = evidence.radar.range_resolution_m();
     let (mut groups, mut along, mut of_still, mut of_pattern) = (vec![], Complex64::ZERO, 0.0, 0.0);
     for start in (0..cells.bins).step_by(GROUP_BINS) {
         let lever = ahead(evidence.room.as_ref(), (start as f64 + 0.5 * GROUP_BINS as f64) * bin_m).powi(2);
         let (mut shown, mut wanted, mut noise) = (0.0, 0.0, 0.0);
-        for cell in (0..sway.pattern.len()).filter(|cell| (start..start + GROUP_BINS).contains(&(cell % cells.bins))) {
-            let Some((pattern, information)) = sway.pattern[cell] else { continue };
+        for cell in (0..vibration.pattern.len()).filter(|cell| (start..start + GROUP_BINS).contains(&(cell % cells.bins))) {
+            let Some((pattern, information)) = vibration.pattern[cell] else { continue };
             let still = cells.still[cell];
             shown += pattern.norm_sqr() - 1.0 / information;
             noise += 1.0 / information;
@@ -297,9 +297,9 @@ fn amplitude(evidence: &Evidence, cells: &Cells, sway: &Sway) -> Option<(f64, f6
     if square <= 0.0 || along.re.abs() > GAIN_LIKE * (of_still * of_pattern).sqrt() {
         return None;
     }
-    let telling: Vec<&(f64, f64, f64)> = groups.iter().filter(|(_, wanted, noise)| square * wanted > 10.0 * noise).collect();
-    let agree = telling.iter().filter(|(shown, wanted, _)| *shown > SHOWN * square * wanted).count();
-    if telling.len() < LEAST_GROUPS || (agree as f64) < AGREEING * telling.len() as f64 {
+    let informative: Vec<&(f64, f64, f64)> = groups.iter().filter(|(_, wanted, noise)| square * wanted > 10.0 * noise).collect();
+    let agree = informative.iter().filter(|(shown, wanted, _)| *shown > SHOWN * square * wanted).count();
+    if informative.len() < LEAST_GROUPS || (agree as f64) < AGREEING * informative.len() as f64 {
         return None;
     }
     // Deviation of the ratio: leave one group out.
@@ -312,20 +312,20 @@ fn amplitude(evidence: &Evidence, cells: &Cells, sway: &Sway) -> Option<(f64, f6
     // 2 J₁(φ) / J₀(φ) = φ + φ³/8 + …
     let measured = square.sqrt();
     let phase = (0..20).fold(measured, |phase, _| measured - phase.powi(3) / 8.0);
-    // The pattern is i times what stands still where that comes from ahead.
+    // The pattern is i times the static return where that comes from ahead.
     (phase < LARGEST && phase > 0.0).then(|| (phase.copysign(along.im), deviation.hypot(PATTERN * phase)))
 }
 
 fn candidate(
     evidence: &Evidence,
     cells: &Cells,
-    sway: &Sway,
+    vibration: &Vibration,
     [radians, deviation, frequency_deviation]: [f64; 3],
     (p_value, gain): (f64, f64),
 ) -> Candidate {
     let (rx, samples) = (evidence.cube.dims[2], evidence.cube.dims[4]);
     let (starts, loop_s, chirp_s) = (evidence.starts_s.clone(), cells.loop_s, evidence.radar.chirp_period_s);
-    let (frequency, phase) = (sway.frequency_hz, sway.phase);
+    let (frequency, phase) = (vibration.frequency_hz, vibration.phase);
     let at = move |frame: usize, channel: usize, index: usize| {
         TAU * frequency * (starts[frame] + index as f64 * loop_s + (channel / rx) as f64 * chirp_s) + phase
     };
@@ -348,8 +348,9 @@ fn candidate(
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
-            "All static returns swing at {frequency:.2} ± {:.2} Hz, in phase with one another but each with a strength of its own, \
-             as returns from several directions do: the radar itself vibrates, by about {:.1} µm along its boresight.",
+            "The phases of all static returns oscillate at {frequency:.2} ± {:.2} Hz, in phase with one another but each with a \
+             strength of its own, as returns from several directions do: the radar itself vibrates, by about {:.1} µm along its \
+             boresight.",
             NINETY * frequency_deviation,
             1e6 * amplitude_m
         ),
@@ -362,11 +363,11 @@ fn candidate(
                     let back = Complex64::cis(-radians * turn.cos());
                     for (n, value) in chirp.iter_mut().enumerate() {
                         let place = channel * samples + n;
-                        let swing: Complex64 =
+                        let vibration: Complex64 =
                             (1..=HARMONICS).map(|order| patterns[order][place] * (order as f64 * turn).cos()).sum();
                         // What moves lies ahead.
                         let still = patterns[0][place];
-                        *value = still + (*value - swing - still) * back;
+                        *value = still + (*value - vibration - still) * back;
                     }
                 });
             }),
@@ -375,7 +376,7 @@ fn candidate(
     }
 }
 
-/// What is constant, and what swings with the sinusoid and its harmonics, in the training frames: least squares,
+/// What is constant, and what oscillates with the sinusoid and its harmonics, in the training frames: least squares,
 /// `[order][channel · sample]`. Short frames far apart do not make the harmonics orthogonal.
 fn patterns(evidence: &Evidence, at: &impl Fn(usize, usize, usize) -> f64) -> Vec<Vec<Complex64>> {
     let (channels, samples) = (evidence.cube.channels(), evidence.cube.dims[4]);

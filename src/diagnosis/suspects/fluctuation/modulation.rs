@@ -1,4 +1,4 @@
-//! A static return that swings at one frequency while the others stay: a lamp, a motor, a screen.
+//! A static return that is modulated at one frequency while the others are constant: a lamp, a motor, a screen.
 //!
 //! Its two sidebands are alike and go on from frame to frame. What moves there has other phases in every frame, so the
 //! frames' own scatter is what a line must stand out of. A lamp shines on all that is around it, so ranges are looked at
@@ -13,12 +13,12 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use rustfft::FftPlanner;
 
-use super::swings::Swings;
+use super::sinusoid::Sinusoid;
 use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::{corrected, fisher_tail};
 
-/// Slower swings belong to people, faster ones to electronics.
+/// Slower modulations belong to people, faster ones to electronics.
 const LOWEST_HZ: f64 = 20.0;
 const HIGHEST_HZ: f64 = 500.0;
 /// Part of a turn that a frame must see: less of it is a slope, which a slow body has, too.
@@ -36,25 +36,26 @@ const OF_ONE: f64 = 2.0;
 const LEAST_RATIO: f64 = 1.5;
 /// Bins to either side that a return reaches under the taper.
 const REACH: usize = 3;
-/// Ranges to either side that may swing with it, and how much plainer than by chance they must.
+/// Ranges to either side that may be modulated with it, and by how much more than by chance they must.
 const WIDEST: usize = 16;
 const PLAIN: f64 = 20.0;
-/// Share of its depth that all other static returns swing by at most, but for so many standard deviations: else it is the receiver's
-/// hum. And how much less likely (nats) it must be that they swing by as much.
+/// Share of its modulation depth that all other static returns have at most, but for so many standard deviations: else it is the
+/// receiver's own amplitude modulation. And how much less likely (nats) it must be that they are modulated as deeply.
 const OTHERS: f64 = 0.3;
 const CHANCE: f64 = 2.0;
 const SURELY: f64 = 12.0;
-/// Share of what stands still that lies elsewhere at least: without it, noise would say whether it is the receiver's.
+/// Share of the static returns' power that lies elsewhere at least: without it, noise would say whether it is the receiver's.
 const ELSEWHERE: f64 = 0.01;
 const FEWEST_FRAMES: usize = 5;
 const REFINEMENTS: usize = 16;
-pub const BEHAVES_LIKE: &str = "a static return that hums";
+pub const BEHAVES_LIKE: &str = "a static return that is modulated";
 
-/// Chirps without what stands still during a frame, by range, and when they were: what changes from frame to frame does not hum.
+/// Chirps without what is static during a frame, by range, and when they were: what changes from frame to frame is no such
+/// modulation.
 struct Chirps<'a> {
     evidence: &'a Evidence,
     bins: usize,
-    /// What stands still, `[channel · bin]`.
+    /// Static returns, `[channel · bin]`.
     still: Vec<Complex64>,
     /// `[frame][loop · channel · bin]`
     spectra: Vec<Vec<Complex64>>,
@@ -128,9 +129,13 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     if p_value >= 0.01 {
         return None;
     }
-    let swings = chirps.swings(line.frequency_hz);
-    let gain = chirps.gain(&line, &swings);
-    if gain > 0.0 && chirps.others_stay(&line, &swings) { candidate(&chirps, &chirps.settled(line), p_value, gain) } else { None }
+    let sidebands = chirps.referenced(line.frequency_hz);
+    let gain = chirps.gain(&line, &sidebands);
+    if gain > 0.0 && chirps.others_are_constant(&line, &sidebands) {
+        candidate(&chirps, &chirps.settled(line), p_value, gain)
+    } else {
+        None
+    }
 }
 
 impl<'a> Chirps<'a> {
@@ -204,16 +209,16 @@ impl<'a> Chirps<'a> {
     }
 
     /// Sidebands with the phases of the recording's beginning.
-    fn swings(&self, frequency_hz: f64) -> Sidebands {
-        let mut swings = self.sidebands(frequency_hz);
-        for (sideband, values) in swings.iter_mut().enumerate() {
+    fn referenced(&self, frequency_hz: f64) -> Sidebands {
+        let mut sidebands = self.sidebands(frequency_hz);
+        for (sideband, values) in sidebands.iter_mut().enumerate() {
             let turns = self.turns(frequency_hz, sideband);
             let size = values.len() / turns.len();
             for (frame, turn) in values.chunks_exact_mut(size).zip(turns) {
                 frame.iter_mut().for_each(|value| *value *= turn);
             }
         }
-        swings
+        sidebands
     }
 
     /// The ranges at which a frequency stands out most.
@@ -278,12 +283,12 @@ impl<'a> Chirps<'a> {
         line
     }
 
-    /// What the training frames' mean gains on the held-out ones, nats.
-    fn gain(&self, line: &Line, swings: &Sidebands) -> f64 {
+    /// Log-likelihood gain of the held-out frames by the training frames' mean, nats.
+    fn gain(&self, line: &Line, sidebands: &Sidebands) -> f64 {
         let (training, held_out) = (&self.evidence.split.training, &self.evidence.split.held_out);
         let channels = self.evidence.cube.channels();
         let (mut gained, mut scatter) = (0.0, 0.0);
-        for values in swings {
+        for values in sidebands {
             for (channel, bin) in (0..channels).flat_map(|channel| line.bins().map(move |bin| (channel, bin))) {
                 let value = |frame: usize| values[(frame * channels + channel) * self.bins + bin];
                 let (mean, own) = self.spread(value);
@@ -292,7 +297,7 @@ impl<'a> Chirps<'a> {
             }
         }
         let width = line.bins().count();
-        let numbers = (swings.len() * channels * width) as f64;
+        let numbers = (sidebands.len() * channels * width) as f64;
         let variance = (scatter / (numbers * (training.len() - 1) as f64)).max(f64::MIN_POSITIVE);
         gained / variance * self.independent(width, variance) / (channels * width) as f64
     }
@@ -304,31 +309,32 @@ impl<'a> Chirps<'a> {
         (mean, training.iter().map(|&frame| (value(frame) - mean).norm_sqr()).sum())
     }
 
-    /// Whether the other static returns, together, surely do not swing by as much of their own: a receiver's hum is in all of them.
-    fn others_stay(&self, line: &Line, swings: &Sidebands) -> bool {
+    /// Whether the other static returns, together, are surely not modulated as deeply: a modulation of the receiver's gain is in
+    /// all of them.
+    fn others_are_constant(&self, line: &Line, sidebands: &Sidebands) -> bool {
         let reached = reached(line.first, line.last);
         let near = |bin: usize| reached.contains(&bin);
-        swings.iter().all(|values| {
+        sidebands.iter().all(|values| {
             let (own, others) = (self.depth(values, &near), self.depth(values, &|bin| !near(bin)));
-            let [stays, hums] = [Complex64::ZERO, own.mean].map(|depth| (others.mean - depth).norm_sqr() / others.variance);
-            others.mean.norm() < OTHERS * own.mean.norm() + CHANCE * others.variance.sqrt() && hums > stays + SURELY
+            let [constant, modulated] =
+                [Complex64::ZERO, own.mean].map(|depth| (others.mean - depth).norm_sqr() / others.variance);
+            others.mean.norm() < OTHERS * own.mean.norm() + CHANCE * others.variance.sqrt() && modulated > constant + SURELY
         })
     }
 
-    /// By how much of themselves some static returns swing, mean of the training frames; ranges count the less the more their frames
-    /// scatter.
+    /// Modulation depth of some static returns, mean of the training frames; ranges count the less the more their frames scatter.
     fn depth(&self, values: &[Complex64], wanted: &dyn Fn(usize) -> bool) -> Depth {
         let training = &self.evidence.split.training;
         let (channels, count) = (self.evidence.cube.channels(), training.len() as f64);
         let mut depths = vec![Complex64::ZERO; training.len()];
         let mut all = 0.0;
         for bin in (0..self.bins).filter(|&bin| wanted(bin)) {
-            let swing = |channel: usize, frame: usize| values[(frame * channels + channel) * self.bins + bin];
-            let scatter: f64 = (0..channels).map(|channel| self.spread(|frame| swing(channel, frame)).1).sum();
+            let sideband = |channel: usize, frame: usize| values[(frame * channels + channel) * self.bins + bin];
+            let scatter: f64 = (0..channels).map(|channel| self.spread(|frame| sideband(channel, frame)).1).sum();
             let weight = 1.0 / scatter.max(f64::MIN_POSITIVE);
             for channel in 0..channels {
                 let still = self.still[channel * self.bins + bin];
-                let own = training.iter().map(|&frame| still.conj() * swing(channel, frame) * weight);
+                let own = training.iter().map(|&frame| still.conj() * sideband(channel, frame) * weight);
                 depths.iter_mut().zip(own).for_each(|(depth, own)| *depth += own);
                 all += still.norm_sqr() * weight;
             }
@@ -339,7 +345,7 @@ impl<'a> Chirps<'a> {
         Depth { mean, variance: variance.max(f64::MIN_POSITIVE) }
     }
 
-    /// Of the frequencies that the frames' rate does not tell apart, the one whose swing explains most within the frames.
+    /// Of the frequencies that the frame rate aliases to one another, the one whose sinusoid explains most within the frames.
     fn settled(&self, line: Line) -> Line {
         let rate_hz = 1.0 / self.evidence.radar.frame_period_s;
         let [lowest_hz, highest_hz] = self.band_hz();
@@ -347,47 +353,47 @@ impl<'a> Chirps<'a> {
         let reach = ((highest_hz - lowest_hz) / rate_hz) as i32;
         let teeth = (-reach..=reach).map(tooth).filter(|frequency| (lowest_hz..highest_hz).contains(frequency));
         let explained = |frequency_hz: f64| {
-            let swings = self.swings_at(frequency_hz)?;
-            Some((frequency_hz, line.bins().map(|bin| self.explained(&swings, bin)[0]).sum::<f64>()))
+            let sinusoid = self.sinusoid(frequency_hz)?;
+            Some((frequency_hz, line.bins().map(|bin| self.explained(&sinusoid, bin)[0]).sum::<f64>()))
         };
         let best = teeth.filter_map(explained).max_by(|a, b| a.1.total_cmp(&b.1));
         Line { frequency_hz: best.map_or(line.frequency_hz, |best| best.0), ..line }
     }
 
-    fn swings_at(&self, frequency_hz: f64) -> Option<Swings<'_>> {
-        Swings::new(&self.evidence.split.training, &self.middles_s, &self.loops_s, frequency_hz)
+    fn sinusoid(&self, frequency_hz: f64) -> Option<Sinusoid<'_>> {
+        Sinusoid::new(&self.evidence.split.training, &self.middles_s, &self.loops_s, frequency_hz)
     }
 
-    /// Energy that a swing takes from a range beyond what is constant, and what it leaves.
-    fn explained(&self, swings: &Swings, bin: usize) -> [f64; 2] {
+    /// Energy that a sinusoid explains at a range beyond what is constant, and what it leaves.
+    fn explained(&self, sinusoid: &Sinusoid, bin: usize) -> [f64; 2] {
         let channels = self.evidence.cube.channels();
         let of_channel = |channel: usize| {
             let value = |frame: usize, index: usize| self.spectra[frame][(index * channels + channel) * self.bins + bin];
-            let sums = swings.sums(value);
-            let fitted = swings.fitted(sums);
+            let sums = sinusoid.sums(value);
+            let fitted = sinusoid.fitted(sums);
             let all: f64 = (0..2).map(|part| (fitted[part].conj() * sums[part]).re).sum();
             let indices = || 0..self.loops_s.len();
             let energy: f64 =
-                swings.training.iter().flat_map(|&frame| indices().map(move |index| value(frame, index).norm_sqr())).sum();
+                sinusoid.training.iter().flat_map(|&frame| indices().map(move |index| value(frame, index).norm_sqr())).sum();
             [all, energy - all]
         };
         (0..channels).map(of_channel).fold([0.0; 2], |sum, one| [sum[0] + one[0], sum[1] + one[1]])
     }
 
-    /// The ranges around one that swing with it.
-    fn patch(&self, swings: &Swings, line: &Line) -> RangeInclusive<usize> {
-        let swings_too = |bin: usize| {
-            let [explained, left] = self.explained(swings, bin);
-            explained * swings.basis.len() as f64 > PLAIN * 2.0 * left
+    /// The ranges around one that are modulated with it.
+    fn patch(&self, sinusoid: &Sinusoid, line: &Line) -> RangeInclusive<usize> {
+        let modulated_too = |bin: usize| {
+            let [explained, left] = self.explained(sinusoid, bin);
+            explained * sinusoid.basis.len() as f64 > PLAIN * 2.0 * left
         };
-        let first = (0..line.first).rev().take(WIDEST).take_while(|&bin| swings_too(bin)).last().unwrap_or(line.first);
-        let last = (line.last + 1..self.bins).take(WIDEST).take_while(|&bin| swings_too(bin)).last().unwrap_or(line.last);
+        let first = (0..line.first).rev().take(WIDEST).take_while(|&bin| modulated_too(bin)).last().unwrap_or(line.first);
+        let last = (line.last + 1..self.bins).take(WIDEST).take_while(|&bin| modulated_too(bin)).last().unwrap_or(line.last);
         let reached = reached(line.first, line.last);
         first.min(*reached.start())..=last.max(*reached.end())
     }
 
-    /// What swings with the cosine and with the sine in some ranges, `[cosine, sine][channel · sample]`.
-    fn waves(&self, swings: &Swings, patch: &RangeInclusive<usize>) -> [Vec<Complex64>; 2] {
+    /// Parts in proportion to the cosine and to the sine in some ranges, `[cosine, sine][channel · sample]`.
+    fn waves(&self, sinusoid: &Sinusoid, patch: &RangeInclusive<usize>) -> [Vec<Complex64>; 2] {
         let evidence = self.evidence;
         let [frames, .., samples] = evidence.cube.dims;
         let channels = evidence.cube.channels();
@@ -396,7 +402,7 @@ impl<'a> Chirps<'a> {
         let mut waves = [vec![], vec![]];
         for channel in 0..channels {
             let moving: Vec<Vec<Complex64>> = (0..frames).map(|frame| evidence.moving(frame, channel)).collect();
-            let of_sample = |n: usize| swings.fitted(swings.sums(|frame, index| moving[frame][index * samples + n]));
+            let of_sample = |n: usize| sinusoid.fitted(sinusoid.sums(|frame, index| moving[frame][index * samples + n]));
             let fitted: Vec<[Complex64; 2]> = (0..samples).map(of_sample).collect();
             for (part, waves) in waves.iter_mut().enumerate() {
                 let mut wave: Vec<Complex64> = fitted.iter().map(|fitted| fitted[part]).collect();
@@ -417,7 +423,7 @@ fn reached(first: usize, last: usize) -> RangeInclusive<usize> {
     first.saturating_sub(REACH)..=last + REACH
 }
 
-/// First and last of ranges to look at together, beside which something stands still. `still`: `[channel · bin]`.
+/// First and last of ranges to look at together, beside which there are static returns. `still`: `[channel · bin]`.
 fn windows(still: &[Complex64], bins: usize) -> Vec<[usize; 2]> {
     let mut powers = vec![0.0; bins];
     still.iter().enumerate().for_each(|(i, value)| powers[i % bins] += value.norm_sqr());
@@ -438,9 +444,9 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Ca
     let samples = evidence.cube.dims[4];
     let bin_m = evidence.radar.range_resolution_m();
     let range_m = line.middle() * bin_m;
-    let swings = chirps.swings_at(line.frequency_hz)?;
-    let (patch, means) = (chirps.patch(&swings, line), swings.means);
-    let waves = chirps.waves(&swings, &patch);
+    let sinusoid = chirps.sinusoid(line.frequency_hz)?;
+    let (patch, means) = (chirps.patch(&sinusoid, line), sinusoid.means);
+    let waves = chirps.waves(&sinusoid, &patch);
     let [near_m, far_m] = [patch.start(), patch.end()].map(|bin| *bin as f64 * bin_m);
     let chirp_count = (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
     let energy = waves.iter().flatten().map(|value| value.norm_sqr()).sum::<f64>() * 0.5 * chirp_count;
@@ -457,8 +463,9 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Ca
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
-            "The return {range_m:.2} m away swings at {frequency_hz:.1} Hz (or at that and a multiple of the {frame_rate_hz:.1} \
-             frames per second), in step from frame to frame, while the other ranges stay: a lamp or a machine is there."
+            "The return {range_m:.2} m away is modulated at {frequency_hz:.1} Hz (or at that and a multiple of the \
+             {frame_rate_hz:.1} frames per second), coherently from frame to frame, while the other ranges are constant: a lamp or \
+             a machine is there."
         ),
         curve: None,
         energy,
@@ -479,9 +486,9 @@ mod tests {
     use super::*;
     use crate::radar::Radar;
 
-    const HUM_HZ: f64 = 160.0;
+    const MODULATION_HZ: f64 = 160.0;
 
-    /// Two static returns, of which one swings, or both, and somebody who moves, in noise.
+    /// Two static returns, of which one is modulated, or both, and somebody who moves, in noise.
     fn evidence(depth: f64, both: bool, walker: f64) -> Evidence {
         let mut radar = Radar::small(8);
         (radar.loops_per_frame, radar.samples_per_chirp) = (16, 64);
@@ -489,17 +496,17 @@ mod tests {
         Evidence::in_noise(radar, 4, |[frame, rx, slow, n]| {
             let (time, n) = (clock.chirp_time_s(frame, 0, slow), n as f64);
             let mover = Complex64::cis(0.6 * n + 0.4 * slow as f64 + 1.9 * (frame * frame) as f64) * walker;
-            let swing = 1.0 + depth * (TAU * HUM_HZ * time).cos();
-            let lamp = Complex64::cis(1.8 * n - 0.2 * rx as f64) * 8.0 * swing;
-            let wall = Complex64::cis(0.9 * n + 0.4 * rx as f64) * 30.0 * if both { swing } else { 1.0 };
+            let modulated = 1.0 + depth * (TAU * MODULATION_HZ * time).cos();
+            let lamp = Complex64::cis(1.8 * n - 0.2 * rx as f64) * 8.0 * modulated;
+            let wall = Complex64::cis(0.9 * n + 0.4 * rx as f64) * 30.0 * if both { modulated } else { 1.0 };
             wall + mover + lamp
         })
     }
 
     #[test]
-    fn a_humming_return_is_found_at_its_range_and_is_gone_once_it_is_explained() {
+    fn a_modulated_return_is_found_at_its_range_and_is_gone_once_it_is_explained() {
         let before = evidence(0.3, false, 4.0);
-        let found = find(&before).expect("it hums");
+        let found = find(&before).expect("it is modulated");
         let [near, far] = found.place.range_m.unwrap();
         let wanted = 1.8 / TAU * 64.0 * before.radar.range_resolution_m();
         assert!((near..far).contains(&wanted), "{wanted} in {near} to {far}");
@@ -510,22 +517,22 @@ mod tests {
         // Every frame sees the same half of a turn: its mean stands still.
         let radar = &before.radar;
         let times = (0..8).flat_map(|frame| (0..16).map(move |slow| radar.chirp_time_s(frame, 0, slow)));
-        let swings: Vec<f64> = times.map(|time| 8.0 * 0.3 * (TAU * HUM_HZ * time).cos()).collect();
-        let mean = swings.iter().sum::<f64>() / swings.len() as f64;
-        let variance = swings.iter().map(|swing| (swing - mean).powi(2)).sum::<f64>() / swings.len() as f64;
+        let waves: Vec<f64> = times.map(|time| 8.0 * 0.3 * (TAU * MODULATION_HZ * time).cos()).collect();
+        let mean = waves.iter().sum::<f64>() / waves.len() as f64;
+        let variance = waves.iter().map(|wave| (wave - mean).powi(2)).sum::<f64>() / waves.len() as f64;
         let planted = variance * before.cube.samples.len() as f64;
         assert!((removed / planted - 1.0).abs() < 0.2, "{removed} of {planted}");
     }
 
     #[test]
-    fn what_stands_or_moves_does_not_hum_and_the_receivers_hum_is_no_lamp() {
+    fn what_stands_or_moves_is_not_modulated_and_the_receivers_modulation_is_no_lamp() {
         assert!(find(&evidence(0.0, false, 4.0)).is_none());
         assert!(find(&evidence(0.3, true, 4.0)).is_none());
     }
 
     #[test]
     fn somebody_who_outshines_the_lamp_elsewhere_does_not_make_it_the_receivers() {
-        let found = find(&evidence(0.5, false, 40.0)).expect("it hums");
+        let found = find(&evidence(0.5, false, 40.0)).expect("it is modulated");
         let wanted = 1.8 / TAU * 64.0 * Radar::small(8).range_resolution_m();
         assert!(found.p_value < 1e-4 && found.place.range_m.is_some_and(|[near, far]| (near..far).contains(&wanted)));
         assert!(find(&evidence(0.5, true, 40.0)).is_none());
