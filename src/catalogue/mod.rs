@@ -68,10 +68,11 @@ pub fn described(id: &str) -> Result<String> {
 pub fn write(folder: &Path, done: &(dyn Fn() + Sync)) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|source| Error::write(folder, source))?;
     let scene = Scene::new()?;
+    let without = scene.recorded()?;
     effects::library().par_iter().try_for_each(|info| {
         let signature = scene.signature(info)?;
         if let Some(signature) = &signature {
-            signature.save(&folder.join(format!("{}.png", info.id)))?;
+            signature.save(&without, &folder.join(format!("{}.png", info.id)))?;
         }
         write_text(folder.join(format!("{}.md", info.id)), &page::markdown(info, signature.as_ref()))?;
         done();

@@ -16,8 +16,8 @@ use crate::person::Placement;
 use crate::person::actions::placement;
 use crate::pictures::Grid;
 use crate::radar::Radar;
-use crate::recorder::effects::{ClockOffset, listed};
-use crate::recorder::{EffectsConfig, RadarChoice, Recorder, RecorderConfig, World};
+use crate::recorder::effects::ClockOffset;
+use crate::recorder::{EffectsConfig, RadarChoice, Recorder, RecorderConfig, Returns, World};
 
 /// Of the scene and of what the effect draws.
 const SEED: u64 = 7;
@@ -26,11 +26,10 @@ const SPARE_S: f64 = 0.8;
 /// Below the strongest cell, dB; the noise of the scene lies some 70 dB below its walls.
 const DEPTH_DB: f64 = 80.0;
 
-/// What all effects are planted into, and its recording without any.
+/// What all effects are planted into.
 pub(super) struct Scene {
     world: World,
     surroundings: Surroundings,
-    without: Recording,
 }
 
 impl Scene {
@@ -39,8 +38,9 @@ impl Scene {
     /// # Errors
     /// What the recorder refuses.
     pub(super) fn new() -> Result<Self> {
-        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 32, ..Radar::small(24) };
+        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 32, ..Radar::small(16) };
         let mut config = RecorderConfig { radar: RadarChoice::Full(Box::new(radar)), seed: SEED, ..RecorderConfig::default() };
+        config.surface.returns = Returns::Vertices;
         let floor_m = config.room.floor_m.unwrap_or(1.0);
         config.person.placement = Some(Placement { start_s: -SPARE_S, ..placement(floor_m, config.person.distance_m) });
         config.effects.clock_offset = Some(ClockOffset { offset_s: SPARE_S });
@@ -54,10 +54,10 @@ impl Scene {
             max_range_m: world.radar.max_range_m(),
             sample_rate_hz: world.radar.sample_rate_hz,
         };
-        Ok(Self { without: Recording::of(&world)?, world, surroundings })
+        Ok(Self { world, surroundings })
     }
 
-    /// Of an effect at the strongest grade of the sealed challenges; none where the recorder has no such effect.
+    /// An effect at the strongest grade of the sealed challenges; none where the recorder has no such effect.
     ///
     /// # Errors
     /// What the recorder refuses.
@@ -65,40 +65,45 @@ impl Scene {
         let Some(graded) = graded(info.id) else {
             return Ok(None);
         };
-        let mut planted = self.world.clone();
-        (graded.add)(&mut planted.effects, graded.strength(1.0), &self.surroundings, &mut ChaCha8Rng::seed_from_u64(SEED));
-        planted.check()?;
-        let (without, with) = (&self.without, Recording::of(&planted)?);
-        let columns = [without.samples.clone(), with.samples.clone(), without.difference(&with)];
-        let radar = &self.world.radar;
-        let analysis = Analysis::new(radar, &HeatmapConfig::default());
-        let frame = |samples: &Vec<Complex32>| analysis.range_doppler(without.shaped(samples).frame(radar.frames / 2));
-        let over_time = |samples: &Vec<Complex32>| analysis.time_doppler(without.shaped(samples), &Gate::default());
-        let maps = [columns.iter().map(frame).collect(), columns.iter().map(over_time).collect()].map(relative);
-        let settings = listed(&planted).into_iter().next().unwrap_or_default();
-        Ok(Some(Signature { title: info.title.into(), maps, settings }))
+        let mut world = self.world.clone();
+        (graded.add)(&mut world.effects, graded.strength(1.0), &self.surroundings, &mut ChaCha8Rng::seed_from_u64(SEED));
+        world.check()?;
+        Ok(Some(Signature { title: info.title.into(), world }))
+    }
+
+    /// Its recording without any effect.
+    ///
+    /// # Errors
+    /// What the recorder refuses.
+    pub(super) fn recorded(&self) -> Result<Recording> {
+        Recording::of(&self.world)
     }
 }
 
-/// Pictures and settings of a planted effect.
+/// A planted effect.
 pub(super) struct Signature {
     title: String,
-    /// Without, with, and the power of the difference: range and velocity of the middle frame; time and velocity.
-    maps: [Vec<Map>; 2],
-    /// Of the plant, as truth.json has them.
-    settings: Value,
+    world: World,
 }
 
 impl Signature {
+    /// Of the plant: what the config of the recorder says.
+    fn settings(&self) -> Value {
+        let effects = serde_json::to_value(&self.world.effects).expect("plain data");
+        let only = effects.as_object().and_then(|effects| effects.values().next()).cloned().unwrap_or_default();
+        // Of effects that may be several, the one.
+        only.get(0).cloned().unwrap_or(only)
+    }
+
     /// What the picture shows, and of what.
     pub(super) fn caption(&self) -> String {
+        let settings = self.settings();
         let said = |(name, value): (&String, &Value)| match value {
             Value::Number(_) | Value::String(_) => Some(format!("{name} = {value}")),
             Value::Array(values) if values.len() <= 4 && values.iter().all(Value::is_number) => Some(format!("{name} = {value}")),
             _ => None,
         };
-        let given: Vec<String> = self
-            .settings
+        let given: Vec<String> = settings
             .as_object()
             .into_iter()
             .flatten()
@@ -115,9 +120,10 @@ impl Signature {
 
     /// The planted effect as a config states it, as far as the library has the same parameters.
     pub(super) fn setting(&self, info: &EffectInfo) -> EffectSetting {
+        let settings = self.settings();
         let mut setting = EffectSetting::neutral(info.id);
         for parameter in info.parameters {
-            let values: Vec<f64> = match &self.settings[parameter.name] {
+            let values: Vec<f64> = match &settings[parameter.name] {
                 Value::Number(value) => value.as_f64().into_iter().collect(),
                 Value::Array(values) => values.iter().filter_map(Value::as_f64).collect(),
                 _ => vec![],
@@ -126,19 +132,30 @@ impl Signature {
                 setting = setting.with(parameter.name, values);
             }
         }
-        let choices = [&self.settings["boundary"], &self.settings["body_part"], &self.settings["body_parts"][0]];
+        let choices = [&settings["boundary"], &settings["body_part"], &settings["body_parts"][0]];
         match choices.into_iter().find_map(Value::as_str) {
             Some(choice) => setting.choosing(choice),
             None => setting,
         }
     }
 
-    /// Writes the picture as PNG.
-    pub(super) fn save(&self, path: &Path) -> Result<()> {
+    /// Records it and writes the picture as PNG: without it, with it, and the power of the difference, over range and velocity in the
+    /// middle frame, and over time and velocity.
+    ///
+    /// # Errors
+    /// What the recorder refuses; a file that cannot be written.
+    pub(super) fn save(&self, without: &Recording, path: &Path) -> Result<()> {
+        let with = Recording::of(&self.world)?;
+        let samples = [without.samples.clone(), with.samples.clone(), without.difference(&with)];
+        let radar = &self.world.radar;
+        let analysis = Analysis::new(radar, &HeatmapConfig::default());
+        let frame = |samples: &Vec<Complex32>| analysis.range_doppler(without.shaped(samples).frame(radar.frames / 2));
+        let over_time = |samples: &Vec<Complex32>| analysis.time_doppler(without.shaped(samples), &Gate::default());
+        let maps = [samples.iter().map(frame).collect(), samples.iter().map(over_time).collect()].map(relative);
         let columns = ["without", "with", "difference"].map(String::from);
         let rows = ["one frame", "all frames"].map(String::from);
         let grid = Grid { title: &self.title, columns: &columns, rows: &rows, low: -DEPTH_DB, high: 0.0, unit: Some("dB") };
-        grid.save(path, &self.maps)
+        grid.save(path, &maps)
     }
 }
 
@@ -150,7 +167,7 @@ fn relative(maps: Vec<Map>) -> Vec<Map> {
 }
 
 /// Samples in units of the transmitted wave, so that recordings with gains of their own can be compared.
-struct Recording {
+pub(super) struct Recording {
     dims: [usize; 5],
     samples: Vec<Complex32>,
 }
