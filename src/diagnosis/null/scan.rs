@@ -292,8 +292,8 @@ mod tests {
 
     #[test]
     fn chances_are_uniform_without_quadrature() {
-        let real = Radar { sampling: Sampling::Real, frames: 60, ..radar(16) };
-        let nulls = (0..60).map(|seed| scan(&Evidence::in_noise(real.clone(), seed, |_| Complex64::ZERO), 1).unwrap().all);
+        let real = Radar { sampling: Sampling::Real, frames: 24, ..radar(16) };
+        let nulls = (0..20).map(|seed| scan(&Evidence::in_noise(real.clone(), seed, |_| Complex64::ZERO), 1).unwrap().all);
         let values: Vec<f64> = nulls.collect();
         assert!(uniform_chance(&values) > 0.02, "{values:?}");
     }
