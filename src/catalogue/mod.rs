@@ -1,6 +1,6 @@
 //! The library of effects as pages that people read: a page an effect, with the picture of its signature that the recorder makes.
 //!
-//! All words are those of [`EffectInfo`](crate::effects::EffectInfo) and of the diagnosis; the recorder, which shares nothing with
+//! All words are those of [`EffectInfo`] and of the diagnosis; the recorder, which shares nothing with
 //! the library, plants what the picture shows.
 
 mod page;
