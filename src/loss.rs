@@ -1,6 +1,8 @@
 //! The loss: how far two range-Doppler maps are apart in decibels (ℒ of the paper, sec. 3.4 and supplement 8), or how unlikely the
 //! measured one is under the simulated one.
 
+use std::f64::consts::LN_10;
+
 use burn::tensor::{Tensor, TensorCreationOptions};
 use serde::{Deserialize, Serialize};
 
@@ -129,7 +131,7 @@ impl DbLoss {
         self.scale == Scale::Likelihood
     }
 
-    /// The maps that are compared, in decibels; with the linear scale, in amplitudes of the strongest cell; with the likelihood, ln(power).
+    /// The maps that are compared, in decibels; with the linear scale, in amplitudes of the strongest cell.
     ///
     /// # Shapes
     /// - `signal`: `[frame, tx, rx, loop, sample]`; noise already added
@@ -139,9 +141,6 @@ impl DbLoss {
     /// Flows to `signal`; smooth except at `clamp_db`, below which it is zero.
     pub fn maps_db(&self, signal: Complex<5>) -> Tensor<3> {
         let power = self.power(signal);
-        if self.scale == Scale::Likelihood {
-            return (power + self.floor_amplitude.powi(2).max(LEAST_POWER)).log();
-        }
         if self.scale == Scale::Linear {
             // The floor keeps the root's gradient finite where there is nothing; a clamp's level is a share of the peak, too.
             let amplitude = ((power + self.floor_amplitude.powi(2)).sqrt()) / self.peak_amplitude;
@@ -195,22 +194,19 @@ impl DbLoss {
     /// # Shapes
     /// - `clean`: `[frame, tx, rx, loop, sample]`, without noise
     /// - `variance`: `[1]`, of each component of the noise in a sample; `None` without noise
-    /// - `measured`: [`Self::maps_db`] of the recording's same frames, a constant of training
+    /// - `measured_db`: [`Self::maps_db`] of the recording's same frames, a constant of training
     ///
     /// # Gradient
     /// Flows to `clean` and to `variance`.
-    pub fn deviance(&self, clean: Complex<5>, variance: Option<Tensor<1>>, measured: Tensor<3>) -> Tensor<1> {
-        let mut power = self.power(clean) + self.floor_amplitude.powi(2).max(LEAST_POWER);
+    pub fn deviance(&self, clean: Complex<5>, variance: Option<Tensor<1>>, measured_db: Tensor<3>) -> Tensor<1> {
+        let mut power = self.power(clean);
         if let Some(variance) = variance {
             power = power + (variance * self.noise_gain).reshape([1, 1, 1]);
         }
-        let ratio = measured - power.log();
+        let ratio = (measured_db - power_db(power, self.floor_amplitude)) * (LN_10 / 10.0);
         (ratio.clone().exp() - ratio - 1.0).mean()
     }
 }
-
-/// Far below any signal, and still a normal f32.
-const LEAST_POWER: f64 = 1e-36;
 
 /// Mean squared difference of two maps of decibels, dB².
 ///

@@ -12,6 +12,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use crate::data::atomic::write_text;
+use crate::data::settings::nearest;
 use crate::effects::{self, EffectInfo, Stage};
 use crate::error::{Error, Result};
 use signature::{Scene, Signature};
@@ -51,11 +52,10 @@ pub fn table() -> String {
 /// An id that the library does not have.
 pub fn described(id: &str) -> Result<String> {
     let Some(info) = effects::info(id) else {
-        let ids: Vec<&str> = effects::library().iter().map(|info| info.id).collect();
-        let nearest = ids.iter().max_by(|a, b| strsim::jaro(id, a).total_cmp(&strsim::jaro(id, b)));
         return Err(Error::Usage {
             message: format!("{id}: the library has no such effect"),
-            hint: nearest.map(|nearest| format!("did you mean {nearest}? `hybridsim effects` lists all")),
+            hint: nearest(id, effects::library().iter().map(|info| info.id))
+                .map(|nearest| format!("did you mean {nearest}? `hybridsim effects` lists all")),
         });
     };
     Ok(page::markdown(info, None))

@@ -8,7 +8,6 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
 use crate::challenge::library::{Surroundings, graded};
-use crate::data::IfFrame;
 use crate::effects::{EffectInfo, EffectSetting};
 use crate::error::Result;
 use crate::heatmap::{Analysis, Gate, HeatmapConfig, Map, Samples};
@@ -46,14 +45,7 @@ impl Scene {
         config.effects.clock_offset = Some(ClockOffset { offset_s: SPARE_S });
         let mut world = config.world(Path::new(""))?;
         world.effects = EffectsConfig::default();
-        let surroundings = Surroundings {
-            room: world.room.clone(),
-            distance_m: config.person.distance_m,
-            frames: world.radar.frames,
-            receivers: world.radar.rx_m.len(),
-            max_range_m: world.radar.max_range_m(),
-            sample_rate_hz: world.radar.sample_rate_hz,
-        };
+        let surroundings = Surroundings::new(&world.radar, world.room.clone(), config.person.distance_m);
         Ok(Self { world, surroundings })
     }
 
@@ -103,13 +95,7 @@ impl Signature {
             Value::Array(values) if values.len() <= 4 && values.iter().all(Value::is_number) => Some(format!("{name} = {value}")),
             _ => None,
         };
-        let given: Vec<String> = settings
-            .as_object()
-            .into_iter()
-            .flatten()
-            .filter(|(name, _)| !matches!(name.as_str(), "id" | "name"))
-            .filter_map(said)
-            .collect();
+        let given: Vec<String> = settings.as_object().into_iter().flatten().filter_map(said).collect();
         format!(
             "Recorded by the independent recorder: a person walks in a room; without the effect, with it, and the difference of the two \
              recordings, all in dB of the strongest cell without it. Above: the middle frame over range (m) and velocity (m/s); below: power \
@@ -162,8 +148,7 @@ impl Signature {
 /// In dB of the strongest cell of the first.
 fn relative(maps: Vec<Map>) -> Vec<Map> {
     let peak = maps[0].max().max(f64::MIN_POSITIVE);
-    let decibels = |power: &f64| 10.0 * (power / peak).max(f64::MIN_POSITIVE).log10();
-    maps.iter().map(|map| map.with_values(map.values.iter().map(decibels).collect())).collect()
+    maps.iter().map(|map| map.with_values(map.values.iter().map(|power| power / peak).collect()).db(0.0)).collect()
 }
 
 /// Samples in units of the transmitted wave, so that recordings with gains of their own can be compared.
@@ -178,9 +163,7 @@ impl Recording {
         let scale = recorder.level().gain.recip() as f32;
         let mut samples = vec![];
         for frame in recorder.frames() {
-            let IfFrame { re, im, .. } = frame?;
-            let im = im.unwrap_or_else(|| vec![0.0; re.len()]);
-            samples.extend(re.into_iter().zip(im).map(|(re, im)| Complex32::new(re * scale, im * scale)));
+            samples.extend(frame?.complex().map(|value| value * scale));
         }
         Ok(Self { dims: world.radar.dims(), samples })
     }

@@ -9,6 +9,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::person::JOINT_NAMES;
+use crate::radar::Radar;
 use crate::recorder::effects::*;
 use crate::room::{Boundary, Room};
 
@@ -22,6 +23,20 @@ pub struct Surroundings {
     pub receivers: usize,
     pub max_range_m: f64,
     pub sample_rate_hz: f64,
+}
+
+impl Surroundings {
+    /// Of a person at a horizontal distance from a radar in a room.
+    pub fn new(radar: &Radar, room: Room, distance_m: f64) -> Self {
+        Self {
+            room,
+            distance_m,
+            frames: radar.frames,
+            receivers: radar.rx_m.len(),
+            max_range_m: radar.max_range_m(),
+            sample_rate_hz: radar.sample_rate_hz,
+        }
+    }
 }
 
 /// An effect with the strengths between which it is drawn, log-uniformly.
@@ -325,14 +340,7 @@ mod tests {
         let mut world = RecorderConfig { radar: RadarChoice::Preset("small".into()), ..RecorderConfig::default() }
             .world(std::path::Path::new("."))
             .unwrap();
-        let at = Surroundings {
-            room: world.room.clone(),
-            distance_m: 2.8,
-            frames: world.radar.frames,
-            receivers: world.radar.rx_m.len(),
-            max_range_m: world.radar.max_range_m(),
-            sample_rate_hz: world.radar.sample_rate_hz,
-        };
+        let at = Surroundings::new(&world.radar, world.room.clone(), 2.8);
         for graded in library().chain(MASKED).chain(OUTSIDE) {
             for level in [-0.5, 0.0, 0.5, 1.0] {
                 for seed in 0..5 {

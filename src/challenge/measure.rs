@@ -50,10 +50,7 @@ fn decibels(ratio: f64) -> f64 {
 }
 
 fn samples(frame: &IfFrame) -> Vec<Complex64> {
-    match &frame.im {
-        Some(im) => frame.re.iter().zip(im).map(|(&re, &im)| Complex64::new(re.into(), im.into())).collect(),
-        None => frame.re.iter().map(|&re| Complex64::from(f64::from(re))).collect(),
-    }
+    frame.complex().map(|value| Complex64::new(value.re.into(), value.im.into())).collect()
 }
 
 /// Samples of a recording.

@@ -182,15 +182,7 @@ fn scene(config: &ChallengeConfig, seed: u64, random: &mut ChaCha8Rng) -> (Recor
 impl Plan {
     /// The scene's effects at their strengths.
     pub fn planted(&self, config: &ChallengeConfig) -> EffectsConfig {
-        let radar = &config.radar;
-        let at = Surroundings {
-            room: self.scene.room.clone(),
-            distance_m: self.distance_m,
-            frames: radar.frames,
-            receivers: radar.rx_m.len(),
-            max_range_m: radar.max_range_m(),
-            sample_rate_hz: radar.sample_rate_hz,
-        };
+        let at = Surroundings::new(&config.radar, self.scene.room.clone(), self.distance_m);
         let mut effects = EffectsConfig::default();
         for (place, &(graded, level)) in self.effects.iter().enumerate() {
             let mut random = self.details.clone();

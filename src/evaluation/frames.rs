@@ -14,9 +14,7 @@ use crate::{
 
 /// The measured samples of a frame, `[tx, rx, loop, sample]`.
 pub fn measured_frame(recording: &Recording, frame: usize) -> Result<Vec<Complex32>> {
-    let samples = recording.frame(frame)?;
-    let im = samples.im.iter().flatten().copied().chain(std::iter::repeat(0.0));
-    Ok(samples.re.iter().copied().zip(im).map(|(re, im)| Complex32::new(re, im)).collect())
+    Ok(recording.frame(frame)?.complex().collect())
 }
 
 /// Those of some frames that are whole: lost chirps are compared with nothing.

@@ -93,15 +93,8 @@ impl Plan {
     /// The effect at its strength.
     pub fn planted(&self, recording: &Recording, secret: &Secret) -> EffectsConfig {
         let radar = &recording.radar;
-        let at = Surroundings {
-            room: recording.room.clone().unwrap_or_default(),
-            // Only effects of the scene would ask.
-            distance_m: 0.0,
-            frames: radar.frames,
-            receivers: radar.rx_m.len(),
-            max_range_m: radar.max_range_m(),
-            sample_rate_hz: radar.sample_rate_hz,
-        };
+        // Only effects of the scene would ask for a distance.
+        let at = Surroundings::new(radar, recording.room.clone().unwrap_or_default(), 0.0);
         let mut effects = EffectsConfig::default();
         (self.graded.add)(&mut effects, self.strength, &at, &mut secret.random("effect", self.draw));
         if let Some(lost) = &mut effects.frame_drop {

@@ -107,6 +107,12 @@ impl IfFrame {
         Complex::new(self.re[position], self.im.as_ref().map_or(0.0, |im| im[position]))
     }
 
+    /// All samples in C order; without quadrature their imaginary parts are zero.
+    pub fn complex(&self) -> impl Iterator<Item = Complex<f32>> + '_ {
+        let im = self.im.iter().flatten().copied().chain(std::iter::repeat(0.0));
+        self.re.iter().copied().zip(im).map(|(re, im)| Complex::new(re, im))
+    }
+
     /// The first sample that is not finite, as `tx 0, rx 1, loop 2, sample 3`.
     pub(super) fn first_non_finite(&self) -> Option<String> {
         let bad = |values: &[f32]| values.iter().position(|value| !value.is_finite());

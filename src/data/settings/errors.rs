@@ -13,7 +13,7 @@ use crate::error::Error;
 pub(super) fn explain(error: &toml::de::Error, sources: &[Source], sets: &[String]) -> Error {
     let keys = keys_of(error);
     if let Some((key, known)) = unknown_key(error.message()) {
-        let nearest = nearest(&key, &known).map(str::to_string);
+        let nearest = nearest(&key, known.iter().map(String::as_str)).map(str::to_string);
         let whole = find_whole(&key, &keys, error, sources, sets);
         let path = match origin(&whole, sources, sets) {
             Origin::Set => "--set".into(),
@@ -64,9 +64,9 @@ fn unknown_key(message: &str) -> Option<(String, Vec<String>)> {
 }
 
 /// The most similar of the known keys.
-fn nearest<'a>(key: &str, known: &'a [String]) -> Option<&'a str> {
+pub fn nearest<'a>(key: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let likeness = |known: &str| strsim::normalized_damerau_levenshtein(key, known).max(strsim::jaro_winkler(key, known) - 0.1);
-    known.iter().map(String::as_str).max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
+    known.into_iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
 }
 
 /// The unknown key with the tables it lies in.

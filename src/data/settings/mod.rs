@@ -3,6 +3,8 @@
 mod errors;
 mod numbers;
 
+pub use errors::nearest;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -29,7 +29,7 @@ const ZERO_PADDING: usize = 4;
 const LEAST_NOISE: f64 = 1e-9;
 
 /// Level of the test that what is near differs between the channels as reflectors do; customary (Fisher 1925).
-const TELLING: f64 = 0.05;
+const SIGNIFICANCE: f64 = 0.05;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if ranges_m(evidence).is_some() && !evidence.is_real() || evidence.cube.dims[4] < 16 {
@@ -243,7 +243,7 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         gain: gain(evidence, &term),
         errs_alike: false,
         look_alikes: [
-            (as_reflectors > TELLING, "static_reflector"),
+            (as_reflectors > SIGNIFICANCE, "static_reflector"),
             (!evidence.is_real() && beat.may_be_constant() && !beat.may_be_leakage(), "dc_offset"),
         ]
         .into_iter()
