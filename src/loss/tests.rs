@@ -1,0 +1,177 @@
+use burn::tensor::{DType, Device, TensorData};
+use rand::{RngExt, SeedableRng};
+
+use super::*;
+use crate::heatmap::synthetic;
+
+const DIMS: [usize; 5] = [1, 2, 2, 4, 6];
+
+fn radar() -> Radar {
+    let mut radar = Radar { loops_per_frame: 4, samples_per_chirp: 6, ..synthetic::radar() };
+    radar.rx_m.truncate(2);
+    radar
+}
+
+fn noise(seed: u64) -> Vec<f64> {
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    (0..DIMS.iter().product()).map(|_| random.random::<f64>() - 0.5).collect()
+}
+
+fn tensor(values: Vec<f64>, device: &Device) -> Tensor<5> {
+    Tensor::from_data(TensorData::new(values, DIMS), (device, DType::F64))
+}
+
+fn signal(seed: u64, device: &Device) -> Complex<5> {
+    Complex::new(tensor(noise(seed), device), tensor(noise(seed + 100), device))
+}
+
+fn loss(config: &LossConfig, device: &Device) -> DbLoss {
+    DbLoss::new(&radar(), &HeatmapConfig::default(), config, 0.2, (device, DType::F64)).unwrap()
+}
+
+#[test]
+fn a_signal_has_no_distance_to_itself_and_ten_times_its_amplitude_is_twenty_decibels_away() {
+    let device = Device::flex();
+    for combine in [Combine::Each, Combine::Mean] {
+        let loss = loss(&LossConfig { combine, ..Default::default() }, &device);
+        let measured = loss.maps_db(signal(1, &device));
+        assert_eq!(loss.loss(signal(1, &device), measured.clone()).into_scalar::<f64>(), 0.0);
+        let louder = loss.loss(signal(1, &device).scale_by(10.0), measured).into_scalar::<f64>();
+        assert!((louder - 400.0).abs() < 1e-3, "{combine:?}: {louder}");
+    }
+}
+
+#[test]
+fn a_linear_loss_hardly_sees_what_is_weak() {
+    let device = Device::flex();
+    // Half the amplitude, of everything or of what is far below the strongest cell: decibels weigh both alike.
+    let lost = |scale: Scale, level: f64| {
+        let loss = loss(&LossConfig { scale, ..Default::default() }, &device);
+        let measured = loss.maps_db(signal(1, &device).scale_by(level));
+        loss.loss(signal(1, &device).scale_by(0.5 * level), measured).into_scalar::<f64>()
+    };
+    let ratio = |scale: Scale| lost(scale, 0.01) / lost(scale, 1.0);
+    assert!((ratio(Scale::Linear) - 1e-4).abs() < 1e-6, "{}", ratio(Scale::Linear));
+    assert!((ratio(Scale::Db) - 1.0).abs() < 0.01, "{}", ratio(Scale::Db));
+}
+
+#[test]
+fn the_likelihood_finds_a_level_in_speckle_and_noise_where_decibels_do_not() {
+    let device = Device::flex();
+    let dims = [1, 1, 1, 64, 64];
+    let radar = Radar { loops_per_frame: 64, samples_per_chirp: 64, tx_m: vec![[0.0; 3]], rx_m: vec![[0.0; 3]], ..radar() };
+    let draw = |seed: u64, scale: f64| {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let values = (0..4096).map(|_| scale * rand_distr::Distribution::<f64>::sample(&rand_distr::StandardNormal, &mut random));
+        let values: Vec<f64> = values.collect();
+        Tensor::<5>::from_data(TensorData::new(values, dims), (&device, DType::F64))
+    };
+    // Signal and noise of equal power; the same law simulates a level that is not known.
+    let measured = Complex::new(draw(1, 2f64.sqrt()), draw(2, 2f64.sqrt()));
+    let best = |value: &dyn Fn(f64) -> f64| {
+        let levels: Vec<f64> = (-60..=60).map(|step| f64::from(step) / 10.0).collect();
+        levels.into_iter().min_by(|a, b| value(*a).total_cmp(&value(*b))).unwrap()
+    };
+    let silent = || Complex::new(draw(3, 0.0), draw(3, 0.0));
+    let scale = |level_db: f64| 10f64.powf(level_db / 20.0);
+    let of = |scale: Scale| {
+        let config = LossConfig { scale, ..Default::default() };
+        DbLoss::new(&radar, &HeatmapConfig::default(), &config, 100.0, (&device, DType::F64)).unwrap()
+    };
+    let exact = of(Scale::Likelihood);
+    let maps = exact.maps_db(measured.clone());
+    let variance =
+        |level_db: f64| Tensor::<1>::from_data(TensorData::from([2.0 * scale(level_db).powi(2)]), (&device, DType::F64));
+    let found = best(&|level| exact.deviance(silent(), Some(variance(level)), maps.clone()).into_scalar::<f64>());
+    assert!(found.abs() < 0.2, "{found} dB");
+    // The mean of the decibels of an exponential is 2.5 dB below those of its mean: Euler's constant in dB.
+    let decibels = of(Scale::Db);
+    let expected = decibels.maps_db(measured).mean().into_scalar::<f64>()
+        - 10.0 * (2.0 * HeatmapConfig::default().noise_gain(&radar)).log10();
+    assert!((expected + 2.5).abs() < 0.2, "{expected} dB");
+}
+
+#[test]
+fn the_likelihood_is_of_all_cells() {
+    let config = LossConfig { scale: Scale::Likelihood, static_removed: true, ..Default::default() };
+    let error = DbLoss::new(&radar(), &HeatmapConfig::default(), &config, 1.0, &Device::flex()).unwrap_err();
+    assert!(error.to_string().contains("static_removed"), "{error}");
+}
+
+#[test]
+fn antennas_are_chosen_and_averaged_as_the_settings_say() {
+    let device = Device::flex();
+    let dims = |config: LossConfig| loss(&config, &device).maps_db(signal(1, &device)).dims();
+    assert_eq!(dims(LossConfig::default()), [4, 4, 6]);
+    assert_eq!(dims(LossConfig { channels: vec![3, 0], ..Default::default() }), [2, 4, 6]);
+    assert_eq!(dims(LossConfig { combine: Combine::Mean, ..Default::default() }), [1, 4, 6]);
+    let all = loss(&LossConfig::default(), &device).maps_db(signal(1, &device));
+    let last = loss(&LossConfig { channels: vec![3], ..Default::default() }, &device).maps_db(signal(1, &device));
+    assert_eq!((all.narrow(0, 3, 1) - last).abs().max().into_scalar::<f64>(), 0.0);
+    let error =
+        DbLoss::new(&radar(), &HeatmapConfig::default(), &LossConfig { channels: vec![4], ..Default::default() }, 1.0, &device);
+    assert_eq!(error.unwrap_err().to_string(), "`loss.channels` is 4, expected 0 to 3: one for each antenna pair");
+}
+
+pub(crate) fn gradients_agree_with_central_differences_for_every_setting() {
+    let device = Device::flex().autodiff();
+    let settings = [
+        LossConfig::default(),
+        LossConfig { combine: Combine::Mean, channels: vec![1, 2], ..Default::default() },
+        LossConfig { clamp_db: Some(-15.0), static_removed: true, ..Default::default() },
+        LossConfig { scale: Scale::Linear, ..Default::default() },
+        LossConfig { scale: Scale::Likelihood, ..Default::default() },
+    ];
+    for config in settings {
+        let loss = loss(&config, &device);
+        let measured = loss.maps_db(signal(2, &device)).detach();
+        let start = noise(1);
+        let value = |re: Tensor<5>| {
+            let simulated = Complex::new(re.clone(), tensor(noise(101), &device));
+            // The noise's level may follow the signal.
+            let variance = (re.clone() * re).mean() * 0.1;
+            match loss.is_likelihood() {
+                true => loss.deviance(simulated, Some(variance), measured.clone()),
+                false => loss.loss(simulated, measured.clone()),
+            }
+        };
+        let tracked = tensor(start.clone(), &device).require_grad();
+        let gradients = value(tracked.clone()).backward();
+        let found: Vec<f64> = tracked.grad(&gradients).unwrap().into_data().iter::<f64>().collect();
+        let step = 1e-6;
+        for index in (0..start.len()).step_by(5) {
+            let moved = |by: f64| {
+                let mut values = start.clone();
+                values[index] += by;
+                value(tensor(values, &device)).into_scalar::<f64>()
+            };
+            let wanted = (moved(step) - moved(-step)) / (2.0 * step);
+            crate::support::compared(&[wanted]);
+            let difference = (found[index] - wanted).abs();
+            assert!(difference < 1e-5 * (1.0 + wanted.abs()), "{config:?} {index}: found {}, wanted {wanted}", found[index]);
+        }
+    }
+}
+
+#[test]
+fn a_clamped_cell_does_not_pull_and_silence_gives_no_nan() {
+    let device = Device::flex().autodiff();
+    let loss = loss(&LossConfig { clamp_db: Some(-40.0), ..Default::default() }, &device);
+    let quiet = |scale: f64| tensor(noise(1), &device) * scale;
+    let measured = loss.maps_db(Complex::new(quiet(1e-9), quiet(0.0))).detach();
+    for scale in [0.0, 1e-8] {
+        let tracked = quiet(scale).detach().require_grad();
+        let value = loss.loss(Complex::new(tracked.clone(), quiet(0.0)), measured.clone());
+        let gradients = value.backward();
+        assert_eq!(value.into_scalar::<f64>(), 0.0);
+        let gradient: Vec<f64> = tracked.grad(&gradients).unwrap().into_data().iter::<f64>().collect();
+        assert!(gradient.iter().all(|g| *g == 0.0), "{gradient:?}");
+    }
+}
+
+#[test]
+fn a_silent_recording_is_refused() {
+    let error = DbLoss::new(&radar(), &HeatmapConfig::default(), &LossConfig::default(), 0.0, &Device::flex()).unwrap_err();
+    assert!(error.to_string().contains("strongest cell has amplitude 0"), "{error}");
+    assert!(error.hint().is_some());
+}
