@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes tests/golden/containers: one small cube in every container that `hybridsim import` reads.
+"""Writes tests/containers: one small cube in every container that `hybridsim import` reads.
 
 Needs numpy, scipy and h5py. The cube is [frame 2, chirp 3, rx 4, sample 8]; number n in C order is (3 n - 200) + j (150 - 2 n).
 """
@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import scipy.io
 
-FOLDER = pathlib.Path(__file__).parent.parent / "tests/golden/containers"
+FOLDER = pathlib.Path(__file__).parent.parent / "tests/containers"
 FOLDER.mkdir(parents=True, exist_ok=True)
 
 n = np.arange(2 * 3 * 4 * 8).reshape(2, 3, 4, 8)

@@ -9,7 +9,7 @@ use crate::error::Result;
 const SHAPE: [usize; 4] = [2, 3, 4, 8];
 
 fn golden(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/containers").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/containers").join(name)
 }
 
 #[track_caller]
