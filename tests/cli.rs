@@ -87,13 +87,14 @@ fn a_run_leaves_pictures_numbers_and_a_model_that_infers_at_once() {
         ["train", &test_config(), "-q", "--device", "flex", "--set", "training.epochs=2", "--set", &recordings, "--out", "run"];
     let output = hybridsim(&arguments, folder.path());
     assert!(output.status.success(), "{}", err(&output));
-    assert!(out(&output).contains("PSNR") && out(&output).contains("report: run/report.md"), "{}", out(&output));
+    assert!(out(&output).contains("PSNR") && out(&output).contains("report: run/report.html"), "{}", out(&output));
     let run = folder.path().join("run");
     for file in [
         "config.toml",
         "metrics.json",
         "run.json",
         "report.md",
+        "report.html",
         "loss.png",
         "range_doppler.png",
         "range_doppler_moving.png",

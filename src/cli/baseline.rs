@@ -135,6 +135,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     say!("  baseline.json  settings, gain");
     say!("  run.json       time");
     say!("  *.png          heatmaps");
+    say!("  report.html    all of them on one page");
     Ok(())
 }
 

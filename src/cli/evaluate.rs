@@ -12,13 +12,14 @@ use super::{
     scores::{self, LpipsArguments},
 };
 use crate::{
-    data::atomic,
+    data::{Scratch, atomic},
     error::{Error, Result},
-    evaluation::{self, Simulation},
+    evaluation::{self, FrameMaps, Simulation},
     lpips::Lpips,
     metrics::MetricsConfig,
+    pictures::page::{self, Markup, html, picture},
     training::{LoadedRecording, checkpoint, refine},
-    verbs::{heatmaps::same_radar, notes},
+    verbs::{heatmaps::same_radar, notes, report::draw_frame, scores::page_of_frames},
 };
 
 #[derive(Args)]
@@ -58,7 +59,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     // Beside `best` and `last`, in the run folder.
     let run_folder = arguments.checkpoint.join("..");
     let poses = refine::read(&run_folder)?;
-    let mut evaluations = Vec::new();
+    let scratch = Scratch::new()?;
+    let (mut evaluations, mut drawn) = (Vec::new(), Vec::new());
     for folder in &arguments.recordings {
         plausible::folder(folder, common)?;
         let recording = LoadedRecording::open(folder, &state.simulator, false)?;
@@ -80,13 +82,19 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         let simulation = Simulation::new(&simulator, &recording.scene, state.seed, true);
         let progress = Progress::new("evaluating", frames.len(), common.quiet);
         let mut done = 0;
-        let mut observe = |_, _, _| {
+        let mut pictures = Ok(html! {});
+        let mut observe = |frame, all, moving| {
             done += 1;
             progress.set(done);
+            // Near the middle, where the person is on the way.
+            if done == frames.len().div_ceil(2) {
+                pictures = of_frame(&scratch, frame, &all, &moving);
+            }
         };
         let evaluation =
             evaluation::evaluate(&recording, &simulation, &frames, &state.heatmap, &metrics, lpips.as_ref(), &mut observe)?;
         progress.finish();
+        drawn.push(pictures?);
         say!("{}", folder.display());
         super::tell(&scores::of_frames(&evaluation));
         evaluations.push((folder.display().to_string(), evaluation));
@@ -97,6 +105,28 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     if let Some(out) = &arguments.out.out {
         atomic::write_text(out.join("metrics.json"), &scores::json(&evaluations))?;
+        let content = html! {
+            h1 { "Simulation against recordings" }
+            p.lead { "Of the checkpoint " code { (page::shown(&arguments.checkpoint.display().to_string())) } "." }
+            @for ((name, evaluation), pictures) in evaluations.iter().zip(&drawn) {
+                h2 { (page::shown(name)) }
+                (page_of_frames(evaluation))
+                (pictures)
+            }
+            @if let (true, Some(summary)) = (evaluations.len() > 1, scores::summary(&evaluations)) {
+                h2 { "Together" }
+                pre { (scores::of_sequences(&summary)) }
+            }
+        };
+        atomic::write_text(out.join("report.html"), &page::page("Simulation against recordings", &content))?;
+        say!("report: {}", out.join("report.html").display());
     }
     Ok(())
+}
+
+/// A frame's pictures, as they stand in a page.
+fn of_frame(scratch: &Scratch, frame: usize, all: &FrameMaps, moving: &FrameMaps) -> Result<Markup> {
+    let files = draw_frame(scratch.path(), &format!("frame {frame}"), all, moving)?;
+    let pictures = files.iter().map(|file| picture(file, "range-Doppler")).collect::<Result<Vec<_>>>()?;
+    Ok(html! { @for picture in &pictures { p { (picture) } } })
 }

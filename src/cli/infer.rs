@@ -118,5 +118,6 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     say!("simulated {} frames: {}", ready.radar.frames, out.display());
     say!("  recording/   IF samples as a recording folder");
     say!("  *.png        heatmaps");
+    say!("  report.html  all of them on one page");
     Ok(())
 }

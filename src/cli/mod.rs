@@ -131,7 +131,7 @@ enum Command {
     /// Fit the simulator to recordings
     ///
     /// Reads recording folders (or makes one first from [record]), trains, and leaves a run folder: config.toml
-    /// (resolved), metrics.json, loss curve and heatmaps as PNG, report.md, and the checkpoints `best` and `last`.
+    /// (resolved), metrics.json, loss curve and heatmaps as PNG, report.html, and the checkpoints `best` and `last`.
     /// Killed runs continue with --resume.
     Train(train::Arguments),
     /// Simulate a motion at a trained site

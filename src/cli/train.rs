@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         say!("{}", folder.display());
         super::tell(&scores::of_frames(evaluation));
     }
-    say!("report: {}", trained.folder.join("report.md").display());
+    say!("report: {}", trained.folder.join("report.html").display());
     Ok(())
 }
 

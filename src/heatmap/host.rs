@@ -6,7 +6,7 @@ use num_complex::{Complex32, Complex64};
 use rustfft::{Fft, FftPlanner};
 use serde::{Deserialize, Serialize};
 
-use super::{Axis, HeatmapConfig, Map, range_axis, range_bins, velocity_axis};
+use super::{Axis, HeatmapConfig, Map, Window, range_axis, range_bins, velocity_axis};
 use crate::radar::{Radar, Sampling};
 
 /// Borrowed IF samples, `[frame, tx, rx, loop, sample]`; the imaginary parts of a real-sampled signal are ignored.
@@ -82,6 +82,7 @@ pub(super) fn widen(value: Complex32) -> Complex64 {
 pub struct Analysis {
     pub(super) radar: Radar,
     range_window: Vec<f64>,
+    pub(super) doppler_kind: Window,
     doppler_window: Vec<f64>,
     range_fft: Arc<dyn Fft<f64>>,
     doppler_fft: Arc<dyn Fft<f64>>,
@@ -93,6 +94,7 @@ impl Analysis {
         let scale = if radar.sampling == Sampling::Real { 2.0 } else { 1.0 };
         Self {
             range_window: config.range_window.weights(radar.samples_per_chirp).into_iter().map(|w| w * scale).collect(),
+            doppler_kind: config.doppler_window,
             doppler_window: config.doppler_window.weights(radar.loops_per_frame),
             range_fft: planner.plan_fft_forward(radar.samples_per_chirp),
             doppler_fft: planner.plan_fft_forward(radar.loops_per_frame),

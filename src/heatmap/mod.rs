@@ -14,6 +14,7 @@ pub(crate) mod dft;
 mod host;
 mod map;
 mod over_time;
+mod spectrogram;
 mod windows;
 
 pub use angle::Scan;

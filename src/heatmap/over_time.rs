@@ -31,7 +31,7 @@ impl Analysis {
         Axis::new("time", "s", (0..frames).map(|frame| self.radar.chirp_time_s(frame, 0, 0)).collect())
     }
 
-    /// Power `[velocity, time]`, summed over the gate's ranges: the micro-Doppler picture. Remove what is static before.
+    /// Power `[velocity, time]`, summed over the gate's ranges, a column a frame. Remove what is static before.
     pub fn time_doppler(&self, samples: Samples<'_>, gate: &Gate) -> Map {
         self.over_time(samples, self.velocity_axis(), |frame| {
             let map = self.range_doppler(frame);

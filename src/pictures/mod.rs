@@ -7,6 +7,7 @@ mod confusion;
 mod grid;
 mod heatmap;
 mod overlay;
+pub mod page;
 mod panels;
 
 pub use chart::{Chart, Series};

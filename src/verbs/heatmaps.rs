@@ -1,6 +1,6 @@
 //! The heatmaps that verbs draw of a recording, measured or simulated.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use num_complex::Complex32;
 
@@ -12,8 +12,11 @@ use crate::{
     radar::Radar,
 };
 
-/// Decibels that a picture shows below its strongest cell.
-const SHOWN_DB: f64 = 60.0;
+/// Decibels that a picture shows below its strongest cell, at most and at least.
+const SHOWN_DB: [f64; 2] = [60.0, 10.0];
+
+/// A picture's title, and its file.
+pub type Drawn = (&'static str, PathBuf);
 
 /// One heatmap of a recording.
 pub struct Heatmap {
@@ -46,21 +49,29 @@ impl Pictures {
     }
 
     /// Pictures of one recording, `[frame, tx, rx, loop, sample]`.
-    pub fn show(&mut self, folder: &Path, samples: &[Complex32]) -> Result<()> {
-        for Heatmap { name, title, map } in self.maps(samples) {
-            let map = self.db(&map, &map);
-            pictures::heatmap(&folder.join(format!("{name}.png")), title, &map, window(&map))?;
-        }
-        Ok(())
+    pub fn show(&self, folder: &Path, samples: &[Complex32]) -> Result<Vec<Drawn>> {
+        self.maps(samples)
+            .into_iter()
+            .map(|Heatmap { name, title, map }| {
+                let (file, map) = (folder.join(format!("{name}.png")), self.db(&map, &map));
+                pictures::heatmap(&file, title, &map, window(&map))?;
+                Ok((title, file))
+            })
+            .collect()
     }
 
     /// Pictures of a measured recording, its simulation and their difference.
-    pub fn compare(&mut self, folder: &Path, measured: &[Complex32], simulated: &[Complex32]) -> Result<()> {
-        for (Heatmap { name, title, map: measured }, simulated) in self.maps(measured).into_iter().zip(self.maps(simulated)) {
-            let (measured, simulated) = (self.db(&measured, &measured), self.db(&simulated.map, &measured));
-            pictures::comparison(&folder.join(format!("{name}.png")), title, &measured, &simulated, window(&measured))?;
-        }
-        Ok(())
+    pub fn compare(&self, folder: &Path, measured: &[Complex32], simulated: &[Complex32]) -> Result<Vec<Drawn>> {
+        self.maps(measured)
+            .into_iter()
+            .zip(self.maps(simulated))
+            .map(|(Heatmap { name, title, map: measured }, simulated)| {
+                let file = folder.join(format!("{name}.png"));
+                let (measured, simulated) = (self.db(&measured, &measured), self.db(&simulated.map, &measured));
+                pictures::comparison(&file, title, &measured, &simulated, window(&measured))?;
+                Ok((title, file))
+            })
+            .collect()
     }
 
     /// Decibels of a power map, with the floor of the settings below the strongest cell of another.
@@ -93,7 +104,7 @@ impl Pictures {
             add("range_azimuth", "Range-azimuth, middle frame, static removed", map);
         }
         if frames > 1 {
-            add("time_doppler", "Time-Doppler, static removed", self.analysis.time_doppler(moving, &everywhere));
+            add("time_doppler", "Time-Doppler, static removed", self.analysis.spectrogram(moving, &everywhere));
             add("time_range", "Time-range, static removed", self.analysis.time_range(moving, &everywhere));
             if tx * rx > 1 {
                 add("time_azimuth", "Time-azimuth, static removed", self.analysis.time_angle(moving, &scan, &everywhere));
@@ -103,6 +114,25 @@ impl Pictures {
     }
 }
 
-pub(super) fn window(map_db: &Map) -> DbWindow {
-    DbWindow::below(map_db.max(), SHOWN_DB)
+/// From the noise floor up: most cells of a map hold noise, so that half of all cells lie below it.
+pub(crate) fn window(map_db: &Map) -> DbWindow {
+    let [most, least] = SHOWN_DB;
+    let high_db = map_db.max();
+    DbWindow { low_db: map_db.median().clamp(high_db - most, high_db - least), high_db }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::heatmap::Axis;
+
+    #[test]
+    fn colours_begin_at_the_noise_floor() {
+        let map = |values: Vec<f64>| Map::new(Axis::new("a", "", vec![0.0]), Axis::new("b", "", vec![0.0; values.len()]), values);
+        let window = |values| super::window(&map(values));
+        assert_eq!(window(vec![-31.0, -30.0, -30.0, -29.0, 5.0]), DbWindow { low_db: -30.0, high_db: 5.0 });
+        // Nothing but noise, and a simulation without any.
+        assert_eq!(window(vec![0.0, -1.0, -2.0]).low_db, -10.0);
+        assert_eq!(window(vec![0.0, -120.0, -120.0]).low_db, -60.0);
+    }
 }

@@ -17,7 +17,10 @@ use crate::{
     evaluation::{self, Evaluation, FrameMaps, Simulation, measured_frame},
     heatmap::{Analysis, Gate, Samples, StaticRemoval, remove_static},
     metrics::MetricsConfig,
-    pictures::{self, Chart, Series},
+    pictures::{
+        self, Chart, Series,
+        page::{self, html, picture},
+    },
     text::shown,
     training::{FrameSplit, LoadedRecording, RefinedPose, checkpoint, checkpoint::Progress},
 };
@@ -62,7 +65,7 @@ impl RunReport<'_> {
                 None,
                 &mut |frame, all, moving| {
                     if index == 0 && frame == middle {
-                        drawn = self.draw_held_out(frame, &all, &moving);
+                        drawn = draw_frame(self.folder, &format!("held-out frame {frame}"), &all, &moving).map(drop);
                     }
                 },
             )?;
@@ -76,14 +79,6 @@ impl RunReport<'_> {
         self.write_numbers(&evaluations)?;
         self.write_report(&evaluations, !split.validation.is_empty())?;
         Ok(evaluations)
-    }
-
-    fn draw_held_out(&self, frame: usize, all: &FrameMaps, moving: &FrameMaps) -> Result<()> {
-        for (name, what, maps) in [("range_doppler.png", "", all), ("range_doppler_moving.png", ", static removed", moving)] {
-            let title = format!("Range-Doppler, held-out frame {frame}{what}");
-            pictures::comparison(&self.folder.join(name), &title, &maps.measured, &maps.simulated, window(&maps.measured))?;
-        }
-        Ok(())
     }
 
     /// Time-Doppler needs all frames at once; a long recording shows its first minute or so.
@@ -100,7 +95,7 @@ impl RunReport<'_> {
         let map = |signal: Vec<Complex32>| {
             let dims = [frames, tx, rx, loops, samples];
             let moving = remove_static(Samples::new(&signal, dims), StaticRemoval::Loops);
-            analysis.time_doppler(Samples::new(&moving, dims), &Gate::default())
+            analysis.spectrogram(Samples::new(&moving, dims), &Gate::default())
         };
         let measured =
             map(shown().map(|frame| measured_frame(&recording.recording, frame)).collect::<Result<Vec<_>>>()?.concat());
@@ -160,31 +155,71 @@ impl RunReport<'_> {
         Ok(())
     }
 
+    /// The same twice: for a terminal, and for a browser.
     fn write_report(&self, evaluations: &[(PathBuf, Evaluation)], held_out: bool) -> Result<()> {
         let history = &self.progress.history;
         let (first, best) = (&history[0], &history[self.progress.best_epoch]);
         let unit = self.config.training.loss.scale.unit();
-        let mut text = format!(
-            "# Training run\n\n{} epochs; the best was epoch {}: loss {:.2} after {:.2} {unit} in the first{}.\n\n",
+        let lead = format!(
+            "{} epochs; the best was epoch {}: loss {:.2} after {:.2} {unit} in the first{}.",
             self.progress.epochs_done,
             best.epoch + 1,
             best.score(),
             first.score(),
             if held_out { ", on held-out frames" } else { " (no frames were held out)" }
         );
+        let which = if held_out { "held-out" } else { "training" };
+        let mut text = format!("# Training run\n\n{lead}\n\n");
         for pose in self.refined {
             writeln!(text, "{} (`pose.toml`).\n", pose.line()).expect("text grows");
         }
         for (folder, evaluation) in evaluations {
-            let which = if held_out { "held-out" } else { "training" };
             writeln!(text, "`{}`, {which} frames:\n\n```\n{}```\n", folder.display(), scores::of_frames(evaluation))
                 .expect("text grows");
         }
-        text.push_str("![loss](loss.png)\n![range-Doppler](range_doppler.png)\n");
-        text.push_str("![range-Doppler, static removed](range_doppler_moving.png)\n![time-Doppler](time_doppler.png)\n\n");
+        let pictures = PICTURES.map(|(name, says)| (self.folder.join(name), name, says));
+        let pictures: Vec<_> = pictures.iter().filter(|(file, ..)| file.is_file()).collect();
+        for (_, name, says) in &pictures {
+            writeln!(text, "![{says}]({name})").expect("text grows");
+        }
         text.push_str(
-            "Settings: `config.toml`. Numbers: `metrics.json`. Time and command: `run.json`. Weights: `best/`, `last/`.\n",
+            "\nSettings: `config.toml`. Numbers: `metrics.json`. Time and command: `run.json`. Weights: `best/`, `last/`.\n",
         );
-        atomic::write_text(self.folder.join("report.md"), &shown(&text))
+        atomic::write_text(self.folder.join("report.md"), &shown(&text))?;
+
+        let drawn = pictures.iter().map(|(file, _, says)| picture(file, says)).collect::<Result<Vec<_>>>()?;
+        let content = html! {
+            h1 { "Training run" }
+            p.lead { (lead) }
+            @for pose in self.refined { p { (page::shown(&pose.line())) " (" code { "pose.toml" } ")." } }
+            @for (folder, evaluation) in evaluations {
+                h2 { (page::shown(&folder.display().to_string())) ", " (which) " frames" }
+                (scores::page_of_frames(evaluation))
+            }
+            @for picture in &drawn { p { (picture) } }
+            p.small {
+                "Settings: " code { "config.toml" } ". Numbers: " code { "metrics.json" } ". Time and command: " code { "run.json" }
+                ". Weights: " code { "best/" } ", " code { "last/" } "."
+            }
+        };
+        atomic::write_text(self.folder.join("report.html"), &page::page("Training run", &content))
     }
+}
+
+/// The pictures of a run, those that are there, and what they show.
+const PICTURES: [(&str, &str); 4] = [
+    ("loss.png", "loss"),
+    ("range_doppler.png", "range-Doppler"),
+    ("range_doppler_moving.png", "range-Doppler, static removed"),
+    ("time_doppler.png", "time-Doppler"),
+];
+
+/// `range_doppler.png` and `range_doppler_moving.png` of one frame: measured, simulated, and their difference.
+pub(crate) fn draw_frame(folder: &Path, which: &str, all: &FrameMaps, moving: &FrameMaps) -> Result<[PathBuf; 2]> {
+    let draw = |name: &str, what: &str, maps: &FrameMaps| {
+        let (file, title) = (folder.join(name), format!("Range-Doppler, {which}{what}"));
+        pictures::comparison(&file, &title, &maps.measured, &maps.simulated, window(&maps.measured))?;
+        Ok(file)
+    };
+    Ok([draw("range_doppler.png", "", all)?, draw("range_doppler_moving.png", ", static removed", moving)?])
 }

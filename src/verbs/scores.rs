@@ -7,6 +7,7 @@ use serde_json::json;
 use crate::{
     evaluation::{Evaluation, ScoreSummary, SequenceSummary, over_sequences},
     lpips::Network,
+    pictures::page::{Markup, html, table as page_table},
 };
 
 /// One recording's scores.
@@ -25,6 +26,33 @@ pub fn of_sequences(found: &SequenceSummary) -> String {
         _ => format!("{sequences} sequences, {frames} frames, mean ± half of its 95 % interval over sequences (Student's t)"),
     };
     table(&title, [&found.global, &found.moving, &found.person], found.lpips)
+}
+
+/// One recording's scores, for a page.
+pub fn page_of_frames(found: &Evaluation) -> Markup {
+    let regions = [("all cells", &found.global), ("static removed", &found.moving), ("person's cells", &found.person)];
+    let rows: Vec<Vec<Markup>> = regions
+        .into_iter()
+        .map(|(name, scores)| {
+            let numbers = match scores {
+                Some(ScoreSummary { psnr_db, ssim, mean_absolute_error_db, lpips }) => [
+                    format!("{psnr_db:.2}"),
+                    format!("{ssim:.3}"),
+                    format!("{mean_absolute_error_db:.2}"),
+                    lpips.map_or("–".into(), |lpips| format!("{lpips:.3}")),
+                ],
+                None => ["not available".to_string(), "–".into(), "–".into(), "–".into()],
+            };
+            std::iter::once(html! { (name) }).chain(numbers.map(|text| html! { (text) })).collect()
+        })
+        .collect();
+    html! {
+        p {
+            (found.frames) " frames, decibels from " (format!("{:.0}", found.span_db))
+            " dB below the strongest cell, mean ± standard deviation over frames."
+        }
+        (page_table(&["", "PSNR, dB", "SSIM", "mean error, dB", "LPIPS"], &rows))
+    }
 }
 
 fn table(title: &str, regions: [&Option<ScoreSummary>; 3], network: Option<Network>) -> String {

@@ -30,8 +30,8 @@ pub struct Trained {
     pub evaluations: Vec<(PathBuf, Evaluation)>,
 }
 
-/// Trains, and leaves a run folder: config.toml (resolved), metrics.json, pictures, report.md, and the checkpoints `best` and
-/// `last`.
+/// Trains, and leaves a run folder: config.toml (resolved), metrics.json, pictures, report.html, report.md, and the checkpoints
+/// `best` and `last`.
 ///
 /// # Errors
 /// A config, recordings or checkpoints that cannot be used; a run folder that holds a run, or that cannot be written.
