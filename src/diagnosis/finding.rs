@@ -193,7 +193,8 @@ impl Candidate {
         Self { id: None, look_alikes: vec![], statement, ..self }
     }
 
-    /// As the simulator takes it; `None` for what has no name, and for what its operator does not take.
+    /// As the simulator takes it; `None` for what has no name, and for what its operator does not take: a value beyond its bounds is
+    /// not moved to them.
     ///
     /// `reference`: the recording's peak sample, to which levels are relative; `body_rms`: of the body's moving return, to which
     /// amplitudes of reflectors are.
@@ -210,11 +211,10 @@ impl Candidate {
                 "recording's unit·m²" => 1.0 / (body_rms * self.range_m(radar)?.powi(2)).max(f64::MIN_POSITIVE),
                 _ => 1.0,
             };
-            let within = |value: &f64| {
-                let value = value / unit;
-                if parameter.is_relative() { value } else { value.clamp(parameter.least, parameter.most) }
-            };
-            let mut values: Vec<f64> = estimate.values.iter().map(within).collect();
+            let mut values: Vec<f64> = estimate.values.iter().map(|value| value / unit).collect();
+            if !parameter.is_relative() && values.iter().any(|value| !(parameter.least..=parameter.most).contains(value)) {
+                return None;
+            }
             if info.id == "antenna_position" {
                 // Found of the receivers along x; the operator moves all antennas along all axes.
                 let receivers = values.iter().flat_map(|&x| [x, 0.0, 0.0]);
@@ -276,10 +276,9 @@ pub(crate) fn nameless(behaves_like: &'static str) -> Candidate {
 mod tests {
     use super::*;
 
-    #[test]
-    fn what_may_be_of_no_size_has_no_name() {
-        let of = |estimates: Vec<Estimate>| Candidate {
-            id: Some("dc_offset"),
+    fn candidate(id: &'static str, estimates: Vec<Estimate>) -> Candidate {
+        Candidate {
+            id: Some(id),
             behaves_like: "additive fast-time",
             estimates,
             choice: None,
@@ -292,7 +291,23 @@ mod tests {
             curve: None,
             energy: 1.0,
             correction: Correction::None,
+        }
+    }
+
+    #[test]
+    fn a_value_beyond_its_operators_bounds_is_not_moved_to_them() {
+        let most = effects::info("clock_drift").unwrap().parameters[0].most;
+        let setting = |value: f64| {
+            let found = candidate("clock_drift", vec![Estimate::normal("relative", value, 1e-3)]);
+            found.setting(1.0, 1.0, &Radar::small(4)).map(|setting| setting.parameters["relative"].clone())
         };
+        assert_eq!(setting(0.5 * most), Some(vec![0.5 * most]));
+        assert_eq!(setting(1.5 * most), None);
+    }
+
+    #[test]
+    fn what_may_be_of_no_size_has_no_name() {
+        let of = |estimates: Vec<Estimate>| candidate("dc_offset", estimates);
         let i = |value: f64| Estimate::list("i", &[value, 0.1], &[1.0, 1.0]);
         let unsure = of(vec![i(0.5), Estimate::normal("q", -0.2, 1.0)]).named_if_sure();
         assert!(unsure.id.is_none() && unsure.look_alikes.is_empty() && unsure.statement.len() > 20);
