@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use super::rules::MASKED_DB;
-use super::surviving::{self, Draw};
+use super::surviving::{self, Draw, Frames};
 use crate::data::IfFrame;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::statistics::exponential_scale;
@@ -53,14 +53,6 @@ fn samples(frame: &IfFrame) -> Vec<Complex64> {
     frame.complex().map(|value| Complex64::new(value.re.into(), value.im.into())).collect()
 }
 
-/// Samples of a recording.
-pub struct Frames {
-    /// Channels, loops, samples.
-    pub dims: [usize; 3],
-    /// `[frame][channel · loop · sample]`
-    pub values: Vec<Vec<Complex64>>,
-}
-
 /// A scene under several draws of the mesh's error and the noise, with one receiver.
 pub struct Draws {
     /// `[draw][frame]`
@@ -68,12 +60,6 @@ pub struct Draws {
     /// Without the person.
     pub empty: Vec<Vec<IfFrame>>,
     pub gain: f64,
-}
-
-impl Frames {
-    pub fn count(&self) -> usize {
-        self.values.len()
-    }
 }
 
 /// `clean` and `planted`: the same scene, noise included, without and with the effect; all but what survives is of the

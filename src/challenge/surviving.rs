@@ -18,7 +18,6 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::measure::Frames;
 use crate::diagnosis::evidence::{spectrum, transform};
 
 /// A return reaches two cells to either side: half the main lobe of a Hann window.
@@ -31,6 +30,20 @@ const ABOVE_ROOM: f64 = 4.0;
 const BLOCK: [usize; 2] = [8, 16];
 /// Standard deviations below its estimate at which a number is sure, to 95 %.
 const SURE: f64 = 1.645;
+
+/// Samples of a recording.
+pub struct Frames {
+    /// Channels, loops, samples.
+    pub dims: [usize; 3],
+    /// `[frame][channel · loop · sample]`
+    pub values: Vec<Vec<Complex64>>,
+}
+
+impl Frames {
+    pub fn count(&self) -> usize {
+        self.values.len()
+    }
+}
 
 /// One draw of the mesh's error, the skin and the noise.
 pub struct Draw {

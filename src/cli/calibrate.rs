@@ -6,9 +6,8 @@ use clap::Args;
 
 use super::{
     Common,
-    challenge::{How, claimed},
+    cases::{How, WITHOUT, claimed},
     progress::Progress,
-    salt::WITHOUT,
 };
 use crate::{
     challenge::{

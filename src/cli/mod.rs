@@ -16,6 +16,7 @@ macro_rules! remark {
 mod align;
 mod baseline;
 mod calibrate;
+mod cases;
 mod catalogue;
 mod challenge;
 mod check;

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{
     Common,
-    challenge::{How, claimed},
+    cases::{How, WITHOUT, claimed},
     progress::Progress,
 };
 use crate::{
@@ -37,9 +37,6 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     how: How,
 }
-
-/// What a diagnosis does that says nothing of what is planted.
-pub(super) const WITHOUT: [&str; 2] = ["diagnosis.epochs=0", "diagnosis.limits=false"];
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let (out, how) = (&arguments.out, arguments.how.config_without(&WITHOUT, common)?);

@@ -5,11 +5,10 @@
 //! the temporary, never a half-written target, and whoever starts next removes it (`leftovers`).
 
 mod folder;
-pub(crate) mod leftovers;
 mod sync;
 
+pub use super::leftovers::{sweep, sweep_all};
 pub use folder::{AtomicFolder, recover};
-pub use leftovers::{sweep, sweep_all};
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -17,9 +16,9 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
+use super::leftovers::{PARTIAL, locked, parent_of, prefix, remove_beside};
 use super::unfinished::{Undo, publish};
 use crate::error::{Error, Result};
-use leftovers::{PARTIAL, locked, parent_of, prefix, remove_beside};
 
 /// A file that appears under its name when `finish` is called, and not at all otherwise.
 pub struct AtomicFile {

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::Shard;
-use super::atomic::leftovers::{is_linked, lock_name, parent_of};
 use super::files;
+use super::leftovers::{is_linked, lock_name, parent_of};
 use super::unfinished::Undo;
 use crate::error::{Error, Result};
 

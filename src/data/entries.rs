@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use crate::data::files;
-use crate::data::recording::SETTINGS_FILE;
 use crate::error::{Error, Result};
+
+/// The settings of a recording, by which a folder is one.
+pub const SETTINGS_FILE: &str = "recording.toml";
 
 /// Whether a name begins with a dot. Such names are no data anywhere: temporaries of writers that were killed have them,
 /// and so have the files that systems leave in every folder.

@@ -10,6 +10,7 @@ mod claim;
 pub mod entries;
 pub mod files;
 mod hex;
+pub(crate) mod leftovers;
 pub mod meshes;
 pub mod motions;
 pub mod program;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tempfile::TempDir;
 
-use super::atomic::leftovers::{locked, orphaned};
+use super::leftovers::{locked, orphaned};
 use super::unfinished::Undo;
 use crate::error::{Error, Result};
 

@@ -18,12 +18,14 @@ mod mmwave_json;
 mod npz;
 pub mod points;
 mod rover;
+mod shards;
 mod sink;
 pub mod split;
 mod wiring;
 
 pub use config::ExportConfig;
-pub use dataset::{Dataset, write_dataset};
+pub use dataset::Dataset;
+pub use shards::write_dataset;
 
 use std::path::Path;
 use std::str::FromStr;

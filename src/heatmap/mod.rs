@@ -11,6 +11,7 @@
 mod angle;
 mod axes;
 pub(crate) mod dft;
+mod gate;
 mod host;
 mod map;
 mod over_time;
@@ -20,9 +21,9 @@ mod windows;
 pub use angle::Scan;
 pub use axes::{doppler_turns_per_loop, range_axis, range_bins, velocity_axis};
 pub use dft::{RangeDoppler, power_db, remove_loop_mean, time_doppler};
+pub use gate::Gate;
 pub use host::{Analysis, Samples, StaticRemoval, remove_static};
 pub use map::{Axis, Map};
-pub use over_time::Gate;
 pub use windows::Window;
 
 use serde::{Deserialize, Serialize};

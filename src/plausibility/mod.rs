@@ -8,6 +8,7 @@
 
 mod antennas;
 mod body;
+mod code_facts;
 mod codes;
 mod facts;
 mod motion;
@@ -20,7 +21,7 @@ mod test_support;
 
 use std::path::PathBuf;
 
-pub use codes::CodeFacts;
+pub use code_facts::CodeFacts;
 pub use facts::{BodyFacts, Course, Facts, Look, RootPath};
 
 use crate::error::{Error, Result};

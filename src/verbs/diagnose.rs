@@ -86,7 +86,8 @@ fn simulate(
     let left_out = diagnosis.report.effects.iter().map(|effect| effect.id.as_str());
     let left_out: Vec<&str> = left_out.filter(|id| effects.iter().all(|setting| setting.id != *id)).collect();
     if !left_out.is_empty() {
-        let note = format!("the simulator was trained without {}: its operator does not take what was found", left_out.join(", "));
+        let note =
+            format!("the simulator was trained without {}: its operator does not take what was found", left_out.join(", "));
         diagnosis.report.notes.push(note);
     }
     let simulated = before_and_after(what.recording, &effects, &start, &keep, line)?;

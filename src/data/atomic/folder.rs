@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use super::leftovers::{OLD, PARTIAL, READY, locked, parent_of, prefix, remove_beside, siblings, sweep};
 use super::sync::{sync_folder, sync_tree};
 use super::with_mode;
 use crate::data::claim::Claim;
 use crate::data::entries::is_hidden;
+use crate::data::leftovers::{OLD, PARTIAL, READY, locked, move_out, named, parent_of, prefix, remove_beside, siblings, sweep};
 use crate::data::unfinished::{Undo, publish};
 use crate::error::{Error, Result};
 
@@ -141,10 +141,6 @@ fn resolved(target: &Path) -> Result<PathBuf> {
     })
 }
 
-fn named(target: &Path) -> io::Result<&std::ffi::OsStr> {
-    target.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "the path has no name at its end"))
-}
-
 fn replace(folder: &Path, target: &Path) -> io::Result<()> {
     let old = take_away(target)?;
     if let Err(source) = fs::rename(folder, target) {
@@ -175,16 +171,6 @@ fn fill(folder: &Path, target: &Path) -> io::Result<()> {
     let ready = target.join(name.replacen(PARTIAL, READY, 1));
     fs::rename(folder, &ready)?;
     move_out(&ready)
-}
-
-/// Moves the entries of a folder into the one around it: settings last, for a folder without them is no recording.
-pub(super) fn move_out(ready: &Path) -> io::Result<()> {
-    let mut entries = fs::read_dir(ready)?.map(|entry| entry.map(|entry| entry.path())).collect::<io::Result<Vec<_>>>()?;
-    entries.sort_by_key(|path| (path.extension().is_some_and(|extension| extension == "toml"), path.clone()));
-    for entry in entries {
-        fs::rename(&entry, parent_of(ready).join(named(&entry)?))?;
-    }
-    fs::remove_dir(ready)
 }
 
 /// Brings back a folder whose replacement was killed between the two renames; call it before reading one that

@@ -1,8 +1,8 @@
 use std::fs::File;
 use std::time::{Duration, SystemTime};
 
-use super::leftovers::siblings;
 use super::*;
+use crate::data::leftovers::siblings;
 use crate::data::test_support::names;
 
 #[test]

@@ -23,15 +23,13 @@ use samples::IfFile;
 
 use crate::data::arrays::{Array, read_npy};
 use crate::data::bodies::read_body;
+pub use crate::data::entries::SETTINGS_FILE;
 use crate::data::meshes::{read_triangles, read_vertices};
 use crate::data::motions::read_motion;
 use crate::error::{Error, Result};
 use crate::person::{Person, Placement};
 use crate::radar::Radar;
 use crate::room::Room;
-
-/// The name of a recording's settings inside its folder.
-pub const SETTINGS_FILE: &str = "recording.toml";
 
 /// An open recording. Its samples stay on the disk until a frame is asked for.
 #[derive(Debug)]

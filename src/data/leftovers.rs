@@ -140,7 +140,7 @@ fn sweep_entry(entry: &fs::DirEntry) {
         remove(&path);
     } else if name.starts_with(READY) {
         if let Some(_lock) = orphaned(&path) {
-            let _ = super::folder::move_out(&path);
+            let _ = move_out(&path);
         }
     } else if let Some(end) = name.find(OLD) {
         // Without a newer one it is the only one: `recover` brings it back.
@@ -148,4 +148,19 @@ fn sweep_entry(entry: &fs::DirEntry) {
             let _ = fs::remove_dir_all(&path);
         }
     }
+}
+
+/// Moves the entries of a folder into the one around it: settings last, for a folder without them is no recording.
+pub(super) fn move_out(ready: &Path) -> io::Result<()> {
+    let mut entries = fs::read_dir(ready)?.map(|entry| entry.map(|entry| entry.path())).collect::<io::Result<Vec<_>>>()?;
+    entries.sort_by_key(|path| (path.extension().is_some_and(|extension| extension == "toml"), path.clone()));
+    for entry in entries {
+        fs::rename(&entry, parent_of(ready).join(named(&entry)?))?;
+    }
+    fs::remove_dir(ready)
+}
+
+/// The last part of a path.
+pub(super) fn named(target: &Path) -> io::Result<&std::ffi::OsStr> {
+    target.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "the path has no name at its end"))
 }
