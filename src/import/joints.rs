@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use serde::Deserialize;
 
-use super::{bvh::Bvh, retarget::BvhConfig};
+use super::{bvh::Bvh, bvh_config::BvhConfig};
 use crate::error::{Error, Result};
 use crate::person::JOINT_NAMES;
 

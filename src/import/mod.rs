@@ -1,13 +1,15 @@
 //! Motions and captures of other programs, turned into what the simulator knows.
 
 pub mod bvh;
+mod bvh_config;
 pub mod capture;
 mod joints;
 mod neutral;
 pub mod retarget;
 
 pub use bvh::Bvh;
-pub use retarget::{BvhConfig, read_bvh_motion, retarget};
+pub use bvh_config::BvhConfig;
+pub use retarget::{read_bvh_motion, retarget};
 
 pub use crate::data::UpAxis;
 

@@ -3,10 +3,11 @@
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, UnitSphere};
 
-use super::effects::Physiology;
+use super::mesh::vertex_normals;
+use super::physiology::Physiology;
 use super::skinning::Skinning;
 use super::timeline::{Interpolation, Timeline, Weights};
-use super::vector::{Vector, add, add_scaled, cross, dot, rotate, subtract, unit};
+use super::vector::{Vector, add, add_scaled, dot, rotate};
 use crate::error::Result;
 use crate::person::{Motion, Person, Placement};
 
@@ -83,19 +84,6 @@ impl MovingBody {
         self.physiology.apply(&mut vertices, &self.faces, self.timeline.time_s(pose));
         vertices
     }
-}
-
-/// Unit normals `[vertex, xyz]`, area-weighted; outward where the faces are counter-clockwise seen from outside.
-pub fn vertex_normals(vertices: &[Vector], faces: &[[usize; 3]]) -> Vec<Vector> {
-    let mut normals = vec![[0.0; 3]; vertices.len()];
-    for face in faces {
-        let [a, b, c] = face.map(|vertex| vertices[vertex]);
-        let doubled_area = cross(subtract(b, a), subtract(c, a));
-        for &vertex in face {
-            normals[vertex] = add(normals[vertex], doubled_area);
-        }
-    }
-    normals.into_iter().map(unit).collect()
 }
 
 /// A random field `[point]` of about unit variance that varies over `correlation_m`: a sum of random waves.

@@ -32,6 +32,15 @@ pub struct Line {
     pub bend_rad: f64,
 }
 
+/// The radar with `guard` more samples before and after its window.
+pub fn widened(radar: &Radar, guard: usize) -> Radar {
+    Radar {
+        samples_per_chirp: radar.samples_per_chirp + 2 * guard,
+        adc_start_s: radar.adc_start_s - guard as f64 / radar.sample_rate_hz,
+        ..radar.clone()
+    }
+}
+
 impl Chirp {
     pub fn new(radar: &Radar) -> Self {
         let middle_s = radar.sample_time_s(radar.samples_per_chirp / 2);

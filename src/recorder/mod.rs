@@ -17,18 +17,24 @@
 
 pub mod amplitude;
 pub mod body;
+mod checks;
 pub mod chirp;
 pub mod config;
+mod effect_settings;
 pub mod effects;
+mod effects_config;
 mod lanes;
 pub mod material;
+mod mesh;
 pub mod mirror;
 mod paths;
+mod physiology;
 pub mod range_grid;
 pub mod receiver;
 mod record;
 pub mod scatter;
 pub mod skinning;
+mod streams;
 pub mod surface;
 mod surroundings;
 pub mod timeline;
@@ -45,7 +51,7 @@ mod laws;
 pub(crate) mod test_support;
 
 pub use config::{ActorConfig, RadarChoice, RecorderConfig};
-pub use effects::EffectsConfig;
+pub use effects_config::EffectsConfig;
 pub use material::Material;
 pub use receiver::{Level, ReceiverConfig};
 pub use record::{Recorder, record};

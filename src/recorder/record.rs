@@ -3,10 +3,11 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::chirp::{Chirp, widened};
 use super::effects::{Chain, EffectsConfig, Mover, Signal, Stage, Stages, codes, movers, shape_noise, twice_bounced, vibration};
 use super::paths::{Paths, body_scatter};
 use super::receiver::{Level, Receiver, noise_for_snr, rail, random_phase};
-use super::scatter::{Scatter, widened};
+use super::scatter::Scatter;
 use super::world::{Draw, World};
 use crate::data::{IfFrame, IfLayout};
 use crate::error::Result;
@@ -118,7 +119,7 @@ impl Recorder {
         let (frame, loops) = (body.frame, body.loops);
         let mut signal = self.all_paths(body)?;
         let antennas = vibration(&self.world);
-        let chirp = super::chirp::Chirp::new(&self.stages.wide);
+        let chirp = Chirp::new(&self.stages.wide);
         let stage = Stage {
             radar: &self.stages.radar,
             chirp: &chirp,

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::amplitude::{Laws, View};
 use super::body::MovingBody;
-use super::chirp::Chirp;
+use super::chirp::{Chirp, widened};
 use super::effects::{Clock, SinusoidalMotion};
 use super::lanes::{BLOCK, ChirpWeights, Lanes, NODES, NodeShares};
 use super::mirror::Mirror;
@@ -65,15 +65,6 @@ struct Moment {
     chirp: usize,
     time_s: f64,
     ramp_s: f64,
-}
-
-/// The radar with `guard` more samples before and after its window.
-pub fn widened(radar: &Radar, guard: usize) -> Radar {
-    Radar {
-        samples_per_chirp: radar.samples_per_chirp + 2 * guard,
-        adc_start_s: radar.adc_start_s - guard as f64 / radar.sample_rate_hz,
-        ..radar.clone()
-    }
 }
 
 impl Scatter {

@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
+use super::mesh::vertex_normals;
 use super::vector::{Vector, add_scaled, combine, cross, distance, dot, length, scale, subtract, unit};
 use crate::error::{Error, Result};
 
@@ -178,7 +179,7 @@ pub struct Patch {
 
 impl Pose {
     pub fn new(vertices: Vec<Vector>, faces: &[[usize; 3]], smoothing: f64) -> Self {
-        let normals = (smoothing > 0.0).then(|| super::body::vertex_normals(&vertices, faces));
+        let normals = (smoothing > 0.0).then(|| vertex_normals(&vertices, faces));
         Self { vertices, normals }
     }
 

@@ -4,13 +4,13 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::effects::{self, EffectsConfig};
+use super::effects_config::EffectsConfig;
 use super::material::Material;
 use super::receiver::ReceiverConfig;
+use super::streams::is_noise;
 use super::surface::SurfaceConfig;
 use super::timeline::Interpolation;
-use crate::bounds;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::person::Person;
 use crate::radar::Radar;
 use crate::room::{Boundary, Room};
@@ -165,7 +165,7 @@ impl World {
         };
         let again = match draw {
             Draw::Noise { .. } => true,
-            Draw::Effect { id, .. } => effects::is_noise(id),
+            Draw::Effect { id, .. } => is_noise(id),
             _ => false,
         };
         let redraw = match draw {
@@ -184,45 +184,9 @@ impl World {
         self.random(Draw::Effect { id, frame: (1 << 30) + index }).random_range(0.0..std::f64::consts::TAU)
     }
 
-    pub fn check(&self) -> Result<()> {
+    /// Refuses a radar that cannot be recorded with.
+    pub fn check_radar(&self) -> Result<()> {
         self.radar.check("radar")?;
-        self.radar.refuse_falling("radar", "the recorder makes no falling ones")?;
-        self.room.check("room")?;
-        self.person.as_ref().map_or(Ok(()), Person::check)?;
-        self.surface.check("surface")?;
-        self.receiver.check("receiver")?;
-        self.effects.check(self, "effects")?;
-        if self.walls.images > 2 {
-            return Err(Error::setting("walls.images", self.walls.images, "0, 1 or 2"));
-        }
-        for (key, value, least) in [
-            ("walls.patch_m", self.walls.patch_m, 1.0e-3),
-            ("walls.open_m", self.walls.open_m, 1.0e-3),
-            ("walls.clutter_gamma", self.walls.clutter_gamma, 0.0),
-            ("mesh_error_m", self.mesh_error_m, 0.0),
-            ("antenna_exponent", self.antenna_exponent, 0.0),
-        ] {
-            if !(value.is_finite() && value >= least) {
-                return Err(Error::setting(key, value, format!("a number of at least {least}")));
-            }
-        }
-        let (low, high) = self.room.extent_m(self.walls.open_m);
-        let along = |axis: usize| ((high[axis] - low[axis]) / self.walls.patch_m).ceil() as usize;
-        let largest = [along(0), along(1), along(2)].into_iter().max().unwrap_or(0);
-        bounds::numbers("walls.patch_m", "patches of six walls along their longest side", &[6, largest, largest])?;
-        for wall in &self.walls.image_walls {
-            if self.room.distance_m(*wall).is_none() {
-                return Err(Error::setting("walls.image_walls", wall.name(), "a boundary that the room has")
-                    .with_hint(format!("give room.{}_m", wall.name())));
-            }
-        }
-        if let Some(bad) = self
-            .furniture
-            .iter()
-            .find(|thing| !(thing.rcs_m2.is_finite() && thing.rcs_m2 >= 0.0 && thing.position_m.iter().all(|x| x.is_finite())))
-        {
-            return Err(Error::setting("furniture", format!("{bad:?}"), "a finite position and a cross-section of at least 0"));
-        }
-        Ok(())
+        self.radar.refuse_falling("radar", "the recorder makes no falling ones")
     }
 }

@@ -9,7 +9,9 @@
 
 mod config;
 mod equations;
+mod groups;
 mod parts;
+mod point_tensors;
 mod points;
 mod scattering;
 mod scene;

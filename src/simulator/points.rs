@@ -4,7 +4,7 @@ use burn::tensor::{DType, Device, Tensor};
 
 use super::{
     FrameView, Scene, Simulator,
-    scattering::{Group, Kind},
+    groups::{Group, Kind},
 };
 use crate::{
     body::{Displacement, PosedBody},

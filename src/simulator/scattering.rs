@@ -1,11 +1,12 @@
 //! From decoded surfaces to the signals of direct and indirect paths.
 
-use burn::tensor::{DType, Device, Tensor};
+use burn::tensor::{Device, Tensor};
 
 use super::{
     Amplitudes, FrameView, Gains, PathModel, Scene, Seen, Simulator, Surface, Surfaces, Weights,
+    groups::{Group, Kind, Scattering, Visible},
+    point_tensors::rows,
     sight::{Attitude, Sight},
-    surfaces::{column, rows},
 };
 use crate::{
     body::{Displacement, PosedFrame},
@@ -19,42 +20,6 @@ use crate::{
         tangent::Frame,
     },
 };
-
-/// Scatterers of body or room that a viewpoint sees.
-pub(super) struct Visible<'a> {
-    pub scene: &'a Scene,
-    pub view: &'a FrameView,
-    /// The body's frame on the device; absent for a room, and where the host poses the body.
-    pub posed: Option<&'a PosedFrame<'a>>,
-    pub kind: Kind,
-    pub points: &'a [usize],
-    pub reference_m: Vec<[f64; 3]>,
-}
-
-/// Scatterers that move together, with what they return.
-pub(super) struct Group<'a> {
-    pub visible: Visible<'a>,
-    pub scattering: Scattering,
-    /// Decoded, of the visible points.
-    surface: Surface,
-    /// What amplitudes are multiplied by, `[point, 1]`; none: nothing.
-    weight: Option<Tensor<2>>,
-}
-
-/// What scatterers are taken for.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Scattering {
-    /// L_p
-    Microfacets,
-    /// SH_{p,k}, from the patches' offset positions.
-    Patches,
-}
-
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Kind {
-    Body,
-    Room,
-}
 
 impl Simulator {
     /// Eq. 2 for all transmitters: `[tx, rx, loop, sample]`.
@@ -249,72 +214,6 @@ impl Simulator {
         match &group.weight {
             Some(weight) => amplitude * weight.clone(),
             None => amplitude,
-        }
-    }
-}
-
-impl Visible<'_> {
-    fn pick<T: Copy>(&self, of_body: impl Fn() -> Vec<T>, of_room: &[T]) -> Vec<T> {
-        match self.kind {
-            Kind::Body => of_body(),
-            Kind::Room => self.points.iter().map(|&point| of_room[point]).collect(),
-        }
-    }
-
-    pub fn normals(&self) -> Vec<[f64; 3]> {
-        self.pick(|| self.of_frame(|frame| &frame.normal), &self.scene.patches.normal)
-    }
-
-    /// `[point, 1]`, m².
-    fn area_tensor(&self, device: &Device) -> Tensor<2> {
-        match self.posed {
-            Some(posed) => posed.areas_m2(self.points),
-            None => {
-                let areas_m2 = self.pick(|| self.of_frame(|frame| &frame.area_m2), &self.scene.patches.area_m2);
-                column(areas_m2.into_iter(), device)
-            }
-        }
-    }
-
-    /// Tangents that turn with the body; a room needs none.
-    pub fn tangents(&self) -> Option<Vec<[f64; 3]>> {
-        (self.kind == Kind::Body).then(|| self.points.iter().map(|&point| self.view.tangent[point]).collect())
-    }
-
-    fn of_frame<T: Copy>(&self, values: impl Fn(&crate::body::BodyFrame) -> &Vec<T>) -> Vec<T> {
-        let values = values(self.view.body.as_ref().expect("a body's group"));
-        self.points.iter().map(|&point| values[point]).collect()
-    }
-}
-
-impl Group<'_> {
-    /// How the points move around their references in the chirps of a transmitter.
-    pub fn displacement(&self, tx: usize, device: &Device) -> Displacement {
-        let Visible { scene, view, kind, points, .. } = &self.visible;
-        let loops = scene.radar.loops_per_frame;
-        let offset_m = (self.scattering == Scattering::Patches).then(|| self.surface.patch.offset_m.clone());
-        if let Some(posed) = self.visible.posed {
-            return posed.displacement(points, tx * loops..(tx + 1) * loops, offset_m);
-        }
-        match (kind, &scene.body, &view.body, offset_m) {
-            (Kind::Body, Some(body), Some(frame), offset_m) => {
-                body.displacement(frame, points, tx * loops..(tx + 1) * loops, offset_m, device)
-            }
-            (_, _, _, Some(offset_m)) => {
-                let along = |axis: usize| offset_m.clone().narrow(1, axis, 1);
-                Displacement { x: along(0), y: along(1), z: along(2) }
-            }
-            (_, _, _, None) => Displacement::still(points.len(), device, DType::F32),
-        }
-    }
-
-    fn amplitude(&self, amplitude: Tensor<2>, displacement: &Displacement, tx: usize) -> Amplitude {
-        let Visible { scene, view, posed, kind, points, reference_m } = &self.visible;
-        match (kind, &view.body) {
-            (Kind::Body, Some(frame)) => {
-                scene.body_amplitude((frame, *posed), points, (reference_m, displacement), tx, amplitude)
-            }
-            _ => Amplitude::real(amplitude),
         }
     }
 }

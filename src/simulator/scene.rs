@@ -9,7 +9,7 @@ use burn::tensor::{DType, Device, Tensor};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::{SimulatorConfig, surfaces::directions};
+use super::{SimulatorConfig, point_tensors::directions};
 use crate::{
     body::{BodyFrame, Displacement, PoseCorrection, PoseTensors, PosedBody, PosedFrame, Posing, Sampling, facets},
     error::Result,

@@ -3,8 +3,8 @@
 use burn::tensor::{DType, Device, Tensor};
 
 use super::{
-    scattering::{Group, Kind, Scattering, Visible},
-    surfaces::{column, directions, towards, vectors},
+    groups::{Group, Kind, Scattering, Visible},
+    point_tensors::{column, directions, towards, vectors},
 };
 use crate::body::Displacement;
 

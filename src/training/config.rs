@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{RefineConfig, Split};
+use super::RefineConfig;
 use crate::{
     bounds,
     error::{Error, Result},
@@ -14,6 +14,19 @@ use crate::{
 
 /// Products of epochs, repeats and frames stay within 64 bits.
 const MOST_REPETITIONS: usize = 1_000_000;
+
+/// How the held-out frames are chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Split {
+    /// The last frames of every recording: nothing near them was trained on.
+    #[default]
+    Last,
+    /// Frames drawn from the whole recording.
+    Random,
+    /// Evenly spaced frames.
+    Interleaved,
+}
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

@@ -10,9 +10,9 @@ mod site;
 mod split;
 mod trainer;
 
-pub use config::TrainingConfig;
+pub use config::{Split, TrainingConfig};
 pub use metrics::EpochMetrics;
 pub use refine::{RefineConfig, RefinedPose};
 pub use site::{LoadedRecording, load_recordings, load_recordings_as_stated, refuse_ambiguous_ranges, site, site_from};
-pub use split::{FrameId, FrameSplit, Split, step_rng};
+pub use split::{FrameId, FrameSplit, step_rng};
 pub use trainer::{Event, Outcome, Trainer};

@@ -3,22 +3,11 @@
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
-use super::{LoadedRecording, TrainingConfig};
-
-/// How the held-out frames are chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Split {
-    /// The last frames of every recording: nothing near them was trained on.
-    #[default]
-    Last,
-    /// Frames drawn from the whole recording.
-    Random,
-    /// Evenly spaced frames.
-    Interleaved,
-}
+use super::{
+    LoadedRecording,
+    config::{Split, TrainingConfig},
+};
 
 /// A frame of one of several recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

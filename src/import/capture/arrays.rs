@@ -8,11 +8,10 @@ use super::boards::Board;
 use super::container;
 use super::cube::{Cube, half_scale_note};
 use super::layout::{Axis, Layout};
+use super::radar_table::{finished, radar_table, rows, table_of};
 use super::words::{Lengths, WordArray};
 use super::{Capture, Stated, coloradar};
 use crate::data::entries::entries;
-use crate::data::read_toml;
-use crate::data::settings::{apply_sets, settings_from_table};
 use crate::error::{Error, Result};
 use crate::radar::Radar;
 
@@ -124,41 +123,6 @@ fn numbered(name: &str) -> Vec<(String, u64)> {
         in_number = letter.is_ascii_digit();
     }
     parts
-}
-
-/// Settings of a file and `--set`s over them.
-pub fn table_of(config: Option<&Path>, sets: &[String]) -> Result<Table> {
-    let mut table: Table = config.map(read_toml).transpose()?.unwrap_or_default();
-    table.retain(|key, _| key == "radar");
-    apply_sets(&mut table, sets)?;
-    Ok(table)
-}
-
-/// The table `radar` in others.
-pub fn radar_table(table: &mut Table) -> Result<&mut Table> {
-    let radar = table.entry("radar").or_insert_with(|| Value::Table(Table::new()));
-    radar.as_table_mut().ok_or_else(|| Error::setting("radar", "no table", "a table of the radar's settings"))
-}
-
-/// Places as a setting.
-pub fn rows(places: Vec<[f64; 3]>) -> Value {
-    Value::Array(places.into_iter().map(|place| Value::Array(place.map(Value::Float).to_vec())).collect())
-}
-
-/// The radar of a table that says all but perhaps when the ADC starts.
-pub fn finished(mut table: Table, name: &Path, notes: &mut Vec<String>) -> Result<Radar> {
-    #[derive(serde::Deserialize)]
-    struct Whole {
-        radar: Radar,
-    }
-    let radar = radar_table(&mut table)?;
-    if !radar.contains_key("adc_start_s") {
-        radar.insert("adc_start_s".into(), Value::Float(0.0));
-        notes.push("adc_start_s is not stated: the first sample is taken to be at the start of the ramp".into());
-    }
-    let whole: Whole = settings_from_table(table, name, &[])?;
-    whole.radar.check("radar")?;
-    Ok(whole.radar)
 }
 
 /// What is stated of the radar, before the array fills what is left open.

@@ -14,10 +14,11 @@ use toml::Value;
 
 use super::boards::{Board, CASCADE};
 use super::cascade_index::{Index, hold_together};
+use super::descriptions::descriptions;
 use super::schedule::Selection;
 use super::stream::Words;
 use super::ti_json::{CASCADED, RECEIVERS};
-use super::{Capture, Stated, arrays, dca1000, ti_json};
+use super::{Capture, Stated, radar_table, ti_json};
 use crate::data::entries::entries;
 use crate::data::{IfFrame, IfLayout};
 use crate::error::{Error, Result};
@@ -50,7 +51,7 @@ pub fn is_folder(folder: &Path) -> bool {
 pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     let parts = parts(sources)?;
     let mut notes = Vec::new();
-    let (configs, _) = dca1000::descriptions(&parts[0][0], stated, &mut notes)?;
+    let (configs, _) = descriptions(&parts[0][0], stated, &mut notes)?;
     let mut stated = stated.clone();
     if stated.board.is_none() {
         notes.push("no board was named: a cascade of four devices is taken for the MMWCAS-RF-EVM".into());
@@ -73,7 +74,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     let (frames, streams) = streams(&parts, words_per_frame, config, &mut notes)?;
     let Selection { radar: found, words_per_frame, starts, notes: more, .. } = radar.select(&stated, &|_, _| Ok(frames))?;
     notes.extend(more);
-    let shaped = dca1000::apply(found, &stated.sets)?;
+    let shaped = radar_table::apply(found, &stated.sets)?;
     Ok(capture(parts, streams, shaped, words_per_frame, starts, radar.lanes.q_first, notes))
 }
 
@@ -176,25 +177,25 @@ fn streams(
 /// The radar of a TOML file; antennas that it does not state are the board's, in the firing order of mmWave Studio's script for TDM
 /// (`Cascade_Configuration_MIMO.lua`): transmitter 12 first.
 fn radar_of(config: &Path, stated: &Stated, notes: &mut Vec<String>) -> Result<Radar> {
-    let mut table = arrays::table_of(Some(config), &stated.sets)?;
-    let radar = arrays::radar_table(&mut table)?;
+    let mut table = radar_table::table_of(Some(config), &stated.sets)?;
+    let radar = radar_table::radar_table(&mut table)?;
     let board = Board::named(stated.board.as_deref().unwrap_or(CASCADE))?;
     notes.push(format!("antennas of the {} ({})", board.name, board.source));
     let rx = (0..RECEIVERS * CASCADED).map_while(|rx| board.rx_m(rx)).collect();
-    radar.entry("rx_m").or_insert_with(|| arrays::rows(rx));
+    radar.entry("rx_m").or_insert_with(|| radar_table::rows(rx));
     if !radar.contains_key("tx_m") {
         notes.push(
             "radar.tx_m is not stated: transmitters fire from the board's last to its first, as mmWave Studio's script has it"
                 .into(),
         );
         let tx = (0..board.tx_half_wavelengths.len()).rev().filter_map(|tx| board.tx_m(tx)).collect();
-        radar.insert("tx_m".into(), arrays::rows(tx));
+        radar.insert("tx_m".into(), radar_table::rows(tx));
     }
     radar.insert("frames".into(), Value::Integer(1));
     if !radar.contains_key("full_scale_codes") {
         radar.insert("full_scale_codes".into(), Value::Float(f64::from(i16::MAX)));
     }
-    let radar = arrays::finished(table, config, notes)?;
+    let radar = radar_table::finished(table, config, notes)?;
     if radar.rx_m.len() != RECEIVERS * CASCADED {
         return Err(Error::setting("radar.rx_m", format!("{} receivers", radar.rx_m.len()), "16, four a device"));
     }

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use toml::{Table, Value};
 
-use super::arrays::rows;
+use super::radar_table::rows;
 use crate::data::files;
 use crate::error::{Error, Result};
 use crate::radar::SPEED_OF_LIGHT;

@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use super::descriptions::descriptions;
+use super::radar_table::apply;
 use super::schedule::{Selection, TiRadar};
 use super::stream::Words;
 use super::{Capture, Stated, cascade, lanes::Lanes, ti_cfg, ti_json};
-use crate::data::entries::entries;
-use crate::data::settings::settings_from_table;
 use crate::data::{IfFrame, IfLayout, files};
 use crate::error::{Error, Result};
-use crate::radar::{Radar, Sampling};
+use crate::radar::Sampling;
 
 /// Understands the files of one capture.
 ///
@@ -67,50 +67,6 @@ fn read(config: &Path) -> Result<TiRadar> {
         Some("json") => ti_json::read_radar(config),
         _ => ti_cfg::read_radar(config),
     }
-}
-
-/// The one file that describes the radar, and the set-up where there is one.
-pub fn descriptions(source: &Path, stated: &Stated, notes: &mut Vec<String>) -> Result<(Vec<PathBuf>, ti_json::Setup)> {
-    let is = |path: &Path, end: &str| path.to_string_lossy().to_lowercase().ends_with(end);
-    let mut given = stated.configs.clone();
-    if given.is_empty() {
-        let folder = source.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut beside = entries(folder)?;
-        beside.retain(|path| is(path, ".mmwave.json") || is(path, ".setup.json") || is(path, ".cfg"));
-        given = beside;
-        for path in &given {
-            notes.push(format!("the radar is that of {}, which lies beside the samples", path.display()));
-        }
-    }
-    let (setups, radars): (Vec<_>, Vec<_>) = given.into_iter().partition(|path| is(path, ".setup.json"));
-    let setup = setups.first().map(|path| ti_json::read_setup(path)).transpose()?.unwrap_or_default();
-    match radars.len() {
-        1 => Ok((radars, setup)),
-        0 => Err(Error::Usage {
-            message: format!("{}: nothing describes the radar", source.display()),
-            hint: Some("give --config FILE: the .mmwave.json of mmWave Studio, or the .cfg that was sent to the radar".into()),
-        }),
-        count => Err(Error::Usage {
-            message: format!(
-                "{count} files describe the radar: {}",
-                radars.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
-            ),
-            hint: Some("name the one of this capture with --config".into()),
-        }),
-    }
-}
-
-/// `--set radar.KEY=VALUE` over what was read.
-pub fn apply(radar: Radar, sets: &[String]) -> Result<Radar> {
-    #[derive(serde::Serialize, serde::Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct Settings {
-        radar: Radar,
-    }
-    let table = toml::Table::try_from(Settings { radar }).expect("a radar is plain data");
-    let settings: Settings = settings_from_table(table, "--set", sets)?;
-    settings.radar.check("radar")?;
-    Ok(settings.radar)
 }
 
 /// The words of a frame as `[tx, rx, loop, sample]`.

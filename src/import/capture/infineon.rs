@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::boards::Board;
 use super::cube::{Cube, half_scale_note};
 use super::json::Json;
-use super::{Capture, Layout, Stated, dca1000::apply};
+use super::{Capture, Layout, Stated, radar_table::apply};
 use crate::data::{IfLayout, entries::entries};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};

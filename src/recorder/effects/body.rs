@@ -1,33 +1,12 @@
 //! The body: what it does beside its motion, and what covers it.
 
-use std::f64::consts::TAU;
-
 use super::EffectsConfig;
 use crate::error::{Error, Result};
 use crate::person::{JOINT_NAMES, Person};
-use crate::recorder::body::vertex_normals;
-use crate::recorder::vector::{Vector, add, rotate};
+use crate::recorder::mesh::vertex_normals;
+use crate::recorder::physiology::{Physiology, Swell};
+use crate::recorder::vector::Vector;
 use crate::recorder::world::World;
-
-/// Displacements of the surface that the handed-out mesh does not know.
-#[derive(Clone, Debug, Default)]
-pub struct Physiology {
-    swells: Vec<Swell>,
-    /// Rotation and translation in the radar frame (`pose_offset`).
-    stands: Option<([[f64; 3]; 3], Vector)>,
-}
-
-/// A part of the surface that moves along its normals.
-#[derive(Clone, Debug)]
-struct Swell {
-    /// `[vertex]`, 0 to 1.
-    weights: Vec<f64>,
-    amplitude_m: f64,
-    rate_hz: f64,
-    phase_rad: f64,
-    /// Strength of the second harmonic.
-    harmonic: f64,
-}
 
 impl Physiology {
     /// Both `breathing` and `heartbeat` need to know which vertices are the trunk; `rest` is the rest pose `[vertex, xyz]`.
@@ -60,25 +39,6 @@ impl Physiology {
             ([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]], pose.offset_m)
         });
         Ok(Self { swells, stands })
-    }
-
-    /// Moves the vertices of one pose, at its time in the motion.
-    pub fn apply(&self, vertices: &mut [Vector], faces: &[[usize; 3]], time_s: f64) {
-        if !self.swells.is_empty() {
-            let normals = vertex_normals(vertices, faces);
-            for swell in &self.swells {
-                let angle = TAU * swell.rate_hz * time_s + swell.phase_rad;
-                let step = swell.amplitude_m * (angle.sin() + swell.harmonic * (2.0 * angle).sin()) / (1.0 + swell.harmonic);
-                for ((vertex, normal), weight) in vertices.iter_mut().zip(&normals).zip(&swell.weights) {
-                    *vertex = add(*vertex, normal.map(|n| n * step * weight));
-                }
-            }
-        }
-        if let Some((rotation, offset)) = &self.stands {
-            for vertex in vertices {
-                *vertex = add(rotate(rotation, *vertex), *offset);
-            }
-        }
     }
 }
 

@@ -6,6 +6,7 @@
 
 mod antenna;
 mod body;
+mod decibels;
 mod if_filter;
 mod noise;
 mod onto;
@@ -14,22 +15,22 @@ mod propagation;
 mod receiver;
 mod resample;
 mod scene;
-mod settings;
 mod signal;
 mod stage;
 mod timing;
 mod truth;
 mod waveform;
 
-use serde::{Deserialize, Serialize};
-
-pub use body::{Physiology, garment_m, reflectivity_db};
+pub use super::effect_settings::*;
+pub use super::effects_config::EffectsConfig;
+pub use super::physiology::Physiology;
+pub(super) use super::streams::*;
+pub use body::{garment_m, reflectivity_db};
 pub use noise::shape as shape_noise;
 pub use onto::{Ground, Onto};
 pub use propagation::{MirrorPlan, Shadow, twice_bounced};
 pub use receiver::Chain;
 pub use scene::{Mover, SinusoidalMotion, Stage, movers, static_points, vibration};
-pub use settings::*;
 pub use signal::Signal;
 pub use stage::{Stages, codes};
 pub use timing::Clock;
@@ -38,139 +39,7 @@ pub use truth::listed;
 use super::world::World;
 use crate::error::Result;
 
-/// Streams of random numbers, one per effect that draws some.
-macro_rules! streams {
-    ($($name:ident = $id:literal),*) => { $(pub(super) const $name: u64 = $id;)* };
-}
-
-streams! {
-    CHIRP_RIPPLE = 1, PHASE_NOISE = 2, CHIRP_START_JITTER = 3, TX_LEAKAGE = 4, DC_OFFSET = 5, RAMP_EDGE_TRANSIENT = 6,
-    SPUR = 7, INTERFERENCE = 8, MUTUAL_COUPLING = 9, MOVING_REFLECTOR = 10, RADAR_VIBRATION = 11, RANGE_ALIAS = 12,
-    BREATHING = 13, HEARTBEAT = 14, IMPULSIVE_NOISE = 15, CORRELATED_NOISE = 16,
-    // The entries of `outside` follow each other.
-    OUTSIDE = 100
-}
-
-/// Whether the draws of an effect are noise, which is another one in each recording of the same truth.
-pub fn is_noise(id: u64) -> bool {
-    [PHASE_NOISE, CHIRP_START_JITTER, IMPULSIVE_NOISE, CORRELATED_NOISE].contains(&id)
-}
-
-/// The table `[effects]`: a sub-table per effect id, off where absent.
-macro_rules! effects {
-    ($($field:ident: $kind:ident),*; $($list:ident: $item:ident),*) => {
-        /// Every effect of a recording, each switched by its table. The names are the ids of docs/report.md.
-        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-        #[serde(deny_unknown_fields, default)]
-        pub struct EffectsConfig {
-            $(#[serde(skip_serializing_if = "Option::is_none")] pub $field: Option<$kind>,)*
-            $(#[serde(skip_serializing_if = "Vec::is_empty")] pub $list: Vec<$item>,)*
-        }
-
-        impl EffectsConfig {
-            /// Refuses numbers out of bounds, whatever the radar and the room.
-            fn check_bounds(&self, key: &str) -> Result<()> {
-                $(if let Some(effect) = &self.$field { effect.check(&format!("{key}.{}", stringify!($field)))?; })*
-                $(for (index, effect) in self.$list.iter().enumerate() {
-                    effect.check(&format!("{key}.{}[{index}]", stringify!($list)))?;
-                })*
-                Ok(())
-            }
-
-            /// Those that are on, as (id, which of its kind, settings).
-            fn listed(&self) -> Vec<(&'static str, usize, serde_json::Value)> {
-                let mut all = vec![];
-                let json = |effect: &dyn Fn() -> serde_json::Result<serde_json::Value>| effect().unwrap_or_default();
-                $(if let Some(effect) = &self.$field {
-                    all.push((stringify!($field), 0, json(&|| serde_json::to_value(effect))));
-                })*
-                $(for (index, effect) in self.$list.iter().enumerate() {
-                    all.push((stringify!($list), index, json(&|| serde_json::to_value(effect))));
-                })*
-                all
-            }
-        }
-    };
-}
-
-effects! {
-    start_frequency_error: StartFrequencyError,
-    adc_start_error: AdcStartError,
-    slope_error: SlopeError,
-    chirp_nonlinearity: ChirpNonlinearity,
-    chirp_ripple: ChirpRipple,
-    phase_noise: PhaseNoise,
-    chirp_start_jitter: ChirpStartJitter,
-    tx_leakage: TxLeakage,
-    dc_offset: DcOffset,
-    iq_imbalance: IqImbalance,
-    compression: Compression,
-    adc_saturation: AdcSaturation,
-    second_harmonic: SecondHarmonic,
-    if_highpass: IfHighpass,
-    if_lowpass: IfLowpass,
-    if_delay: IfDelay,
-    chirp_droop: ChirpDroop,
-    ramp_edge_transient: RampEdgeTransient,
-    chirp_settling: ChirpSettling,
-    gain_drift: GainDrift,
-    spur: Spur,
-    interference: Interference,
-    channel_mismatch: ChannelMismatch,
-    antenna_position: AntennaPosition,
-    antenna_pattern: AntennaPattern,
-    mutual_coupling: MutualCoupling,
-    clock_offset: ClockOffset,
-    clock_drift: ClockDrift,
-    frame_drop: FrameDrop,
-    tdm_phase: TdmPhase,
-    pose_offset: PoseOffset,
-    range_bias: RangeBias,
-    carried_reflector: CarriedReflector,
-    radar_vibration: RadarVibration,
-    floor_bounce: FloorBounce,
-    object_radar_object: ObjectRadarObject,
-    range_alias: RangeAlias,
-    soft_occlusion: SoftOcclusion,
-    body_multibounce: BodyMultibounce,
-    breathing: Breathing,
-    heartbeat: Heartbeat,
-    clothing_delay: ClothingDelay,
-    part_reflectivity: PartReflectivity,
-    coloured_noise: ColouredNoise,
-    impulsive_noise: ImpulsiveNoise,
-    correlated_noise: CorrelatedNoise;
-    static_reflector: StaticReflector,
-    moving_reflector: MovingReflector,
-    wall_ghost: WallGhost,
-    outside: Outside
-}
-
 impl EffectsConfig {
-    /// Whether nothing is planted.
-    pub fn is_off(&self) -> bool {
-        *self == Self::default()
-    }
-
-    /// Those that a scene without a person can have.
-    pub fn without_person(&self) -> Self {
-        Self {
-            soft_occlusion: None,
-            body_multibounce: None,
-            breathing: None,
-            heartbeat: None,
-            clothing_delay: None,
-            part_reflectivity: None,
-            pose_offset: None,
-            clock_offset: None,
-            clock_drift: None,
-            floor_bounce: None,
-            carried_reflector: None,
-            wall_ghost: vec![],
-            ..self.clone()
-        }
-    }
-
     /// Refuses what cannot work in this world; `key` names the table in messages.
     pub fn check(&self, world: &World, key: &str) -> Result<()> {
         self.check_bounds(key)?;

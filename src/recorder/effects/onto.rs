@@ -54,7 +54,9 @@ impl Onto {
     pub fn new(radar: &Radar, effects: &EffectsConfig, seed: u64, ground: &Ground) -> Result<Self> {
         let receiver = ReceiverConfig { noise: true, adc: ground.rail.is_some(), ..ReceiverConfig::ideal() };
         let world = World { radar: radar.clone(), effects: effects.clone(), receiver, seed, ..World::empty() };
-        world.check()?;
+        world.check_radar()?;
+        // The rest of an empty world can be recorded.
+        effects.check(&world, "effects")?;
         Ok(Self {
             path: Chirp::new(radar),
             leakage: leakage(&world),

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use rand::RngExt;
 
-use super::receiver::from_db;
+use super::decibels::from_db;
 use super::resample::Resampler;
 use super::signal::{Place, Signal};
 use super::timing::Clock;

@@ -2,7 +2,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use super::receiver::from_db;
+use super::decibels::from_db;
 use super::test_support::*;
 use super::*;
 use crate::recorder::receiver::ReceiverConfig;

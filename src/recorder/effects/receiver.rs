@@ -6,16 +6,13 @@ use num_complex::Complex64;
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::decibels::from_db;
 use super::signal::{Place, Signal};
 use super::timing::Clock;
 use super::{EffectsConfig, outside};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, SPEED_OF_LIGHT, Sampling};
 use crate::recorder::world::{Draw, World};
-
-pub fn from_db(db: f64) -> f64 {
-    10f64.powf(db / 20.0)
-}
 
 /// The receiver's own imperfections; `peak` is what relative levels are relative to.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 use num_complex::Complex64;
 
-use super::receiver::from_db;
+use super::decibels::from_db;
 use super::test_support::*;
 use super::*;
 use crate::radar::{Radar, Sampling};

@@ -12,8 +12,7 @@ use super::waveform::{ChirpError, Oscillator, delayed, true_radar};
 use super::{EffectsConfig, Outside, outside};
 use crate::data::IfFrame;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
-use crate::recorder::chirp::Chirp;
-use crate::recorder::scatter::widened;
+use crate::recorder::chirp::{Chirp, widened};
 use crate::recorder::world::World;
 
 /// Everything between the scene and the converter that does not depend on how strong the signal is.

@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
+use super::decibels::from_db;
 use super::receiver::{bursts, leakage, offsets};
 use super::stage::Stages;
 use super::{
@@ -57,7 +58,7 @@ fn drawn(world: &World, id: &str, index: usize) -> Value {
             })
         }
         "ramp_edge_transient" => {
-            json!({ "relative": effects.ramp_edge_transient.as_ref().map(|effect| super::receiver::from_db(effect.level_db)) })
+            json!({ "relative": effects.ramp_edge_transient.as_ref().map(|effect| from_db(effect.level_db)) })
         }
         "interference" => json!({ "drawn": bursts(world).iter().map(|burst| json!({
             "frame": burst.frame, "tx": burst.tx, "loop": burst.index, "sample": burst.sample,
