@@ -1,5 +1,9 @@
 //! A recording as far as it is explained so far, and what every suspect needs of it.
 
+pub mod denoised;
+pub mod power;
+pub mod products;
+
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -13,14 +17,13 @@ use super::course::Course;
 #[cfg(test)]
 use super::cube;
 use super::cube::{Cube, Loaded, Split};
-use super::denoised;
 use super::finding::{Undo, Volume};
-use super::power::PowerModel;
 use super::prediction::BodyPrediction;
-use super::products::Products;
 use super::statistics;
 use crate::radar::{Radar, Sampling};
 use crate::room::Room;
+use power::PowerModel;
+use products::Products;
 
 /// Neighbouring range bins over which the noise's shape is taken together.
 const SHAPE_BINS: usize = 5;

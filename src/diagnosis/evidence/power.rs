@@ -14,8 +14,8 @@ use rayon::prelude::*;
 pub use fit::{Reach, fit_weights, improve, log_likelihood};
 pub use spread::Cells;
 
-use super::evidence::Evidence;
-use super::prediction::{Point, range_and_velocity};
+use super::Evidence;
+use crate::diagnosis::prediction::{Point, range_and_velocity};
 use crate::radar::Radar;
 
 /// Doppler bins on either side of zero that hold remains of static clutter.

@@ -6,11 +6,11 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::cube::{folds, mean_chirp};
 use super::denoised;
-use super::evidence::{Evidence, spectrum, transform};
-use super::statistics::{chi2_tail, corrected};
-use super::suspects::receiver::image::empty_bins;
+use super::{Evidence, spectrum, transform};
+use crate::diagnosis::cube::{folds, mean_chirp};
+use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::suspects::receiver::image::empty_bins;
 
 #[derive(Clone, Copy, Default)]
 struct Sums {

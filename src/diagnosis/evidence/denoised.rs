@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use rustfft::FftDirection;
 
-use super::evidence::{Evidence, fft_2d};
+use super::{Evidence, fft_2d};
 
 /// Power over the noise's mean from which on a cell holds signal.
 const SIGNAL: f64 = 12.0;
