@@ -43,11 +43,39 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
 /// The strongest mover, if any.
 fn strongest(evidence: &Evidence) -> Option<Candidate> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let (bins, channels) = (evidence.range_bins(), evidence.cube.channels() as f64);
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     let cells = loops * samples;
-    let moving = |doppler: usize| moves(doppler, loops);
     let mean: Vec<f64> = (0..cells).map(|cell| mean_power(evidence, training, cell)).collect();
+    let peak = peak(evidence, &mean)?;
+    let (doppler, range) = (peak / samples, peak % samples);
+    let count = training.len() as f64 * evidence.cube.channels() as f64;
+    let p_value = statistics::corrected(statistics::mean_power_tail(mean[peak], count), cells as f64);
+    let another = evidence.accepted.contains(&"moving_reflector");
+    if p_value > 0.01 || held_out.is_empty() || another && mean[peak] < BESIDE_ANOTHER {
+        return None;
+    }
+    // What keeps its beat frequency whatever its Doppler frequency says is no return.
+    let tone = wandering::find(evidence).filter(|tone| tone.p_value < 0.01 && tone.is_at([doppler, range], [loops, samples]));
+    if tone.is_some() {
+        return None;
+    }
+    let mover = Mover::new(evidence, [doppler, range]);
+    let gain: f64 = (0..cells)
+        .filter(|&cell| cell == peak || moves(cell / samples, loops) && mover.holds(cell / samples, cell % samples))
+        .flat_map(|cell| held_out.iter().map(move |&f| (f, cell)))
+        .map(|(f, cell)| power_gain(evidence, f, cell, mean[cell]))
+        .sum();
+    if gain < 3.0 {
+        return None;
+    }
+    Some(mover.candidate(10.0 * mean[peak].log10(), p_value, gain))
+}
+
+/// The strongest cell that moves and stands out of its range's floor, `doppler · samples + range`.
+fn peak(evidence: &Evidence, mean: &[f64]) -> Option<usize> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let bins = evidence.range_bins();
+    let moving = |doppler: usize| moves(doppler, loops);
     let mut column: Vec<f64> = vec![];
     // A floor over all velocities is the modulation of something strong, no mover.
     let floor: Vec<f64> = (0..bins)
@@ -63,91 +91,114 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
         .filter(|&(d, r)| mean[d * samples + r] > ABOVE_FLOOR * floor[r])
         .map(|(d, r)| d * samples + r)
         .collect();
-    let peak = candidates.iter().copied().max_by(|&a, &b| mean[a].total_cmp(&mean[b]))?;
-    let (doppler, range) = (peak / samples, peak % samples);
-    let count = training.len() as f64 * channels;
-    let p_value = statistics::corrected(statistics::mean_power_tail(mean[peak], count), cells as f64);
-    let another = evidence.accepted.contains(&"moving_reflector");
-    if p_value > 0.01 || held_out.is_empty() || another && mean[peak] < BESIDE_ANOTHER {
-        return None;
+    candidates.iter().copied().max_by(|&a, &b| mean[a].total_cmp(&mean[b]))
+}
+
+/// A mover in the longest stretch without a gap.
+struct Mover<'a> {
+    evidence: &'a Evidence,
+    /// Frames transformed as one.
+    run: usize,
+    stretch: Stretch,
+    top: Cell,
+    /// +1 or −1.
+    sign: i64,
+    region: Vec<Cell>,
+    /// The region's ends.
+    dopplers: [f64; 2],
+    ranges: [f64; 2],
+}
+
+/// A Doppler bin with its direction: from half of all on it counts from the end, below zero.
+fn signed(doppler: usize, loops: usize) -> f64 {
+    if 2 * doppler >= loops { doppler as f64 - loops as f64 } else { doppler as f64 }
+}
+
+impl<'a> Mover<'a> {
+    /// From its strongest cell in the maps of single frames.
+    fn new(evidence: &'a Evidence, [doppler, range]: [usize; 2]) -> Self {
+        let signed = signed(doppler, evidence.cube.dims[3]);
+        let run = run(evidence);
+        let stretch = Stretch::new(evidence, run);
+        let sign = signed.signum() as i64;
+        let top = stretch.peak([signed as i64 * run as i64, range as i64], run as i64 + run as i64 / 2, sign);
+        let reach = (REACH_M / evidence.radar.range_resolution_m()).max(2.0) as i64;
+        let region = stretch.around(top, sign, reach, evidence.range_bins());
+        let span = |axis: usize| {
+            let values = region.iter().map(|cell| cell[axis]);
+            [values.clone().min().unwrap_or(top[axis]) as f64, values.max().unwrap_or(top[axis]) as f64]
+        };
+        let (dopplers, ranges) = (span(0), span(1));
+        Self { evidence, run, stretch, top, sign, region, dopplers, ranges }
     }
-    // What keeps its beat frequency whatever its Doppler frequency says is no return.
-    let tone = wandering::find(evidence).filter(|tone| tone.p_value < 0.01 && tone.is_at([doppler, range], [loops, samples]));
-    if tone.is_some() {
-        return None;
-    }
-    let signed = |d: usize| if 2 * d >= loops { d as f64 - loops as f64 } else { d as f64 };
-    let run = run(evidence);
-    let stretch = Stretch::new(evidence, run);
-    let sign = signed(doppler).signum() as i64;
-    let top = stretch.peak([signed(doppler) as i64 * run as i64, range as i64], run as i64 + run as i64 / 2, sign);
-    let radar = &evidence.radar;
-    let (bin_m, bin_mps) = (radar.range_resolution_m(), radar.velocity_resolution_mps() / run as f64);
-    let region = stretch.around(top, sign, (REACH_M / bin_m).max(2.0) as i64, bins);
-    let span = |axis: usize| {
-        let values = region.iter().map(|cell| cell[axis]);
-        [values.clone().min().unwrap_or(top[axis]) as f64, values.max().unwrap_or(top[axis]) as f64]
-    };
-    let (dopplers, ranges) = (span(0), span(1));
-    let inside = |d: usize, r: usize| {
-        let scaled = signed(d) * run as f64;
+
+    /// Whether a cell of a single frame's maps is within its region.
+    fn holds(&self, d: usize, r: usize) -> bool {
+        let scaled = signed(d, self.evidence.cube.dims[3]) * self.run as f64;
+        let (dopplers, ranges) = (self.dopplers, self.ranges);
         (dopplers[0]..=dopplers[1]).contains(&scaled) && (ranges[0]..=ranges[1]).contains(&(r as f64))
-    };
-    let gain: f64 = (0..cells)
-        .filter(|&cell| cell == peak || moving(cell / samples) && inside(cell / samples, cell % samples))
-        .flat_map(|cell| held_out.iter().map(move |&f| (f, cell)))
-        .map(|(f, cell)| power_gain(evidence, f, cell, mean[cell]))
-        .sum();
-    if gain < 3.0 {
-        return None;
     }
-    let centre = top[1] as f64 + stretch.summit(top, [0, 1]);
-    let range_m = centre * bin_m;
-    let velocity_mps = (top[0] as f64 + stretch.summit(top, [1, 0])) * bin_mps;
-    let azimuth = azimuth_deg(evidence, &stretch, top);
-    let decibel = 10.0 * mean[peak].log10();
-    let noise: f64 = evidence.noise().iter().sum();
-    let energy =
-        region.iter().map(|&cell| (stretch.at(cell) - 1.0).max(0.0)).sum::<f64>() * noise * (evidence.cube.dims[0] / run) as f64;
-    // Past zero Doppler it would be somebody else's.
-    let cut = Region {
-        range: [ranges[0] - 1.0, ranges[1] + 1.0],
-        doppler: if sign > 0 { [dopplers[0] - 1.0, dopplers[1] + 2.0] } else { [dopplers[0] - 2.0, dopplers[1] + 1.0] },
-    };
-    let training = training.clone();
-    let direction = azimuth.map_or(String::new(), |(a, _)| format!(", {a:+.0}° to the side"));
-    let estimates = azimuth.map_or(vec![], |(a, deviation)| {
-        let (s, c) = a.to_radians().sin_cos();
-        let across = range_m * deviation.to_radians();
-        vec![Estimate::list(
-            "position_m",
-            &[range_m * s, range_m * c, 0.0],
-            &[(across * c).abs().max(0.3 * bin_m), (across * s).abs().max(0.3 * bin_m), HEIGHT * range_m],
-        )]
-    });
-    Some(Candidate {
-        id: Some("moving_reflector"),
-        behaves_like: super::paths::PATH_LIKE,
-        estimates,
-        choice: None,
-        place: Place {
-            range_m: Some([(ranges[0] - 0.5).max(0.0) * bin_m, (ranges[1] + 0.5) * bin_m]),
-            velocity_mps: Some([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps]),
-            azimuth_deg: azimuth.map(|(a, d)| [a - 2.0 * d, a + 2.0 * d]),
-            ..Place::at("scene")
-        },
-        p_value,
-        gain,
-        errs_alike: false,
-        look_alikes: vec![],
-        statement: format!(
-            "Something moves at {range_m:.2} m with {velocity_mps:+.2} m/s along the line of sight{direction}, {decibel:.0} dB above \
-             the noise, and nobody is tracked there."
-        ),
-        curve: None,
-        energy,
-        correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, run, cut))),
-    })
+
+    fn energy(&self) -> f64 {
+        let noise: f64 = self.evidence.noise().iter().sum();
+        self.region.iter().map(|&cell| (self.stretch.at(cell) - 1.0).max(0.0)).sum::<f64>()
+            * noise
+            * (self.evidence.cube.dims[0] / self.run) as f64
+    }
+
+    /// What is taken away with it.
+    fn cut(&self) -> Region {
+        let (dopplers, ranges) = (self.dopplers, self.ranges);
+        // Past zero Doppler it would be somebody else's.
+        Region {
+            range: [ranges[0] - 1.0, ranges[1] + 1.0],
+            doppler: if self.sign > 0 { [dopplers[0] - 1.0, dopplers[1] + 2.0] } else { [dopplers[0] - 2.0, dopplers[1] + 1.0] },
+        }
+    }
+
+    fn candidate(&self, decibel: f64, p_value: f64, gain: f64) -> Candidate {
+        let &Self { evidence, run, ref stretch, top, dopplers, ranges, .. } = self;
+        let radar = &evidence.radar;
+        let (bin_m, bin_mps) = (radar.range_resolution_m(), radar.velocity_resolution_mps() / run as f64);
+        let centre = top[1] as f64 + stretch.summit(top, [0, 1]);
+        let range_m = centre * bin_m;
+        let velocity_mps = (top[0] as f64 + stretch.summit(top, [1, 0])) * bin_mps;
+        let azimuth = azimuth_deg(evidence, stretch, top);
+        let (cut, training) = (self.cut(), evidence.split.training.clone());
+        let direction = azimuth.map_or(String::new(), |(a, _)| format!(", {a:+.0}° to the side"));
+        let estimates = azimuth.map_or(vec![], |(a, deviation)| {
+            let (s, c) = a.to_radians().sin_cos();
+            let across = range_m * deviation.to_radians();
+            vec![Estimate::list(
+                "position_m",
+                &[range_m * s, range_m * c, 0.0],
+                &[(across * c).abs().max(0.3 * bin_m), (across * s).abs().max(0.3 * bin_m), HEIGHT * range_m],
+            )]
+        });
+        Candidate {
+            id: Some("moving_reflector"),
+            behaves_like: super::paths::PATH_LIKE,
+            estimates,
+            choice: None,
+            place: Place {
+                range_m: Some([(ranges[0] - 0.5).max(0.0) * bin_m, (ranges[1] + 0.5) * bin_m]),
+                velocity_mps: Some([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps]),
+                azimuth_deg: azimuth.map(|(a, d)| [a - 2.0 * d, a + 2.0 * d]),
+                ..Place::at("scene")
+            },
+            p_value,
+            gain,
+            errs_alike: false,
+            look_alikes: vec![],
+            statement: format!(
+                "Something moves at {range_m:.2} m with {velocity_mps:+.2} m/s along the line of sight{direction}, {decibel:.0} dB \
+                 above the noise, and nobody is tracked there."
+            ),
+            curve: None,
+            energy: self.energy(),
+            correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, run, cut))),
+        }
+    }
 }
 
 /// Runs of frames transformed as one, static clutter removed; cells are signed Doppler bins and range bins.

@@ -55,6 +55,12 @@ pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     if gain <= 0.0 {
         return None;
     }
+    Some(candidate(evidence, fit, &found, excess, p_value, gain))
+}
+
+/// `found`: coefficient and weight of every receiver; `excess`: of their variance over the noise's.
+fn candidate(evidence: &Evidence, fit: &Fit, found: &[(Complex64, f64)], excess: f64, p_value: f64, gain: f64) -> Candidate {
+    let rx = found.len();
     let mean =
         found.iter().map(|(mu, weight)| mu * weight).sum::<Complex64>() / found.iter().map(|(_, weight)| weight).sum::<f64>();
     // Receivers differ: one number for all errs by their scatter.
@@ -66,7 +72,7 @@ pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     let coefficients: Vec<Complex64> = found.iter().map(|(mu, _)| *mu).collect();
     let still: f64 = evidence.still().iter().map(|value| value.norm_sqr()).sum();
     let course = fit.course.clone();
-    Some(Candidate {
+    Candidate {
         id: Some("iq_imbalance"),
         behaves_like: "conjugate image",
         estimates: vec![
@@ -87,7 +93,7 @@ pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
         curve: None,
         energy: mean.norm_sqr() * still * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
         correction: Correction::Inverse(Arc::new(move |cube| undo(cube, &course.turned, &coefficients)), Volume::BY_SAMPLE),
-    })
+    }
 }
 
 /// In samples in which static returns were turned back.

@@ -59,6 +59,18 @@ pub fn find(evidence: &Evidence, course: &Course, bin: f64, amplitude: &[Complex
     } else {
         vec![]
     };
+    Some(candidate(evidence, best, bin, amplitude, (corrected(best.p_value, tried), gain), look_alikes))
+}
+
+/// `bin`: range of what moves itself, and its channels' amplitudes.
+fn candidate(
+    evidence: &Evidence,
+    best: &Along,
+    bin: f64,
+    amplitude: &[Complex64],
+    (p_value, gain): (f64, f64),
+    look_alikes: Vec<&'static str>,
+) -> Candidate {
     let bin_m = evidence.radar.range_resolution_m();
     let range_m = best.bin as f64 * bin_m;
     let level_db = DECIBEL * best.factor.norm().ln();
@@ -70,7 +82,7 @@ pub fn find(evidence: &Evidence, course: &Course, bin: f64, amplitude: &[Complex
     let region = Region { range: window(best.bin), doppler: [-1.0, 1.0] };
     let training = evidence.split.training.clone();
     let power: f64 = amplitude.iter().map(|a| a.norm_sqr()).sum();
-    Some(Candidate {
+    Candidate {
         id: Some(KINDS[best.kind].0),
         behaves_like: PATH_LIKE,
         estimates: vec![if KINDS[best.kind].1 {
@@ -80,7 +92,7 @@ pub fn find(evidence: &Evidence, course: &Course, bin: f64, amplitude: &[Complex
         }],
         choice: None,
         place: Place { range_m: Some(window(best.bin).map(|bin| bin * bin_m)), ..Place::at("propagation") },
-        p_value: corrected(best.p_value, tried),
+        p_value,
         gain,
         errs_alike: false,
         look_alikes,
@@ -93,7 +105,7 @@ pub fn find(evidence: &Evidence, course: &Course, bin: f64, amplitude: &[Complex
         curve: None,
         energy: best.factor.norm_sqr() * power * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
         correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, 1, region))),
-    })
+    }
 }
 
 /// Of the channels, from the amplitudes of what moves itself: those of one arrival, or twice their phases.

@@ -65,11 +65,6 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if bursts.is_empty() || hit as f64 > 0.05 * total {
         return vec![];
     }
-    // Hits of one chirp in all receivers at once are one burst.
-    let places: BTreeSet<(usize, usize, usize)> =
-        bursts.iter().map(|burst| (burst.frame, burst.channel / rx, burst.chirp)).collect();
-    let together = bursts.len() as f64 / places.len() as f64;
-    let seen_by_all = rx > 1 && together > 0.5 * rx as f64;
     let alone = corrected((-HIGH * strong as f64).exp(), total);
     let p_value = crossings.as_ref().map_or(alone, |crossings| alone.min(crossings.p_value));
     let powers: Vec<Vec<f64>> = bursts.iter().map(|burst| powers(&evidence.cube, burst)).collect();
@@ -86,7 +81,41 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if gain <= 0.0 {
         return vec![];
     }
+    let Claim { id, look_alikes, estimates, place, statement } = claim(&bursts, hit, rx, crossings.as_ref());
     let volume = Volume { of_samples: Some(Arc::new(spread(evidence, &bursts, &powers))), ..Volume::KEPT };
+    vec![Candidate {
+        id: Some(id),
+        behaves_like: "sparse additive",
+        estimates,
+        choice: None,
+        place,
+        p_value,
+        gain,
+        errs_alike: false,
+        look_alikes,
+        statement,
+        curve: None,
+        energy: removed,
+        correction: Correction::Inverse(Arc::new(move |cube: &mut Cube| repair_all(cube, &bursts)), volume),
+    }]
+}
+
+/// What is said of bursts.
+struct Claim {
+    id: &'static str,
+    look_alikes: Vec<&'static str>,
+    estimates: Vec<Estimate>,
+    place: Place,
+    statement: String,
+}
+
+/// Another radar, or impulses; `hit`: samples of all bursts.
+fn claim(bursts: &[Burst], hit: usize, rx: usize, crossings: Option<&Crossings>) -> Claim {
+    // Hits of one chirp in all receivers at once are one burst.
+    let places: BTreeSet<(usize, usize, usize)> =
+        bursts.iter().map(|burst| (burst.frame, burst.channel / rx, burst.chirp)).collect();
+    let together = bursts.len() as f64 / places.len() as f64;
+    let seen_by_all = rx > 1 && together > 0.5 * rx as f64;
     let list = |values: BTreeSet<usize>| Some(values.into_iter().collect::<Vec<_>>());
     let place = Place {
         frames: list(bursts.iter().map(|burst| burst.frame).collect()),
@@ -104,7 +133,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         (false, false) => ("impulsive_noise", vec!["interference"]),
     };
     let count = places.len() as f64;
-    let estimates = if id == "interference" { vec![bursts_in_all(count, crossings.as_ref())] } else { vec![] };
+    let estimates = if id == "interference" { vec![bursts_in_all(count, crossings)] } else { vec![] };
     let statement = if id == "interference" {
         format!(
             "{count} chirps hold a burst of {lengths:.0} samples that all receivers see at once and that neither the chirp before \
@@ -113,21 +142,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     } else {
         format!("{} single samples of {count} chirps stand far above the noise, each in one receiver: impulses", bursts.len())
     };
-    vec![Candidate {
-        id: Some(id),
-        behaves_like: "sparse additive",
-        estimates,
-        choice: None,
-        place,
-        p_value,
-        gain,
-        errs_alike: false,
-        look_alikes,
-        statement,
-        curve: None,
-        energy: removed,
-        correction: Correction::Inverse(Arc::new(move |cube: &mut Cube| repair_all(cube, &bursts)), volume),
-    }]
+    Claim { id, look_alikes, estimates, place, statement }
 }
 
 /// How unlikely it is that a sample is hit, and by so much, where another would have had noise: each burst's samples are measured

@@ -70,11 +70,16 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         return vec![];
     }
     let scatter = jackknife(&sums, &evidence.split.training).max(variance.sqrt());
+    vec![candidate(evidence, mu, scatter, p_value, gain)]
+}
+
+/// `scatter`: standard deviation of μ.
+fn candidate(evidence: &Evidence, mu: Complex64, scatter: f64, p_value: f64, gain: f64) -> Candidate {
     let (gain_db, phase_deg) = imbalance(mu);
     let db_error = DECIBEL * 2.0 * scatter / std::f64::consts::SQRT_2;
     let degree_error = (2.0 * scatter / std::f64::consts::SQRT_2).to_degrees();
     let total: f64 = evidence.cube.samples.iter().map(Complex64::norm_sqr).sum();
-    vec![Candidate {
+    Candidate {
         id: Some("iq_imbalance"),
         behaves_like: "conjugate image",
         estimates: vec![Estimate::normal("gain_db", gain_db, db_error), Estimate::normal("phase_deg", phase_deg, degree_error)],
@@ -92,7 +97,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         curve: None,
         energy: total * mu.norm_sqr(),
         correction: undo(mu),
-    }]
+    }
 }
 
 /// Strong parents whose image falls where neither body nor room can be, by channel.

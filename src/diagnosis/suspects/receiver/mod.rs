@@ -1,11 +1,15 @@
 //! The receiver and its noise: what lives in fast time, beat frequency and amplitude, and needs no body to be seen.
 
 pub mod bursts;
+mod coloured;
 mod crossings;
 pub mod declip;
+mod elements;
 pub mod field;
+mod filters;
 pub mod harmonic;
 pub mod image;
+mod line;
 pub mod noise;
 pub mod open;
 pub mod rail;
@@ -13,6 +17,7 @@ pub mod response;
 mod slow_spur;
 pub mod spur;
 pub mod still;
+mod still_term;
 pub mod support;
 pub mod wandering;
 pub mod zero_beat;

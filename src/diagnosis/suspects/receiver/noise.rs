@@ -7,20 +7,16 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use super::coloured::coloured;
 use super::image::empty_bins;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::cube::folds;
 use crate::diagnosis::evidence::{hann, transform_under};
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
-use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale, median};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
+use crate::diagnosis::statistics::{chi2_tail, corrected, median};
 
-/// Cells of a Hann-windowed map per independent one, with reserve for the quantile's inefficiency.
-const SHARED: f64 = 4.0;
 /// A cell's power over the noise, beyond which it is a mover's.
 const MOVER: f64 = 8.0;
-
-/// How well a real noise follows the law, as a logarithm's deviation.
-const LAW: f64 = 0.05;
 
 /// Cells of a map under one Hann window per independent product of two receivers' noise: neighbours in range are correlated by 2/3
 /// and 1/6, and their products by the square of that.
@@ -55,124 +51,6 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let known = ["correlated_noise", "mutual_coupling", "adc_saturation"].iter().any(|id| evidence.accepted.contains(id));
     let correlation = if known { None } else { correlated(evidence, &bins) };
     colour.into_iter().chain(correlation).collect()
-}
-
-/// Power over beat frequency, `[bin]`.
-fn spectrum(evidence: &Evidence, frames: &[usize], bins: &[usize]) -> Vec<f64> {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let channels = evidence.cube.channels();
-    let mut powers: Vec<Vec<f64>> = vec![vec![]; bins.len()];
-    for &frame in frames {
-        for channel in 0..channels {
-            let map = evidence.range_doppler(frame, channel);
-            let noise = evidence.noise()[channel].max(1e-300);
-            for (bin, powers) in bins.iter().zip(&mut powers) {
-                powers.extend((3..loops - 2).map(|doppler| map[doppler * samples + bin].norm_sqr() / noise));
-            }
-        }
-    }
-    powers.par_iter_mut().map(|powers| exponential_scale(powers, 0.5)).collect()
-}
-
-fn coloured(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let rate = evidence.radar.sample_rate_hz;
-    let hertz: Vec<f64> = bins.iter().map(|&bin| bin.min(samples - bin) as f64 * rate / samples as f64).collect();
-    let step = rate / samples as f64;
-    let per_frame = (evidence.cube.channels() * (loops - 5)) as f64 / SHARED;
-    let found = spectrum(evidence, &evidence.split.training, bins);
-    let held = spectrum(evidence, &evidence.split.held_out, bins);
-    let count = per_frame * evidence.split.training.len() as f64;
-    let fit = |knee: f64, power: f64| {
-        // A Hann window mixes a cell with its neighbours.
-        let of = |f: f64| 1.0 + (knee / f).powf(power);
-        let shape: Vec<f64> = hertz.iter().map(|f| (of(f - step) + 4.0 * of(*f) + of(f + step)) / 6.0).collect();
-        let level = found.iter().zip(&shape).map(|(p, s)| p / s).sum::<f64>() / bins.len() as f64;
-        let likelihood: f64 = found.iter().zip(&shape).map(|(p, s)| -(level * s).ln() - p / (level * s)).sum::<f64>() * count;
-        (likelihood, level, shape)
-    };
-    let (white, white_level, _) = fit(0.0, 1.0);
-    let likelihood = |[knee, power]: [f64; 2]| if knee < 0.5 * rate { fit(knee, power).0 } else { f64::NEG_INFINITY };
-    let grid: Vec<[f64; 2]> = (0..40)
-        .flat_map(|i| (1..=10).map(move |j| [0.05 * rate / samples as f64 * 1.22f64.powi(i), 0.25 * f64::from(j)]))
-        .collect();
-    let first = grid.into_iter().max_by(|a, b| likelihood(*a).total_cmp(&likelihood(*b)))?;
-    let Top { at: [knee, power], height: best, deviations } = climb(likelihood, first);
-    let p_value = corrected(chi2_tail(2.0 * (best - white), 2.0), 20.0);
-    if p_value > 1e-3 {
-        return None;
-    }
-    let (_, level, shape) = fit(knee, power);
-    let held_count = per_frame * evidence.split.held_out.len() as f64;
-    let gain: f64 = held
-        .iter()
-        .zip(&shape)
-        .map(|(p, s)| -(level * s).ln() - p / (level * s) + white_level.ln() + p / white_level)
-        .sum::<f64>()
-        * held_count;
-    let excess = found.iter().sum::<f64>() / bins.len() as f64 / level - 1.0;
-    let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
-    let of = |name: &'static str, value: f64, deviation: f64| {
-        let factor = (1.645 * deviation.hypot(LAW)).exp();
-        Estimate { name, values: vec![value], ci90: vec![[value / factor, value * factor]] }
-    };
-    Some(Candidate {
-        id: Some("coloured_noise"),
-        behaves_like: "noise over beat frequency",
-        estimates: vec![of("knee_hz", knee, deviations[0]), of("power", power, deviations[1])],
-        choice: None,
-        place: Place::at("noise"),
-        p_value,
-        gain,
-        errs_alike: false,
-        look_alikes: vec![],
-        statement: format!(
-            "the noise rises towards low beat frequencies, by 3 dB at {:.0} kHz and with the power {power:.2} of the frequency below: \
-             thermal noise would be level",
-            knee * 1e-3
-        ),
-        curve: Some(Curve {
-            title: "Noise over beat frequency".into(),
-            x_label: "beat frequency, Hz".into(),
-            y_label: "power over the median, dB".into(),
-            series: vec![
-                ("measured".into(), hertz.clone(), found.iter().map(|p| 10.0 * p.max(1e-12).log10()).collect()),
-                ("fitted".into(), hertz, shape.iter().map(|s| 10.0 * (level * s).log10()).collect()),
-            ],
-        }),
-        energy: excess.max(0.0) * level * noise * evidence.cube.samples.len() as f64,
-        correction: Correction::None,
-    })
-}
-
-/// The top of a likelihood of two positive parameters, with the deviations of their logarithms.
-struct Top {
-    at: [f64; 2],
-    height: f64,
-    deviations: [f64; 2],
-}
-
-/// From the best of a grid, by steps along both logarithms and their diagonals.
-fn climb(likelihood: impl Fn([f64; 2]) -> f64, first: [f64; 2]) -> Top {
-    const STEPS: [[f64; 2]; 8] =
-        [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
-    let moved = |at: [f64; 2], step: [f64; 2], width: f64| [0, 1].map(|i| at[i] * (width * step[i]).exp());
-    let (mut at, mut height, mut width) = (first, likelihood(first), 0.2);
-    while width > 1e-3 {
-        let near = STEPS.map(|step| moved(at, step, width)).map(|next| (next, likelihood(next)));
-        let (next, found) = near.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).expect("some steps");
-        if found > height { (at, height) = (next, found) } else { width *= 0.5 }
-    }
-    // Curvature, from second differences wide enough for the rounding.
-    let wide = 0.02;
-    let second = |a: [f64; 2], b: [f64; 2]| {
-        (2.0 * height - likelihood(moved(at, a, wide)) - likelihood(moved(at, b, wide))) / (wide * wide)
-    };
-    let [aa, bb] = [second(STEPS[0], STEPS[1]), second(STEPS[2], STEPS[3])];
-    let ab = 0.5 * (second(STEPS[4], STEPS[5]) - aa - bb);
-    let determinant = aa * bb - ab * ab;
-    let deviation = |other: f64| if determinant > 0.0 && other > 0.0 { (other / determinant).sqrt().min(1.0) } else { 1.0 };
-    Top { at, height, deviations: [deviation(bb), deviation(aa)] }
 }
 
 /// Whitened by each channel's own power; cells with a mover in any channel are left out.

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
-use super::still::subtract;
+use super::still_term::subtract;
 use super::support::{energy, range_m, ranges_m, tone};
 use super::zero_beat::ZeroBeat;
 use crate::diagnosis::evidence::hann;
@@ -175,12 +175,88 @@ fn offset(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
     })
 }
 
-fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let rate = evidence.radar.sample_rate_hz;
-    let long = samples * ZERO_PADDING;
+/// What is nearest in the spectra of still chirps, apart from what is behind it.
+struct Near {
+    /// Zero-padded, `[channel][bin]`, and their mean over the channels.
+    spectra: Vec<Vec<f64>>,
+    mean: Vec<f64>,
+    /// Bins of its summit, of the valley behind it, and of the strongest return farther away.
+    peak: usize,
+    valley: usize,
+    far: usize,
+    /// Bins from here on are not looked at.
+    last: usize,
+    bin_m: f64,
+    /// Power of the noise in a still chirp.
+    white: f64,
+}
+
+impl Near {
+    fn find(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Self> {
+        let [_, _, _, loops, samples] = evidence.cube.dims;
+        let long = samples * ZERO_PADDING;
+        let spectra = spectra(still);
+        let mean: Vec<f64> = (0..long).map(|bin| spectra.iter().map(|s| s[bin]).sum::<f64>() / spectra.len() as f64).collect();
+        let bin_m = range_m(evidence, evidence.radar.sample_rate_hz / long as f64);
+        let near = (NEAR_M / bin_m).floor() as usize;
+        let last = if evidence.is_real() { long / 2 } else { long - 4 * ZERO_PADDING };
+        if near < 2 || near + 8 >= last {
+            return None;
+        }
+        let best = |range: std::ops::Range<usize>| range.max_by(|&a, &b| mean[a].total_cmp(&mean[b]));
+        // A summit: what rises towards farther ranges is the flank of a return there.
+        let peak = best(0..near).filter(|&peak| mean[peak] >= mean[peak + 1])?;
+        let valley_end = (2.5 * NEAR_M / bin_m) as usize;
+        let valley = (peak..valley_end.min(last)).min_by(|&a, &b| mean[a].total_cmp(&mean[b]))?;
+        let far = best(valley..last)?;
+        let white =
+            evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64 / (loops * evidence.split.training.len()) as f64;
+        let found = Self { spectra, mean, peak, valley, far, last, bin_m, white };
+        let [at_peak, at_far] = [peak, far].map(|bin| found.mean[bin]);
+        let weak = found.depth_db() < VALLEY_DB || at_peak < 0.1 * at_far || decibels(found.over_noise(peak)) < 20.0;
+        (!weak).then_some(found)
+    }
+
+    fn over_noise(&self, bin: usize) -> f64 {
+        self.mean[bin] / self.white.max(1e-300)
+    }
+
+    /// Of the valley.
+    fn depth_db(&self) -> f64 {
+        decibels(self.mean[self.peak] / self.mean[self.valley])
+    }
+
+    /// Between the channels, dB.
+    fn spread(&self, bin: usize) -> f64 {
+        let of_channels = self.spectra.iter().map(|s| s[bin]);
+        let (low, high) = of_channels.fold((f64::INFINITY, 0.0f64), |(low, high), s| (low.min(s), high.max(s)));
+        decibels(high / low.max(1e-300))
+    }
+
+    /// Chance of its spread among those of the reflectors behind it.
+    fn as_reflectors(&self) -> f64 {
+        // Channels differ at a cell where several reflectors interfere, too: what leaks differs more than they do.
+        let reflectors = (self.valley + 1..self.last - 1)
+            .filter(|&bin| {
+                self.mean[bin] > self.mean[bin - 1]
+                    && self.mean[bin] >= self.mean[bin + 1]
+                    && decibels(self.over_noise(bin)) >= 20.0
+            })
+            .map(|bin| self.spread(bin));
+        rank_chance(self.spread(self.peak), reflectors)
+    }
+}
+
+fn decibels(ratio: f64) -> f64 {
+    10.0 * ratio.max(1e-30).log10()
+}
+
+/// Powers under a Hann window, zero-padded, `[channel][bin]`.
+fn spectra(still: &[Vec<Complex64>]) -> Vec<Vec<f64>> {
+    let samples = still[0].len();
     let window = hann(samples);
-    let spectra: Vec<Vec<f64>> = still
+    let long = samples * ZERO_PADDING;
+    still
         .iter()
         .map(|chirp| {
             let mut padded = vec![Complex64::ZERO; long];
@@ -190,60 +266,36 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
             FftPlanner::new().plan_fft_forward(long).process(&mut padded);
             padded.iter().map(Complex64::norm_sqr).collect()
         })
-        .collect();
-    let mean: Vec<f64> = (0..long).map(|bin| spectra.iter().map(|s| s[bin]).sum::<f64>() / spectra.len() as f64).collect();
-    let bin_m = range_m(evidence, rate / long as f64);
-    let near = (NEAR_M / bin_m).floor() as usize;
-    let last = if evidence.is_real() { long / 2 } else { long - 4 * ZERO_PADDING };
-    if near < 2 || near + 8 >= last {
-        return None;
-    }
-    let best = |range: std::ops::Range<usize>| range.max_by(|&a, &b| mean[a].total_cmp(&mean[b]));
-    // A summit: what rises towards farther ranges is the flank of a return there.
-    let peak = best(0..near).filter(|&peak| mean[peak] >= mean[peak + 1])?;
-    let valley_end = (2.5 * NEAR_M / bin_m) as usize;
-    let valley = (peak..valley_end.min(last)).min_by(|&a, &b| mean[a].total_cmp(&mean[b]))?;
-    let far = best(valley..last)?;
-    let decibels = |ratio: f64| 10.0 * ratio.max(1e-30).log10();
-    let white =
-        evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64 / (loops * evidence.split.training.len()) as f64;
-    let over_noise = mean[peak] / white.max(1e-300);
-    if decibels(mean[peak] / mean[valley]) < VALLEY_DB || mean[peak] < 0.1 * mean[far] || decibels(over_noise) < 20.0 {
-        return None;
-    }
-    let spread = |bin: usize| {
-        let (low, high) = spectra.iter().fold((f64::INFINITY, 0.0f64), |(low, high), s| (low.min(s[bin]), high.max(s[bin])));
-        decibels(high / low.max(1e-300))
-    };
-    let (near_spread, far_spread) = (spread(peak), spread(far));
-    // Channels differ at a cell where several reflectors interfere, too: what leaks differs more than they do.
-    let reflectors = (valley + 1..last - 1)
-        .filter(|&bin| mean[bin] > mean[bin - 1] && mean[bin] >= mean[bin + 1] && decibels(mean[bin] / white.max(1e-300)) >= 20.0)
-        .map(spread);
-    let as_reflectors = rank_chance(near_spread, reflectors);
-    let range = (peak as f64 * bin_m).max(0.0);
-    let end = valley as f64 / ZERO_PADDING as f64;
-    let part = near_part(&mean, end, white, samples, evidence.is_real())?;
+        .collect()
+}
+
+fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let near = Near::find(evidence, still)?;
+    let range = (near.peak as f64 * near.bin_m).max(0.0);
+    let end = near.valley as f64 / ZERO_PADDING as f64;
+    let part = near_part(&near.mean, end, near.white, samples, evidence.is_real())?;
     let term: Vec<Vec<Complex64>> =
         still.iter().map(|chirp| (&part * DVector::from_column_slice(chirp)).iter().copied().collect()).collect();
     let largest = term.iter().flatten().map(|value| value.norm()).fold(0.0, f64::max);
     let peak_sample = denoised::peak_beside(evidence, |channel, n| Some(term[channel][n]));
     let level_db = 20.0 * (largest / peak_sample.max(1e-300)).log10();
-    let resolution = range_m(evidence, rate / samples as f64);
+    let resolution = range_m(evidence, evidence.radar.sample_rate_hz / samples as f64);
     let variance = |channel: usize| evidence.noise()[channel] / (loops * evidence.split.training.len()) as f64;
     let beat = ZeroBeat::new(evidence, &term, variance);
     let channels = still.len();
+    let (near_spread, far_spread) = (near.spread(near.peak), near.spread(near.far));
     Some(Candidate {
         id: Some("tx_leakage"),
         behaves_like: "additive fast-time",
         estimates: vec![Estimate::normal("range_m", range, 0.3 * resolution), Estimate::normal("level_db", level_db, 1.0)],
         choice: None,
-        place: Place { range_m: Some([0.0, valley as f64 * bin_m]), ..Place::at("receiver") },
-        p_value: chi2_tail(2.0 * over_noise * channels as f64, 2.0 * channels as f64),
+        place: Place { range_m: Some([0.0, near.valley as f64 * near.bin_m]), ..Place::at("receiver") },
+        p_value: chi2_tail(2.0 * near.over_noise(near.peak) * channels as f64, 2.0 * channels as f64),
         gain: gain(evidence, &term),
         errs_alike: false,
         look_alikes: [
-            (as_reflectors > SIGNIFICANCE, "static_reflector"),
+            (near.as_reflectors() > SIGNIFICANCE, "static_reflector"),
             (!evidence.is_real() && beat.may_be_constant() && !beat.may_be_leakage(), "dc_offset"),
         ]
         .into_iter()
@@ -253,8 +305,8 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
             "a strong return {range:.2} m away that never changes, {:.0} dB above the valley behind it; it differs by \
              {near_spread:.0} dB between the {channels} channels, while the strongest far return ({:.1} m) differs by \
              {far_spread:.0} dB: the transmitters leak into the receivers",
-            decibels(mean[peak] / mean[valley]),
-            far as f64 * bin_m,
+            near.depth_db(),
+            near.far as f64 * near.bin_m,
         ),
         curve: None,
         energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * loops) as f64,

@@ -4,7 +4,6 @@
 //! room's delays: what is measured must lie in H · U, with U the space of the room's tones. No knowledge of the scene
 //! inside is needed. A filter that starts from rest leaves a decaying transient at the chirp's beginning instead.
 
-use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
@@ -13,9 +12,10 @@ use rayon::prelude::*;
 use rustfft::FftPlanner;
 
 use super::field::{Field, add, orthonormal};
+use super::filters::{Filter, SHAPES, Shape, decay};
 use super::support::{beat_hz, dot, tone};
 use crate::diagnosis::evidence::hann;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Volume};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Volume};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
 
@@ -23,78 +23,6 @@ use crate::diagnosis::{Cube, Evidence};
 const INDISTINGUISHABLE: f64 = 4.6;
 /// Power that a response must let through to be undone in full.
 const LEAST_POWER: f64 = 0.25;
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Shape {
-    /// `wrapped`: beat frequencies above half the sample rate count as negative.
-    Highpass {
-        order: i32,
-        from_rest: bool,
-        wrapped: bool,
-    },
-    Lowpass {
-        wrapped: bool,
-    },
-    Delay {
-        wrapped: bool,
-    },
-}
-
-impl Shape {
-    fn id(self) -> &'static str {
-        match self {
-            Self::Highpass { .. } => "if_highpass",
-            Self::Lowpass { .. } => "if_lowpass",
-            Self::Delay { .. } => "if_delay",
-        }
-    }
-
-    /// Response over the DFT's bins; `value` in hertz, or seconds for a delay.
-    fn response(self, value: f64, samples: usize, rate: f64) -> Vec<Complex64> {
-        let one = Complex64::ONE;
-        let hertz = |bin: usize, wrapped: bool| {
-            let bin = if wrapped && 2 * bin >= samples { bin as f64 - samples as f64 } else { bin as f64 };
-            bin * rate / samples as f64
-        };
-        (0..samples)
-            .map(|bin| match self {
-                Self::Highpass { order, wrapped, .. } => {
-                    let ratio = Complex64::I * (hertz(bin, wrapped) / value);
-                    (ratio / (one + ratio)).powi(order)
-                }
-                Self::Lowpass { wrapped } => one / (one + Complex64::I * (hertz(bin, wrapped) / value)),
-                Self::Delay { wrapped } => Complex64::cis(-TAU * hertz(bin, wrapped) * value),
-            })
-            .collect()
-    }
-
-    fn grid(self, samples: usize, rate: f64) -> Vec<f64> {
-        let geometric = |low: f64, high: f64, count: usize| {
-            (0..count).map(move |i| low * (high / low).powf(i as f64 / (count as f64 - 1.0))).collect::<Vec<_>>()
-        };
-        match self {
-            Self::Highpass { .. } => geometric(0.4 * rate / samples as f64, 0.25 * rate, 9),
-            Self::Lowpass { .. } => geometric(0.15 * rate, 20.0 * rate, 6),
-            Self::Delay { .. } => (-4..=4).filter(|&i| i != 0).map(|i| 0.4 * f64::from(i) / rate).collect(),
-        }
-    }
-}
-
-const SHAPES: [Shape; 13] = [
-    Shape::Highpass { order: 1, from_rest: false, wrapped: true },
-    Shape::Highpass { order: 2, from_rest: false, wrapped: true },
-    Shape::Highpass { order: 3, from_rest: false, wrapped: true },
-    Shape::Highpass { order: 1, from_rest: false, wrapped: false },
-    Shape::Highpass { order: 2, from_rest: false, wrapped: false },
-    Shape::Highpass { order: 3, from_rest: false, wrapped: false },
-    Shape::Highpass { order: 1, from_rest: true, wrapped: true },
-    Shape::Highpass { order: 2, from_rest: true, wrapped: true },
-    Shape::Highpass { order: 3, from_rest: true, wrapped: true },
-    Shape::Lowpass { wrapped: true },
-    Shape::Lowpass { wrapped: false },
-    Shape::Delay { wrapped: true },
-    Shape::Delay { wrapped: false },
-];
 
 /// A response and the log-likelihood that training frames gain by it.
 pub struct Found {
@@ -108,121 +36,143 @@ pub struct Found {
 ///
 /// `without`: the still chirps less an additive term that competes with it.
 pub fn find(evidence: &Evidence, field: &Field, without: &[Vec<Complex64>]) -> Option<Found> {
-    let samples = evidence.cube.dims[4];
-    let rate = evidence.radar.sample_rate_hz;
-    let band = |range: f64| beat_hz(evidence, range) / rate;
-    let process = Process::new(field, band(field.support.low_m), band(field.support.high_m));
-    let training = evidence.split.training.len() as f64;
-    let of_mean: Vec<f64> = field.variance.iter().map(|variance| variance / training).collect();
-    let nothing = process.likelihood(&field.still, &of_mean, None, rate);
+    let search = Search::new(evidence, field);
     // What an additive term would make of the same scene.
-    let additive = process.likelihood(without, &of_mean, None, rate) - nothing;
-    let likelihood = |shape: Shape, value: f64| process.likelihood(&field.still, &of_mean, Some((shape, value)), rate) - nothing;
-    let tried: Vec<(f64, Shape, f64)> = SHAPES
-        .iter()
-        .filter(|shape| !evidence.accepted.contains(&shape.id()))
-        .flat_map(|&shape| shape.grid(samples, rate).into_iter().map(move |value| (shape, value)))
-        .collect::<Vec<_>>()
-        .into_par_iter()
-        .map(|(shape, value)| (likelihood(shape, value), shape, value))
-        .collect();
-    let count = tried.len() as f64;
-    // The best grid point of each shape, the promising ones refined.
-    let mut best: Vec<(f64, Shape, f64)> = vec![];
-    for shape in SHAPES {
-        let of_shape = tried.iter().filter(|(_, s, _)| *s == shape).max_by(|a, b| a.0.total_cmp(&b.0));
-        best.extend(of_shape.copied());
-    }
-    best.sort_by(|a, b| b.0.total_cmp(&a.0));
-    best.truncate(3);
-    let mut best: Vec<(f64, Shape, f64)> = best
-        .into_par_iter()
-        .map(|(_, shape, value)| {
-            let value = refine(shape, value, samples, rate, |value| likelihood(shape, value));
-            (likelihood(shape, value), shape, value)
-        })
-        .collect();
-    best.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let &(top, shape, value) = best.first()?;
+    let additive = search.process.likelihood(without, &search.of_mean, None, search.rate) - search.nothing;
+    let (best, count) = search.best();
+    let &(top, shape, _) = best.first()?;
     if top <= 0.0 {
         return None;
     }
     let p_value = corrected(chi2_tail(2.0 * top, 3.0), count);
-    let held_out: Vec<Vec<Complex64>> =
-        evidence.cube.still(field.held_out()).chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
-    let of_held_out: Vec<f64> = field.variance.iter().map(|variance| variance / field.held_out().len().max(1) as f64).collect();
-    let gain = process.likelihood(&held_out, &of_held_out, Some((shape, value)), rate)
-        - process.likelihood(&held_out, &of_held_out, None, rate);
-    let step = 0.01 * value.abs();
-    let curvature = (2.0 * top - likelihood(shape, value + step) - likelihood(shape, value - step)) / (step * step);
-    let error = if curvature > 0.0 { curvature.recip().sqrt().max(2e-3 * value.abs()) } else { 0.1 * value.abs() };
     let mut look_alikes: Vec<&'static str> = best
         .iter()
         .filter(|(likelihood, other, _)| top - likelihood < INDISTINGUISHABLE && other.id() != shape.id())
         .map(|(_, other, _)| other.id())
         .collect();
     look_alikes.dedup();
-    let (estimates, statement) = described(shape, value, error);
-    let response = shape.response(value, samples, rate);
-    let (fitted, still) = restored(field, shape, value, rate);
-    let energy = field
-        .still
-        .iter()
-        .zip(&still)
-        .map(|(found, clean)| found.iter().zip(clean).map(|(a, b)| (a - b).norm_sqr()).sum::<f64>())
-        .sum::<f64>()
-        * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
-    let half = samples / 2;
-    let hertz: Vec<f64> = (0..half).map(|bin| bin as f64 * rate / samples as f64).collect();
-    let decibels = (0..half).map(|bin| 20.0 * response[bin].norm().max(1e-6).log10()).collect();
-    let candidate = Candidate {
-        id: Some(shape.id()),
-        behaves_like: "beat-frequency gain",
-        estimates,
-        choice: None,
-        place: Place::at("receiver"),
-        p_value,
-        gain,
-        errs_alike: false,
-        look_alikes,
-        statement,
-        curve: Some(Curve {
-            title: "Response of the intermediate frequency".into(),
-            x_label: "beat frequency, Hz".into(),
-            y_label: "gain, dB".into(),
-            series: vec![("fitted".into(), hertz, decibels)],
-        }),
-        energy,
-        correction: undo(&response, fitted, still),
-    };
+    let candidate = search.candidate(best[0], p_value, look_alikes);
     Some(Found { candidate, likelihood: top, additive })
 }
 
-fn described(shape: Shape, value: f64, error: f64) -> (Vec<Estimate>, String) {
-    match shape {
-        Shape::Highpass { order, from_rest, .. } => (
-            vec![
-                Estimate::normal("corner_hz", value, error),
-                Estimate { name: "order", values: vec![order.into()], ci90: vec![[f64::from(order), f64::from(order)]] },
-            ],
-            format!(
-                "the receiver weakens and turns low beat frequencies: a high-pass filter of order {order} with its corner at \
-                 {:.0} kHz{}; near ranges appear too weak",
-                value * 1e-3,
-                if from_rest { ", which starts from rest in each chirp and leaves a transient" } else { "" }
-            ),
-        ),
-        Shape::Lowpass { .. } => (
-            vec![Estimate::normal("corner_hz", value, error)],
-            format!(
-                "the receiver weakens and delays high beat frequencies: a low-pass filter with its corner at {:.2} MHz",
-                value * 1e-6
-            ),
-        ),
-        Shape::Delay { .. } => (
-            vec![Estimate::normal("delay_s", value, error)],
-            format!("the intermediate frequency reaches the converter {:.1} ns late", value * 1e9),
-        ),
+/// A shape with its value, after the log-likelihood that it gains.
+type Tried = (f64, Shape, f64);
+
+/// Responses by what they make of the still chirps.
+struct Search<'a> {
+    evidence: &'a Evidence,
+    field: &'a Field,
+    process: Process,
+    rate: f64,
+    /// Variance of the mean chirps, by channel.
+    of_mean: Vec<f64>,
+    /// Log-likelihood without a response.
+    nothing: f64,
+}
+
+impl<'a> Search<'a> {
+    fn new(evidence: &'a Evidence, field: &'a Field) -> Self {
+        let rate = evidence.radar.sample_rate_hz;
+        let band = |range: f64| beat_hz(evidence, range) / rate;
+        let process = Process::new(field, band(field.support.low_m), band(field.support.high_m));
+        let training = evidence.split.training.len() as f64;
+        let of_mean: Vec<f64> = field.variance.iter().map(|variance| variance / training).collect();
+        let nothing = process.likelihood(&field.still, &of_mean, None, rate);
+        Self { evidence, field, process, rate, of_mean, nothing }
+    }
+
+    fn likelihood(&self, shape: Shape, value: f64) -> f64 {
+        self.process.likelihood(&self.field.still, &self.of_mean, Some((shape, value)), self.rate) - self.nothing
+    }
+
+    /// The best of the most promising shapes, best first, and how many were tried.
+    fn best(&self) -> (Vec<Tried>, f64) {
+        let (samples, rate) = (self.evidence.cube.dims[4], self.rate);
+        let tried: Vec<Tried> = SHAPES
+            .iter()
+            .filter(|shape| !self.evidence.accepted.contains(&shape.id()))
+            .flat_map(|&shape| shape.grid(samples, rate).into_iter().map(move |value| (shape, value)))
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|(shape, value)| (self.likelihood(shape, value), shape, value))
+            .collect();
+        // The best grid point of each shape, the promising ones refined.
+        let mut best: Vec<Tried> = vec![];
+        for shape in SHAPES {
+            let of_shape = tried.iter().filter(|(_, s, _)| *s == shape).max_by(|a, b| a.0.total_cmp(&b.0));
+            best.extend(of_shape.copied());
+        }
+        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        best.truncate(3);
+        let mut best: Vec<Tried> = best
+            .into_par_iter()
+            .map(|(_, shape, value)| {
+                let value = refine(shape, value, samples, rate, |value| self.likelihood(shape, value));
+                (self.likelihood(shape, value), shape, value)
+            })
+            .collect();
+        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        (best, tried.len() as f64)
+    }
+
+    /// Log-likelihood that the held-out frames gain.
+    fn gain(&self, shape: Shape, value: f64) -> f64 {
+        let Self { evidence, field, process, rate, .. } = self;
+        let samples = evidence.cube.dims[4];
+        let held_out: Vec<Vec<Complex64>> =
+            evidence.cube.still(field.held_out()).chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
+        let of_held_out: Vec<f64> =
+            field.variance.iter().map(|variance| variance / field.held_out().len().max(1) as f64).collect();
+        process.likelihood(&held_out, &of_held_out, Some((shape, value)), *rate)
+            - process.likelihood(&held_out, &of_held_out, None, *rate)
+    }
+
+    /// Standard deviation of a value, by the likelihood's curvature there.
+    fn deviation(&self, (top, shape, value): Tried) -> f64 {
+        let step = 0.01 * value.abs();
+        let curvature = (2.0 * top - self.likelihood(shape, value + step) - self.likelihood(shape, value - step)) / (step * step);
+        if curvature > 0.0 { curvature.recip().sqrt().max(2e-3 * value.abs()) } else { 0.1 * value.abs() }
+    }
+
+    fn candidate(&self, best: Tried, p_value: f64, look_alikes: Vec<&'static str>) -> Candidate {
+        let (evidence, field, (_, shape, value)) = (self.evidence, self.field, best);
+        let (estimates, statement) = shape.described(value, self.deviation(best));
+        let response = shape.response(value, evidence.cube.dims[4], self.rate);
+        let (fitted, still) = restored(field, shape, value, self.rate);
+        let energy = field
+            .still
+            .iter()
+            .zip(&still)
+            .map(|(found, clean)| found.iter().zip(clean).map(|(a, b)| (a - b).norm_sqr()).sum::<f64>())
+            .sum::<f64>()
+            * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
+        Candidate {
+            id: Some(shape.id()),
+            behaves_like: "beat-frequency gain",
+            estimates,
+            choice: None,
+            place: Place::at("receiver"),
+            p_value,
+            gain: self.gain(shape, value),
+            errs_alike: false,
+            look_alikes,
+            statement,
+            curve: Some(curve(&response, self.rate)),
+            energy,
+            correction: undo(&response, fitted, still),
+        }
+    }
+}
+
+fn curve(response: &[Complex64], rate: f64) -> Curve {
+    let (samples, half) = (response.len(), response.len() / 2);
+    let hertz: Vec<f64> = (0..half).map(|bin| bin as f64 * rate / samples as f64).collect();
+    let decibels = (0..half).map(|bin| 20.0 * response[bin].norm().max(1e-6).log10()).collect();
+    Curve {
+        title: "Response of the intermediate frequency".into(),
+        x_label: "beat frequency, Hz".into(),
+        y_label: "gain, dB".into(),
+        series: vec![("fitted".into(), hertz, decibels)],
     }
 }
 
@@ -314,15 +264,6 @@ impl Process {
     }
 }
 
-fn decay(turns_per_sample: f64, power: i32, samples: usize, amplitude: f64) -> Vec<Complex64> {
-    (0..samples)
-        .map(|n| {
-            let turns = turns_per_sample * n as f64;
-            Complex64::from(amplitude * (TAU * turns).powi(power) * (-TAU * turns).exp())
-        })
-        .collect()
-}
-
 /// What the static scene can look like behind the response.
 fn space(field: &Field, shape: Shape, value: f64, rate: f64) -> Vec<Vec<Complex64>> {
     let inside = &field.support.inside;
@@ -383,31 +324,6 @@ fn undo(response: &[Complex64], fitted: Vec<Vec<Complex64>>, still: Vec<Vec<Comp
         }),
         Volume { alike: stretched, ..Volume::KEPT },
     )
-}
-
-/// A multiplication of a chirp's DFT.
-struct Filter {
-    response: Vec<Complex64>,
-    forward: Arc<dyn rustfft::Fft<f64>>,
-    inverse: Arc<dyn rustfft::Fft<f64>>,
-}
-
-impl Filter {
-    fn new(response: &[Complex64]) -> Self {
-        let mut planner = FftPlanner::new();
-        let samples = response.len();
-        Self {
-            response: response.iter().map(|h| h / samples as f64).collect(),
-            forward: planner.plan_fft_forward(samples),
-            inverse: planner.plan_fft_inverse(samples),
-        }
-    }
-
-    fn apply(&self, chirp: &mut [Complex64]) {
-        self.forward.process(chirp);
-        chirp.iter_mut().zip(&self.response).for_each(|(value, h)| *value *= h);
-        self.inverse.process(chirp);
-    }
 }
 
 /// Golden-section search between the grid's neighbours.

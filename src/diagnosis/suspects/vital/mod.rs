@@ -11,9 +11,10 @@ mod rhythm;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use frames::frames;
+use circle::Reflector;
+use frames::{Frames, frames};
 use num_complex::Complex64;
-use rhythm::{BREATHING_HZ, HEART_HZ, rhythm};
+use rhythm::{BREATHING_HZ, HEART_HZ, Rhythm, rhythm};
 
 use super::region::{Region, remove};
 use crate::diagnosis::course::{Course, Of};
@@ -46,13 +47,33 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
 fn one(evidence: &Evidence) -> Option<Candidate> {
     let data = frames(evidence);
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
-    let channels = evidence.cube.channels();
     let bins = data.bins;
-    let mean: Vec<Complex64> = (0..channels * bins)
+    let mean: Vec<Complex64> = (0..evidence.cube.channels() * bins)
         .map(|i| training.iter().map(|&f| data.values[f][i]).sum::<Complex64>() / training.len() as f64)
         .collect();
-    // Power of what changes over the noise, by range.
-    let change: Vec<f64> = (0..bins)
+    let change = change(&data, &mean, training);
+    let strongest = (NEAREST_BIN..bins.saturating_sub(1)).max_by(|&a, &b| change[a].total_cmp(&change[b]))?;
+    if change[strongest] < 10.0 {
+        return None;
+    }
+    let near = strongest.saturating_sub(NEIGHBOURS + 1)..(strongest + NEIGHBOURS + 2).min(bins);
+    let moving: Vec<usize> = near.filter(|&bin| change[bin] > 10.0).collect();
+    let best = circle::common(&data, &mean, &moving, training)?;
+    let metres = evidence.radar.wavelength_m() / (4.0 * PI);
+    let named = rhythm(&evidence.starts_s, &best.phase, training, held_out)
+        .filter(|r| r.share > RHYTHMIC && r.p_value < 1e-3)
+        .and_then(|r| Some((name(&r, metres)?, r)));
+    let gain = held_out_gain(evidence, &data, &mean, &best);
+    if gain <= 3.0 {
+        return None;
+    }
+    Some(Motion { evidence, data, change, strongest, circle: best, metres, named }.candidate(gain))
+}
+
+/// Power of what changes over the noise, by range.
+fn change(data: &Frames, mean: &[Complex64], training: &[usize]) -> Vec<f64> {
+    let (bins, channels) = (data.bins, data.noise.len());
+    (0..bins)
         .map(|bin| {
             let sum: f64 = (0..channels)
                 .map(|c| {
@@ -62,29 +83,27 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
                 .sum();
             sum / (channels * (training.len() - 1)) as f64
         })
-        .collect();
-    let strongest = (NEAREST_BIN..bins.saturating_sub(1)).max_by(|&a, &b| change[a].total_cmp(&change[b]))?;
-    if change[strongest] < 10.0 {
-        return None;
+        .collect()
+}
+
+/// What moves in a rhythm by its rate and its size; `metres`: of a radian.
+fn name(rhythm: &Rhythm, metres: f64) -> Option<&'static str> {
+    let (rate, amplitude_m) = (rhythm.frequency_hz, rhythm.amplitude * metres);
+    if (BREATHING_HZ[0]..=BREATHING_HZ[1]).contains(&rate) && amplitude_m < LARGEST_BREATH_M {
+        Some("breathing")
+    } else if (HEART_HZ[0]..=HEART_HZ[1]).contains(&rate) && amplitude_m < LARGEST_HEARTBEAT_M {
+        Some("heartbeat")
+    } else {
+        None
     }
-    let near = strongest.saturating_sub(NEIGHBOURS + 1)..(strongest + NEIGHBOURS + 2).min(bins);
-    let moving: Vec<usize> = near.filter(|&bin| change[bin] > 10.0).collect();
-    let best = circle::common(&data, &mean, &moving, training)?;
-    let times: Vec<f64> = evidence.starts_s.clone();
-    let rhythm = rhythm(&times, &best.phase, training, held_out);
-    let metres = evidence.radar.wavelength_m() / (4.0 * PI);
-    let named = rhythm.as_ref().filter(|r| r.share > RHYTHMIC && r.p_value < 1e-3).and_then(|r| {
-        let (rate, amplitude_m) = (r.frequency_hz, r.amplitude * metres);
-        if (BREATHING_HZ[0]..=BREATHING_HZ[1]).contains(&rate) && amplitude_m < LARGEST_BREATH_M {
-            Some(("breathing", r))
-        } else if (HEART_HZ[0]..=HEART_HZ[1]).contains(&rate) && amplitude_m < LARGEST_HEARTBEAT_M {
-            Some(("heartbeat", r))
-        } else {
-            None
-        }
-    });
+}
+
+/// Log-likelihood that the held-out frames gain.
+fn held_out_gain(evidence: &Evidence, data: &Frames, mean: &[Complex64], best: &Reflector) -> f64 {
+    let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
+    let times = &evidence.starts_s;
     // A held-out frame lies between two training frames; its phase is between theirs.
-    let gain: f64 = held_out
+    held_out
         .iter()
         .map(|&f| {
             let before = training.iter().rev().find(|&&t| t < f);
@@ -102,79 +121,110 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
                 })
                 .sum::<f64>()
         })
-        .sum();
-    if gain <= 3.0 {
-        return None;
+        .sum()
+}
+
+/// A slow motion at some range.
+struct Motion<'a> {
+    evidence: &'a Evidence,
+    data: Frames,
+    /// Power of what changes over the noise, by range, and where it is strongest.
+    change: Vec<f64>,
+    strongest: usize,
+    circle: Reflector,
+    /// Of a radian.
+    metres: f64,
+    /// What it is by its rhythm.
+    named: Option<(&'static str, Rhythm)>,
+}
+
+impl Motion<'_> {
+    /// Range bins that it reaches.
+    fn ends(&self) -> [usize; 2] {
+        let (change, bins) = (&self.change, self.data.bins);
+        let reach = |mut bin: usize, step: isize| {
+            while change[bin] > 2.0 && bin > NEAREST_BIN && bin + 1 < bins {
+                bin = bin.wrapping_add_signed(step);
+            }
+            bin
+        };
+        [reach(self.strongest, -1), reach(self.strongest, 1)]
     }
-    let reach = |mut bin: usize, step: isize| {
-        while change[bin] > 2.0 && bin > NEAREST_BIN && bin + 1 < bins {
-            bin = bin.wrapping_add_signed(step);
+
+    /// `displacement`: mm.
+    fn statement(&self, range_m: f64, displacement: &[f64]) -> String {
+        let extent = displacement.iter().fold([f64::MAX, f64::MIN], |[low, high], &d| [low.min(d), high.max(d)]);
+        match &self.named {
+            Some((id, r)) => format!(
+                "At {range_m:.2} m something moves to and fro {:.1} times a minute ({:.3} Hz) by {:.2} mm (amplitude of the \
+                 fundamental); {:.0} % of its motion has this rhythm, as {} has.",
+                60.0 * r.frequency_hz,
+                r.frequency_hz,
+                1e3 * r.amplitude * self.metres,
+                100.0 * r.share,
+                if *id == "breathing" { "a breathing chest" } else { "a beating heart" }
+            ),
+            None => format!(
+                "At {range_m:.2} m something moves slowly, over {:.1} mm during the recording, without a rhythm that would show \
+                 within its length.",
+                extent[1] - extent[0]
+            ),
         }
-        bin
-    };
-    let ends = [reach(strongest, -1), reach(strongest, 1)];
-    let bin_m = evidence.radar.range_resolution_m();
-    let range_m = strongest as f64 * bin_m;
-    let displacement: Vec<f64> = best.phase.iter().map(|p| 1e3 * p * metres).collect();
-    let extent = displacement.iter().fold([f64::MAX, f64::MIN], |[low, high], &d| [low.min(d), high.max(d)]);
-    let statement = match named {
-        Some((id, r)) => format!(
-            "At {range_m:.2} m something moves to and fro {:.1} times a minute ({:.3} Hz) by {:.2} mm (amplitude of the \
-             fundamental); {:.0} % of its motion has this rhythm, as {} has.",
-            60.0 * r.frequency_hz,
-            r.frequency_hz,
-            1e3 * r.amplitude * metres,
-            100.0 * r.share,
-            if id == "breathing" { "a breathing chest" } else { "a beating heart" }
-        ),
-        None => format!(
-            "At {range_m:.2} m something moves slowly, over {:.1} mm during the recording, without a rhythm that would show \
-             within its length.",
-            extent[1] - extent[0]
-        ),
-    };
-    // Of the change alone; the rhythm has its own.
-    let changed = statistics::corrected(
-        statistics::mean_power_tail(change[strongest], (channels * (training.len() - 1)) as f64),
-        bins as f64,
-    );
-    let region = Region { range: [ends[0].saturating_sub(1) as f64, (ends[1] + 1) as f64], doppler: [-1.0, 1.0] };
-    let turned = best.phase.iter().map(|&phase| Complex64::cis(phase)).collect();
-    let course = Course { of: Of::Mover { bin: best.bin as f64, amplitude: best.amplitude.clone() }, turned };
-    let training = training.clone();
-    let energy: f64 = change.iter().map(|c| (c - 1.0).max(0.0)).sum::<f64>()
-        * data.noise.iter().sum::<f64>()
-        * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
-    Some(Candidate {
-        id: named.map(|n| n.0),
-        behaves_like: super::paths::PATH_LIKE,
-        estimates: named.map_or(vec![], |(_, r)| {
-            vec![
-                Estimate::normal("rate_hz", r.frequency_hz, r.frequency_deviation_hz),
-                Estimate::normal("amplitude_m", r.amplitude * metres, r.amplitude_deviation * metres),
-            ]
-        }),
-        choice: None,
-        place: Place {
-            range_m: Some([ends[0] as f64 * bin_m, ends[1] as f64 * bin_m]),
-            ..Place::at(if named.is_some() { "body" } else { "scene" })
-        },
-        p_value: named.map_or(changed, |(_, r)| statistics::corrected(r.p_value, 4.0)),
-        gain,
-        errs_alike: true,
-        // A curtain in the wind does the same; so does whatever oscillates there.
-        look_alikes: if named.is_some() { vec!["moving_reflector"] } else { vec![] },
-        statement,
-        curve: Some(Curve {
-            title: format!("Displacement at {range_m:.2} m"),
-            x_label: "time, s".into(),
-            y_label: "displacement, mm".into(),
-            series: vec![("measured".into(), times, displacement)],
-        }),
-        energy,
-        correction: Correction::Followed(
-            Box::new(Correction::Samples(Arc::new(move |cube| remove(cube, &training, 1, region)))),
-            Arc::new(course),
-        ),
-    })
+    }
+
+    /// Of the change alone; a rhythm has its own.
+    fn p_value(&self) -> f64 {
+        if let Some((_, rhythm)) = &self.named {
+            return statistics::corrected(rhythm.p_value, 4.0);
+        }
+        let count = (self.data.noise.len() * (self.evidence.split.training.len() - 1)) as f64;
+        statistics::corrected(statistics::mean_power_tail(self.change[self.strongest], count), self.data.bins as f64)
+    }
+
+    fn candidate(self, gain: f64) -> Candidate {
+        let (evidence, metres, ends) = (self.evidence, self.metres, self.ends());
+        let bin_m = evidence.radar.range_resolution_m();
+        let range_m = self.strongest as f64 * bin_m;
+        let displacement: Vec<f64> = self.circle.phase.iter().map(|p| 1e3 * p * metres).collect();
+        let (statement, p_value) = (self.statement(range_m, &displacement), self.p_value());
+        let region = Region { range: [ends[0].saturating_sub(1) as f64, (ends[1] + 1) as f64], doppler: [-1.0, 1.0] };
+        let turned = self.circle.phase.iter().map(|&phase| Complex64::cis(phase)).collect();
+        let course = Course { of: Of::Mover { bin: self.circle.bin as f64, amplitude: self.circle.amplitude }, turned };
+        let training = evidence.split.training.clone();
+        let energy: f64 = self.change.iter().map(|c| (c - 1.0).max(0.0)).sum::<f64>()
+            * self.data.noise.iter().sum::<f64>()
+            * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
+        Candidate {
+            id: self.named.as_ref().map(|n| n.0),
+            behaves_like: super::paths::PATH_LIKE,
+            estimates: self.named.as_ref().map_or(vec![], |(_, r)| {
+                vec![
+                    Estimate::normal("rate_hz", r.frequency_hz, r.frequency_deviation_hz),
+                    Estimate::normal("amplitude_m", r.amplitude * metres, r.amplitude_deviation * metres),
+                ]
+            }),
+            choice: None,
+            place: Place {
+                range_m: Some([ends[0] as f64 * bin_m, ends[1] as f64 * bin_m]),
+                ..Place::at(if self.named.is_some() { "body" } else { "scene" })
+            },
+            p_value,
+            gain,
+            errs_alike: true,
+            // A curtain in the wind does the same; so does whatever oscillates there.
+            look_alikes: if self.named.is_some() { vec!["moving_reflector"] } else { vec![] },
+            statement,
+            curve: Some(Curve {
+                title: format!("Displacement at {range_m:.2} m"),
+                x_label: "time, s".into(),
+                y_label: "displacement, mm".into(),
+                series: vec![("measured".into(), evidence.starts_s.clone(), displacement)],
+            }),
+            energy,
+            correction: Correction::Followed(
+                Box::new(Correction::Samples(Arc::new(move |cube| remove(cube, &training, 1, region)))),
+                Arc::new(course),
+            ),
+        }
+    }
 }

@@ -24,18 +24,26 @@ pub struct Rhythm {
     pub p_value: f64,
 }
 
-pub fn rhythm(times: &[f64], phase: &[f64], training: &[usize], held_out: &[usize]) -> Option<Rhythm> {
-    let duration = times[times.len() - 1] - times[0];
-    let interval = duration / (times.len() - 1) as f64;
-    let frames: Vec<usize> = {
-        let mut all = [training, held_out].concat();
-        all.sort_unstable();
-        all
-    };
-    let lowest = (FEWEST_PERIODS / duration).max(0.5 * BREATHING_HZ[0]);
-    let highest = HEART_HZ[1].min(0.4 / interval);
-    // A straight line is the body's slow sway.
-    let fit = |frequency: Option<f64>| -> (f64, f64, Vec<f64>) {
+/// A phase over the frames' times.
+struct Series<'a> {
+    times: &'a [f64],
+    phase: &'a [f64],
+    frames: Vec<usize>,
+    duration: f64,
+}
+
+/// A sinusoid beside a straight line.
+struct Fit {
+    misfit: f64,
+    amplitude: f64,
+    /// What is left, by frame.
+    left: Vec<f64>,
+}
+
+impl Series<'_> {
+    /// A straight line is the body's slow sway.
+    fn fit(&self, frequency: Option<f64>) -> Fit {
+        let Self { times, phase, frames, duration } = self;
         let size = if frequency.is_some() { 4 } else { 2 };
         let mut normal = DMatrix::<f64>::zeros(size, size);
         let mut right = DVector::<f64>::zeros(size);
@@ -47,7 +55,7 @@ pub fn rhythm(times: &[f64], phase: &[f64], training: &[usize], held_out: &[usiz
             }
             DVector::from_vec(row)
         };
-        for &f in &frames {
+        for &f in frames {
             let row = row(times[f]);
             right += &row * phase[f];
             normal += &row * row.transpose();
@@ -55,42 +63,62 @@ pub fn rhythm(times: &[f64], phase: &[f64], training: &[usize], held_out: &[usiz
         let found = normal.cholesky().map_or_else(|| DVector::zeros(size), |c| c.solve(&right));
         let left: Vec<f64> = frames.iter().map(|&f| phase[f] - found.dot(&row(times[f]))).collect();
         let misfit = left.iter().map(|l| l * l).sum();
-        (misfit, if size == 4 { found[2].hypot(found[3]) } else { 0.0 }, left)
-    };
-    let step = 0.1 / duration;
-    let steps = ((highest - lowest) / step).floor();
-    if steps < 2.0 {
-        return None;
+        Fit { misfit, amplitude: if size == 4 { found[2].hypot(found[3]) } else { 0.0 }, left }
     }
-    let total = fit(None).0;
-    let best =
-        (0..=steps as usize).map(|i| lowest + i as f64 * step).min_by(|a, b| fit(Some(*a)).0.total_cmp(&fit(Some(*b)).0))?;
-    let mut frequency_hz = best;
-    let mut width = 0.5 * step;
-    while width > 1e-3 * step {
-        let misfit = |f: f64| fit(Some(f)).0;
-        if misfit(frequency_hz + width) < misfit(frequency_hz) {
-            frequency_hz += width;
-        } else if misfit(frequency_hz - width) < misfit(frequency_hz) {
-            frequency_hz -= width;
-        } else {
-            width *= 0.5;
+
+    /// The frequency between two that leaves the least.
+    fn best(&self, lowest: f64, highest: f64) -> Option<f64> {
+        let step = 0.1 / self.duration;
+        let steps = ((highest - lowest) / step).floor();
+        if steps < 2.0 {
+            return None;
         }
-    }
-    let (misfit, amplitude, left) = fit(Some(frequency_hz));
-    let share = 1.0 - misfit / total.max(f64::MIN_POSITIVE);
-    // The rest of the motion is slow as well: what counts is how far the line stands out of the frequencies around it,
-    // its harmonics left out.
-    let reach = if frequency_hz < HEART_HZ[0] { [0.0, HEART_HZ[0]] } else { [frequency_hz - 0.5, frequency_hz + 0.5] };
-    let mut around = vec![];
-    for k in 1..(0.5 * duration / interval) as usize {
-        let f = k as f64 / duration;
-        let harmonic = (f / frequency_hz).round().max(1.0) * frequency_hz;
-        if f >= reach[0] && f <= reach[1] && (f - harmonic).abs() > 1.0 / duration {
-            let sum: Complex64 = left.iter().zip(&frames).map(|(l, &i)| l * Complex64::cis(-TAU * f * times[i])).sum();
-            around.push((2.0 * sum.norm() / left.len() as f64).powi(2));
+        let misfit = |f: f64| self.fit(Some(f)).misfit;
+        let mut frequency_hz =
+            (0..=steps as usize).map(|i| lowest + i as f64 * step).min_by(|a, b| misfit(*a).total_cmp(&misfit(*b)))?;
+        let mut width = 0.5 * step;
+        while width > 1e-3 * step {
+            if misfit(frequency_hz + width) < misfit(frequency_hz) {
+                frequency_hz += width;
+            } else if misfit(frequency_hz - width) < misfit(frequency_hz) {
+                frequency_hz -= width;
+            } else {
+                width *= 0.5;
+            }
         }
+        Some(frequency_hz)
     }
+
+    /// Squared amplitudes of what is left at the frequencies around one, its harmonics left out.
+    fn around(&self, frequency_hz: f64, left: &[f64], interval: f64) -> Vec<f64> {
+        let Self { times, frames, duration, .. } = self;
+        let reach = if frequency_hz < HEART_HZ[0] { [0.0, HEART_HZ[0]] } else { [frequency_hz - 0.5, frequency_hz + 0.5] };
+        let mut around = vec![];
+        for k in 1..(0.5 * duration / interval) as usize {
+            let f = k as f64 / duration;
+            let harmonic = (f / frequency_hz).round().max(1.0) * frequency_hz;
+            if f >= reach[0] && f <= reach[1] && (f - harmonic).abs() > 1.0 / duration {
+                let sum: Complex64 = left.iter().zip(frames).map(|(l, &i)| l * Complex64::cis(-TAU * f * times[i])).sum();
+                around.push((2.0 * sum.norm() / left.len() as f64).powi(2));
+            }
+        }
+        around
+    }
+}
+
+pub fn rhythm(times: &[f64], phase: &[f64], training: &[usize], held_out: &[usize]) -> Option<Rhythm> {
+    let duration = times[times.len() - 1] - times[0];
+    let interval = duration / (times.len() - 1) as f64;
+    let mut frames = [training, held_out].concat();
+    frames.sort_unstable();
+    let series = Series { times, phase, frames, duration };
+    let lowest = (FEWEST_PERIODS / duration).max(0.5 * BREATHING_HZ[0]);
+    let highest = HEART_HZ[1].min(0.4 / interval);
+    let frequency_hz = series.best(lowest, highest)?;
+    let Fit { misfit, amplitude, left } = series.fit(Some(frequency_hz));
+    let share = 1.0 - misfit / series.fit(None).misfit.max(f64::MIN_POSITIVE);
+    // The rest of the motion is slow as well: what counts is how far the line stands out of the frequencies around it.
+    let around = series.around(frequency_hz, &left, interval);
     if around.len() < 3 {
         return None;
     }

@@ -16,24 +16,20 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 
+use super::doppler_cells::{Cell, cells, place};
 use crate::diagnosis::estimated::Estimated;
-use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Volume};
 use crate::diagnosis::power::PowerModel;
-use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::speckle::{Look, groups};
 use crate::diagnosis::statistics::{DECIBEL, corrected};
 use crate::diagnosis::{BodyPrediction, Cube, Evidence};
 use crate::effects::legendre;
-use crate::radar::SPEED_OF_LIGHT;
+use crate::radar::{Radar, SPEED_OF_LIGHT};
 
 /// Parts of a chirp, and samples of a part, at least.
 const PARTS: [usize; 2] = [16, 8];
 const LEAST_SAMPLES: usize = 4;
-/// Expected power over the noise in a part from which on a Doppler cell is used.
-const LEAST_POWER: f64 = 3.0;
 /// Groups of a frame's Doppler cells that errors are taken from, at most.
 const MOST_GROUPS: usize = 6;
 /// Share of a cell's power that is independent from part to part: what the prediction does not know of the ranges.
@@ -106,16 +102,6 @@ pub fn chance(evidence: &Evidence) -> Option<f64> {
 /// Some of the numbers alone, `[number, direction]`.
 fn directions(numbers: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(NUMBERS, numbers.len(), |row, column| f64::from(u8::from(row == numbers[column])))
-}
-
-/// A Doppler cell of a frame.
-struct Cell {
-    /// By channel, over the chirp's parts, in units of the noise, turned back by the mean range.
-    observed: Vec<DVector<Complex64>>,
-    /// Covariance that is expected of two parts by their distance.
-    expected: Vec<Complex64>,
-    /// Mean delay over the body's.
-    delay: f64,
 }
 
 /// All chirps' Doppler cells that the body fills.
@@ -259,28 +245,16 @@ impl Chirps {
 
     fn bend(&self, evidence: &Evidence, found: &Estimated) -> Candidate {
         let [bend, trend] = [0, 1].map(|index| found.values.get(index).copied().unwrap_or(0.0));
-        // Or a finer shape than one bend.
-        let finer = || {
-            let at = DVector::from_column_slice(&[bend, 0.0]);
-            let both = Estimated::new(&self.looks(0.0, [bend, trend]), &at, &directions(&[BEND, FINER]), &[BEND_FLOOR; 2])?;
-            let chance = both.chance(&DMatrix::from_column_slice(2, 1, &[0.0, 1.0]));
-            Some(chance < UNLIKELY && both.values[1].abs() > LARGE * both.values[0].abs())
-        };
-        let named = found.values.len() == 1 && finer() != Some(true);
+        let named = found.values.len() == 1 && self.is_finer(bend, trend) != Some(true);
         let of_frequency = 1.0 / (TAU * self.delay_s);
         let mut first = DVector::zeros(found.values.len());
         first[0] = 1.0;
         let (second_hz, deviation_hz) = (bend * of_frequency, found.deviation(&first) * of_frequency);
-        // The curve's form decides how far it leaves the straight ramp.
-        let ends = PEAK.map(|peak| peak * second_hz.abs());
-        let usual = ends[1] * second_hz.signum();
-        let reserve = NINETY * deviation_hz * PEAK[1];
-        let [low, high] = [ends[0] - reserve, ends[2] + reserve].map(|end| end * second_hz.signum());
-        let peak = Estimate { name: "peak_hz", values: vec![usual], ci90: vec![[low.min(high), low.max(high)]] };
+        let peak = peak_hz(second_hz, deviation_hz);
+        let usual = peak.values[0];
         let total: f64 = evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum();
-        let radar = evidence.radar.clone();
-        let at: Vec<f64> = (0..radar.samples_per_chirp).map(|n| place(n, radar.samples_per_chirp)).collect();
-        let by_frame: Vec<f64> = (0..self.frames.len()).map(|frame| bend + trend * self.during(frame)).collect();
+        let samples = evidence.radar.samples_per_chirp;
+        let at: Vec<f64> = (0..samples).map(|n| place(n, samples)).collect();
         let range_m = 0.5 * self.delay_s * SPEED_OF_LIGHT;
         Candidate {
             id: named.then_some("chirp_nonlinearity"),
@@ -293,8 +267,8 @@ impl Chirps {
             errs_alike: true,
             look_alikes: vec![],
             statement: format!(
-                "The chirp's ramp is not straight: its frequency bends by {:.0} kHz along the chirp, which smears what is at {range_m:.1} m \
-                 by {:.2} radian, and what is farther more.{}",
+                "The chirp's ramp is not straight: its frequency bends by {:.0} kHz along the chirp, which smears what is at \
+                 {range_m:.1} m by {:.2} radian, and what is farther more.{}",
                 1e-3 * usual.abs(),
                 bend.abs(),
                 match (named, found.values.len()) {
@@ -317,87 +291,41 @@ impl Chirps {
                 )],
             }),
             energy: total * (bend * bend + trend * trend / 3.0) / 5.0,
-            correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-                let samples_per_hz = radar.sample_rate_hz / radar.slope_hz_per_s;
-                let shifts: Vec<Vec<f64>> = by_frame
-                    .iter()
-                    .map(|bend| at.iter().map(|&x| bend * of_frequency * samples_per_hz * legendre(2, x)).collect())
-                    .collect();
-                cube.each_chirp(|[frame, ..], chirp| straighten(chirp, &shifts[frame]));
-            })),
+            correction: self.straightened(&evidence.radar, at, bend, trend),
         }
+    }
+
+    /// Whether another shape than one bend is there.
+    fn is_finer(&self, bend: f64, trend: f64) -> Option<bool> {
+        let at = DVector::from_column_slice(&[bend, 0.0]);
+        let both = Estimated::new(&self.looks(0.0, [bend, trend]), &at, &directions(&[BEND, FINER]), &[BEND_FLOOR; 2])?;
+        let chance = both.chance(&DMatrix::from_column_slice(2, 1, &[0.0, 1.0]));
+        Some(chance < UNLIKELY && both.values[1].abs() > LARGE * both.values[0].abs())
+    }
+
+    /// `at`: places of the samples over the chirp.
+    fn straightened(&self, radar: &Radar, at: Vec<f64>, bend: f64, trend: f64) -> Correction {
+        let of_frequency = 1.0 / (TAU * self.delay_s);
+        let samples_per_hz = radar.sample_rate_hz / radar.slope_hz_per_s;
+        let by_frame: Vec<f64> = (0..self.frames.len()).map(|frame| bend + trend * self.during(frame)).collect();
+        Correction::Samples(Arc::new(move |cube: &mut Cube| {
+            let shifts: Vec<Vec<f64>> = by_frame
+                .iter()
+                .map(|bend| at.iter().map(|&x| bend * of_frequency * samples_per_hz * legendre(2, x)).collect())
+                .collect();
+            cube.each_chirp(|[frame, ..], chirp| straighten(chirp, &shifts[frame]));
+        }))
     }
 }
 
-/// The middle of one of so many equal pieces of a chirp, −1 to 1.
-fn place(piece: usize, of: usize) -> f64 {
-    (2.0 * piece as f64 + 1.0) / of as f64 - 1.0
-}
-
-/// Doppler cells of a frame, in order.
-fn cells(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, frame: usize, parts: usize) -> Vec<Cell> {
-    let radar = &evidence.radar;
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let length = samples / parts;
-    // The same velocity is another Doppler frequency at the chirp's end than at its start.
-    let ends = [-0.5, 0.5].map(|end| 1.0 + end * radar.bandwidth_hz() * radar.wavelength_m() / SPEED_OF_LIGHT);
-    let mut at_ends = vec![[0.0; 2]; loops];
-    // Doppler cell, beat frequency (bins) and expected power of every point in every cell that it reaches.
-    let mut shares: Vec<Vec<(f64, f64)>> = vec![vec![]; loops];
-    for point in body.with_echoes(radar, body.frames[frame].clone(), None) {
-        let (range_m, velocity_mps) = range_and_velocity(radar, point.position_m, point.velocity_mps);
-        let (_, bins) = model.cells.place(range_m, velocity_mps);
-        // Of a part instead of a whole windowed chirp.
-        let power = model.peak(radar, point) * 1.5 * length as f64 / samples as f64;
-        if power > 0.0 && bins.is_finite() {
-            model.cells.each_doppler(velocity_mps, |doppler, share| shares[doppler].push((bins, power * f64::from(share))));
-            for (end, scale) in ends.into_iter().enumerate() {
-                model
-                    .cells
-                    .each_doppler(velocity_mps * scale, |doppler, share| at_ends[doppler][end] += power * f64::from(share));
-            }
-        }
-    }
-    let mean = |shares: &[(f64, f64)]| {
-        let power: f64 = shares.iter().map(|(_, power)| power).sum();
-        (power, shares.iter().map(|(bins, power)| bins * power).sum::<f64>() / power.max(f64::MIN_POSITIVE))
-    };
-    let used: Vec<usize> =
-        (0..loops).filter(|&doppler| model.usable()[doppler * samples] && mean(&shares[doppler]).0 > LEAST_POWER).collect();
-    let mut observed: Vec<Vec<DVector<Complex64>>> = vec![vec![]; used.len()];
-    let window = hann(loops);
-    let fft = FftPlanner::new().plan_fft_forward(loops);
-    let middles: Vec<f64> = used.iter().map(|&doppler| mean(&shares[doppler]).1).collect();
-    // By the noise, too, which stays.
-    let tilts: Vec<f64> =
-        used.iter().map(|&doppler| 0.25 * ((1.0 + at_ends[doppler][1]) / (1.0 + at_ends[doppler][0])).ln()).collect();
-    for channel in 0..evidence.cube.channels() {
-        let moving = evidence.moving(frame, channel);
-        let scale = 1.0 / (evidence.noise()[channel].max(f64::MIN_POSITIVE) * length as f64).sqrt();
-        observed.iter_mut().for_each(|observed| observed.push(DVector::zeros(parts)));
-        for sample in 0..parts * length {
-            let mut slow: Vec<Complex64> = (0..loops).map(|i| moving[i * samples + sample] * (window[i] * scale)).collect();
-            fft.process(&mut slow);
-            let part = place(sample / length, parts);
-            for (((observed, &doppler), middle), tilt) in observed.iter_mut().zip(&used).zip(&middles).zip(&tilts) {
-                let back = Complex64::from_polar((-tilt * part).exp(), -TAU * middle * sample as f64 / samples as f64);
-                observed[channel][sample / length] += slow[doppler] * back;
-            }
-        }
-    }
-    let bins_to_delay = radar.sample_rate_hz / (samples as f64 * radar.slope_hz_per_s);
-    let of = |((observed, &doppler), middle): ((Vec<DVector<Complex64>>, &usize), &f64)| {
-        let mut expected = vec![Complex64::ZERO; parts];
-        for (bins, power) in &shares[doppler] {
-            // Phase from part to part, and what is left of the sum over a part.
-            let turn = TAU * (bins - middle) * length as f64 / samples as f64;
-            let half = 0.5 * turn;
-            let power = power * if half.abs() < 1e-6 { 1.0 } else { (half.sin() / half).powi(2) };
-            expected.iter_mut().enumerate().for_each(|(apart, sum)| *sum += Complex64::from_polar(power, turn * apart as f64));
-        }
-        Cell { observed, expected, delay: middle * bins_to_delay }
-    };
-    observed.into_iter().zip(&used).zip(&middles).map(of).collect()
+/// Largest deviation from a straight ramp by its part of second order.
+fn peak_hz(second_hz: f64, deviation_hz: f64) -> Estimate {
+    // The curve's form decides how far it leaves the straight ramp.
+    let ends = PEAK.map(|peak| peak * second_hz.abs());
+    let usual = ends[1] * second_hz.signum();
+    let reserve = NINETY * deviation_hz * PEAK[1];
+    let [low, high] = [ends[0] - reserve, ends[2] + reserve].map(|end| end * second_hz.signum());
+    Estimate { name: "peak_hz", values: vec![usual], ci90: vec![[low.min(high), low.max(high)]] }
 }
 
 /// Reads a chirp earlier by so many samples each: by polynomials through its neighbours, fewer near the ends.
@@ -423,81 +351,5 @@ fn straighten(chirp: &mut [Complex64], earlier: &[f64]) {
 }
 
 #[cfg(test)]
-mod tests {
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-
-    use super::*;
-
-    const PARTS: usize = 16;
-
-    /// A body of points over ranges of a few bins, in twelve frames, and what becomes of it on the way.
-    fn chirps(seed: u64, changed: impl Fn(usize, f64) -> Complex64) -> Chirps {
-        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let mut chirps = Chirps { frames: vec![], parts: PARTS, delay_s: 2e-8 };
-        for frame in 0..12 {
-            let mut cell = || {
-                let (mut expected, mut field) = (vec![Complex64::ZERO; PARTS], DVector::zeros(PARTS));
-                for _ in 0..8 {
-                    let (power, turn) = (100.0, 0.3 * normal());
-                    let amplitude = Complex64::new(normal(), normal()) * f64::sqrt(0.5 * power);
-                    expected
-                        .iter_mut()
-                        .enumerate()
-                        .for_each(|(apart, sum)| *sum += Complex64::from_polar(power, turn * apart as f64));
-                    // The body is a little beside where it is predicted.
-                    field += DVector::from_fn(PARTS, |part, _| amplitude * Complex64::cis((turn + 0.02) * part as f64));
-                }
-                let noise = DVector::from_fn(PARTS, |_, _| Complex64::new(normal(), normal()) * f64::sqrt(0.5));
-                let observed = DVector::from_fn(PARTS, |part, _| field[part] * changed(frame, place(part, PARTS)) + noise[part]);
-                Cell { observed: vec![observed], expected, delay: 1.0 }
-            };
-            chirps.frames.push((0..5).map(|_| (0..2).map(|_| cell()).collect()).collect());
-        }
-        chirps
-    }
-
-    fn converged(chirps: &Chirps, numbers: &[usize]) -> Estimated {
-        chirps.converged(&chirps.looks(0.0, [0.0; 2]), numbers).unwrap()
-    }
-
-    #[test]
-    fn a_bend_a_changing_bend_and_a_tilt_are_told_with_their_sizes() {
-        let bend = converged(&chirps(1, |_, x| Complex64::cis(0.2 * legendre(2, x))), &[BEND]);
-        assert!((bend.values[0] - 0.2).abs() < 0.03 && bend.p_value < 1e-6 && bend.gain > 10.0, "{:?}", bend.values);
-        let changing = chirps(2, |frame, x| Complex64::cis(0.2 * (frame as f64 / 5.5 - 1.0) * legendre(2, x)));
-        let changing = converged(&changing, &[BEND, TREND]);
-        assert!((changing.values[1] - 0.2).abs() < 0.04 && changing.values[0].abs() < 0.03, "{:?}", changing.values);
-        let tilt = converged(&chirps(3, |_, x| Complex64::from(f64::exp(-0.3 * x))), &[TILT]);
-        assert!((tilt.values[0] + 0.3).abs() < 0.08 && tilt.p_value < 1e-3, "{:?}", tilt.values);
-    }
-
-    #[test]
-    fn a_body_beside_its_place_neither_bends_nor_tilts() {
-        let chances: Vec<f64> = (10..40)
-            .flat_map(|seed| {
-                let none = chirps(seed, |_, _| Complex64::ONE);
-                [[TILT], [BEND]].map(|number| converged(&none, &number).p_value)
-            })
-            .collect();
-        // Uniform or larger.
-        let below = |chance: f64| chances.iter().filter(|&&p| p < chance).count();
-        assert!(below(0.01) <= 4 && below(0.1) <= 14, "{chances:?}");
-    }
-
-    #[test]
-    fn a_warped_tone_is_straight_again() {
-        let shifts: Vec<f64> = (0..128).map(|n| 0.2 * legendre(2, place(n, 128))).collect();
-        for turns in [0.02, 0.2, 0.35] {
-            let tone = |at: f64| Complex64::cis(TAU * turns * at);
-            let mut chirp: Vec<Complex64> = shifts.iter().enumerate().map(|(n, shift)| tone(n as f64 + shift)).collect();
-            straighten(&mut chirp, &shifts);
-            let error = |n: usize| (chirp[n] - tone(n as f64)).norm();
-            let inside = (4..124).map(error).fold(0.0, f64::max);
-            // At the very end nothing is known beyond: it stays as it was.
-            let before = (tone(shifts[0]) - tone(0.0)).norm();
-            assert!(inside < 0.01 && error(0) < before + 1e-9, "{turns}: {inside} {}", error(0));
-        }
-    }
-}
+#[path = "along_tests.rs"]
+mod tests;

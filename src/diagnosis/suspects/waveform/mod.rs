@@ -1,6 +1,7 @@
 //! Errors of the chirp's frequency within a chirp: they act in proportion to the delay.
 
 pub mod along;
+mod doppler_cells;
 pub mod ripple;
 
 use crate::diagnosis::evidence::Evidence;

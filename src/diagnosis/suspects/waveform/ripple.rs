@@ -138,67 +138,99 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let (alpha, score) = training[best].paired();
     let p_value = statistics::corrected((-score / scale).exp(), shifts.len() as f64);
     let gain = held_out[best].gain(alpha) / scale;
-    let deviation_hz = alpha.norm() / PI;
-    // Height of an echo at 3 m relative to its return.
-    let stated = PI * deviation_hz * 2.0 * 3.0 / SPEED_OF_LIGHT;
-    if p_value > 0.01 || gain < 3.0 || stated > LARGEST {
+    let pair = Pair { shift: shifts[best] as f64 + summit(&scores, best), alpha, score, scale, sums: training[best] };
+    if p_value > 0.01 || gain < 3.0 || pair.stated() > LARGEST {
         return None;
     }
     let bin_hz = radar.sample_rate_hz / samples as f64;
-    let at = if best > 0 && best + 1 < scores.len() {
-        let (left, right) = (scores[best - 1], scores[best + 1]);
-        let bend = left - 2.0 * score + right;
-        if bend < 0.0 { (0.5 * (left - right) / bend).clamp(-0.5, 0.5) } else { 0.0 }
-    } else {
-        0.0
+    let curve = Curve {
+        title: "Paired echoes by their distance from the return".into(),
+        x_label: "beat frequency offset, kHz".into(),
+        y_label: "log-likelihood gained, nats".into(),
+        series: vec![(
+            "training frames".into(),
+            shifts.iter().map(|s| 1e-3 * *s as f64 * bin_hz / PADDING as f64).collect(),
+            scores.iter().map(|s| s / scale).collect(),
+        )],
     };
-    let ripple_hz = (shifts[best] as f64 + at) * bin_hz / PADDING as f64;
-    let error = (0.5 * scale / training[best].energy()).sqrt() / PI;
-    // A line of a few cells: so well is its frequency known.
-    let frequency_error = bin_hz * 0.5 / (score / scale).sqrt().max(1.0);
-    let named = score >= PAIRED * training[best].free();
-    let still: f64 = evidence.still().iter().map(|v| v.norm_sqr()).sum();
-    let chirps = (frames * evidence.cube.dims[3]) as f64;
-    let (radar_copy, turned_hz) = (radar.clone(), ripple_hz);
-    Some(Candidate {
-        id: named.then_some("chirp_ripple"),
-        behaves_like: "delay-proportional phase",
-        estimates: if named {
-            vec![
-                Estimate::normal("deviation_hz", deviation_hz, error.max(0.03 * deviation_hz)),
-                Estimate::normal("ripple_hz", ripple_hz, frequency_error.max(0.02 * bin_hz)),
-            ]
-        } else {
-            vec![]
-        },
-        choice: None,
-        place: Place::at("waveform"),
-        p_value,
-        gain,
-        errs_alike: false,
-        look_alikes: vec![],
-        statement: format!(
-            "Every return has a pair of faint echoes {:.0} kHz ({:.2} m) before and behind it, higher the farther it is ({:.0} dB at 3 \
-             m): the chirp's frequency is modulated by {:.1} kHz, {:.0} thousand times a second.",
-            1e-3 * ripple_hz,
-            ripple_hz * SPEED_OF_LIGHT / (2.0 * radar.slope_hz_per_s),
-            20.0 * stated.max(1e-9).log10(),
-            1e-3 * deviation_hz,
-            1e-3 * ripple_hz
-        ),
-        curve: Some(Curve {
-            title: "Paired echoes by their distance from the return".into(),
-            x_label: "beat frequency offset, kHz".into(),
-            y_label: "log-likelihood gained, nats".into(),
-            series: vec![(
-                "training frames".into(),
-                shifts.iter().map(|s| 1e-3 * *s as f64 * bin_hz / PADDING as f64).collect(),
-                scores.iter().map(|s| s / scale).collect(),
-            )],
-        }),
-        energy: still * chirps * 2.0 * (stated * stated),
-        correction: Correction::Samples(Arc::new(move |cube| undo(cube, &radar_copy, alpha, turned_hz))),
-    })
+    Some(pair.candidate(evidence, p_value, gain, curve))
+}
+
+/// Top of the parabola through a score and its neighbours, in shifts from it.
+fn summit(scores: &[f64], best: usize) -> f64 {
+    if best == 0 || best + 1 >= scores.len() {
+        return 0.0;
+    }
+    let (left, right) = (scores[best - 1], scores[best + 1]);
+    let bend = left - 2.0 * scores[best] + right;
+    if bend < 0.0 { (0.5 * (left - right) / bend).clamp(-0.5, 0.5) } else { 0.0 }
+}
+
+/// Paired echoes of every return.
+struct Pair {
+    /// In units of a padded bin.
+    shift: f64,
+    alpha: Complex64,
+    score: f64,
+    /// Of scores without echoes.
+    scale: f64,
+    sums: Sums,
+}
+
+impl Pair {
+    fn deviation_hz(&self) -> f64 {
+        self.alpha.norm() / PI
+    }
+
+    /// Height of an echo at 3 m relative to its return.
+    fn stated(&self) -> f64 {
+        PI * self.deviation_hz() * 2.0 * 3.0 / SPEED_OF_LIGHT
+    }
+
+    fn candidate(&self, evidence: &Evidence, p_value: f64, gain: f64, curve: Curve) -> Candidate {
+        let &Self { shift, alpha, score, scale, sums } = self;
+        let (radar, [frames, _, _, loops, samples]) = (&evidence.radar, evidence.cube.dims);
+        let (deviation_hz, stated) = (self.deviation_hz(), self.stated());
+        let bin_hz = radar.sample_rate_hz / samples as f64;
+        let ripple_hz = shift * bin_hz / PADDING as f64;
+        let error = (0.5 * scale / sums.energy()).sqrt() / PI;
+        // A line of a few cells: so well is its frequency known.
+        let frequency_error = bin_hz * 0.5 / (score / scale).sqrt().max(1.0);
+        let named = score >= PAIRED * sums.free();
+        let still: f64 = evidence.still().iter().map(|v| v.norm_sqr()).sum();
+        let chirps = (frames * loops) as f64;
+        let (radar_copy, turned_hz) = (radar.clone(), ripple_hz);
+        Candidate {
+            id: named.then_some("chirp_ripple"),
+            behaves_like: "delay-proportional phase",
+            estimates: if named {
+                vec![
+                    Estimate::normal("deviation_hz", deviation_hz, error.max(0.03 * deviation_hz)),
+                    Estimate::normal("ripple_hz", ripple_hz, frequency_error.max(0.02 * bin_hz)),
+                ]
+            } else {
+                vec![]
+            },
+            choice: None,
+            place: Place::at("waveform"),
+            p_value,
+            gain,
+            errs_alike: false,
+            look_alikes: vec![],
+            statement: format!(
+                "Every return has a pair of faint echoes {:.0} kHz ({:.2} m) before and behind it, higher the farther it is ({:.0} dB \
+                 at 3 m): the chirp's frequency is modulated by {:.1} kHz, {:.0} thousand times a second.",
+                1e-3 * ripple_hz,
+                ripple_hz * SPEED_OF_LIGHT / (2.0 * radar.slope_hz_per_s),
+                20.0 * stated.max(1e-9).log10(),
+                1e-3 * deviation_hz,
+                1e-3 * ripple_hz
+            ),
+            curve: Some(curve),
+            energy: still * chirps * 2.0 * (stated * stated),
+            correction: Correction::Samples(Arc::new(move |cube| undo(cube, &radar_copy, alpha, turned_hz))),
+        }
+    }
 }
 
 /// Sums over the empty cells of a frame, by shift.

@@ -1,0 +1,162 @@
+//! Noise whose power over beat frequency follows a law with a knee, as 1/f noise does, beside white noise.
+
+use rayon::prelude::*;
+
+use crate::diagnosis::Evidence;
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
+use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale};
+
+/// Cells of a Hann-windowed map per independent one, with reserve for the quantile's inefficiency.
+const SHARED: f64 = 4.0;
+/// How well a real noise follows the law, as a logarithm's deviation.
+const LAW: f64 = 0.05;
+
+/// Over beat frequencies, the power that training frames have over the noise.
+struct Powers {
+    hertz: Vec<f64>,
+    found: Vec<f64>,
+    /// Between the transform's bins, Hz.
+    step: f64,
+    /// Independent cells at a beat frequency.
+    count: f64,
+}
+
+/// A law's level and its shape over beat frequencies.
+struct Fit {
+    likelihood: f64,
+    level: f64,
+    shape: Vec<f64>,
+}
+
+impl Powers {
+    fn fit(&self, knee: f64, power: f64) -> Fit {
+        let Self { hertz, found, step, count } = self;
+        // A Hann window mixes a cell with its neighbours.
+        let of = |f: f64| 1.0 + (knee / f).powf(power);
+        let shape: Vec<f64> = hertz.iter().map(|f| (of(f - step) + 4.0 * of(*f) + of(f + step)) / 6.0).collect();
+        let level = found.iter().zip(&shape).map(|(p, s)| p / s).sum::<f64>() / hertz.len() as f64;
+        let likelihood: f64 = found.iter().zip(&shape).map(|(p, s)| -(level * s).ln() - p / (level * s)).sum::<f64>() * count;
+        Fit { likelihood, level, shape }
+    }
+
+    fn curve(self, fit: &Fit) -> Curve {
+        let Self { hertz, found, .. } = self;
+        Curve {
+            title: "Noise over beat frequency".into(),
+            x_label: "beat frequency, Hz".into(),
+            y_label: "power over the median, dB".into(),
+            series: vec![
+                ("measured".into(), hertz.clone(), found.iter().map(|p| 10.0 * p.max(1e-12).log10()).collect()),
+                ("fitted".into(), hertz, fit.shape.iter().map(|s| 10.0 * (fit.level * s).log10()).collect()),
+            ],
+        }
+    }
+}
+
+/// `bins`: beat frequencies where nothing returns.
+pub fn coloured(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let rate = evidence.radar.sample_rate_hz;
+    let hertz: Vec<f64> = bins.iter().map(|&bin| bin.min(samples - bin) as f64 * rate / samples as f64).collect();
+    let per_frame = (evidence.cube.channels() * (loops - 5)) as f64 / SHARED;
+    let found = spectrum(evidence, &evidence.split.training, bins);
+    let count = per_frame * evidence.split.training.len() as f64;
+    let powers = Powers { hertz, found, step: rate / samples as f64, count };
+    let white = powers.fit(0.0, 1.0);
+    let likelihood =
+        |[knee, power]: [f64; 2]| if knee < 0.5 * rate { powers.fit(knee, power).likelihood } else { f64::NEG_INFINITY };
+    let grid: Vec<[f64; 2]> = (0..40)
+        .flat_map(|i| (1..=10).map(move |j| [0.05 * rate / samples as f64 * 1.22f64.powi(i), 0.25 * f64::from(j)]))
+        .collect();
+    let first = grid.into_iter().max_by(|a, b| likelihood(*a).total_cmp(&likelihood(*b)))?;
+    let top = climb(likelihood, first);
+    let p_value = corrected(chi2_tail(2.0 * (top.height - white.likelihood), 2.0), 20.0);
+    if p_value > 1e-3 {
+        return None;
+    }
+    let fit = powers.fit(top.at[0], top.at[1]);
+    let held = spectrum(evidence, &evidence.split.held_out, bins);
+    let gain: f64 = held
+        .iter()
+        .zip(&fit.shape)
+        .map(|(p, s)| -(fit.level * s).ln() - p / (fit.level * s) + white.level.ln() + p / white.level)
+        .sum::<f64>()
+        * (per_frame * evidence.split.held_out.len() as f64);
+    Some(candidate(evidence, powers, &top, &fit, p_value, gain))
+}
+
+fn candidate(evidence: &Evidence, powers: Powers, top: &Top, fit: &Fit, p_value: f64, gain: f64) -> Candidate {
+    let [knee, power] = top.at;
+    let excess = powers.found.iter().sum::<f64>() / powers.found.len() as f64 / fit.level - 1.0;
+    let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
+    let of = |name: &'static str, value: f64, deviation: f64| {
+        let factor = (1.645 * deviation.hypot(LAW)).exp();
+        Estimate { name, values: vec![value], ci90: vec![[value / factor, value * factor]] }
+    };
+    Candidate {
+        id: Some("coloured_noise"),
+        behaves_like: "noise over beat frequency",
+        estimates: vec![of("knee_hz", knee, top.deviations[0]), of("power", power, top.deviations[1])],
+        choice: None,
+        place: Place::at("noise"),
+        p_value,
+        gain,
+        errs_alike: false,
+        look_alikes: vec![],
+        statement: format!(
+            "the noise rises towards low beat frequencies, by 3 dB at {:.0} kHz and with the power {power:.2} of the frequency below: \
+             thermal noise would be level",
+            knee * 1e-3
+        ),
+        curve: Some(powers.curve(fit)),
+        energy: excess.max(0.0) * fit.level * noise * evidence.cube.samples.len() as f64,
+        correction: Correction::None,
+    }
+}
+
+/// Power over beat frequency, `[bin]`.
+fn spectrum(evidence: &Evidence, frames: &[usize], bins: &[usize]) -> Vec<f64> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let channels = evidence.cube.channels();
+    let mut powers: Vec<Vec<f64>> = vec![vec![]; bins.len()];
+    for &frame in frames {
+        for channel in 0..channels {
+            let map = evidence.range_doppler(frame, channel);
+            let noise = evidence.noise()[channel].max(1e-300);
+            for (bin, powers) in bins.iter().zip(&mut powers) {
+                powers.extend((3..loops - 2).map(|doppler| map[doppler * samples + bin].norm_sqr() / noise));
+            }
+        }
+    }
+    powers.par_iter_mut().map(|powers| exponential_scale(powers, 0.5)).collect()
+}
+
+/// The top of a likelihood of two positive parameters, with the deviations of their logarithms.
+struct Top {
+    at: [f64; 2],
+    height: f64,
+    deviations: [f64; 2],
+}
+
+/// From the best of a grid, by steps along both logarithms and their diagonals.
+fn climb(likelihood: impl Fn([f64; 2]) -> f64, first: [f64; 2]) -> Top {
+    const STEPS: [[f64; 2]; 8] =
+        [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
+    let moved = |at: [f64; 2], step: [f64; 2], width: f64| [0, 1].map(|i| at[i] * (width * step[i]).exp());
+    let (mut at, mut height, mut width) = (first, likelihood(first), 0.2);
+    while width > 1e-3 {
+        let near = STEPS.map(|step| moved(at, step, width)).map(|next| (next, likelihood(next)));
+        let (next, found) = near.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).expect("some steps");
+        if found > height { (at, height) = (next, found) } else { width *= 0.5 }
+    }
+    // Curvature, from second differences wide enough for the rounding.
+    let wide = 0.02;
+    let second = |a: [f64; 2], b: [f64; 2]| {
+        (2.0 * height - likelihood(moved(at, a, wide)) - likelihood(moved(at, b, wide))) / (wide * wide)
+    };
+    let [aa, bb] = [second(STEPS[0], STEPS[1]), second(STEPS[2], STEPS[3])];
+    let ab = 0.5 * (second(STEPS[4], STEPS[5]) - aa - bb);
+    let determinant = aa * bb - ab * ab;
+    let deviation = |other: f64| if determinant > 0.0 && other > 0.0 { (other / determinant).sqrt().min(1.0) } else { 1.0 };
+    Top { at, height, deviations: [deviation(bb), deviation(aa)] }
+}

@@ -1,0 +1,214 @@
+//! Elements of a still field, chosen one after the other by their log-likelihood less the price of what they leave open.
+
+use num_complex::Complex64;
+
+use super::field::{Field, Fitted, Templates, orthonormal, remove};
+use super::support::{beat_hz, dot, tone};
+use crate::diagnosis::Evidence;
+
+/// Leakage over the board is nearer than this.
+const NEAR_M: f64 = 0.5;
+/// Longest transient at an edge, samples.
+const LONGEST_EDGE: usize = 16;
+const MOST_ELEMENTS: usize = 8;
+
+#[derive(Clone, Debug, PartialEq)]
+pub enum Element {
+    Offset,
+    /// Beat frequency in turns per sample.
+    Leakage(f64),
+    Start(usize),
+    End(usize),
+    Image,
+    Square,
+}
+
+/// Price in nats of another complex number.
+fn penalty(field: &Field) -> f64 {
+    1.5 * field.freedom().ln().max(4.0)
+}
+
+/// What non-linear receivers make of the static scene, `[channel][sample]`.
+pub struct Images {
+    conjugate: Vec<Vec<Complex64>>,
+    square: Vec<Vec<Complex64>>,
+}
+
+impl Images {
+    pub fn new(evidence: &Evidence, field: &Field) -> Self {
+        let conjugate = field.still.iter().map(|chirp| chirp.iter().map(Complex64::conj).collect()).collect();
+        let samples = evidence.cube.dims[4];
+        let mut square = vec![vec![Complex64::ZERO; samples]; field.channels()];
+        // A few chirps of each frame are enough: the scene's own square hardly changes within it.
+        let loops = evidence.cube.dims[3];
+        let step = loops.div_ceil(8);
+        let count = (evidence.split.training.len() * loops.div_ceil(step)) as f64;
+        for &frame in &evidence.split.training {
+            for (channel, sum) in square.iter_mut().enumerate() {
+                for chirp in evidence.cube.channel(frame, channel).chunks_exact(samples).step_by(step) {
+                    sum.iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value * value / count);
+                }
+            }
+        }
+        Self { conjugate, square }
+    }
+}
+
+pub fn templates(elements: &[Element], images: &Images) -> Templates {
+    let samples = images.conjugate[0].len();
+    let mut templates = Templates::default();
+    for element in elements {
+        match element {
+            Element::Image => templates.common.push(images.conjugate.clone()),
+            Element::Square => templates.common.push(images.square.clone()),
+            own => templates.own.extend(columns(own, samples)),
+        }
+    }
+    templates
+}
+
+/// Fast-time templates with an amplitude in every channel.
+pub fn columns(element: &Element, samples: usize) -> Vec<Vec<Complex64>> {
+    let impulse = |at: usize| (0..samples).map(|n| if n == at { Complex64::ONE } else { Complex64::ZERO }).collect();
+    match *element {
+        Element::Offset => vec![vec![Complex64::ONE; samples]],
+        Element::Leakage(turns) => vec![tone(turns, samples)],
+        Element::Start(count) => (0..count).map(impulse).collect(),
+        Element::End(count) => (samples - count..samples).map(impulse).collect(),
+        Element::Image | Element::Square => vec![],
+    }
+}
+
+/// Complex numbers that an element adds.
+pub fn unknowns(element: &Element, channels: usize) -> f64 {
+    match element {
+        Element::Offset => channels as f64,
+        Element::Leakage(_) => channels as f64 + 0.5,
+        Element::Start(count) | Element::End(count) => (count * channels) as f64,
+        Element::Image | Element::Square => 1.0,
+    }
+}
+/// The elements that a recording holds.
+pub fn choose(evidence: &Evidence, field: &Field, images: &Images) -> Vec<Element> {
+    let near = leakages(evidence);
+    let mut chosen: Vec<Element> = vec![];
+    while chosen.len() < MOST_ELEMENTS {
+        let options = Next::new(field, images, &chosen).options(&near);
+        let best = options.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        match best {
+            Some((score, element)) if score > 0.0 => chosen.push(element),
+            _ => break,
+        }
+        if chosen.iter().filter(|element| matches!(element, Element::Leakage(_))).count() > 0 && chosen.len() > 1 {
+            improve(field, images, &mut chosen, near[1] - near[0]);
+        }
+    }
+    chosen
+}
+
+/// Grid of a leakage's beat frequencies, turns per sample.
+fn leakages(evidence: &Evidence) -> Vec<f64> {
+    let samples = evidence.cube.dims[4];
+    let highest = beat_hz(evidence, NEAR_M) / evidence.radar.sample_rate_hz;
+    let lowest = beat_hz(evidence, 0.01) / evidence.radar.sample_rate_hz;
+    let grid = (highest * samples as f64 * 12.0).ceil().max(2.0) as usize;
+    (0..=grid).map(|i| lowest + (highest - lowest) * i as f64 / grid as f64).collect()
+}
+
+/// The choice of one more element beside those that were chosen.
+struct Next<'a> {
+    field: &'a Field,
+    images: &'a Images,
+    chosen: &'a [Element],
+    fitted: Fitted,
+    /// What they leave, `[channel][direction]`.
+    rest: Vec<Vec<Complex64>>,
+    /// Directions that they take.
+    basis: Vec<Vec<Complex64>>,
+    samples: usize,
+}
+
+impl<'a> Next<'a> {
+    fn new(field: &'a Field, images: &'a Images, chosen: &'a [Element]) -> Self {
+        let fitted = field.fit(&templates(chosen, images));
+        let rest: Vec<Vec<Complex64>> = field
+            .mean
+            .iter()
+            .zip(&fitted.predicted)
+            .map(|(found, predicted)| found.iter().zip(predicted).map(|(found, predicted)| found - predicted).collect())
+            .collect();
+        let basis = orthonormal(&templates(chosen, images).own.iter().map(|own| field.project(own)).collect::<Vec<_>>());
+        Self { field, images, chosen, fitted, rest, basis, samples: field.still[0].len() }
+    }
+
+    /// Log-likelihood that an element of fast time gains, less its price.
+    fn score(&self, element: &Element) -> f64 {
+        let (field, channels) = (self.field, self.field.channels());
+        let mut columns: Vec<Vec<Complex64>> =
+            columns(element, self.samples).iter().map(|column| field.project(column)).collect();
+        columns.iter_mut().for_each(|column| remove(column, &self.basis));
+        let directions = orthonormal(&columns);
+        (0..channels)
+            .map(|channel| field.weight(channel) * directions.iter().map(|d| dot(d, &self.rest[channel]).norm_sqr()).sum::<f64>())
+            .sum::<f64>()
+            - penalty(field) * unknowns(element, channels)
+    }
+
+    /// All that may be added, with what it gains; `near`: a grid of leakages' beat frequencies.
+    fn options(&self, near: &[f64]) -> Vec<(f64, Element)> {
+        let chosen = self.chosen;
+        let mut options: Vec<(f64, Element)> = vec![];
+        if !chosen.contains(&Element::Offset) {
+            options.push((self.score(&Element::Offset), Element::Offset));
+        }
+        if chosen.iter().filter(|element| matches!(element, Element::Leakage(_))).count() < 3 {
+            let score = |turns: f64| self.score(&Element::Leakage(turns));
+            let best = near.iter().map(|&turns| (score(turns), turns)).max_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((_, turns)) = best {
+                let turns = refine(turns, near[1] - near[0], score);
+                options.push((score(turns), Element::Leakage(turns)));
+            }
+        }
+        for edge in [Element::Start as fn(usize) -> Element, Element::End] {
+            if chosen.iter().any(|element| std::mem::discriminant(element) == std::mem::discriminant(&edge(1))) {
+                continue;
+            }
+            for count in 1..=LONGEST_EDGE.min(self.samples / 8) {
+                options.push((self.score(&edge(count)), edge(count)));
+            }
+        }
+        for image in [Element::Image, Element::Square] {
+            if !chosen.contains(&image) {
+                let with: Vec<Element> = chosen.iter().cloned().chain([image.clone()]).collect();
+                let gain = self.field.fit(&templates(&with, self.images)).likelihood - self.fitted.likelihood;
+                options.push((gain - penalty(self.field), image));
+            }
+        }
+        options
+    }
+}
+
+/// Moves each leakage's beat frequency where all elements together fit best.
+fn improve(field: &Field, images: &Images, chosen: &mut [Element], step: f64) {
+    for index in 0..chosen.len() {
+        if let Element::Leakage(turns) = chosen[index] {
+            let mut tried = chosen.to_vec();
+            let best = refine(turns, step, |turns| {
+                tried[index] = Element::Leakage(turns);
+                field.fit(&templates(&tried, images)).likelihood
+            });
+            chosen[index] = Element::Leakage(best);
+        }
+    }
+}
+
+/// Golden-section search of a maximum near a grid's best.
+pub fn refine(at: f64, step: f64, mut value: impl FnMut(f64) -> f64) -> f64 {
+    const RATIO: f64 = 0.618_033_988_749_895;
+    let (mut low, mut high) = (at - step, at + step);
+    for _ in 0..18 {
+        let (a, b) = (high - RATIO * (high - low), low + RATIO * (high - low));
+        if value(a) > value(b) { high = b } else { low = a }
+    }
+    0.5 * (low + high)
+}
