@@ -48,6 +48,73 @@ struct Frame {
     rest: Vec<f32>,
 }
 
+impl Frame {
+    fn of(readings: &Readings, frame: usize) -> Self {
+        let power = readings.power(frame);
+        Self { inverse: power.iter().map(|p| 1.0 / (2.0 + p)).collect(), rest: power.iter().map(|p| p / (2.0 + p)).collect() }
+    }
+}
+
+/// What every pose is compared with: frames, at all headings and ranges.
+struct Searched<'a> {
+    readings: &'a Readings,
+    pivot: &'a Pivot,
+    frames: &'a [Frame],
+    ranges_m: &'a [f64],
+    /// Distances from which the body is seen, and its power there.
+    nodes: &'a [f64],
+    scales: &'a [f64],
+}
+
+impl Searched<'_> {
+    /// Of a pose, `[frame]` → `[facing][range]`, nats; nothing where the motion has none.
+    fn gains(&self, pose: Option<&Pose>) -> Vec<Vec<f32>> {
+        let Self { readings, ranges_m, nodes, .. } = *self;
+        let mut gains = vec![vec![0.0f32; if pose.is_some() { FACINGS * ranges_m.len() } else { 0 }]; self.frames.len()];
+        let Some(pose) = pose else { return gains };
+        let of_node = |range: f64| (((range - NEAREST_M) / NODE_M).round() as usize).min(nodes.len() - 1);
+        for facing in 0..FACINGS {
+            for (node, &node_m) in nodes.iter().enumerate() {
+                let near: Vec<usize> = (0..ranges_m.len()).filter(|&range| of_node(ranges_m[range]) == node).collect();
+                if near.is_empty() {
+                    continue;
+                }
+                let map = map(readings, &placed(pose, self.pivot, facing, node_m));
+                let template = Template::of(readings, &map, self.scales[node]);
+                for range in near {
+                    let shift = ((ranges_m[range] - node_m) * readings.cells.bins_per_m).round() as i32;
+                    for (frame, gains) in self.frames.iter().zip(&mut gains) {
+                        gains[facing * ranges_m.len() + range] = template.gain(readings, frame, shift);
+                    }
+                }
+            }
+        }
+        gains
+    }
+}
+
+fn placed(pose: &Pose, pivot: &Pivot, facing: usize, node_m: f64) -> Pose {
+    let facing_rad = TAU * facing as f64 / FACINGS as f64;
+    pose.clone().placed(pivot, &Place { facing_rad, range_m: node_m, ..pivot.stated() })
+}
+
+/// Of each distance: what makes the body as strong as what moves in the recording.
+fn scales(readings: &Readings, pivot: &Pivot, shown: &[Option<Pose>], nodes: &[f64]) -> Vec<f64> {
+    let moving = moving_energy(readings);
+    let known: Vec<&Pose> = shown.iter().flatten().collect();
+    let some: Vec<&Pose> = known.iter().copied().step_by(known.len().div_ceil(8).max(1)).collect();
+    nodes
+        .par_iter()
+        .map(|&node| {
+            let both = some.iter().flat_map(|pose| (0..FACINGS).step_by(2).map(move |facing| (pose, facing)));
+            let energies: Vec<f64> = both
+                .map(|(pose, facing)| map(readings, &placed(pose, pivot, facing, node)).iter().map(|p| f64::from(*p)).sum())
+                .collect();
+            moving * energies.len() as f64 / energies.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+        })
+        .collect()
+}
+
 /// Cells and powers of the body at one distance.
 struct Template {
     /// Doppler row and range bin, expected power over the noise and noise.
@@ -79,58 +146,10 @@ impl Grid {
             (0..).map(|step| NEAREST_M + f64::from(step) * RANGE_STEP_M).take_while(|range| *range <= farthest_m).collect();
         let nodes: Vec<f64> =
             (0..).map(|step| NEAREST_M + f64::from(step) * NODE_M).take_while(|node| *node <= farthest_m + NODE_M).collect();
-        let placed = |pose: &Pose, facing: usize, node: f64| {
-            let facing_rad = TAU * facing as f64 / FACINGS as f64;
-            pose.clone().placed(pivot, &Place { facing_rad, range_m: node, ..pivot.stated() })
-        };
-        // Of each distance: what makes the body as strong as what moves in the recording.
-        let moving = moving_energy(readings);
-        let known: Vec<&Pose> = shown.iter().flatten().collect();
-        let some: Vec<&Pose> = known.iter().copied().step_by(known.len().div_ceil(8).max(1)).collect();
-        let scales: Vec<f64> = nodes
-            .par_iter()
-            .map(|&node| {
-                let both = some.iter().flat_map(|pose| (0..FACINGS).step_by(2).map(move |facing| (pose, facing)));
-                let energies: Vec<f64> = both
-                    .map(|(pose, facing)| map(readings, &placed(pose, facing, node)).iter().map(|p| f64::from(*p)).sum())
-                    .collect();
-                moving * energies.len() as f64 / energies.iter().sum::<f64>().max(f64::MIN_POSITIVE)
-            })
-            .collect();
-        let compared: Vec<Frame> = frames
-            .iter()
-            .map(|&frame| {
-                let power = readings.power(frame);
-                Frame {
-                    inverse: power.iter().map(|p| 1.0 / (2.0 + p)).collect(),
-                    rest: power.iter().map(|p| p / (2.0 + p)).collect(),
-                }
-            })
-            .collect();
-        let of_node = |range: f64| (((range - NEAREST_M) / NODE_M).round() as usize).min(nodes.len() - 1);
-        let by_pose: Vec<Vec<Vec<f32>>> = shown
-            .par_iter()
-            .map(|pose| {
-                let mut gains = vec![vec![0.0f32; if pose.is_some() { FACINGS * ranges_m.len() } else { 0 }]; frames.len()];
-                let Some(pose) = pose else { return gains };
-                for facing in 0..FACINGS {
-                    for (node, &node_m) in nodes.iter().enumerate() {
-                        let near: Vec<usize> = (0..ranges_m.len()).filter(|&range| of_node(ranges_m[range]) == node).collect();
-                        if near.is_empty() {
-                            continue;
-                        }
-                        let template = Template::of(readings, &map(readings, &placed(pose, facing, node_m)), scales[node]);
-                        for range in near {
-                            let shift = ((ranges_m[range] - node_m) * readings.cells.bins_per_m).round() as i32;
-                            for (frame, gains) in compared.iter().zip(&mut gains) {
-                                gains[facing * ranges_m.len() + range] = template.gain(readings, frame, shift);
-                            }
-                        }
-                    }
-                }
-                gains
-            })
-            .collect();
+        let scales = scales(readings, pivot, &shown, &nodes);
+        let compared: Vec<Frame> = frames.iter().map(|&frame| Frame::of(readings, frame)).collect();
+        let searched = Searched { readings, pivot, frames: &compared, ranges_m: &ranges_m, nodes: &nodes, scales: &scales };
+        let by_pose: Vec<Vec<Vec<f32>>> = shown.par_iter().map(|pose| searched.gains(pose.as_ref())).collect();
         // From [pose][frame] to [frame][pose].
         let mut gains: Vec<Vec<Vec<f32>>> = vec![vec![]; frames.len()];
         by_pose.into_iter().for_each(|of_frames| gains.iter_mut().zip(of_frames).for_each(|(all, one)| all.push(one)));

@@ -50,23 +50,7 @@ const ROUNDING_S: f64 = 1e-9;
 pub fn basis(pose_times_s: &[f64], times_s: &[f64], interpolation: Interpolation) -> Result<Basis> {
     let first = times_s.iter().copied().fold(f64::INFINITY, f64::min);
     let last = times_s.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let (start, end) = match pose_times_s {
-        [start, .., end] => (*start, *end),
-        _ => {
-            return Err(Error::Usage {
-                message: format!("the motion has {} pose(s), expected at least two to move between", pose_times_s.len()),
-                hint: Some("repeat the pose at a later time for a person who stands still".into()),
-            });
-        }
-    };
-    if first < start - ROUNDING_S || last > end + ROUNDING_S {
-        return Err(Error::Usage {
-            message: format!(
-                "the frame from {first:.4} s to {last:.4} s lies outside the motion, which lasts from {start:.4} s to {end:.4} s"
-            ),
-            hint: Some("record fewer frames, give a longer motion, or shift it with motion.start_s".into()),
-        });
-    }
+    inside(pose_times_s, first, last)?;
     let segment = |time: f64| pose_times_s.partition_point(|&pose| pose <= time).clamp(1, pose_times_s.len() - 1) - 1;
     let reach = if interpolation == Interpolation::Cubic { 1 } else { 0 };
     let poses = if times_s.is_empty() {
@@ -108,6 +92,28 @@ pub fn basis(pose_times_s: &[f64], times_s: &[f64], interpolation: Interpolation
         }
     }
     Ok(basis)
+}
+
+/// Refuses times that the motion does not reach.
+fn inside(pose_times_s: &[f64], first: f64, last: f64) -> Result<()> {
+    let (start, end) = match pose_times_s {
+        [start, .., end] => (*start, *end),
+        _ => {
+            return Err(Error::Usage {
+                message: format!("the motion has {} pose(s), expected at least two to move between", pose_times_s.len()),
+                hint: Some("repeat the pose at a later time for a person who stands still".into()),
+            });
+        }
+    };
+    if first < start - ROUNDING_S || last > end + ROUNDING_S {
+        return Err(Error::Usage {
+            message: format!(
+                "the frame from {first:.4} s to {last:.4} s lies outside the motion, which lasts from {start:.4} s to {end:.4} s"
+            ),
+            hint: Some("record fewer frames, give a longer motion, or shift it with motion.start_s".into()),
+        });
+    }
+    Ok(())
 }
 
 /// The velocity at a pose as (pose, weight in 1/s) pairs: the slope of the parabola through its neighbours, or the

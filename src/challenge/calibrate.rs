@@ -252,16 +252,7 @@ pub fn gather(
     if missing(out, nulls) > 0 {
         return Ok(None);
     }
-    let (mut reports, mut seeds, mut failures) = (vec![], vec![], vec![]);
-    for index in 0..nulls {
-        let folder = folder(out, index);
-        if folder.join("report.json").is_file() {
-            reports.push(Report::read(&folder.join("report.json"))?);
-            seeds.push(secret.world_seed(index));
-        } else {
-            failures.push(format!("null {index}: {}", read_json::<Failure>(&folder.join("failure.json"))?.reason));
-        }
-    }
+    let (reports, seeds, failures) = reports(nulls, secret, out)?;
     let p_values = ascending(reports.iter().filter_map(|report| report.p_value));
     if p_values.is_empty() {
         let first = failures.first().cloned().or_else(|| reports.first().map(|report| report.reason.clone())).unwrap_or_default();
@@ -301,6 +292,21 @@ pub fn gather(
         p_values,
     };
     Ok(Some(Calibrated { table, rows, failures, notes: source.notes.clone() }))
+}
+
+/// What the nulls' processes left: reports, the worlds' seeds, and why there is no report.
+fn reports(nulls: usize, secret: &Secret, out: &Path) -> Result<(Vec<Report>, Vec<u64>, Vec<String>)> {
+    let (mut reports, mut seeds, mut failures) = (vec![], vec![], vec![]);
+    for index in 0..nulls {
+        let folder = folder(out, index);
+        if folder.join("report.json").is_file() {
+            reports.push(Report::read(&folder.join("report.json"))?);
+            seeds.push(secret.world_seed(index));
+        } else {
+            failures.push(format!("null {index}: {}", read_json::<Failure>(&folder.join("failure.json"))?.reason));
+        }
+    }
+    Ok((reports, seeds, failures))
 }
 
 fn ascending(values: impl Iterator<Item = f64>) -> Vec<f64> {

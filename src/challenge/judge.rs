@@ -90,6 +90,31 @@ pub struct Judgement {
 }
 
 impl Judgement {
+    /// Before anything is held against the truth.
+    fn unanswered(case: &str, truth: &Truth, failure: Option<String>) -> Self {
+        Self {
+            case: case.into(),
+            stratum: truth.stratum,
+            tier: truth.tier.clone(),
+            truth: truth.effects.iter().map(word).collect(),
+            strength: truth.strength,
+            failure,
+            verdict: String::new(),
+            claims: false,
+            named: vec![],
+            found: vec![false; truth.effects.len()],
+            first_right: false,
+            first_exact: false,
+            overclaims: vec![],
+            twins_overclaimed: vec![],
+            located: None,
+            left_unnamed: None,
+            parameters: vec![],
+            limit_holds: None,
+            said_hidden: false,
+        }
+    }
+
     /// What survives unknown phases and amplitudes, and what is coherent. What was planted without being measured counts as
     /// strong.
     pub fn d_primes(&self) -> [f64; 2] {
@@ -111,27 +136,7 @@ pub(super) fn stands_for(reported: &Effect, id: &str) -> bool {
 }
 
 pub fn judge(case: &str, truth: &Truth, report: &std::result::Result<Report, String>) -> Judgement {
-    let mut judgement = Judgement {
-        case: case.into(),
-        stratum: truth.stratum,
-        tier: truth.tier.clone(),
-        truth: truth.effects.iter().map(word).collect(),
-        strength: truth.strength,
-        failure: report.as_ref().err().cloned(),
-        verdict: String::new(),
-        claims: false,
-        named: vec![],
-        found: vec![false; truth.effects.len()],
-        first_right: false,
-        first_exact: false,
-        overclaims: vec![],
-        twins_overclaimed: vec![],
-        located: None,
-        left_unnamed: None,
-        parameters: vec![],
-        limit_holds: None,
-        said_hidden: false,
-    };
+    let mut judgement = Judgement::unanswered(case, truth, report.as_ref().err().cloned());
     let Ok(report) = report else { return judgement };
     let ids: Vec<&str> = truth.ids().into_iter().flatten().collect();
     judgement.verdict = report.verdict.clone();

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::answer::Answers;
-use super::baselines::{self, Statistics, TEMPLATES, quantile};
+use super::baselines::{self, Statistics, quantile};
 use super::commitment::{Commitment, joint_root, read_json, sha256};
 use super::config::Stratum;
 use super::judge::{Judgement, Truth, judge};
@@ -18,13 +18,14 @@ use super::report::{Measures, Report};
 use super::rules::*;
 use super::seal::measured;
 use super::secret::Secret;
-use super::table::{Aim, Row, markdown, middle, share};
-use super::uniformity;
+use super::table::{Row, markdown};
 use crate::data::atomic::write_text;
 use crate::data::entries::entries;
 use crate::data::{Recording, read_toml};
 use crate::error::{Error, Result};
 use crate::text::shown;
+
+mod rows;
 
 /// A misfit per sample below this, nats, is nothing that could be removed.
 const LEAST_REMOVABLE: f64 = 2.0e-3;
@@ -101,7 +102,7 @@ pub fn score(
         challenge: root,
         answers: answers.sha256,
         cases: cases.len(),
-        rows: rows(&cases, psychometric),
+        rows: rows::all(&cases, psychometric),
         psychometric,
         failures: cases.iter().filter_map(|case| failure(&case.judgement)).collect(),
         judgements: cases.into_iter().map(|case| case.judgement).collect(),
@@ -177,6 +178,14 @@ impl Case {
         kinds.contains(&self.judgement.stratum) && self.judgement.truth.iter().all(|id| scalable(id))
     }
 
+    fn overclaims(&self) -> bool {
+        !self.judgement.overclaims.is_empty()
+    }
+
+    fn all_found(&self) -> bool {
+        self.judgement.found.iter().all(|&found| found)
+    }
+
     fn undetectable(&self) -> bool {
         self.planted() && self.coherent_d_prime() < UNDETECTABLE_D_PRIME && self.judgement.truth.iter().all(|id| scalable(id))
     }
@@ -223,206 +232,6 @@ fn points(cases: &[Case]) -> Vec<(f64, bool)> {
         .filter(|case| case.graded_single() && case.judgement.strength.is_some())
         .map(|case| (case.d_prime().max(1e-3).log10(), case.judgement.claims))
         .collect()
-}
-
-fn rows(cases: &[Case], psychometric: Option<Logistic>) -> Vec<Row> {
-    let all = |keep: &dyn Fn(&Case) -> bool| -> Vec<&Case> { cases.iter().filter(|case| keep(case)).collect() };
-    let nulls = all(&|case| case.is(Stratum::Null));
-    let graded = all(&|case| case.graded_single() && !case.undetectable());
-    let singles: Vec<&Case> = graded.iter().copied().filter(|case| case.d_prime() >= UNDETECTABLE_D_PRIME).collect();
-    let detected: Vec<&Case> = singles.iter().copied().filter(|case| case.judgement.claims).collect();
-    let pairs = all(&|case| case.is(Stratum::Pair) && case.d_prime() >= OBVIOUS_D_PRIME);
-    let outside = all(&|case| case.is(Stratum::Outside) && case.d_prime() >= OBVIOUS_D_PRIME);
-    let decoys = all(&|case| case.is(Stratum::LookAlike) && case.d_prime() >= OBVIOUS_D_PRIME);
-    let undetectable = all(&|case| case.undetectable());
-    let concealed = all(&|case| case.concealed);
-    let concealed_library: Vec<&Case> = concealed.iter().copied().filter(|case| !case.is(Stratum::Outside)).collect();
-    let over = |case: &&Case| !case.judgement.overclaims.is_empty();
-    let mut rows = vec![
-        share(
-            "nulls on which anything is claimed (false alarms)",
-            nulls.iter().map(|case| case.judgement.claims),
-            Aim::AtMost(0.02),
-        ),
-        share("nulls with a confident wrong name", nulls.iter().map(over), Aim::AtMost(0.01)),
-        share(
-            "nulls answered `no_mismatch`",
-            nulls.iter().map(|case| case.judgement.verdict == "no_mismatch"),
-            Aim::AtLeast(0.95),
-        ),
-    ];
-    rows.extend(uniformity::rows(nulls.iter().filter_map(|case| case.report.as_ref())));
-    for (low, high, aim) in [(2.0, 8.0, Aim::None), (8.0, 30.0, Aim::AtLeast(0.8)), (30.0, f64::INFINITY, Aim::AtLeast(0.95))] {
-        let within = singles.iter().filter(|case| (low..high).contains(&case.d_prime()));
-        let name = if high.is_finite() {
-            format!("single effects detected, d′ {low} to {high}")
-        } else {
-            format!("single effects detected, d′ ≥ {low}")
-        };
-        rows.push(share(name, within.map(|case| case.judgement.claims), aim));
-    }
-    let hidden = graded.iter().filter(|case| case.d_prime() < UNDETECTABLE_D_PRIME);
-    rows.push(share(
-        format!("single effects detected, d′ below {UNDETECTABLE_D_PRIME}: unknown phases and amplitudes can be all of it"),
-        hidden.map(|case| case.judgement.claims),
-        Aim::None,
-    ));
-    let strong = graded.iter().filter(|case| case.coherent_d_prime() >= OBVIOUS_D_PRIME);
-    rows.push(share(
-        format!("single effects detected, coherent d′ ≥ {OBVIOUS_D_PRIME}: nothing but the effect is unknown"),
-        strong.map(|case| case.judgement.claims),
-        Aim::None,
-    ));
-    if let Some(fit) = psychometric {
-        for part in [0.5, 0.9] {
-            let level = 10f64.powf(fit.level(part));
-            rows.push(Row {
-                what: format!("d′ at which {:.0} % are detected (logistic fit)", 100.0 * part),
-                n: cases.iter().filter(|case| case.graded_single()).count(),
-                estimate: level.is_finite().then_some(level),
-                interval: None,
-                aim: Aim::None,
-            });
-        }
-    }
-    rows.extend([
-        share(
-            "detected singles whose first name is right, look-alikes allowed",
-            detected.iter().map(|case| case.judgement.first_right),
-            Aim::AtLeast(0.85),
-        ),
-        share(
-            "detected singles whose first name is the very effect",
-            detected.iter().map(|case| case.judgement.first_exact),
-            Aim::None,
-        ),
-        share(
-            "detected singles that are named at all",
-            detected.iter().map(|case| case.judgement.found.iter().all(|&found| found)),
-            Aim::None,
-        ),
-        share(
-            "planted cases with a confident wrong name (overclaims)",
-            cases.iter().filter(|case| case.planted()).map(|case| over(&case)),
-            Aim::AtMost(0.05),
-        ),
-        share(
-            "planted cases that name a twin as the only possibility",
-            cases.iter().filter(|case| case.planted()).map(|case| !case.judgement.twins_overclaimed.is_empty()),
-            Aim::AtMost(0.02),
-        ),
-        share("look-alikes with a confident wrong name", decoys.iter().map(over), Aim::AtMost(0.05)),
-        share("pairs, both named", pairs.iter().map(|case| case.judgement.found.iter().all(|&found| found)), Aim::None),
-        share(
-            "pairs, at least one named",
-            pairs.iter().map(|case| case.judgement.found.iter().any(|&found| found)),
-            Aim::AtLeast(0.8),
-        ),
-        share("named effects at the right place", cases.iter().filter_map(|case| case.judgement.located), Aim::AtLeast(0.9)),
-        share(
-            "90 % intervals that hold the truth",
-            cases.iter().flat_map(|case| &case.judgement.parameters).map(|p| p.covered),
-            Aim::Between(0.85, 0.95),
-        ),
-        share(
-            "outside the library: found, at its place, left unnamed",
-            outside.iter().map(|case| case.judgement.left_unnamed == Some(true)),
-            Aim::AtLeast(0.8),
-        ),
-        share("outside the library: detected in any way", outside.iter().map(|case| case.judgement.claims), Aim::None),
-        share("outside the library: confident wrong name", outside.iter().map(over), Aim::AtMost(0.05)),
-        share(
-            "undetectable effects answered with silence",
-            undetectable.iter().map(|case| case.judgement.failure.is_none() && !case.judgement.claims),
-            Aim::AtLeast(0.95),
-        ),
-        share(
-            "limits on undetected effects that hold",
-            cases.iter().filter_map(|case| case.judgement.limit_holds),
-            Aim::AtLeast(0.9),
-        ),
-        middle(
-            "removable held-out misfit recovered where an effect was named, median",
-            cases.iter().filter(|case| case.judgement.found.contains(&true)).filter_map(Case::recovered),
-            Aim::AtLeast(0.9),
-        ),
-        middle(
-            "removable held-out misfit recovered, missed cases too, median",
-            cases.iter().filter(|case| !case.is(Stratum::Outside)).filter_map(Case::recovered),
-            Aim::None,
-        ),
-        share("concealed effects detected", concealed.iter().map(|case| case.judgement.claims), Aim::AtLeast(0.8)),
-        share(
-            "concealed effects detected, or said to be such that no recording of this kind can show them",
-            concealed.iter().map(|case| case.judgement.claims || case.judgement.said_hidden),
-            Aim::None,
-        ),
-        share(
-            "concealed effects of the library, detected and named, look-alikes allowed",
-            concealed_library.iter().map(|case| case.judgement.found.iter().all(|&found| found)),
-            Aim::None,
-        ),
-        share("cases without a usable report", cases.iter().map(|case| case.judgement.failure.is_some()), Aim::AtMost(0.0)),
-    ]);
-    rows.extend(baseline_rows(cases, &nulls, &singles, &concealed));
-    rows
-}
-
-/// A baseline's favourite template and how far it stands out.
-type Pick<'a> = &'a dyn Fn(&Case) -> Option<(usize, f64)>;
-
-/// Each baseline with the threshold that the nulls of this very set give it.
-fn baseline_rows(cases: &[Case], nulls: &[&Case], singles: &[&Case], concealed: &[&Case]) -> Vec<Row> {
-    let part = 1.0 - BASELINE_FALSE_ALARMS;
-    let over_nulls =
-        |of: &dyn Fn(&Case) -> Option<f64>| quantile(&nulls.iter().filter_map(|case| of(case)).collect::<Vec<_>>(), part);
-    let strong: Vec<&&Case> = singles.iter().filter(|case| case.d_prime() >= OBVIOUS_D_PRIME).collect();
-    // Each template on the scale of its own nulls: by the middle and the spread of their logarithms, not by their largest,
-    // beyond which one of many templates soon is.
-    let scales: Vec<[f64; 2]> = (0..TEMPLATES.len())
-        .map(|k| {
-            let logs: Vec<f64> =
-                nulls.iter().filter_map(|case| Some(case.baseline.as_ref()?.templates[k].max(1e-3).ln())).collect();
-            let [low, centre, high] = [0.16, 0.5, 0.84].map(|part| quantile(&logs, part));
-            [centre, (0.5 * (high - low)).max(0.1)]
-        })
-        .collect();
-    let beyond = |k: usize, value: f64| (value.max(1e-3).ln() - scales[k][0]) / scales[k][1];
-    let best = |case: &Case| -> Option<(usize, f64)> {
-        let all = case.baseline.as_ref()?.templates.iter().enumerate().map(|(k, &value)| (k, beyond(k, value)));
-        all.max_by(|a, b| a.1.total_cmp(&b.1))
-    };
-    let sparse = |case: &Case| -> Option<(usize, f64)> {
-        let picked = case.baseline.as_ref()?.sparse.iter().map(|&(k, gain)| (k, beyond(k, gain)));
-        // Nothing picked is as far from an alarm as can be.
-        Some(picked.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::MIN)))
-    };
-    let global = |case: &Case| case.before.db_mse;
-    let chi2 = |case: &Case| case.baseline.as_ref().map(|b| b.chi2);
-    let mut rows = vec![];
-    let mut add = |name: &str, value: &dyn Fn(&Case) -> Option<f64>, pick: Option<Pick>| {
-        let limit = over_nulls(value);
-        let alarm = |case: &Case| value(case).is_some_and(|value| value > limit);
-        rows.push(share(
-            format!("{name}: singles with d′ ≥ {OBVIOUS_D_PRIME} detected"),
-            strong.iter().map(|case| alarm(case)),
-            Aim::None,
-        ));
-        rows.push(share(format!("{name}: concealed effects detected"), concealed.iter().map(|case| alarm(case)), Aim::None));
-        if let Some(pick) = pick {
-            let named =
-                |case: &Case| pick(case).is_some_and(|(k, _)| case.judgement.truth.iter().any(|id| look_alike(TEMPLATES[k], id)));
-            let all = strong.iter().filter(|case| alarm(case));
-            rows.push(share(format!("{name}: of those, the right name"), all.map(|case| named(case)), Aim::None));
-            let wrong = cases.iter().filter(|case| case.planted() && alarm(case)).map(|case| !named(case));
-            rows.push(share(format!("{name}: planted alarms with a wrong name"), wrong, Aim::None));
-        }
-    };
-    add("baseline, error of the trained simulator", &global, None);
-    add("baseline, χ² outside the scene", &chi2, None);
-    add("baseline, templates one by one", &|case| best(case).map(|(_, ratio)| ratio), Some(&best));
-    add("baseline, sparse regression", &|case| sparse(case).map(|(_, ratio)| ratio), Some(&sparse));
-    rows
 }
 
 /// What went wrong with a case, in a line; none if nothing did.

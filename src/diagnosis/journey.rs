@@ -57,17 +57,7 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     if let (Some(table), Some(path)) = (&table, &config.calibration) {
         table.check(recording, path)?;
     }
-    let mut notes = recording.notes.clone();
-    let stretch = recording.whole_stretch()?;
-    if stretch.len() < recording.radar.frames {
-        let (first, last) = (stretch.start, stretch.end - 1);
-        notes.push(format!(
-            "the frames {first} to {last} were looked at, the longest stretch without lost chirps; frames are counted from frame {first}"
-        ));
-    }
-    if stretch.len() > most_frames {
-        notes.push(format!("the first {most_frames} of {} frames were looked at", stretch.len()));
-    }
+    let mut notes = notes(recording, most_frames)?;
     config.check()?;
     progress("reading");
     let integrity = integrity::inspect(recording, most_frames)?;
@@ -82,6 +72,49 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     let held_out = HeldOut::of(&loaded.split);
     let original = Evidence::new(loaded, recording.room.clone(), body);
     let mut report = Report {
+        audit: integrity.into_iter().map(Check::from).collect(),
+        notes,
+        settings: config.fingerprint(&table.iter().map(Table::shaping).collect::<Vec<_>>()),
+        ..undecided(recording, held_out)
+    };
+    if let Some(damage) = damage {
+        // Physics fitted to what no receiver sent would be a fiction.
+        (report.verdict, report.reason) = (Verdict::Damaged, damage);
+        return Ok(Diagnosis { report, radar, original, explanation: None });
+    }
+    if let Some(reason) = first_to_be_mended(recording, &original, config, &mut report.audit, progress) {
+        report.reason = reason;
+        return Ok(Diagnosis { report, radar, original, explanation: None });
+    }
+    progress("locating the residual");
+    report.located = Location::of(&original);
+    progress("asking whether anything is missing at all");
+    report.null = Null::of(&original, config.seed);
+    progress("looking for what was left out");
+    let explanation = explain(original.clone(), config, progress);
+    conclude(&mut report, &original, &explanation, config, table.as_ref(), progress);
+    Ok(Diagnosis { report, radar, original, explanation: Some(explanation) })
+}
+
+/// What is to be known of how a recording is read.
+fn notes(recording: &Recording, most_frames: usize) -> Result<Vec<String>> {
+    let mut notes = recording.notes.clone();
+    let stretch = recording.whole_stretch()?;
+    if stretch.len() < recording.radar.frames {
+        let (first, last) = (stretch.start, stretch.end - 1);
+        notes.push(format!(
+            "the frames {first} to {last} were looked at, the longest stretch without lost chirps; frames are counted from frame {first}"
+        ));
+    }
+    if stretch.len() > most_frames {
+        notes.push(format!("the first {most_frames} of {} frames were looked at", stretch.len()));
+    }
+    Ok(notes)
+}
+
+/// The report before anything is known.
+fn undecided(recording: &Recording, held_out: HeldOut) -> Report {
+    Report {
         format: FORMAT,
         recording: recording.folder.display().to_string(),
         held_out,
@@ -92,41 +125,48 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         null: Null::default(),
         calibration: None,
         suspects: BTreeMap::new(),
-        audit: integrity.into_iter().map(Check::from).collect(),
+        audit: vec![],
         effects: vec![],
         unexplained: vec![],
         not_detectable: vec![],
         fit: Fit { before: Misfit::default(), after: Misfit::default() },
         located: Location::default(),
-        notes,
+        notes: vec![],
         simulator: None,
-        settings: config.fingerprint(&table.iter().map(Table::shaping).collect::<Vec<_>>()),
-    };
-    if let Some(damage) = damage {
-        // Physics fitted to what no receiver sent would be a fiction.
-        (report.verdict, report.reason) = (Verdict::Damaged, damage);
-        return Ok(Diagnosis { report, radar, original, explanation: None });
+        settings: String::new(),
     }
+}
+
+/// Why no physics can be fitted yet: what the audit cannot decide on, or a convention that is wrong. `checks` receives what the audit
+/// found.
+fn first_to_be_mended(
+    recording: &Recording,
+    original: &Evidence,
+    config: &DiagnosisConfig,
+    checks: &mut Vec<Check>,
+    progress: &mut dyn FnMut(&str),
+) -> Option<String> {
     progress("checking conventions");
-    report.audit.extend(audit::audit(&original, recording.person().and_then(Person::origin_m)));
-    if let Some(reason) = audit::undecidable(&original, &report.audit) {
-        report.reason = reason;
-        return Ok(Diagnosis { report, radar, original, explanation: None });
+    checks.extend(audit::audit(original, recording.person().and_then(Person::origin_m)));
+    if let Some(reason) = audit::undecidable(original, checks) {
+        return Some(reason);
     }
-    observed_again(&original, config, &mut report.audit, progress);
-    if let Some(wrong) = report.audit.iter().find(|check| !check.ok && audit::is_convention(check)) {
-        // Physics fitted under a wrong convention would only imitate it.
-        report.reason =
-            format!("a convention, or the scene as it is stated, is wrong, which comes before any physics: {}", wrong.found);
-        return Ok(Diagnosis { report, radar, original, explanation: None });
-    }
-    progress("locating the residual");
-    report.located = Location::of(&original);
-    progress("asking whether anything is missing at all");
-    report.null = Null::of(&original, config.seed);
-    progress("looking for what was left out");
-    let explanation = explain(original.clone(), config, progress);
-    let findings = Findings::of(&explanation, moving_energy(&original));
+    observed_again(original, config, checks, progress);
+    let wrong = checks.iter().find(|check| !check.ok && audit::is_convention(check))?;
+    // Physics fitted under a wrong convention would only imitate it.
+    Some(format!("a convention, or the scene as it is stated, is wrong, which comes before any physics: {}", wrong.found))
+}
+
+/// Verdict, effects, limits and probabilities, by what the rounds left.
+fn conclude(
+    report: &mut Report,
+    original: &Evidence,
+    explanation: &Explanation,
+    config: &DiagnosisConfig,
+    table: Option<&Table>,
+    progress: &mut dyn FnMut(&str),
+) {
+    let findings = Findings::of(explanation, moving_energy(original));
     report.verdict = findings.verdict;
     report.reason = findings.reason;
     report.effects = findings.effects;
@@ -135,14 +175,14 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     if config.limits {
         progress("putting in what was not found, to see how strong it can be");
         let taken: Vec<&str> = report.effects.iter().flat_map(Effect::names).collect();
-        let limits = limits(&explanation.evidence, &taken, moving_energy(&original), config);
+        let limits = limits(&explanation.evidence, &taken, moving_energy(original), config);
         report.not_detectable.extend(limits.into_iter().map(NotDetectable::at_most));
     }
     report.not_detectable.retain(|limit| report.effects.iter().all(|effect| effect.id != limit.id));
     report.null.suspicion = Some(explanation.suspicion);
     report.suspects = explanation.suspects.clone();
     report.p_value = report.null.p_value();
-    if let (Some(table), Some(raw)) = (&table, report.p_value) {
+    if let (Some(table), Some(raw)) = (table, report.p_value) {
         let calibrated = table.calibrated(raw, &report.suspects);
         report.p_value = Some(calibrated.p_value());
         report.calibration = Some(calibrated);
@@ -153,7 +193,6 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
         _ => nothing,
     };
     report.fit = Fit { before: explanation.before, after: explanation.after };
-    Ok(Diagnosis { report, radar, original, explanation: Some(explanation) })
 }
 
 /// A body that is not observed may be masked by what needs no body to be found (a phase noise spreads the static clutter over all

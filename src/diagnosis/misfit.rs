@@ -63,58 +63,10 @@ impl Misfit {
     /// before it in the same frame, or on average of the training frames. These laws, that nothing was taken out, and that
     /// nothing is explained weigh the same at first; every frame and channel says which of them holds (Bayes).
     pub fn after(recording: &Evidence, explained: &Evidence) -> Self {
-        let [_, _, _, loops, samples] = recording.cube.dims;
-        let channels = recording.cube.channels();
-        let support = Support::new(&recording.radar, recording.room.as_ref());
-        let before = Baseline::new(recording, &support, None, recording.noise());
-        let after = (!std::ptr::eq(recording, explained)).then(|| Explained::new(recording, explained, &support));
         let inverted = Inverted::new(recording, explained);
-        let from_inverted = inverted.as_ref().map(|inverted| Explained::new(&inverted.evidence, explained, &support));
-        let bins = recording.range_bins();
-        let cells: Vec<usize> = (0..loops).flat_map(|doppler| (0..bins).map(move |range| doppler * samples + range)).collect();
-        let of_frame = |&frame: &usize| {
-            let expected = [recording.expected(frame), explained.expected(frame)];
-            let [here, here_inverted] = [&after, &from_inverted].map(|after| after.as_ref().map(|after| after.powers(frame)));
-            let of_channel = |channel: usize| {
-                let measured = transform(recording.cube.channel(frame, channel), samples);
-                let unexplained = before.law(channel, &expected[0], None);
-                let density = |law: &Law, measured: &[Complex64]| -> f64 {
-                    cells.iter().map(|&cell| law.log_density(cell, measured[cell])).sum()
-                };
-                let more = after.iter().zip(&here).flat_map(|(after, here)| after.more(here, channel));
-                let more: Vec<Vec<f32>> = more.collect();
-                let mut laws = vec![unexplained];
-                if let Some(after) = &after {
-                    laws.extend(after.laws(channel, &expected[1], &more));
-                }
-                let mut each: Vec<f64> = laws.iter().map(|law| density(law, &measured)).collect();
-                let of_laws = log_sum(&each);
-                let weights: Vec<f64> = each.iter().map(|value| (value - of_laws).exp()).collect();
-                if let (Some(inverted), Some(after), Some(here)) = (&inverted, &from_inverted, &here_inverted) {
-                    let became = transform(inverted.evidence.cube.channel(frame, channel), samples);
-                    let stretched = inverted.volume[frame * channels + channel] * bins as f64 / samples as f64;
-                    let more = after.more(here, channel);
-                    each.extend(after.laws(channel, &expected[1], &more).map(|law| density(&law, &became) + stretched));
-                }
-                let mut sums = Sums {
-                    likelihood: log_sum(&each) - (each.len() as f64).ln(),
-                    cells: cells.len(),
-                    peak: 1.0,
-                    ..Sums::default()
-                };
-                let unit = before.variance[channel];
-                for &cell in &cells {
-                    let wanted: f64 = laws.iter().zip(&weights).map(|(law, weight)| weight * law.power(cell)).sum::<f64>();
-                    let (seen, wanted) = (measured[cell].norm_sqr() / unit, wanted / unit);
-                    sums.squares += (10.0 * (seen.max(FLOOR) / wanted.max(FLOOR)).log10()).powi(2);
-                    sums.peak = sums.peak.max(seen);
-                }
-                sums
-            };
-            (0..channels).map(of_channel).fold(Sums::default(), Sums::and)
-        };
+        let laws = Laws::new(recording, explained, inverted.as_ref());
         // In the order of the frames, whichever thread had which.
-        let of_frames: Vec<Sums> = recording.split.held_out.par_iter().map(of_frame).collect();
+        let of_frames: Vec<Sums> = recording.split.held_out.par_iter().map(|&frame| laws.sums(frame)).collect();
         let sums = of_frames.into_iter().fold(Sums::default(), Sums::and);
         let cells = sums.cells.max(1) as f64;
         let (db_mse, span) = (sums.squares / cells, 10.0 * sums.peak.max(1.0).log10());
@@ -123,6 +75,84 @@ impl Misfit {
             db_mse,
             psnr_db: 10.0 * (span * span / db_mse.max(f64::MIN_POSITIVE)).log10(),
         }
+    }
+}
+
+/// The laws that a recording's cells are held against.
+struct Laws<'a> {
+    recording: &'a Evidence,
+    explained: &'a Evidence,
+    before: Baseline,
+    /// None where nothing is explained.
+    after: Option<Explained<'a>>,
+    /// None where no law was inverted; with what the inverted recording is expected to be.
+    inverted: Option<(&'a Inverted, Explained<'a>)>,
+    /// Of a range-Doppler map, as far as ranges are seen.
+    cells: Vec<usize>,
+}
+
+impl<'a> Laws<'a> {
+    fn new(recording: &'a Evidence, explained: &'a Evidence, inverted: Option<&'a Inverted>) -> Self {
+        let [_, _, _, loops, samples] = recording.cube.dims;
+        let support = Support::new(&recording.radar, recording.room.as_ref());
+        let bins = recording.range_bins();
+        Self {
+            recording,
+            explained,
+            before: Baseline::new(recording, &support, None, recording.noise()),
+            after: (!std::ptr::eq(recording, explained)).then(|| Explained::new(recording, explained, &support)),
+            inverted: inverted.map(|inverted| (inverted, Explained::new(&inverted.evidence, explained, &support))),
+            cells: (0..loops).flat_map(|doppler| (0..bins).map(move |range| doppler * samples + range)).collect(),
+        }
+    }
+
+    /// Of all channels of a frame.
+    fn sums(&self, frame: usize) -> Sums {
+        let expected = [self.recording.expected(frame), self.explained.expected(frame)];
+        let here = self.after.as_ref().map(|after| after.powers(frame));
+        let here_inverted = self.inverted.as_ref().map(|(_, after)| after.powers(frame));
+        let of_channel = |channel: usize| {
+            let measured = transform(self.recording.cube.channel(frame, channel), self.recording.cube.dims[4]);
+            let more = self.after.iter().zip(&here).flat_map(|(after, here)| after.more(here, channel));
+            let more: Vec<Vec<f32>> = more.collect();
+            let mut laws = vec![self.before.law(channel, &expected[0], None)];
+            if let Some(after) = &self.after {
+                laws.extend(after.laws(channel, &expected[1], &more));
+            }
+            let mut each: Vec<f64> = laws.iter().map(|law| self.log_density(law, &measured)).collect();
+            let of_laws = log_sum(&each);
+            let weights: Vec<f64> = each.iter().map(|value| (value - of_laws).exp()).collect();
+            each.extend(here_inverted.iter().flat_map(|here| self.inverted_densities(frame, channel, &expected[1], here)));
+            let sums = self.powers(&measured, &laws, &weights, self.before.variance[channel]);
+            Sums { likelihood: log_sum(&each) - (each.len() as f64).ln(), ..sums }
+        };
+        (0..self.recording.cube.channels()).map(of_channel).fold(Sums::default(), Sums::and)
+    }
+
+    fn log_density(&self, law: &Law, measured: &[Complex64]) -> f64 {
+        self.cells.iter().map(|&cell| law.log_density(cell, measured[cell])).sum()
+    }
+
+    /// Of a channel by the laws of the inverted recording, as densities of what was recorded.
+    fn inverted_densities(&self, frame: usize, channel: usize, expected: &[f32], here: &[Vec<f32>]) -> Vec<f64> {
+        let Some((inverted, after)) = &self.inverted else { return vec![] };
+        let (samples, bins) = (self.recording.cube.dims[4], self.recording.range_bins());
+        let became = transform(inverted.evidence.cube.channel(frame, channel), samples);
+        let stretched = inverted.volume[frame * self.recording.cube.channels() + channel] * bins as f64 / samples as f64;
+        let more = after.more(here, channel);
+        after.laws(channel, expected, &more).map(|law| self.log_density(&law, &became) + stretched).collect()
+    }
+
+    /// Measured and expected powers of a channel, over the noise; `weights`: how likely each law is.
+    fn powers(&self, measured: &[Complex64], laws: &[Law], weights: &[f64], noise: f64) -> Sums {
+        let mut sums = Sums { cells: self.cells.len(), peak: 1.0, ..Sums::default() };
+        for &cell in &self.cells {
+            let wanted: f64 = laws.iter().zip(weights).map(|(law, weight)| weight * law.power(cell)).sum::<f64>();
+            let (seen, wanted) = (measured[cell].norm_sqr() / noise, wanted / noise);
+            sums.squares += (10.0 * (seen.max(FLOOR) / wanted.max(FLOOR)).log10()).powi(2);
+            sums.peak = sums.peak.max(seen);
+        }
+        sums
     }
 }
 
@@ -348,69 +378,5 @@ impl<'a> Removed<'a> {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use super::*;
-    use crate::diagnosis::{Candidate, Correction, Place, Volume};
-    use crate::radar::Radar;
-
-    /// A return that stands still, whose samples have an image where nothing can stand.
-    fn still(image: Complex64) -> Evidence {
-        let mut radar = Radar::small(12);
-        (radar.loops_per_frame, radar.samples_per_chirp) = (16, 64);
-        let mut evidence = Evidence::in_noise(radar, 3, |[.., n]| Complex64::cis(0.8 * n as f64) * 30.0);
-        evidence.cube.each_chirp(|_, chirp| chirp.iter_mut().for_each(|value| *value += image * value.conj()));
-        evidence.changed()
-    }
-
-    fn without(image: Complex64) -> Candidate {
-        let undo = move |cube: &mut Cube| {
-            let scale = (1.0 - image.norm_sqr()).recip();
-            cube.each_chirp(|_, chirp| chirp.iter_mut().for_each(|value| *value = (*value - image * value.conj()) * scale));
-        };
-        Candidate {
-            id: None,
-            behaves_like: "image",
-            estimates: vec![],
-            choice: None,
-            place: Place::at("receiver"),
-            p_value: 0.0,
-            gain: 0.0,
-            errs_alike: false,
-            look_alikes: vec![],
-            statement: String::new(),
-            curve: None,
-            energy: 0.0,
-            correction: Correction::Inverse(Arc::new(undo), Volume::BY_SAMPLE),
-        }
-    }
-
-    #[test]
-    fn a_law_that_is_inverted_leaves_what_there_was_without_it() {
-        let image = Complex64::new(0.06, -0.08);
-        let (with, clean) = (still(image), Misfit::of(&still(Complex64::ZERO)));
-        let before = Misfit::of(&with);
-        let after = |image: Complex64| Misfit::after(&with, &with.with(&without(image))).loglik_per_sample;
-        // As a density of what was recorded: its volumes were shrunk by 1 − |μ|².
-        let wanted = clean.loglik_per_sample - (1.0 - image.norm_sqr()).ln();
-        let recovered = (after(image) - before.loglik_per_sample) / (wanted - before.loglik_per_sample);
-        assert!((recovered - 1.0).abs() < 0.02, "{recovered} of {}", wanted - before.loglik_per_sample);
-        // A wrong one gains nothing.
-        assert!(after(-image) < before.loglik_per_sample + 0.02 * (wanted - before.loglik_per_sample));
-    }
-
-    #[test]
-    fn a_stretch_changes_no_likelihood_but_by_its_volume() {
-        let with = still(Complex64::ZERO);
-        let twice = |cube: &mut Cube| cube.samples.iter_mut().for_each(|value| *value *= 2.0);
-        for volume in [Volume::BY_SAMPLE, Volume { alike: 2.0 * 2f64.ln(), ..Volume::KEPT }] {
-            let candidate =
-                Candidate { correction: Correction::Inverse(Arc::new(twice), volume.clone()), ..without(Complex64::ZERO) };
-            let stretched = Misfit::after(&with, &with.with(&candidate));
-            let law = stretched.loglik_per_sample - Misfit::of(&with).loglik_per_sample;
-            // Nothing is gained; of several laws that all say the same, some say something else.
-            assert!((-0.01..1e-6).contains(&law), "{volume:?} {law}");
-        }
-    }
-}
+#[path = "misfit_tests.rs"]
+mod tests;

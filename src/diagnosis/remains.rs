@@ -81,15 +81,16 @@ pub fn is_product(candidate: &Candidate) -> bool {
     is_one_of(candidate, &PRODUCTS)
 }
 
+fn is_path(candidate: &Candidate) -> bool {
+    candidate.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_none_or(|id| paths::MANY.contains(&id))
+}
+
 fn is_one_of(candidate: &Candidate, ids: &[&str]) -> bool {
     candidate.id.is_some_and(|id| ids.contains(&id))
 }
 
 /// Whether a candidate may be no more than what a rough correction left, or what a moving path left around its range.
 pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
-    let is_path = |candidate: &Candidate| {
-        candidate.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_none_or(|id| paths::MANY.contains(&id))
-    };
     let of_remains = is_of_remains(candidate);
     // An image of the body is all over the place: what else is there is something else.
     let beside = is_path(accepted)
@@ -132,25 +133,30 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let rest = no_single && is_path(candidate);
     let smeared = vibrates || timed || is_by_chirp(accepted) || path_like;
     let uneven = (smeared || is_one_of(accepted, &OF_REMAINS)) && is_of_receivers(candidate);
-    // To undo a coupling of receivers mixes their noise, and chirps read between their samples have less of it.
-    let mixed = is_of_receivers(accepted) && candidate.id == Some("correlated_noise")
-        || accepted.id == Some("chirp_nonlinearity") && candidate.id == Some("coloured_noise");
     // Chirps that start at random differ from their neighbours, and go on doing so a little.
     let unlike = is_by_chirp(accepted) && is_one_of(candidate, &BURSTS);
-    // A signal that is cut and cannot be restored has products of all returns along every chirp, and other ones in every receiver.
-    let cut = accepted.id == Some("adc_saturation")
-        && matches!(accepted.correction, Correction::None)
-        && (is_of_receivers(candidate) || candidate.place.stage == "waveform");
     // Up to which share of what was gained.
     [
         (roughly || fades || image || unlike, ROUGHLY),
         (bursts || behind || line, 1.0),
-        (hardly || uneven || mixed || cut || products || alone, f64::INFINITY),
+        (hardly || uneven || is_mixed_or_cut(accepted, candidate) || products || alone, f64::INFINITY),
         (shaken || rest, SHAKEN),
         (by_chirp || faint, SLIGHTLY),
     ]
     .into_iter()
     .any(|(holds, share)| holds && candidate.gain < share * accepted.gain)
+}
+
+/// Whether it is in the noise as an accepted correction mixes it, or in the products of a signal that is cut.
+fn is_mixed_or_cut(accepted: &Candidate, candidate: &Candidate) -> bool {
+    // To undo a coupling of receivers mixes their noise, and chirps read between their samples have less of it.
+    let mixed = is_of_receivers(accepted) && candidate.id == Some("correlated_noise")
+        || accepted.id == Some("chirp_nonlinearity") && candidate.id == Some("coloured_noise");
+    // A signal that is cut and cannot be restored has products of all returns along every chirp, and other ones in every receiver.
+    let cut = accepted.id == Some("adc_saturation")
+        && matches!(accepted.correction, Correction::None)
+        && (is_of_receivers(candidate) || candidate.place.stage == "waveform");
+    mixed || cut
 }
 
 fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> bool {

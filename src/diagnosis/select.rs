@@ -4,18 +4,20 @@
 //! was accepted early may only have mimicked what was found later, so at the end each one is asked to stand again with
 //! all others taken into account.
 
+mod precedence;
+
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
 use super::config::DiagnosisConfig;
-use super::course::Of;
 use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
 use super::remains::{ROUGHLY, is_by_chirp, is_left_by, is_of_receivers, is_of_remains, is_product, is_rough, is_same};
 use super::suspects::receiver::harmonic;
 use super::suspects::{SUSPECTS, Suspect, by_suspect, excess, paths, strongest_suspicion};
+use precedence::{is_displaced, is_echo, upstream};
 
 impl DiagnosisConfig {
     /// Limit of one suspect's p-value.
@@ -57,12 +59,6 @@ const NEARLY: f64 = 0.8;
 /// What is named even where products of the signal with itself lie everywhere.
 const WHATEVER_THE_SIGNAL: [&str; 2] = ["iq_imbalance", "adc_saturation"];
 
-/// What never changes and may be a return or added behind the mixer: what turns all returns distinguishes the two, and goes first.
-const ADDED: [&str; 3] = ["tx_leakage", "dc_offset", "static_reflector"];
-
-/// Stages of the signal's chain at which everything that is received is changed.
-const UPSTREAM: [&str; 2] = ["waveform", "receiver"];
-
 /// What raises the held-out frames' dB error by this factor as it is undone is not what happened.
 const FAR_WORSE: f64 = 1.6;
 
@@ -101,102 +97,24 @@ pub struct Explanation {
 pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut dyn FnMut(&str)) -> Explanation {
     let before = Misfit::of(&evidence);
     let original = evidence;
-    let mut current: Option<Evidence> = None;
-    let mut accepted: Vec<Accepted> = vec![];
-    let mut first_suspected = None;
-    // Candidates of the round before that could still turn out to be the same thing as what was accepted in it.
-    let mut pending: Vec<Candidate> = vec![];
-    let mut misfit = before;
-    // Names that would make everything far worse.
-    let mut refused: Vec<&'static str> = vec![];
-    // Names that passed on the untouched recording, and what they gained.
-    let mut at_first: Option<Vec<(&'static str, f64)>> = None;
-    // What was suspected in a round that only refused a name: nothing has changed since.
-    let mut suspected: Option<Vec<(usize, Candidate)>> = None;
+    let mut rounds = Rounds {
+        original: &original,
+        thresholds,
+        current: None,
+        misfit: before,
+        accepted: vec![],
+        pending: vec![],
+        first_suspected: None,
+        at_first: None,
+        refused: vec![],
+        suspected: None,
+    };
     for _ in 0..=thresholds.most {
-        let evidence = current.as_ref().unwrap_or(&original);
-        let found = suspected.take().unwrap_or_else(|| suspicions(evidence));
-        first_suspected.get_or_insert_with(|| (strongest_suspicion(&found), by_suspect(&found)));
-        // So they do where products were taken out roughly.
-        let bent = |effect: &Accepted| effect.candidate.behaves_like == harmonic::QUADRATIC;
-        let mixed = evidence.products().mixed().is_some() || accepted.iter().any(bent);
-        let untouched = accepted.is_empty();
-        let passes = |(suspect, candidate): &&(usize, Candidate)| thresholds.passes(*suspect, candidate, untouched);
-        let named = || found.iter().filter(passes).filter_map(|(_, candidate)| Some((candidate.id?, candidate.gain))).collect();
-        let at_first: &Vec<(&'static str, f64)> = at_first.get_or_insert_with(named);
-        // What a radar that vibrates leaves, or paths of what differs between receivers, or that of their noise, is less than there
-        // was before; and a tone or a product that was there before is no remains.
-        let was_there = |effect: &Accepted, candidate: &Candidate| {
-            let as_much = |&(id, gain): &(&str, f64)| candidate.id == Some(id) && candidate.gain > NEARLY * gain;
-            let vibrates = effect.candidate.id == Some("radar_vibration");
-            let of_receivers = is_of_receivers(candidate) || is_of_receivers(&effect.candidate);
-            (vibrates || of_receivers || candidate.id == Some("spur") || is_product(candidate)) && at_first.iter().any(as_much)
-        };
-        let left = |effect: &Accepted, candidate: &Candidate| {
-            is_same(&effect.candidate, candidate) || is_left_by(&effect.candidate, candidate) && !was_there(effect, candidate)
-        };
-        let known = |candidate: &Candidate| accepted.iter().any(|effect| left(effect, candidate));
-        let by_chirp = accepted.iter().any(|effect| is_by_chirp(&effect.candidate));
-        let may_be_named = |id: &str| {
-            (!mixed || WHATEVER_THE_SIGNAL.contains(&id))
-                && (!by_chirp || !LIKE_EDGES.contains(&id) || at_first.iter().any(|first| first.0 == id))
-                && !refused.contains(&id)
-                && accepted.iter().filter(|effect| effect.candidate.id == Some(id)).count() < MOST_ALIKE
-        };
-        let clocks_were_wrong = accepted.iter().any(|effect| effect.candidate.place.stage == "timing");
-        let elsewhere = clocks_were_wrong || found.iter().filter(passes).any(|(_, candidate)| is_displaced(candidate));
-        let passing: Vec<&(usize, Candidate)> = found
-            .iter()
-            .filter(passes)
-            .filter(|(suspect, _)| !(elsewhere && SUSPECTS[*suspect].trusts_the_place))
-            .filter(|(_, candidate)| !known(candidate) && candidate.id.is_none_or(may_be_named))
-            .collect();
-        if let Some(last) = accepted.last_mut() {
-            settle_rivals(last, &pending, &passing, thresholds);
-        }
-        // What happened last in the signal's chain is undone first; else the strongest; what has no shape at all last.
-        let order = |(suspect, candidate): &&&(usize, Candidate)| {
-            let suspect = &SUSPECTS[*suspect];
-            let worth = if is_rough(candidate) { ROUGHLY * candidate.gain } else { candidate.gain };
-            (suspect.last_in_chain, !suspect.last_resort, worth)
-        };
-        let strongest = passing.iter().max_by(|a, b| order(a).partial_cmp(&order(b)).expect("gains are finite"));
-        let Some(strongest) = strongest.map(|best| upstream(&original, evidence, best, &passing)) else {
-            break;
-        };
-        let (suspect, best) = strongest;
-        if accepted.len() == thresholds.most {
+        if !rounds.next(progress) {
             break;
         }
-        let mut best = best.clone();
-        let mut next = evidence.with(&best);
-        let mut after = Misfit::after(&original, &next);
-        if let Some(id) = best.id
-            && after.db_mse > FAR_WORSE * misfit.db_mse
-        {
-            if !SUSPECTS[*suspect].last_in_chain {
-                refused.push(id);
-                suspected = Some(found);
-                continue;
-            }
-            // What the codes themselves show is there, even where it cannot be undone.
-            best.correction = Correction::None;
-            next = evidence.with(&best);
-            after = misfit;
-        }
-        progress(&best.statement);
-        pending = passing.iter().filter(|other| !std::ptr::eq(**other, strongest)).map(|(_, other)| other.clone()).collect();
-        accepted.push(Accepted {
-            suspect: *suspect,
-            rivals: best.look_alikes.clone(),
-            candidate: best,
-            probability: 1.0,
-            before: misfit,
-            after,
-        });
-        misfit = after;
-        current = Some(next);
     }
+    let Rounds { current, accepted, first_suspected, .. } = rounds;
     drop(current);
     let accepted = verified(&original, accepted, thresholds);
     let evidence = accepted.iter().fold(original.clone(), |evidence, effect| evidence.with(&effect.candidate));
@@ -209,66 +127,122 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     Explanation { accepted, evidence, suspicion, suspects, before, after }
 }
 
-/// Whether the body is elsewhere, or at another time, than predicted.
-fn is_displaced(candidate: &Candidate) -> bool {
-    matches!(candidate.correction, Correction::Body(_)) && candidate.place.stage != "propagation"
+/// What the rounds have found so far.
+struct Rounds<'a> {
+    original: &'a Evidence,
+    thresholds: &'a DiagnosisConfig,
+    /// The recording with everything accepted taken into account; none before anything was.
+    current: Option<Evidence>,
+    misfit: Misfit,
+    accepted: Vec<Accepted>,
+    /// Candidates of the round before that could still turn out to be the same thing as what was accepted in it.
+    pending: Vec<Candidate>,
+    first_suspected: Option<(f64, BTreeMap<String, f64>)>,
+    /// Names that passed on the untouched recording, and what they gained.
+    at_first: Option<Vec<(&'static str, f64)>>,
+    /// Names that would make everything far worse.
+    refused: Vec<&'static str>,
+    /// What was suspected in a round that only refused a name: nothing has changed since.
+    suspected: Option<Vec<(usize, Candidate)>>,
 }
 
-/// Whether it acts on every return, or on all of the body. What has no name does where nobody is tracked: most ranges share it then.
-fn is_on_all(candidate: &Candidate, evidence: &Evidence) -> bool {
-    let id = candidate.id.unwrap_or_default();
-    (!id.is_empty() || evidence.body.is_none())
-        && (id == "radar_vibration" || is_displaced(candidate) || UPSTREAM.contains(&candidate.place.stage.as_str()))
-}
-
-/// Whether it may be something else's echoes of the body.
-fn is_echo(candidate: &Candidate) -> bool {
-    candidate.behaves_like.starts_with(paths::PATH_LIKE) || is_rough(candidate)
-}
-
-/// What acts on every return makes echoes of the body too, which look like paths of their own, and of the room beyond its ranges; and a
-/// body that is elsewhere than predicted looks like another one: where both are suspected, the one is accepted that leaves less.
-fn upstream<'a>(
-    original: &Evidence,
-    evidence: &Evidence,
-    best: &'a (usize, Candidate),
-    passing: &[&'a (usize, Candidate)],
-) -> &'a (usize, Candidate) {
-    let turns_all = |(_, candidate): &&&(usize, Candidate)| matches!(&candidate.correction, Correction::Followed(_, course) if course.of == Of::All);
-    if ADDED.iter().any(|id| best.1.id == Some(id))
-        && let Some(course) = passing.iter().filter(turns_all).max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))
-    {
-        return course;
+impl Rounds<'_> {
+    /// One round; whether another may follow.
+    fn next(&mut self, progress: &mut dyn FnMut(&str)) -> bool {
+        let evidence = self.current.as_ref().unwrap_or(self.original);
+        let found = self.suspected.take().unwrap_or_else(|| suspicions(evidence));
+        self.first_suspected.get_or_insert_with(|| (strongest_suspicion(&found), by_suspect(&found)));
+        if self.at_first.is_none() {
+            let passing = found.iter().filter(|suspicion| self.passes(suspicion));
+            self.at_first = Some(passing.filter_map(|(_, candidate)| Some((candidate.id?, candidate.gain))).collect());
+        }
+        let passing = self.passing(evidence, &found);
+        if let Some(last) = self.accepted.last_mut() {
+            settle_rivals(last, &self.pending, &passing, self.thresholds);
+        }
+        let strongest = strongest(&passing).map(|best| upstream(self.original, evidence, best, &passing));
+        let Some(strongest) = strongest.filter(|_| self.accepted.len() < self.thresholds.most) else {
+            return false;
+        };
+        let (suspect, mut best) = strongest.clone();
+        let mut next = evidence.with(&best);
+        let mut after = Misfit::after(self.original, &next);
+        if let Some(id) = best.id
+            && after.db_mse > FAR_WORSE * self.misfit.db_mse
+        {
+            if !SUSPECTS[suspect].last_in_chain {
+                self.refused.push(id);
+                self.suspected = Some(found);
+                return true;
+            }
+            // What the codes themselves show is there, even where it cannot be undone.
+            best.correction = Correction::None;
+            next = evidence.with(&best);
+            after = self.misfit;
+        }
+        progress(&best.statement);
+        let others = passing.iter().filter(|other| !std::ptr::eq(**other, strongest));
+        self.pending = others.map(|(_, other)| other.clone()).collect();
+        let (before, rivals) = (self.misfit, best.look_alikes.clone());
+        self.accepted.push(Accepted { suspect, rivals, candidate: best, probability: 1.0, before, after });
+        self.misfit = after;
+        self.current = Some(next);
+        true
     }
-    if best.1.id == Some("tx_leakage") {
-        // What the chirp makes of the room's returns never changes either, nor does an offset, and a leakage is free in every channel: it
-        // is none where nothing is left of it.
-        let left = |evidence: &Evidence| (SUSPECTS[best.0].find)(evidence).iter().any(|candidate| candidate.id == best.1.id);
-        let simpler = |candidate: &Candidate| candidate.place.stage == "waveform" || candidate.id == Some("dc_offset");
-        let mut simpler = passing.iter().filter(|(_, candidate)| simpler(candidate));
-        return simpler.find(|(_, candidate)| !left(&evidence.with(candidate))).copied().unwrap_or(best);
+
+    fn passes(&self, (suspect, candidate): &(usize, Candidate)) -> bool {
+        self.thresholds.passes(*suspect, candidate, self.accepted.is_empty())
     }
-    let others = passing.iter().filter(|(_, candidate)| is_on_all(candidate, evidence));
-    let Some(other) = others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| is_echo(&best.1)) else {
-        return best;
+
+    /// Of what was found: what is significant, and neither known already nor a name that may not be given.
+    fn passing<'b>(&self, evidence: &Evidence, found: &'b [(usize, Candidate)]) -> Vec<&'b (usize, Candidate)> {
+        // So they do where products were taken out roughly.
+        let bent = |effect: &Accepted| effect.candidate.behaves_like == harmonic::QUADRATIC;
+        let mixed = evidence.products().mixed().is_some() || self.accepted.iter().any(bent);
+        let by_chirp = self.accepted.iter().any(|effect| is_by_chirp(&effect.candidate));
+        let may_be_named = |id: &str| {
+            (!mixed || WHATEVER_THE_SIGNAL.contains(&id))
+                && (!by_chirp || !LIKE_EDGES.contains(&id) || self.at_first.iter().flatten().any(|first| first.0 == id))
+                && !self.refused.contains(&id)
+                && self.accepted.iter().filter(|effect| effect.candidate.id == Some(id)).count() < MOST_ALIKE
+        };
+        let passes = || found.iter().filter(|suspicion| self.passes(suspicion));
+        let clocks_were_wrong = self.accepted.iter().any(|effect| effect.candidate.place.stage == "timing");
+        let elsewhere = clocks_were_wrong || passes().any(|(_, candidate)| is_displaced(candidate));
+        passes()
+            .filter(|(suspect, _)| !(elsewhere && SUSPECTS[*suspect].trusts_the_place))
+            .filter(|(_, candidate)| !self.known(candidate) && candidate.id.is_none_or(may_be_named))
+            .collect()
+    }
+
+    /// Whether it is what was accepted, or what that left.
+    fn known(&self, candidate: &Candidate) -> bool {
+        let left = |effect: &Accepted| {
+            is_same(&effect.candidate, candidate)
+                || is_left_by(&effect.candidate, candidate) && !self.was_there(effect, candidate)
+        };
+        self.accepted.iter().any(left)
+    }
+
+    /// What a radar that vibrates leaves, or paths of what differs between receivers, or that of their noise, is less than there
+    /// was before; and a tone or a product that was there before is no remains.
+    fn was_there(&self, effect: &Accepted, candidate: &Candidate) -> bool {
+        let as_much = |&(id, gain): &(&str, f64)| candidate.id == Some(id) && candidate.gain > NEARLY * gain;
+        let vibrates = effect.candidate.id == Some("radar_vibration");
+        let of_receivers = is_of_receivers(candidate) || is_of_receivers(&effect.candidate);
+        (vibrates || of_receivers || candidate.id == Some("spur") || is_product(candidate))
+            && self.at_first.iter().flatten().any(as_much)
+    }
+}
+
+/// What happened last in the signal's chain is undone first; else the strongest; what has no shape at all last.
+fn strongest<'a>(passing: &[&'a (usize, Candidate)]) -> Option<&'a (usize, Candidate)> {
+    let order = |(suspect, candidate): &(usize, Candidate)| {
+        let suspect = &SUSPECTS[*suspect];
+        let worth = if is_rough(candidate) { ROUGHLY * candidate.gain } else { candidate.gain };
+        (suspect.last_in_chain, !suspect.last_resort, worth)
     };
-    // Seen from a wrong place, an echo of the body has no name: where the body is elsewhere with and without the echo, it is put right
-    // first.
-    let stands = |(suspect, other): &(usize, Candidate)| {
-        let again = (SUSPECTS[*suspect].find)(&evidence.with(&best.1));
-        again.iter().any(|found| found.id == other.id && found.gain > NEARLY * other.gain)
-    };
-    if best.1.id.is_none() && is_displaced(&other.1) && stands(other) {
-        return other;
-    }
-    if evidence.body.is_none() {
-        // Nobody predicts where something moves: it does where it still seems to once what all returns share is undone.
-        let again = (SUSPECTS[best.0].find)(&evidence.with(&other.1));
-        let stands = again.iter().any(|found| is_same(&best.1, found) && found.gain > NEARLY * best.1.gain);
-        return if stands { best } else { other };
-    }
-    let left = |candidate: &Candidate| Misfit::after(original, &evidence.with(candidate)).loglik_per_sample;
-    if left(&other.1) > left(&best.1) { other } else { best }
+    passing.iter().copied().max_by(|a, b| order(a).partial_cmp(&order(b)).expect("gains are finite"))
 }
 
 /// What every suspect has to say.

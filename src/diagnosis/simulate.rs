@@ -25,6 +25,21 @@ pub struct Start<'a> {
     pub checkpoint: Option<&'a Path>,
 }
 
+impl Start<'_> {
+    /// How simulators learn from all but a part of the frames.
+    fn learning_without(&self, held_out: f64) -> TrainingConfig {
+        TrainingConfig {
+            epochs: self.epochs,
+            validation_fraction: held_out,
+            split: Split::Interleaved,
+            frames: None,
+            repeats: 1,
+            start_from: None,
+            ..self.learning.clone()
+        }
+    }
+}
+
 /// Both simulators, and what they are worth.
 pub struct Simulated {
     pub fit: SimulatorFit,
@@ -56,15 +71,7 @@ pub fn before_and_after(
         return Ok(None);
     }
     let held_out: Vec<usize> = (0..frames).filter(|frame| frame % 4 == 2).collect();
-    let learning = TrainingConfig {
-        epochs: start.epochs,
-        validation_fraction: held_out.len() as f64 / frames as f64,
-        split: Split::Interleaved,
-        frames: None,
-        repeats: 1,
-        start_from: None,
-        ..start.learning.clone()
-    };
+    let learning = start.learning_without(held_out.len() as f64 / frames as f64);
     let scratch = AtomicFolder::replacing(keep)?;
     // The second one goes on from the first, where that was there before.
     let onwards = TrainingConfig { start_from: start.checkpoint.map(Path::to_path_buf), ..learning.clone() };

@@ -145,8 +145,10 @@ fn a_second_room_without_the_training_subject_is_refused() {
 #[test]
 fn takes_are_planned_in_the_order_in_which_they_are_found() {
     let config = SiteConfig::read(Path::new("configs/site_reproduce_smoke.toml"), &[]).unwrap();
-    let names: Vec<String> =
-        super::planned(site::sequences(&config, Path::new("configs")).unwrap()).into_iter().map(|take| take.name).collect();
+    let names: Vec<String> = super::place::planned(site::sequences(&config, Path::new("configs")).unwrap())
+        .into_iter()
+        .map(|take| take.name)
+        .collect();
     let mut sorted = names.clone();
     sorted.sort();
     assert!(names == sorted && names.len() == 12, "{names:?}");

@@ -150,16 +150,21 @@ pub fn collect(plan: &Plan, store: &Store, records: &[Record]) -> Result<Results
         let found: Vec<serde_json::Value> = read_json(folder(stage).join("effects.json"))?;
         Ok::<_, Error>(found.iter().filter_map(|effect| Some(effect["id"].as_str()?.to_string())).collect())
     });
-    let mut seconds = BTreeMap::new();
-    for record in records {
-        let kind = record.name.split('/').next().expect("the first part").to_string();
-        *seconds.entry(kind).or_default() += record.seconds;
-    }
+    let seconds = seconds_by_kind(records);
     let mut programs = BTreeMap::new();
     records.iter().for_each(|record| *programs.entry(record.program.clone()).or_default() += 1);
     let device = records.last().map(|record| record.device.clone()).unwrap_or_default();
     let pairs = pairs(plan, &scores)?;
     Ok(Results { methods, pairs, stability, figures, effects: effects.transpose()?, seconds, device, programs })
+}
+
+fn seconds_by_kind(records: &[Record]) -> BTreeMap<String, f64> {
+    let mut seconds = BTreeMap::new();
+    for record in records {
+        let kind = record.name.split('/').next().expect("the first part").to_string();
+        *seconds.entry(kind).or_default() += record.seconds;
+    }
+    seconds
 }
 
 /// Every pair that is asked for and was scored on the same recordings.

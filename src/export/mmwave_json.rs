@@ -20,33 +20,41 @@ pub struct Described {
     capture: Value,
 }
 
+/// To the picosecond.
+fn microseconds(seconds: f64) -> f64 {
+    (seconds * PICOSECONDS).round() / (PICOSECONDS / 1e6)
+}
+
+/// The shape of all chirps.
+fn profile(radar: &Radar) -> Value {
+    let window_s = radar.adc_start_s + radar.samples_per_chirp as f64 / radar.sample_rate_hz;
+    // The chip's times are in steps of 10 ns.
+    let ramp_s = ((window_s * 1e8 - 1e-6).ceil() * 1e-8).min(radar.chirp_period_s);
+    json!({ "rlProfileCfg_t": {
+        "profileId": 0,
+        "pfVcoSelect": "0x2",
+        "pfCalLutUpdate": "0x0",
+        "startFreqConst_GHz": radar.start_frequency_hz / 1e9,
+        "idleTimeConst_usec": microseconds(microseconds(radar.chirp_period_s) * 1e-6 - microseconds(ramp_s) * 1e-6),
+        "adcStartTimeConst_usec": microseconds(radar.adc_start_s),
+        "rampEndTime_usec": microseconds(ramp_s),
+        "txOutPowerBackoffCode": "0x0",
+        "txPhaseShifter": "0x0",
+        "freqSlopeConst_MHz_usec": radar.slope_hz_per_s / 1e12,
+        "txStartTime_usec": 0.0,
+        "numAdcSamples": radar.samples_per_chirp,
+        "digOutSampleRate": whole(radar.sample_rate_hz / 1e3),
+        "hpfCornerFreq1": 0,
+        "hpfCornerFreq2": 0,
+        "rxGain_dB": "0x1E",
+    }})
+}
+
 impl Described {
     /// The notes say what cannot be expressed.
     pub fn of(radar: &Radar, wiring: &Wiring, notes: &mut Vec<String>) -> Self {
-        let window_s = radar.adc_start_s + radar.samples_per_chirp as f64 / radar.sample_rate_hz;
-        // The chip's times are in steps of 10 ns.
-        let ramp_s = ((window_s * 1e8 - 1e-6).ceil() * 1e-8).min(radar.chirp_period_s);
         say_what_changes(radar, notes);
-        let us = |seconds: f64| (seconds * PICOSECONDS).round() / (PICOSECONDS / 1e6);
         let mask = |numbers: &[usize]| format!("0x{:X}", numbers.iter().fold(0, |mask, number| mask | 1_usize << number));
-        let profile = json!({ "rlProfileCfg_t": {
-            "profileId": 0,
-            "pfVcoSelect": "0x2",
-            "pfCalLutUpdate": "0x0",
-            "startFreqConst_GHz": radar.start_frequency_hz / 1e9,
-            "idleTimeConst_usec": us(us(radar.chirp_period_s) * 1e-6 - us(ramp_s) * 1e-6),
-            "adcStartTimeConst_usec": us(radar.adc_start_s),
-            "rampEndTime_usec": us(ramp_s),
-            "txOutPowerBackoffCode": "0x0",
-            "txPhaseShifter": "0x0",
-            "freqSlopeConst_MHz_usec": radar.slope_hz_per_s / 1e12,
-            "txStartTime_usec": 0.0,
-            "numAdcSamples": radar.samples_per_chirp,
-            "digOutSampleRate": whole(radar.sample_rate_hz / 1e3),
-            "hpfCornerFreq1": 0,
-            "hpfCornerFreq2": 0,
-            "rxGain_dB": "0x1E",
-        }});
         let chirp = |(index, tx): (usize, &usize)| {
             json!({ "rlChirpCfg_t": {
                 "chirpStartIdx": index,
@@ -70,14 +78,14 @@ impl Described {
                 "b2AdcBits": 2, "b8FullScaleReducFctr": 0, "b2AdcOutFmt": u8::from(radar.sampling == Sampling::Complex),
             }},
             "rlLowPowerModeCfg_t": { "lpAdcMode": 0 },
-            "rlProfiles": [profile],
+            "rlProfiles": [profile(radar)],
             "rlChirps": wiring.tx.iter().enumerate().map(chirp).collect::<Vec<_>>(),
             "rlFrameCfg_t": {
                 "chirpStartIdx": 0,
                 "chirpEndIdx": wiring.tx.len() - 1,
                 "numLoops": radar.loops_per_frame,
                 "numFrames": radar.frames,
-                "framePeriodicity_msec": us(radar.frame_period_s) / 1e3,
+                "framePeriodicity_msec": microseconds(radar.frame_period_s) / 1e3,
                 "triggerSelect": 1,
                 "numDummyChirpsAtEnd": 0,
                 "frameTriggerDelay": 0.0,

@@ -42,6 +42,10 @@ pub fn read_motion(path: &Path, model: &BodyModel, config: &BvhConfig) -> Result
 }
 
 #[cfg(test)]
+mod tried_files_tests;
+#[cfg(test)]
+mod tried_npz_tests;
+#[cfg(test)]
 mod tried_tests;
 #[cfg(test)]
 mod written;

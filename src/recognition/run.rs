@@ -107,16 +107,7 @@ pub fn run(
     let (found, means) = judgements(&judge(&network, &test_maps, config, device), &test_maps, config);
     let counts = confusion(&found, actions.len());
     let (accuracy, macro_f1) = scores(&found, actions.len(), config.confidence, config.resamplings, config.seed);
-    let answers: Vec<Answer> = test
-        .iter()
-        .zip(&means)
-        .map(|(labelled, mean)| Answer {
-            recording: labelled.recording.folder.display().to_string(),
-            action: labelled.action.clone(),
-            judged: actions[best(mean)].clone(),
-            probability: mean[best(mean)],
-        })
-        .collect();
+    let answers: Vec<Answer> = test.iter().zip(&means).map(|(labelled, mean)| labelled.answer(mean, &actions)).collect();
     let right = answers.iter().filter(|answer| answer.action == answer.judged).count();
     Ok(Recognition {
         notes: notes(&training, &test, &actions),
@@ -141,6 +132,18 @@ struct Labelled {
     recording: Recording,
     action: String,
     subject: Option<String>,
+}
+
+impl Labelled {
+    fn answer(&self, probabilities: &[f64], actions: &[String]) -> Answer {
+        let judged = best(probabilities);
+        Answer {
+            recording: self.recording.folder.display().to_string(),
+            action: self.action.clone(),
+            judged: actions[judged].clone(),
+            probability: probabilities[judged],
+        }
+    }
 }
 
 /// Recordings of the folders, in the order given and by name within a folder.

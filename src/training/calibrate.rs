@@ -63,26 +63,14 @@ pub fn fit_levels(
         let transform = prepared[id.recording].loss.transform();
         levels.add(&plain, &recordings[id.recording], id.frame, &surfaces[id.recording], transform, heatmap)?;
     }
-    let measured = levels.measured_moving + levels.measured_still;
-    if !(measured.is_finite() && measured > 0.0) {
-        return Err(Error::Usage {
-            message: format!("the recording's power is {measured}, nothing can be learned from it"),
-            hint: Some("check that the recording holds a signal: `hybridsim check`".into()),
-        });
-    }
-    if !(levels.simulated.is_finite() && levels.simulated > 0.0) {
-        return Err(Error::Usage {
-            message: format!("the simulated power is {}: the radar sees nothing of the scene", levels.simulated),
-            hint: Some("check the room's distances and where the person stands: `hybridsim check`".into()),
-        });
-    }
+    levels.check()?;
     let ratio = |measured: f64, simulated: f64| (measured > 0.0 && simulated > 0.0).then(|| (measured / simulated).sqrt());
     let body = ratio(levels.measured_moving, levels.simulated_moving);
     let room = ratio(levels.measured_still, levels.simulated_still);
     // Where one of them cannot be told apart, the other's level is the best guess.
     let gains = simulator.config().equations.gains;
     let decoders = &mut simulator.decoders;
-    let any = (measured / levels.simulated).sqrt();
+    let any = (levels.measured() / levels.simulated).sqrt();
     if gains == Gains::Paper {
         // None is applied: the materials must reach the level by themselves.
     } else if known_body {
@@ -113,6 +101,27 @@ fn decode(plain: &Simulator, prepared: &[Prepared]) -> Vec<Surfaces> {
 }
 
 impl Levels {
+    fn measured(&self) -> f64 {
+        self.measured_moving + self.measured_still
+    }
+
+    fn check(&self) -> Result<()> {
+        let measured = self.measured();
+        if !(measured.is_finite() && measured > 0.0) {
+            return Err(Error::Usage {
+                message: format!("the recording's power is {measured}, nothing can be learned from it"),
+                hint: Some("check that the recording holds a signal: `hybridsim check`".into()),
+            });
+        }
+        if !(self.simulated.is_finite() && self.simulated > 0.0) {
+            return Err(Error::Usage {
+                message: format!("the simulated power is {}: the radar sees nothing of the scene", self.simulated),
+                hint: Some("check the room's distances and where the person stands: `hybridsim check`".into()),
+            });
+        }
+        Ok(())
+    }
+
     fn add(
         &mut self,
         plain: &Simulator,

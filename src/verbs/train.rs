@@ -59,22 +59,11 @@ pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, tell: &mut 
         });
     }
     let mut config = Config::read(&config_path, sets)?;
-    if resume.is_none() && run_folder.join("last").is_dir() {
-        return Err(Error::Usage {
-            message: format!("{}: already holds a run", run_folder.display()),
-            hint: Some("continue it with --resume, or choose another folder with --out".into()),
-        });
+    if resume.is_none() {
+        holds_no_run(&run_folder)?;
     }
     let _claim = resumed.map_or_else(|| claimed(&run_folder), Ok)?;
-    if config.data.recordings.is_empty() {
-        let recorded = record::recorded(config.record(&config_path)?, &config_path, as_stated, tell)?;
-        config.data.recordings = vec![recorded];
-    }
-    absolute(&mut config.data.recordings)?;
-    absolute(config.training.start_from.as_mut_slice())?;
-    for recording in &config.data.recordings {
-        plausible::folder(recording, as_stated, tell)?;
-    }
+    has_recordings(&mut config, &config_path, as_stated, tell)?;
     let config_toml = config.to_toml();
     if resume.is_some() && by_config {
         is_the_same(&run_folder.join("config.toml"), &config_toml)?;
@@ -103,6 +92,30 @@ pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, tell: &mut 
     };
     let evaluations = report.write()?;
     Ok(Trained { folder: run_folder, progress: outcome.progress, evaluations })
+}
+
+fn holds_no_run(folder: &Path) -> Result<()> {
+    match folder.join("last").is_dir() {
+        false => Ok(()),
+        true => Err(Error::Usage {
+            message: format!("{}: already holds a run", folder.display()),
+            hint: Some("continue it with --resume, or choose another folder with --out".into()),
+        }),
+    }
+}
+
+/// Records where a config names no recordings, and finds those that it names.
+fn has_recordings(config: &mut Config, config_path: &Path, as_stated: bool, tell: &mut Tell<'_>) -> Result<()> {
+    if config.data.recordings.is_empty() {
+        let recorded = record::recorded(config.record(config_path)?, config_path, as_stated, tell)?;
+        config.data.recordings = vec![recorded];
+    }
+    absolute(&mut config.data.recordings)?;
+    absolute(config.training.start_from.as_mut_slice())?;
+    for recording in &config.data.recordings {
+        plausible::folder(recording, as_stated, tell)?;
+    }
+    Ok(())
 }
 
 /// Refuses to go on with a run of other settings.

@@ -188,4 +188,6 @@ pub fn check_placement(path: &Path, placement: &Placement) -> Result<()> {
 }
 
 #[cfg(test)]
+mod samples_tests;
+#[cfg(test)]
 mod tests;

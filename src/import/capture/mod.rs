@@ -205,4 +205,6 @@ fn one(sources: &[PathBuf]) -> Result<&Path> {
 }
 
 #[cfg(test)]
+mod array_tests;
+#[cfg(test)]
 mod tests;

@@ -108,27 +108,43 @@ mod tests {
         place.iter().zip(of).fold(0, |number, (at, length)| number * length + at) as f32
     }
 
-    /// Files of a preset's layout, in the types that its data set has; where several are the frames, one for each.
-    fn files(folder: &Path, preset: &Preset, dims: [usize; 4]) -> (Vec<PathBuf>, [usize; 6]) {
-        let layout = preset.layout().unwrap();
-        let [tx, rx, loops, samples] = dims;
-        let of = [FRAMES, tx, rx, loops, samples, 2];
-        let is_words = preset.frame_files || layout.place(Axis::Lane).is_some();
-        let in_pairs = layout.place(Axis::Iq).is_some();
-        let length = |axis: &Axis| match axis {
-            Axis::Frame => FRAMES,
-            Axis::Tx => tx,
-            Axis::Rx => rx,
-            Axis::Loop => loops,
-            Axis::Chirp => loops * tx,
-            Axis::Antenna => tx * rx,
-            Axis::Sample => samples / if layout.place(Axis::Lane).is_some() { 2 } else { 1 },
-            Axis::Lane | Axis::Iq => 2,
-        };
-        let shape: Vec<usize> = layout.0.iter().map(length).collect();
-        let place = |mut rank: usize, file: usize| {
+    /// A preset's axes at a small size, and the place of each of its numbers.
+    struct Small<'a> {
+        preset: &'a Preset,
+        layout: Layout,
+        /// Transmitters, receivers, loops, samples.
+        dims: [usize; 4],
+        shape: Vec<usize>,
+    }
+
+    impl<'a> Small<'a> {
+        fn of(preset: &'a Preset, dims: [usize; 4]) -> Self {
+            let layout = preset.layout().unwrap();
+            let [tx, rx, loops, samples] = dims;
+            let length = |axis: &Axis| match axis {
+                Axis::Frame => FRAMES,
+                Axis::Tx => tx,
+                Axis::Rx => rx,
+                Axis::Loop => loops,
+                Axis::Chirp => loops * tx,
+                Axis::Antenna => tx * rx,
+                Axis::Sample => samples / length_of_group(&layout),
+                Axis::Lane | Axis::Iq => 2,
+            };
+            let shape = layout.0.iter().map(length).collect();
+            Self { preset, layout, dims, shape }
+        }
+
+        /// Lengths of the axes of [`Self::place`].
+        fn lengths(&self) -> [usize; 6] {
+            let [tx, rx, loops, samples] = self.dims;
+            [FRAMES, tx, rx, loops, samples, 2]
+        }
+
+        fn place(&self, mut rank: usize, file: usize) -> [usize; 6] {
+            let [tx, rx, ..] = self.dims;
             let mut at = [file, 0, 0, 0, 0, 0];
-            for (axis, &length) in layout.0.iter().zip(&shape).rev() {
+            for (axis, &length) in self.layout.0.iter().zip(&self.shape).rev() {
                 let index = rank % length;
                 rank /= length;
                 match axis {
@@ -138,55 +154,67 @@ mod tests {
                     Axis::Loop => at[3] = index,
                     Axis::Chirp => (at[1], at[3]) = (index % tx, index / tx),
                     Axis::Antenna => (at[1], at[2]) = (index / rx, index % rx),
-                    Axis::Sample => at[4] += index * length_of_group(&layout),
+                    Axis::Sample => at[4] += index * length_of_group(&self.layout),
                     Axis::Lane => at[4] += index,
                     Axis::Iq => at[5] = index,
                 }
             }
             at
-        };
-        let count: usize = shape.iter().product();
-        let several = if layout.place(Axis::Frame).is_some() { 1 } else { FRAMES };
-        let values = |file: usize, part: usize| -> Vec<f32> {
-            (0..count)
-                .map(|rank| place(rank, file))
-                .map(|mut at| {
-                    at[5] += part;
-                    number(at, of)
-                })
-                .collect()
-        };
-        let mut written = vec![];
-        for file in 0..several {
-            let all = values(file, 0);
-            if is_words {
-                let bytes: Vec<u8> = all.iter().flat_map(|value| (*value as i16).to_le_bytes()).collect();
-                let pieces = if preset.frame_files { FRAMES } else { 1 };
-                for (piece, bytes) in bytes.chunks(bytes.len() / pieces).enumerate() {
-                    let path = folder.join(format!("frame_{}.bin", 9 + piece));
-                    fs::write(&path, bytes).unwrap();
-                    written.push(path);
-                }
-                continue;
-            }
-            let path = folder.join(format!("frame_{}.npy", 9 + file));
-            if in_pairs {
-                write_npy(&path, &shape, Values::F32(&all)).unwrap();
-            } else {
-                let pairs: Vec<_> =
-                    all.iter().zip(values(file, 1)).map(|(&re, im)| num_complex::Complex32::new(re, im)).collect();
-                let values = Values::Complex64(&pairs);
-                if let Some(variable) = &preset.variable {
-                    let path = path.with_extension("npz");
-                    write_npz(&path, &[Member { name: variable, shape: shape.clone(), values }]).unwrap();
-                    written.push(path);
-                    continue;
-                }
-                write_npy(&path, &shape, values).unwrap();
-            }
-            written.push(path);
         }
-        (written, of)
+
+        /// All numbers of a file; `part`: of I or Q, where they are no axis.
+        fn values(&self, file: usize, part: usize) -> Vec<f32> {
+            let place = |rank: usize| {
+                let mut at = self.place(rank, file);
+                at[5] += part;
+                number(at, self.lengths())
+            };
+            (0..self.shape.iter().product()).map(place).collect()
+        }
+
+        fn write_words(&self, folder: &Path, file: usize) -> Vec<PathBuf> {
+            let bytes: Vec<u8> = self.values(file, 0).iter().flat_map(|value| (*value as i16).to_le_bytes()).collect();
+            let pieces = if self.preset.frame_files { FRAMES } else { 1 };
+            let write = |(piece, bytes): (usize, &[u8])| {
+                let path = folder.join(format!("frame_{}.bin", 9 + piece));
+                fs::write(&path, bytes).unwrap();
+                path
+            };
+            bytes.chunks(bytes.len() / pieces).enumerate().map(write).collect()
+        }
+
+        fn write_array(&self, path: PathBuf, file: usize) -> PathBuf {
+            let all = self.values(file, 0);
+            if self.layout.place(Axis::Iq).is_some() {
+                write_npy(&path, &self.shape, Values::F32(&all)).unwrap();
+                return path;
+            }
+            let pairs = all.iter().zip(self.values(file, 1)).map(|(&re, im)| num_complex::Complex32::new(re, im));
+            let pairs: Vec<_> = pairs.collect();
+            let values = Values::Complex64(&pairs);
+            if let Some(variable) = &self.preset.variable {
+                let path = path.with_extension("npz");
+                write_npz(&path, &[Member { name: variable, shape: self.shape.clone(), values }]).unwrap();
+                return path;
+            }
+            write_npy(&path, &self.shape, values).unwrap();
+            path
+        }
+    }
+
+    /// Files of a preset's layout, in the types that its data set has; where several are the frames, one for each.
+    fn files(folder: &Path, preset: &Preset, dims: [usize; 4]) -> (Vec<PathBuf>, [usize; 6]) {
+        let small = Small::of(preset, dims);
+        let is_words = preset.frame_files || small.layout.place(Axis::Lane).is_some();
+        let several = if small.layout.place(Axis::Frame).is_some() { 1 } else { FRAMES };
+        let write = |file: usize| {
+            if is_words {
+                small.write_words(folder, file)
+            } else {
+                vec![small.write_array(folder.join(format!("frame_{}.npy", 9 + file)), file)]
+            }
+        };
+        ((0..several).flat_map(write).collect(), small.lengths())
     }
 
     fn length_of_group(layout: &Layout) -> usize {

@@ -85,8 +85,12 @@ impl TiRadar {
 
     /// Words of one whole frame in a stream, all profiles and subframes.
     pub fn words_per_frame(&self) -> Result<u64> {
+        self.words_of(&self.bursts)
+    }
+
+    fn words_of(&self, bursts: &[Burst]) -> Result<u64> {
         let mut words = 0;
-        for burst in &self.bursts {
+        for burst in bursts {
             for chirp in &burst.chirps {
                 words += (burst.loops * self.words_per_chirp(self.profile(chirp.profile)?.samples)) as u64;
             }
@@ -102,12 +106,7 @@ impl TiRadar {
         let burst_index = self.chosen_burst(stated)?;
         let burst = &self.bursts[burst_index];
         let profile = self.profile(self.chosen_profile(burst, stated)?)?;
-        let mut before = 0;
-        for burst in &self.bursts[..burst_index] {
-            for chirp in &burst.chirps {
-                before += burst.loops * self.words_per_chirp(self.profile(chirp.profile)?.samples);
-            }
-        }
+        let before = self.words_of(&self.bursts[..burst_index])?;
         // (start in time, start in words, transmitters) of the chirps that are kept, and the loop's length.
         let (mut time_s, mut offset, mut kept) = (0.0, 0, Vec::new());
         for chirp in &burst.chirps {
@@ -134,7 +133,7 @@ impl TiRadar {
             .expect("the whole loop repeats itself");
         let starts = (0..burst.loops)
             .flat_map(|index| kept.chunks(period).map(move |chirps| (index, chirps)))
-            .map(|(index, chirps)| chirps.iter().map(|&(_, words, _)| (before + index * offset + words) as u64).collect())
+            .map(|(index, chirps)| chirps.iter().map(|&(_, words, _)| before + (index * offset + words) as u64).collect())
             .collect::<Vec<Vec<u64>>>();
         let words_per_frame = self.words_per_frame()?;
         let mut notes = self.notes.clone();

@@ -222,4 +222,6 @@ pub fn placement(floor_m: f64, distance_m: f64) -> Placement {
 }
 
 #[cfg(test)]
+mod small_tests;
+#[cfg(test)]
 mod tests;

@@ -24,6 +24,96 @@ impl Cone {
     }
 }
 
+/// A body's cones, and the lengths of which their radii are shares.
+struct Built<'a> {
+    skeleton: &'a Skeleton,
+    height: f64,
+    girth: f64,
+    extremity: f64,
+    cones: Vec<Cone>,
+}
+
+impl<'a> Built<'a> {
+    fn new(config: &PersonConfig, skeleton: &'a Skeleton) -> Self {
+        let height = config.height_m;
+        let (girth, extremity) = (height * config.build, height * config.build.powf(0.35));
+        Self { skeleton, height, girth, extremity, cones: Vec::new() }
+    }
+
+    fn add(&mut self, from: Vector3<f64>, to: Vector3<f64>, radii: [f64; 2], scale: f64, stretch: [f64; 3]) {
+        let squeeze = Vector3::from(stretch.map(|factor| 1.0 / factor));
+        self.cones.push(Cone { from, to, radius_m: radii.map(|radius| radius * scale), squeeze });
+    }
+
+    /// Pelvis, belly, chest, neck, head.
+    fn trunk(&mut self, belly: f64) {
+        let (joints, height, girth, extremity) = (&self.skeleton.joints, self.height, self.girth, self.extremity);
+        let middle = |joint: usize, forward: f64| joints[joint] + vector![0.0, 0.0, forward * height];
+        let pelvis = joints[1].x * 0.70;
+        self.add(
+            vector![-pelvis, -0.012 * height, -0.006 * height],
+            vector![pelvis, -0.012 * height, -0.006 * height],
+            [0.053; 2],
+            girth,
+            [1.0, 1.05, 1.12],
+        );
+        self.add(middle(3, 0.008), middle(6, 0.012), [0.078, 0.077], girth, [1.0, 1.0, 0.72 * belly]);
+        self.add(middle(6, 0.010), middle(9, 0.016) + vector![0.0, 0.028 * height, 0.0], [0.083, 0.093], girth, [1.0, 1.0, 0.68]);
+        self.add(middle(12, 0.0) - vector![0.0, 0.035 * height, 0.0], middle(15, 0.0), [0.034, 0.031], extremity, [1.0; 3]);
+        let skull = self.skeleton.head_top - vector![0.0, 0.0455 * height, 0.0];
+        self.add(joints[15] + vector![0.0, 0.018, 0.012] * height, skull, [0.034, 0.0455], height, [0.95, 1.0, 1.14]);
+        self.add(
+            joints[15] + vector![0.0, 0.030, 0.042] * height,
+            joints[15] + vector![0.0, 0.042, 0.052] * height,
+            [0.012, 0.009],
+            height,
+            [1.0; 3],
+        );
+    }
+
+    /// To the side, the body's height.
+    fn out(&self, side: usize) -> f64 {
+        self.skeleton.joints[1 + side].x.signum() * self.height
+    }
+
+    fn arm(&mut self, side: usize) {
+        let (height, girth, extremity, out) = (self.height, self.girth, self.extremity, self.out(side));
+        let [collar, shoulder, elbow, wrist] = [13, 16, 18, 20].map(|joint| self.skeleton.joints[joint + side]);
+        // Shoulder girdle and arm.
+        self.add(collar + vector![0.018 * out, -0.012 * height, 0.0], shoulder, [0.044, 0.038], girth, [1.0, 1.0, 1.05]);
+        self.add(collar + vector![0.0, 0.012 * height, -0.004 * height], shoulder, [0.026, 0.030], girth, [1.0; 3]);
+        self.add(shoulder, elbow, [0.0335, 0.0245], girth, [1.0; 3]);
+        self.add(elbow, elbow + (wrist - elbow) * 0.35, [0.0245, 0.0255], girth, [1.0; 3]);
+        self.add(elbow + (wrist - elbow) * 0.35, wrist, [0.0255, 0.0165], girth, [1.0; 3]);
+        let tip = self.skeleton.fingertips[side] - vector![0.018 * out, 0.0, 0.0];
+        let palm = wrist + vector![0.025 * out, 0.0, 0.002 * height];
+        self.add(wrist, palm, [0.0170, 0.0230], extremity, [1.0, 0.68, 1.0]);
+        self.add(palm, tip, [0.0230, 0.0185], extremity, [1.0, 0.58, 1.0]);
+    }
+
+    fn leg(&mut self, side: usize) {
+        let (height, girth, extremity, out) = (self.height, self.girth, self.extremity, self.out(side));
+        let [hip, knee, ankle, ball] = [1, 4, 7, 10].map(|joint| self.skeleton.joints[joint + side]);
+        // Seat, thigh, shank with the calf behind it.
+        self.add(
+            hip + vector![-0.006 * out, -0.012 * height, -0.026 * height],
+            hip + vector![-0.004 * out, -0.035 * height, -0.022 * height],
+            [0.046, 0.044],
+            girth,
+            [1.0; 3],
+        );
+        self.add(hip + vector![0.004 * out, -0.02 * height, 0.004 * height], knee, [0.0485, 0.0325], girth, [1.0; 3]);
+        self.add(knee, ankle, [0.0325, 0.0200], girth, [1.0; 3]);
+        let calf = |fraction: f64, back: f64| knee + (ankle - knee) * fraction - vector![0.0, 0.0, back * height];
+        self.add(calf(0.15, 0.008), calf(0.42, 0.009), [0.027, 0.027], girth, [1.0; 3]);
+        // Foot: heel, instep, toes.
+        self.add(self.skeleton.heels[side], ankle, [0.021, 0.020], extremity, [1.0; 3]);
+        self.add(ankle - vector![0.0, 0.008 * height, 0.0], ball, [0.021, 0.021], extremity, [1.05, 0.9, 1.0]);
+        self.add(self.skeleton.heels[side], ball, [0.021, 0.024], extremity, [1.0, 0.85, 1.0]);
+        self.add(ball, self.skeleton.toes[side], [0.024, 0.0185], extremity, [1.0, 0.72, 1.0]);
+    }
+}
+
 pub struct Flesh {
     cones: Vec<Cone>,
     /// Width over which neighbouring cones melt into each other.
@@ -36,70 +126,13 @@ pub struct Flesh {
 impl Flesh {
     pub fn new(config: &PersonConfig, skeleton: &Skeleton) -> Self {
         let height = config.height_m;
-        let (girth, extremity) = (height * config.build, height * config.build.powf(0.35));
-        let joints = &skeleton.joints;
-        let middle = |joint: usize, forward: f64| joints[joint] + vector![0.0, 0.0, forward * height];
-        let belly = 1.0 + 0.5 * (config.build - 1.0).max(0.0);
-        let mut cones = Vec::new();
-        let mut add = |from: Vector3<f64>, to: Vector3<f64>, radii: [f64; 2], scale: f64, stretch: [f64; 3]| {
-            let squeeze = Vector3::from(stretch.map(|factor| 1.0 / factor));
-            cones.push(Cone { from, to, radius_m: radii.map(|radius| radius * scale), squeeze });
-        };
-
-        // Trunk: pelvis, belly, chest, neck, head.
-        let pelvis = joints[1].x * 0.70;
-        add(
-            vector![-pelvis, -0.012 * height, -0.006 * height],
-            vector![pelvis, -0.012 * height, -0.006 * height],
-            [0.053; 2],
-            girth,
-            [1.0, 1.05, 1.12],
-        );
-        add(middle(3, 0.008), middle(6, 0.012), [0.078, 0.077], girth, [1.0, 1.0, 0.72 * belly]);
-        add(middle(6, 0.010), middle(9, 0.016) + vector![0.0, 0.028 * height, 0.0], [0.083, 0.093], girth, [1.0, 1.0, 0.68]);
-        add(middle(12, 0.0) - vector![0.0, 0.035 * height, 0.0], middle(15, 0.0), [0.034, 0.031], extremity, [1.0; 3]);
-        let skull = skeleton.head_top - vector![0.0, 0.0455 * height, 0.0];
-        add(joints[15] + vector![0.0, 0.018, 0.012] * height, skull, [0.034, 0.0455], height, [0.95, 1.0, 1.14]);
-        add(
-            joints[15] + vector![0.0, 0.030, 0.042] * height,
-            joints[15] + vector![0.0, 0.042, 0.052] * height,
-            [0.012, 0.009],
-            height,
-            [1.0; 3],
-        );
-
+        let mut built = Built::new(config, skeleton);
+        built.trunk(1.0 + 0.5 * (config.build - 1.0).max(0.0));
         for side in 0..2 {
-            let [hip, knee, ankle, ball] = [1, 4, 7, 10].map(|joint| joints[joint + side]);
-            let [collar, shoulder, elbow, wrist] = [13, 16, 18, 20].map(|joint| joints[joint + side]);
-            let out = hip.x.signum() * height;
-            // Shoulder girdle and arm.
-            add(collar + vector![0.018 * out, -0.012 * height, 0.0], shoulder, [0.044, 0.038], girth, [1.0, 1.0, 1.05]);
-            add(collar + vector![0.0, 0.012 * height, -0.004 * height], shoulder, [0.026, 0.030], girth, [1.0; 3]);
-            add(shoulder, elbow, [0.0335, 0.0245], girth, [1.0; 3]);
-            add(elbow, elbow + (wrist - elbow) * 0.35, [0.0245, 0.0255], girth, [1.0; 3]);
-            add(elbow + (wrist - elbow) * 0.35, wrist, [0.0255, 0.0165], girth, [1.0; 3]);
-            let tip = skeleton.fingertips[side] - vector![0.018 * out, 0.0, 0.0];
-            let palm = wrist + vector![0.025 * out, 0.0, 0.002 * height];
-            add(wrist, palm, [0.0170, 0.0230], extremity, [1.0, 0.68, 1.0]);
-            add(palm, tip, [0.0230, 0.0185], extremity, [1.0, 0.58, 1.0]);
-            // Seat, thigh, shank with the calf behind it.
-            add(
-                hip + vector![-0.006 * out, -0.012 * height, -0.026 * height],
-                hip + vector![-0.004 * out, -0.035 * height, -0.022 * height],
-                [0.046, 0.044],
-                girth,
-                [1.0; 3],
-            );
-            add(hip + vector![0.004 * out, -0.02 * height, 0.004 * height], knee, [0.0485, 0.0325], girth, [1.0; 3]);
-            add(knee, ankle, [0.0325, 0.0200], girth, [1.0; 3]);
-            let calf = |fraction: f64, back: f64| knee + (ankle - knee) * fraction - vector![0.0, 0.0, back * height];
-            add(calf(0.15, 0.008), calf(0.42, 0.009), [0.027, 0.027], girth, [1.0; 3]);
-            // Foot: heel, instep, toes.
-            add(skeleton.heels[side], ankle, [0.021, 0.020], extremity, [1.0; 3]);
-            add(ankle - vector![0.0, 0.008 * height, 0.0], ball, [0.021, 0.021], extremity, [1.05, 0.9, 1.0]);
-            add(skeleton.heels[side], ball, [0.021, 0.024], extremity, [1.0, 0.85, 1.0]);
-            add(ball, skeleton.toes[side], [0.024, 0.0185], extremity, [1.0, 0.72, 1.0]);
+            built.arm(side);
+            built.leg(side);
         }
+        let cones = built.cones;
 
         let reach = vector![0.06, 0.06, 0.15] * height * config.build.max(1.0);
         let side = vector![skeleton.fingertips[0].x, 0.0, 0.0];

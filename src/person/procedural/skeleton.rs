@@ -73,33 +73,37 @@ pub struct Skeleton {
     pub heels: [Vector3<f64>; 2],
 }
 
+/// Hip, knee, ankle, ball of the foot, collar, shoulder, elbow, wrist, hand, fingertip, toes and heel of a side, in fractions of the
+/// stature.
+fn side_of_body(config: &PersonConfig, floor: f64, trunk: f64, side: f64) -> [Vector3<f64>; 12] {
+    let (hip, shoulder) = (0.052 * config.hip_width, 0.102 * config.shoulder_width);
+    let spread = 0.020;
+    let knee_x = hip + 0.5 * spread;
+    let (ankle_x, ankle_y) = (hip + spread, 0.042 - floor);
+    let knee_y = -0.010 + 0.50 * (ankle_y + 0.010);
+    let arm_y = 0.272 * trunk;
+    [
+        vector![side * hip, -0.010, 0.0],
+        vector![side * knee_x, knee_y, 0.006],
+        vector![side * ankle_x, ankle_y, -0.012],
+        vector![side * (ankle_x + 0.004), 0.017 - floor, 0.070],
+        vector![side * 0.016, 0.262 * trunk, -0.006],
+        vector![side * shoulder, arm_y, -0.008],
+        vector![side * (shoulder + 0.165), arm_y, -0.008],
+        vector![side * (shoulder + 0.310), arm_y, -0.008],
+        vector![side * (shoulder + 0.355), arm_y, -0.008],
+        vector![side * (shoulder + 0.418), arm_y, -0.008],
+        vector![side * (ankle_x + 0.006), 0.014 - floor, 0.106],
+        vector![side * ankle_x, 0.020 - floor, -0.030],
+    ]
+}
+
 impl Skeleton {
     pub fn new(config: &PersonConfig) -> Self {
-        // Everything below is in fractions of the stature. Longer legs leave less of it to the trunk.
+        // In fractions of the stature. Longer legs leave less of it to the trunk.
         let floor = 0.535 * config.leg_length;
         let trunk = (1.0 - floor) / 0.465;
-        let (hip, shoulder) = (0.052 * config.hip_width, 0.102 * config.shoulder_width);
-        let spread = 0.020;
-        let sided = |side: f64| {
-            let knee_x = hip + 0.5 * spread;
-            let (ankle_x, ankle_y) = (hip + spread, 0.042 - floor);
-            let knee_y = -0.010 + 0.50 * (ankle_y + 0.010);
-            let arm_y = 0.272 * trunk;
-            [
-                vector![side * hip, -0.010, 0.0],
-                vector![side * knee_x, knee_y, 0.006],
-                vector![side * ankle_x, ankle_y, -0.012],
-                vector![side * (ankle_x + 0.004), 0.017 - floor, 0.070],
-                vector![side * 0.016, 0.262 * trunk, -0.006],
-                vector![side * shoulder, arm_y, -0.008],
-                vector![side * (shoulder + 0.165), arm_y, -0.008],
-                vector![side * (shoulder + 0.310), arm_y, -0.008],
-                vector![side * (shoulder + 0.355), arm_y, -0.008],
-                vector![side * (shoulder + 0.418), arm_y, -0.008],
-                vector![side * (ankle_x + 0.006), 0.014 - floor, 0.106],
-                vector![side * ankle_x, 0.020 - floor, -0.030],
-            ]
-        };
+        let sided = |side: f64| side_of_body(config, floor, trunk, side);
         let (left, right) = (sided(1.0), sided(-1.0));
         let middle = |height: f64, z: f64| vector![0.0, height * trunk, z];
         let joints = [

@@ -1,0 +1,77 @@
+//! Which of two suspects comes first, where one of them makes what the other one sees.
+
+use super::NEARLY;
+use crate::diagnosis::course::Of;
+use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::finding::{Candidate, Correction};
+use crate::diagnosis::misfit::Misfit;
+use crate::diagnosis::remains::{is_rough, is_same};
+use crate::diagnosis::suspects::{SUSPECTS, paths};
+
+/// What never changes and may be a return or added behind the mixer: what turns all returns distinguishes the two, and goes first.
+const ADDED: [&str; 3] = ["tx_leakage", "dc_offset", "static_reflector"];
+
+/// Stages of the signal's chain at which everything that is received is changed.
+const UPSTREAM: [&str; 2] = ["waveform", "receiver"];
+
+/// Whether the body is elsewhere, or at another time, than predicted.
+pub(super) fn is_displaced(candidate: &Candidate) -> bool {
+    matches!(candidate.correction, Correction::Body(_)) && candidate.place.stage != "propagation"
+}
+
+/// Whether it acts on every return, or on all of the body. What has no name does where nobody is tracked: most ranges share it then.
+fn is_on_all(candidate: &Candidate, evidence: &Evidence) -> bool {
+    let id = candidate.id.unwrap_or_default();
+    (!id.is_empty() || evidence.body.is_none())
+        && (id == "radar_vibration" || is_displaced(candidate) || UPSTREAM.contains(&candidate.place.stage.as_str()))
+}
+
+/// Whether it may be something else's echoes of the body.
+pub(super) fn is_echo(candidate: &Candidate) -> bool {
+    candidate.behaves_like.starts_with(paths::PATH_LIKE) || is_rough(candidate)
+}
+
+/// What acts on every return makes echoes of the body too, which look like paths of their own, and of the room beyond its ranges; and a
+/// body that is elsewhere than predicted looks like another one: where both are suspected, the one is accepted that leaves less.
+pub(super) fn upstream<'a>(
+    original: &Evidence,
+    evidence: &Evidence,
+    best: &'a (usize, Candidate),
+    passing: &[&'a (usize, Candidate)],
+) -> &'a (usize, Candidate) {
+    let turns_all = |(_, candidate): &&&(usize, Candidate)| matches!(&candidate.correction, Correction::Followed(_, course) if course.of == Of::All);
+    if ADDED.iter().any(|id| best.1.id == Some(id))
+        && let Some(course) = passing.iter().filter(turns_all).max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))
+    {
+        return course;
+    }
+    if best.1.id == Some("tx_leakage") {
+        // What the chirp makes of the room's returns never changes either, nor does an offset, and a leakage is free in every channel: it
+        // is none where nothing is left of it.
+        let left = |evidence: &Evidence| (SUSPECTS[best.0].find)(evidence).iter().any(|candidate| candidate.id == best.1.id);
+        let simpler = |candidate: &Candidate| candidate.place.stage == "waveform" || candidate.id == Some("dc_offset");
+        let mut simpler = passing.iter().filter(|(_, candidate)| simpler(candidate));
+        return simpler.find(|(_, candidate)| !left(&evidence.with(candidate))).copied().unwrap_or(best);
+    }
+    let others = passing.iter().filter(|(_, candidate)| is_on_all(candidate, evidence));
+    let Some(other) = others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| is_echo(&best.1)) else {
+        return best;
+    };
+    // Seen from a wrong place, an echo of the body has no name: where the body is elsewhere with and without the echo, it is put right
+    // first.
+    let stands = |(suspect, other): &(usize, Candidate)| {
+        let again = (SUSPECTS[*suspect].find)(&evidence.with(&best.1));
+        again.iter().any(|found| found.id == other.id && found.gain > NEARLY * other.gain)
+    };
+    if best.1.id.is_none() && is_displaced(&other.1) && stands(other) {
+        return other;
+    }
+    if evidence.body.is_none() {
+        // Nobody predicts where something moves: it does where it still seems to once what all returns share is undone.
+        let again = (SUSPECTS[best.0].find)(&evidence.with(&other.1));
+        let stands = again.iter().any(|found| is_same(&best.1, found) && found.gain > NEARLY * best.1.gain);
+        return if stands { best } else { other };
+    }
+    let left = |candidate: &Candidate| Misfit::after(original, &evidence.with(candidate)).loglik_per_sample;
+    if left(&other.1) > left(&best.1) { other } else { best }
+}
