@@ -25,8 +25,8 @@ pub use correction::{PoseCorrection, PoseTensors};
 pub use facets::{FacetEdges, facet_integral};
 pub use frame::BodyFrame;
 pub use motion::Interpolation;
-pub use posing::{PosedFrame, Posing};
-pub use surface::{Sampling, Surface, SurfaceConfig};
+pub use posing::PosedFrame;
+pub use surface::{Posing, Sampling, Surface, SurfaceConfig};
 
 use kinematics::{Matrix, Vector};
 use posing::DeviceBodies;

@@ -11,7 +11,6 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
 use burn::tensor::{DType, Device, Int, Tensor, TensorData};
-use serde::{Deserialize, Serialize};
 
 use super::correction::PoseTensors;
 use super::facets::FacetEdges;
@@ -21,17 +20,6 @@ use super::tensors::BodyTensors;
 use super::{BodyFrame, Displacement, PosedBody};
 use crate::person::BodyModel;
 use mover::Mover;
-
-/// Where the body is posed (setting `simulator.surface.posing`).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Posing {
-    /// On the device, as tensor operations: gradients flow to the pose. The same values to f32's rounding.
-    #[default]
-    Tensor,
-    /// On the host in f64: positions, normals and areas are constants of training.
-    Host,
-}
 
 /// A device without its autodiff, and a number type: constants are made there, gradients come from what they meet.
 pub struct On {

@@ -5,8 +5,18 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 
 use super::kinematics::Vector;
-use super::posing::Posing;
 use crate::error::{Error, Result};
+
+/// Where the body is posed (setting `simulator.surface.posing`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Posing {
+    /// On the device, as tensor operations: gradients flow to the pose. The same values to f32's rounding.
+    #[default]
+    Tensor,
+    /// On the host in f64: positions, normals and areas are constants of training.
+    Host,
+}
 
 /// Where on the mesh the scatterers sit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

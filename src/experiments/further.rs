@@ -1,12 +1,12 @@
 //! Tables of what goes beyond the comparison on the first site: pairs, the additional subject, the second scene, stability,
 //! the parts of the signal.
 
+use super::cells::{GLOBAL, MOVING, PERSON, Table, cells, number, recognised, scores};
 use super::config::Protocol;
 use super::figures::Levels;
 use super::paper::{self, Paper};
 use super::plan::Method;
 use super::results::{MethodResults, Results, StabilityResults};
-use super::tables::{GLOBAL, MOVING, PERSON, Table, cells, number, recognised, scores};
 use super::variants::Variant;
 use crate::evaluation::SequenceSummary;
 

@@ -8,6 +8,7 @@
 //! - [`stage`], [`mod@run`], [`steps`]: each is done once, under the hash of all that it depends on
 //! - [`results`], [`paper`], [`tables`], [`report`]: numbers, the paper's, and both side by side
 
+mod cells;
 pub mod config;
 pub mod figures;
 mod further;

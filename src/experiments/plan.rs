@@ -38,6 +38,9 @@ pub struct Stage {
     pub task: Task,
 }
 
+/// The action on which the paper looks at the graph convolution more closely (table 6).
+pub const ARM_SWING: &str = "walk_back_forth_armswing";
+
 /// The stages whose results belong to one method.
 #[derive(Clone, Debug, Default)]
 pub struct MethodStages {

@@ -9,15 +9,12 @@ use serde::{Deserialize, Serialize};
 use super::config::Protocol;
 use super::figures::Levels;
 use super::pairs::{Behind, On, Pair, asked_for};
-use super::plan::{Method, MethodStages, Plan};
+use super::plan::{ARM_SWING, Method, MethodStages, Plan};
 use super::stage::{Record, Store};
 use super::steps::{Speed, Stability, read_json};
 use super::variants::Variant;
 use crate::error::{Error, Result};
 use crate::evaluation::{Evaluation, SequenceSummary, over_sequences};
-
-/// The action on which the paper looks at the graph convolution more closely (table 6).
-pub const ARM_SWING: &str = "walk_back_forth_armswing";
 
 /// All numbers of one method; means are over recordings, with 95 % intervals.
 #[derive(Clone, Debug, Serialize)]

@@ -11,7 +11,7 @@ use std::f64::consts::LN_2;
 
 use burn::{module::Module, tensor::Tensor};
 
-use super::{FrameId, LoadedRecording, trainer::Prepared};
+use super::{FrameId, LoadedRecording, prepared::Prepared};
 use crate::{
     complex::Complex,
     error::{Error, Result},

@@ -5,6 +5,7 @@ pub mod checkpoint;
 mod config;
 mod largest;
 mod metrics;
+mod prepared;
 pub mod refine;
 mod site;
 mod split;

@@ -11,6 +11,7 @@ use rand::RngExt;
 use super::{
     EpochMetrics, FrameId, FrameSplit, LoadedRecording, RefinedPose, TrainingConfig,
     checkpoint::{self, CheckpointState, Progress, Site},
+    prepared::Prepared,
     refine, step_rng,
 };
 use crate::{
@@ -18,7 +19,7 @@ use crate::{
     error::{Error, Result},
     heatmap::RangeDoppler,
     loss::DbLoss,
-    simulator::{Mode, SceneConstants, Simulator, SimulatorConfig},
+    simulator::{Mode, Simulator, SimulatorConfig},
 };
 
 /// What happens in a run, for whoever shows it.
@@ -52,12 +53,6 @@ pub enum Event {
 pub struct Outcome {
     pub simulator: Simulator,
     pub progress: Progress,
-}
-
-/// What training keeps of each recording beside its scene.
-pub(super) struct Prepared {
-    pub loss: DbLoss,
-    pub constants: SceneConstants,
 }
 
 /// Everything a run needs; `run` does it.

@@ -3,12 +3,11 @@
 
 use std::path::PathBuf;
 
-use super::{Method, MethodStages, Place, Planner, Trained};
+use super::{ARM_SWING, Method, MethodStages, Place, Planner, Trained};
 use crate::error::{Error, Result};
 use crate::experiments::config::{Protocol, SecondSceneConfig, StabilityConfig};
 use crate::experiments::figures::{FigureColumn, FigureTask, Panel};
 use crate::experiments::preflight;
-use crate::experiments::results::ARM_SWING;
 use crate::experiments::takes::Take;
 use crate::experiments::task::Task;
 use crate::experiments::variants::Variant;

@@ -5,10 +5,11 @@ use std::path::Path;
 use burn::grad_clipping::GradientClipping;
 use burn::optim::{AdamConfig, ModuleOptimizer};
 
-use super::{Learned, Prepared, Trainer};
+use super::{Learned, Trainer};
 use crate::error::{Error, Result};
 use crate::simulator::{Simulator, SimulatorConfig};
 use crate::training::checkpoint::{self, Progress};
+use crate::training::prepared::Prepared;
 use crate::training::{FrameSplit, calibrate};
 
 impl Trainer<'_> {

@@ -6,11 +6,12 @@ use burn::tensor::{Device, Tensor};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Learned, Prepared, Trainer};
+use super::{Learned, Trainer};
 use crate::complex::Complex;
 use crate::error::{Error, Result};
 use crate::simulator::{Mode, Simulator, is_finite};
 use crate::training::largest::largest_gradient;
+use crate::training::prepared::Prepared;
 use crate::training::{FrameId, checkpoint, step_rng};
 
 /// A frame of a step, and the seed of its noise.
