@@ -231,6 +231,20 @@ fn in_blocks(cube: &Cube, radar: &Radar) -> Option<(Cube, Radar, usize)> {
     Some((Cube::new([radar.frames, tx, rx, short, samples], samples_out), radar, short))
 }
 
+/// Mean chirps of the even and of the odd loops.
+pub fn halves(channel: &[Complex64], samples: usize) -> [Vec<Complex64>; 2] {
+    let mut sums = [vec![Complex64::ZERO; samples], vec![Complex64::ZERO; samples]];
+    let mut counts = [0.0; 2];
+    for (index, chirp) in channel.chunks_exact(samples).enumerate() {
+        sums[index % 2].iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value);
+        counts[index % 2] += 1.0;
+    }
+    for (sum, count) in sums.iter_mut().zip(counts) {
+        sum.iter_mut().for_each(|value| *value /= count);
+    }
+    sums
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

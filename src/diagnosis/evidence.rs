@@ -1,5 +1,6 @@
 //! A recording as far as it is explained so far, and what every suspect needs of it.
 
+pub mod beat;
 pub mod denoised;
 pub mod power;
 pub mod products;

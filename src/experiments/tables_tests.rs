@@ -1,11 +1,13 @@
 use std::collections::BTreeMap;
 
 use super::*;
+use crate::evaluation::{ScoreSummary, SequenceSummary};
 use crate::experiments::figures::Levels;
 use crate::experiments::pairs::{On, Pair};
-use crate::experiments::results::{Figure, StabilityResults, Training};
+use crate::experiments::results::{Figure, Recognised, Share, StabilityResults, Training};
 use crate::experiments::steps::train::Broke;
 use crate::experiments::steps::{Speed, Stability};
+use crate::metrics::Spread;
 use crate::training::EpochMetrics;
 
 fn summary(psnr_db: f64, lpips: Option<f64>) -> SequenceSummary {

@@ -6,11 +6,11 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::beat::empty_bins;
 use super::denoised;
 use super::{Evidence, spectrum, transform};
 use crate::diagnosis::cube::{folds, mean_chirp};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
-use crate::diagnosis::suspects::receiver::image::empty_bins;
 
 #[derive(Clone, Copy, Default)]
 struct Sums {

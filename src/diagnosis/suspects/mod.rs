@@ -2,6 +2,8 @@
 
 pub mod broadband;
 pub mod carried;
+pub mod climb;
+pub mod clutter;
 pub mod codes;
 pub mod excess;
 pub mod fluctuation;
@@ -11,6 +13,8 @@ pub mod paths;
 pub mod receiver;
 pub mod region;
 pub mod slow;
+pub mod steering;
+pub mod undo;
 pub mod untracked;
 pub mod vital;
 pub mod waveform;
@@ -67,7 +71,7 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect { predicts_all_frames: true, ..Suspect::new("one channel", slow::channels::find) },
     Suspect::new("chirp's number in its frame", slow::locked::find),
     Suspect::new("single frame", slow::odd_frame::find),
-    Suspect { last_in_chain: true, ..Suspect::new("slipped samples", slow::slip::find) },
+    Suspect { last_in_chain: true, ..Suspect::new("slipped samples", receiver::slip::find) },
     Suspect { last_in_chain: true, ..Suspect::new("converter's codes", codes::find) },
     Suspect::new("chirp", waveform::find),
     Suspect::new("vital signs", vital::find),

@@ -3,7 +3,7 @@
 //! lies mostly among the direct one's cells is not taken for a body that stands elsewhere.
 
 use super::change::Change;
-use super::displaced::{Fitted, refine};
+use super::fitted::{Fitted, refine};
 use super::trial::Trial;
 use crate::diagnosis::prediction::{Echo, SIDE_SPREAD, mirror_id, range_and_velocity};
 use crate::diagnosis::{Estimate, Place};

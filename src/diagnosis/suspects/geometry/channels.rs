@@ -7,92 +7,26 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::bearing::{Bearing, PHASE_FLOOR_RAD, Sums, along, bearing};
 use super::change::{Change, Moves};
 use super::covariance::{Array, Cells, used};
+use super::found::{AS_WELL, Found, UNEVEN};
 use super::{coupling, mismatch, places, skew};
 use crate::diagnosis::power::{PowerModel, part_templates};
-use crate::diagnosis::suspects::{paths::still_power, slow};
-use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, statistics};
-use crate::radar::Radar;
+use crate::diagnosis::suspects::clutter::still_power;
+use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place};
 
+/// What the gain of one channel that hops behaves like.
+pub const SLOW_GAIN_OF_ONE: &str = "slow-time gain of one channel";
 /// Expected power over the noise from which on a cell is used.
 const LEAST_POWER: f32 = 10.0;
-/// What the power model's errors, and other effects that were not taken out, do to a phase between neighbouring receivers (half a
-/// wavelength).
-const PHASE_FLOOR_RAD: f64 = 3.0 * PI / 180.0;
-/// Chance below which receivers may not be alike, and below which they are not.
-pub const UNEVEN: f64 = 0.05;
+/// Chance below which receivers are not alike.
 const UNLIKELY: f64 = 1e-4;
 /// Cells that one independent draw is spread over by two Hann windows.
 const CELLS_PER_DRAW: f64 = 2.25;
-/// In which ways receivers may differ.
-pub const LOOKS: f64 = 5.0;
-/// What explains the recording as well as the best, within so many nats, looks alike.
-pub const AS_WELL: f64 = 4.6;
-
-/// Sums over the cells of a frame after the predicted steering.
-#[derive(Clone, Debug)]
-pub struct Sums {
-    /// `[rx, rx]`, the second one conjugated.
-    products: Vec<Complex64>,
-    cells: f64,
-    range_m: f64,
-}
-
-impl Sums {
-    fn receivers(&self) -> usize {
-        self.products.len().isqrt()
-    }
-
-    /// With the first receiver.
-    fn cross(&self, rx: usize) -> Complex64 {
-        self.products[rx * self.receivers()]
-    }
-
-    fn own(&self, rx: usize) -> f64 {
-        self.products[rx * self.receivers() + rx].re
-    }
-
-    /// How far aside the body is seen (as a sine), its range, and how much information this frame has of it.
-    pub fn sine(&self, radar: &Radar) -> [f64; 3] {
-        let (places, wave) = (along(radar), TAU / radar.wavelength_m());
-        let sum = |of: &dyn Fn(usize) -> f64| (1..places.len()).map(|rx| self.cross(rx).norm() * of(rx)).sum::<f64>();
-        let spread = sum(&|rx| places[rx].powi(2));
-        let sine = -sum(&|rx| self.cross(rx).arg() * places[rx]) / (spread * wave).max(f64::MIN_POSITIVE);
-        [sine, self.range_m, spread]
-    }
-}
-
-/// A mean over frames and the standard error of it.
-#[derive(Clone, Copy, Debug)]
-struct Mean {
-    value: f64,
-    deviation: f64,
-}
-
-/// How far aside of its place the body is seen.
-#[derive(Clone, Copy, Debug)]
-pub struct Bearing {
-    pub sine: f64,
-    pub deviation: f64,
-    /// Chance that it is none.
-    pub p_value: f64,
-}
-
-impl Bearing {
-    /// What turns the body back to where it stands, `[rx, rx]`.
-    pub fn turned_back(&self, radar: &Radar) -> DMatrix<Complex64> {
-        let wave = TAU / radar.wavelength_m();
-        let turns = along(radar).into_iter().map(|x| Complex64::cis(self.sine * wave * x));
-        DMatrix::from_diagonal(&DVector::from_iterator(radar.rx_m.len(), turns))
-    }
-}
-
 /// What the receivers observe of the body.
 pub struct Observed {
     training: Vec<Sums>,
@@ -125,7 +59,7 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     let radar = &evidence.radar;
     let accepted = |id: &str| evidence.accepted.contains(&id);
     // One channel whose gain hopped was brought to its own mean, which need not be that of the others.
-    if accepted(slow::channels::BEHAVES_LIKE) || accepted("antenna_position") {
+    if accepted(SLOW_GAIN_OF_ONE) || accepted("antenna_position") {
         return vec![];
     }
     let Some(Observed { training, held_out, array }) = Observed::new(evidence, model, body) else { return vec![] };
@@ -163,15 +97,6 @@ fn differ(evidence: &Evidence, array: &Array, displaced: bool) -> Option<Candida
     best(differ.into_iter().flatten().collect())
 }
 
-/// One way in which receivers may differ.
-pub struct Found {
-    pub candidate: Candidate,
-    /// What it gains if errors of the prediction are not counted, nats: by which they are compared.
-    pub likelihood: f64,
-    /// Whether the receivers are alike without it.
-    pub explains_all: bool,
-}
-
 /// Of what is unlikely to be chance, what predicts held-out frames best; what does so nearly as well looks alike. A coupling
 /// comes before any gains and phases where it leaves the receivers alike: few that differ in any other way look like that.
 fn best(mut found: Vec<Found>) -> Option<Candidate> {
@@ -187,33 +112,6 @@ fn best(mut found: Vec<Found>) -> Option<Candidate> {
     best.look_alikes.sort_unstable();
     best.look_alikes.dedup();
     Some(best)
-}
-
-/// Places of the receivers along x, from the first one.
-pub fn along(radar: &Radar) -> Vec<f64> {
-    radar.rx_m.iter().map(|rx| rx[0] - radar.rx_m[0][0]).collect()
-}
-
-/// The part of the phases between receivers that is a direction: least squares through the receivers' places.
-fn bearing(radar: &Radar, training: &[Sums]) -> Bearing {
-    let receivers = radar.rx_m.len();
-    let phases: Vec<Mean> = (1..receivers).map(|rx| phase(training, rx)).collect();
-    let (places, wave) = (along(radar), TAU / radar.wavelength_m());
-    let spread: f64 = places.iter().map(|x| x * x).sum();
-    if spread <= 0.0 {
-        return Bearing { sine: 0.0, deviation: 0.0, p_value: 1.0 };
-    }
-    let over = |of: &dyn Fn(&Mean, f64) -> f64| phases.iter().zip(&places[1..]).map(|(phase, &x)| of(phase, x)).sum::<f64>();
-    let sine = -over(&|phase, x| phase.value * x) / (spread * wave);
-    // One direction for all: its error from those of the phases, as if they erred together.
-    let deviation = over(&|phase, x| phase.deviation * x.abs()) / (spread * wave);
-    let own = tail((sine.abs() - PHASE_FLOOR_RAD / PI) / deviation.max(1e-12), training.len() as f64 - 1.0);
-    Bearing { sine, deviation, p_value: statistics::corrected(own, 2.0 * receivers as f64) }
-}
-
-/// Two-sided, of Student's law.
-fn tail(t: f64, freedom: f64) -> f64 {
-    if t <= 0.0 { 1.0 } else { StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| 2.0 * law.sf(t)) }
 }
 
 /// None where the body fills too few cells. `still`: power of static clutter, by range.
@@ -261,15 +159,6 @@ fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &
         }
     }
     Some(sums)
-}
-
-/// Phase of a receiver against the first, radians.
-fn phase(frames: &[Sums], rx: usize) -> Mean {
-    let total: Complex64 = frames.iter().map(|sums| sums.cross(rx)).sum();
-    let turned = |sums: &Sums| (sums.cross(rx) * total.conj() / total.norm().max(f64::MIN_POSITIVE)).im;
-    let scatter: f64 = frames.iter().map(|sums| turned(sums).powi(2)).sum();
-    let count = frames.len() as f64;
-    Mean { value: total.arg(), deviation: (scatter * count / (count - 1.0)).sqrt() / total.norm().max(f64::MIN_POSITIVE) }
 }
 
 /// Of held-out frames, pair by pair with the first receiver: circular Gaussian fields with equal powers and a real
@@ -329,9 +218,12 @@ fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, g
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{DMatrix, DVector};
+
     use super::super::covariance::{four_receivers, walking};
     use super::*;
     use crate::diagnosis::cube::Loaded;
+    use crate::diagnosis::statistics;
 
     /// What is found of a body seen by receivers: after a turn by receiver and sine, and a matrix.
     fn found(seed: u64, turned: impl Fn(usize, f64) -> Complex64, array: &DMatrix<Complex64>) -> Vec<Candidate> {

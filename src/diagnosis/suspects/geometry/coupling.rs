@@ -5,8 +5,8 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::channels::{AS_WELL, Found, LOOKS, UNEVEN};
 use super::covariance::Array;
+use super::found::{AS_WELL, Found, LOOKS, UNEVEN};
 use super::mismatch;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;

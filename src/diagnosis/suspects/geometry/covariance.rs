@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::channels::Bearing;
+use super::bearing::Bearing;
 use crate::diagnosis::power::PowerModel;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::speckle::{self, Look};

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::channels::{Found, LOOKS};
 use super::covariance::{Array, Cells};
+use super::found::{Found, LOOKS};
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;
 use crate::diagnosis::statistics::{DECIBEL, corrected};
@@ -132,7 +132,7 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
 
 #[cfg(test)]
 mod tests {
-    use super::super::channels::Bearing;
+    use super::super::bearing::Bearing;
     use super::super::covariance::walking;
     use super::*;
     use crate::diagnosis::cube::Loaded;

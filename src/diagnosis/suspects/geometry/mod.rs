@@ -1,11 +1,14 @@
 //! Geometry and time: the body is not where or when it was predicted, or it is seen a second time among its own cells.
 
 mod again;
+mod bearing;
 mod change;
 mod channels;
 mod coupling;
 mod covariance;
 mod displaced;
+mod fitted;
+mod found;
 mod mismatch;
 mod places;
 mod skew;
@@ -14,6 +17,7 @@ mod trial;
 
 use change::Moves;
 use channels::Observed;
+pub use channels::SLOW_GAIN_OF_ONE;
 use trial::Trial;
 
 use nalgebra::DVector;

@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::channels::{Found, LOOKS};
 use super::covariance::{Array, Cells};
+use super::found::{Found, LOOKS};
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};

@@ -7,9 +7,9 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use super::channels::{Bearing, Sums, along};
+use super::bearing::{Bearing, Sums, along};
 use super::standing::Standing;
-use crate::diagnosis::suspects::slow::undo;
+use crate::diagnosis::suspects::undo;
 use crate::diagnosis::{Candidate, Correction, Cube, Evidence, Place, Volume};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 

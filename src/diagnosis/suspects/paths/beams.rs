@@ -8,13 +8,14 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::coloured::{Coloured, FINE};
-use super::scene::{STILL_BINS, Scene, still_power};
-use super::steering::{beam, power, sines, steering};
+use super::scene::{STILL_BINS, Scene};
 use crate::diagnosis::Point;
 use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::power::Cells;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::statistics::median;
+use crate::diagnosis::suspects::clutter::still_power;
+use crate::diagnosis::suspects::steering::{beam, power, sines, steering};
 
 /// The body may return so much more than is expected of it.
 const SAFETY: f64 = 2.0;

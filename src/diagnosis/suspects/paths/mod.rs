@@ -13,7 +13,6 @@ pub mod product;
 mod removal;
 mod scene;
 mod sinusoidal;
-mod steering;
 mod still_point;
 mod track;
 
@@ -23,8 +22,6 @@ mod tests;
 use crate::diagnosis::{Candidate, Evidence};
 
 use scene::Scene;
-pub use scene::still_power;
-pub use steering::{beam, sines, steering};
 pub use still_point::body_rms;
 
 /// A ghost must predict at least this share of the held-out frames that show it.

@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::steering::{power, steering};
 use crate::diagnosis::evidence::{hann, transform};
 use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::suspects::steering::{power, steering};
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::{Boundary, Room};

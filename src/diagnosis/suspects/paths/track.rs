@@ -5,9 +5,9 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::scene::Scene;
-use super::steering::{aperture_m, power, steering};
 use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::statistics::{chi2_tail, mean_power_tail};
+use crate::diagnosis::suspects::steering::{aperture_m, power, steering};
 
 /// One frame's sighting.
 #[derive(Clone, Copy, Debug)]

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::burst::Burst;
 use super::crossings::{self, Crossings};
 use super::support::energy;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, OfSample, Place};
@@ -23,24 +24,6 @@ const LEAST_LIKELY: f64 = 1e-3;
 const UNSEEN: f64 = 5.0;
 /// Samples next to it that count once it is known to be hit.
 const NEXT: f64 = 6.0;
-
-/// A hit stretch of one chirp.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Burst {
-    pub frame: usize,
-    pub channel: usize,
-    pub chirp: usize,
-    pub first: usize,
-    pub last: usize,
-}
-
-impl Burst {
-    fn overlaps(&self, other: &Self) -> bool {
-        (self.frame, self.channel, self.chirp) == (other.frame, other.channel, other.chirp)
-            && self.first <= other.last
-            && other.first <= self.last
-    }
-}
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [frames, _, rx, loops, samples] = evidence.cube.dims;

@@ -14,10 +14,10 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::bursts::Burst;
+use super::burst::Burst;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::statistics::{median, poisson_tail};
-use crate::diagnosis::suspects::paths::{beam, sines, steering};
+use crate::diagnosis::suspects::steering::{beam, sines, steering};
 
 /// Samples in which a sweep crosses a band as wide as the sample rate.
 const DURATIONS: [f64; 7] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];

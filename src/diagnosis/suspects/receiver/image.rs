@@ -9,7 +9,8 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::harmonic::QUADRATIC;
-use super::support::{beat_hz, ranges_m};
+use super::support::beat_hz;
+use crate::diagnosis::evidence::beat::{LOBE, empty_bins};
 use crate::diagnosis::evidence::spectrum;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
 use crate::diagnosis::statistics::{DECIBEL, chi2_tail, corrected};
@@ -19,9 +20,6 @@ use crate::diagnosis::{Cube, Evidence};
 const STRONG: f64 = 100.0;
 /// Power that is left in the image's cells, over the noise's, from which on the image must be most of what is in them.
 const CROWDED: f64 = 1.5;
-/// The window's main lobe, cells to each side.
-const LOBE: usize = 3;
-
 /// Σ conj(parent)* · image, Σ |parent|² and Σ |image|² of a frame over the noise.
 #[derive(Clone, Copy, Default)]
 struct Sums {
@@ -143,26 +141,6 @@ fn of_frame(evidence: &Evidence, frame: usize) -> Vec<Sums> {
             sums
         })
         .collect()
-}
-
-/// Beat frequencies, as bins, that hold neither room nor body.
-pub fn empty_bins(evidence: &Evidence) -> Vec<bool> {
-    let samples = evidence.cube.dims[4];
-    match ranges_m(evidence) {
-        Some([low, high]) => {
-            let bin = |range: f64| beat_hz(evidence, range) / evidence.radar.sample_rate_hz * samples as f64;
-            let (low, high) = (bin(low) - LOBE as f64, bin(high) + LOBE as f64);
-            (0..samples)
-                .map(|bin| {
-                    let bin = bin as f64;
-                    let inside = |bin: f64| (low..=high).contains(&bin);
-                    !inside(bin) && !inside(bin + samples as f64) && !inside(bin - samples as f64)
-                })
-                .collect()
-        }
-        // Without a room, the negative half and its edges stay clear of near parents only.
-        None => (0..samples).map(|_| false).collect(),
-    }
 }
 
 /// Whether the channels' own estimates are compatible with one μ.

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::image::empty_bins;
 use crate::diagnosis::Evidence;
+use crate::diagnosis::evidence::beat::empty_bins;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::locate::Residual;
 use crate::diagnosis::power::Cells;

@@ -1,5 +1,6 @@
 //! The receiver and its noise: what lives in fast time, beat frequency and amplitude, and needs no body to be seen.
 
+mod burst;
 pub mod bursts;
 mod coloured;
 mod crossings;
@@ -14,6 +15,7 @@ pub mod noise;
 pub mod open;
 pub mod rail;
 pub mod response;
+pub mod slip;
 mod slow_spur;
 pub mod spur;
 pub mod still;

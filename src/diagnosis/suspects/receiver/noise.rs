@@ -8,9 +8,9 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::coloured::coloured;
-use super::image::empty_bins;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::cube::folds;
+use crate::diagnosis::evidence::beat::empty_bins;
 use crate::diagnosis::evidence::{hann, transform_under};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected, median};

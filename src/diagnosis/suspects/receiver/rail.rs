@@ -6,10 +6,10 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::declip::{Declip, FARTHEST};
-use super::image::empty_bins;
+use crate::diagnosis::evidence::beat::empty_bins;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::corrected;
-use crate::diagnosis::suspects::paths::still_power;
+use crate::diagnosis::suspects::clutter::still_power;
 use crate::diagnosis::{Cube, Evidence, Volume, denoised};
 
 /// Fewest components at the rail.

@@ -12,7 +12,7 @@ use rustfft::FftPlanner;
 
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::statistics::corrected;
-use crate::diagnosis::suspects::slow::lines::climb;
+use crate::diagnosis::suspects::climb::climb;
 use crate::diagnosis::{Cube, Evidence};
 
 /// Frames that are looked at, at most; and at least.

@@ -10,13 +10,8 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use num_complex::Complex64;
 
 use crate::diagnosis::Evidence;
-use crate::radar::SPEED_OF_LIGHT;
+pub use crate::diagnosis::evidence::beat::{beat_hz, range_m, ranges_m};
 
-/// Clearance before the nearest and behind the farthest surface: antennas off the reference point, surfaces that are
-/// not quite where they are said to be.
-const CLEARANCE_M: f64 = 0.3;
-/// The same behind the farthest, for a slope that is not quite as stated.
-const CLEARANCE_SHARE: f64 = 0.05;
 /// Chirps longer than this would take too long.
 const MOST_SAMPLES: usize = 512;
 
@@ -33,15 +28,6 @@ pub struct Support {
     pub high_m: f64,
 }
 
-/// Round-trip beat frequency of a range.
-pub fn beat_hz(evidence: &Evidence, range_m: f64) -> f64 {
-    2.0 * range_m * evidence.radar.slope_hz_per_s / SPEED_OF_LIGHT
-}
-
-pub fn range_m(evidence: &Evidence, beat_hz: f64) -> f64 {
-    beat_hz * SPEED_OF_LIGHT / (2.0 * evidence.radar.slope_hz_per_s)
-}
-
 /// exp(j2π f n) with the frequency in turns per sample.
 pub fn tone(turns_per_sample: f64, samples: usize) -> Vec<Complex64> {
     (0..samples).map(|n| Complex64::cis(TAU * (turns_per_sample * n as f64).fract())).collect()
@@ -54,15 +40,6 @@ pub fn dot(a: &[Complex64], b: &[Complex64]) -> Complex64 {
 
 pub fn energy(a: &[Complex64]) -> f64 {
     a.iter().map(Complex64::norm_sqr).sum()
-}
-
-/// Ranges of still surfaces: none unless the room is closed in front and on both sides.
-pub fn ranges_m(evidence: &Evidence) -> Option<[f64; 2]> {
-    let room = evidence.room.as_ref()?;
-    room.front_m.and(room.left_m).and(room.right_m)?;
-    let nearest = room.boundaries().into_iter().filter_map(|boundary| room.distance_m(boundary)).fold(f64::INFINITY, f64::min);
-    let farthest = room.farthest_m()?;
-    Some([(nearest - CLEARANCE_M).max(0.5 * nearest), farthest * (1.0 + CLEARANCE_SHARE) + CLEARANCE_M])
 }
 
 /// `contrast`: energy of a still chirp over the variance of the noise in a sample of it.

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, hann};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median, normal_tails};
-use crate::diagnosis::suspects::slow::lines::climb;
+use crate::diagnosis::suspects::climb::climb;
 
 /// Doppler bins around zero where a Hann window leaves static clutter.
 const STILL_BINS: usize = 2;

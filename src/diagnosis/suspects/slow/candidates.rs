@@ -10,12 +10,12 @@ use super::field::{Field, PATTERN, Part, ahead};
 use super::lines::Line;
 use super::random::Random;
 use super::settling::Settling;
-use super::undo;
 use crate::diagnosis::course::{Course, Of};
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Volume};
 use crate::diagnosis::statistics;
+use crate::diagnosis::suspects::undo;
 use crate::radar::SPEED_OF_LIGHT;
 
 /// Range at which a phase in proportion to the delay is stated.

@@ -29,7 +29,7 @@ const GAP: usize = 2;
 const SAME: f64 = 0.8;
 /// Variance of a group's gain over that of independent bins: the window's noise bandwidth.
 const NEIGHBOURS: f64 = 2.0;
-pub const BEHAVES_LIKE: &str = "slow-time gain of one channel";
+pub use geometry::SLOW_GAIN_OF_ONE as BEHAVES_LIKE;
 
 /// Gains of one receiver or transmitter relative to the others.
 struct Relative {

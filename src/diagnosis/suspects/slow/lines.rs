@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use rustfft::FftPlanner;
 
 use super::field::{Field, Series};
+use crate::diagnosis::suspects::climb::climb;
 
 /// A sinusoid `a cos + b sin` of 2π f T, with its harmonics.
 #[derive(Clone, Debug)]
@@ -205,22 +206,6 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
     line.background = if background > LOUD { background } else { 1.0 };
     line.held_out_gain = series.gain(field, held_out, |_, _, time| line.value(time)) / line.background;
     Some(line)
-}
-
-/// The top near a start and its height: steps of one width as long as they lead up, then of half of it, down to the finest.
-pub fn climb(height: impl Fn(f64) -> f64, start: f64, width: f64, finest: f64) -> (f64, f64) {
-    let (mut at, mut top, mut width) = (start, height(start), width);
-    while width > finest {
-        let (left, right) = (height(at - width), height(at + width));
-        if left > top {
-            (at, top) = (at - width, left);
-        } else if right > top {
-            (at, top) = (at + width, right);
-        } else {
-            width *= 0.5;
-        }
-    }
-    (at, top)
 }
 
 /// Power of a frame at the line's frequency after the line is taken out, relative to the noise's.

@@ -15,11 +15,9 @@ mod platform_vibration;
 pub mod random;
 pub mod settling;
 mod shared;
-pub mod slip;
 pub mod steady;
 #[cfg(test)]
 mod tests;
-pub mod undo;
 
 use field::{Field, Part};
 use num_complex::Complex64;

@@ -10,6 +10,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::diagnosis::Cube;
+use crate::diagnosis::cube::halves;
 use crate::diagnosis::evidence::{Evidence, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::{corrected, median};
@@ -131,20 +132,6 @@ fn scores(deviations: &[Deviation], channels: usize) -> Vec<f64> {
     let mut apart: Vec<f64> = scores.iter().map(|score| (score - middle).abs()).collect();
     let spread = TO_DEVIATION * median(&mut apart);
     scores.iter().map(|score| (score - middle) / spread.max(LEAST_SPREAD)).collect()
-}
-
-/// Mean chirps of the even and of the odd loops.
-pub fn halves(channel: &[Complex64], samples: usize) -> [Vec<Complex64>; 2] {
-    let mut sums = [vec![Complex64::ZERO; samples], vec![Complex64::ZERO; samples]];
-    let mut counts = [0.0; 2];
-    for (index, chirp) in channel.chunks_exact(samples).enumerate() {
-        sums[index % 2].iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value);
-        counts[index % 2] += 1.0;
-    }
-    for (sum, count) in sums.iter_mut().zip(counts) {
-        sum.iter_mut().for_each(|value| *value /= count);
-    }
-    sums
 }
 
 #[cfg(test)]

@@ -10,11 +10,11 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::field::{PATTERN, ahead, free};
-use super::lines::climb;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place, Volume};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::suspects::climb::climb;
 
 /// Bins over which the window spreads what is independent.
 const BINS_PER_VALUE: f64 = 2.0;

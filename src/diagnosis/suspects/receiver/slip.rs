@@ -12,15 +12,15 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::odd_frame::halves;
-use crate::diagnosis::Cube;
-use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Correction, Place};
-use crate::diagnosis::statistics::corrected;
-use crate::diagnosis::suspects::receiver::{
+use super::{
     field::distance,
     support::{dot, energy},
 };
+use crate::diagnosis::Cube;
+use crate::diagnosis::cube::halves;
+use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::finding::{Candidate, Correction, Place};
+use crate::diagnosis::statistics::corrected;
 
 /// Fewest frames, loops and samples from which a slip is estimable.
 const FEWEST: [usize; 3] = [4, 4, 32];

@@ -1,0 +1,50 @@
+//! Where in beat frequency the room and the body can be.
+
+use super::Evidence;
+use crate::radar::SPEED_OF_LIGHT;
+
+/// Clearance before the nearest and behind the farthest surface: antennas off the reference point, surfaces that are
+/// not quite where they are said to be.
+const CLEARANCE_M: f64 = 0.3;
+/// The same behind the farthest, for a slope that is not quite as stated.
+const CLEARANCE_SHARE: f64 = 0.05;
+/// The window's main lobe, cells to each side.
+pub const LOBE: usize = 3;
+
+/// Round-trip beat frequency of a range.
+pub fn beat_hz(evidence: &Evidence, range_m: f64) -> f64 {
+    2.0 * range_m * evidence.radar.slope_hz_per_s / SPEED_OF_LIGHT
+}
+
+pub fn range_m(evidence: &Evidence, beat_hz: f64) -> f64 {
+    beat_hz * SPEED_OF_LIGHT / (2.0 * evidence.radar.slope_hz_per_s)
+}
+
+/// Ranges of still surfaces: none unless the room is closed in front and on both sides.
+pub fn ranges_m(evidence: &Evidence) -> Option<[f64; 2]> {
+    let room = evidence.room.as_ref()?;
+    room.front_m.and(room.left_m).and(room.right_m)?;
+    let nearest = room.boundaries().into_iter().filter_map(|boundary| room.distance_m(boundary)).fold(f64::INFINITY, f64::min);
+    let farthest = room.farthest_m()?;
+    Some([(nearest - CLEARANCE_M).max(0.5 * nearest), farthest * (1.0 + CLEARANCE_SHARE) + CLEARANCE_M])
+}
+
+/// Beat frequencies, as bins, that hold neither room nor body.
+pub fn empty_bins(evidence: &Evidence) -> Vec<bool> {
+    let samples = evidence.cube.dims[4];
+    match ranges_m(evidence) {
+        Some([low, high]) => {
+            let bin = |range: f64| beat_hz(evidence, range) / evidence.radar.sample_rate_hz * samples as f64;
+            let (low, high) = (bin(low) - LOBE as f64, bin(high) + LOBE as f64);
+            (0..samples)
+                .map(|bin| {
+                    let bin = bin as f64;
+                    let inside = |bin: f64| (low..=high).contains(&bin);
+                    !inside(bin) && !inside(bin + samples as f64) && !inside(bin - samples as f64)
+                })
+                .collect()
+        }
+        // Without a room, the negative half and its edges stay clear of near parents only.
+        None => (0..samples).map(|_| false).collect(),
+    }
+}

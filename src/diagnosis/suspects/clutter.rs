@@ -1,0 +1,18 @@
+//! Static clutter against the noise.
+
+use crate::diagnosis::evidence::{Evidence, transform};
+
+/// Power of static clutter over the noise of one frame's map, by range, mean over channels.
+pub fn still_power(evidence: &Evidence) -> Vec<f64> {
+    let samples = evidence.cube.dims[4];
+    let count = evidence.cube.channels() as f64;
+    let mut power = vec![0.0; samples];
+    for (channel, still) in evidence.still().chunks_exact(samples).enumerate() {
+        // One loop: a window of unit energy is one, so that the Doppler transform does nothing.
+        let spectrum = transform(still, samples);
+        let noise = evidence.noise()[channel].max(f64::MIN_POSITIVE);
+        power.iter_mut().zip(spectrum).for_each(|(sum, value)| *sum += value.norm_sqr() / (noise * count));
+    }
+    let gain = evidence.cube.dims[3] as f64 / 1.5;
+    power.iter().map(|power| power * gain).collect()
+}
