@@ -20,8 +20,8 @@ use crate::{
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// The capture: .bin files of one DCA1000 capture in their order, the folder of a cascade or of the Infineon SDK, or arrays
-    /// (.npy, .npz, .mat, .h5, .bin; several or a folder: a frame each)
+    /// The capture: .bin files of one DCA1000 capture in their order, the folder of a cascade, of roverd or of the Infineon SDK, or
+    /// arrays (.npy, .npz, .mat, .h5, .bin; several or a folder: a frame each)
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,
     /// What describes the radar: .mmwave.json, .setup.json or .cfg of TI, TOML with [radar], or ColoRadar's .txt; may be repeated

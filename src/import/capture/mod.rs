@@ -2,8 +2,8 @@
 //!
 //! A source says which radar it is of and gives its samples frame by frame; nothing of it is held in memory but the
 //! frame at hand. What had to be assumed is a note. One layout, one file: `dca1000` (TI boards with a DCA1000 capture
-//! card), `cascade` (four devices on an MMWCAS-DSP-EVM), `infineon` (folders of the Radar SDK and of ifxdaq), `arrays` (arrays of any
-//! order of axes, in any file of `container` or as words alone).
+//! card), `cascade` (four devices on an MMWCAS-DSP-EVM), `infineon` (folders of the Radar SDK and of ifxdaq), `rover` (traces of roverd),
+//! `arrays` (arrays of any order of axes, in any file of `container` or as words alone).
 
 mod arrays;
 pub mod boards;
@@ -20,6 +20,8 @@ pub mod lanes;
 mod layout;
 mod presets;
 mod radar_table;
+mod rover;
+mod rover_radar;
 mod schedule;
 mod stream;
 mod ti_cfg;
@@ -86,6 +88,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         return match () {
             () if cascade::is_folder(folder) => cascade::open(sources, stated),
             () if is_laid_out => arrays::open(sources, stated),
+            () if rover::is_folder(folder) => rover::open(folder, stated),
             () => infineon::open(folder, stated),
         };
     }
@@ -100,8 +103,8 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         other => Err(Error::Usage {
             message: format!("{}: a capture of type `{}`", first.display(), other.unwrap_or("none")),
             hint: Some(
-                "known are .bin or .setup.json (DCA1000), folders with master_0000_data.bin and so on (cascades) or with radar.npy and \
-                 config.json (Infineon), and .npy, .npz, .mat, .h5 or .bin with --layout or --preset"
+                "known are .bin or .setup.json (DCA1000), folders with master_0000_data.bin and so on (cascades), with radar.npy and \
+                 config.json (Infineon) or with meta.json and iq (roverd), and .npy, .npz, .mat, .h5 or .bin with --layout or --preset"
                     .into(),
             ),
         }),
@@ -112,6 +115,8 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
 pub struct Draft {
     source: PathBuf,
     staged: StagedRecording,
+    /// Chirps that the capture itself says were lost.
+    lost: Vec<[usize; 4]>,
     /// What the samples say of what is stated.
     pub findings: Vec<Finding>,
 }
@@ -133,8 +138,9 @@ impl Draft {
             ));
         }
         let mut notes = std::mem::take(&mut self.staged.recording.notes);
-        let lost: Vec<[usize; 4]> = self.findings.iter().flat_map(|finding| finding.chirps.iter().copied()).collect();
+        let mut lost: Vec<[usize; 4]> = self.findings.iter().flat_map(|finding| finding.chirps.iter().copied()).collect();
         if !lost.is_empty() {
+            lost.append(&mut self.lost);
             self.staged.set_valid(&Valid::without(&self.staged.recording.radar, lost))?;
             if self.staged.recording.whole_frames().next().is_none() {
                 return Err(Error::field(
@@ -176,9 +182,13 @@ pub fn draft(
         (capture.frame)(frame)
     })?;
     progress(capture.radar.frames, capture.radar.frames);
+    let lost = rover::lost(&capture.source, &capture.radar)?;
+    if !lost.is_empty() {
+        staged.set_valid(&Valid::without(&capture.radar, lost.iter().copied()))?;
+    }
     staged.recording.notes.splice(0..0, capture.notes);
     let findings = integrity::inspect(&staged.recording, staged.recording.radar.frames)?;
-    Ok(Draft { source: capture.source, staged, findings })
+    Ok(Draft { source: capture.source, staged, lost, findings })
 }
 
 /// Writes a capture as a recording folder and opens it; its notes come first. `progress` as in [`draft`].
