@@ -34,8 +34,8 @@ def heatmaps(
     Returns:
         By name: ``range_doppler``, ``range_doppler_moving`` (static removed), ``range_azimuth`` of the middle frame
         (``[velocity or azimuth, range]``; m/s, degrees, m), ``time_doppler``, ``time_range`` and ``time_azimuth``
-        (``[velocity, range or azimuth, time]``; s), static removed. Those over time need two frames, those over azimuth two
-        antenna pairs.
+        (``[velocity, range or azimuth, time]``; s), static removed. ``time_doppler`` is a short-time Fourier transform over
+        all chirps, the others have a column a frame. Those over time need two frames, those over azimuth two antenna pairs.
 
     Raises:
         hybridsim.Error: samples that are not whole frames of the radar.
