@@ -6,7 +6,7 @@ use super::descriptions::descriptions;
 use super::radar_table::apply;
 use super::schedule::{Selection, TiRadar};
 use super::stream::Words;
-use super::{Capture, Stated, cascade, lanes::Lanes, ti_cfg, ti_json};
+use super::{Capture, Stated, cascade, lanes::Lanes, parts, ti_cfg, ti_json};
 use crate::data::{IfFrame, IfLayout, files};
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
@@ -32,6 +32,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     let Selection { radar: found, words_per_frame, starts, inverted_rx, notes: more } =
         radar.select(&stated, &|words_per_frame, notes| radar.frames_present(&words, words_per_frame, notes))?;
     notes.extend(more);
+    notes.extend(parts::note_of_others(sources));
     notes.extend(log_beside(&sources[0]));
     let shaped = apply(found, &std::mem::take(&mut stated.sets))?;
     let lanes = radar.lanes;

@@ -13,11 +13,13 @@ mod coloradar;
 mod container;
 mod cube;
 mod dca1000;
+mod described;
 mod descriptions;
 mod infineon;
 mod json;
 pub mod lanes;
 mod layout;
+mod parts;
 mod presets;
 mod radar_table;
 mod rover;
@@ -89,6 +91,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
             () if cascade::is_folder(folder) => cascade::open(sources, stated),
             () if is_laid_out => arrays::open(sources, stated),
             () if rover::is_folder(folder) => rover::open(folder, stated),
+            () if !parts::in_folder(folder)?.is_empty() => dca1000::open(&parts::in_folder(folder)?, stated),
             () => infineon::open(folder, stated),
         };
     }
@@ -96,7 +99,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     match extension.as_deref() {
         Some("bin") if cascade::is_part(first) => cascade::open(sources, stated),
         Some("bin") if is_laid_out => arrays::open(sources, stated),
-        Some("bin") => dca1000::open(sources, stated),
+        Some("bin") => dca1000::open(&parts::in_order(sources)?, stated),
         Some("json") => dca1000::open_setup(one(sources)?, stated),
         Some("npy") if infineon::is_samples(first) => infineon::open(first.parent().unwrap_or(Path::new("")), stated),
         Some(kind) if container::EXTENSIONS.contains(&kind) => arrays::open(sources, stated),

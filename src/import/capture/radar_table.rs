@@ -51,8 +51,56 @@ pub fn apply(radar: Radar, sets: &[String]) -> Result<Radar> {
     struct Settings {
         radar: Radar,
     }
-    let table = toml::Table::try_from(Settings { radar }).expect("a radar is plain data");
+    let table = toml::Table::try_from(Settings { radar: radar.clone() }).expect("a radar is plain data");
     let settings: Settings = settings_from_table(table, "--set", sets)?;
     settings.radar.check("radar")?;
+    keeps_its_shape(&radar, &settings.radar)?;
     Ok(settings.radar)
+}
+
+/// Where a sample lies follows from what was read: of frames and loops fewer can be taken, all else must stay.
+fn keeps_its_shape(read: &Radar, set: &Radar) -> Result<()> {
+    let ([frames, tx, rx, loops, samples], of) = (set.dims(), read.dims());
+    let wrong = [
+        ("frames", frames, of[0], frames > of[0]),
+        ("tx_m", tx, of[1], tx != of[1]),
+        ("rx_m", rx, of[2], rx != of[2]),
+        ("loops_per_frame", loops, of[3], loops > of[3]),
+        ("samples_per_chirp", samples, of[4], samples != of[4]),
+    ];
+    let hint = "correct the description that the capture was read by, or describe the array itself with --layout";
+    if let Some((key, found, there, _)) = wrong.into_iter().find(|(.., wrong)| *wrong) {
+        let expected = if ["frames", "loops_per_frame"].contains(&key) { format!("at most {there}") } else { there.to_string() };
+        let found = if key.ends_with("_m") { format!("{found} places") } else { found.to_string() };
+        return Err(
+            Error::setting(format!("radar.{key}"), found, format!("{expected}, as the capture is described")).with_hint(hint)
+        );
+    }
+    if set.sampling != read.sampling {
+        let expected = format!("{:?}, as the capture is described", read.sampling).to_lowercase();
+        return Err(Error::setting("radar.sampling", format!("{:?}", set.sampling).to_lowercase(), expected).with_hint(hint));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_shapes_the_samples_cannot_be_set_but_fewer_frames_and_loops_can() {
+        let radar = Radar::small(4);
+        let set = |text: &str| apply(radar.clone(), &[text.to_string()]);
+        assert_eq!(set("radar.frames=2").unwrap().frames, 2);
+        assert_eq!(set("radar.frame_period_s=0.2").unwrap().frame_period_s, 0.2);
+        for (text, message) in [
+            ("radar.frames=5", "`radar.frames` is 5, expected at most 4, as the capture is described"),
+            ("radar.samples_per_chirp=8", "`radar.samples_per_chirp` is 8"),
+            ("radar.loops_per_frame=1000", "`radar.loops_per_frame` is 1000, expected at most"),
+            ("radar.rx_m=[[0.0, 0.0, 0.0]]", "`radar.rx_m` is 1 places"),
+        ] {
+            let error = set(text).unwrap_err();
+            assert!(error.to_string().starts_with(message) && error.hint().is_some(), "{error}");
+        }
+    }
 }

@@ -67,7 +67,7 @@ pub struct Selection {
 }
 
 impl TiRadar {
-    fn profile(&self, id: usize) -> Result<&Profile> {
+    pub(super) fn profile(&self, id: usize) -> Result<&Profile> {
         self.profiles.iter().find(|profile| profile.id == id).ok_or_else(|| {
             let known: Vec<_> = self.profiles.iter().map(|profile| profile.id.to_string()).collect();
             Error::field(&self.file, "profile", format!("{id}, which nothing describes"), format!("one of {}", known.join(", ")))
@@ -124,6 +124,11 @@ impl TiRadar {
                 .with_hint("leave out --tx or --profile, or name another"));
         }
         self.even(&kept, time_s)?;
+        // Before anything of a frame's size is made: a description may ask for more than there is.
+        let words_per_frame = self.words_per_frame()?;
+        let mut notes = self.notes.clone();
+        let frames = present(words_per_frame, &mut notes)?;
+        self.hold_against_ordered(frames, &mut notes);
         let masks: Vec<usize> = kept.iter().map(|&(_, _, mask)| mask).collect();
         // A loop that repeats itself (128 chirps of one transmitter) is as many loops.
         let period = (1..=masks.len())
@@ -135,10 +140,6 @@ impl TiRadar {
             .flat_map(|index| kept.chunks(period).map(move |chirps| (index, chirps)))
             .map(|(index, chirps)| chirps.iter().map(|&(_, words, _)| before + (index * offset + words) as u64).collect())
             .collect::<Vec<Vec<u64>>>();
-        let words_per_frame = self.words_per_frame()?;
-        let mut notes = self.notes.clone();
-        let frames = present(words_per_frame, &mut notes)?;
-        self.hold_against_ordered(frames, &mut notes);
         let (tx_m, rx_m, inverted_rx) = self.antennas(&masks[..period], stated, profile, &mut notes)?;
         let radar = Radar {
             start_frequency_hz: profile.start_frequency_hz,

@@ -74,6 +74,14 @@ pub fn read_radar(file: &Path) -> Result<TiRadar> {
         Some(advanced) => advanced_frame(advanced, &all("subFrameCfg"), &chirps)?,
         None => frame(last("frameCfg")?, &chirps)?,
     };
+    // bpmCfg <subframe> <enabled> <first chirp> <second chirp>
+    for line in all("bpmCfg") {
+        if line.count_at(1)? != 0 {
+            return Err(line.wrong("transmitters that send together with switched phases", "0: time division").with_hint(
+                "separate the transmitters (sums and differences of the two chirps) and import the array with --layout",
+            ));
+        }
+    }
     let mut notes: Vec<String> = profiles.iter().filter_map(|profile| check_ramp(file, profile)).collect();
     let lanes = lanes(last("adcCfg")?, last("adcbufCfg")?, &mut notes)?;
     if let Some(stream) = all("lvdsStreamCfg").pop() {
@@ -85,7 +93,7 @@ pub fn read_radar(file: &Path) -> Result<TiRadar> {
             return Err(stream.wrong(format!("data format {}", stream.count_at(2)?), "1: samples only"));
         }
     }
-    Ok(TiRadar {
+    let radar = TiRadar {
         file: file.into(),
         profiles,
         bursts,
@@ -95,7 +103,8 @@ pub fn read_radar(file: &Path) -> Result<TiRadar> {
         devices: 1,
         lanes,
         notes,
-    })
+    };
+    radar.checked()
 }
 
 /// profileCfg id start_GHz idle_us adc_start_us ramp_end_us power phase slope_MHz/us tx_start samples rate_ksps …

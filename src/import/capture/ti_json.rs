@@ -57,7 +57,7 @@ pub fn read_radar(path: &Path) -> Result<TiRadar> {
     let lanes = lanes(&rf, &raw)?;
     let rx_mask = rf.get("rlChanCfg_t")?.get("rxChannelEn")?.count()?;
     let notes = profiles.iter().filter_map(|profile| check_ramp(path, profile)).collect();
-    Ok(TiRadar { file: path.into(), profiles, bursts, frame_period_s, frames, rx_mask, devices: 1, lanes, notes })
+    TiRadar { file: path.into(), profiles, bursts, frame_period_s, frames, rx_mask, devices: 1, lanes, notes }.checked()
 }
 
 /// Reads the radar of a cascade: transmitters and receivers are numbered through the devices, master first.
@@ -93,7 +93,7 @@ pub fn read_cascade(path: &Path) -> Result<TiRadar> {
     }
     let mut whole = whole.expect("there are four");
     whole.rx_mask = (1 << (RECEIVERS * CASCADED)) - 1;
-    Ok(whole)
+    whole.checked()
 }
 
 /// One device of a cascade, its transmitters numbered after those of the devices before it.

@@ -1,0 +1,95 @@
+//! The files that a DCA1000 splits a capture into: `NAME_Raw_0.bin`, `NAME_Raw_1.bin` and so on.
+
+use std::path::{Path, PathBuf};
+
+use crate::data::entries::entries;
+use crate::error::{Error, Result};
+
+/// `NAME_Raw_` and the number.
+fn part(path: &Path) -> Option<(PathBuf, usize)> {
+    let stem = path.file_stem()?.to_str()?;
+    let end = stem.trim_end_matches(|letter: char| letter.is_ascii_digit());
+    let number = stem[end.len()..].parse().ok()?;
+    (end.ends_with("Raw_") && path.extension().is_some_and(|kind| kind == "bin")).then(|| (path.with_file_name(end), number))
+}
+
+/// Numbered files of one capture in the order in which the card wrote them, however a shell sorts them; others as they are.
+///
+/// # Errors
+/// A number that is missing or named twice.
+pub fn in_order(sources: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut parts: Vec<(PathBuf, usize)> = sources.iter().filter_map(|path| part(path)).collect();
+    if sources.len() < 2 || parts.len() != sources.len() || parts.iter().any(|(name, _)| *name != parts[0].0) {
+        return Ok(sources.to_vec());
+    }
+    parts.sort_by_key(|&(_, number)| number);
+    let file = |number: usize| PathBuf::from(format!("{}{number}.bin", parts[0].0.display()));
+    if let Some(pair) = parts.windows(2).find(|pair| pair[1].1 != pair[0].1 + 1) {
+        let next = pair[0].1 + 1;
+        let found = format!("followed by {}", file(pair[1].1).display());
+        return Err(Error::field(file(pair[0].1), "parts", found, file(next).display().to_string())
+            .with_hint("name every file of the capture once: frames go on from one to the next"));
+    }
+    Ok(parts.iter().map(|&(_, number)| file(number)).collect())
+}
+
+/// The samples in a folder as mmWave Studio leaves it: the only `.bin` file, or the parts of one capture.
+///
+/// # Errors
+/// Several captures.
+pub fn in_folder(folder: &Path) -> Result<Vec<PathBuf>> {
+    let is_samples = |path: &PathBuf| path.extension().is_some_and(|kind| kind == "bin");
+    let found: Vec<PathBuf> = entries(folder)?.into_iter().filter(is_samples).collect();
+    let names: Vec<Option<PathBuf>> = found.iter().map(|path| part(path).map(|(name, _)| name)).collect();
+    if found.len() > 1 && names.iter().any(|name| name.is_none() || *name != names[0]) {
+        let list: Vec<String> = found.iter().take(4).map(|path| path.display().to_string()).collect();
+        return Err(Error::Usage {
+            message: format!("{}: {} files of samples: {}", folder.display(), found.len(), list.join(", ")),
+            hint: Some("name the file of one capture, or all parts of it (_Raw_0.bin, _Raw_1.bin and so on)".into()),
+        });
+    }
+    in_order(&found)
+}
+
+/// That a file alone is one of several.
+pub fn note_of_others(sources: &[PathBuf]) -> Option<String> {
+    let [only] = sources else { return None };
+    let (name, number) = part(only)?;
+    let beside = |number: usize| PathBuf::from(format!("{}{number}.bin", name.display()));
+    let others = [number.checked_sub(1), Some(number + 1)].into_iter().flatten().map(beside).find(|path| path.is_file())?;
+    Some(format!("{} is of the same capture and was not named: only {} is read", others.display(), only.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn paths(names: &[&str]) -> Vec<PathBuf> {
+        names.iter().map(PathBuf::from).collect()
+    }
+
+    #[test]
+    fn parts_are_joined_by_number_and_a_missing_one_is_named() {
+        let shell = paths(&["a/x_Raw_0.bin", "a/x_Raw_1.bin", "a/x_Raw_10.bin", "a/x_Raw_2.bin"]);
+        let error = in_order(&shell).unwrap_err().to_string();
+        assert_eq!(error, "a/x_Raw_2.bin: `parts` is followed by a/x_Raw_10.bin, expected a/x_Raw_3.bin");
+        let right = paths(&["a/x_Raw_9.bin", "a/x_Raw_10.bin"]);
+        assert_eq!(in_order(&paths(&["a/x_Raw_10.bin", "a/x_Raw_9.bin"])).unwrap(), right);
+        // Not numbered by the card: the user's order.
+        let named = paths(&["b.bin", "a.bin"]);
+        assert_eq!(in_order(&named).unwrap(), named);
+    }
+
+    #[test]
+    fn a_folder_has_one_capture_or_is_asked_about() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in ["x_Raw_1.bin", "x_Raw_0.bin", "x.mmwave.json"] {
+            std::fs::write(at(name), "ab").unwrap();
+        }
+        assert_eq!(in_folder(folder.path()).unwrap(), [at("x_Raw_0.bin"), at("x_Raw_1.bin")]);
+        assert!(note_of_others(&[at("x_Raw_0.bin")]).unwrap().contains("x_Raw_1.bin"));
+        std::fs::write(at("y.bin"), "ab").unwrap();
+        assert!(in_folder(folder.path()).unwrap_err().to_string().contains("3 files of samples"));
+    }
+}
