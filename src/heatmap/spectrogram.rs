@@ -12,8 +12,8 @@ use crate::radar::Radar;
 const ACCELERATION_MPS2: f64 = 30.0;
 /// Hops of a window: Hann's overlaps by three quarters as usual.
 const OVERLAP: usize = 4;
-/// Most columns of a map: more than a picture has pixels.
-const MOST_COLUMNS: usize = 2048;
+/// Most columns of a map: as many as a picture of three maps has pixels for each.
+const MOST_COLUMNS: usize = 512;
 
 /// Which loops a column looks at.
 #[derive(Clone, Debug, PartialEq)]
