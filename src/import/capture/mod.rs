@@ -91,8 +91,10 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
             () if cascade::is_folder(folder) => cascade::open(sources, stated),
             () if is_laid_out => arrays::open(sources, stated),
             () if rover::is_folder(folder) => rover::open(folder, stated),
-            () if !parts::in_folder(folder)?.is_empty() => dca1000::open(&parts::in_folder(folder)?, stated),
-            () => infineon::open(folder, stated),
+            () => match parts::in_folder(folder)?.as_slice() {
+                [] => infineon::open(folder, stated),
+                parts => dca1000::open(parts, stated),
+            },
         };
     }
     let extension = first.extension().map(|extension| extension.to_string_lossy().to_lowercase());

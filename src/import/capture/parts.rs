@@ -18,19 +18,19 @@ fn part(path: &Path) -> Option<(PathBuf, usize)> {
 /// # Errors
 /// A number that is missing or named twice.
 pub fn in_order(sources: &[PathBuf]) -> Result<Vec<PathBuf>> {
-    let mut parts: Vec<(PathBuf, usize)> = sources.iter().filter_map(|path| part(path)).collect();
-    if sources.len() < 2 || parts.len() != sources.len() || parts.iter().any(|(name, _)| *name != parts[0].0) {
+    let mut parts: Vec<(&PathBuf, PathBuf, usize)> =
+        sources.iter().filter_map(|path| part(path).map(|(name, number)| (path, name, number))).collect();
+    if sources.len() < 2 || parts.len() != sources.len() || parts.iter().any(|(_, name, _)| *name != parts[0].1) {
         return Ok(sources.to_vec());
     }
-    parts.sort_by_key(|&(_, number)| number);
-    let file = |number: usize| PathBuf::from(format!("{}{number}.bin", parts[0].0.display()));
-    if let Some(pair) = parts.windows(2).find(|pair| pair[1].1 != pair[0].1 + 1) {
-        let next = pair[0].1 + 1;
-        let found = format!("followed by {}", file(pair[1].1).display());
-        return Err(Error::field(file(pair[0].1), "parts", found, file(next).display().to_string())
+    parts.sort_by_key(|&(_, _, number)| number);
+    if let Some(pair) = parts.windows(2).find(|pair| pair[1].2 != pair[0].2 + 1) {
+        let found = format!("followed by {}", pair[1].0.display());
+        let expected = format!("{}{}.bin", pair[0].1.display(), pair[0].2 + 1);
+        return Err(Error::field(pair[0].0, "parts", found, expected)
             .with_hint("name every file of the capture once: frames go on from one to the next"));
     }
-    Ok(parts.iter().map(|&(_, number)| file(number)).collect())
+    Ok(parts.into_iter().map(|(path, ..)| path.clone()).collect())
 }
 
 /// The samples in a folder as mmWave Studio leaves it: the only `.bin` file, or the parts of one capture.
