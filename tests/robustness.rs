@@ -316,19 +316,19 @@ fn an_empty_folder_behind_a_link_is_filled() {
 #[test]
 fn weights_have_the_mode_of_their_neighbours_and_equal_runs_write_equal_bytes() {
     let (folder, recording) = (tempfile::tempdir().unwrap(), made().join("recording"));
+    // The same commands in two folders: what a page says of its checkpoint is how the command named it.
     let once = |run: &str| {
-        assert_done(&train(folder.path(), &recording, run));
-        let checkpoint = format!("{run}/best");
-        let made = format!("{run}/made");
-        let infer = ["infer", "--checkpoint", &checkpoint, "--action", "lunge", "--frames", "2", "-q", "--out", &made];
-        assert_done(&hybridsim(&infer, folder.path()));
-        let (recording, lobes) = (recording.display().to_string(), format!("{run}/lobes"));
-        let baseline = ["baseline", "mmgpe", &recording, "-q", "--device", "flex", "--out", &lobes];
-        assert_done(&hybridsim(&baseline, folder.path()));
-        let scores = format!("{run}/scores");
-        let evaluate = ["evaluate", &recording, "--checkpoint", &checkpoint, "-q", "--device", "flex", "--out", &scores];
-        assert_done(&hybridsim(&evaluate, folder.path()));
-        files(&folder.path().join(run))
+        let folder = folder.path().join(run);
+        fs::create_dir(&folder).unwrap();
+        assert_done(&train(&folder, &recording, "run"));
+        let infer = ["infer", "--checkpoint", "run/best", "--action", "lunge", "--frames", "2", "-q", "--out", "run/made"];
+        assert_done(&hybridsim(&infer, &folder));
+        let recording = recording.display().to_string();
+        let baseline = ["baseline", "mmgpe", &recording, "-q", "--device", "flex", "--out", "run/lobes"];
+        assert_done(&hybridsim(&baseline, &folder));
+        let evaluate = ["evaluate", &recording, "--checkpoint", "run/best", "-q", "--device", "flex", "--out", "run/scores"];
+        assert_done(&hybridsim(&evaluate, &folder));
+        files(&folder.join("run"))
     };
     let (first, second) = (once("first"), once("second"));
     assert_eq!(first.keys().collect::<Vec<_>>(), second.keys().collect::<Vec<_>>());
@@ -338,7 +338,7 @@ fn weights_have_the_mode_of_their_neighbours_and_equal_runs_write_equal_bytes() 
     assert!(differ.len() == 2, "{differ:?}");
 
     let modes: BTreeMap<u32, &PathBuf> =
-        first.keys().map(|path| (fs::metadata(folder.path().join("first").join(path)).unwrap().mode() & 0o777, path)).collect();
+        first.keys().map(|path| (fs::metadata(folder.path().join("first/run").join(path)).unwrap().mode() & 0o777, path)).collect();
     fs::write(folder.path().join("ordinary"), "").unwrap();
     let ordinary = fs::metadata(folder.path().join("ordinary")).unwrap().permissions().mode() & 0o777;
     assert!(modes.keys().eq([&ordinary]), "{modes:?}, an ordinary file has {ordinary}");
