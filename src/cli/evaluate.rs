@@ -1,6 +1,6 @@
 //! `hybridsim evaluate`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -14,7 +14,7 @@ use super::{
 use crate::{
     data::{Scratch, atomic},
     error::{Error, Result},
-    evaluation::{self, FrameMaps, Simulation},
+    evaluation::{self, Evaluation, FrameMaps, Simulation},
     lpips::Lpips,
     metrics::MetricsConfig,
     pictures::page::{self, Markup, html, picture},
@@ -55,30 +55,19 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let (mut simulator, state) = checkpoint::open(&arguments.checkpoint, &device)?;
     arguments.without.switch_off(&mut simulator)?;
     let lpips = arguments.lpips.config().map(|config| Lpips::open(&config, &device)).transpose()?;
-    let metrics = MetricsConfig::default();
     // Beside `best` and `last`, in the run folder.
-    let run_folder = arguments.checkpoint.join("..");
-    let poses = refine::read(&run_folder)?;
+    let poses = refine::read(&arguments.checkpoint.join(".."))?;
     let scratch = Scratch::new()?;
     let (mut evaluations, mut drawn) = (Vec::new(), Vec::new());
     for folder in &arguments.recordings {
         plausible::folder(folder, common)?;
-        let recording = LoadedRecording::open(folder, &state.simulator, false)?;
-        let (recording, moved) = refine::refined(recording, &poses)?;
+        let (recording, moved) = refine::refined(LoadedRecording::open(folder, &state.simulator, false)?, &poses)?;
         if moved {
             remark!("note: {}: its motion as the training run refined it ({})", folder.display(), refine::FILE);
         }
         same_radar(folder, &recording.scene.radar, &state.site.radar)?;
         notes::of(&recording).iter().for_each(|note| remark!("note: {note}"));
-        let available = recording.scene.radar.frames;
-        let (first, end) = arguments.frames.unwrap_or((0, available));
-        if end > available {
-            return Err(Error::Usage {
-                message: format!("--frames {first}..{end}: {} has {available} frames", folder.display()),
-                hint: None,
-            });
-        }
-        let frames: Vec<usize> = (first..end).collect();
+        let frames = arguments.frames_of(folder, &recording)?;
         let simulation = Simulation::new(&simulator, &recording.scene, state.seed, true);
         let progress = Progress::new("evaluating", frames.len(), common.quiet);
         let mut done = 0;
@@ -91,6 +80,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
                 pictures = of_frame(&scratch, frame, &all, &moving);
             }
         };
+        let metrics = MetricsConfig::default();
         let evaluation =
             evaluation::evaluate(&recording, &simulation, &frames, &state.heatmap, &metrics, lpips.as_ref(), &mut observe)?;
         progress.finish();
@@ -105,23 +95,43 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     if let Some(out) = &arguments.out.out {
         atomic::write_text(out.join("metrics.json"), &scores::json(&evaluations))?;
-        let content = html! {
-            h1 { "Simulation against recordings" }
-            p.lead { "Of the checkpoint " code { (page::shown(&arguments.checkpoint.display().to_string())) } "." }
-            @for ((name, evaluation), pictures) in evaluations.iter().zip(&drawn) {
-                h2 { (page::shown(name)) }
-                (page_of_frames(evaluation))
-                (pictures)
-            }
-            @if let (true, Some(summary)) = (evaluations.len() > 1, scores::summary(&evaluations)) {
-                h2 { "Together" }
-                pre { (scores::of_sequences(&summary)) }
-            }
-        };
+        let content = content(&arguments.checkpoint, &evaluations, &drawn);
         atomic::write_text(out.join("report.html"), &page::page("Simulation against recordings", &content))?;
         say!("report: {}", out.join("report.html").display());
     }
     Ok(())
+}
+
+impl Arguments {
+    /// The frames of a recording that are compared.
+    fn frames_of(&self, folder: &Path, recording: &LoadedRecording) -> Result<Vec<usize>> {
+        let available = recording.scene.radar.frames;
+        let (first, end) = self.frames.unwrap_or((0, available));
+        if end > available {
+            return Err(Error::Usage {
+                message: format!("--frames {first}..{end}: {} has {available} frames", folder.display()),
+                hint: None,
+            });
+        }
+        Ok((first..end).collect())
+    }
+}
+
+/// What the page says, recording by recording and of all together.
+fn content(checkpoint: &Path, evaluations: &[(String, Evaluation)], drawn: &[Markup]) -> Markup {
+    html! {
+        h1 { "Simulation against recordings" }
+        p.lead { "Of the checkpoint " code { (page::shown(&checkpoint.display().to_string())) } "." }
+        @for ((name, evaluation), pictures) in evaluations.iter().zip(drawn) {
+            h2 { (page::shown(name)) }
+            (page_of_frames(evaluation))
+            (pictures)
+        }
+        @if let (true, Some(summary)) = (evaluations.len() > 1, scores::summary(evaluations)) {
+            h2 { "Together" }
+            pre { (scores::of_sequences(&summary)) }
+        }
+    }
 }
 
 /// A frame's pictures, as they stand in a page.

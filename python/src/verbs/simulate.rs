@@ -42,20 +42,7 @@ pub fn simulate(
     tell: &Bound<'_, PyAny>,
 ) -> PyResult<(String, Option<Numbers>)> {
     let asked = || -> hybridsim::Result<Simulate> {
-        let what = match (motion, action, recording) {
-            (Some(path), None, None) => {
-                let up = up.map(|name| named("up", &name, UpAxis::ALL, |axis: &UpAxis| axis.name())).transpose()?;
-                What::Motion { path, config: motion_config, up }
-            }
-            (None, Some(name), None) => What::Action(named("action", &name, Action::every(), |action: &Action| action.name())?),
-            (None, None, Some(recording)) => What::Recording(recording),
-            _ => {
-                return Err(Error::Usage {
-                    message: "what is to be simulated: expected one of motion, action and recording".into(),
-                    hint: None,
-                });
-            }
-        };
+        let what = what(motion, motion_config, up, action, recording)?;
         let only = only.map(|name| named("only", &name, Part::ALL, |part: &Part| part.name())).transpose()?;
         let without = Without { all: without_effects, ids: without };
         Ok(Simulate { checkpoint, what, body, distance_m, frames, clean, only, without })
@@ -83,6 +70,28 @@ pub fn simulate(
             }
         }
     })
+}
+
+/// The one of motion, action and recording that is given.
+fn what(
+    motion: Option<PathBuf>,
+    motion_config: Option<PathBuf>,
+    up: Option<String>,
+    action: Option<String>,
+    recording: Option<PathBuf>,
+) -> hybridsim::Result<What> {
+    match (motion, action, recording) {
+        (Some(path), None, None) => {
+            let up = up.map(|name| named("up", &name, UpAxis::ALL, |axis: &UpAxis| axis.name())).transpose()?;
+            Ok(What::Motion { path, config: motion_config, up })
+        }
+        (None, Some(name), None) => Ok(What::Action(named("action", &name, Action::every(), |action: &Action| action.name())?)),
+        (None, None, Some(recording)) => Ok(What::Recording(recording)),
+        _ => Err(Error::Usage {
+            message: "what is to be simulated: expected one of motion, action and recording".into(),
+            hint: None,
+        }),
+    }
 }
 
 /// The one of this name, or which there are.
