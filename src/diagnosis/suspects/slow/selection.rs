@@ -8,7 +8,7 @@ const NEARLY: f64 = 0.8;
 /// The same for what a sure name explains over the noise, where what has no name leaves more than noise itself.
 const HALF: f64 = 0.5;
 /// Difference of log-likelihood gains (nats) that decides nothing.
-const UNDECIDED: f64 = 4.6;
+pub(super) const UNDECIDED: f64 = 4.6;
 /// p-value below which a law that a background makes unsure is sure.
 const SURE: f64 = 1e-3;
 

@@ -18,9 +18,9 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use rustfft::{FftDirection, FftPlanner};
 
-use super::UNDECIDED;
 use super::candidates::{self, Deviation};
 use super::field::{Group, PATTERN, Part, ahead};
+use super::selection::UNDECIDED;
 use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics;
