@@ -78,6 +78,7 @@ fn unit() -> Vec<Case> {
     for mode in ["forward", "positions"] {
         cases.push(Case { mode: mode.into(), dechirp: Dechirp::Paper, ..base() });
         cases.push(Case { bench: "unit, room at rest".into(), mode: mode.into(), still: 5000, ..base() });
+        #[cfg(feature = "ndarray")]
         cases.push(Case { form: SumForm::Tensor, backend: "ndarray".into(), mode: mode.into(), ..base() });
     }
     // The definition, on a sixteenth of the chirps and one receiver: 64 times less.
@@ -201,8 +202,12 @@ impl World {
             rx_m: (0..case.receivers).map(|rx| [(rx as f64 - 6.0) * wavelength / 2.0, 0.0, 0.0]).collect(),
             full_scale_codes: None,
         };
-        #[allow(deprecated)]
-        let device = if case.backend == "ndarray" { Device::ndarray() } else { Device::flex() };
+        let device = match case.backend.as_str() {
+            #[cfg(feature = "ndarray")]
+            #[allow(deprecated)]
+            "ndarray" => Device::ndarray(),
+            _ => Device::flex(),
+        };
         let mut random = ChaCha8Rng::seed_from_u64(0);
         let mut part = |count: usize, speed: f64, chirps: usize| {
             let mut uniform = |low: f64, high: f64| random.random_range(low..=high);

@@ -152,6 +152,7 @@ fn a_wrong_gradient_of_the_smallest_parameter_is_found_by_name() {
 }
 
 #[test]
+#[cfg(feature = "ndarray")]
 fn ndarray_gives_the_same_signal_and_gradients_as_flex() {
     assert_same_as_flex("ndarray", &hybridsim::cli::device("ndarray").unwrap());
 }

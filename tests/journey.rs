@@ -118,8 +118,7 @@ fn devices_that_share_the_frames_learn_what_one_learns() {
     config.training.frames_per_step = 4;
     let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
     let alone = train(&config, &recordings, None, None);
-    #[allow(deprecated)]
-    let devices = [Device::flex(), Device::flex(), Device::ndarray()];
+    let devices = [Device::flex(), Device::flex(), Device::flex()];
     let shared = train_on(&devices, &config, &recordings, None, None);
     shared.result.as_ref().unwrap();
     for (alone, shared) in alone.losses.iter().zip(&shared.losses) {

@@ -87,6 +87,7 @@ fn assert_same_as_flex(name: &str, device: &Device) {
 }
 
 #[test]
+#[cfg(feature = "ndarray")]
 fn ndarray_gives_the_same_gradients_to_the_pose_as_flex() {
     assert_same_as_flex("ndarray", &hybridsim::cli::device("ndarray").unwrap());
 }

@@ -84,7 +84,7 @@ def run(
         most: stop after so many cases.
         limit_s: longest time for one case, in seconds.
         set: changes of the diagnosis' settings, such as ``{"diagnosis.epochs": 0}``.
-        device: ``flex``, ``ndarray``, ``wgpu``, ``cuda:0`` or ``auto``.
+        device: ``flex``, ``wgpu``, ``cuda:0`` or ``auto``.
         progress: ``True``, ``False``, or a function of :class:`hybridsim.Progress`.
 
     Returns:

@@ -6,7 +6,7 @@ use burn::tensor::DeviceKind;
 
 use crate::error::{Error, Result};
 
-/// The device of a name: `flex` (or `cpu`), `ndarray`, `wgpu`, `wgpu-cpu`, `cuda`, `cuda:1`, or `auto`.
+/// The device of a name: `flex` (or `cpu`), `auto`, or of a backend of this build: `ndarray`, `wgpu`, `wgpu-cpu`, `cuda`, `cuda:1`.
 ///
 /// `auto` is CUDA or wgpu only where a real adapter answers, never a software driver; else flex.
 pub fn device(name: &str) -> Result<Device> {
@@ -18,6 +18,7 @@ pub fn device(name: &str) -> Result<Device> {
         "auto" => Ok(fastest()),
         "flex" | "cpu" => Ok(Device::flex()),
         // Deprecated in Burn 0.22, kept as a second CPU implementation to compare with.
+        #[cfg(feature = "ndarray")]
         #[allow(deprecated)]
         "ndarray" => Ok(Device::ndarray()),
         #[cfg(feature = "wgpu")]
@@ -53,7 +54,9 @@ fn fastest() -> Device {
 /// Backends that work here, for `--device` and messages.
 pub fn available() -> Vec<String> {
     #[allow(unused_mut)]
-    let mut names = vec!["flex".to_string(), "ndarray".to_string()];
+    let mut names = vec!["flex".to_string()];
+    #[cfg(feature = "ndarray")]
+    names.push("ndarray".into());
     #[cfg(feature = "wgpu")]
     {
         if real_adapter(0).is_some() {
@@ -74,6 +77,7 @@ fn unknown(name: &str) -> Error {
     let available = available().join(", ");
     let missing = match name.split(':').next().unwrap_or(name) {
         "wgpu" | "wgpu-cpu" if !cfg!(feature = "wgpu") => " (this build lacks it: add `--features wgpu`)",
+        "ndarray" if !cfg!(feature = "ndarray") => " (this build lacks it: add `--features ndarray`)",
         "cuda" if !cfg!(feature = "cuda") => " (this build lacks it: add `--features cuda`)",
         _ => "",
     };
@@ -120,7 +124,7 @@ mod tests {
         assert_eq!(devices("flex, cpu").unwrap().len(), 2);
         assert!(devices("flex,").is_err());
         let error = device("abacus").unwrap_err().to_string();
-        assert!(error.starts_with("no device `abacus` here, available: flex, ndarray"), "{error}");
+        assert!(error.starts_with("no device `abacus` here, available: flex"), "{error}");
     }
 
     #[test]

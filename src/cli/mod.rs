@@ -87,7 +87,7 @@ pub(crate) struct Common {
     /// Change one setting, such as training.epochs=10; may be repeated
     #[arg(long, global = true, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// flex, ndarray, wgpu, wgpu-cpu, cuda:0 or auto (a real GPU if there is one, else flex)
+    /// flex, auto (a real GPU if there is one, else flex), or of a build that has it: wgpu, wgpu-cpu, cuda:0, ndarray
     #[arg(long, global = true, value_name = "NAME", default_value = "auto")]
     pub device: String,
     /// Take radar, body, motion, place and the samples of a capture as they are stated, however implausible

@@ -31,7 +31,11 @@ fn error(found: &[Complex64], wanted: &[Complex64]) -> f64 {
 #[test]
 #[allow(deprecated)] // ndarray is the second opinion on a CPU, for as long as it exists
 fn the_graph_agrees_with_the_fft_for_lengths_that_are_no_powers_of_two() {
-    let devices = [Device::flex(), Device::ndarray()];
+    let devices = [
+        Device::flex(),
+        #[cfg(feature = "ndarray")]
+        Device::ndarray(),
+    ];
     for (loops, samples) in [(85, 128), (128, 85), (100, 64), (1, 7), (48, 100)] {
         for sampling in [Sampling::Complex, Sampling::Real] {
             for window in [Window::Hann, Window::Rectangular] {

@@ -78,8 +78,13 @@ fn is_flex(device: &Device) -> bool {
     matches!(device.clone().without_autodiff().as_dispatch(), DispatchDevice::Flex(_))
 }
 
-fn is_cpu(device: &Device) -> bool {
-    is_flex(device) || matches!(device.clone().without_autodiff().as_dispatch(), DispatchDevice::NdArray(_))
+/// Whether the processor itself computes: flex, or ndarray where the build has it.
+pub(crate) fn is_cpu(device: &Device) -> bool {
+    #[cfg(feature = "ndarray")]
+    if matches!(device.clone().without_autodiff().as_dispatch(), DispatchDevice::NdArray(_)) {
+        return true;
+    }
+    is_flex(device)
 }
 
 #[cfg(test)]

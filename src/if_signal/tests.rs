@@ -117,9 +117,12 @@ fn every_form_agrees_with_the_definition_in_f64() {
                     check(format!("{name} f64"), form(&returns.phasors(&Device::flex(), DType::F64, complex), samples), 1e-11);
                 }
             }
-            #[allow(deprecated)]
-            let ndarray = Device::ndarray();
-            check("spread on ndarray".into(), spread::sum(&returns.phasors(&ndarray, DType::F32, complex), samples), 3e-5);
+            #[cfg(feature = "ndarray")]
+            {
+                #[allow(deprecated)]
+                let ndarray = Device::ndarray();
+                check("spread on ndarray".into(), spread::sum(&returns.phasors(&ndarray, DType::F32, complex), samples), 3e-5);
+            }
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
@@ -219,7 +222,11 @@ fn no_points_give_silence_in_every_form() {
 fn auto_and_fused_fall_back_where_the_kernel_cannot_run() {
     let returns = returns(20, 4, 32, 0.02);
     #[allow(deprecated)]
-    let others = [(Device::flex(), DType::F64), (Device::ndarray(), DType::F32)];
+    let others = [
+        (Device::flex(), DType::F64),
+        #[cfg(feature = "ndarray")]
+        (Device::ndarray(), DType::F32),
+    ];
     for (device, dtype) in others {
         for form in [SumForm::Auto, SumForm::Fused] {
             let signal = coherent_sum(&returns.phasors(&device, dtype, true), 32, form);

@@ -258,7 +258,7 @@ pub fn disagreements(
     rows
 }
 
-/// Gradient of every input element against central differences in f64, on flex and on ndarray.
+/// Gradient of every input element against central differences in f64, on flex (and on ndarray, where the build has it).
 ///
 /// # Panics
 /// With all rows that disagree.
@@ -296,36 +296,50 @@ pub fn check_finite(inputs: &[Input], function: impl Fn(&[Tensor<1>]) -> Tensor<
     }
 }
 
-/// The same f32 values and gradients on flex and ndarray, to `tolerance` of the largest.
+/// The same f32 values and gradients on flex and on every other backend of the build, to `tolerance` of the largest.
 pub fn check_backends(inputs: &[Input], tolerance: f64, function: impl Fn(&[Tensor<1>]) -> Tensor<1>) {
-    let runs: Vec<(Vec<f64>, Vec<Vec<f64>>)> = cpu_devices()
-        .into_iter()
-        .map(|(_, device)| {
-            let device = device.autodiff();
-            let tensors: Vec<Tensor<1>> = inputs
-                .iter()
-                .map(|input| tensor(&input.values, [input.values.len()], &device).cast(DType::F32).detach().require_grad())
-                .collect();
-            let output = function(&tensors);
-            let found = values(&output.clone().inner());
-            let gradients = output.powi_scalar(2).sum().backward();
-            let gradients =
-                tensors.iter().map(|t| t.grad(&gradients).map(|g| values(&g)).unwrap_or_default()).collect::<Vec<_>>();
-            (found, gradients)
-        })
-        .collect();
-    assert_close("values", &runs[1].0, &runs[0].0, tolerance);
-    for (input, (a, b)) in inputs.iter().zip(runs[1].1.iter().zip(&runs[0].1)) {
-        assert_close(input.name, a, b, tolerance);
+    let run = |device: Device| -> (Vec<f64>, Vec<Vec<f64>>) {
+        let device = device.autodiff();
+        let tensors: Vec<Tensor<1>> = inputs
+            .iter()
+            .map(|input| tensor(&input.values, [input.values.len()], &device).cast(DType::F32).detach().require_grad())
+            .collect();
+        let output = function(&tensors);
+        let found = values(&output.clone().inner());
+        let gradients = output.powi_scalar(2).sum().backward();
+        (found, tensors.iter().map(|t| t.grad(&gradients).map(|g| values(&g)).unwrap_or_default()).collect())
+    };
+    let others: Vec<_> = cpu_devices().into_iter().skip(1).chain(software_gpu()).collect();
+    if others.is_empty() {
+        skip("a build with a second backend");
     }
+    let wanted = run(Device::flex());
+    for (name, device) in others {
+        let found = run(device);
+        assert_close(&format!("values on {name}"), &found.0, &wanted.0, tolerance);
+        for (input, (a, b)) in inputs.iter().zip(found.1.iter().zip(&wanted.1)) {
+            assert_close(&format!("{} on {name}", input.name), a, b, tolerance);
+        }
+    }
+}
+
+/// wgpu on a software driver.
+fn software_gpu() -> Option<(&'static str, Device)> {
+    #[cfg(feature = "wgpu")]
+    return Some(("wgpu", Device::wgpu(burn::tensor::DeviceKind::Cpu)));
+    #[cfg(not(feature = "wgpu"))]
+    None
 }
 
 /// The backends that compute in f64.
 pub fn cpu_devices() -> Vec<(&'static str, Device)> {
-    // ndarray is deprecated in 0.22, but it is the independent implementation to compare with.
-    #[allow(deprecated)]
-    let ndarray = Device::ndarray();
-    vec![("flex", Device::flex()), ("ndarray", ndarray)]
+    vec![
+        ("flex", Device::flex()),
+        // ndarray is deprecated in 0.22, but it is the independent implementation to compare with.
+        #[cfg(feature = "ndarray")]
+        #[allow(deprecated)]
+        ("ndarray", Device::ndarray()),
+    ]
 }
 
 /// # Panics

@@ -29,7 +29,7 @@ def diagnose(
         checkpoint: a simulator trained on such recordings, in place of one trained now.
         config: a TOML file with ``[diagnosis]``, ``[simulator]`` and ``[training]``.
         set: changes of settings, such as ``{"diagnosis.epochs": 0}`` (train no simulator) or ``{"diagnosis.limits": False}``.
-        device: ``flex``, ``ndarray``, ``wgpu``, ``cuda:0`` or ``auto``.
+        device: ``flex``, ``wgpu``, ``cuda:0`` or ``auto``.
         as_stated: take what is stated, however implausible.
         progress: ``True``, ``False``, or a function of :class:`hybridsim.Progress`.
 

@@ -56,7 +56,7 @@ def reproduce(
         shard: of ``stage`` only part ``i`` of ``n``, as ``(i, n)`` with ``i`` from 1 and ``n`` at most its ``pieces``; doing the stage
             later finds them done.
         set: changes of settings, such as ``{"training.epochs": 3}``.
-        device: ``flex``, ``ndarray``, ``wgpu``, ``cuda:0``, ``auto``, or several with commas between.
+        device: ``flex``, ``wgpu``, ``cuda:0``, ``auto``, or several with commas between.
         as_stated: take what is stated, however implausible.
         progress: ``True``, ``False``, or a function of :class:`hybridsim.Progress`.
 

@@ -92,7 +92,7 @@ def simulate(
         only: ``"direct"``, ``"indirect"`` or ``"noise"``: one part of the signal; the three add up to the whole.
         without_effects: leave out all effects beyond the plain simulator, or these.
         out: folder for a recording (``out/recording``) and pictures; without it the samples are returned and nothing is written.
-        device: ``flex``, ``ndarray``, ``wgpu``, ``cuda:0`` or ``auto``.
+        device: ``flex``, ``wgpu``, ``cuda:0`` or ``auto``.
         as_stated: take what is stated, however implausible.
         progress: ``True``, ``False``, or a function of :class:`hybridsim.Progress`.
 

@@ -27,7 +27,7 @@ def train(
         resume: a run folder that was interrupted, in place of a config. Ctrl-C keeps the checkpoint of the last whole epoch.
         go_on: a run of the same settings that is in ``out`` already is continued; of others it is refused.
         set: changes of settings, such as ``{"training.epochs": 10}``.
-        device: ``flex``, ``ndarray``, ``wgpu``, ``cuda:0``, ``auto``, or several with commas between.
+        device: ``flex``, ``wgpu``, ``cuda:0``, ``auto``, or several with commas between.
         as_stated: take what is stated, however implausible.
         progress: ``True``, ``False``, or a function of :class:`hybridsim.Progress`, whose ``epoch`` holds the losses.
 
