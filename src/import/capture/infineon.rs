@@ -34,22 +34,25 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
     let radar = apply(radar, &stated.sets)?;
     cube.check(&radar)?;
     notes.extend(half_scale_note(&cube)?);
-    let stamps = stamps(&folder)?;
-    let grid = match &stamps {
-        Some(stamps) => Grid::read(stamps, &times(stamps, cube.frames(), &source)?, &mut notes),
-        None => {
-            notes.push("no time stamps: frames are taken to be evenly spaced".into());
-            None
-        }
-    };
-    if let (Some(stamps), Some(grid)) = (&stamps, &grid) {
+    let grid = grid(&folder, &source, cube.frames(), &mut notes)?;
+    if let Some((stamps, grid)) = &grid {
         grid.hold(stamps, radar.frame_period_s, stated.has_set("radar.frame_period_s"), &mut notes)?;
     }
     let capture = Capture { source, radar, layout, notes, lost: vec![], frame: Box::new(move |index| cube.frame(index)) };
-    Ok(match (stamps, grid) {
-        (Some(stamps), Some(grid)) => grid.place(&stamps, capture),
-        _ => capture,
+    Ok(match grid {
+        Some((stamps, grid)) => grid.place(&stamps, capture),
+        None => capture,
     })
+}
+
+/// When frames came, by the folder's file of time stamps, and that file; none where there is none or it does not say.
+fn grid(folder: &Path, samples: &Path, frames: usize, notes: &mut Vec<String>) -> Result<Option<(PathBuf, Grid)>> {
+    let Some(stamps) = stamps(folder)? else {
+        notes.push("no time stamps: frames are taken to be evenly spaced".into());
+        return Ok(None);
+    };
+    let grid = Grid::read(&stamps, &times(&stamps, frames, samples)?, notes);
+    Ok(grid.map(|grid| (stamps, grid)))
 }
 
 /// What the folder says of its device.

@@ -1,8 +1,9 @@
 //! `.mat` of MATLAB 5 to 7.2 (`save -v6`, `-v7`, scipy.io.savemat).
 //!
 //! Source: MathWorks, "MAT-File Format" (R2019b), chapter 1. Read are numeric arrays, at the top of the file and in structures and cells:
-//! `data.adc`, `frames(2).adc`, `parts{1}`, counted as in MATLAB. Objects, sparse and character arrays are passed over. `matrw` 0.1.4 reads these files, too, but panics where a compressed variable is damaged, takes a
-//! file that is cut off for a shorter one and the numbers of a big-endian one for little-endian ones.
+//! `data.adc`, `frames(2).adc`, `parts{1}`, counted as in MATLAB. Objects, sparse and character arrays are passed over. `matrw` 0.1.4
+//! reads these files, too, but panics where a compressed variable is damaged, takes a file that is cut off for a shorter one and the
+//! numbers of a big-endian one for little-endian ones.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -24,6 +25,8 @@ const LONGEST_NAME: u32 = 1 << 10;
 const MOST_AXES: u32 = 32;
 /// Bytes of the names of a structure's fields.
 const LONGEST_FIELDS: u32 = 1 << 20;
+/// Arrays of a file; compressed, far more fit into one than memory holds names.
+const MOST_ARRAYS: usize = 1 << 16;
 /// Structures inside structures that are looked into, as in HDF5.
 const DEEPEST: usize = 8;
 const CELL: u32 = 1;
@@ -121,6 +124,7 @@ impl<R: Read> Elements<R> {
         Ok((kind, data))
     }
 
+    /// What comes before an array's numbers, cells or fields.
     fn describe(&mut self) -> Io<Described> {
         let (_, flags) = self.data(8)?;
         let flags = flags.first_chunk().map(|flags| self.number(*flags)).ok_or_else(|| damaged("no array flags"))?;
@@ -152,6 +156,9 @@ impl<R: Read + Skip> Elements<R> {
         }
         let Described { class, is_complex, shape, name } = self.describe()?;
         let name = path.map_or(name, str::to_string);
+        if found.variables.len() + found.others.len() >= MOST_ARRAYS {
+            return Err(damaged(format!("more than {MOST_ARRAYS} arrays")));
+        }
         match class {
             6..=15 => found.variables.push(Variable { name, shape, is_complex, element: 0, inside }),
             CELL | STRUCTURE if depth > 0 => self.find_below(&name, &shape, class, end, depth - 1, found)?,

@@ -21,6 +21,9 @@ use crate::error::{Error, Result};
 /// The kinds of files, by the end of their names.
 pub const EXTENSIONS: [&str; 5] = ["npy", "npz", "mat", "h5", "hdf5"];
 
+/// Arrays that a message lists.
+const MOST_LISTED: usize = 32;
+
 /// A numeric array of a file.
 #[derive(Clone, Debug, PartialEq)]
 struct Entry {
@@ -125,15 +128,23 @@ fn named(path: &Path, entries: &[Entry], others: &[Other], name: &str) -> Result
     }
     let found = match others.iter().find(|other| is_above(&other.name)) {
         Some(other) if plain(&other.name) == plain(name) => other.kind.to_string(),
-        Some(other) => format!("in {}, which is {}", other.name, other.kind),
+        Some(other) => format!("below `{}`: {}", other.name, other.kind),
         None => "missing".into(),
     };
     Err(Error::field(path, name, found, "a numeric array").with_hint(format!("the file holds: {}", list(entries.iter()))))
 }
 
+/// Names and shapes, of many the first ones.
 fn list<'a>(entries: impl Iterator<Item = &'a Entry>) -> String {
-    let listed = entries.map(|entry| format!("{} {:?}", entry.name, entry.shape)).collect::<Vec<_>>().join(", ");
-    if listed.is_empty() { "no numeric array".into() } else { listed }
+    let mut listed: Vec<String> = entries.map(|entry| format!("{} {:?}", entry.name, entry.shape)).collect();
+    if listed.is_empty() {
+        return "no numeric array".into();
+    }
+    if let Some(more) = listed.len().checked_sub(MOST_LISTED).filter(|more| *more > 0) {
+        listed.truncate(MOST_LISTED);
+        listed.push(format!("and {more} more"));
+    }
+    listed.join(", ")
 }
 
 /// Copies exactly so many bytes into a file of its own.
