@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from golden_captures import captures
 from golden_equations import equations
 
 FOLDER = Path(__file__).resolve().parent.parent / "tests" / "golden"
@@ -447,7 +448,7 @@ def skinning():
     }
 
 
-TOPICS = [heatmap, metrics, direct, indirect, fresnel, microfacet, triplane, encoding, harmonics, skinning, equations]
+TOPICS = [heatmap, metrics, direct, indirect, fresnel, microfacet, triplane, encoding, harmonics, skinning, equations, captures]
 
 
 def differs(stored, made):

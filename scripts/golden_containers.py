@@ -22,14 +22,29 @@ for name, compressed in [("v6.mat", False), ("v7.mat", True)]:
     variables = {"cube": cube, "pairs": pairs, "note": "not a number", "rate": 2e6}
     scipy.io.savemat(FOLDER / name, variables, do_compression=compressed)
 
+# Structures, arrays of structures, and cells.
+frames = np.zeros(2, dtype=[("adc", object), ("time", object)])
+cells = np.empty(2, dtype=object)
+for index in range(2):
+    frames[index] = (cube[index], 0.1 * index)
+    cells[index] = cube[index]
+nested = {"radar": {"rate": 2e6, "board": "none", "data": {"cube": cube}}, "frames": frames, "cells": cells, "note": "not a number"}
+for name, compressed in [("structures_v6.mat", False), ("structures_v7.mat", True)]:
+    scipy.io.savemat(FOLDER / name, nested, do_compression=compressed)
+
 # As MATLAB 7.3 does: a block of its own first, axes in reverse, complex numbers as a compound of real and imag.
 with h5py.File(FOLDER / "v73.mat", "w", userblock_size=512, libver="earliest") as file:
     parts = np.empty(cube.T.shape, dtype=[("real", "<i2"), ("imag", "<i2")])
     parts["real"], parts["imag"] = re.T, im.T
     file.create_dataset("cube", data=parts, chunks=(8, 4, 3, 1), compression="gzip").attrs["MATLAB_class"] = np.bytes_("int16")
     file.create_dataset("rate", data=np.array([[2e6]])).attrs["MATLAB_class"] = np.bytes_("double")
-with open(FOLDER / "v73.mat", "r+b") as file:
-    file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64, HDF5 schema 1.00 .".ljust(124) + b"\x00\x02IM")
+with h5py.File(FOLDER / "structures_v73.mat", "w", userblock_size=512, libver="earliest") as file:
+    file.create_dataset("radar/data/cube", data=parts).attrs["MATLAB_class"] = np.bytes_("int16")
+    cell = file.create_dataset("#refs#/a", data=parts)
+    file.create_dataset("cells", data=np.array([[cell.ref]], dtype=h5py.ref_dtype)).attrs["MATLAB_class"] = np.bytes_("cell")
+for name in ["v73.mat", "structures_v73.mat"]:
+    with open(FOLDER / name, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64, HDF5 schema 1.00 .".ljust(124) + b"\x00\x02IM")
 
 with h5py.File(FOLDER / "h5py.h5", "w") as file:
     file.create_dataset("radar/cube", data=cube, chunks=(1, 3, 2, 8), compression="gzip", shuffle=True)

@@ -169,7 +169,7 @@ fn channels_that_contradict_each_other_are_refused_by_name() {
 }
 
 #[test]
-fn time_stamps_that_contradict_the_frame_period_are_refused_and_gaps_are_noted() {
+fn time_stamps_that_contradict_the_frame_period_are_refused_and_gaps_are_marked() {
     let (_folder, trace, sensor) = trace();
     let ts = sensor.join("ts");
     write_times(&sensor, &[10.0, 10.05, 10.1]);
@@ -180,11 +180,14 @@ fn time_stamps_that_contradict_the_frame_period_are_refused_and_gaps_are_noted()
     assert!(kept.notes.contains(&note), "{:?}", kept.notes);
     write_times(&sensor, &[10.0, 10.0333, 10.1332]);
     let note = format!(
-        "{}: by the time stamps 2 frames were lost, the first after frame 1; those that are there are taken to be evenly spaced",
+        "{}: by the time stamps 2 frames were lost, the first after frame 1; they are zeros here and marked as lost (valid.npy), so that \
+         the others keep their times",
         ts.display()
     );
     let gap = opened(&trace, &Stated::default());
     assert!(gap.notes.contains(&note), "{:?}", gap.notes);
+    // Frame 1 is one that `valid` says is not whole.
+    assert_eq!((gap.radar.frames, &gap.lost[..]), (5, &[1, 2, 3][..]));
     near(gap.radar.frame_period_s, 0.0333);
     write_times(&sensor, &[10.0, 10.0333, 9.0]);
     let note = format!("{}: time stamps go back after frame 1: they do not say when frames came", ts.display());

@@ -1,11 +1,12 @@
 //! Captures that others have turned into arrays.
 
 use std::fs;
+use std::path::Path;
 
 use super::tests::*;
-use super::{Layout, Stated, import, open};
-use crate::data::IfLayout;
+use super::{Capture, Layout, Stated, import, open};
 use crate::data::arrays::{Values, write_npy};
+use crate::data::{IfLayout, Recording};
 use crate::radar::Sampling;
 use crate::support::numbers;
 
@@ -90,8 +91,8 @@ fn signed_words_stored_as_unsigned_are_recognised_and_offset_codes_are_not_touch
     }
 }
 
-#[test]
-fn a_folder_of_the_infineon_sdk_is_read() {
+/// A folder of the Radar SDK: chirps of 8 samples, two of each of two receivers, frames 50 ms apart.
+fn infineon(frames: usize, samples: impl Fn(usize) -> f64) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let device = folder.path().join("RadarIfxAvian_00");
     fs::create_dir(&device).unwrap();
@@ -103,8 +104,18 @@ fn a_folder_of_the_infineon_sdk_is_read() {
     )
     .unwrap();
     fs::write(device.join("meta.json"), r#"{"adc_resolution": 12, "description": "BGT60TR13C FMCW Radar Sensor"}"#).unwrap();
-    let codes: Vec<f64> = (0..3 * 2 * 2 * 8).map(f64::from).collect();
-    write_npy(device.join("radar.npy"), &[3, 2, 2, 8], Values::F64(&codes)).unwrap();
+    let samples: Vec<f64> = (0..frames * 2 * 2 * 8).map(samples).collect();
+    write_npy(device.join("radar.npy"), &[frames, 2, 2, 8], Values::F64(&samples)).unwrap();
+    folder
+}
+
+fn import_all(capture: Capture, folder: &Path) -> Recording {
+    import(capture, folder, [("action".into(), "sit".into())].into(), &mut |_, _| {}).unwrap()
+}
+
+#[test]
+fn a_folder_of_the_infineon_sdk_is_read() {
+    let folder = infineon(3, |place| place as f64);
     let mut capture = open(&[folder.path().into()], &Stated::default()).unwrap();
     let radar = &capture.radar;
     assert_eq!((radar.dims(), radar.sampling), ([3, 1, 2, 2, 8], Sampling::Real));
@@ -112,8 +123,79 @@ fn a_folder_of_the_infineon_sdk_is_read() {
     assert_eq!(radar.full_scale_codes, Some(4095.0));
     let frame = (capture.frame)(2).unwrap();
     assert_eq!(frame.sample(0, 1, 1, 7).re, 95.0);
-    let out = folder.path().join("recording");
-    let recording = import(capture, &out, [("action".into(), "sit".into())].into(), &mut |_, _| {}).unwrap();
+    let recording = import_all(capture, &folder.path().join("recording"));
     assert_eq!(recording.labels["action"], "sit");
     assert_eq!(recording.frame(2).unwrap(), frame);
+}
+
+#[test]
+fn fractions_of_full_scale_are_kept_and_codes_are_codes() {
+    let noise = numbers(9, 3 * 2 * 2 * 8, -0.5, 0.5);
+    let folder = infineon(3, |place| noise[place]);
+    let capture = open(&[folder.path().into()], &Stated::default()).unwrap();
+    assert_eq!((capture.layout, capture.radar.full_scale_codes), (IfLayout::Real, None));
+    assert!(capture.notes.iter().any(|note| note.starts_with("samples are floats up to 0.")), "{:?}", capture.notes);
+    let recording = import_all(capture, &folder.path().join("recording"));
+    assert_eq!(recording.frame(1).unwrap().re, noise[32..64].iter().map(|value| *value as f32).collect::<Vec<_>>());
+}
+
+#[test]
+fn antennas_of_a_board_that_is_not_known_must_be_stated() {
+    let folder = infineon(3, |place| place as f64);
+    let meta = folder.path().join("RadarIfxAvian_00/meta.json");
+    fs::write(&meta, r#"{"description": "BGT60ATR24C FMCW Radar Sensor"}"#).unwrap();
+    let error = open(&[folder.path().into()], &Stated::default()).err().unwrap();
+    assert!(error.to_string().contains("no board `BGT60ATR24C`") && error.hint().unwrap().contains("radar.rx_m"), "{error}");
+    let sets = ["radar.tx_m=[[0.0, 0.0, 0.0]]", "radar.rx_m=[[0.0, 0.0, 0.0], [0.0025, 0.0, 0.0]]"].map(String::from).to_vec();
+    let capture = open(&[folder.path().into()], &Stated { sets, ..Stated::default() }).unwrap();
+    assert_eq!(capture.radar.rx_m, [[0.0; 3], [0.0025, 0.0, 0.0]]);
+}
+
+#[test]
+fn time_stamps_say_which_frames_were_lost() {
+    let noise = numbers(9, 20 * 32, 0.0, 4000.0);
+    let folder = infineon(20, |place| noise[place].round());
+    let stamps = folder.path().join("RadarIfxAvian_00/radar_timestamp.csv");
+    let write = |period: f64, lost: usize| {
+        // Up to a fifth of a period late; after frame 11 some were lost.
+        let late = numbers(10, 20, 0.0, 0.2);
+        let slot = |index: usize| index + if index > 11 { lost } else { 0 };
+        let line = |index: usize| format!("{:.6}\n", 1.7e9 + period * (slot(index) as f64 + late[index]));
+        fs::write(&stamps, (0..20).map(line).collect::<String>()).unwrap();
+    };
+    write(0.05, 2);
+    let opened = |stated: &Stated| open(&[folder.path().into()], stated);
+    let capture = opened(&Stated::default()).unwrap();
+    assert_eq!((capture.radar.frames, &capture.lost[..]), (22, &[12, 13][..]));
+    assert!(
+        capture.notes.iter().any(|note| note.contains("2 frames were lost, the first after frame 11")),
+        "{:?}",
+        capture.notes
+    );
+    let recording = import_all(capture, &folder.path().join("recording"));
+    assert_eq!(recording.whole_frames().collect::<Vec<_>>(), (0..12).chain(14..22).collect::<Vec<_>>());
+    for (frame, read) in [(11, 11), (14, 12), (21, 19)] {
+        let wanted: Vec<f32> = noise[read * 32..(read + 1) * 32].iter().map(|value| value.round() as f32).collect();
+        assert_eq!(recording.frame(frame).unwrap().re, wanted);
+    }
+    // More than are there: where the clock was set, nothing is filled in.
+    write(0.05, 4000);
+    let capture = opened(&Stated::default()).unwrap();
+    assert_eq!((capture.radar.frames, &capture.lost[..]), (20, &[][..]));
+    let said = "the first after frame 11; more than are there";
+    assert!(capture.notes.iter().any(|note| note.contains(said)), "{:?}", capture.notes);
+    write(0.08, 0);
+    let error = opened(&Stated::default()).err().unwrap();
+    assert!(error.to_string().ends_with("s, expected 0.05 s, the radar's frame_period_s"), "{error}");
+    let sets = vec!["radar.frame_period_s=0.08".to_string()];
+    assert_eq!(opened(&Stated { sets, ..Stated::default() }).unwrap().radar.frames, 20);
+    let text = fs::read_to_string(&stamps).unwrap();
+    for (text, part) in [
+        (format!("time\n{text}"), "`line 1` is time, expected seconds since 1970"),
+        (text.lines().skip(1).collect::<Vec<_>>().join("\n"), "`lines` is 19, expected 20, as in"),
+    ] {
+        fs::write(&stamps, text).unwrap();
+        let error = opened(&Stated::default()).err().unwrap();
+        assert!(error.to_string().contains(part) && error.hint().is_some(), "{error}");
+    }
 }

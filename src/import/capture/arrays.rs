@@ -66,7 +66,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         cube.check(&one_frame)?;
         cube.frame(0)
     };
-    Ok(Capture { source, radar, layout: stored_as, notes, frame: Box::new(frame) })
+    Ok(Capture { source, radar, layout: stored_as, notes, lost: vec![], frame: Box::new(frame) })
 }
 
 fn one(path: &Path, cube: Cube, mut settings: Settings, mut notes: Vec<String>) -> Result<Capture> {
@@ -74,7 +74,14 @@ fn one(path: &Path, cube: Cube, mut settings: Settings, mut notes: Vec<String>) 
     let radar = settings.finish(&mut notes)?;
     cube.check(&radar)?;
     notes.extend(half_scale_note(&cube)?);
-    Ok(Capture { source: path.into(), layout: cube.stored_as(), radar, notes, frame: Box::new(move |index| cube.frame(index)) })
+    Ok(Capture {
+        source: path.into(),
+        layout: cube.stored_as(),
+        radar,
+        notes,
+        lost: vec![],
+        frame: Box::new(move |index| cube.frame(index)),
+    })
 }
 
 fn extension(path: &Path) -> String {

@@ -93,7 +93,7 @@ fn capture(
         let blocks = streams.iter().map(read).collect::<Result<Vec<_>>>()?;
         Ok(arrange(&blocks, &starts, [n_tx, n_rx, loops, samples], q_first))
     };
-    Capture { source: parts[0][0].clone(), radar, layout: IfLayout::Codes, notes, frame: Box::new(frame) }
+    Capture { source: parts[0][0].clone(), radar, layout: IfLayout::Codes, notes, lost: vec![], frame: Box::new(frame) }
 }
 
 /// The words of a frame, device by device, as `[tx, rx, loop, sample]`.

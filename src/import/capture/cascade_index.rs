@@ -8,6 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use super::stream::Words;
+use super::time_stamps::Grid;
 use crate::data::files;
 use crate::error::{Error, Result};
 
@@ -98,14 +99,12 @@ impl Index {
         Ok(())
     }
 
-    /// Which frame period every frame came in, counted from the first one's; none where the stamps do not say.
-    fn slots(&self) -> Option<Vec<u64>> {
+    /// When frames came; none where the stamps do not say.
+    fn grid(&self) -> Option<Grid> {
         let times = self.times.as_ref().filter(|times| times.len() > 2)?;
-        let mut steps = times.windows(2).map(|pair| pair[1].checked_sub(pair[0])).collect::<Option<Vec<u64>>>()?;
-        steps.sort_unstable();
-        // Gaps are longer, so that of two the shorter one counts.
-        let period = steps[(steps.len() - 1) / 2];
-        (period > 0).then(|| times.iter().map(|time| (time - times[0]).saturating_add(period / 2) / period).collect())
+        // Counted from the first one's, so that a float holds them.
+        let since = |time: &u64| i128::from(*time) - i128::from(times[0]);
+        Grid::of(&times.iter().map(|time| since(time) as f64).collect::<Vec<_>>()).ok()
     }
 }
 
@@ -121,24 +120,16 @@ pub fn hold_together(devices: &[Index], notes: &mut Vec<String>) -> Result<()> {
             "a file is cut off or of another capture, or a device lost frames: those after them do not belong together",
         ));
     }
-    let Some(wanted) = master.slots() else { return Ok(()) };
+    let Some(wanted) = master.grid() else { return Ok(()) };
     for slave in slaves {
-        let Some(slots) = slave.slots() else { continue };
-        if let Some(at) = slots.iter().zip(&wanted).position(|(own, wanted)| own != wanted) {
-            let found = format!("frame {at} in frame period {}", slots[at]);
-            let expected = format!("period {}, as in {}", wanted[at], master.data.display());
+        let Some(grid) = slave.grid() else { continue };
+        if let Some(at) = grid.slots.iter().zip(&wanted.slots).position(|(own, wanted)| own != wanted) {
+            let found = format!("frame {at} in frame period {}", grid.slots[at]);
+            let expected = format!("period {}, as in {}", wanted.slots[at], master.data.display());
             return Err(Error::field(&slave.data, "time stamps", found, expected)
                 .with_hint("a device lost frames: those after them do not belong together"));
         }
     }
-    let lost = wanted.last().map_or(0, |last| (last + 1).saturating_sub(wanted.len() as u64));
-    if lost > 0 {
-        let after = wanted.windows(2).position(|pair| pair[1] > pair[0] + 1).unwrap_or(0);
-        notes.push(format!(
-            "{}: by the time stamps {lost} frames were lost, the first after frame {after}; those that are there are taken to be evenly \
-             spaced",
-            master.data.display()
-        ));
-    }
+    notes.extend(wanted.note(&master.data, "those that are there are taken to be evenly spaced"));
     Ok(())
 }

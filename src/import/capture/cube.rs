@@ -96,6 +96,10 @@ impl Cube {
         if complex { Sampling::Complex } else { Sampling::Real }
     }
 
+    pub fn holds_floats(&self) -> bool {
+        matches!(&self.numbers, Numbers::Array(source) if source.number().0 == Kind::Float)
+    }
+
     /// How a recording stores these numbers: whole ones of 16 bits as codes.
     pub fn stored_as(&self) -> IfLayout {
         let codes = match &self.numbers {

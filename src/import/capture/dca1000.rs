@@ -42,7 +42,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         Ok(arrange(&words, &starts, lanes, [n_tx, n_rx, loops, samples], &inverted_rx))
     };
     let layout = if lanes.sampling == Sampling::Complex { IfLayout::Codes } else { IfLayout::RealCodes };
-    Ok(Capture { source: sources[0].clone(), radar: shaped, layout, notes, frame: Box::new(frame) })
+    Ok(Capture { source: sources[0].clone(), radar: shaped, layout, notes, lost: vec![], frame: Box::new(frame) })
 }
 
 /// Opens the files that a `.setup.json` of mmWave Studio names.

@@ -1,15 +1,16 @@
 //! Recording folders of Infineon's Radar SDK (`RadarIfxAvian_00`) and of ifxdaq.
 //!
 //! Source: Infineon Radar SDK, `config.json` of a recording; `radar.npy` is `[frame, rx, chirp, sample]`, unsigned
-//! ADC codes around half scale.
+//! ADC codes around half scale. ifxdaq writes `radar_timestamp.csv` beside it: on each line when a frame came, in seconds since 1970.
 
 use std::path::{Path, PathBuf};
 
 use super::boards::Board;
 use super::cube::{Cube, half_scale_note};
 use super::json::Json;
+use super::time_stamps::Grid;
 use super::{Capture, Layout, Stated, radar_table::apply};
-use crate::data::{IfLayout, entries::entries};
+use crate::data::{IfLayout, entries::entries, files};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
 
@@ -25,28 +26,98 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
     let mut notes = Vec::new();
     let config = Json::read(&stated.configs.first().cloned().unwrap_or_else(|| folder.join("config.json")))?;
     let shape = shape_of(&config)?;
-    let meta = folder.join("meta.json");
-    let description = if meta.is_file() {
-        Json::read(&meta)?.find("description").map(|text| text.text().map(str::to_string)).transpose()?
-    } else {
-        None
-    };
-    let board = board(stated, description.as_deref(), &mut notes)?;
-    let cube = Cube::open(&folder.join(SAMPLES), None, Layout::parse("frame rx loop sample")?)?;
+    let board = board(stated, description(&folder)?.as_deref(), &mut notes)?;
+    let source = folder.join(SAMPLES);
+    let cube = Cube::open(&source, None, Layout::parse("frame rx loop sample")?)?;
     let radar = radar(&config, &shape, board, cube.frames(), &mut notes)?;
+    let (layout, radar) = stored_as(&cube, radar, &mut notes)?;
     let radar = apply(radar, &stated.sets)?;
     cube.check(&radar)?;
     notes.extend(half_scale_note(&cube)?);
-    if !folder.join("timestamps.csv").is_file() && !folder.join("radar_timestamp.csv").is_file() {
-        notes.push("no time stamps: frames are taken to be evenly spaced".into());
+    let grid = grid(&folder, &source, cube.frames(), &mut notes)?;
+    if let Some((stamps, grid)) = &grid {
+        grid.hold(stamps, radar.frame_period_s, stated.has_set("radar.frame_period_s"), &mut notes)?;
     }
-    Ok(Capture {
-        source: folder.join(SAMPLES),
-        radar,
-        layout: IfLayout::RealCodes,
-        notes,
-        frame: Box::new(move |index| cube.frame(index)),
+    let capture = Capture { source, radar, layout, notes, lost: vec![], frame: Box::new(move |index| cube.frame(index)) };
+    Ok(match grid {
+        Some((stamps, grid)) => grid.place(&stamps, capture),
+        None => capture,
     })
+}
+
+/// When frames came, by the folder's file of time stamps, and that file; none where there is none or it does not say.
+fn grid(folder: &Path, samples: &Path, frames: usize, notes: &mut Vec<String>) -> Result<Option<(PathBuf, Grid)>> {
+    let Some(stamps) = stamps(folder)? else {
+        notes.push("no time stamps: frames are taken to be evenly spaced".into());
+        return Ok(None);
+    };
+    let grid = Grid::read(&stamps, &times(&stamps, frames, samples)?, notes);
+    Ok(grid.map(|grid| (stamps, grid)))
+}
+
+/// What the folder says of its device.
+fn description(folder: &Path) -> Result<Option<String>> {
+    let meta = folder.join("meta.json");
+    if !meta.is_file() {
+        return Ok(None);
+    }
+    Json::read(&meta)?.find("description").map(|text| text.text().map(str::to_string)).transpose()
+}
+
+/// The file of time stamps, where there is one.
+fn stamps(folder: &Path) -> Result<Option<PathBuf>> {
+    let is_stamps = |path: &Path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+        name.contains("timestamp") && name.ends_with(".csv")
+    };
+    let mut found = entries(folder)?;
+    found.retain(|path| is_stamps(path));
+    match &found[..] {
+        [] => Ok(None),
+        [only] => Ok(Some(only.clone())),
+        [_, second, ..] => {
+            Err(Error::field(second, "time stamps", format!("one of {} files", found.len()), "one file of a radar")
+                .with_hint("take the files of other sensors out of the folder"))
+        }
+    }
+}
+
+/// When every frame came, seconds.
+fn times(stamps: &Path, frames: usize, samples: &Path) -> Result<Vec<f64>> {
+    let text = files::read_text(stamps)?;
+    let time = |(index, line): (usize, &str)| {
+        let time = line.trim().parse().ok().filter(|time: &f64| time.is_finite());
+        let found = line.chars().take(60).collect::<String>();
+        time.ok_or_else(|| {
+            Error::field(stamps, format!("line {}", index + 1), found, "seconds since 1970, a number on each line")
+                .with_hint("without this file, frames are taken to be evenly spaced")
+        })
+    };
+    let times = text.trim_end().lines().enumerate().map(time).collect::<Result<Vec<f64>>>()?;
+    if times.len() != frames {
+        let expected = format!("{frames}, as in {}", samples.display());
+        return Err(Error::field(stamps, "lines", times.len().to_string(), expected)
+            .with_hint("a file is cut off or of another capture: copy the whole folder again"));
+    }
+    Ok(times)
+}
+
+/// Floats stay floats. Those that are no whole numbers are not codes, so that the converter's largest code says nothing of them.
+fn stored_as(cube: &Cube, radar: Radar, notes: &mut Vec<String>) -> Result<(IfLayout, Radar)> {
+    if !cube.holds_floats() {
+        return Ok((IfLayout::RealCodes, radar));
+    }
+    let samples = cube.frame(0)?.re;
+    if samples.iter().all(|sample| sample.fract() == 0.0) {
+        notes.push("samples are floats that are whole numbers: they are taken for the converter's codes".into());
+        return Ok((IfLayout::Real, radar));
+    }
+    let largest = samples.iter().fold(0.0f32, |largest, sample| largest.max(sample.abs()));
+    notes.push(format!(
+        "samples are floats up to {largest} (first frame), no codes: their scale, such as 1 for the converter's full range, is kept, and \
+         radar.full_scale_codes is left out"
+    ));
+    Ok((IfLayout::Real, Radar { full_scale_codes: None, ..radar }))
 }
 
 /// The folder with the samples: this one, or the only one of its kind below.
@@ -85,43 +156,45 @@ fn shape_of(config: &Json) -> Result<Json> {
     Ok(shape)
 }
 
-fn board(stated: &Stated, description: Option<&str>, notes: &mut Vec<String>) -> Result<&'static Board> {
-    if let Some(name) = &stated.board {
-        return Board::named(name);
+/// The board of the antennas; none where `--set` states them all.
+fn board(stated: &Stated, description: Option<&str>, notes: &mut Vec<String>) -> Result<Option<&'static Board>> {
+    if stated.has_set("radar.tx_m") && stated.has_set("radar.rx_m") {
+        return Ok(None);
     }
-    let named = description.and_then(|text| text.split_whitespace().find_map(|word| Board::named(word).ok()));
-    Ok(named.unwrap_or_else(|| {
-        notes.push("no board was named: taken for a BGT60TR13C; --board NAME says otherwise".into());
-        Board::named("BGT60TR13C").expect("it is known")
-    }))
+    let named = description.and_then(|text| text.split_whitespace().find(|word| word.starts_with("BGT")));
+    let board = match stated.board.as_deref().or(named) {
+        Some(name) => Board::named(name)?,
+        None => {
+            notes.push("no board was named: taken for a BGT60TR13C; --board NAME says otherwise".into());
+            Board::named("BGT60TR13C")?
+        }
+    };
+    notes.push(format!("antennas of the {} ({})", board.name, board.source));
+    Ok(Some(board))
 }
 
-fn radar(config: &Json, shape: &Json, board: &Board, frames: usize, notes: &mut Vec<String>) -> Result<Radar> {
-    let number = |key: &str| shape.get(key)?.number();
-    let antennas = |key: &str| -> Result<Vec<usize>> {
-        shape
-            .get(key)?
-            .items()?
-            .iter()
-            .map(|entry| entry.count()?.checked_sub(1).ok_or_else(|| entry.wrong("antennas from 1 on")))
-            .collect()
-    };
-    let (start_hz, end_hz) = (number("start_frequency_Hz")?, number("end_frequency_Hz")?);
-    let (rate_hz, samples) = (number("sample_rate_Hz")?, shape.get("num_samples_per_chirp")?.count()?);
-    let at = |index: usize, what: &str, place: Option<[f64; 3]>| {
-        place.ok_or_else(|| {
-            Error::field(config.file(), what, format!("antenna {}", index + 1), format!("those of the {}", board.name))
+/// Places of the antennas that a shape names under a key; zeros without a board, for `--set` to state.
+fn places(shape: &Json, key: &str, board: Option<&Board>, of: fn(&Board, usize) -> Option<[f64; 3]>) -> Result<Vec<[f64; 3]>> {
+    let place = |entry: &Json| {
+        let antenna = entry.count()?;
+        let index = antenna.checked_sub(1).ok_or_else(|| entry.wrong("antennas from 1 on"))?;
+        let Some(board) = board else { return Ok([0.0; 3]) };
+        of(board, index).ok_or_else(|| {
+            Error::field(shape.file(), key, format!("antenna {antenna}"), format!("those of the {}", board.name))
                 .with_hint("name the board with --board")
         })
     };
-    let place = |key: &str, of: &dyn Fn(usize) -> Option<[f64; 3]>| -> Result<Vec<[f64; 3]>> {
-        antennas(key)?.into_iter().map(|index| at(index, key, of(index))).collect()
-    };
-    let tx_m = place("tx_antennas", &|index| board.tx_m(index))?;
+    shape.get(key)?.items()?.iter().map(place).collect()
+}
+
+fn radar(config: &Json, shape: &Json, board: Option<&Board>, frames: usize, notes: &mut Vec<String>) -> Result<Radar> {
+    let number = |key: &str| shape.get(key)?.number();
+    let (start_hz, end_hz) = (number("start_frequency_Hz")?, number("end_frequency_Hz")?);
+    let (rate_hz, samples) = (number("sample_rate_Hz")?, shape.get("num_samples_per_chirp")?.count()?);
+    let tx_m = places(shape, "tx_antennas", board, Board::tx_m)?;
     if tx_m.len() > 1 {
         return Err(shape.get("tx_antennas")?.wrong("one transmitter: several are not read yet"));
     }
-    notes.push(format!("antennas of the {} ({})", board.name, board.source));
     notes.push("the first sample is taken to be at the start of the ramp".into());
     let bits =
         Json::read(&config.file().with_file_name("meta.json")).ok().and_then(|meta| meta.find("adc_resolution")?.count().ok());
@@ -138,7 +211,7 @@ fn radar(config: &Json, shape: &Json, board: &Board, frames: usize, notes: &mut 
         frames,
         position_m: [0.0; 3],
         tx_m,
-        rx_m: place("rx_antennas", &|index| board.rx_m(index))?,
+        rx_m: places(shape, "rx_antennas", board, Board::rx_m)?,
         full_scale_codes: bits.map(|bits| f64::from(1u32 << bits.min(16)) - 1.0),
     })
 }

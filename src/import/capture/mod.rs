@@ -26,6 +26,7 @@ mod rover;
 mod rover_radar;
 mod schedule;
 mod stream;
+mod time_stamps;
 mod ti_cfg;
 mod ti_json;
 mod words;
@@ -64,6 +65,13 @@ pub struct Stated {
     pub sets: Vec<String>,
 }
 
+impl Stated {
+    /// Whether `--set` states a key.
+    fn has_set(&self, key: &str) -> bool {
+        self.sets.iter().any(|set| set.split('=').next().is_some_and(|own| own.trim() == key))
+    }
+}
+
 /// A capture that has been understood: its radar, and a way to its samples.
 pub struct Capture {
     /// The file that messages name.
@@ -71,6 +79,8 @@ pub struct Capture {
     pub radar: Radar,
     pub layout: IfLayout,
     pub notes: Vec<String>,
+    /// Frames that were lost, wholly or in part, as the capture itself says.
+    pub lost: Vec<usize>,
     /// Gives the samples of a frame.
     pub frame: Box<dyn FnMut(usize) -> Result<IfFrame>>,
 }
@@ -187,7 +197,7 @@ pub fn draft(
         (capture.frame)(frame)
     })?;
     progress(capture.radar.frames, capture.radar.frames);
-    let lost = rover::lost(&capture.source, &capture.radar)?;
+    let lost = chirps_of(&capture.lost, &capture.radar);
     if !lost.is_empty() {
         staged.set_valid(&Valid::without(&capture.radar, lost.iter().copied()))?;
     }
@@ -207,6 +217,15 @@ pub fn import(
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Recording> {
     draft(capture, folder, labels, progress)?.publish(false)
+}
+
+/// All chirps of some frames: frame, transmitter, receiver, loop.
+fn chirps_of(frames: &[usize], radar: &Radar) -> Vec<[usize; 4]> {
+    let [_, n_tx, n_rx, loops, _] = radar.dims();
+    let chirps = |&frame: &usize| {
+        (0..n_tx * n_rx * loops).map(move |chirp| [frame, chirp / (n_rx * loops), chirp / loops % n_rx, chirp % loops])
+    };
+    frames.iter().flat_map(chirps).collect()
 }
 
 fn one(sources: &[PathBuf]) -> Result<&Path> {

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use toml::Table;
 
 use super::Layout;
+use crate::data::settings::nearest;
 use crate::error::{Error, Result};
 
 const TABLE: &str = include_str!("presets.toml");
@@ -35,14 +36,23 @@ pub struct Preset {
 }
 
 impl Preset {
+    /// A data set by its name, in capitals or not.
+    ///
     /// # Errors
-    /// A name that the table has not.
+    /// A name that the table has not; the hint names the one that looks most alike, and all.
     pub fn named(name: &str) -> Result<Self> {
+        let plain = name.trim().to_lowercase();
         let mut all = Self::all();
+        if let Some(preset) = all.remove(&plain) {
+            return Ok(preset);
+        }
+        let nearest = nearest(&plain, all.keys().map(String::as_str)).expect("the table is not empty");
         let known = all.keys().cloned().collect::<Vec<_>>().join(", ");
-        all.remove(name).ok_or_else(|| Error::Usage {
+        Err(Error::Usage {
             message: format!("no data set `{name}`"),
-            hint: Some(format!("known are {known}; describe others with --layout, --board and --set radar.KEY=VALUE")),
+            hint: Some(format!(
+                "did you mean `{nearest}`? Known are {known}; describe others with --layout, --board and --set radar.KEY=VALUE"
+            )),
         })
     }
 
@@ -77,6 +87,18 @@ mod tests {
             }
         }
         assert!(Preset::named("nothing").unwrap_err().hint().unwrap().contains("uw_raw_adc"));
+    }
+
+    #[test]
+    fn names_are_found_as_their_papers_write_them_and_near_ones_are_suggested() {
+        for (written, name) in [("mmMesh", "mmmesh"), ("HuPR", "hupr"), ("RADDet", "raddet"), ("CubeLearn", "cubelearn")] {
+            assert_eq!(Preset::named(written).unwrap().title, Preset::all()[name].title);
+        }
+        for (written, name) in [("coloradar-cascade", "coloradar_cascade"), ("mmesh", "mmmesh"), ("RaDICaL", "radical_indoor")] {
+            let hint = Preset::named(written).unwrap_err().hint().unwrap().to_string();
+            assert!(hint.starts_with(&format!("did you mean `{name}`?")), "{hint}");
+        }
+        assert!(Preset::all().keys().all(|name| *name == name.to_lowercase()));
     }
 
     const LOOPS: usize = 3;

@@ -13,11 +13,12 @@ use super::json::Json;
 use super::lanes::Lanes;
 use super::rover_radar::{Frames, radar_of};
 use super::stream::Words;
+use super::time_stamps::Grid;
 use super::{Capture, Stated};
 use crate::data::entries::entries;
 use crate::data::{IfFrame, IfLayout, files};
 use crate::error::{Error, Result};
-use crate::radar::{Radar, Sampling};
+use crate::radar::Sampling;
 
 const META: &str = "meta.json";
 const SAMPLES: &str = "iq";
@@ -70,17 +71,10 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
     let words = Words::open(&[sensor.join(SAMPLES)])?;
     let block = shape.iter().try_fold(1u64, |all, &length| all.checked_mul(length as u64)).unwrap_or(u64::MAX);
     let frames = whole_frames(&words, block, shape, meta.file())?;
-    match whole(sensor, &meta, frames)? {
-        Some(whole) if !whole.contains(&true) => {
-            return Err(Error::field(sensor.join(WHOLE), WHOLE, "0 in every frame", "one frame at least that is whole")
-                .with_hint("too much was lost to use this capture: record again"));
-        }
-        Some(_) => {}
-        None => notes.push(format!("{}: no channel `{WHOLE}`: every frame is taken to be whole", meta.file().display())),
-    }
+    let lost = lost(sensor, &meta, frames, &mut notes)?;
     let stamps = sensor.join(STAMPS);
-    let spacing_s = spacing_s(&stamps, &times(sensor, &meta, frames)?, &mut notes)?;
-    let found = Frames { meta: meta.file(), stamps: &stamps, shape, frames, spacing_s };
+    let grid = Grid::read(&stamps, &times(sensor, &meta, frames)?, &mut notes);
+    let found = Frames { meta: meta.file(), stamps: &stamps, shape, frames, grid: grid.as_ref() };
     let (radar, inverted_rx) = radar_of(sensor, &found, stated, &mut notes)?;
     let lanes = Lanes { count: 2, interleaved: false, q_first: true, sampling: radar.sampling };
     let [_, n_tx, n_rx, loops, samples] = radar.dims();
@@ -89,27 +83,24 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
         Ok(arrange(&words, lanes, [n_tx, n_rx, loops, samples], &inverted_rx))
     };
     let layout = if lanes.sampling == Sampling::Complex { IfLayout::Codes } else { IfLayout::RealCodes };
-    Ok(Capture { source: sensor.join(SAMPLES), radar, layout, notes, frame: Box::new(frame) })
+    let capture = Capture { source: sensor.join(SAMPLES), radar, layout, notes, lost, frame: Box::new(frame) };
+    Ok(match grid {
+        Some(grid) => grid.place(&stamps, capture),
+        None => capture,
+    })
 }
 
-/// Chirps that a trace says were lost, by the file of its samples: all of every frame that is not whole. None of other captures.
-///
-/// # Errors
-/// A channel that cannot be read.
-pub fn lost(source: &Path, radar: &Radar) -> Result<Vec<[usize; 4]>> {
-    let Some(sensor) =
-        source.parent().filter(|folder| source.file_name().is_some_and(|name| name == SAMPLES) && is_sensor(folder))
-    else {
+/// Frames that are not whole.
+fn lost(sensor: &Path, meta: &Json, frames: usize, notes: &mut Vec<String>) -> Result<Vec<usize>> {
+    let Some(whole) = whole(sensor, meta, frames)? else {
+        notes.push(format!("{}: no channel `{WHOLE}`: every frame is taken to be whole", meta.file().display()));
         return Ok(vec![]);
     };
-    let [frames, n_tx, n_rx, loops, _] = radar.dims();
-    let whole = whole(sensor, &Json::read(&sensor.join(META))?, frames)?.unwrap_or_default();
-    let broken = whole.iter().enumerate().filter(|(_, whole)| !**whole).map(|(frame, _)| frame);
-    let chirps = move |frame: usize| {
-        let place = move |chirp: usize| [frame, chirp / (n_rx * loops), chirp / loops % n_rx, chirp % loops];
-        (0..n_tx * n_rx * loops).map(place)
-    };
-    Ok(broken.flat_map(chirps).collect())
+    if !whole.contains(&true) {
+        return Err(Error::field(sensor.join(WHOLE), WHOLE, "0 in every frame", "one frame at least that is whole")
+            .with_hint("too much was lost to use this capture: record again"));
+    }
+    Ok((0..frames).filter(|&frame| !whole[frame]).collect())
 }
 
 /// Refuses a channel that is compressed or of another type.
@@ -186,34 +177,6 @@ fn times(sensor: &Path, meta: &Json, frames: usize) -> Result<Vec<f64>> {
         }
         None => Ok(times),
     }
-}
-
-/// From one frame to the next: the median, of two the shorter one, as gaps are longer. None where the stamps do not say.
-fn spacing_s(stamps: &Path, times: &[f64], notes: &mut Vec<String>) -> Result<Option<f64>> {
-    let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if steps.is_empty() {
-        return Ok(None);
-    }
-    if let Some(at) = steps.iter().position(|step| *step < 0.0) {
-        notes.push(format!("{}: time stamps go back after frame {at}: they do not say when frames came", stamps.display()));
-        return Ok(None);
-    }
-    let mut sorted = steps.clone();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let spacing_s = sorted[(sorted.len() - 1) / 2];
-    if spacing_s == 0.0 {
-        notes.push(format!("{}: time stamps stand still: they do not say when frames came", stamps.display()));
-        return Ok(None);
-    }
-    let missing = |step: &f64| ((step / spacing_s).round() - 1.0).max(0.0);
-    if let Some(after) = steps.iter().position(|step| missing(step) > 0.0) {
-        notes.push(format!(
-            "{}: by the time stamps {} frames were lost, the first after frame {after}; those that are there are taken to be evenly spaced",
-            stamps.display(),
-            steps.iter().map(missing).sum::<f64>()
-        ));
-    }
-    Ok(Some(spacing_s))
 }
 
 /// The words of a frame as `[tx, rx, loop, sample]`.

@@ -13,14 +13,14 @@ use super::Stated;
 use super::boards::Board;
 use super::json::Json;
 use super::radar_table::{finished, radar_table, rows, table_of};
+use super::time_stamps::Grid;
 use crate::data::files;
 use crate::error::{Error, Result};
 use crate::radar::{Radar, SPEED_OF_LIGHT, Sampling};
 
-/// Most that resolutions may differ from those of the radar's settings: they are written in float32 and rounded.
-const RESOLUTION_SHARE: f64 = 0.01;
-/// Most that the median spacing of time stamps may differ from the frame period: stamps are taken where packets arrive.
-const SPACING_SHARE: f64 = 0.1;
+/// Most that resolutions may differ from those of the radar's settings: `RadarConfig` computes them by the same laws, so that they differ
+/// by rounding alone, at most that of single precision.
+const RESOLUTION_SHARE: f64 = f32::EPSILON as f64;
 const PERIOD: &str = "frame_period_s";
 
 /// What the channels say.
@@ -30,8 +30,8 @@ pub struct Frames<'a> {
     /// Loops, transmitters, receivers, words.
     pub shape: [usize; 4],
     pub frames: usize,
-    /// Between frames, by their time stamps.
-    pub spacing_s: Option<f64>,
+    /// By their time stamps.
+    pub grid: Option<&'a Grid>,
 }
 
 /// The radar, and the receivers whose samples its board turns by half a turn.
@@ -164,7 +164,7 @@ fn fill_from_channels(radar: &mut Table, found: &Frames, notes: &mut Vec<String>
     radar.entry("loops_per_frame").or_insert(Value::Integer(loops as i64));
     radar.entry("samples_per_chirp").or_insert(Value::Integer(samples as i64));
     radar.entry("full_scale_codes").or_insert(Value::Float(f64::from(i16::MAX)));
-    if let Some(spacing_s) = found.spacing_s.filter(|_| !radar.contains_key(PERIOD)) {
+    if let Some(spacing_s) = found.grid.map(|grid| grid.period).filter(|_| !radar.contains_key(PERIOD)) {
         notes.push(format!("{PERIOD} is not stated: {spacing_s:.6} s is the median spacing of {}", found.stamps.display()));
         radar.insert(PERIOD.into(), Value::Float(spacing_s));
     }
@@ -238,22 +238,8 @@ fn hold_against_channels(radar: &Radar, found: &Frames, stated: &Stated, notes: 
         return Err(Error::field(found.meta, "iq.shape", format!("{:?}", found.shape), expected)
             .with_hint("the settings or the board are of another capture"));
     }
-    let Some(spacing_s) = found.spacing_s.filter(|spacing_s| (spacing_s / radar.frame_period_s - 1.0).abs() > SPACING_SHARE)
-    else {
-        return Ok(());
-    };
-    if stated.sets.iter().any(|set| set.split('=').next().is_some_and(|key| key.trim() == "radar.frame_period_s")) {
-        notes.push(format!(
-            "{}: frames came every {spacing_s:.6} s by their time stamps; {} s is kept, as it was set",
-            found.stamps.display(),
-            radar.frame_period_s
-        ));
-        return Ok(());
-    }
-    let expected = format!("{} s, the radar's {PERIOD}", radar.frame_period_s);
-    Err(Error::field(found.stamps, "median spacing", format!("{spacing_s:.6} s"), expected).with_hint(
-        "the settings are of another capture, or most frames were lost; --set radar.frame_period_s=VALUE keeps a period against them",
-    ))
+    let Some(grid) = found.grid else { return Ok(()) };
+    grid.hold(found.stamps, radar.frame_period_s, stated.has_set("radar.frame_period_s"), notes)
 }
 
 /// The settings against `radar.json`.

@@ -14,7 +14,7 @@ use hdf5_reader::{
     ByteOrder, Dataset, Datatype, FileStorage, H5Type, Hdf5File, OpenOptions, SliceInfo, SliceInfoElem, dtype_element_size,
 };
 
-use super::{Container, Entry, Laid, Plane, opened};
+use super::{Container, Entry, Laid, Other, Plane, opened};
 use crate::data::arrays::{Kind, Stored};
 use crate::error::{Error, Result};
 
@@ -85,6 +85,7 @@ fn parts(dtype: &Datatype) -> Option<Vec<(usize, Stored)>> {
 pub(super) struct Hdf5 {
     path: PathBuf,
     datasets: Vec<(String, Dataset)>,
+    others: Vec<Other>,
     is_matlab: bool,
 }
 
@@ -100,12 +101,12 @@ impl Hdf5 {
         let most = usize::try_from(size.saturating_mul(1040)).unwrap_or(usize::MAX);
         let options: OpenOptions = Default::default();
         let options = options.with_max_read_bytes(most).with_max_chunk_bytes(most);
-        let mut datasets = vec![];
+        let (mut datasets, mut others) = (vec![], vec![]);
         FileStorage::from_file(file)
             .and_then(|storage| Hdf5File::from_storage_with_options(Arc::new(storage), options))
-            .and_then(|file| collect(&file.root_group()?, "", DEEPEST, &mut datasets))
+            .and_then(|file| collect(&file.root_group()?, "", DEEPEST, &mut datasets, &mut others))
             .map_err(|error| damaged(path, "arrays", &error))?;
-        Ok(Self { path: path.into(), datasets, is_matlab })
+        Ok(Self { path: path.into(), datasets, others, is_matlab })
     }
 }
 
@@ -123,19 +124,34 @@ fn damaged(path: &Path, field: &str, error: &Hdf5Error) -> Error {
         .with_hint("copy or download the file again")
 }
 
-/// Every dataset of numbers in a group and below it, by its path.
-fn collect(group: &Group, above: &str, depth: usize, found: &mut Vec<(String, Dataset)>) -> Hdf5Result<()> {
+/// Every dataset of numbers in a group and below it, by its path, and what else there is.
+fn collect(
+    group: &Group,
+    above: &str,
+    depth: usize,
+    found: &mut Vec<(String, Dataset)>,
+    others: &mut Vec<Other>,
+) -> Hdf5Result<()> {
     let (groups, datasets) = group.members()?;
     for dataset in datasets {
-        if parts(dataset.dtype()).is_some() {
-            found.push((format!("{above}{}", dataset.name().rsplit('/').next().unwrap_or_default()), dataset));
+        let name = format!("{above}{}", dataset.name().rsplit('/').next().unwrap_or_default());
+        match dataset.dtype() {
+            kind if parts(kind).is_some() => found.push((name, dataset)),
+            Datatype::Reference { .. } => others.push(Other { name, kind: "cells or an array of structures (references)" }),
+            _ => others.push(Other { name, kind: "no number, nor a complex one" }),
         }
     }
-    for group in groups.into_iter().filter(|_| depth > 0) {
-        let name = group.name().rsplit('/').next().unwrap_or_default().to_string();
+    for group in groups {
+        let own = group.name().rsplit('/').next().unwrap_or_default().to_string();
         // MATLAB keeps what its variables refer to in a group of its own.
-        if !name.starts_with('#') {
-            collect(&group, &format!("{above}{name}/"), depth - 1, found)?;
+        if own.starts_with('#') {
+            continue;
+        }
+        let name = format!("{above}{own}");
+        if depth > 0 {
+            collect(&group, &format!("{name}/"), depth - 1, found, others)?;
+        } else {
+            others.push(Other { name, kind: "a group deeper than are looked into" });
         }
     }
     Ok(())
@@ -151,6 +167,10 @@ impl Container for Hdf5 {
             shape
         };
         self.datasets.iter().map(|(name, dataset)| Entry { name: name.clone(), shape: shape(dataset) }).collect()
+    }
+
+    fn others(&self) -> &[Other] {
+        &self.others
     }
 
     fn lay_out(&mut self, name: &str, scratch: &Path) -> Result<Laid> {

@@ -1,8 +1,9 @@
 //! `.mat` of MATLAB 5 to 7.2 (`save -v6`, `-v7`, scipy.io.savemat).
 //!
-//! Source: MathWorks, "MAT-File Format" (R2019b), chapter 1. Read are numeric arrays at the top of the file; structures, cells, sparse
-//! and character arrays are passed over. `matrw` 0.1.4 reads these files, too, but panics where a compressed variable is damaged, takes a
-//! file that is cut off for a shorter one and the numbers of a big-endian one for little-endian ones.
+//! Source: MathWorks, "MAT-File Format" (R2019b), chapter 1. Read are numeric arrays, at the top of the file and in structures and cells:
+//! `data.adc`, `frames(2).adc`, `parts{1}`, counted as in MATLAB. Objects, sparse and character arrays are passed over. `matrw` 0.1.4
+//! reads these files, too, but panics where a compressed variable is damaged, takes a file that is cut off for a shorter one and the
+//! numbers of a big-endian one for little-endian ones.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -10,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use flate2::read::ZlibDecoder;
 
-use super::{Container, Entry, Laid, Plane, copy_out, opened};
+use super::{Container, Entry, Laid, Other, Plane, copy_out, opened};
 use crate::data::arrays::{Kind, Stored};
 use crate::error::{Error, Result};
 
@@ -22,20 +23,45 @@ const BEST_COMPRESSION: u64 = 1040;
 /// MATLAB's own limit is 63 letters; a file that says more is damaged.
 const LONGEST_NAME: u32 = 1 << 10;
 const MOST_AXES: u32 = 32;
+/// Bytes of the names of a structure's fields.
+const LONGEST_FIELDS: u32 = 1 << 20;
+/// Arrays of a file; compressed, far more fit into one than memory holds names.
+const MOST_ARRAYS: usize = 1 << 16;
+/// Structures inside structures that are looked into, as in HDF5.
+const DEEPEST: usize = 8;
+const CELL: u32 = 1;
+const STRUCTURE: u32 = 2;
 
-/// A numeric array: its name, its shape, and where its element begins.
+/// A numeric array: its name, its shape, where its variable's element begins, and how far in that the array itself.
 #[derive(Clone)]
 struct Variable {
     name: String,
     shape: Vec<usize>,
     is_complex: bool,
     element: u64,
+    inside: u64,
+}
+
+/// What an element holds: flags, shape and name; no more of what has none.
+struct Described {
+    class: u32,
+    is_complex: bool,
+    shape: Vec<usize>,
+    name: String,
+}
+
+/// What was found in an element.
+#[derive(Default)]
+struct Found {
+    variables: Vec<Variable>,
+    others: Vec<Other>,
 }
 
 pub(super) struct MatFile {
     path: PathBuf,
     big_endian: bool,
     variables: Vec<Variable>,
+    others: Vec<Other>,
 }
 
 /// The tag of an element, and its data where they lie in the tag itself.
@@ -98,18 +124,111 @@ impl<R: Read> Elements<R> {
         Ok((kind, data))
     }
 
-    /// Name, shape and whether there are imaginary parts; none of what is no numeric array.
-    fn describe(&mut self) -> Io<Option<(String, Vec<usize>, bool)>> {
+    /// What comes before an array's numbers, cells or fields.
+    fn describe(&mut self) -> Io<Described> {
         let (_, flags) = self.data(8)?;
         let flags = flags.first_chunk().map(|flags| self.number(*flags)).ok_or_else(|| damaged("no array flags"))?;
-        // Classes 6 to 15: double, single, integers.
-        if !(6..=15).contains(&(flags & 0xff)) {
-            return Ok(None);
+        let (class, is_complex) = (flags & 0xff, flags & 0x0800 != 0);
+        // Function handles and objects of a class of its own have neither shape nor name.
+        if class > 15 {
+            return Ok(Described { class, is_complex, shape: vec![], name: String::new() });
         }
         let (_, dims) = self.data(4 * MOST_AXES)?;
         let shape: Vec<usize> = dims.as_chunks().0.iter().map(|bytes| self.number(*bytes) as usize).collect();
         let (_, name) = self.data(LONGEST_NAME)?;
-        Ok(Some((String::from_utf8_lossy(&name).into_owned(), shape, flags & 0x0800 != 0)))
+        Ok(Described { class, is_complex, shape, name: String::from_utf8_lossy(&name).into_owned() })
+    }
+}
+
+impl<R: Read + Skip> Elements<R> {
+    fn skip_to(&mut self, end: u64) -> Io<()> {
+        let bytes = end.checked_sub(self.at).ok_or_else(|| damaged("an element longer than the one around it"))?;
+        self.reader.skip(bytes)?;
+        self.at = end;
+        Ok(())
+    }
+
+    /// Finds the arrays in the matrix that begins here and ends there; `path` names one inside another.
+    fn find(&mut self, path: Option<&str>, end: u64, depth: usize, found: &mut Found) -> Io<()> {
+        let inside = self.at;
+        if inside == end {
+            return Ok(());
+        }
+        let Described { class, is_complex, shape, name } = self.describe()?;
+        let name = path.map_or(name, str::to_string);
+        if found.variables.len() + found.others.len() >= MOST_ARRAYS {
+            return Err(damaged(format!("more than {MOST_ARRAYS} arrays")));
+        }
+        match class {
+            6..=15 => found.variables.push(Variable { name, shape, is_complex, element: 0, inside }),
+            CELL | STRUCTURE if depth > 0 => self.find_below(&name, &shape, class, end, depth - 1, found)?,
+            _ if name.is_empty() => {}
+            _ => found.others.push(Other { name, kind: kind(class) }),
+        }
+        Ok(())
+    }
+
+    /// The same in the cells of an array of cells, or in the fields of a structure or of an array of structures.
+    fn find_below(&mut self, name: &str, shape: &[usize], class: u32, end: u64, depth: usize, found: &mut Found) -> Io<()> {
+        let count = shape.iter().try_fold(1usize, |count, &length| count.checked_mul(length)).unwrap_or(usize::MAX);
+        let fields = if class == STRUCTURE { Some(self.fields()?) } else { None };
+        let of_one = |index: usize| match &fields {
+            None => vec![format!("{name}{{{}}}", index + 1)],
+            Some(fields) if count == 1 => fields.iter().map(|field| format!("{name}.{field}")).collect(),
+            Some(fields) => fields.iter().map(|field| format!("{name}({}).{field}", index + 1)).collect(),
+        };
+        let is_empty = fields.as_ref().is_some_and(Vec::is_empty);
+        for path in (0..if is_empty { 0 } else { count }).flat_map(of_one) {
+            let Tag { kind: MATRIX, bytes, small: None } = self.tag()? else {
+                return Err(damaged(format!("no array in {path}")));
+            };
+            let own_end = self.at + u64::from(bytes);
+            if own_end > end {
+                return Err(damaged(format!("{path} needs {bytes} bytes, {} are there", end.saturating_sub(self.at))));
+            }
+            self.find(Some(&path), own_end, depth, found)?;
+            self.skip_to(own_end)?;
+        }
+        Ok(())
+    }
+
+    /// Names of a structure's fields.
+    fn fields(&mut self) -> Io<Vec<String>> {
+        let (_, length) = self.data(4)?;
+        let length = length.first_chunk().map(|length| self.number(*length) as usize).filter(|length| *length > 0);
+        let length = length.ok_or_else(|| damaged("no length of field names"))?;
+        let (_, names) = self.data(LONGEST_FIELDS)?;
+        let name = |bytes: &[u8]| String::from_utf8_lossy(bytes.split(|byte| *byte == 0).next().unwrap_or_default()).into_owned();
+        Ok(names.chunks(length).map(name).collect())
+    }
+}
+
+/// Going forward without reading, where that is possible.
+trait Skip {
+    fn skip(&mut self, bytes: u64) -> Io<()>;
+}
+
+impl Skip for BufReader<File> {
+    fn skip(&mut self, bytes: u64) -> Io<()> {
+        self.seek_relative(i64::try_from(bytes).map_err(|_| damaged("an element beyond any file"))?)
+    }
+}
+
+impl<R: Read> Skip for ZlibDecoder<R> {
+    fn skip(&mut self, bytes: u64) -> Io<()> {
+        let passed = std::io::copy(&mut self.take(bytes), &mut std::io::sink())?;
+        if passed == bytes { Ok(()) } else { Err(std::io::ErrorKind::UnexpectedEof.into()) }
+    }
+}
+
+/// What people call an array of a class.
+fn kind(class: u32) -> &'static str {
+    match class {
+        CELL | STRUCTURE => "a structure or cells deeper than are looked into",
+        4 => "text",
+        5 => "a sparse array",
+        16 => "a function",
+        _ => "an object",
     }
 }
 
@@ -143,35 +262,37 @@ impl MatFile {
             _ => return Err(not_mat("another file, or one of MATLAB 4".into()).with_hint("save it again with MATLAB: save -v7")),
         };
         elements.big_endian = big_endian;
-        let mut variables = vec![];
+        let mut found = Found::default();
         while elements.at < size {
-            let element = elements.at;
-            let seen = Self::look(&mut elements, size).map_err(|error| cut_off(path, element, &error))?;
-            variables.extend(seen.map(|(name, shape, is_complex)| Variable { name, shape, is_complex, element }));
+            let (element, first) = (elements.at, found.variables.len());
+            Self::look(&mut elements, size, &mut found).map_err(|error| cut_off(path, element, &error))?;
+            found.variables[first..].iter_mut().for_each(|variable| variable.element = element);
         }
-        Ok(Self { path: path.into(), big_endian, variables })
+        Ok(Self { path: path.into(), big_endian, variables: found.variables, others: found.others })
     }
 
-    /// Describes the next element and goes to the one after it.
-    #[allow(clippy::type_complexity)]
-    fn look(elements: &mut Elements<BufReader<File>>, size: u64) -> Io<Option<(String, Vec<usize>, bool)>> {
+    /// Looks into the next element and goes to the one after it.
+    fn look(elements: &mut Elements<BufReader<File>>, size: u64, found: &mut Found) -> Io<()> {
         let tag = elements.tag()?;
         let end = elements.at + u64::from(tag.bytes);
         if end > size {
             return Err(damaged(format!("it needs {} bytes, {} are there", tag.bytes, size - elements.at)));
         }
-        let seen = match tag.kind {
-            MATRIX => elements.describe()?,
+        match tag.kind {
+            MATRIX => elements.find(None, end, DEEPEST, found)?,
             COMPRESSED => {
                 let reader = ZlibDecoder::new((&mut elements.reader).take(tag.bytes.into()));
                 let mut inside = Elements { reader, big_endian: elements.big_endian, at: 0 };
-                if inside.tag()?.kind == MATRIX { inside.describe()? } else { None }
+                let tag = inside.tag()?;
+                if tag.kind == MATRIX {
+                    inside.find(None, inside.at + u64::from(tag.bytes), DEEPEST, found)?;
+                }
             }
-            _ => None,
-        };
+            _ => {}
+        }
         elements.reader.seek(SeekFrom::Start(end))?;
         elements.at = end;
-        Ok(seen)
+        Ok(())
     }
 
     /// The planes of an array of so many numbers, from where its numbers begin; `own` names a file for one that has to be copied.
@@ -224,21 +345,27 @@ impl Container for MatFile {
         self.variables.iter().map(|variable| Entry { name: variable.name.clone(), shape: variable.shape.clone() }).collect()
     }
 
+    fn others(&self) -> &[Other] {
+        &self.others
+    }
+
     fn lay_out(&mut self, name: &str, scratch: &Path) -> Result<Laid> {
-        let variable = self.variables.iter().find(|variable| variable.name == name).expect("a name of the entries").clone();
-        let own = |index: usize| scratch.join(format!("{name}-{index}.raw"));
+        let index = self.variables.iter().position(|variable| variable.name == name).expect("a name of the entries");
+        let variable = self.variables[index].clone();
+        let own = |part: usize| scratch.join(format!("{index}-{part}.raw"));
         let read = || -> Io<Vec<Plane>> {
             let mut reader = BufReader::new(crate::data::files::regular(&self.path)?);
             reader.seek(SeekFrom::Start(variable.element))?;
             let mut elements = Elements { reader, big_endian: self.big_endian, at: variable.element };
             let tag = elements.tag()?;
             if tag.kind == MATRIX {
+                elements.skip_to(variable.inside)?;
                 elements.describe()?;
                 return self.planes(&mut elements, &variable, &own, true, tag.bytes.into());
             }
             let reader = ZlibDecoder::new(elements.reader.take(tag.bytes.into()));
             let mut inside = Elements { reader, big_endian: self.big_endian, at: 0 };
-            inside.tag()?;
+            inside.skip_to(variable.inside)?;
             inside.describe()?;
             let planes =
                 self.planes(&mut inside, &variable, &own, false, u64::from(tag.bytes).saturating_mul(BEST_COMPRESSION))?;

@@ -21,11 +21,21 @@ use crate::error::{Error, Result};
 /// The kinds of files, by the end of their names.
 pub const EXTENSIONS: [&str; 5] = ["npy", "npz", "mat", "h5", "hdf5"];
 
+/// Arrays that a message lists.
+const MOST_LISTED: usize = 32;
+
 /// A numeric array of a file.
 #[derive(Clone, Debug, PartialEq)]
 struct Entry {
     name: String,
     shape: Vec<usize>,
+}
+
+/// What a file holds besides, and is not read: its name and what it is.
+#[derive(Clone, Debug, PartialEq)]
+struct Other {
+    name: String,
+    kind: &'static str,
 }
 
 /// Where the numbers of an array lie.
@@ -48,6 +58,9 @@ struct Plane {
 
 trait Container {
     fn entries(&self) -> Vec<Entry>;
+    fn others(&self) -> &[Other] {
+        &[]
+    }
     /// Brings the numbers of an array to the disk, into `scratch` where they do not lie in the file as they are.
     fn lay_out(&mut self, name: &str, scratch: &Path) -> Result<Laid>;
 }
@@ -65,7 +78,7 @@ pub fn open(path: &Path, variable: Option<&str>, axes: usize) -> Result<Source> 
         _ => Box::new(npy::Npy::open(path)?),
     };
     let entries = container.entries();
-    let names = chosen(path, &entries, variable, axes)?;
+    let names = chosen(path, &entries, container.others(), variable, axes)?;
     let scratch = Scratch::new()?;
     let mut parts = names.iter().map(|name| container.lay_out(name, scratch.path())).collect::<Result<Vec<_>>>()?.into_iter();
     let mut laid = parts.next().expect("a name at least is chosen");
@@ -79,38 +92,59 @@ pub fn open(path: &Path, variable: Option<&str>, axes: usize) -> Result<Source> 
     Source::new(path, names.join(","), laid, scratch)
 }
 
-fn chosen(path: &Path, entries: &[Entry], variable: Option<&str>, axes: usize) -> Result<Vec<String>> {
-    let list = |entries: &[&Entry]| {
-        entries.iter().map(|entry| format!("{} {:?}", entry.name, entry.shape)).collect::<Vec<_>>().join(", ")
-    };
-    let all: Vec<&Entry> = entries.iter().collect();
-    let held = if all.is_empty() { "no numeric array".to_string() } else { list(&all) };
+/// The names of the array, or of its two parts.
+fn chosen(path: &Path, entries: &[Entry], others: &[Other], variable: Option<&str>, axes: usize) -> Result<Vec<String>> {
     if let Some(variable) = variable {
-        let names: Vec<String> = variable.split(',').map(|name| name.trim().to_string()).collect();
+        let names: Vec<&str> = variable.split(',').map(str::trim).collect();
         if names.len() > 2 {
-            return Err(Error::field(
-                path,
-                variable,
-                format!("{} names", names.len()),
-                "one array, or its real and its imaginary part",
-            ));
+            let found = format!("{} names", names.len());
+            return Err(Error::field(path, variable, found, "one array, or its real and its imaginary part"));
         }
-        return match names.iter().find(|name| !all.iter().any(|entry| entry.name == **name)) {
-            Some(name) => {
-                Err(Error::field(path, name, "missing", "a numeric array").with_hint(format!("the file holds: {held}")))
-            }
-            None => Ok(names),
-        };
+        return names.into_iter().map(|name| named(path, entries, others, name)).collect();
     }
-    let fitting: Vec<&Entry> = all.into_iter().filter(|entry| entry.shape.len() == axes).collect();
+    // A single number is no capture.
+    let fitting: Vec<&Entry> =
+        entries.iter().filter(|entry| entry.shape.len() == axes && entry.shape.iter().any(|length| *length != 1)).collect();
+    let expected = format!("one with the {axes} axes of --layout");
     match fitting[..] {
         [only] => Ok(vec![only.name.clone()]),
         [] if entries.len() == 1 => Ok(vec![entries[0].name.clone()]),
-        [] => Err(Error::field(path, "arrays", held, format!("one with the {axes} axes of --layout"))
+        [] => Err(Error::field(path, "arrays", list(entries.iter()), expected)
             .with_hint("name the array with --variable NAME, or write --layout with one word for each of its axes")),
-        _ => Err(Error::field(path, "arrays", list(&fitting), format!("one with the {axes} axes of --layout"))
+        _ => Err(Error::field(path, "arrays", list(fitting.into_iter()), expected)
             .with_hint("name the array with --variable NAME; real and imaginary parts apart with --variable RE,IM")),
     }
+}
+
+/// Of HDF5, `a/b`, and of MATLAB, `a.b`, are written either way.
+fn named(path: &Path, entries: &[Entry], others: &[Other], name: &str) -> Result<String> {
+    let plain = |name: &str| name.trim_matches('/').replace('/', ".");
+    let is_above = |above: &str| {
+        plain(name).strip_prefix(&plain(above)).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '(', '{']))
+    };
+    let exact = entries.iter().find(|entry| entry.name == name);
+    if let Some(entry) = exact.or_else(|| entries.iter().find(|entry| plain(&entry.name) == plain(name))) {
+        return Ok(entry.name.clone());
+    }
+    let found = match others.iter().find(|other| is_above(&other.name)) {
+        Some(other) if plain(&other.name) == plain(name) => other.kind.to_string(),
+        Some(other) => format!("below `{}`: {}", other.name, other.kind),
+        None => "missing".into(),
+    };
+    Err(Error::field(path, name, found, "a numeric array").with_hint(format!("the file holds: {}", list(entries.iter()))))
+}
+
+/// Names and shapes, of many the first ones.
+fn list<'a>(entries: impl Iterator<Item = &'a Entry>) -> String {
+    let mut listed: Vec<String> = entries.map(|entry| format!("{} {:?}", entry.name, entry.shape)).collect();
+    if listed.is_empty() {
+        return "no numeric array".into();
+    }
+    if let Some(more) = listed.len().checked_sub(MOST_LISTED).filter(|more| *more > 0) {
+        listed.truncate(MOST_LISTED);
+        listed.push(format!("and {more} more"));
+    }
+    listed.join(", ")
 }
 
 /// Copies exactly so many bytes into a file of its own.

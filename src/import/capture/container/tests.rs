@@ -38,12 +38,44 @@ fn every_container_gives_the_same_numbers() {
         ("h5py.h5", Some("radar/re,radar/im")),
         ("parts.npz", Some("real, imag")),
         ("cube.npz", None),
+        // In structures, by MATLAB's separator and by that of HDF5; the only array of four axes.
+        ("structures_v6.mat", None),
+        ("structures_v6.mat", Some("radar.data.cube")),
+        ("structures_v7.mat", Some("radar/data/cube")),
+        ("structures_v73.mat", Some("radar.data.cube")),
+        ("structures_v73.mat", None),
     ] {
         assert_cube(open(&golden(name), variable, 4), name);
     }
     let pairs = open(&golden("v7.mat"), None, 5).unwrap();
     assert_eq!((pairs.shape(), pairs.is_complex(), pairs.holds_codes()), (&[2, 3, 4, 8, 2][..], false, true));
     assert_eq!(pairs.numbers(Some(0), 1).unwrap().0[..4], [88.0, -42.0, 91.0, -44.0]);
+}
+
+#[test]
+fn arrays_of_structures_and_cells_are_counted_as_in_matlab() {
+    for name in ["structures_v6.mat", "structures_v7.mat"] {
+        for variable in ["frames(2).adc", "cells{2}"] {
+            let source = open(&golden(name), Some(variable), 3).unwrap_or_else(|error| panic!("{name}, {variable}: {error}"));
+            assert_eq!((source.shape(), source.is_complex()), (&SHAPE[1..], true));
+            assert_eq!(source.numbers(None, 0).unwrap().0[..2], [88.0, 91.0], "{name}, {variable}");
+        }
+    }
+}
+
+/// What is not read is said by name, and what it is.
+#[test]
+fn what_is_no_array_is_named_for_what_it_is() {
+    for (name, variable, found) in [
+        ("structures_v6.mat", "note", "`note` is text, expected a numeric array"),
+        ("structures_v7.mat", "radar.board", "`radar.board` is text, expected a numeric array"),
+        ("structures_v7.mat", "radar.cube", "`radar.cube` is missing, expected a numeric array"),
+        ("structures_v73.mat", "cells{1}", "`cells{1}` is below `cells`: cells or an array of structures (references), expected"),
+    ] {
+        let error = open(&golden(name), Some(variable), 4).err().unwrap();
+        assert!(error.to_string().contains(found), "{error}");
+        assert!(error.hint().unwrap().contains("cube [2, 3, 4, 8]"), "{:?}", error.hint());
+    }
 }
 
 /// What h5py writes as its latest and as its earliest format: chunks by every kind of index, filters, byte orders.
@@ -93,6 +125,8 @@ fn a_file_that_is_cut_off_anywhere_is_refused() {
     for (name, variable) in [
         ("v6.mat", "cube"),
         ("v7.mat", "cube"),
+        ("structures_v6.mat", "radar.data.cube"),
+        ("structures_v7.mat", "radar.data.cube"),
         ("v73.mat", "cube"),
         ("h5py.h5", "radar/cube"),
         ("latest.h5", "growing_twice"),
@@ -118,6 +152,8 @@ fn a_file_that_is_damaged_anywhere_does_not_panic() {
     for (name, variable) in [
         ("v6.mat", "cube"),
         ("v7.mat", "cube"),
+        ("structures_v6.mat", "radar.data.cube"),
+        ("structures_v7.mat", "radar.data.cube"),
         ("v73.mat", "cube"),
         ("h5py.h5", "radar/cube"),
         ("latest.h5", "fixed"),
