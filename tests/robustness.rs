@@ -337,8 +337,10 @@ fn weights_have_the_mode_of_their_neighbours_and_equal_runs_write_equal_bytes() 
     assert!(differ.iter().all(|path| path.ends_with("run.json")), "{differ:?}");
     assert!(differ.len() == 2, "{differ:?}");
 
-    let modes: BTreeMap<u32, &PathBuf> =
-        first.keys().map(|path| (fs::metadata(folder.path().join("first/run").join(path)).unwrap().mode() & 0o777, path)).collect();
+    let modes: BTreeMap<u32, &PathBuf> = first
+        .keys()
+        .map(|path| (fs::metadata(folder.path().join("first/run").join(path)).unwrap().mode() & 0o777, path))
+        .collect();
     fs::write(folder.path().join("ordinary"), "").unwrap();
     let ordinary = fs::metadata(folder.path().join("ordinary")).unwrap().permissions().mode() & 0o777;
     assert!(modes.keys().eq([&ordinary]), "{modes:?}, an ordinary file has {ordinary}");

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{ORIGIN, STAGES, Signature};
+use super::{ORIGIN, Signature, heading};
 use crate::diagnosis::report::never_detectable;
 use crate::effects::{EffectInfo, EffectSetting, ParameterInfo};
 
@@ -13,13 +13,12 @@ pub(super) fn link(id: &str) -> String {
 
 /// The page; the picture lies beside it.
 pub(super) fn markdown(info: &EffectInfo, signature: Option<&Signature>) -> String {
-    let stage = STAGES.iter().find(|(stage, _)| *stage == info.stage).map_or("", |(_, name)| name);
     let mut text = format!(
         "{ORIGIN}\n# {}: {}\n\n{}\n\nStage: {}. Term of the IF signal:\n\n```text\n{}\n```\n",
         info.id,
         info.title,
         info.explanation,
-        stage.to_lowercase(),
+        heading(info.stage).to_lowercase(),
         info.equation
     );
     text.push_str("\n| parameter | unit | neutral or start | prior |\n|---|---|---|---|\n");

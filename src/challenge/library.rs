@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use crate::effects;
 use crate::person::JOINT_NAMES;
 use crate::radar::Radar;
 use crate::recorder::effects::*;
@@ -212,7 +213,7 @@ const MANY: &[Graded] = listed! {
 /// Below returns of the person and the walls.
 pub const MASKED: &[Graded] = &[
     Graded {
-        id: "moving_reflector",
+        id: effects::moving_reflector::ID,
         weakest: 3e-3,
         strongest: 0.1,
         add: |effects, strength, at, random| {
@@ -226,7 +227,7 @@ pub const MASKED: &[Graded] = &[
         },
     },
     Graded {
-        id: "static_reflector",
+        id: effects::static_reflector::ID,
         weakest: 3e-3,
         strongest: 0.1,
         add: |effects, strength, at, random| {
@@ -239,7 +240,7 @@ pub const MASKED: &[Graded] = &[
         },
     },
     Graded {
-        id: "carried_reflector",
+        id: effects::carried_reflector::ID,
         weakest: 3e-3,
         strongest: 0.1,
         add: |effects, strength, _, random| {
@@ -248,7 +249,7 @@ pub const MASKED: &[Graded] = &[
         },
     },
     Graded {
-        id: "body_multibounce",
+        id: effects::body_multibounce::ID,
         weakest: 3e-3,
         strongest: 0.1,
         add: |effects, strength, _, random| {
@@ -256,7 +257,7 @@ pub const MASKED: &[Graded] = &[
         },
     },
     Graded {
-        id: "wall_ghost",
+        id: effects::wall_ghost::ID,
         weakest: 3e-3,
         strongest: 0.1,
         add: |effects, strength, at, random| {
@@ -265,7 +266,7 @@ pub const MASKED: &[Graded] = &[
         },
     },
     Graded {
-        id: "chirp_ripple",
+        id: effects::chirp_ripple::ID,
         weakest: 2e3,
         strongest: 1e5,
         add: |effects, strength, _, random| {
@@ -276,16 +277,16 @@ pub const MASKED: &[Graded] = &[
 
 /// Effects that learned amplitudes can absorb.
 pub const ABSORBED: [&str; 10] = [
-    "if_highpass",
-    "if_lowpass",
-    "antenna_pattern",
-    "part_reflectivity",
-    "start_frequency_error",
-    "clothing_delay",
-    "soft_occlusion",
-    "breathing",
-    "range_bias",
-    "chirp_droop",
+    effects::if_highpass::ID,
+    effects::if_lowpass::ID,
+    effects::antenna_pattern::ID,
+    effects::part_reflectivity::ID,
+    effects::start_frequency_error::ID,
+    effects::clothing_delay::ID,
+    effects::soft_occlusion::ID,
+    effects::breathing::ID,
+    effects::range_bias::ID,
+    effects::chirp_droop::ID,
 ];
 
 /// Effects outside the library: no id of docs/report.md names them.

@@ -9,8 +9,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "adc_saturation";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "adc_saturation",
+    id: ID,
     card: "R4",
     stage: Stage::Receiver,
     title: "the converter's saturation",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "adc_start_error";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "adc_start_error",
+    id: ID,
     card: "W4",
     stage: Stage::Waveform,
     title: "an error of the sampling window's start",

@@ -8,8 +8,10 @@ use super::{
     values::Values,
 };
 
+pub const ID: &str = "antenna_pattern";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "antenna_pattern",
+    id: ID,
     card: "C3",
     stage: Stage::Antenna,
     title: "the antennas' directivity",

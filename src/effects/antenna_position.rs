@@ -14,8 +14,10 @@ use crate::{
     radar::Radar,
 };
 
+pub const ID: &str = "antenna_position";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "antenna_position",
+    id: ID,
     card: "C2",
     stage: Stage::Antenna,
     title: "antennas that are not where they are declared",

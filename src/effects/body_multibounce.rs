@@ -10,8 +10,10 @@ use crate::{
     radar::{Radar, SPEED_OF_LIGHT},
 };
 
+pub const ID: &str = "body_multibounce";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "body_multibounce",
+    id: ID,
     card: "T9",
     stage: Stage::Propagation,
     title: "echoes between parts of the body",

@@ -9,8 +9,10 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "breathing";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "breathing",
+    id: ID,
     card: "T1",
     stage: Stage::Body,
     title: "the chest's breathing",

@@ -12,8 +12,10 @@ use crate::{
     radar::Radar,
 };
 
+pub const ID: &str = "carried_reflector";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "carried_reflector",
+    id: ID,
     card: "",
     stage: Stage::Scene,
     title: "an object that the person carries",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "channel_mismatch";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "channel_mismatch",
+    id: ID,
     card: "C1",
     stage: Stage::Antenna,
     title: "different gains and phases of the channels",

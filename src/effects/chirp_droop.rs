@@ -9,8 +9,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "chirp_droop";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "chirp_droop",
+    id: ID,
     card: "R9",
     stage: Stage::Receiver,
     title: "a change of gain along the chirp",

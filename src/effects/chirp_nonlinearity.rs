@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "chirp_nonlinearity";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "chirp_nonlinearity",
+    id: ID,
     card: "W6",
     stage: Stage::Waveform,
     title: "a bend of the chirp",

@@ -9,8 +9,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "chirp_ripple";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "chirp_ripple",
+    id: ID,
     card: "W7",
     stage: Stage::Waveform,
     title: "a ripple of the chirp's frequency",

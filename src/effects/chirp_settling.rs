@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "chirp_settling";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "chirp_settling",
+    id: ID,
     card: "",
     stage: Stage::Receiver,
     title: "chirps that settle at the start of a frame",

@@ -9,8 +9,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "chirp_start_jitter";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "chirp_start_jitter",
+    id: ID,
     card: "W9",
     stage: Stage::Waveform,
     title: "a jitter of the chirps' starts",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "clock_drift";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "clock_drift",
+    id: ID,
     card: "G3",
     stage: Stage::Timing,
     title: "a difference in rate between the radar's clock and the motion's",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "clock_offset";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "clock_offset",
+    id: ID,
     card: "G2",
     stage: Stage::Timing,
     title: "an offset between the radar's clock and the motion's",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "clothing_delay";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "clothing_delay",
+    id: ID,
     card: "T3",
     stage: Stage::Body,
     title: "an extra delay on clothed parts of the body",

@@ -8,8 +8,10 @@ use super::{
 };
 use crate::{complex::Complex, radar::Radar};
 
+pub const ID: &str = "coloured_noise";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "coloured_noise",
+    id: ID,
     card: "V2",
     stage: Stage::Noise,
     title: "noise that is stronger at low frequencies",

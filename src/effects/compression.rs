@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "compression";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "compression",
+    id: ID,
     card: "R4",
     stage: Stage::Receiver,
     title: "the receiver's compression",

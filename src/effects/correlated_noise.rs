@@ -6,8 +6,10 @@ use super::{
 };
 use crate::{complex::Complex, if_signal::noise, radar::Radar};
 
+pub const ID: &str = "correlated_noise";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "correlated_noise",
+    id: ID,
     card: "V4",
     stage: Stage::Noise,
     title: "noise that the receivers have in common",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "dc_offset";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "dc_offset",
+    id: ID,
     card: "R2",
     stage: Stage::Receiver,
     title: "a constant offset of the receivers",

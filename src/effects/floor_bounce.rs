@@ -13,8 +13,10 @@ use crate::{
     room::{Boundary, Room},
 };
 
+pub const ID: &str = "floor_bounce";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "floor_bounce",
+    id: ID,
     card: "P6",
     stage: Stage::Propagation,
     title: "the body's reflection in the floor",

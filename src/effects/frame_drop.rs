@@ -5,8 +5,10 @@ use super::{
     values::Values,
 };
 
+pub const ID: &str = "frame_drop";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "frame_drop",
+    id: ID,
     card: "G4",
     stage: Stage::Timing,
     title: "frames that were lost",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "gain_drift";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "gain_drift",
+    id: ID,
     card: "W10",
     stage: Stage::Receiver,
     title: "a gain that changes with time",

@@ -9,8 +9,10 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "heartbeat";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "heartbeat",
+    id: ID,
     card: "T2",
     stage: Stage::Body,
     title: "the heartbeat's motion of the chest",

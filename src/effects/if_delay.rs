@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "if_delay";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "if_delay",
+    id: ID,
     card: "W3",
     stage: Stage::Receiver,
     title: "a delay in the IF chain",

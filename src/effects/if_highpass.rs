@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "if_highpass";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "if_highpass",
+    id: ID,
     card: "R7",
     stage: Stage::Receiver,
     title: "the receiver's IF high-pass filter",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "if_lowpass";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "if_lowpass",
+    id: ID,
     card: "R8",
     stage: Stage::Receiver,
     title: "the receiver's IF low-pass filter",

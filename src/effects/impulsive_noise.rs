@@ -10,8 +10,10 @@ use super::{
 };
 use crate::{complex::Complex, radar::Radar};
 
+pub const ID: &str = "impulsive_noise";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "impulsive_noise",
+    id: ID,
     card: "V3",
     stage: Stage::Noise,
     title: "noise with rare strong samples",

@@ -27,18 +27,34 @@ pub(super) const fn parameter(name: &'static str, unit: &'static str, neutral: f
     ParameterInfo { name, unit, neutral, least, most }
 }
 
-/// Where in the signal's way an effect acts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+/// Where in the signal's way an effect acts, in the order of that way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
+    Timing,
     Scene,
     Body,
     Propagation,
-    Antenna,
     Waveform,
+    Antenna,
     Receiver,
-    Timing,
     Noise,
+}
+
+impl Stage {
+    /// As reports write it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Timing => "timing",
+            Self::Scene => "scene",
+            Self::Body => "body",
+            Self::Propagation => "propagation",
+            Self::Waveform => "waveform",
+            Self::Antenna => "antenna",
+            Self::Receiver => "receiver",
+            Self::Noise => "noise",
+        }
+    }
 }
 
 /// An effect as the library describes it.

@@ -12,8 +12,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "interference";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "interference",
+    id: ID,
     card: "I1",
     stage: Stage::Receiver,
     title: "bursts from another radar",

@@ -9,8 +9,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "iq_imbalance";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "iq_imbalance",
+    id: ID,
     card: "R3",
     stage: Stage::Receiver,
     title: "an imbalance of the I and Q channels",

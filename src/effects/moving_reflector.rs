@@ -15,8 +15,10 @@ use crate::{
     radar::Radar,
 };
 
+pub const ID: &str = "moving_reflector";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "moving_reflector",
+    id: ID,
     card: "P2",
     stage: Stage::Scene,
     title: "an object that moves by itself",

@@ -9,8 +9,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "mutual_coupling";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "mutual_coupling",
+    id: ID,
     card: "C4",
     stage: Stage::Antenna,
     title: "coupling between neighbouring receivers",

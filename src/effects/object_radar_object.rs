@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "object_radar_object";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "object_radar_object",
+    id: ID,
     card: "R6",
     stage: Stage::Propagation,
     title: "a second trip between the scene and the radar",

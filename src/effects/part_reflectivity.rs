@@ -8,8 +8,10 @@ use super::{
     values::Values,
 };
 
+pub const ID: &str = "part_reflectivity";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "part_reflectivity",
+    id: ID,
     card: "T4",
     stage: Stage::Body,
     title: "another reflectivity of one part of the body",

@@ -14,8 +14,10 @@ use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
 /// Range that `per_chirp_rad` refers to.
 const REFERENCE_M: f64 = 3.0;
 
+pub const ID: &str = "phase_noise";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "phase_noise",
+    id: ID,
     card: "W8",
     stage: Stage::Waveform,
     title: "the oscillator's phase noise",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "pose_offset";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "pose_offset",
+    id: ID,
     card: "G1",
     stage: Stage::Scene,
     title: "an offset of the body's place",

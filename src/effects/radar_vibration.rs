@@ -9,8 +9,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "radar_vibration";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "radar_vibration",
+    id: ID,
     card: "I2",
     stage: Stage::Scene,
     title: "a vibration of the radar",

@@ -9,8 +9,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "ramp_edge_transient";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "ramp_edge_transient",
+    id: ID,
     card: "",
     stage: Stage::Receiver,
     title: "a transient at the ramp's edge",

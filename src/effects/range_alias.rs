@@ -7,8 +7,10 @@ use super::{
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
 
+pub const ID: &str = "range_alias";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "range_alias",
+    id: ID,
     card: "P8",
     stage: Stage::Propagation,
     title: "an echo from beyond the unambiguous range",

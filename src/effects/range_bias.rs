@@ -8,8 +8,10 @@ use super::{
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
 
+pub const ID: &str = "range_bias";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "range_bias",
+    id: ID,
     card: "D1'",
     stage: Stage::Scene,
     title: "a constant delay of all paths",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "second_harmonic";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "second_harmonic",
+    id: ID,
     card: "R5",
     stage: Stage::Receiver,
     title: "the receiver's second harmonic",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "slope_error";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "slope_error",
+    id: ID,
     card: "W5",
     stage: Stage::Waveform,
     title: "an error of the chirp's slope",

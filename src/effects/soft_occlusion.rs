@@ -8,8 +8,10 @@ use super::{
     values::Values,
 };
 
+pub const ID: &str = "soft_occlusion";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "soft_occlusion",
+    id: ID,
     card: "T7",
     stage: Stage::Propagation,
     title: "waves that bend around the body's edges",

@@ -8,8 +8,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "spur";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "spur",
+    id: ID,
     card: "R12",
     stage: Stage::Receiver,
     title: "a spur",

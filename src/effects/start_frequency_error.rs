@@ -7,8 +7,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "start_frequency_error";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "start_frequency_error",
+    id: ID,
     card: "W3",
     stage: Stage::Waveform,
     title: "an error of the chirp's start frequency",

@@ -12,8 +12,10 @@ use crate::{
     radar::Radar,
 };
 
+pub const ID: &str = "static_reflector";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "static_reflector",
+    id: ID,
     card: "P1",
     stage: Stage::Scene,
     title: "an object at rest that the scene does not know",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "tdm_phase";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "tdm_phase",
+    id: ID,
     card: "G5",
     stage: Stage::Timing,
     title: "an error in the time between the transmitters' slots",

@@ -7,8 +7,10 @@ use super::{
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
 
+pub const ID: &str = "tx_leakage";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "tx_leakage",
+    id: ID,
     card: "R1",
     stage: Stage::Receiver,
     title: "leakage from transmitters to receivers",

@@ -13,8 +13,10 @@ use crate::{
     room::{Boundary, Room},
 };
 
+pub const ID: &str = "wall_ghost";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "wall_ghost",
+    id: ID,
     card: "P4, P5",
     stage: Stage::Propagation,
     title: "the body's reflection in a wall",

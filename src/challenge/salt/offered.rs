@@ -1,6 +1,7 @@
 //! Which effects can be put onto samples alone, in which unit their strength is, and why the others cannot.
 
 use crate::challenge::library::{Graded, every};
+use crate::effects;
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
 
@@ -75,28 +76,54 @@ const REFUSED: &[(&str, &[&str])] = &[
     (
         PLACE,
         &[
-            "static_reflector",
-            "moving_reflector",
-            "carried_reflector",
-            "pose_offset",
-            "range_bias",
-            "radar_vibration",
+            effects::static_reflector::ID,
+            effects::moving_reflector::ID,
+            effects::carried_reflector::ID,
+            effects::pose_offset::ID,
+            effects::range_bias::ID,
+            effects::radar_vibration::ID,
             "lamp_modulation",
             "moving_curtain",
-            "antenna_position",
-            "antenna_pattern",
+            effects::antenna_position::ID,
+            effects::antenna_pattern::ID,
         ],
     ),
-    (BODY, &["breathing", "heartbeat", "clothing_delay", "part_reflectivity", "clock_offset", "clock_drift"]),
+    (
+        BODY,
+        &[
+            effects::breathing::ID,
+            effects::heartbeat::ID,
+            effects::clothing_delay::ID,
+            effects::part_reflectivity::ID,
+            effects::clock_offset::ID,
+            effects::clock_drift::ID,
+        ],
+    ),
     (
         PATHS,
-        &["wall_ghost", "floor_bounce", "object_radar_object", "range_alias", "soft_occlusion", "body_multibounce", "tdm_phase"],
+        &[
+            effects::wall_ghost::ID,
+            effects::floor_bounce::ID,
+            effects::object_radar_object::ID,
+            effects::range_alias::ID,
+            effects::soft_occlusion::ID,
+            effects::body_multibounce::ID,
+            effects::tdm_phase::ID,
+        ],
     ),
     (
         WINDOW,
-        &["slope_error", "chirp_nonlinearity", "chirp_ripple", "thermal_curvature", "if_highpass", "if_lowpass", "rx_mux_skew"],
+        &[
+            effects::slope_error::ID,
+            effects::chirp_nonlinearity::ID,
+            effects::chirp_ripple::ID,
+            "thermal_curvature",
+            effects::if_highpass::ID,
+            effects::if_lowpass::ID,
+            "rx_mux_skew",
+        ],
     ),
-    (DELAY, &["start_frequency_error", "adc_start_error", "if_delay"]),
+    (DELAY, &[effects::start_frequency_error::ID, effects::adc_start_error::ID, effects::if_delay::ID]),
 ];
 
 /// Fewest frames of which some can be lost: eight, and the six that the strongest gap takes.
@@ -113,14 +140,16 @@ pub fn refusal(id: &str, radar: &Radar, codes: bool) -> Option<&'static str> {
     }
     let chirps = radar.loops_per_frame * radar.tx_m.len();
     match id {
-        "iq_imbalance" if radar.sampling == Sampling::Real => Some("this receiver has no quadrature"),
-        "channel_mismatch" | "mutual_coupling" | "mux_crosstalk" | "correlated_noise" if radar.rx_m.len() < 2 => {
+        effects::iq_imbalance::ID if radar.sampling == Sampling::Real => Some("this receiver has no quadrature"),
+        effects::channel_mismatch::ID | effects::mutual_coupling::ID | "mux_crosstalk" | effects::correlated_noise::ID
+            if radar.rx_m.len() < 2 =>
+        {
             Some("this radar has a single receiver")
         }
-        "chirp_settling" if chirps < 2 => Some("a frame has a single chirp"),
+        effects::chirp_settling::ID if chirps < 2 => Some("a frame has a single chirp"),
         "chirp_afterglow" if radar.loops_per_frame < 2 => Some("a frame has a single chirp of each transmitter"),
         "gain_hop" if radar.frames < 2 => Some("there is a single frame"),
-        "frame_drop" if radar.frames < FEWEST_FRAMES => Some("there are fewer than 14 frames"),
+        effects::frame_drop::ID if radar.frames < FEWEST_FRAMES => Some("there are fewer than 14 frames"),
         "lsb_stuck" if !codes => Some("the samples are no whole codes"),
         _ => None,
     }
