@@ -94,7 +94,7 @@ fn index() -> String {
     for (name, infos) in by_stage() {
         let _ = write!(text, "\n## {name}\n\n| id | what it is | look-alikes |\n|---|---|---|\n");
         for info in infos {
-            let alike: Vec<String> = info.look_alikes.iter().map(|id| page::link(id)).collect();
+            let alike: Vec<String> = effects::look_alikes(info).map(|other| page::link(other.id)).collect();
             let _ = writeln!(text, "| {} | {} | {} |", page::link(info.id), info.title, alike.join(", "));
         }
     }

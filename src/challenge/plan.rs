@@ -100,7 +100,7 @@ impl Decks {
                 *deck = match stratum {
                     Stratum::Masked => library::MASKED.iter().collect(),
                     Stratum::Absorbed => library::ABSORBED.iter().filter_map(|id| library::graded(id)).collect(),
-                    Stratum::LookAlike => DECOYS.concat().into_iter().filter_map(library::graded).collect(),
+                    Stratum::LookAlike => DECOYS.into_iter().filter_map(library::graded).collect(),
                     Stratum::Outside => library::OUTSIDE.iter().collect(),
                     _ => library::library().collect(),
                 };

@@ -14,6 +14,7 @@ pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "C3",
     stage: Stage::Antenna,
+    needs_person: false,
     title: "the antennas' directivity",
     explanation: "The antennas send and receive less towards the side, so that echoes fade as the person leaves the boresight.",
     equation: "A_p → A_p (cos θ_p)^exponent, both ways together",

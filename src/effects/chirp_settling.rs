@@ -13,6 +13,7 @@ pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "",
     stage: Stage::Receiver,
+    needs_person: false,
     title: "chirps that settle at the start of a frame",
     explanation: "The first chirps of each frame are weaker until the radar has settled.",
     equation: "× 1 − depth e^{−m/chirps}, m counts the chirps of the frame",

@@ -15,6 +15,7 @@ pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "T2",
     stage: Stage::Body,
+    needs_person: true,
     title: "the heartbeat's motion of the chest",
     explanation: "The chest moves by a fraction of a millimetre with every beat of the heart.",
     equation: "p → p + n_p amplitude_m sin(2π rate_hz T + phase_rad) on the upper torso",

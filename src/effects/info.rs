@@ -64,6 +64,8 @@ pub struct EffectInfo {
     /// Of the catalogue of effects; empty where there is none.
     pub card: &'static str,
     pub stage: Stage,
+    /// Whether it changes the person's returns alone: a recording without a person cannot have it.
+    pub needs_person: bool,
     /// With its article: "the receiver's IF high-pass filter".
     pub title: &'static str,
     /// One plain sentence: what it is and what it does to the data.
@@ -71,8 +73,9 @@ pub struct EffectInfo {
     /// The term as it enters the IF signal; p counts paths, m chirps, n samples, T is the chirp's time.
     pub equation: &'static str,
     pub parameters: &'static [ParameterInfo],
-    /// Ids of effects that leave nearly the same trace.
-    pub look_alikes: &'static [&'static str],
+    /// Ids of effects that leave nearly the same trace. A pair stands once, with either of the two:
+    /// [`look_alikes`](super::look_alikes) has both directions.
+    pub(super) look_alikes: &'static [&'static str],
     /// The recording that would tell it from them.
     pub separate_by: &'static str,
 }

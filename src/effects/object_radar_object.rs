@@ -13,6 +13,7 @@ pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "R6",
     stage: Stage::Propagation,
+    needs_person: false,
     title: "a second trip between the scene and the radar",
     explanation: "Part of the echo is reflected by the radar itself and goes to the scene once more: everything appears again at twice the range and twice the speed, in every pair.",
     equation: "s_{t,r} → s_{t,r} + coefficient s_{t,0} s_{0,r} / reference",

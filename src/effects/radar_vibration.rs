@@ -15,6 +15,7 @@ pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "I2",
     stage: Stage::Scene,
+    needs_person: false,
     title: "a vibration of the radar",
     explanation: "The radar itself shakes along its boresight, so that all echoes, also those of the walls, swing in phase together.",
     equation: "s(T) → s(T) exp(j 4π amplitude_m sin(2π frequency_hz T + phase_rad) / λ)",

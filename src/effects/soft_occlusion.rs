@@ -14,6 +14,7 @@ pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "T7",
     stage: Stage::Propagation,
+    needs_person: true,
     title: "waves that bend around the body's edges",
     explanation: "A point is not suddenly hidden: its echo fades as its surface turns away, over the width that diffraction gives.",
     equation: "A_p → A_p (1 − exp(−cos²θ_p / width²)), θ_p between the normal and the line of sight",
