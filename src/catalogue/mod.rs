@@ -22,17 +22,19 @@ const ORIGIN: &str = "<!-- Written by `hybridsim effects --out docs/effects`. --
 /// The page that lists all.
 const INDEX: &str = "index.md";
 
-/// The stages in the order of the signal's way, with the words that people read.
-const STAGES: [(Stage, &str); 8] = [
-    (Stage::Timing, "Timing"),
-    (Stage::Scene, "Scene"),
-    (Stage::Body, "Body"),
-    (Stage::Propagation, "Propagation"),
-    (Stage::Waveform, "Chirp"),
-    (Stage::Antenna, "Antennas"),
-    (Stage::Receiver, "Receiver"),
-    (Stage::Noise, "Noise"),
-];
+/// A stage in the words that people read.
+fn heading(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Timing => "Timing",
+        Stage::Scene => "Scene",
+        Stage::Body => "Body",
+        Stage::Propagation => "Propagation",
+        Stage::Waveform => "Chirp",
+        Stage::Antenna => "Antennas",
+        Stage::Receiver => "Receiver",
+        Stage::Noise => "Noise",
+    }
+}
 
 /// One line an effect, by stage.
 pub fn table() -> String {
@@ -81,10 +83,8 @@ pub fn write(folder: &Path, done: &(dyn Fn() + Sync)) -> Result<()> {
     write_text(folder.join(INDEX), &index())
 }
 
-fn by_stage() -> impl Iterator<Item = (&'static str, Vec<&'static EffectInfo>)> {
-    STAGES.iter().map(|&(stage, name)| {
-        (name, effects::library().iter().filter(|info| info.stage == stage).copied().collect::<Vec<&'static EffectInfo>>())
-    })
+fn by_stage() -> impl Iterator<Item = (&'static str, &'static [&'static EffectInfo])> {
+    effects::library().chunk_by(|a, b| a.stage == b.stage).map(|infos| (heading(infos[0].stage), infos))
 }
 
 fn index() -> String {
@@ -94,7 +94,7 @@ fn index() -> String {
     for (name, infos) in by_stage() {
         let _ = write!(text, "\n## {name}\n\n| id | what it is | look-alikes |\n|---|---|---|\n");
         for info in infos {
-            let alike: Vec<String> = info.look_alikes.iter().map(|id| page::link(id)).collect();
+            let alike: Vec<String> = effects::look_alikes(info).map(|other| page::link(other.id)).collect();
             let _ = writeln!(text, "| {} | {} | {} |", page::link(info.id), info.title, alike.join(", "));
         }
     }

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::{ORIGIN, STAGES, Signature};
+use super::{ORIGIN, Signature, heading};
 use crate::diagnosis::report::never_detectable;
-use crate::effects::{EffectInfo, EffectSetting, ParameterInfo};
+use crate::effects::{EffectInfo, EffectSetting, ParameterInfo, look_alikes};
 
 /// To the page of an effect, from another page.
 pub(super) fn link(id: &str) -> String {
@@ -13,13 +13,13 @@ pub(super) fn link(id: &str) -> String {
 
 /// The page; the picture lies beside it.
 pub(super) fn markdown(info: &EffectInfo, signature: Option<&Signature>) -> String {
-    let stage = STAGES.iter().find(|(stage, _)| *stage == info.stage).map_or("", |(_, name)| name);
     let mut text = format!(
-        "{ORIGIN}\n# {}: {}\n\n{}\n\nStage: {}. Term of the IF signal:\n\n```text\n{}\n```\n",
+        "{ORIGIN}\n# {}: {}\n\n{}\n\nStage: {}.{} Term of the IF signal:\n\n```text\n{}\n```\n",
         info.id,
         info.title,
         info.explanation,
-        stage.to_lowercase(),
+        heading(info.stage).to_lowercase(),
+        if info.needs_person { " A recording without a person cannot have it." } else { "" },
         info.equation
     );
     text.push_str("\n| parameter | unit | neutral or start | prior |\n|---|---|---|---|\n");
@@ -31,14 +31,8 @@ pub(super) fn markdown(info: &EffectInfo, signature: Option<&Signature>) -> Stri
         let _ = write!(text, "\n## Signature\n\n![{}]({}.png)\n\n{}\n", info.title, info.id, signature.caption());
     }
     text.push_str("\n## Look-alikes\n\n");
-    match info.look_alikes {
-        [] => text.push_str("None in the library.\n"),
-        alike => {
-            for id in alike {
-                let title = crate::effects::info(id).map_or("", |info| info.title);
-                let _ = writeln!(text, "- {}: {title}", link(id));
-            }
-        }
+    for other in look_alikes(info) {
+        let _ = writeln!(text, "- {}: {}", link(other.id), other.title);
     }
     let _ = write!(text, "\nTo separate them: {}.\n", info.separate_by.trim_end_matches('.'));
     if let Some(never) = never_detectable(true).into_iter().find(|never| never.id == info.id) {

@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::data::Recording;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::statistics::exponential_scale;
+use crate::effects;
 use crate::error::Result;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
@@ -22,19 +23,19 @@ const MOST_ATOMS: usize = 3;
 
 /// Derivatives of the samples by an effect's parameter, at zero, as far as the samples themselves determine them.
 pub const TEMPLATES: [&str; 13] = [
-    "dc_offset",
-    "tx_leakage",
-    "iq_imbalance",
-    "second_harmonic",
-    "compression",
-    "chirp_droop",
-    "if_highpass",
-    "if_lowpass",
-    "slope_error",
-    "chirp_nonlinearity",
-    "gain_drift",
-    "chirp_settling",
-    "ramp_edge_transient",
+    effects::dc_offset::ID,
+    effects::tx_leakage::ID,
+    effects::iq_imbalance::ID,
+    effects::second_harmonic::ID,
+    effects::compression::ID,
+    effects::chirp_droop::ID,
+    effects::if_highpass::ID,
+    effects::if_lowpass::ID,
+    effects::slope_error::ID,
+    effects::chirp_nonlinearity::ID,
+    effects::gain_drift::ID,
+    effects::chirp_settling::ID,
+    effects::ramp_edge_transient::ID,
 ];
 
 /// Of one case.
@@ -123,21 +124,23 @@ fn template(k: usize, channel: &[Complex64], radar: &Radar, peak: f64, progress:
     let fast = |i: usize| (i % samples) as f64 / samples as f64 - 0.5;
     let map = |f: &dyn Fn(usize, Complex64) -> Complex64| channel.iter().enumerate().map(|(i, &y)| f(i, y)).collect();
     match TEMPLATES[k] {
-        "dc_offset" => vec![Complex64::from(peak); channel.len()],
-        "tx_leakage" => {
+        effects::dc_offset::ID => vec![Complex64::from(peak); channel.len()],
+        effects::tx_leakage::ID => {
             let cycles = 2.0 * 0.1 / SPEED_OF_LIGHT * radar.slope_hz_per_s / radar.sample_rate_hz;
             map(&|i, _| Complex64::cis(std::f64::consts::TAU * cycles * (i % samples) as f64) * peak)
         }
-        "iq_imbalance" => map(&|_, y| y.conj()),
-        "second_harmonic" => map(&|_, y| y * y / peak),
-        "compression" => map(&|_, y| y * (y.norm_sqr() / (peak * peak))),
-        "chirp_droop" => map(&|i, y| y * fast(i)),
-        "gain_drift" => map(&|_, y| y * progress),
-        "chirp_settling" => map(&|i, y| y * (-((i / samples) as f64) / 3.0).exp()),
-        "ramp_edge_transient" => map(&|i, _| if i % samples + 2 >= samples { Complex64::from(peak) } else { Complex64::ZERO }),
-        "if_highpass" => filtered(channel, samples, |f| Complex64::new(0.0, -1.0 / (f + 0.5))),
-        "if_lowpass" => filtered(channel, samples, |f| Complex64::new(0.0, f)),
-        "slope_error" => times(filtered(channel, samples, |f| Complex64::new(0.0, f)), fast),
+        effects::iq_imbalance::ID => map(&|_, y| y.conj()),
+        effects::second_harmonic::ID => map(&|_, y| y * y / peak),
+        effects::compression::ID => map(&|_, y| y * (y.norm_sqr() / (peak * peak))),
+        effects::chirp_droop::ID => map(&|i, y| y * fast(i)),
+        effects::gain_drift::ID => map(&|_, y| y * progress),
+        effects::chirp_settling::ID => map(&|i, y| y * (-((i / samples) as f64) / 3.0).exp()),
+        effects::ramp_edge_transient::ID => {
+            map(&|i, _| if i % samples + 2 >= samples { Complex64::from(peak) } else { Complex64::ZERO })
+        }
+        effects::if_highpass::ID => filtered(channel, samples, |f| Complex64::new(0.0, -1.0 / (f + 0.5))),
+        effects::if_lowpass::ID => filtered(channel, samples, |f| Complex64::new(0.0, f)),
+        effects::slope_error::ID => times(filtered(channel, samples, |f| Complex64::new(0.0, f)), fast),
         _ => times(filtered(channel, samples, |f| Complex64::new(0.0, f)), |i| fast(i).powi(2)),
     }
 }

@@ -10,6 +10,7 @@ use super::config::Stratum;
 use super::measure::Strength;
 use super::report::{Effect, Place, Report};
 use super::rules::{CONFIDENT, PLACE_M, RANGE_SLACK_M, look_alike, stage};
+use crate::effects;
 use crate::error::{Error, Result};
 
 /// What a case holds.
@@ -225,7 +226,7 @@ fn at_place(effect: &Value, place: &Place) -> bool {
 /// What a parameter of docs/report.md is by the recorder's numbers; none where the two are not comparable, because the
 /// report's unit is not fixed (amplitudes, levels of a direct current).
 fn true_value(id: &str, parameter: &str, effect: &Value) -> Option<Vec<f64>> {
-    if id == "dc_offset" || parameter == "amplitude" {
+    if id == effects::dc_offset::ID || parameter == "amplitude" {
         return None;
     }
     if parameter == "level_db" && effect["relative"].is_f64() {

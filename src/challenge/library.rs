@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use crate::effects;
 use crate::person::JOINT_NAMES;
 use crate::radar::Radar;
 use crate::recorder::effects::*;
@@ -108,7 +109,7 @@ fn per_receiver(at: &Surroundings, mut value: impl FnMut() -> f64) -> Vec<f64> {
 macro_rules! graded {
     ($($id:ident $weakest:literal $strongest:literal |$strength:ident, $at:ident, $random:ident| $value:expr;)*) => {
         &[$(Graded {
-            id: stringify!($id),
+            id: effects::$id::ID,
             weakest: $weakest,
             strongest: $strongest,
             add: |effects, $strength, $at, $random| { let _ = ($at, &$random); effects.$id = Some($value); },
@@ -117,12 +118,23 @@ macro_rules! graded {
 }
 
 macro_rules! listed {
-    ($($id:ident in $list:ident $weakest:literal $strongest:literal |$strength:ident, $at:ident, $random:ident| $value:expr;)*) => {
+    ($($id:ident $weakest:literal $strongest:literal |$strength:ident, $at:ident, $random:ident| $value:expr;)*) => {
         &[$(Graded {
-            id: stringify!($id),
+            id: effects::$id::ID,
             weakest: $weakest,
             strongest: $strongest,
-            add: |effects, $strength, $at, $random| { let _ = ($at, &$random); effects.$list.push($value); },
+            add: |effects, $strength, $at, $random| { let _ = ($at, &$random); effects.$id.push($value); },
+        }),*]
+    };
+}
+
+macro_rules! outside {
+    ($($kind:ident $weakest:literal $strongest:literal |$strength:ident, $at:ident, $random:ident| $value:expr;)*) => {
+        &[$(Graded {
+            id: Outside::$kind,
+            weakest: $weakest,
+            strongest: $strongest,
+            add: |effects, $strength, $at, $random| { let _ = ($at, &$random); effects.outside.push($value); },
         }),*]
     };
 }
@@ -198,21 +210,21 @@ const SINGLE: &[Graded] = graded! {
 
 /// Of the library, as many as one likes.
 const MANY: &[Graded] = listed! {
-    static_reflector in static_reflector 3e-3 3.0 |s, at, random| StaticReflector { position_m: place(at, random), amplitude: s };
-    moving_reflector in moving_reflector 3e-3 1.0 |s, at, random| MovingReflector {
+    static_reflector 3e-3 3.0 |s, at, random| StaticReflector { position_m: place(at, random), amplitude: s };
+    moving_reflector 3e-3 1.0 |s, at, random| MovingReflector {
         position_m: place(at, random),
         axis: [0.0, 1.0, 0.0],
         swing_m: between(0.03, 0.15, random),
         rate_hz: between(0.4, 2.0, random),
         amplitude: s,
     };
-    wall_ghost in wall_ghost 3e-3 0.7 |s, at, random| WallGhost { boundary: wall(at, random), coefficient: s * sign(random), order: 1 };
+    wall_ghost 3e-3 0.7 |s, at, random| WallGhost { boundary: wall(at, random), coefficient: s * sign(random), order: 1 };
 };
 
 /// Below returns of the person and the walls.
 pub const MASKED: &[Graded] = &[
     Graded {
-        id: "moving_reflector",
+        id: effects::moving_reflector::ID,
         weakest: 3e-3,
         strongest: 0.1,
         add: |effects, strength, at, random| {
@@ -226,7 +238,7 @@ pub const MASKED: &[Graded] = &[
         },
     },
     Graded {
-        id: "static_reflector",
+        id: effects::static_reflector::ID,
         weakest: 3e-3,
         strongest: 0.1,
         add: |effects, strength, at, random| {
@@ -239,7 +251,7 @@ pub const MASKED: &[Graded] = &[
         },
     },
     Graded {
-        id: "carried_reflector",
+        id: effects::carried_reflector::ID,
         weakest: 3e-3,
         strongest: 0.1,
         add: |effects, strength, _, random| {
@@ -248,7 +260,7 @@ pub const MASKED: &[Graded] = &[
         },
     },
     Graded {
-        id: "body_multibounce",
+        id: effects::body_multibounce::ID,
         weakest: 3e-3,
         strongest: 0.1,
         add: |effects, strength, _, random| {
@@ -256,7 +268,7 @@ pub const MASKED: &[Graded] = &[
         },
     },
     Graded {
-        id: "wall_ghost",
+        id: effects::wall_ghost::ID,
         weakest: 3e-3,
         strongest: 0.1,
         add: |effects, strength, at, random| {
@@ -265,7 +277,7 @@ pub const MASKED: &[Graded] = &[
         },
     },
     Graded {
-        id: "chirp_ripple",
+        id: effects::chirp_ripple::ID,
         weakest: 2e3,
         strongest: 1e5,
         add: |effects, strength, _, random| {
@@ -276,40 +288,40 @@ pub const MASKED: &[Graded] = &[
 
 /// Effects that learned amplitudes can absorb.
 pub const ABSORBED: [&str; 10] = [
-    "if_highpass",
-    "if_lowpass",
-    "antenna_pattern",
-    "part_reflectivity",
-    "start_frequency_error",
-    "clothing_delay",
-    "soft_occlusion",
-    "breathing",
-    "range_bias",
-    "chirp_droop",
+    effects::if_highpass::ID,
+    effects::if_lowpass::ID,
+    effects::antenna_pattern::ID,
+    effects::part_reflectivity::ID,
+    effects::start_frequency_error::ID,
+    effects::clothing_delay::ID,
+    effects::soft_occlusion::ID,
+    effects::breathing::ID,
+    effects::range_bias::ID,
+    effects::chirp_droop::ID,
 ];
 
 /// Effects outside the library: no id of docs/report.md names them.
-pub const OUTSIDE: &[Graded] = listed! {
-    mains_gain_ripple in outside 3e-4 0.2 |s, at, random| Outside::MainsGainRipple {
+pub const OUTSIDE: &[Graded] = outside! {
+    MAINS_GAIN_RIPPLE 3e-4 0.2 |s, at, random| Outside::MainsGainRipple {
         rate_hz: [50.0, 60.0, 100.0, 120.0][random.random_range(0..4)], depth: s
     };
-    lsb_stuck in outside 1.0 256.0 |s, at, random| Outside::LsbStuck {
+    LSB_STUCK 1.0 256.0 |s, at, random| Outside::LsbStuck {
         rx: random.random_range(0..at.receivers), bit: s.log2().round() as usize
     };
-    rx_mux_skew in outside 1e-3 0.3 |s, at, random| Outside::RxMuxSkew { fraction: s };
-    lamp_modulation in outside 3e-2 0.9 |s, at, random| Outside::LampModulation {
+    RX_MUX_SKEW 1e-3 0.3 |s, at, random| Outside::RxMuxSkew { fraction: s };
+    LAMP_MODULATION 3e-2 0.9 |s, at, random| Outside::LampModulation {
         position_m: [0.0, at.room.front_m.unwrap_or(5.0), 0.5], radius_m: 1.0, rate_hz: 100.0, depth: s
     };
-    moving_curtain in outside 1e-5 5e-3 |s, at, random| Outside::MovingCurtain {
+    MOVING_CURTAIN 1e-5 5e-3 |s, at, random| Outside::MovingCurtain {
         position_m: [between(-1.0, 1.0, random), at.room.front_m.unwrap_or(5.0), 0.0], radius_m: 0.8,
         rate_hz: between(0.2, 1.0, random), swing_m: s
     };
-    lo_pulling in outside 3e-3 1.0 |s, at, random| Outside::LoPulling { peak_rad: s };
-    thermal_curvature in outside 1e4 5e6 |s, at, random| Outside::ThermalCurvature { peak_hz: s };
-    gain_hop in outside 1e-2 3.0 |s, at, random| Outside::GainHop { rx: random.random_range(0..at.receivers), db: s };
-    mux_crosstalk in outside 1e-3 0.2 |s, at, random| Outside::MuxCrosstalk { level_db: db(s) };
-    chirp_afterglow in outside 1e-3 0.2 |s, at, random| Outside::ChirpAfterglow { level_db: db(s) };
-    buffer_slip in outside 1.0 16.0 |s, at, random| Outside::BufferSlip {
+    LO_PULLING 3e-3 1.0 |s, at, random| Outside::LoPulling { peak_rad: s };
+    THERMAL_CURVATURE 1e4 5e6 |s, at, random| Outside::ThermalCurvature { peak_hz: s };
+    GAIN_HOP 1e-2 3.0 |s, at, random| Outside::GainHop { rx: random.random_range(0..at.receivers), db: s };
+    MUX_CROSSTALK 1e-3 0.2 |s, at, random| Outside::MuxCrosstalk { level_db: db(s) };
+    CHIRP_AFTERGLOW 1e-3 0.2 |s, at, random| Outside::ChirpAfterglow { level_db: db(s) };
+    BUFFER_SLIP 1.0 16.0 |s, at, random| Outside::BufferSlip {
         frame: random.random_range(0..at.frames), rx: random.random_range(0..at.receivers), samples: s.round().max(1.0) as usize
     };
 };
@@ -334,6 +346,32 @@ mod tests {
 
     use super::*;
     use crate::recorder::{RadarChoice, RecorderConfig};
+
+    #[test]
+    fn the_recorder_and_the_library_agree_on_what_needs_a_person() {
+        let world = RecorderConfig::default().world(std::path::Path::new(".")).unwrap();
+        let at = Surroundings::new(&world.radar, world.room.clone(), 2.8);
+        for graded in library() {
+            let mut config = EffectsConfig::default();
+            (graded.add)(&mut config, graded.strength(1.0), &at, &mut ChaCha8Rng::seed_from_u64(0));
+            let needs_person = effects::info(graded.id).unwrap().needs_person;
+            assert_eq!(config.without_person().is_off(), needs_person, "{}", graded.id);
+        }
+    }
+
+    #[test]
+    fn every_kind_outside_the_library_is_graded_under_the_recorders_word() {
+        let world = RecorderConfig::default().world(std::path::Path::new(".")).unwrap();
+        let at = Surroundings::new(&world.radar, world.room.clone(), 2.8);
+        for graded in OUTSIDE {
+            let mut config = EffectsConfig::default();
+            (graded.add)(&mut config, graded.strength(1.0), &at, &mut ChaCha8Rng::seed_from_u64(0));
+            assert_eq!(config.outside[0].kind(), graded.id);
+            let written = serde_json::to_value(&config.outside[0]).unwrap();
+            assert_eq!(written["kind"], graded.id);
+            assert!(effects::info(graded.id).is_none(), "{}", graded.id);
+        }
+    }
 
     #[test]
     fn every_effect_is_within_the_recorders_bounds_at_both_ends() {

@@ -8,6 +8,7 @@ use super::config::{ChallengeConfig, Scenes, Stratum};
 use super::library::{self, Graded, Surroundings};
 use super::rules::DECOYS;
 use super::secret::Secret;
+use crate::effects;
 use crate::person::Placement;
 use crate::person::actions::{StyleConfig, placement};
 use crate::recorder::{ActorConfig, EffectsConfig, RadarChoice, RecorderConfig, SurfaceConfig, WallsConfig};
@@ -99,7 +100,7 @@ impl Decks {
                 *deck = match stratum {
                     Stratum::Masked => library::MASKED.iter().collect(),
                     Stratum::Absorbed => library::ABSORBED.iter().filter_map(|id| library::graded(id)).collect(),
-                    Stratum::LookAlike => DECOYS.concat().into_iter().filter_map(library::graded).collect(),
+                    Stratum::LookAlike => DECOYS.into_iter().filter_map(library::graded).collect(),
                     Stratum::Outside => library::OUTSIDE.iter().collect(),
                     _ => library::library().collect(),
                 };
@@ -119,7 +120,15 @@ impl Decks {
 
 /// Whether an effect has an amplitude that can be made as small as one likes and a d′ that follows it.
 pub fn scalable(id: &str) -> bool {
-    !matches!(id, "coloured_noise" | "impulsive_noise" | "correlated_noise" | "frame_drop" | "soft_occlusion" | "adc_saturation")
+    !matches!(
+        id,
+        effects::coloured_noise::ID
+            | effects::impulsive_noise::ID
+            | effects::correlated_noise::ID
+            | effects::frame_drop::ID
+            | effects::soft_occlusion::ID
+            | effects::adc_saturation::ID
+    )
 }
 
 fn between(bounds: [f64; 2], random: &mut ChaCha8Rng) -> f64 {

@@ -1,5 +1,7 @@
 //! What counts as what: fixed before any sealed run, and changed only with a new sealed set.
 
+use crate::effects;
+
 /// A name is confident from this probability on.
 pub const CONFIDENT: f64 = 0.8;
 /// An effect below this coherent d′ (square root of twice its energy over the noise's variance) cannot be detected by
@@ -21,71 +23,45 @@ pub const BASELINE_FALSE_ALARMS: f64 = 0.02;
 /// Effects that one recording cannot distinguish (R² ≥ 0.9 between what they do to its samples). Naming one of a set names them
 /// all.
 pub const LOOK_ALIKES: &[&[&str]] = &[
-    &["start_frequency_error", "adc_start_error", "if_delay", "if_lowpass"],
-    &["range_bias", "slope_error", "pose_offset"],
-    &["clock_offset", "pose_offset"],
-    &["phase_noise", "chirp_start_jitter"],
+    &[effects::start_frequency_error::ID, effects::adc_start_error::ID, effects::if_delay::ID, effects::if_lowpass::ID],
+    &[effects::range_bias::ID, effects::slope_error::ID, effects::pose_offset::ID],
+    &[effects::clock_offset::ID, effects::pose_offset::ID],
+    &[effects::phase_noise::ID, effects::chirp_start_jitter::ID],
 ];
 
-/// Effects that are easily taken for one another although a recording can distinguish them; decoys are drawn from these.
-pub const DECOYS: &[&[&str]] = &[
-    &["second_harmonic", "object_radar_object"],
-    &["iq_imbalance", "range_alias"],
-    &["chirp_ripple", "wall_ghost", "spur"],
-    &["radar_vibration", "breathing", "phase_noise"],
-    &["chirp_droop", "chirp_nonlinearity"],
-    &["tx_leakage", "dc_offset", "coloured_noise"],
-    &["compression", "adc_saturation"],
-    &["moving_reflector", "wall_ghost", "body_multibounce"],
-    &["gain_drift", "chirp_settling"],
-    &["channel_mismatch", "antenna_position", "mutual_coupling"],
-];
-
-/// The stage of an effect, as the table of docs/report.md has it.
-const STAGES: &[(&str, &[&str])] = &[
-    (
-        "waveform",
-        &[
-            "start_frequency_error",
-            "adc_start_error",
-            "slope_error",
-            "chirp_nonlinearity",
-            "chirp_ripple",
-            "phase_noise",
-            "chirp_start_jitter",
-        ],
-    ),
-    (
-        "receiver",
-        &[
-            "tx_leakage",
-            "dc_offset",
-            "iq_imbalance",
-            "compression",
-            "adc_saturation",
-            "second_harmonic",
-            "if_highpass",
-            "if_lowpass",
-            "if_delay",
-            "chirp_droop",
-            "ramp_edge_transient",
-            "chirp_settling",
-            "gain_drift",
-            "spur",
-            "interference",
-        ],
-    ),
-    ("antenna", &["channel_mismatch", "antenna_position", "antenna_pattern", "mutual_coupling"]),
-    ("timing", &["clock_offset", "clock_drift", "frame_drop", "tdm_phase"]),
-    ("scene", &["pose_offset", "range_bias", "static_reflector", "moving_reflector", "carried_reflector", "radar_vibration"]),
-    ("propagation", &["wall_ghost", "floor_bounce", "object_radar_object", "range_alias", "soft_occlusion", "body_multibounce"]),
-    ("body", &["breathing", "heartbeat", "clothing_delay", "part_reflectivity"]),
-    ("noise", &["coloured_noise", "impulsive_noise", "correlated_noise"]),
+/// Effects that are easily taken for a look-alike although a recording can distinguish the two. What stands here twice is drawn
+/// twice as often.
+pub const DECOYS: [&str; 25] = [
+    effects::second_harmonic::ID,
+    effects::object_radar_object::ID,
+    effects::iq_imbalance::ID,
+    effects::range_alias::ID,
+    effects::chirp_ripple::ID,
+    effects::wall_ghost::ID,
+    effects::spur::ID,
+    effects::radar_vibration::ID,
+    effects::breathing::ID,
+    effects::phase_noise::ID,
+    effects::chirp_droop::ID,
+    effects::chirp_nonlinearity::ID,
+    effects::tx_leakage::ID,
+    effects::dc_offset::ID,
+    effects::coloured_noise::ID,
+    effects::compression::ID,
+    effects::adc_saturation::ID,
+    effects::moving_reflector::ID,
+    effects::wall_ghost::ID,
+    effects::body_multibounce::ID,
+    effects::gain_drift::ID,
+    effects::chirp_settling::ID,
+    effects::channel_mismatch::ID,
+    effects::antenna_position::ID,
+    effects::mutual_coupling::ID,
 ];
 
 /// The stage of an id of docs/report.md; none for what is no such id.
 pub fn stage(id: &str) -> Option<&'static str> {
-    STAGES.iter().find(|(_, ids)| ids.contains(&id)).map(|(stage, _)| *stage)
+    effects::info(id).map(|info| info.stage.name())
 }
 
 /// Whether one recording cannot distinguish the two, or they are the same.
@@ -103,11 +79,14 @@ mod tests {
         for graded in library::library() {
             assert!(stage(graded.id).is_some(), "{}", graded.id);
         }
-        for id in LOOK_ALIKES.iter().chain(DECOYS).flat_map(|set| set.iter()) {
+        for id in LOOK_ALIKES.concat().iter().chain(&DECOYS) {
             assert!(library::graded(id).is_some(), "{id}");
         }
-        for graded in library::OUTSIDE {
-            assert!(stage(graded.id).is_none(), "{}", graded.id);
+        for set in LOOK_ALIKES {
+            for (id, other) in set.iter().flat_map(|id| set.iter().map(move |other| (id, other))).filter(|(a, b)| a != b) {
+                let known = effects::look_alikes(effects::info(id).unwrap()).any(|known| known.id == *other);
+                assert!(known, "{id} and {other}: the library does not say that they are look-alikes");
+            }
         }
         assert!(look_alike("if_delay", "adc_start_error") && !look_alike("if_delay", "spur"));
     }

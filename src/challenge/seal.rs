@@ -20,8 +20,10 @@ use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
 use super::sealing::{self, commit, one_case, published, set_times};
 use super::secret::Secret;
 use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, write_recording};
+use crate::effects;
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
+use crate::recorder::effects::Outside;
 use crate::recorder::{EffectsConfig, ReceiverConfig, Recorder, RecorderConfig, Returns, World};
 
 /// Attempts at what a kind of case asks for, after which the effect is taken as it is; what it then counts as is decided
@@ -113,7 +115,8 @@ struct Recorded {
 fn record(config: &ChallengeConfig, plan: &mut Plan) -> Result<Recorded> {
     let mut scene = plan.scene.clone();
     // What the converter does is not seen in samples that it never touched.
-    scene.receiver.adc = plan.effects.iter().any(|(graded, _)| matches!(graded.id, "adc_saturation" | "lsb_stuck"));
+    scene.receiver.adc =
+        plan.effects.iter().any(|(graded, _)| matches!(graded.id, effects::adc_saturation::ID | Outside::LSB_STUCK));
     let world = scene.world(Path::new("."))?;
     if plan.stratum == Stratum::Null || config.every.is_some() {
         let settings = RecorderConfig { effects: plan.planted(config), ..scene };

@@ -9,7 +9,7 @@ use super::course::Course;
 use super::cube::Cube;
 use super::prediction::BodyPrediction;
 use super::statistics::chi2_tail;
-use crate::effects::{self, EffectSetting};
+use crate::effects::{self, EffectSetting, Stage};
 use crate::radar::Radar;
 
 /// Half of a 90 % interval, in standard deviations of an error. These know of the noise, not of what the laws themselves leave out, so
@@ -41,7 +41,9 @@ impl Estimate {
 /// `where` of a report; what is absent was not localised along that axis: the effect acts everywhere on it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Place {
-    pub stage: String,
+    /// Empty where it was not asked.
+    #[serde(with = "word")]
+    pub stage: Option<Stage>,
     pub range_m: Option<[f64; 2]>,
     pub velocity_mps: Option<[f64; 2]>,
     pub azimuth_deg: Option<[f64; 2]>,
@@ -55,13 +57,30 @@ pub struct Place {
     pub body_part: Option<String>,
 }
 
+/// A stage as reports write it.
+mod word {
+    use serde::de::IntoDeserializer;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    use crate::effects::Stage;
+
+    pub fn serialize<S: Serializer>(stage: &Option<Stage>, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(stage.map_or("", Stage::name))
+    }
+
+    pub fn deserialize<'a, D: Deserializer<'a>>(deserializer: D) -> Result<Option<Stage>, D::Error> {
+        let word = String::deserialize(deserializer)?;
+        if word.is_empty() { Ok(None) } else { Stage::deserialize(word.into_deserializer()).map(Some) }
+    }
+}
+
 impl Place {
-    pub fn at(stage: &str) -> Self {
-        Self { stage: stage.into(), ..Self::default() }
+    pub fn at(stage: Stage) -> Self {
+        Self { stage: Some(stage), ..Self::default() }
     }
 
     /// Where some returns are, each of a range (m) and a velocity (m/s).
-    pub fn spanning(stage: &str, returns: impl Iterator<Item = (f64, f64)>) -> Self {
+    pub fn spanning(stage: Stage, returns: impl Iterator<Item = (f64, f64)>) -> Self {
         let (mut low, mut high, mut slow, mut fast) = (f64::INFINITY, 0.0f64, f64::INFINITY, f64::NEG_INFINITY);
         for (range, velocity) in returns {
             (low, high) = (low.min(range), high.max(range));
@@ -206,7 +225,7 @@ impl Candidate {
             let Some(parameter) = info.parameters.iter().find(|parameter| parameter.name == estimate.name) else { continue };
             let unit = match parameter.unit {
                 // Offsets are found in the recording's codes.
-                "of the reference" if info.id == "dc_offset" => reference,
+                "of the reference" if info.id == effects::dc_offset::ID => reference,
                 // Amplitudes of reflectors as they arrive, and the simulator wants them at one metre.
                 "recording's unit·m²" => 1.0 / (body_rms * self.range_m(radar)?.powi(2)).max(f64::MIN_POSITIVE),
                 _ => 1.0,
@@ -215,7 +234,7 @@ impl Candidate {
             if !parameter.is_relative() && values.iter().any(|value| !(parameter.least..=parameter.most).contains(value)) {
                 return None;
             }
-            if info.id == "antenna_position" {
+            if info.id == effects::antenna_position::ID {
                 // Found of the receivers along x; the operator moves all antennas along all axes.
                 let receivers = values.iter().flat_map(|&x| [x, 0.0, 0.0]);
                 values = std::iter::repeat_n(0.0, 3 * radar.tx_m.len()).chain(receivers).collect();
@@ -260,7 +279,7 @@ pub(crate) fn nameless(behaves_like: &'static str) -> Candidate {
         behaves_like,
         estimates: vec![],
         choice: None,
-        place: Place::at("receiver"),
+        place: Place::at(Stage::Receiver),
         p_value: 0.0,
         gain: 1.0,
         errs_alike: false,
@@ -282,11 +301,11 @@ mod tests {
             behaves_like: "additive fast-time",
             estimates,
             choice: None,
-            place: Place::at("receiver"),
+            place: Place::at(Stage::Receiver),
             p_value: 1e-9,
             gain: 30.0,
             errs_alike: true,
-            look_alikes: vec!["tx_leakage"],
+            look_alikes: vec![effects::tx_leakage::ID],
             statement: "Something.".into(),
             curve: None,
             energy: 1.0,
@@ -296,9 +315,9 @@ mod tests {
 
     #[test]
     fn a_value_beyond_its_operators_bounds_is_not_moved_to_them() {
-        let most = effects::info("clock_drift").unwrap().parameters[0].most;
+        let most = effects::info(effects::clock_drift::ID).unwrap().parameters[0].most;
         let setting = |value: f64| {
-            let found = candidate("clock_drift", vec![Estimate::normal("relative", value, 1e-3)]);
+            let found = candidate(effects::clock_drift::ID, vec![Estimate::normal("relative", value, 1e-3)]);
             found.setting(1.0, 1.0, &Radar::small(4)).map(|setting| setting.parameters["relative"].clone())
         };
         assert_eq!(setting(0.5 * most), Some(vec![0.5 * most]));
@@ -307,11 +326,11 @@ mod tests {
 
     #[test]
     fn what_may_be_of_no_size_has_no_name() {
-        let of = |estimates: Vec<Estimate>| candidate("dc_offset", estimates);
+        let of = |estimates: Vec<Estimate>| candidate(effects::dc_offset::ID, estimates);
         let i = |value: f64| Estimate::list("i", &[value, 0.1], &[1.0, 1.0]);
         let unsure = of(vec![i(0.5), Estimate::normal("q", -0.2, 1.0)]).named_if_sure();
         assert!(unsure.id.is_none() && unsure.look_alikes.is_empty() && unsure.statement.len() > 20);
-        assert_eq!(of(vec![i(5.0), Estimate::normal("q", -0.2, 1.0)]).named_if_sure().id, Some("dc_offset"));
-        assert_eq!(of(vec![]).named_if_sure().id, Some("dc_offset"));
+        assert_eq!(of(vec![i(5.0), Estimate::normal("q", -0.2, 1.0)]).named_if_sure().id, Some(effects::dc_offset::ID));
+        assert_eq!(of(vec![]).named_if_sure().id, Some(effects::dc_offset::ID));
     }
 }

@@ -14,7 +14,7 @@ use super::cube::Cube;
 use super::evidence::Evidence;
 use super::suspects::SUSPECTS;
 use crate::complex::Complex;
-use crate::effects::{Context, EffectSetting, Effects};
+use crate::effects::{self, Context, EffectSetting, Effects};
 
 /// Strengths between an effect's least and most.
 const STEPS: usize = 12;
@@ -40,35 +40,59 @@ const ALONG: &[&str] = &["along the chirp"];
 const PRODUCTS: &[&str] = &["non-linear receiver", "extra paths"];
 
 const SALTS: [Salt; 19] = [
-    Salt { id: "object_radar_object", suspects: PRODUCTS, least: 1e-4, most: 1.0, setting: |s, x, _| s.with("coefficient", [x]) },
     Salt {
-        id: "chirp_ripple",
+        id: effects::object_radar_object::ID,
+        suspects: PRODUCTS,
+        least: 1e-4,
+        most: 1.0,
+        setting: |s, x, _| s.with("coefficient", [x]),
+    },
+    Salt {
+        id: effects::chirp_ripple::ID,
         suspects: &["chirp"],
         least: 1e3,
         most: 3e6,
         setting: |s, x, _| s.with("deviation_hz", [x]).with("ripple_hz", [4e5]),
     },
-    Salt { id: "chirp_nonlinearity", suspects: ALONG, least: 3e4, most: 1e7, setting: |s, x, _| s.with("peak_hz", [x]) },
-    Salt { id: "chirp_droop", suspects: ALONG, least: 0.1, most: 12.0, setting: |s, x, _| s.with("db", [x]) },
-    Salt { id: "phase_noise", suspects: SLOW, least: 1e-4, most: 1.0, setting: |s, x, _| s.with("per_chirp_rad", [x]) },
-    Salt { id: "chirp_start_jitter", suspects: SLOW, least: 1e-11, most: 1e-7, setting: |s, x, _| s.with("jitter_s", [x]) },
     Salt {
-        id: "radar_vibration",
+        id: effects::chirp_nonlinearity::ID,
+        suspects: ALONG,
+        least: 3e4,
+        most: 1e7,
+        setting: |s, x, _| s.with("peak_hz", [x]),
+    },
+    Salt { id: effects::chirp_droop::ID, suspects: ALONG, least: 0.1, most: 12.0, setting: |s, x, _| s.with("db", [x]) },
+    Salt {
+        id: effects::phase_noise::ID,
+        suspects: SLOW,
+        least: 1e-4,
+        most: 1.0,
+        setting: |s, x, _| s.with("per_chirp_rad", [x]),
+    },
+    Salt {
+        id: effects::chirp_start_jitter::ID,
+        suspects: SLOW,
+        least: 1e-11,
+        most: 1e-7,
+        setting: |s, x, _| s.with("jitter_s", [x]),
+    },
+    Salt {
+        id: effects::radar_vibration::ID,
         suspects: SLOW,
         least: 1e-8,
         most: 1e-3,
         setting: |s, x, _| s.with("amplitude_m", [x]).with("frequency_hz", [20.0]),
     },
-    Salt { id: "gain_drift", suspects: SLOW, least: 1e-3, most: 6.0, setting: |s, x, _| s.with("db", [x]) },
+    Salt { id: effects::gain_drift::ID, suspects: SLOW, least: 1e-3, most: 6.0, setting: |s, x, _| s.with("db", [x]) },
     Salt {
-        id: "chirp_settling",
+        id: effects::chirp_settling::ID,
         suspects: SLOW,
         least: 1e-4,
         most: 0.6,
         setting: |s, x, _| s.with("depth", [x]).with("chirps", [4.0]),
     },
     Salt {
-        id: "channel_mismatch",
+        id: effects::channel_mismatch::ID,
         suspects: &["geometry"],
         least: 1e-2,
         most: 10.0,
@@ -79,32 +103,38 @@ const SALTS: [Salt; 19] = [
         },
     },
     Salt {
-        id: "mutual_coupling",
+        id: effects::mutual_coupling::ID,
         suspects: &["geometry"],
         least: 1e-3,
         most: 0.5,
         setting: |s, x, _| s.with("level_db", [db(x)]),
     },
     Salt {
-        id: "tx_leakage",
+        id: effects::tx_leakage::ID,
         suspects: STILL,
         least: 1e-5,
         most: 1.0,
         setting: |s, x, _| s.with("level_db", [db(x)]).with("range_m", [0.1]),
     },
     Salt {
-        id: "ramp_edge_transient",
+        id: effects::ramp_edge_transient::ID,
         suspects: STILL,
         least: 1e-4,
         most: 3.0,
         setting: |s, x, _| s.with("level_db", [db(x)]).with("samples", [2.0]),
     },
-    Salt { id: "dc_offset", suspects: STILL, least: 1e-6, most: 1.0, setting: |s, x, _| s.with("i", [x]) },
-    Salt { id: "if_highpass", suspects: STILL, least: 1e3, most: 1e6, setting: |s, x, _| s.with("corner_hz", [x]) },
-    Salt { id: "second_harmonic", suspects: PRODUCTS, least: 1e-5, most: 0.5, setting: |s, x, _| s.with("level_db", [db(x)]) },
-    Salt { id: "compression", suspects: PRODUCTS, least: 1e-4, most: 0.4, setting: |s, x, _| s.with("level", [x]) },
+    Salt { id: effects::dc_offset::ID, suspects: STILL, least: 1e-6, most: 1.0, setting: |s, x, _| s.with("i", [x]) },
+    Salt { id: effects::if_highpass::ID, suspects: STILL, least: 1e3, most: 1e6, setting: |s, x, _| s.with("corner_hz", [x]) },
     Salt {
-        id: "spur",
+        id: effects::second_harmonic::ID,
+        suspects: PRODUCTS,
+        least: 1e-5,
+        most: 0.5,
+        setting: |s, x, _| s.with("level_db", [db(x)]),
+    },
+    Salt { id: effects::compression::ID, suspects: PRODUCTS, least: 1e-4, most: 0.4, setting: |s, x, _| s.with("level", [x]) },
+    Salt {
+        id: effects::spur::ID,
         suspects: &["spur"],
         least: 1e-6,
         most: 1.0,
@@ -115,7 +145,7 @@ const SALTS: [Salt; 19] = [
         },
     },
     Salt {
-        id: "iq_imbalance",
+        id: effects::iq_imbalance::ID,
         suspects: &["quadrature image"],
         least: 1e-4,
         most: 3.0,

@@ -2,6 +2,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::diagnosis::{Candidate, Correction, Place, Volume};
+use crate::effects::Stage;
 use crate::radar::Radar;
 
 /// A return that stands still, whose samples have an image where nothing can stand.
@@ -23,7 +24,7 @@ fn without(image: Complex64) -> Candidate {
         behaves_like: "image",
         estimates: vec![],
         choice: None,
-        place: Place::at("receiver"),
+        place: Place::at(Stage::Receiver),
         p_value: 0.0,
         gain: 0.0,
         errs_alike: false,

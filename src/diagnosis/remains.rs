@@ -3,6 +3,7 @@
 use super::finding::{Candidate, Correction};
 use super::suspects::receiver::harmonic;
 use super::suspects::{excess, fluctuation, paths};
+use crate::effects::{self, Stage};
 
 /// What has no name is modelled roughly, and these are modelled most roughly of all: what they leave, up to this share of
 /// their gain, takes any shape; and they come after whatever gains more than it.
@@ -11,7 +12,7 @@ pub const ROUGHLY: f64 = 0.1;
 
 /// What is undone chirp by chirp, each by its own estimate, leaves a little of everything that moves: paths below this share
 /// of its gain.
-const BY_CHIRP: [&str; 2] = ["phase_noise", "chirp_start_jitter"];
+const BY_CHIRP: [&str; 2] = [effects::phase_noise::ID, effects::chirp_start_jitter::ID];
 const SLIGHTLY: f64 = 0.01;
 
 /// What a radar that vibrates leaves: turns of static clutter that are not quite undone, and their sidebands, up to this share of
@@ -21,23 +22,29 @@ const SHAKEN: f64 = 0.5;
 const FADING: &str = "slow-time gain";
 
 /// What is cut out where it is plain, and goes on below the noise.
-const BURSTS: [&str; 2] = ["interference", "impulsive_noise"];
+const BURSTS: [&str; 2] = [effects::interference::ID, effects::impulsive_noise::ID];
 
 /// And what a path that was taken out roughly leaves below the noise looks like the faintest of these, or like a faint path anywhere.
-const FAINT: [&str; 5] = ["interference", "chirp_start_jitter", "phase_noise", "correlated_noise", "spur"];
+const FAINT: [&str; 5] = [
+    effects::interference::ID,
+    effects::chirp_start_jitter::ID,
+    effects::phase_noise::ID,
+    effects::correlated_noise::ID,
+    effects::spur::ID,
+];
 
 /// Products of the signal with itself, of which either is hardly taken out in full: one that was never there makes the other.
-const PRODUCTS: [&str; 2] = ["object_radar_object", "second_harmonic"];
+const PRODUCTS: [&str; 2] = [effects::object_radar_object::ID, effects::second_harmonic::ID];
 
 /// What explains a little of anything that moves near the body: remains of a strong path that was taken out.
-const OF_REMAINS: [&str; 2] = ["body_multibounce", "carried_reflector"];
+const OF_REMAINS: [&str; 2] = [effects::body_multibounce::ID, effects::carried_reflector::ID];
 
 /// The body by way of a boundary.
-const IMAGES: [&str; 2] = ["floor_bounce", "wall_ghost"];
+const IMAGES: [&str; 2] = [effects::floor_bounce::ID, effects::wall_ghost::ID];
 
 /// Stage of what differs between receivers. It shows in the little that they do not have in common of the body: so does whatever a
 /// path, a turn or a wrong time left there.
-const OF_RECEIVERS: &str = "antenna";
+const OF_RECEIVERS: Stage = Stage::Antenna;
 
 /// Two instances of an effect closer than this are one.
 const NEAR_M: f64 = 0.3;
@@ -68,7 +75,7 @@ pub fn is_by_chirp(candidate: &Candidate) -> bool {
 
 /// Whether it differs between receivers: what others leave, or leaves what others are, unless those were there before.
 pub fn is_of_receivers(candidate: &Candidate) -> bool {
-    candidate.place.stage == OF_RECEIVERS
+    candidate.place.stage == Some(OF_RECEIVERS)
 }
 
 /// Whether it explains a little of whatever is near the body.
@@ -101,7 +108,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let by_chirp = is_by_chirp(accepted) && is_path(candidate);
     // How much the returns of each range turn when the radar moves is known roughly: sidebands are left of them; and large
     // turns change how much is received.
-    let vibrates = accepted.id == Some("radar_vibration");
+    let vibrates = accepted.id == Some(effects::radar_vibration::ID);
     let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
     // So of one return that is modulated, which reaches a little beyond its ranges.
     let around = accepted.place.range_m.map(|[near, far]| [near - NEAR_M, far + NEAR_M]);
@@ -117,19 +124,19 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside || of_drift;
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it
     // and among its images, and what a part may carry, the last resort, is never sure there.
-    let timed = accepted.place.stage == "timing";
+    let timed = accepted.place.stage == Some(Stage::Timing);
     let behind = timed && of_remains;
     let image = timed && is_one_of(candidate, &IMAGES);
-    let hardly = timed && candidate.id == Some("carried_reflector");
+    let hardly = timed && candidate.id == Some(effects::carried_reflector::ID);
     let products = is_product(accepted) && is_product(candidate);
     // What bursts leave below the noise of single samples is in all receivers at once.
-    let bursts = is_one_of(accepted, &BURSTS) && candidate.id == Some("correlated_noise");
+    let bursts = is_one_of(accepted, &BURSTS) && candidate.id == Some(effects::correlated_noise::ID);
     let path_like = accepted.behaves_like.starts_with(paths::PATH_LIKE);
     let faint = path_like && (is_one_of(candidate, &FAINT) || is_path(candidate));
     // What moves as no single reflector does was taken out along one track: what else of it moves with the body is left, and a line
     // where it stays longest.
     let no_single = is_path(accepted) && accepted.id.is_none();
-    let line = no_single && candidate.id == Some("spur");
+    let line = no_single && candidate.id == Some(effects::spur::ID);
     let rest = no_single && is_path(candidate);
     let smeared = vibrates || timed || is_by_chirp(accepted) || path_like;
     let uneven = (smeared || is_one_of(accepted, &OF_REMAINS)) && is_of_receivers(candidate);
@@ -150,12 +157,12 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
 /// Whether it is in the noise as an accepted correction mixes it, or in the products of a signal that is cut.
 fn is_mixed_or_cut(accepted: &Candidate, candidate: &Candidate) -> bool {
     // To undo a coupling of receivers mixes their noise, and chirps read between their samples have less of it.
-    let mixed = is_of_receivers(accepted) && candidate.id == Some("correlated_noise")
-        || accepted.id == Some("chirp_nonlinearity") && candidate.id == Some("coloured_noise");
+    let mixed = is_of_receivers(accepted) && candidate.id == Some(effects::correlated_noise::ID)
+        || accepted.id == Some(effects::chirp_nonlinearity::ID) && candidate.id == Some(effects::coloured_noise::ID);
     // A signal that is cut and cannot be restored has products of all returns along every chirp, and other ones in every receiver.
-    let cut = accepted.id == Some("adc_saturation")
+    let cut = accepted.id == Some(effects::adc_saturation::ID)
         && matches!(accepted.correction, Correction::None)
-        && (is_of_receivers(candidate) || candidate.place.stage == "waveform");
+        && (is_of_receivers(candidate) || candidate.place.stage == Some(Stage::Waveform));
     mixed || cut
 }
 
@@ -169,15 +176,15 @@ mod tests {
     use crate::diagnosis::Place;
 
     fn of(id: Option<&'static str>, behaves_like: &'static str, gain: f64) -> Candidate {
-        let place = Place::at("scene");
+        let place = Place::at(Stage::Scene);
         Candidate { id, gain, place, ..crate::diagnosis::finding::nameless(behaves_like) }
     }
 
     #[test]
     fn a_path_leaves_faint_tones_and_paths_and_one_without_a_law_leaves_more_of_itself() {
         let path = |id: Option<&'static str>, gain: f64| of(id, paths::PATH_LIKE, gain);
-        let spur = |gain: f64| of(Some("spur"), "tone", gain);
-        let image = path(Some("wall_ghost"), 1e4);
+        let spur = |gain: f64| of(Some(effects::spur::ID), "tone", gain);
+        let image = path(Some(effects::wall_ghost::ID), 1e4);
         assert!(is_left_by(&image, &spur(90.0)) && !is_left_by(&image, &spur(110.0)));
         // At another place: a second path may be there.
         let elsewhere = |id: Option<&'static str>, gain: f64| {
@@ -185,9 +192,9 @@ mod tests {
             path.place.range_m = Some([3.0, 4.0]);
             path
         };
-        let mut mover = path(Some("moving_reflector"), 1e4);
+        let mut mover = path(Some(effects::moving_reflector::ID), 1e4);
         mover.place.range_m = Some([1.0, 2.0]);
-        let ghost = |gain: f64| elsewhere(Some("wall_ghost"), gain);
+        let ghost = |gain: f64| elsewhere(Some(effects::wall_ghost::ID), gain);
         assert!(is_left_by(&mover, &ghost(90.0)) && !is_left_by(&mover, &ghost(110.0)));
         let no_law = Candidate { id: None, ..mover };
         assert!(is_left_by(&no_law, &ghost(4e3)) && !is_left_by(&no_law, &ghost(6e3)));

@@ -266,9 +266,7 @@ impl Effect {
             }
         }
         let mut place = candidate.place.clone();
-        if place.stage.is_empty() {
-            place.stage = info.map(|info| stage(info.stage).to_string()).unwrap_or_default();
-        }
+        place.stage = place.stage.or(info.map(|info| info.stage));
         Self {
             id: id.into(),
             probability: accepted.probability * (1.0 - candidate.p_value),
@@ -285,21 +283,6 @@ impl Effect {
             },
             separate_by: info.filter(|_| !accepted.rivals.is_empty()).map(|info| info.separate_by.into()),
         }
-    }
-}
-
-/// As docs/report.md writes a stage.
-pub fn stage(stage: effects::Stage) -> &'static str {
-    use effects::Stage;
-    match stage {
-        Stage::Scene => "scene",
-        Stage::Body => "body",
-        Stage::Propagation => "propagation",
-        Stage::Antenna => "antenna",
-        Stage::Waveform => "waveform",
-        Stage::Receiver => "receiver",
-        Stage::Timing => "timing",
-        Stage::Noise => "noise",
     }
 }
 
@@ -344,37 +327,49 @@ impl Findings {
     }
 }
 
-/// What no recording of this kind can show, whatever its size: ids and why.
-const NEVER: [(&[&str], &str); 5] = [
-    (
-        &["part_reflectivity"],
-        "a wrong reflectivity is only another amplitude, and amplitudes are free: no recording can show it without a prior",
-    ),
-    (
-        &["start_frequency_error", "adc_start_error", "if_delay"],
-        "all three only turn every return by a phase in proportion to its delay, and phases of returns are free: millimetres of the \
+/// What no recording of this kind can show, whatever its size, and why.
+struct Never {
+    ids: &'static [&'static str],
+    /// Only where somebody was tracked.
+    of_the_tracked: bool,
+    reason: &'static str,
+}
+
+const NEVER: [Never; 5] = [
+    Never {
+        ids: &[effects::part_reflectivity::ID],
+        of_the_tracked: false,
+        reason: "a wrong reflectivity is only another amplitude, and amplitudes are free: no recording can show it without a prior",
+    },
+    Never {
+        ids: &[effects::start_frequency_error::ID, effects::adc_start_error::ID, effects::if_delay::ID],
+        of_the_tracked: false,
+        reason: "all three only turn every return by a phase in proportion to its delay, and phases of returns are free: millimetres of the \
          mesh and of the room do the same; they would show only if known ranges were good to a fiftieth of a millimetre",
-    ),
-    (
-        &["antenna_pattern"],
-        "a factor that depends on direction alone is part of the amplitudes of whatever stands in that direction, and those are \
+    },
+    Never {
+        ids: &[effects::antenna_pattern::ID],
+        of_the_tracked: false,
+        reason: "a factor that depends on direction alone is part of the amplitudes of whatever stands in that direction, and those are \
          free; the same body would have to be seen from the same side in several directions",
-    ),
-    (
-        &["tdm_phase"],
-        "within the body's few velocities it is a phase of channels, which is reported as such (channel_mismatch); a faster target \
+    },
+    Never {
+        ids: &[effects::tdm_phase::ID],
+        of_the_tracked: false,
+        reason: "within the body's few velocities it is a phase of channels, which is reported as such (channel_mismatch); a faster target \
          would tell them apart",
-    ),
-    (
-        &["breathing", "heartbeat", "clothing_delay"],
-        "of a body whose motion is known to millimetres: the mesh's own error moves by as much, and as slowly; breath and heart \
+    },
+    Never {
+        ids: &[effects::breathing::ID, effects::heartbeat::ID, effects::clothing_delay::ID],
+        of_the_tracked: true,
+        reason: "of a body whose motion is known to millimetres: the mesh's own error moves by as much, and as slowly; breath and heart \
          are looked for only where nobody was tracked",
-    ),
+    },
 ];
 
 /// Effects that no recording of this kind can show; `body`: somebody was tracked.
 pub fn never_detectable(body: bool) -> Vec<NotDetectable> {
-    let applies = |id: &&&str| body || !matches!(**id, "breathing" | "heartbeat" | "clothing_delay");
     let entry = |id: &&str, reason: &str| NotDetectable { id: (*id).into(), at_most_db: None, reason: reason.into() };
-    NEVER.iter().flat_map(|(ids, reason)| ids.iter().filter(applies).map(|id| entry(id, reason))).collect()
+    let applying = NEVER.iter().filter(|never| body || !never.of_the_tracked);
+    applying.flat_map(|never| never.ids.iter().map(|id| entry(id, never.reason))).collect()
 }

@@ -6,6 +6,7 @@
 
 mod precedence;
 
+use crate::effects::{self, Stage};
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
@@ -50,14 +51,15 @@ const MOST_SURPLUS: f64 = 10.0;
 const NO_CHANCE: f64 = 1e-12;
 
 /// What undoing chirp by chirp leaves at the chirps' edges looks like these; a true one was there before.
-const LIKE_EDGES: [&str; 4] = ["ramp_edge_transient", "if_highpass", "if_lowpass", "if_delay"];
+const LIKE_EDGES: [&str; 4] =
+    [effects::ramp_edge_transient::ID, effects::if_highpass::ID, effects::if_lowpass::ID, effects::if_delay::ID];
 
 /// What gains less than this share of what it gained before a vibration was undone is what the vibration leaves; what gains more
 /// was there all along.
 const NEARLY: f64 = 0.8;
 
 /// What is named even where products of the signal with itself lie everywhere.
-const WHATEVER_THE_SIGNAL: [&str; 2] = ["iq_imbalance", "adc_saturation"];
+const WHATEVER_THE_SIGNAL: [&str; 2] = [effects::iq_imbalance::ID, effects::adc_saturation::ID];
 
 /// What raises the held-out frames' dB error by this factor as it is undone is not what happened.
 const FAR_WORSE: f64 = 1.6;
@@ -207,7 +209,7 @@ impl Rounds<'_> {
                 && self.accepted.iter().filter(|effect| effect.candidate.id == Some(id)).count() < MOST_ALIKE
         };
         let passes = || found.iter().filter(|suspicion| self.passes(suspicion));
-        let clocks_were_wrong = self.accepted.iter().any(|effect| effect.candidate.place.stage == "timing");
+        let clocks_were_wrong = self.accepted.iter().any(|effect| effect.candidate.place.stage == Some(Stage::Timing));
         let elsewhere = clocks_were_wrong || passes().any(|(_, candidate)| is_displaced(candidate));
         passes()
             .filter(|(suspect, _)| !(elsewhere && SUSPECTS[*suspect].trusts_the_place))
@@ -228,9 +230,9 @@ impl Rounds<'_> {
     /// was before; and a tone or a product that was there before is no remains.
     fn was_there(&self, effect: &Accepted, candidate: &Candidate) -> bool {
         let as_much = |&(id, gain): &(&str, f64)| candidate.id == Some(id) && candidate.gain > NEARLY * gain;
-        let vibrates = effect.candidate.id == Some("radar_vibration");
+        let vibrates = effect.candidate.id == Some(effects::radar_vibration::ID);
         let of_receivers = is_of_receivers(candidate) || is_of_receivers(&effect.candidate);
-        (vibrates || of_receivers || candidate.id == Some("spur") || is_product(candidate))
+        (vibrates || of_receivers || candidate.id == Some(effects::spur::ID) || is_product(candidate))
             && self.at_first.iter().flatten().any(as_much)
     }
 }
@@ -260,7 +262,7 @@ fn prior(id: &str) -> f64 {
     match id {
         // It must lie beyond the unambiguous range, and be stronger by the fourth power of that to be seen at all. Where it
         // is accepted itself, it was seen beyond the room.
-        "range_alias" => 0.1,
+        effects::range_alias::ID => 0.1,
         _ => 1.0,
     }
 }
@@ -331,7 +333,9 @@ fn again(
 ) -> Option<Candidate> {
     let effect = &accepted[index];
     // An image or a product of what the antennas do otherwise is that of the signal with it: what is in the receiver is undone first.
-    let before = |other: &Accepted| effect.candidate.place.stage == "receiver" && other.candidate.place.stage == "antenna";
+    let before = |other: &Accepted| {
+        effect.candidate.place.stage == Some(Stage::Receiver) && other.candidate.place.stage == Some(Stage::Antenna)
+    };
     let stands = |(other, accepted): &(usize, &Accepted)| *other != index && !without.contains(other) && !before(accepted);
     let others = accepted.iter().enumerate().filter(stands);
     let evidence = others.fold(original.clone(), |evidence, (_, effect)| evidence.with(&effect.candidate));

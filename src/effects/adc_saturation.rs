@@ -9,10 +9,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "adc_saturation";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "adc_saturation",
+    id: ID,
     card: "R4",
     stage: Stage::Receiver,
+    needs_person: false,
     title: "the converter's saturation",
     explanation: "Samples beyond the converter's rail are cut off: products of the strong echoes fill the map in the affected chirps.",
     equation: "Re s, Im s → clamped to ± level · reference",
@@ -20,7 +23,7 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("level", "of the reference", 10.0, 0.01, 10.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
-    look_alikes: &["compression", "interference"],
+    look_alikes: &["interference"],
     separate_by: "a lower receiver gain; the samples' histogram shows a pile at the rail",
 };
 

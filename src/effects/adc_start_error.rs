@@ -7,15 +7,18 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "adc_start_error";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "adc_start_error",
+    id: ID,
     card: "W4",
     stage: Stage::Waveform,
+    needs_person: false,
     title: "an error of the sampling window's start",
     explanation: "Sampling starts later than declared; the sampled part of the ramp is another one and all phases are wrong in proportion to the delay.",
     equation: "t → t + offset_s, that is × exp(j2π τ_p S offset_s)",
     parameters: &[parameter("offset_s", "s", 0.0, -1e-05, 1e-05)],
-    look_alikes: &["start_frequency_error", "if_delay", "if_lowpass"],
+    look_alikes: &["if_delay", "if_lowpass"],
     separate_by: "the same scene with another slope; never from one setting of the radar",
 };
 

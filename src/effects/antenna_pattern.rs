@@ -8,10 +8,13 @@ use super::{
     values::Values,
 };
 
+pub const ID: &str = "antenna_pattern";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "antenna_pattern",
+    id: ID,
     card: "C3",
     stage: Stage::Antenna,
+    needs_person: false,
     title: "the antennas' directivity",
     explanation: "The antennas send and receive less towards the side, so that echoes fade as the person leaves the boresight.",
     equation: "A_p → A_p (cos θ_p)^exponent, both ways together",

@@ -10,10 +10,13 @@ use crate::{
     radar::{Radar, SPEED_OF_LIGHT},
 };
 
+pub const ID: &str = "body_multibounce";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "body_multibounce",
+    id: ID,
     card: "T9",
     stage: Stage::Propagation,
+    needs_person: true,
     title: "echoes between parts of the body",
     explanation: "The wave goes from one part of the body to another before it returns: a faint second body, a little behind the first.",
     equation: "+ coefficient s_body(τ + 2 extra_m / c)",
@@ -22,7 +25,7 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("coefficient", "1", 0.0, -1.0, 1.0),
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
-    look_alikes: &["floor_bounce", "wall_ghost"],
+    look_alikes: &[],
     separate_by: "arms held away from the body, legs apart",
 };
 

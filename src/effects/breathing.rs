@@ -9,10 +9,13 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "breathing";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "breathing",
+    id: ID,
     card: "T1",
     stage: Stage::Body,
+    needs_person: true,
     title: "the chest's breathing",
     explanation: "The torso's surface moves in and out by a few millimetres as the person breathes, which the motion does not hold.",
     equation: "p → p + n_p amplitude_m sin(2π rate_hz T + phase_rad) on the torso",
@@ -21,7 +24,7 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("amplitude_m", "m", 0.0, 0.0, 0.012),
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
-    look_alikes: &["pose_offset", "clock_drift", "radar_vibration"],
+    look_alikes: &["pose_offset"],
     separate_by: "a person who stands still, and a breath held on command",
 };
 

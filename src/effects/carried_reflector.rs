@@ -12,10 +12,13 @@ use crate::{
     radar::Radar,
 };
 
+pub const ID: &str = "carried_reflector";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "carried_reflector",
+    id: ID,
     card: "",
     stage: Stage::Scene,
+    needs_person: true,
     title: "an object that the person carries",
     explanation: "The person carries something that reflects, such as a telephone or keys: an echo that moves with one part of the body.",
     equation: "+ amplitude e^{jφ} exp j2π(f_c τ + S t τ) / (d_tx d_rx), τ from the point in the middle of the body part",

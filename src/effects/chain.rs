@@ -39,50 +39,55 @@ pub(super) enum Operator {
 pub(super) fn operator(id: &str) -> Operator {
     use Operator::{Amplitude, Displacement, Frame, Noise, Paths, Signal};
     match id {
-        "frame_drop" => Frame,
-        "clock_offset" => Displacement(clock_offset::displace),
-        "clock_drift" => Displacement(clock_drift::displace),
-        "tdm_phase" => Displacement(tdm_phase::displace),
-        "pose_offset" => Displacement(pose_offset::displace),
-        "breathing" => Displacement(breathing::displace),
-        "heartbeat" => Displacement(heartbeat::displace),
-        "clothing_delay" => Displacement(clothing_delay::displace),
-        "part_reflectivity" => Amplitude(part_reflectivity::weigh),
-        "soft_occlusion" => Amplitude(soft_occlusion::weigh),
-        "antenna_pattern" => Amplitude(antenna_pattern::weigh),
-        "static_reflector" | "moving_reflector" | "carried_reflector" | "wall_ghost" | "floor_bounce" | "body_multibounce"
-        | "antenna_position" => Paths,
-        "range_bias" => Signal(range_bias::apply),
-        "radar_vibration" => Signal(radar_vibration::apply),
-        "object_radar_object" => Signal(object_radar_object::apply),
-        "range_alias" => Signal(range_alias::apply),
-        "start_frequency_error" => Signal(start_frequency_error::apply),
-        "adc_start_error" => Signal(adc_start_error::apply),
-        "slope_error" => Signal(slope_error::apply),
-        "chirp_nonlinearity" => Signal(chirp_nonlinearity::apply),
-        "chirp_ripple" => Signal(chirp_ripple::apply),
-        "phase_noise" => Signal(phase_noise::apply),
-        "chirp_start_jitter" => Signal(chirp_start_jitter::apply),
-        "channel_mismatch" => Signal(channel_mismatch::apply),
-        "mutual_coupling" => Signal(mutual_coupling::apply),
-        "tx_leakage" => Signal(tx_leakage::apply),
-        "chirp_droop" => Signal(chirp_droop::apply),
-        "chirp_settling" => Signal(chirp_settling::apply),
-        "gain_drift" => Signal(gain_drift::apply),
-        "interference" => Signal(interference::apply),
-        "second_harmonic" => Signal(second_harmonic::apply),
-        "compression" => Signal(compression::apply),
-        "if_delay" => Signal(if_delay::apply),
-        "if_highpass" => Signal(if_highpass::apply),
-        "if_lowpass" => Signal(if_lowpass::apply),
-        "spur" => Signal(spur::apply),
-        "ramp_edge_transient" => Signal(ramp_edge_transient::apply),
-        "iq_imbalance" => Signal(iq_imbalance::apply),
-        "dc_offset" => Signal(dc_offset::apply),
-        "adc_saturation" => Signal(adc_saturation::apply),
-        "coloured_noise" => Noise(coloured_noise::shape),
-        "impulsive_noise" => Noise(impulsive_noise::shape),
-        "correlated_noise" => Noise(correlated_noise::shape),
+        frame_drop::ID => Frame,
+        clock_offset::ID => Displacement(clock_offset::displace),
+        clock_drift::ID => Displacement(clock_drift::displace),
+        tdm_phase::ID => Displacement(tdm_phase::displace),
+        pose_offset::ID => Displacement(pose_offset::displace),
+        breathing::ID => Displacement(breathing::displace),
+        heartbeat::ID => Displacement(heartbeat::displace),
+        clothing_delay::ID => Displacement(clothing_delay::displace),
+        part_reflectivity::ID => Amplitude(part_reflectivity::weigh),
+        soft_occlusion::ID => Amplitude(soft_occlusion::weigh),
+        antenna_pattern::ID => Amplitude(antenna_pattern::weigh),
+        static_reflector::ID
+        | moving_reflector::ID
+        | carried_reflector::ID
+        | wall_ghost::ID
+        | floor_bounce::ID
+        | body_multibounce::ID
+        | antenna_position::ID => Paths,
+        range_bias::ID => Signal(range_bias::apply),
+        radar_vibration::ID => Signal(radar_vibration::apply),
+        object_radar_object::ID => Signal(object_radar_object::apply),
+        range_alias::ID => Signal(range_alias::apply),
+        start_frequency_error::ID => Signal(start_frequency_error::apply),
+        adc_start_error::ID => Signal(adc_start_error::apply),
+        slope_error::ID => Signal(slope_error::apply),
+        chirp_nonlinearity::ID => Signal(chirp_nonlinearity::apply),
+        chirp_ripple::ID => Signal(chirp_ripple::apply),
+        phase_noise::ID => Signal(phase_noise::apply),
+        chirp_start_jitter::ID => Signal(chirp_start_jitter::apply),
+        channel_mismatch::ID => Signal(channel_mismatch::apply),
+        mutual_coupling::ID => Signal(mutual_coupling::apply),
+        tx_leakage::ID => Signal(tx_leakage::apply),
+        chirp_droop::ID => Signal(chirp_droop::apply),
+        chirp_settling::ID => Signal(chirp_settling::apply),
+        gain_drift::ID => Signal(gain_drift::apply),
+        interference::ID => Signal(interference::apply),
+        second_harmonic::ID => Signal(second_harmonic::apply),
+        compression::ID => Signal(compression::apply),
+        if_delay::ID => Signal(if_delay::apply),
+        if_highpass::ID => Signal(if_highpass::apply),
+        if_lowpass::ID => Signal(if_lowpass::apply),
+        spur::ID => Signal(spur::apply),
+        ramp_edge_transient::ID => Signal(ramp_edge_transient::apply),
+        iq_imbalance::ID => Signal(iq_imbalance::apply),
+        dc_offset::ID => Signal(dc_offset::apply),
+        adc_saturation::ID => Signal(adc_saturation::apply),
+        coloured_noise::ID => Noise(coloured_noise::shape),
+        impulsive_noise::ID => Noise(impulsive_noise::shape),
+        correlated_noise::ID => Noise(correlated_noise::shape),
         _ => panic!("no effect {id}"),
     }
 }
@@ -126,7 +131,7 @@ impl Effects {
 
     /// Switches off what is not linear in the signal.
     pub fn switch_off_nonlinear(&mut self) {
-        for id in ["object_radar_object", "second_harmonic", "compression", "adc_saturation"] {
+        for id in [object_radar_object::ID, second_harmonic::ID, compression::ID, adc_saturation::ID] {
             self.switch_off(Some(id));
         }
     }
@@ -134,15 +139,15 @@ impl Effects {
     /// Switches off what adds to silence.
     pub fn switch_off_additive(&mut self) {
         for id in [
-            "static_reflector",
-            "moving_reflector",
-            "carried_reflector",
-            "range_alias",
-            "tx_leakage",
-            "interference",
-            "spur",
-            "ramp_edge_transient",
-            "dc_offset",
+            static_reflector::ID,
+            moving_reflector::ID,
+            carried_reflector::ID,
+            range_alias::ID,
+            tx_leakage::ID,
+            interference::ID,
+            spur::ID,
+            ramp_edge_transient::ID,
+            dc_offset::ID,
         ] {
             self.switch_off(Some(id));
         }
@@ -163,12 +168,12 @@ impl Effects {
 
     /// How many frames later than its number a frame shows the scene.
     pub fn frame_shift(&self, frame: usize, device: &Device) -> usize {
-        self.named("frame_drop").map(|effect| frame_drop::shift(&effect.values(device, DType::F32), frame)).sum()
+        self.named(frame_drop::ID).map(|effect| frame_drop::shift(&effect.values(device, DType::F32), frame)).sum()
     }
 
     /// Whether [`BodyPoints::velocity`] is needed.
     pub fn needs_velocity(&self) -> bool {
-        ["clock_offset", "clock_drift", "tdm_phase"].into_iter().any(|id| self.has(id))
+        [clock_offset::ID, clock_drift::ID, tdm_phase::ID].into_iter().any(|id| self.has(id))
     }
 
     /// Whether anything acts on the body's points one by one.
@@ -206,7 +211,7 @@ impl Effects {
 
     /// The direct signal of points, with the antennas where they are: `[rx, chirp, sample]`.
     pub fn direct_signal(&self, points: Points, radar: &Radar, tx: usize, dechirp: Dechirp, form: SumForm) -> Complex<3> {
-        match self.named("antenna_position").next() {
+        match self.named(antenna_position::ID).next() {
             Some(effect) => {
                 let values = effect.values(&points.displacement.x.device(), points.displacement.x.dtype());
                 antenna_position::direct_signal(points, &values, radar, tx, dechirp, form)
@@ -233,9 +238,9 @@ impl Effects {
         let parts = self.enabled().filter_map(|effect| {
             let values = || effect.values(&device, dtype);
             match effect.id() {
-                "wall_ghost" => wall_ghost::signal(points, &values(), room?, radar, tx, dechirp, form),
-                "floor_bounce" => floor_bounce::signal(points, &values(), room?, radar, tx, dechirp, form),
-                "body_multibounce" => Some(body_multibounce::echo(direct.clone(), &values(), radar)),
+                wall_ghost::ID => wall_ghost::signal(points, &values(), room?, radar, tx, dechirp, form),
+                floor_bounce::ID => floor_bounce::signal(points, &values(), room?, radar, tx, dechirp, form),
+                body_multibounce::ID => Some(body_multibounce::echo(direct.clone(), &values(), radar)),
                 _ => None,
             }
         });
@@ -258,8 +263,8 @@ impl Effects {
         let parts = self.enabled().filter_map(|effect| {
             let values = || effect.values(options.0, options.1);
             match effect.id() {
-                "static_reflector" => Some(static_reflector::signal(&values(), radar, tx, dechirp, form)),
-                "moving_reflector" => Some(moving_reflector::signal(&values(), times_s, radar, tx, dechirp, form)),
+                static_reflector::ID => Some(static_reflector::signal(&values(), radar, tx, dechirp, form)),
+                moving_reflector::ID => Some(moving_reflector::signal(&values(), times_s, radar, tx, dechirp, form)),
                 _ => None,
             }
         });
@@ -268,7 +273,7 @@ impl Effects {
 
     /// Objects that the body carries, each with its part of the body.
     pub fn carried(&self) -> impl Iterator<Item = (&Effect, Option<&str>)> {
-        self.named("carried_reflector").map(|effect| (effect, effect.choice()))
+        self.named(carried_reflector::ID).map(|effect| (effect, effect.choice()))
     }
 
     /// All that happens to the sum of the paths, `[tx, rx, loop, sample]`.

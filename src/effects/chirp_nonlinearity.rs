@@ -7,10 +7,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "chirp_nonlinearity";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "chirp_nonlinearity",
+    id: ID,
     card: "W6",
     stage: Stage::Waveform,
+    needs_person: false,
     title: "a bend of the chirp",
     explanation: "The ramp is not straight: an echo is smeared over ranges, the more the farther it is.",
     equation: "× exp(j2π τ_p δf(t)), δf = Σ_k peak_hz[k] P_{k+2}(x), x = −1 … 1 over the window",

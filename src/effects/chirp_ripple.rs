@@ -9,10 +9,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "chirp_ripple";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "chirp_ripple",
+    id: ID,
     card: "W7",
     stage: Stage::Waveform,
+    needs_person: false,
     title: "a ripple of the chirp's frequency",
     explanation: "The ramp's frequency swings periodically: every echo gets a pair of fainter ones, before and behind, whose strength grows with range.",
     equation: "× exp(j2π τ_p deviation_hz sin(2π ripple_hz t + phase_rad))",
@@ -21,7 +24,7 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("ripple_hz", "Hz", 200000.0, 10000.0, 5000000.0),
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
-    look_alikes: &["wall_ghost", "spur", "chirp_nonlinearity"],
+    look_alikes: &["wall_ghost", "spur"],
     separate_by: "move the target: the pair keeps its distance and grows with range; a spur stays where it is",
 };
 

@@ -7,10 +7,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "chirp_settling";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "chirp_settling",
+    id: ID,
     card: "",
     stage: Stage::Receiver,
+    needs_person: false,
     title: "chirps that settle at the start of a frame",
     explanation: "The first chirps of each frame are weaker until the radar has settled.",
     equation: "× 1 − depth e^{−m/chirps}, m counts the chirps of the frame",

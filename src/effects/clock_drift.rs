@@ -7,10 +7,13 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "clock_drift";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "clock_drift",
+    id: ID,
     card: "G3",
     stage: Stage::Timing,
+    needs_person: true,
     title: "a difference in rate between the radar's clock and the motion's",
     explanation: "One of the two clocks is faster, so that the body's displacement along its velocity grows with time.",
     equation: "τ_p(T) → τ_p(T (1 + relative))",

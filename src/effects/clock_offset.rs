@@ -7,10 +7,13 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "clock_offset";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "clock_offset",
+    id: ID,
     card: "G2",
     stage: Stage::Timing,
+    needs_person: true,
     title: "an offset between the radar's clock and the motion's",
     explanation: "The motion was filmed by another clock: at each chirp the body is where it will be, or was, a moment later; every moving part is displaced along its velocity.",
     equation: "τ_p(T) → τ_p(T + offset_s)",

@@ -7,15 +7,18 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "clothing_delay";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "clothing_delay",
+    id: ID,
     card: "T3",
     stage: Stage::Body,
+    needs_person: true,
     title: "an extra delay on clothed parts of the body",
     explanation: "Cloth and hair delay the wave on its way to the skin, so that the parts beneath seem farther away than the mesh.",
     equation: "τ_p → τ_p + 2 extra_m / c on the clothed part",
     parameters: &[parameter("extra_m", "m", 0.0, -0.01, 0.01)],
-    look_alikes: &["pose_offset", "range_bias"],
+    look_alikes: &["range_bias"],
     separate_by: "the same motion with and without the coat",
 };
 

@@ -8,10 +8,13 @@ use super::{
 };
 use crate::{complex::Complex, radar::Radar};
 
+pub const ID: &str = "coloured_noise";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "coloured_noise",
+    id: ID,
     card: "V2",
     stage: Stage::Noise,
+    needs_person: false,
     title: "noise that is stronger at low frequencies",
     explanation: "The receiver's noise is not the same at all beat frequencies: the floor rises towards short ranges.",
     equation: "noise power × 1 + (knee_hz/f)^power",

@@ -6,10 +6,13 @@ use super::{
 };
 use crate::{complex::Complex, if_signal::noise, radar::Radar};
 
+pub const ID: &str = "correlated_noise";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "correlated_noise",
+    id: ID,
     card: "V4",
     stage: Stage::Noise,
+    needs_person: false,
     title: "noise that the receivers have in common",
     explanation: "Supply or oscillator noise reaches all receivers at once: a faint echo from one direction in every cell.",
     equation: "n_r → n_r + coefficient n_common",

@@ -7,10 +7,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "dc_offset";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "dc_offset",
+    id: ID,
     card: "R2",
     stage: Stage::Receiver,
+    needs_person: false,
     title: "a constant offset of the receivers",
     explanation: "Each receiver's output has a constant offset: a line at range zero and speed zero.",
     equation: "s_r → s_r + reference (i_r + j q_r)",
@@ -19,7 +22,7 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("q", "of the reference", 0.0, -1.0, 1.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
-    look_alikes: &["tx_leakage"],
+    look_alikes: &[],
     separate_by: "several transmitters: an offset is the same for all of them, leakage is not",
 };
 

@@ -5,10 +5,13 @@ use super::{
     values::Values,
 };
 
+pub const ID: &str = "frame_drop";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "frame_drop",
+    id: ID,
     card: "G4",
     stage: Stage::Timing,
+    needs_person: false,
     title: "frames that were lost",
     explanation: "Frames are missing from the recording, so that from there on every frame shows the body later than its number says.",
     equation: "T_k → T_k + count·T_F for k ≥ at",

@@ -7,15 +7,18 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "gain_drift";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "gain_drift",
+    id: ID,
     card: "W10",
     stage: Stage::Receiver,
+    needs_person: false,
     title: "a gain that changes with time",
     explanation: "Temperature or a recalibration changes the gain of all echoes in the course of the recording.",
     equation: "× 10^{db(T)/20}, db piecewise linear over the frames",
     parameters: &[parameter("db", "dB", 0.0, -20.0, 20.0)],
-    look_alikes: &["chirp_settling", "part_reflectivity", "compression"],
+    look_alikes: &["part_reflectivity", "compression"],
     separate_by: "a wall in view: its echo changes along with the body's; a step has a date, a drift has none",
 };
 

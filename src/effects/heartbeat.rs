@@ -9,10 +9,13 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "heartbeat";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "heartbeat",
+    id: ID,
     card: "T2",
     stage: Stage::Body,
+    needs_person: true,
     title: "the heartbeat's motion of the chest",
     explanation: "The chest moves by a fraction of a millimetre with every beat of the heart.",
     equation: "p → p + n_p amplitude_m sin(2π rate_hz T + phase_rad) on the upper torso",

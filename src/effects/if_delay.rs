@@ -7,15 +7,18 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "if_delay";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "if_delay",
+    id: ID,
     card: "W3",
     stage: Stage::Receiver,
+    needs_person: false,
     title: "a delay in the IF chain",
     explanation: "The IF chain delays the signal, so that each beat is sampled late: a phase in proportion to range.",
     equation: "s(t) → s(t − delay_s), that is × exp(−j2π S τ_p delay_s)",
     parameters: &[parameter("delay_s", "s", 0.0, -1e-06, 1e-06)],
-    look_alikes: &["start_frequency_error", "adc_start_error", "if_lowpass"],
+    look_alikes: &["if_lowpass"],
     separate_by: "the same scene with another slope; never from one setting of the radar",
 };
 

@@ -7,10 +7,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "if_highpass";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "if_highpass",
+    id: ID,
     card: "R7",
     stage: Stage::Receiver,
+    needs_person: false,
     title: "the receiver's IF high-pass filter",
     explanation: "A filter that keeps leakage out also weakens near echoes and turns their phase, the more the nearer they are.",
     equation: "× [(j f_b/corner_hz) / (1 + j f_b/corner_hz)]^order, f_b = S τ",

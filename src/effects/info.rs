@@ -27,18 +27,34 @@ pub(super) const fn parameter(name: &'static str, unit: &'static str, neutral: f
     ParameterInfo { name, unit, neutral, least, most }
 }
 
-/// Where in the signal's way an effect acts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+/// Where in the signal's way an effect acts, in the order of that way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
+    Timing,
     Scene,
     Body,
     Propagation,
-    Antenna,
     Waveform,
+    Antenna,
     Receiver,
-    Timing,
     Noise,
+}
+
+impl Stage {
+    /// As reports write it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Timing => "timing",
+            Self::Scene => "scene",
+            Self::Body => "body",
+            Self::Propagation => "propagation",
+            Self::Waveform => "waveform",
+            Self::Antenna => "antenna",
+            Self::Receiver => "receiver",
+            Self::Noise => "noise",
+        }
+    }
 }
 
 /// An effect as the library describes it.
@@ -48,6 +64,8 @@ pub struct EffectInfo {
     /// Of the catalogue of effects; empty where there is none.
     pub card: &'static str,
     pub stage: Stage,
+    /// Whether it changes the person's returns alone: a recording without a person cannot have it.
+    pub needs_person: bool,
     /// With its article: "the receiver's IF high-pass filter".
     pub title: &'static str,
     /// One plain sentence: what it is and what it does to the data.
@@ -55,8 +73,9 @@ pub struct EffectInfo {
     /// The term as it enters the IF signal; p counts paths, m chirps, n samples, T is the chirp's time.
     pub equation: &'static str,
     pub parameters: &'static [ParameterInfo],
-    /// Ids of effects that leave nearly the same trace.
-    pub look_alikes: &'static [&'static str],
+    /// Ids of effects that leave nearly the same trace. A pair stands once, with either of the two:
+    /// [`look_alikes`](super::look_alikes) has both directions.
+    pub(super) look_alikes: &'static [&'static str],
     /// The recording that would tell it from them.
     pub separate_by: &'static str,
 }

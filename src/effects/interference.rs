@@ -12,10 +12,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "interference";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "interference",
+    id: ID,
     card: "I1",
     stage: Stage::Receiver,
+    needs_person: false,
     title: "bursts from another radar",
     explanation: "Another radar's chirp crosses ours now and then: short bursts in single chirps, over all ranges.",
     equation: "+ (re + j im) reference e^{jπ (n − n_b)² / length} on samples first … first + length of a chirp",

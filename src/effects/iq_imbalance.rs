@@ -9,10 +9,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "iq_imbalance";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "iq_imbalance",
+    id: ID,
     card: "R3",
     stage: Stage::Receiver,
+    needs_person: false,
     title: "an imbalance of the I and Q channels",
     explanation: "The two receiver branches differ in gain and angle: a faint mirror image of the scene at negative ranges and speeds.",
     equation: "s → s + μ s*, μ = (10^{gain_db/20} − 1 + j phase_deg π/180) / 2",

@@ -150,6 +150,11 @@ pub fn info(id: &str) -> Option<&'static EffectInfo> {
     LIBRARY.iter().find(|info| info.id == id).copied()
 }
 
+/// Effects that leave nearly the same trace as this one, in the library's order.
+pub fn look_alikes(of: &EffectInfo) -> impl Iterator<Item = &'static EffectInfo> {
+    library().iter().copied().filter(|other| other.look_alikes.contains(&of.id) || of.look_alikes.contains(&other.id))
+}
+
 #[cfg(test)]
 mod known_answer_tests;
 #[cfg(test)]

@@ -15,10 +15,13 @@ use crate::{
     radar::Radar,
 };
 
+pub const ID: &str = "moving_reflector";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "moving_reflector",
+    id: ID,
     card: "P2",
     stage: Stage::Scene,
+    needs_person: false,
     title: "an object that moves by itself",
     explanation: "Something else moves, such as a fan, a curtain or a second person: an echo with a Doppler of its own.",
     equation: "+ amplitude e^{jφ} exp j2π(f_c τ + S t τ) / (d_tx d_rx), τ from position_m + axis · swing_m sin(2π rate_hz T + motion_rad)",
@@ -31,7 +34,7 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("amplitude", "recording's unit·m²", 0.0, -1000000000.0, 1000000000.0),
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
-    look_alikes: &["wall_ghost", "second_harmonic", "object_radar_object"],
+    look_alikes: &["wall_ghost", "second_harmonic", "object_radar_object", "range_alias", "breathing", "heartbeat"],
     separate_by: "a recording of the room without the person: the object still moves, a ghost of the person does not",
 };
 

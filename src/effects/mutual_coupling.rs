@@ -9,10 +9,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "mutual_coupling";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "mutual_coupling",
+    id: ID,
     card: "C4",
     stage: Stage::Antenna,
+    needs_person: false,
     title: "coupling between neighbouring receivers",
     explanation: "Each receiver also picks up what its neighbours receive.",
     equation: "s_r → s_r + (z + re + j im)(s_{r−1} + s_{r+1}), |z| = 10^{level_db/20}",
@@ -21,7 +24,7 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("re", "1", 0.0, -1.0, 1.0),
         parameter("im", "1", 0.0, -1.0, 1.0),
     ],
-    look_alikes: &["channel_mismatch"],
+    look_alikes: &[],
     separate_by: "a strong reflector at several directions",
 };
 

@@ -7,10 +7,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "object_radar_object";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "object_radar_object",
+    id: ID,
     card: "R6",
     stage: Stage::Propagation,
+    needs_person: false,
     title: "a second trip between the scene and the radar",
     explanation: "Part of the echo is reflected by the radar itself and goes to the scene once more: everything appears again at twice the range and twice the speed, in every pair.",
     equation: "s_{t,r} → s_{t,r} + coefficient s_{t,0} s_{0,r} / reference",

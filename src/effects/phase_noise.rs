@@ -14,15 +14,18 @@ use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
 /// Range that `per_chirp_rad` refers to.
 const REFERENCE_M: f64 = 3.0;
 
+pub const ID: &str = "phase_noise";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "phase_noise",
+    id: ID,
     card: "W8",
     stage: Stage::Waveform,
+    needs_person: false,
     title: "the oscillator's phase noise",
     explanation: "The oscillator's frequency wanders from chirp to chirp: a pedestal in Doppler around strong echoes that grows with range.",
     equation: "× exp(j δ_m τ_p/τ_3m), δ_m normal of deviation per_chirp_rad",
     parameters: &[parameter("per_chirp_rad", "rad at 3 m", 0.0, 0.0, 1.0)],
-    look_alikes: &["chirp_start_jitter", "radar_vibration", "gain_drift"],
+    look_alikes: &["chirp_start_jitter", "gain_drift"],
     separate_by: "two walls at different ranges: this phase grows with range, a vibration's does not",
 };
 

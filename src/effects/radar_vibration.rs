@@ -9,10 +9,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "radar_vibration";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "radar_vibration",
+    id: ID,
     card: "I2",
     stage: Stage::Scene,
+    needs_person: false,
     title: "a vibration of the radar",
     explanation: "The radar itself shakes along its boresight, so that all echoes, also those of the walls, swing in phase together.",
     equation: "s(T) → s(T) exp(j 4π amplitude_m sin(2π frequency_hz T + phase_rad) / λ)",

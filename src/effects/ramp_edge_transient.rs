@@ -9,10 +9,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "ramp_edge_transient";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "ramp_edge_transient",
+    id: ID,
     card: "",
     stage: Stage::Receiver,
+    needs_person: false,
     title: "a transient at the ramp's edge",
     explanation: "At the start or the end of each ramp the receiver has not settled: the same additive jump in the first or last samples of every chirp.",
     equation: "+ (10^{level_db/20} + re + j im) reference on the last `samples` samples (the first ones where negative)",

@@ -7,10 +7,13 @@ use super::{
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
 
+pub const ID: &str = "range_alias";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "range_alias",
+    id: ID,
     card: "P8",
     stage: Stage::Propagation,
+    needs_person: false,
     title: "an echo from beyond the unambiguous range",
     explanation: "Something farther away than the radar can measure appears folded back to a near range.",
     equation: "+ (re + j im) exp j2π(f_c τ + S t τ), τ = 2 range_m / c, S τ beyond the sample rate",
@@ -21,7 +24,7 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("im", "of the reference", 0.0, -10.0, 10.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
-    look_alikes: &["static_reflector", "spur"],
+    look_alikes: &["spur"],
     separate_by: "change the sample rate by 5 %: the alias moves, a near object does not",
 };
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{info, library};
+use super::{carried_reflector, clothing_delay, info, library, part_reflectivity, wall_ghost};
 use crate::{
     error::{Error, Result},
     person::JOINT_NAMES,
@@ -76,11 +76,13 @@ impl EffectSetting {
         let boundaries = || Boundary::ALL.map(Boundary::name).join(", ");
         let key = format!("{key}.choice");
         match (self.id.as_str(), self.choice.as_deref()) {
-            ("wall_ghost", Some(choice)) if !Boundary::ALL.iter().any(|boundary| boundary.name() == choice) => {
+            (wall_ghost::ID, Some(choice)) if !Boundary::ALL.iter().any(|boundary| boundary.name() == choice) => {
                 Err(Error::setting(key, choice, format!("one of {}", boundaries())))
             }
-            ("wall_ghost", None) => Err(Error::setting(key, "missing", format!("one of {}", boundaries()))),
-            ("clothing_delay" | "part_reflectivity" | "carried_reflector", Some(choice)) if !JOINT_NAMES.contains(&choice) => {
+            (wall_ghost::ID, None) => Err(Error::setting(key, "missing", format!("one of {}", boundaries()))),
+            (clothing_delay::ID | part_reflectivity::ID | carried_reflector::ID, Some(choice))
+                if !JOINT_NAMES.contains(&choice) =>
+            {
                 Err(Error::setting(key, choice, format!("one of {}", JOINT_NAMES.join(", "))))
             }
             _ => Ok(()),

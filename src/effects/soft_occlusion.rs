@@ -8,10 +8,13 @@ use super::{
     values::Values,
 };
 
+pub const ID: &str = "soft_occlusion";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "soft_occlusion",
+    id: ID,
     card: "T7",
     stage: Stage::Propagation,
+    needs_person: true,
     title: "waves that bend around the body's edges",
     explanation: "A point is not suddenly hidden: its echo fades as its surface turns away, over the width that diffraction gives.",
     equation: "A_p → A_p (1 − exp(−cos²θ_p / width²)), θ_p between the normal and the line of sight",

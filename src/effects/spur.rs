@@ -8,10 +8,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "spur";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "spur",
+    id: ID,
     card: "R12",
     stage: Stage::Receiver,
+    needs_person: false,
     title: "a spur",
     explanation: "A clock's tone reaches the receiver: a line at one beat frequency that has no echo behind it.",
     equation: "+ (10^{level_db/20} + re + j im) reference exp(j2π frequency_hz T)",
@@ -22,7 +25,7 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("im", "of the reference", 0.0, -10.0, 10.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
-    look_alikes: &["static_reflector", "interference", "range_alias"],
+    look_alikes: &["static_reflector"],
     separate_by: "transmit nothing: the spur stays",
 };
 

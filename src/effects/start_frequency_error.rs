@@ -7,10 +7,13 @@ use super::{
 };
 use crate::complex::Complex;
 
+pub const ID: &str = "start_frequency_error";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "start_frequency_error",
+    id: ID,
     card: "W3",
     stage: Stage::Waveform,
+    needs_person: false,
     title: "an error of the chirp's start frequency",
     explanation: "The ramp starts at another frequency than declared, so that every path's phase is wrong in proportion to its delay.",
     equation: "× exp(j2π τ_p f_0 relative) on path p",

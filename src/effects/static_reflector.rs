@@ -12,10 +12,13 @@ use crate::{
     radar::Radar,
 };
 
+pub const ID: &str = "static_reflector";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "static_reflector",
+    id: ID,
     card: "P1",
     stage: Stage::Scene,
+    needs_person: false,
     title: "an object at rest that the scene does not know",
     explanation: "Something at rest, such as furniture, sends an echo that no wall or body explains.",
     equation: "+ amplitude e^{jφ} exp j2π(f_c τ + S t τ) / (d_tx d_rx), τ from position_m",

@@ -7,10 +7,13 @@ use super::{
 };
 use crate::body::Displacement;
 
+pub const ID: &str = "tdm_phase";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "tdm_phase",
+    id: ID,
     card: "G5",
     stage: Stage::Timing,
+    needs_person: false,
     title: "an error in the time between the transmitters' slots",
     explanation: "The transmitters fire one after the other, later than assumed; a moving part gains a phase from one transmitter to the next, which turns its direction.",
     equation: "τ_p → τ_p + τ̇_p · j · slot_s for transmitter j",

@@ -2,23 +2,9 @@ use super::*;
 
 #[test]
 fn the_library_is_complete_and_consistent() {
-    let order = [
-        Stage::Timing,
-        Stage::Scene,
-        Stage::Body,
-        Stage::Propagation,
-        Stage::Waveform,
-        Stage::Antenna,
-        Stage::Receiver,
-        Stage::Noise,
-    ];
-    let place = |info: &EffectInfo| order.iter().position(|stage| *stage == info.stage).unwrap();
-    assert!(library().windows(2).all(|pair| place(pair[0]) <= place(pair[1])), "out of the signal's order");
+    assert!(library().windows(2).all(|pair| pair[0].stage <= pair[1].stage), "out of the signal's order");
     for effect in library() {
         assert!(std::ptr::eq(info(effect.id).unwrap(), *effect), "{} is there twice", effect.id);
-        for other in effect.look_alikes {
-            assert!(*other != effect.id && info(other).is_some(), "{} looks like {other}", effect.id);
-        }
         for text in [effect.title, effect.explanation, effect.equation, effect.separate_by] {
             assert!(!text.is_empty(), "{}", effect.id);
         }
@@ -27,6 +13,22 @@ fn the_library_is_complete_and_consistent() {
         }
     }
     assert!(info("no_such_effect").is_none());
+}
+
+#[test]
+fn every_look_alike_exists_is_stated_once_and_is_mutual() {
+    for effect in library() {
+        for (index, other) in effect.look_alikes.iter().enumerate() {
+            let known = info(other).unwrap_or_else(|| panic!("{} looks like {other}, which does not exist", effect.id));
+            assert!(known.id != effect.id, "{} looks like itself", effect.id);
+            let again = known.look_alikes.contains(&effect.id) || effect.look_alikes[..index].contains(other);
+            assert!(!again, "{} and {other} are stated twice", effect.id);
+        }
+        assert!(look_alikes(effect).next().is_some(), "{} has none", effect.id);
+        for other in look_alikes(effect) {
+            assert!(look_alikes(other).any(|back| back.id == effect.id), "{} and {}", effect.id, other.id);
+        }
+    }
 }
 
 use burn::tensor::{Device, Tensor};

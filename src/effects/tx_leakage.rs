@@ -7,10 +7,13 @@ use super::{
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
 
+pub const ID: &str = "tx_leakage";
+
 pub static INFO: EffectInfo = EffectInfo {
-    id: "tx_leakage",
+    id: ID,
     card: "R1",
     stage: Stage::Receiver,
+    needs_person: false,
     title: "leakage from transmitters to receivers",
     explanation: "Part of the transmitted wave goes straight to the receivers: a strong echo at rest in the first range bins, different in every channel.",
     equation: "+ L_{t,r} exp(j2π S τ_L t), τ_L = 2 range_m / c, L = reference (10^{level_db/20} + re + j im)",
@@ -21,7 +24,7 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("im", "of the reference", 0.0, -10.0, 10.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
-    look_alikes: &["dc_offset", "static_reflector"],
+    look_alikes: &["dc_offset"],
     separate_by: "turn the radar: leakage stays, the room moves; a cover of absorber on the radar takes the room away",
 };
 

@@ -285,20 +285,32 @@ pub enum Outside {
 }
 
 impl Outside {
+    pub const MAINS_GAIN_RIPPLE: &str = "mains_gain_ripple";
+    pub const LSB_STUCK: &str = "lsb_stuck";
+    pub const RX_MUX_SKEW: &str = "rx_mux_skew";
+    pub const LAMP_MODULATION: &str = "lamp_modulation";
+    pub const MOVING_CURTAIN: &str = "moving_curtain";
+    pub const LO_PULLING: &str = "lo_pulling";
+    pub const THERMAL_CURVATURE: &str = "thermal_curvature";
+    pub const GAIN_HOP: &str = "gain_hop";
+    pub const MUX_CROSSTALK: &str = "mux_crosstalk";
+    pub const CHIRP_AFTERGLOW: &str = "chirp_afterglow";
+    pub const BUFFER_SLIP: &str = "buffer_slip";
+
     /// The word of `kind`.
     pub fn kind(&self) -> &'static str {
         match self {
-            Self::MainsGainRipple { .. } => "mains_gain_ripple",
-            Self::LsbStuck { .. } => "lsb_stuck",
-            Self::RxMuxSkew { .. } => "rx_mux_skew",
-            Self::LampModulation { .. } => "lamp_modulation",
-            Self::MovingCurtain { .. } => "moving_curtain",
-            Self::LoPulling { .. } => "lo_pulling",
-            Self::ThermalCurvature { .. } => "thermal_curvature",
-            Self::GainHop { .. } => "gain_hop",
-            Self::MuxCrosstalk { .. } => "mux_crosstalk",
-            Self::ChirpAfterglow { .. } => "chirp_afterglow",
-            Self::BufferSlip { .. } => "buffer_slip",
+            Self::MainsGainRipple { .. } => Self::MAINS_GAIN_RIPPLE,
+            Self::LsbStuck { .. } => Self::LSB_STUCK,
+            Self::RxMuxSkew { .. } => Self::RX_MUX_SKEW,
+            Self::LampModulation { .. } => Self::LAMP_MODULATION,
+            Self::MovingCurtain { .. } => Self::MOVING_CURTAIN,
+            Self::LoPulling { .. } => Self::LO_PULLING,
+            Self::ThermalCurvature { .. } => Self::THERMAL_CURVATURE,
+            Self::GainHop { .. } => Self::GAIN_HOP,
+            Self::MuxCrosstalk { .. } => Self::MUX_CROSSTALK,
+            Self::ChirpAfterglow { .. } => Self::CHIRP_AFTERGLOW,
+            Self::BufferSlip { .. } => Self::BUFFER_SLIP,
         }
     }
 

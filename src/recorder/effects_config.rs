@@ -119,4 +119,10 @@ impl EffectsConfig {
             ..self.clone()
         }
     }
+
+    /// The first that is on and that a scene without a person cannot have.
+    pub(super) fn of_person(&self) -> Option<&'static str> {
+        let others = self.without_person().listed();
+        self.listed().into_iter().map(|(id, ..)| id).find(|id| others.iter().all(|(other, ..)| other != id))
+    }
 }

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     body::{Displacement, PosedBody},
     complex::Complex,
-    effects::{BodyPoints, Effect, carried_reflector},
+    effects::{self, BodyPoints, Effect, carried_reflector},
 };
 
 impl Simulator {
@@ -54,7 +54,7 @@ impl Simulator {
     /// Echoes of objects that are not in the scene, `[tx, rx, loop, sample]`: those on their own as of this frame, those
     /// that the body carries as it is seen.
     pub(super) fn reflectors_signal(&self, scene: &Scene, frame: usize, seen: &FrameView) -> Option<Complex<4>> {
-        let ids = ["static_reflector", "moving_reflector", "carried_reflector"];
+        let ids = [effects::static_reflector::ID, effects::moving_reflector::ID, effects::carried_reflector::ID];
         if !ids.into_iter().any(|id| self.effects.has(id)) {
             return None;
         }

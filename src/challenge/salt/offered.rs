@@ -1,8 +1,10 @@
 //! Which effects can be put onto samples alone, in which unit their strength is, and why the others cannot.
 
 use crate::challenge::library::{Graded, every};
+use crate::effects::{self, Stage};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
+use crate::recorder::effects::Outside;
 
 /// An effect that is offered.
 pub struct Offered {
@@ -28,75 +30,78 @@ const NOISE: &[&str] = &["noise", "sparse additive", "excess power"];
 const CODES: &[&str] = &["quantisation", "slipped samples", "single frame", "amplitude", "damaged"];
 
 macro_rules! offered {
-    ($($id:ident $unit:literal $family:ident;)*) => {
-        &[$(Offered { id: stringify!($id), unit: $unit, family: $family }),*]
+    ($($id:expr => $unit:literal $family:ident;)*) => {
+        &[$(Offered { id: $id, unit: $unit, family: $family }),*]
     };
 }
 
 /// In the order of the signal's chain. "Of the peak" is of the recording's peak sample.
 pub const OFFERED: &[Offered] = offered! {
-    tx_leakage "of the peak" ADDED;
-    phase_noise "rad at 3 m" SLOW;
-    chirp_start_jitter "s" SLOW;
-    channel_mismatch "dB, and 6° each" CHANNEL;
-    mutual_coupling "of the neighbour" CHANNEL;
-    chirp_droop "dB" FAST;
-    gain_drift "dB" SLOW;
-    chirp_settling "of the gain" SLOW;
-    mains_gain_ripple "of the gain" SLOW;
-    gain_hop "dB" CHANNEL;
-    compression "of the peak" NONLINEAR;
-    second_harmonic "of the peak" NONLINEAR;
-    iq_imbalance "dB, and up to 5° each" NONLINEAR;
-    lo_pulling "rad at the peak" NONLINEAR;
-    dc_offset "of the peak" ADDED;
-    ramp_edge_transient "of the peak" ADDED;
-    spur "of the peak" ADDED;
-    interference "of the peak" ADDED;
-    chirp_afterglow "of the chirp before" SLOW;
-    mux_crosstalk "of the receiver before" CHANNEL;
-    coloured_noise "Hz" NOISE;
-    impulsive_noise "of the samples" NOISE;
-    correlated_noise "correlation" NOISE;
-    adc_saturation "of the peak, beyond the rail" CODES;
-    lsb_stuck "codes" CODES;
-    buffer_slip "samples" CODES;
-    frame_drop "frames" CODES;
+    effects::tx_leakage::ID => "of the peak" ADDED;
+    effects::phase_noise::ID => "rad at 3 m" SLOW;
+    effects::chirp_start_jitter::ID => "s" SLOW;
+    effects::channel_mismatch::ID => "dB, and 6° each" CHANNEL;
+    effects::mutual_coupling::ID => "of the neighbour" CHANNEL;
+    effects::chirp_droop::ID => "dB" FAST;
+    effects::gain_drift::ID => "dB" SLOW;
+    effects::chirp_settling::ID => "of the gain" SLOW;
+    Outside::MAINS_GAIN_RIPPLE => "of the gain" SLOW;
+    Outside::GAIN_HOP => "dB" CHANNEL;
+    effects::compression::ID => "of the peak" NONLINEAR;
+    effects::second_harmonic::ID => "of the peak" NONLINEAR;
+    effects::iq_imbalance::ID => "dB, and up to 5° each" NONLINEAR;
+    Outside::LO_PULLING => "rad at the peak" NONLINEAR;
+    effects::dc_offset::ID => "of the peak" ADDED;
+    effects::ramp_edge_transient::ID => "of the peak" ADDED;
+    effects::spur::ID => "of the peak" ADDED;
+    effects::interference::ID => "of the peak" ADDED;
+    Outside::CHIRP_AFTERGLOW => "of the chirp before" SLOW;
+    Outside::MUX_CROSSTALK => "of the receiver before" CHANNEL;
+    effects::coloured_noise::ID => "Hz" NOISE;
+    effects::impulsive_noise::ID => "of the samples" NOISE;
+    effects::correlated_noise::ID => "correlation" NOISE;
+    effects::adc_saturation::ID => "of the peak, beyond the rail" CODES;
+    Outside::LSB_STUCK => "codes" CODES;
+    Outside::BUFFER_SLIP => "samples" CODES;
+    effects::frame_drop::ID => "frames" CODES;
 };
 
 const PLACE: &str = "it acts on returns by their places, and the samples hold all returns summed";
+const VELOCITY: &str = "it acts on returns by their velocities, and the samples hold all returns summed";
 const BODY: &str = "it acts on the person, whose returns the samples hold summed with all others";
 const PATHS: &str = "it is a further way of single returns, and the samples hold all returns summed";
 const WINDOW: &str = "it needs the signal before and after the window that was sampled";
 const DELAY: &str = "it turns each return by a phase in proportion to its delay, and the samples hold all returns summed";
 
-/// Why the others are not offered.
+/// Why others are not offered that change neither the person alone nor the ways of returns.
 const REFUSED: &[(&str, &[&str])] = &[
     (
         PLACE,
         &[
-            "static_reflector",
-            "moving_reflector",
-            "carried_reflector",
-            "pose_offset",
-            "range_bias",
-            "radar_vibration",
-            "lamp_modulation",
-            "moving_curtain",
-            "antenna_position",
-            "antenna_pattern",
+            effects::static_reflector::ID,
+            effects::moving_reflector::ID,
+            effects::range_bias::ID,
+            effects::radar_vibration::ID,
+            Outside::LAMP_MODULATION,
+            Outside::MOVING_CURTAIN,
+            effects::antenna_position::ID,
+            effects::antenna_pattern::ID,
         ],
     ),
-    (BODY, &["breathing", "heartbeat", "clothing_delay", "part_reflectivity", "clock_offset", "clock_drift"]),
-    (
-        PATHS,
-        &["wall_ghost", "floor_bounce", "object_radar_object", "range_alias", "soft_occlusion", "body_multibounce", "tdm_phase"],
-    ),
+    (VELOCITY, &[effects::tdm_phase::ID]),
     (
         WINDOW,
-        &["slope_error", "chirp_nonlinearity", "chirp_ripple", "thermal_curvature", "if_highpass", "if_lowpass", "rx_mux_skew"],
+        &[
+            effects::slope_error::ID,
+            effects::chirp_nonlinearity::ID,
+            effects::chirp_ripple::ID,
+            Outside::THERMAL_CURVATURE,
+            effects::if_highpass::ID,
+            effects::if_lowpass::ID,
+            Outside::RX_MUX_SKEW,
+        ],
     ),
-    (DELAY, &["start_frequency_error", "adc_start_error", "if_delay"]),
+    (DELAY, &[effects::start_frequency_error::ID, effects::adc_start_error::ID, effects::if_delay::ID]),
 ];
 
 /// Fewest frames of which some can be lost: eight, and the six that the strongest gap takes.
@@ -106,22 +111,33 @@ pub fn offered(id: &str) -> Option<&'static Offered> {
     OFFERED.iter().find(|offered| offered.id == id)
 }
 
+/// Why samples alone cannot be given an effect, whatever the radar.
+fn refused(id: &str) -> Option<&'static str> {
+    match effects::info(id) {
+        Some(info) if info.stage == Stage::Propagation => Some(PATHS),
+        Some(info) if info.needs_person => Some(BODY),
+        _ => REFUSED.iter().find(|(_, ids)| ids.contains(&id)).map(|(reason, _)| *reason),
+    }
+}
+
 /// Why an effect cannot be put onto recordings of this radar; none where it can. `codes`: its samples are whole codes.
 pub fn refusal(id: &str, radar: &Radar, codes: bool) -> Option<&'static str> {
     if offered(id).is_none() {
-        return REFUSED.iter().find(|(_, ids)| ids.contains(&id)).map(|(reason, _)| *reason).or(Some("no such effect is known"));
+        return refused(id).or(Some("no such effect is known"));
     }
     let chirps = radar.loops_per_frame * radar.tx_m.len();
     match id {
-        "iq_imbalance" if radar.sampling == Sampling::Real => Some("this receiver has no quadrature"),
-        "channel_mismatch" | "mutual_coupling" | "mux_crosstalk" | "correlated_noise" if radar.rx_m.len() < 2 => {
+        effects::iq_imbalance::ID if radar.sampling == Sampling::Real => Some("this receiver has no quadrature"),
+        effects::channel_mismatch::ID | effects::mutual_coupling::ID | Outside::MUX_CROSSTALK | effects::correlated_noise::ID
+            if radar.rx_m.len() < 2 =>
+        {
             Some("this radar has a single receiver")
         }
-        "chirp_settling" if chirps < 2 => Some("a frame has a single chirp"),
-        "chirp_afterglow" if radar.loops_per_frame < 2 => Some("a frame has a single chirp of each transmitter"),
-        "gain_hop" if radar.frames < 2 => Some("there is a single frame"),
-        "frame_drop" if radar.frames < FEWEST_FRAMES => Some("there are fewer than 14 frames"),
-        "lsb_stuck" if !codes => Some("the samples are no whole codes"),
+        effects::chirp_settling::ID if chirps < 2 => Some("a frame has a single chirp"),
+        Outside::CHIRP_AFTERGLOW if radar.loops_per_frame < 2 => Some("a frame has a single chirp of each transmitter"),
+        Outside::GAIN_HOP if radar.frames < 2 => Some("there is a single frame"),
+        effects::frame_drop::ID if radar.frames < FEWEST_FRAMES => Some("there are fewer than 14 frames"),
+        Outside::LSB_STUCK if !codes => Some("the samples are no whole codes"),
         _ => None,
     }
 }
@@ -151,13 +167,15 @@ mod tests {
     #[test]
     fn every_effect_is_offered_or_refused_with_a_reason_and_none_both() {
         for graded in every() {
-            let refused = REFUSED.iter().filter(|(_, ids)| ids.contains(&graded.id)).count();
-            assert_eq!(refused + usize::from(offered(graded.id).is_some()), 1, "{}", graded.id);
+            assert_ne!(refused(graded.id).is_some(), offered(graded.id).is_some(), "{}", graded.id);
+            let stated = REFUSED.iter().filter(|(_, ids)| ids.contains(&graded.id)).count();
+            let derived = effects::info(graded.id).is_some_and(|info| info.needs_person || info.stage == Stage::Propagation);
+            assert!(stated + usize::from(derived) <= 1, "{}", graded.id);
         }
         let known = |id: &str| every().any(|graded| graded.id == id);
         assert!(OFFERED.iter().all(|offered| known(offered.id)));
         // Some ids of docs/report.md are never drawn.
-        assert!(REFUSED.iter().flat_map(|(_, ids)| *ids).all(|id| known(id) || *id == "tdm_phase"));
+        assert!(REFUSED.iter().flat_map(|(_, ids)| *ids).all(|id| known(id) || *id == effects::tdm_phase::ID));
     }
 
     #[test]

@@ -138,7 +138,7 @@ fn overlap(a: &Box3, b: &Box3) -> bool {
 
 fn region(evidence: &Evidence, residual: &Residual, cells: &Cells, found: &Box3) -> Region {
     let [frames, loops, _] = residual.dims;
-    let mut place = Place::at("");
+    let mut place = Place::default();
     let mut axes = vec![];
     if found.high[0] - found.low[0] < frames {
         axes.push("frame");

@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 
 use super::Point;
+use crate::effects;
 use crate::radar::Radar;
 use crate::room::Boundary;
 
@@ -14,7 +15,7 @@ pub const SIDE_SPREAD: f64 = 0.3;
 
 /// What the body's image at a boundary is called.
 pub fn mirror_id(boundary: Boundary) -> &'static str {
-    if boundary == Boundary::Floor { "floor_bounce" } else { "wall_ghost" }
+    if boundary == Boundary::Floor { effects::floor_bounce::ID } else { effects::wall_ghost::ID }
 }
 
 /// Power that comes beside the direct return, for every point of the body.

@@ -7,23 +7,26 @@ use crate::diagnosis::finding::{Candidate, Correction};
 use crate::diagnosis::misfit::Misfit;
 use crate::diagnosis::remains::{is_rough, is_same};
 use crate::diagnosis::suspects::{SUSPECTS, paths};
+use crate::effects::{self, Stage};
 
 /// What never changes and may be a return or added behind the mixer: what turns all returns distinguishes the two, and goes first.
-const ADDED: [&str; 3] = ["tx_leakage", "dc_offset", "static_reflector"];
+const ADDED: [&str; 3] = [effects::tx_leakage::ID, effects::dc_offset::ID, effects::static_reflector::ID];
 
 /// Stages of the signal's chain at which everything that is received is changed.
-const UPSTREAM: [&str; 2] = ["waveform", "receiver"];
+const UPSTREAM: [Stage; 2] = [Stage::Waveform, Stage::Receiver];
 
 /// Whether the body is elsewhere, or at another time, than predicted.
 pub(super) fn is_displaced(candidate: &Candidate) -> bool {
-    matches!(candidate.correction, Correction::Body(_)) && candidate.place.stage != "propagation"
+    matches!(candidate.correction, Correction::Body(_)) && candidate.place.stage != Some(Stage::Propagation)
 }
 
 /// Whether it acts on every return, or on all of the body. What has no name does where nobody is tracked: most ranges share it then.
 fn is_on_all(candidate: &Candidate, evidence: &Evidence) -> bool {
     let id = candidate.id.unwrap_or_default();
     (!id.is_empty() || evidence.body.is_none())
-        && (id == "radar_vibration" || is_displaced(candidate) || UPSTREAM.contains(&candidate.place.stage.as_str()))
+        && (id == effects::radar_vibration::ID
+            || is_displaced(candidate)
+            || candidate.place.stage.is_some_and(|stage| UPSTREAM.contains(&stage)))
 }
 
 /// Whether it may be something else's echoes of the body.
@@ -45,11 +48,13 @@ pub(super) fn upstream<'a>(
     {
         return course;
     }
-    if best.1.id == Some("tx_leakage") {
+    if best.1.id == Some(effects::tx_leakage::ID) {
         // What the chirp makes of the room's returns never changes either, nor does an offset, and a leakage is free in every channel: it
         // is none where nothing is left of it.
         let left = |evidence: &Evidence| (SUSPECTS[best.0].find)(evidence).iter().any(|candidate| candidate.id == best.1.id);
-        let simpler = |candidate: &Candidate| candidate.place.stage == "waveform" || candidate.id == Some("dc_offset");
+        let simpler = |candidate: &Candidate| {
+            candidate.place.stage == Some(Stage::Waveform) || candidate.id == Some(effects::dc_offset::ID)
+        };
         let mut simpler = passing.iter().filter(|(_, candidate)| simpler(candidate));
         return simpler.find(|(_, candidate)| !left(&evidence.with(candidate))).copied().unwrap_or(best);
     }

@@ -14,6 +14,7 @@ use super::region::{Region, mean_power, moves, power_gain, remove};
 use crate::diagnosis::evidence::{Evidence, HANN_LOBE, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
+use crate::effects::{self, Stage};
 
 const FEWEST_LOOPS: usize = 16;
 /// Floor over the noise that a static return must have if it were modulated as well, for its absence to show that it is not.
@@ -108,14 +109,14 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let region = Region { range: [first as f64 - 0.5, last as f64 + 0.5], doppler: [-half, half] };
     let training = evidence.split.training.clone();
     Some(Candidate {
-        id: Some("moving_reflector"),
+        id: Some(effects::moving_reflector::ID),
         behaves_like: PATH_LIKE,
         estimates: vec![],
         choice: None,
         place: Place {
             range_m: Some([(first as f64 - 0.5).max(0.0) * bin_m, (last as f64 + 0.5) * bin_m]),
             velocity_mps: Some([-fastest, fastest]),
-            ..Place::at("scene")
+            ..Place::at(Stage::Scene)
         },
         p_value,
         gain,
@@ -193,7 +194,7 @@ mod tests {
     fn what_fills_all_velocities_at_one_range_is_a_mover_there_and_then_nothing() {
         let evidence = evidence(true, 0.0, 0.0);
         let found = find(&evidence).pop().expect("a fan");
-        assert_eq!(found.id, Some("moving_reflector"));
+        assert_eq!(found.id, Some(effects::moving_reflector::ID));
         assert!(found.p_value < 1e-9 && found.gain > 100.0, "{found:?}");
         let bin_m = evidence.radar.range_resolution_m();
         let [low, high] = found.place.range_m.unwrap();

@@ -11,6 +11,7 @@ use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::power::{LOBES, PowerModel, Template, fit_weights, log_likelihood, sum};
 use crate::diagnosis::prediction::{Centre, range_and_velocity};
 use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place, statistics};
+use crate::effects::{self, Stage};
 
 /// Power over that of the part's own skin, dB, from which on it is no skin.
 const LEAST_DB: f64 = 8.0;
@@ -45,7 +46,11 @@ fn find(evidence: &Evidence) -> Vec<Candidate> {
     let parts = body.parts.len();
     // Remains of paths that were taken out are near the body, too, and in a copied frame the body is not where it is said to be.
     let remains = paths::LEAVE_REMAINS.iter().any(|id| evidence.accepted.contains(id));
-    if parts < 2 || remains || body.centres.len() != body.frames.len() || evidence.accepted.contains(&"carried_reflector") {
+    if parts < 2
+        || remains
+        || body.centres.len() != body.frames.len()
+        || evidence.accepted.contains(&effects::carried_reflector::ID)
+    {
         return vec![];
     }
     let skin: Vec<Vec<Template>> = (0..body.frames.len()).into_par_iter().map(|frame| skin(model, frame)).collect();
@@ -159,7 +164,7 @@ fn candidate(
         let Centre { position_m, velocity_mps } = centres[found.part];
         range_and_velocity(&evidence.radar, position_m, velocity_mps)
     });
-    let place = Place::spanning("scene", middles);
+    let place = Place::spanning(Stage::Scene, middles);
     let power: f64 = (0..skin.len()).map(|frame| weight * total(&point(evidence, model, body, found.part, frame))).sum();
     let beside = if others.is_empty() {
         String::new()
@@ -167,7 +172,7 @@ fn candidate(
         format!(" (or at {}, as far as ranges and velocities resolve)", others.join(", "))
     };
     Candidate {
-        id: Some("carried_reflector"),
+        id: Some(effects::carried_reflector::ID),
         behaves_like: "return of one part of the body",
         estimates: vec![Estimate::normal("amplitude", relative, LEVEL_ERROR * relative)],
         choice: None,
@@ -175,7 +180,7 @@ fn candidate(
         p_value: 1.0,
         gain: 0.0,
         errs_alike: true,
-        look_alikes: vec!["part_reflectivity"],
+        look_alikes: vec![effects::part_reflectivity::ID],
         statement: format!(
             "Something at the {}{beside} returns {:.0} dB more than the skin there would if it were like that of the rest of the body: \
              something is carried or worn, or that part reflects far more strongly.",
@@ -270,7 +275,7 @@ mod tests {
     #[test]
     fn what_the_hand_carries_is_found_there_and_skin_is_nothing() {
         let found = find(&evidence(1, 12.0));
-        assert!(found.len() == 1 && found[0].id == Some("carried_reflector"), "{found:?}");
+        assert!(found.len() == 1 && found[0].id == Some(effects::carried_reflector::ID), "{found:?}");
         assert_eq!(found[0].place.body_part.as_deref(), Some("left_hand"));
         assert!(found[0].p_value < 1e-6 && found[0].gain > 6.0, "{found:?}");
         for seed in 2..8 {

@@ -12,6 +12,7 @@ use crate::diagnosis::codes::{BITS, Component};
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics;
+use crate::effects::Stage;
 
 /// The signal's deviation in units of the bit's value from which on the bit must be fair.
 const FAR_BELOW: f64 = 8.0;
@@ -137,7 +138,7 @@ fn candidate(evidence: &Evidence, component: &Component, bit: usize, share: f64,
         behaves_like: BEHAVES_LIKE,
         estimates: vec![],
         choice: None,
-        place: Place { rx: Some(vec![rx]), ..Place::at("receiver") },
+        place: Place { rx: Some(vec![rx]), ..Place::at(Stage::Receiver) },
         p_value: p_value.max(f64::MIN_POSITIVE),
         gain,
         errs_alike: false,

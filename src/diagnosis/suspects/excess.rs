@@ -3,6 +3,7 @@
 use crate::diagnosis::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::locate::{Residual, strongest};
+use crate::effects::Stage;
 
 pub const BEHAVES_LIKE: &str = "excess power";
 
@@ -25,7 +26,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         behaves_like: BEHAVES_LIKE,
         estimates: vec![],
         choice: None,
-        place: Place { stage: "propagation".into(), ..place.clone() },
+        place: Place { stage: Some(Stage::Propagation), ..place.clone() },
         p_value: found.p_value,
         gain: found.gain,
         errs_alike: false,

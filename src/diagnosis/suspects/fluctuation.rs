@@ -20,6 +20,7 @@ use rustfft::FftPlanner;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
 use crate::diagnosis::statistics::{DECIBEL, corrected};
+use crate::effects::{self, Stage};
 
 use course::Frames;
 use returns::{Returns, Series};
@@ -32,7 +33,7 @@ const FEWEST: usize = 6;
 const FEWEST_STRONG: usize = 5;
 /// What either finds at most by chance.
 const LEAST_LIKELY: f64 = 0.01;
-pub const ID: &str = "soft_occlusion";
+pub const ID: &str = effects::soft_occlusion::ID;
 pub use fluctuating::BEHAVES_LIKE as FLUCTUATES;
 pub use modulation::BEHAVES_LIKE as IS_MODULATED;
 
@@ -130,7 +131,7 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, gai
         place: Place {
             range_m: Some([range_m - 1.5 * bin_m, range_m + 1.5 * bin_m]),
             velocity_mps: Some([0.0, 0.0]),
-            ..Place::at("propagation")
+            ..Place::at(Stage::Propagation)
         },
         p_value: p_value.max(f64::MIN_POSITIVE),
         gain,

@@ -15,6 +15,7 @@ use super::region::{Region, STILL_BINS, joined, mean_power, moves, power_gain, r
 use crate::diagnosis::evidence::{Evidence, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics;
+use crate::effects::{self, Stage};
 
 /// Standard deviation of how high something stands, which receivers in a row do not show, over its range.
 const HEIGHT: f64 = 0.3;
@@ -50,7 +51,7 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
     let (doppler, range) = (peak / samples, peak % samples);
     let count = training.len() as f64 * evidence.cube.channels() as f64;
     let p_value = statistics::corrected(statistics::mean_power_tail(mean[peak], count), cells as f64);
-    let another = evidence.accepted.contains(&"moving_reflector");
+    let another = evidence.accepted.contains(&effects::moving_reflector::ID);
     if p_value > 0.01 || held_out.is_empty() || another && mean[peak] < BESIDE_ANOTHER {
         return None;
     }
@@ -176,7 +177,7 @@ impl<'a> Mover<'a> {
             )]
         });
         Candidate {
-            id: Some("moving_reflector"),
+            id: Some(effects::moving_reflector::ID),
             behaves_like: super::paths::PATH_LIKE,
             estimates,
             choice: None,
@@ -184,7 +185,7 @@ impl<'a> Mover<'a> {
                 range_m: Some([(ranges[0] - 0.5).max(0.0) * bin_m, (ranges[1] + 0.5) * bin_m]),
                 velocity_mps: Some([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps]),
                 azimuth_deg: azimuth.map(|(a, d)| [a - 2.0 * d, a + 2.0 * d]),
-                ..Place::at("scene")
+                ..Place::at(Stage::Scene)
             },
             p_value,
             gain,

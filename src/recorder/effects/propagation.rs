@@ -159,21 +159,8 @@ pub fn check(world: &World, key: &str) -> Result<()> {
                 .with_hint(format!("give room.{}_m", wall.name())));
         }
     }
-    let of_the_body = [
-        ("soft_occlusion", effects.soft_occlusion.is_some()),
-        ("body_multibounce", effects.body_multibounce.is_some()),
-        ("breathing", effects.breathing.is_some()),
-        ("heartbeat", effects.heartbeat.is_some()),
-        ("clothing_delay", effects.clothing_delay.is_some()),
-        ("part_reflectivity", effects.part_reflectivity.is_some()),
-        ("pose_offset", effects.pose_offset.is_some()),
-        ("clock_offset", effects.clock_offset.is_some()),
-        ("clock_drift", effects.clock_drift.is_some()),
-        ("floor_bounce", effects.floor_bounce.is_some()),
-        ("wall_ghost", !effects.wall_ghost.is_empty()),
-    ];
-    match of_the_body.iter().find(|(_, on)| *on && world.person.is_none()) {
-        Some((name, _)) => Err(Error::setting(format!("{key}.{name}"), "on", "off without a person")),
+    match effects.of_person().filter(|_| world.person.is_none()) {
+        Some(name) => Err(Error::setting(format!("{key}.{name}"), "on", "off without a person")),
         None => Ok(()),
     }
 }

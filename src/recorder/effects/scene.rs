@@ -174,9 +174,6 @@ pub fn static_points(effects: &EffectsConfig, centre: Vector, level: f64) -> Vec
 
 pub fn check(world: &World, key: &str) -> Result<()> {
     let effects = &world.effects;
-    if effects.carried_reflector.is_some() && world.person.is_none() {
-        return Err(Error::setting(format!("{key}.carried_reflector"), "on", "off without a person"));
-    }
     for (index, mover) in effects.moving_reflector.iter().enumerate() {
         let axis = length(mover.axis);
         if axis == 0.0 && mover.swing_m > 0.0 {

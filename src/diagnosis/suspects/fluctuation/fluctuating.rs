@@ -17,6 +17,7 @@ use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::evidence::{Evidence, blackman_harris};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::effects::Stage;
 
 pub const BEHAVES_LIKE: &str = "static returns that change at one range";
 /// So many times as much, as a share, as the other returns change together: else it is what all of them do.
@@ -144,7 +145,7 @@ fn candidate(
         place: Place {
             range_m: Some([near_m - 1.5 * bin_m, far_m + 1.5 * bin_m]),
             velocity_mps: Some([0.0, 0.0]),
-            ..Place::at("scene")
+            ..Place::at(Stage::Scene)
         },
         p_value: change.p_value.max(f64::MIN_POSITIVE),
         gain,

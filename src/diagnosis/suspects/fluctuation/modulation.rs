@@ -17,6 +17,7 @@ use super::sinusoid::Sinusoid;
 use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::{corrected, fisher_tail};
+use crate::effects::Stage;
 
 /// Slower modulations belong to people, faster ones to electronics.
 const LOWEST_HZ: f64 = 20.0;
@@ -457,7 +458,7 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Ca
         behaves_like: BEHAVES_LIKE,
         estimates: vec![],
         choice: None,
-        place: Place { range_m: Some([near_m, far_m]), ..Place::at("scene") },
+        place: Place { range_m: Some([near_m, far_m]), ..Place::at(Stage::Scene) },
         p_value: p_value.max(f64::MIN_POSITIVE),
         gain,
         errs_alike: false,

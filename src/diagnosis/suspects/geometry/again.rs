@@ -7,6 +7,7 @@ use super::fitted::{Fitted, refine};
 use super::trial::Trial;
 use crate::diagnosis::prediction::{Echo, SIDE_SPREAD, mirror_id, range_and_velocity};
 use crate::diagnosis::{Estimate, Place};
+use crate::effects::{self, Stage};
 use crate::room::Boundary;
 
 /// Powers over the direct return's that are tried first; the others only where the least of them gains anything.
@@ -25,7 +26,7 @@ const BEFORE: f64 = 0.3;
 fn id(echo: Echo) -> &'static str {
     match echo {
         Echo::Mirror { boundary, .. } => mirror_id(boundary),
-        Echo::Delayed { .. } => "body_multibounce",
+        Echo::Delayed { .. } => effects::body_multibounce::ID,
     }
 }
 
@@ -60,7 +61,7 @@ pub fn best(trial: &Trial, coarse: &[usize]) -> Vec<Fitted> {
         })
         .collect();
     let mut found: Vec<Fitted> = vec![];
-    for name in ["floor_bounce", "wall_ghost", "body_multibounce"] {
+    for name in [effects::floor_bounce::ID, effects::wall_ghost::ID, effects::body_multibounce::ID] {
         let of_name = tried.iter().filter(|(echo, _, gain)| id(*echo) == name && *gain > 0.0);
         let Some(&(echo, power, gain)) = of_name.max_by(|a, b| a.2.total_cmp(&b.2)) else { continue };
         if let Echo::Delayed { extra_m, .. } = echo {
@@ -86,7 +87,7 @@ pub fn place(trial: &Trial, echo: Echo) -> Place {
     let radar = &trial.evidence.radar;
     let points = trial.body.frames.iter().flat_map(|points| echo.points(radar, points));
     let returns = points.map(|point| range_and_velocity(radar, point.position_m, point.velocity_mps));
-    let place = Place::spanning("propagation", returns);
+    let place = Place::spanning(Stage::Propagation, returns);
     match echo {
         Echo::Mirror { boundary, .. } => Place { boundary: Some(boundary.name().into()), ..place },
         Echo::Delayed { .. } => Place { range_m: None, ..place },
@@ -201,8 +202,8 @@ mod tests {
         let alone = found(&evidence(None));
         assert!(alone.is_none(), "{alone:?}");
         for (echo, id) in [
-            (Echo::Delayed { extra_m: 0.4, coefficient: 0.5 }, "body_multibounce"),
-            (Echo::Mirror { boundary: Boundary::Floor, distance_m: 1.1, coefficient: 0.5 }, "floor_bounce"),
+            (Echo::Delayed { extra_m: 0.4, coefficient: 0.5 }, effects::body_multibounce::ID),
+            (Echo::Mirror { boundary: Boundary::Floor, distance_m: 1.1, coefficient: 0.5 }, effects::floor_bounce::ID),
         ] {
             let mut evidence = evidence(Some(echo));
             let found_first = found(&evidence).unwrap_or_else(|| panic!("{id} not found"));

@@ -18,6 +18,7 @@ use super::{coupling, mismatch, places, skew};
 use crate::diagnosis::power::{PowerModel, part_templates};
 use crate::diagnosis::suspects::clutter::still_power;
 use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place};
+use crate::effects::{self, Stage};
 
 /// What the gain of one channel that hops behaves like.
 pub const SLOW_GAIN_OF_ONE: &str = "slow-time gain of one channel";
@@ -59,7 +60,7 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     let radar = &evidence.radar;
     let accepted = |id: &str| evidence.accepted.contains(&id);
     // One channel whose gain hopped was brought to its own mean, which need not be that of the others.
-    if accepted(SLOW_GAIN_OF_ONE) || accepted("antenna_position") {
+    if accepted(SLOW_GAIN_OF_ONE) || accepted(effects::antenna_position::ID) {
         return vec![];
     }
     let Some(Observed { training, held_out, array }) = Observed::new(evidence, model, body) else { return vec![] };
@@ -85,8 +86,8 @@ fn differ(evidence: &Evidence, array: &Array, displaced: bool) -> Option<Candida
     let accepted = |id: &str| evidence.accepted.contains(&id);
     // What is common to the receivers says nothing of them where it is not the body's; and those that differed were
     // brought to the first one's, a neighbour's part included.
-    let alike = !displaced && !accepted("channel_mismatch");
-    let may_couple = alike && !accepted("mutual_coupling");
+    let alike = !displaced && !accepted(effects::channel_mismatch::ID);
+    let may_couple = alike && !accepted(effects::mutual_coupling::ID);
     let coupled = if may_couple { coupling::find(evidence, array) } else { None };
     let differ = [
         if alike { mismatch::find(evidence, array) } else { None },
@@ -102,7 +103,7 @@ fn differ(evidence: &Evidence, array: &Array, displaced: bool) -> Option<Candida
 fn best(mut found: Vec<Found>) -> Option<Candidate> {
     found.retain(|found| found.candidate.p_value < UNEVEN && found.candidate.gain > 0.0);
     if found.iter().any(|found| found.explains_all && found.candidate.p_value < UNLIKELY) {
-        found.retain(|found| found.candidate.id != Some("channel_mismatch"));
+        found.retain(|found| found.candidate.id != Some(effects::channel_mismatch::ID));
     }
     let each: Vec<_> = found.iter().map(|found| (found.candidate.id, found.likelihood)).collect();
     let unlikely = found.into_iter().filter(|found| found.candidate.p_value < UNLIKELY);
@@ -191,19 +192,19 @@ fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, g
     let change = Change::Offset([offset, 0.0, 0.0]);
     let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
     Candidate {
-        id: Some("pose_offset"),
+        id: Some(effects::pose_offset::ID),
         behaves_like: "direction offset",
         estimates: vec![
             Estimate::list("offset_m", &[offset, 0.0, 0.0], &[deviation, 0.05, 0.2]),
             Estimate::normal("yaw_deg", 0.0, 1.0),
         ],
         choice: None,
-        place: Place::at("scene"),
+        place: Place::at(Stage::Scene),
         p_value: bearing.p_value,
         gain,
         errs_alike: true,
         // A phase in proportion to the receivers' places is a direction, whoever makes it.
-        look_alikes: vec!["channel_mismatch"],
+        look_alikes: vec![effects::channel_mismatch::ID],
         statement: format!(
             "The body is seen {:.1}° to the {} of where it stands: {:.0} mm at its mean range, or the radar or its receivers are turned by that much.",
             bearing.sine.clamp(-1.0, 1.0).asin().abs() * 180.0 / PI,
@@ -252,7 +253,7 @@ mod tests {
                 [[0.0, -0.10, 0.06, 0.04], [0.0, 0.06, -0.04, 0.02]].map(|of| of.map(|value: f64| value * scale));
             let array = DMatrix::from_diagonal(&DVector::from_fn(4, |rx, _| Complex64::from_polar(gains[rx].exp(), phases[rx])));
             let found = found(1, |_, _| Complex64::ONE, &array);
-            assert!(found.len() == 1 && found[0].id == Some("channel_mismatch"), "{scale} {found:?}");
+            assert!(found.len() == 1 && found[0].id == Some(effects::channel_mismatch::ID), "{scale} {found:?}");
             assert!(found[0].p_value < 1e-6 && found[0].gain > 10.0, "{scale} {found:?}");
             holds(&found[0].estimates[0], &gains.map(|gain| gain * statistics::DECIBEL));
             holds(&found[0].estimates[1], &phases.map(f64::to_degrees));
@@ -269,7 +270,10 @@ mod tests {
                 _ => Complex64::ZERO,
             });
             let found = found(2, |_, _| Complex64::ONE, &array);
-            assert!(found.len() == 1 && found[0].id == Some("mutual_coupling") && found[0].p_value < 1e-5, "{level} {found:?}");
+            assert!(
+                found.len() == 1 && found[0].id == Some(effects::mutual_coupling::ID) && found[0].p_value < 1e-5,
+                "{level} {found:?}"
+            );
             let level_db = 20.0 * level.log10();
             let [low, high] = found[0].estimates[0].ci90[0];
             assert!(low <= level_db && level_db <= high, "{level_db} {found:?}");
@@ -298,7 +302,7 @@ mod tests {
             |seed: u64, offsets_m: [f64; 4]| found(seed, |rx, sine| Complex64::cis(-wave * offsets_m[rx] * sine), &alike());
         let offsets_m = [0.0, 2e-4, -1e-4, 1e-4];
         let displaced = look(3, offsets_m);
-        assert!(displaced.len() == 1 && displaced[0].id == Some("antenna_position"), "{displaced:?}");
+        assert!(displaced.len() == 1 && displaced[0].id == Some(effects::antenna_position::ID), "{displaced:?}");
         assert!(displaced[0].p_value < 1e-5 && displaced[0].gain > 6.0, "{displaced:?}");
         holds(&displaced[0].estimates[0], &offsets_m);
         // As the simulator takes them: of every antenna, along all axes.

@@ -11,6 +11,7 @@ use super::mismatch;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, Volume, statistics};
+use crate::effects::{self, Stage};
 
 /// What errors of the prediction may imitate: 0.3° and 0.05 dB.
 const FLOOR: f64 = 0.005;
@@ -31,7 +32,7 @@ pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
     let after = mismatch::left(array, &looks_alone(array, coupling)?);
     // Any receivers may look like that by chance, if not to the last digit.
     if after.as_ref().is_some_and(|after| after.square > BY_CHANCE * before) {
-        candidate.look_alikes.push("channel_mismatch");
+        candidate.look_alikes.push(effects::channel_mismatch::ID);
     }
     let explains_all = after.is_none_or(|after| after.p_value > UNEVEN);
     Some(Found { candidate, likelihood: found.likelihood, explains_all })
@@ -123,16 +124,16 @@ fn candidate(evidence: &Evidence, strength: Complex64, found: &Estimated) -> Can
     let samples = evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum::<f64>();
     let mean_neighbours = 2.0 * (receivers as f64 - 1.0) / receivers as f64;
     Candidate {
-        id: Some("mutual_coupling"),
+        id: Some(effects::mutual_coupling::ID),
         behaves_like: "channel gain",
         estimates: vec![Estimate::normal("level_db", level_db, statistics::DECIBEL * deviation / strength.norm())],
         choice: None,
-        place: Place::at("antenna"),
+        place: Place::at(Stage::Antenna),
         p_value: statistics::corrected(found.p_value, LOOKS),
         gain: found.gain,
         errs_alike: true,
         // Of three receivers only the middle one is odd.
-        look_alikes: if receivers < 4 { vec!["channel_mismatch"] } else { vec![] },
+        look_alikes: if receivers < 4 { vec![effects::channel_mismatch::ID] } else { vec![] },
         statement: format!(
             "Each receiver also receives its neighbours' signals, {:.1} dB below them and {:.0}° ahead: the inner receivers, which \
              have two neighbours, differ from the outer ones, which have one, in the way that every direction of the body \

@@ -16,7 +16,7 @@ use super::trial::{Score, Trial};
 use crate::diagnosis::prediction::BEYOND;
 use crate::diagnosis::suspects::paths::PATH_LIKE;
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};
-use crate::effects::slope_error;
+use crate::effects::{Stage, clock_drift, clock_offset, frame_drop, pose_offset, range_bias, slope_error};
 
 /// Errors of the prediction that are no finding: metres of range, seconds.
 const RANGE_FLOOR_M: f64 = 4e-3;
@@ -45,9 +45,9 @@ const FEWEST_AFTER: usize = 2;
 const STEP_INFLATION: f64 = 3.0;
 
 /// Errors of clocks.
-const TIMING: [&str; 3] = ["clock_offset", "clock_drift", "frame_drop"];
+const TIMING: [&str; 3] = [clock_offset::ID, clock_drift::ID, frame_drop::ID];
 /// Displacements along the line of sight.
-const ALONG: [&str; 2] = ["range_bias", "slope_error"];
+const ALONG: [&str; 2] = [range_bias::ID, slope_error::ID];
 
 pub fn find(trial: &Trial) -> Vec<Candidate> {
     let evidence = trial.evidence;
@@ -65,21 +65,21 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
     let interesting = |fit: &Option<Fitted>| fit.as_ref().is_some_and(|fit| p_value(fit, &null, training) < 0.05);
     let mut fitted = vec![];
     let at = best_of(trial, &coarse, RANGE_GRID_M.into_iter(), Change::Range);
-    let range = refine(trial, "range_bias", at, 0.03, RANGE_FLOOR_M, Change::Range);
+    let range = refine(trial, range_bias::ID, at, 0.03, RANGE_FLOOR_M, Change::Range);
     if interesting(&range) {
         let offset = range.as_ref().map_or(0.0, |range| range.value);
         let along = |offset: f64| Change::Offset([0.0, offset, 0.0]);
-        fitted.extend(refine(trial, "slope_error", offset / range_m, 0.03 / range_m, RANGE_FLOOR_M / range_m, Change::Scale));
+        fitted.extend(refine(trial, slope_error::ID, offset / range_m, 0.03 / range_m, RANGE_FLOOR_M / range_m, Change::Scale));
         fitted.extend(range);
-        fitted.extend(refine(trial, "pose_offset", offset, 0.03, RANGE_FLOOR_M, along));
+        fitted.extend(refine(trial, pose_offset::ID, offset, 0.03, RANGE_FLOOR_M, along));
     }
     let at = best_of(trial, &coarse, CLOCK_GRID.into_iter().map(|step| step * period), Change::Clock);
-    let clock = refine(trial, "clock_offset", at, 0.12 * period, CLOCK_FLOOR_S, Change::Clock);
+    let clock = refine(trial, clock_offset::ID, at, 0.12 * period, CLOCK_FLOOR_S, Change::Clock);
     let duration = (body.middle_s[every.len() - 1] - body.middle_s[0]).max(period);
     let rate = best_of(trial, &coarse, DRIFT_GRID.into_iter(), Change::Drift);
     if interesting(&clock) || rate != 0.0 {
         let floor = 2.0 * CLOCK_FLOOR_S / duration;
-        fitted.extend(refine(trial, "clock_drift", rate, 0.24 * period / duration, floor, Change::Drift));
+        fitted.extend(refine(trial, clock_drift::ID, rate, 0.24 * period / duration, floor, Change::Drift));
     }
     fitted.extend(clock);
     fitted.extend(again::best(trial, &coarse));
@@ -90,7 +90,7 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
     }
     // A ramp's slope is wrong by no more than the library allows it.
     let most_slope = slope_error::INFO.parameters[0].most;
-    fitted.retain(|fit| !evidence.accepted.contains(&fit.id) && (fit.id != "slope_error" || fit.value.abs() <= most_slope));
+    fitted.retain(|fit| !evidence.accepted.contains(&fit.id) && (fit.id != slope_error::ID || fit.value.abs() <= most_slope));
 
     // Alternatives are compared where all of them know the motion, where there is such a frame.
     let known = |frame: &usize| fitted.iter().all(|fit| fit.score.known[*frame]);
@@ -98,7 +98,7 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
     let common = if common.is_empty() { training } else { &common };
     // A pose has four parameters of which one is fitted: it must be better by what the others could gain.
     let gain = |fit: &Fitted| {
-        let occam = if fit.id == "pose_offset" { 1.5 * (training.len() as f64).ln() * fit.inflation } else { 0.0 };
+        let occam = if fit.id == pose_offset::ID { 1.5 * (training.len() as f64).ln() * fit.inflation } else { 0.0 };
         fit.score.gain_over(&null, common) - occam
     };
     let Some(best) = (0..fitted.len()).max_by(|&a, &b| gain(&fitted[a]).total_cmp(&gain(&fitted[b]))) else { return vec![] };
@@ -114,8 +114,8 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
         |fit: &&Fitted| fit.id != best_fit.id && best_fit.score.gain_over(&fit.score, &every) / best_fit.inflation < ALIKE_NATS;
     let mut look_alikes: Vec<&'static str> = fitted.iter().filter(close).map(|fit| fit.id).collect();
     // A body that stands aside may stand nearer or farther as well.
-    if ALONG.contains(&best_fit.id) && evidence.accepted.contains(&"pose_offset") && !look_alikes.contains(&"pose_offset") {
-        look_alikes.push("pose_offset");
+    if ALONG.contains(&best_fit.id) && evidence.accepted.contains(&pose_offset::ID) && !look_alikes.contains(&pose_offset::ID) {
+        look_alikes.push(pose_offset::ID);
     }
     vec![candidate(trial, best_fit, look_alikes, p_value, held_out)]
 }
@@ -164,7 +164,7 @@ fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
     let later = (at..frames.len() - 1).take_while(held_out).map(|frame| frame + 1);
     let scores = earlier.chain(later).chain([at]).map(|at| trial.score(Change::Drop { at, count }, &frames, true));
     let score = scores.max_by(|a, b| a.gain_over(null, &frames).total_cmp(&b.gain_over(null, &frames)))?;
-    Some(Fitted { id: "frame_drop", value: count as f64, deviation: 0.0, floor: 0.0, inflation: STEP_INFLATION, score })
+    Some(Fitted { id: frame_drop::ID, value: count as f64, deviation: 0.0, floor: 0.0, inflation: STEP_INFLATION, score })
 }
 
 /// Log-likelihood gain of frames from which the change was not estimated: the held-out ones. Where the motion is known in none of
@@ -247,12 +247,14 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
     let deviation = deviation(trial, fit).hypot(SCENE * fit.floor);
     let normal = |name| vec![Estimate::normal(name, fit.value, deviation)];
     let (estimates, stage, statement) = match fit.score.change {
-        Change::Range(_) => {
-            (normal("offset_m"), "scene", format!("The body appears {} than it stands, at whatever range.", farther(fit.value)))
-        }
+        Change::Range(_) => (
+            normal("offset_m"),
+            Stage::Scene,
+            format!("The body appears {} than it stands, at whatever range.", farther(fit.value)),
+        ),
         Change::Scale(_) => (
             normal("relative"),
-            "waveform",
+            Stage::Waveform,
             format!(
                 "Ranges are stretched by {:.2} %: the ramp climbs by that much faster than stated, {:.1} mm at the body's mean range.",
                 1e2 * fit.value,
@@ -261,28 +263,30 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
         ),
         Change::Offset(_) => (
             vec![Estimate::list("offset_m", &[0.0, fit.value, 0.0], &[UNSEEN_M, deviation, UNSEEN_M])],
-            "scene",
+            Stage::Scene,
             format!("The body stands {} along boresight than stated.", farther(fit.value)),
         ),
         Change::Clock(_) => (
             normal("offset_s"),
-            "timing",
+            Stage::Timing,
             format!(
                 "The body is {:.0} ms {} in its motion than the clocks say: the error grows with each limb's velocity.",
                 1e3 * fit.value.abs(),
                 if fit.value > 0.0 { "later" } else { "earlier" }
             ),
         ),
-        Change::Drift(_) => {
-            (normal("relative"), "timing", format!("The motion's clock runs {:.2} % faster than the radar's.", 1e2 * fit.value))
-        }
+        Change::Drift(_) => (
+            normal("relative"),
+            Stage::Timing,
+            format!("The motion's clock runs {:.2} % faster than the radar's.", 1e2 * fit.value),
+        ),
         Change::Again(echo) => {
             let (estimates, statement) = again::described(trial, echo, fit.value, deviation);
-            (estimates, "propagation", statement)
+            (estimates, Stage::Propagation, statement)
         }
         Change::Drop { at, count } => (
             vec![Estimate::normal("at", at as f64, 1.5), Estimate::normal("count", count as f64, 0.0)],
-            "timing",
+            Stage::Timing,
             format!("From frame {at} on the body is {count} frame(s) later in its motion: frames were lost there."),
         ),
     };
@@ -295,8 +299,8 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
     Candidate {
         id: Some(fit.id),
         behaves_like: match stage {
-            "timing" => "time offset",
-            "propagation" => PATH_LIKE,
+            Stage::Timing => "time offset",
+            Stage::Propagation => PATH_LIKE,
             _ => "range offset",
         },
         estimates,

@@ -15,6 +15,7 @@ use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;
 use crate::diagnosis::statistics::{DECIBEL, corrected};
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place, Volume};
+use crate::effects::{self, Stage};
 
 /// What errors of the prediction do to a gain and to a phase: a body that keeps its place shows the same wrong reflectivities in all frames.
 const GAIN_FLOOR_DB: f64 = 0.05;
@@ -99,7 +100,7 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
         })
         .sum();
     Candidate {
-        id: Some("channel_mismatch"),
+        id: Some(effects::channel_mismatch::ID),
         behaves_like: "channel gain",
         statement: format!(
             "The receivers differ: against the first, {} {} dB of gain and {}° of phase, which no direction of the body explains.",
@@ -112,7 +113,7 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
             Estimate::list("phase_deg", &phases_deg, &phase_deviations),
         ],
         choice: None,
-        place: Place { rx: Some((1..receivers).collect()), ..Place::at("antenna") },
+        place: Place { rx: Some((1..receivers).collect()), ..Place::at(Stage::Antenna) },
         p_value,
         gain,
         errs_alike: true,

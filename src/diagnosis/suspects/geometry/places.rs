@@ -12,6 +12,7 @@ use super::found::{Found, LOOKS};
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};
+use crate::effects::{self, Stage};
 
 /// What errors of the prediction look like, radian per unit of the sine.
 const FLOOR: f64 = 0.02;
@@ -53,11 +54,11 @@ fn candidate(evidence: &Evidence, cells: &Cells, directions: &DMatrix<f64>, foun
     let growth = found.values.norm();
     let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
     Candidate {
-        id: Some("antenna_position"),
+        id: Some(effects::antenna_position::ID),
         behaves_like: "phase between receivers that grows with the direction",
         estimates: vec![Estimate::list("offset_m", offsets.as_slice(), &deviations)],
         choice: None,
-        place: Place::at("antenna"),
+        place: Place::at(Stage::Antenna),
         p_value: corrected(found.p_value, LOOKS),
         gain: found.gain,
         errs_alike: true,

@@ -11,6 +11,7 @@ use super::bearing::{Bearing, Sums, along};
 use super::standing::Standing;
 use crate::diagnosis::suspects::undo;
 use crate::diagnosis::{Candidate, Correction, Cube, Evidence, Place, Volume};
+use crate::effects::Stage;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
 /// How the sine of a body that stands aside, or is seen in another direction, may depend on the range, and that of what is sampled
@@ -71,7 +72,7 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, gain: f64)
         behaves_like: "delay-proportional phase by receiver",
         estimates: vec![],
         choice: None,
-        place: Place { rx: Some((1..radar.rx_m.len()).collect()), ..Place::at("receiver") },
+        place: Place { rx: Some((1..radar.rx_m.len()).collect()), ..Place::at(Stage::Receiver) },
         // The ratio of the walls' likelihoods, whose numbers the body gave, is one on average by chance: a p-value may be divided by it.
         p_value: (bearing.p_value * (-walls_gain).exp()).clamp(f64::MIN_POSITIVE, 1.0),
         gain,

@@ -10,6 +10,7 @@ use crate::diagnosis::evidence::{Evidence, HANN_LOBE, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
 use crate::diagnosis::statistics::DECIBEL;
 use crate::diagnosis::suspects::receiver::image::{balanced, imbalance};
+use crate::effects::{self, Stage};
 
 /// Orders of the fit: static returns and what turns backwards.
 const STATIC: usize = 0;
@@ -19,7 +20,7 @@ const NEAREST: usize = 2 * HANN_LOBE;
 
 pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     let [_, tx, rx, _, samples] = evidence.cube.dims;
-    if evidence.is_real() || samples < 16 * HANN_LOBE || evidence.accepted.contains(&"iq_imbalance") {
+    if evidence.is_real() || samples < 16 * HANN_LOBE || evidence.accepted.contains(&effects::iq_imbalance::ID) {
         return None;
     }
     let of = |order: usize| -> Vec<Vec<Complex64>> { fit.parts[order].iter().map(|part| spectrum(part)).collect() };
@@ -73,14 +74,14 @@ fn candidate(evidence: &Evidence, fit: &Fit, found: &[(Complex64, f64)], excess:
     let still: f64 = evidence.still().iter().map(|value| value.norm_sqr()).sum();
     let course = fit.course.clone();
     Candidate {
-        id: Some("iq_imbalance"),
+        id: Some(effects::iq_imbalance::ID),
         behaves_like: "conjugate image",
         estimates: vec![
             Estimate::normal("gain_db", gain_db, 2.0 * DECIBEL * deviation),
             Estimate::normal("phase_deg", phase_deg, (2.0 * deviation).to_degrees()),
         ],
         choice: None,
-        place: Place::at("receiver"),
+        place: Place::at(Stage::Receiver),
         p_value,
         gain,
         errs_alike: false,

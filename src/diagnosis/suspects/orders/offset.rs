@@ -12,13 +12,14 @@ use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, HANN_LOBE, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::suspects::receiver::zero_beat::ZeroBeat;
+use crate::effects::{self, Stage};
 
 /// Order of the fit that it has.
 const ADDED: usize = 1;
 
 pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     let [frames, tx, rx, loops, samples] = evidence.cube.dims;
-    if evidence.is_real() || samples < 8 * HANN_LOBE || evidence.accepted.contains(&"dc_offset") {
+    if evidence.is_real() || samples < 8 * HANN_LOBE || evidence.accepted.contains(&effects::dc_offset::ID) {
         return None;
     }
     let spectra: Vec<Vec<Complex64>> = fit.parts[ADDED].iter().map(|part| spectrum(part)).collect();
@@ -42,15 +43,15 @@ pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     let course = fit.course.clone();
     let constant = offsets.clone();
     Some(Candidate {
-        id: Some("dc_offset"),
+        id: Some(effects::dc_offset::ID),
         behaves_like: "additive fast-time",
         estimates: vec![Estimate::list("i", &parts(|d| d.re), &deviations), Estimate::list("q", &parts(|d| d.im), &deviations)],
         choice: None,
-        place: Place { range_m: Some([0.0, 0.0]), ..Place::at("receiver") },
+        place: Place { range_m: Some([0.0, 0.0]), ..Place::at(Stage::Receiver) },
         p_value,
         gain,
         errs_alike: false,
-        look_alikes: if beat.may_be_leakage() { vec!["tx_leakage"] } else { vec![] },
+        look_alikes: if beat.may_be_leakage() { vec![effects::tx_leakage::ID] } else { vec![] },
         statement: format!(
             "a constant of {} codes is added to every sample of the {rx} receivers: it does not turn when all static returns do",
             offsets.iter().map(|d| format!("{:.1}", d.norm())).collect::<Vec<_>>().join(", ")

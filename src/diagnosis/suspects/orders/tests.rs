@@ -4,6 +4,7 @@ use num_complex::Complex64;
 
 use super::*;
 use crate::diagnosis::Correction;
+use crate::effects;
 use crate::radar::Radar;
 
 const FRAMES: usize = 32;
@@ -52,7 +53,11 @@ fn what_does_not_turn_with_the_room_is_an_offset_and_what_turns_backwards_its_im
     let (offset, image) = (Complex64::new(4.0, -2.0), Complex64::from_polar(0.05, 1.0));
     let evidence = turned(1, offset, image);
     let found = sure(&evidence);
-    assert_eq!(found.iter().filter_map(|found| found.id).collect::<Vec<_>>(), ["dc_offset", "iq_imbalance"], "{found:?}");
+    assert_eq!(
+        found.iter().filter_map(|found| found.id).collect::<Vec<_>>(),
+        [effects::dc_offset::ID, effects::iq_imbalance::ID],
+        "{found:?}"
+    );
     let of = |found: &Candidate, name: &str| found.estimates.iter().find(|e| e.name == name).unwrap().clone();
     for (name, truth) in [("i", offset.re), ("q", offset.im)] {
         for [low, high] in of(&found[0], name).ci90 {
@@ -85,7 +90,7 @@ fn breathes(seed: u64, order: f64, amplitude: f64) -> Evidence {
             + tone(9.4, n) * 40.0
     });
     let candidate = crate::diagnosis::suspects::vital::find(&evidence).pop().expect("somebody who breathes");
-    assert_eq!(candidate.id, Some("breathing"), "{candidate:?}");
+    assert_eq!(candidate.id, Some(effects::breathing::ID), "{candidate:?}");
     evidence.with(&candidate)
 }
 
@@ -93,7 +98,7 @@ fn breathes(seed: u64, order: f64, amplitude: f64) -> Evidence {
 fn a_return_that_goes_out_again_turns_twice_and_a_second_mover_with_the_same_course_does_not() {
     let found = sure(&breathes(1, 2.0, 3.0));
     assert_eq!(found.len(), 1, "{found:?}");
-    assert_eq!(found[0].id, Some("object_radar_object"), "{found:?}");
+    assert_eq!(found[0].id, Some(effects::object_radar_object::ID), "{found:?}");
     assert!(sure(&breathes(1, 1.0, 3.0)).is_empty());
     assert!(sure(&breathes(1, 2.0, 0.0)).is_empty());
 }

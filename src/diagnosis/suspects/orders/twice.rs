@@ -17,9 +17,10 @@ use crate::diagnosis::suspects::paths::PATH_LIKE;
 use crate::diagnosis::suspects::paths::product::CLOSE;
 use crate::diagnosis::suspects::region::{Region, remove};
 use crate::diagnosis::suspects::vital::frames::{Frames, frames};
+use crate::effects::{self, Stage};
 
 /// What may lie at twice the range: the second trip, and the harmonic.
-const KINDS: [(&str, bool); 2] = [("object_radar_object", false), ("second_harmonic", true)];
+const KINDS: [(&str, bool); 2] = [(effects::object_radar_object::ID, false), (effects::second_harmonic::ID, true)];
 /// Range bins to each side of twice the range: the mean range of a body that moves is between bins.
 const ASIDE: usize = 1;
 
@@ -91,7 +92,7 @@ fn candidate(
             Estimate::normal("coefficient", value, deviation)
         }],
         choice: None,
-        place: Place { range_m: Some(window(best.bin).map(|bin| bin * bin_m)), ..Place::at("propagation") },
+        place: Place { range_m: Some(window(best.bin).map(|bin| bin * bin_m)), ..Place::at(Stage::Propagation) },
         p_value,
         gain,
         errs_alike: false,

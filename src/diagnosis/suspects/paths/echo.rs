@@ -12,6 +12,7 @@ use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::receiver::harmonic;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Volume};
+use crate::effects::{self, Stage};
 use crate::radar::SPEED_OF_LIGHT;
 
 /// Delays that are tried, half cells of range.
@@ -139,11 +140,11 @@ pub fn multibounce(scene: &Scene, tried: f64) -> Option<Candidate> {
         .filter(|&(frame, cell)| scene.model.support(frame)[cell])
         .map(|(frame, cell)| f64::from(scene.map(frame)[cell] - 1.0))
         .sum();
-    let mut place = Place::at("propagation");
+    let mut place = Place::at(Stage::Propagation);
     place.range_m = None;
     let step_m = scene.range_m(0.125);
     Some(Candidate {
-        id: Some("body_multibounce"),
+        id: Some(effects::body_multibounce::ID),
         behaves_like: super::PATH_LIKE,
         estimates: vec![Estimate::normal("extra_m", extra_m, 0.4 * step_m)],
         choice: None,

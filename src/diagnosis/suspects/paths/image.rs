@@ -9,6 +9,7 @@ use super::scene::Scene;
 use crate::diagnosis::prediction::{SIDE_SPREAD, mirror_id, mirrored_return};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Candidate, Correction, Estimate, Place};
+use crate::effects::Stage;
 
 /// Log-likelihood within which two boundaries are not told apart.
 const CLOSE: f64 = 4.6;
@@ -18,7 +19,7 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
     let distance_m = evidence.room.as_ref().and_then(|room| room.distance_m(ghost.boundary)).unwrap_or(0.0);
     let points = evidence.body.iter().flat_map(|body| body.frames.iter().flatten());
     let images = points.map(|point| mirrored_return(&evidence.radar, point, ghost.boundary, distance_m, false));
-    let place = Place::spanning("propagation", images.map(|image| (image.range_m, image.velocity_mps)));
+    let place = Place::spanning(Stage::Propagation, images.map(|image| (image.range_m, image.velocity_mps)));
     let name = ghost.boundary.name();
     let id = mirror_id(ghost.boundary);
     let peak = scene_power(scene, ghost);

@@ -20,6 +20,7 @@ mod track;
 mod tests;
 
 use crate::diagnosis::{Candidate, Evidence};
+use crate::effects;
 
 use scene::Scene;
 pub use still_point::body_rms;
@@ -52,19 +53,19 @@ pub const PATH_LIKE: &str = "path-like";
 pub const OVER_THE_BODY: &str = "path-like, over the body";
 
 /// Effects of which there may be several.
-pub const MANY: [&str; 3] = ["wall_ghost", "floor_bounce", "moving_reflector"];
+pub const MANY: [&str; 3] = [effects::wall_ghost::ID, effects::floor_bounce::ID, effects::moving_reflector::ID];
 
 /// What leaves remains when it is taken out that no single frame shows and that move by a law: how the body is seen otherwise or
 /// again, things that move themselves, and a receiver in which all these change one another.
 pub const LEAVE_REMAINS: [&str; 8] = [
-    "wall_ghost",
-    "floor_bounce",
-    "body_multibounce",
-    "object_radar_object",
-    "soft_occlusion",
-    "moving_reflector",
-    "range_alias",
-    "compression",
+    effects::wall_ghost::ID,
+    effects::floor_bounce::ID,
+    effects::body_multibounce::ID,
+    effects::object_radar_object::ID,
+    effects::soft_occlusion::ID,
+    effects::moving_reflector::ID,
+    effects::range_alias::ID,
+    effects::compression::ID,
 ];
 
 /// Mirror images of the body at the room's boundaries, and movers that are none.
@@ -77,7 +78,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         if !elsewhere {
             let remains = LEAVE_REMAINS.iter().any(|id| evidence.accepted.contains(id));
             // Noise that receivers share comes from one direction, as if something were there.
-            let shared = evidence.accepted.contains(&"correlated_noise");
+            let shared = evidence.accepted.contains(&effects::correlated_noise::ID);
             let motion = (!remains && !shared).then(|| sinusoidal::strongest(&scene)).flatten();
             let least = |mover: &mover::Mover| {
                 let distinct = mover.power > STRONG && mover::aside(&scene, &mover.track.sightings);
@@ -146,12 +147,12 @@ fn moving(scene: &Scene) -> Vec<Candidate> {
 
 /// A wall behind the radar returns nearly the same of a body before it as the body's own echoes do: a copy that keeps its phases.
 fn told_apart(found: &mut Vec<Candidate>, again: &mut Candidate) {
-    let alike = |found: &Candidate| found.id == Some("wall_ghost") && again.gain > ALIKE * found.gain;
+    let alike = |found: &Candidate| found.id == Some(effects::wall_ghost::ID) && again.gain > ALIKE * found.gain;
     let Some(index) = found.iter().position(alike) else { return };
     if found[index].estimates.iter().any(|estimate| estimate.name == "coefficient" && estimate.values[0].abs() > STRONGEST_WALL) {
         found.remove(index);
-        again.look_alikes.push("wall_ghost");
+        again.look_alikes.push(effects::wall_ghost::ID);
     } else {
-        found[index].look_alikes.push("body_multibounce");
+        found[index].look_alikes.push(effects::body_multibounce::ID);
     }
 }

@@ -9,6 +9,7 @@ use super::track::{Sighting, Track};
 use crate::diagnosis::power::Template;
 use crate::diagnosis::statistics::{corrected, median};
 use crate::diagnosis::{Candidate, Correction, Estimate, Place};
+use crate::effects::{self, Stage};
 
 /// Sightings are good to this share of a cell, and no better than that: the windows' law holds for a steady tone.
 const CELL_ERROR: f64 = 0.12;
@@ -54,8 +55,8 @@ impl Mover {
                 scene.gain(frame, &template, power)
             })
             .sum();
-        let id = if pendulum.is_some() { Some("moving_reflector") } else { named(scene, &track.sightings) };
-        let id = id.map(|id| if outside(scene, &track.sightings) { "range_alias" } else { id });
+        let id = if pendulum.is_some() { Some(effects::moving_reflector::ID) } else { named(scene, &track.sightings) };
+        let id = id.map(|id| if outside(scene, &track.sightings) { effects::range_alias::ID } else { id });
         // Where the body is, what moves with it has the same law: only a sinusoidal motion to one side of it is identified.
         let id = id.filter(|_| !scene.over_body || (pendulum.is_some() && aside(scene, &track.sightings)));
         let unlike = if scene.over_body {
@@ -79,7 +80,7 @@ impl Mover {
         };
         let sines: Vec<f64> = sightings.iter().filter_map(|s| s.sine).collect();
         let mut estimates = vec![];
-        let mut place = Place::at(if self.id == Some("range_alias") { "propagation" } else { "scene" });
+        let mut place = Place::at(if self.id == Some(effects::range_alias::ID) { Stage::Propagation } else { Stage::Scene });
         place.range_m = Some([ranges[0] - 0.5 * cell_m, ranges[1] + 0.5 * cell_m]);
         place.velocity_mps = Some(velocities);
         let mut whereabouts = String::new();
@@ -129,7 +130,7 @@ impl Mover {
         let everywhere = frames.len() == scene.frames();
         place.frames = (!everywhere).then_some(frames);
         let alias = match self.id {
-            Some("range_alias") => {
+            Some(effects::range_alias::ID) => {
                 " Its range falls when its Doppler says that it recedes: it lies beyond the unambiguous range and is folded back."
             }
             None => " Its range and its Doppler do not belong together: no single reflector moves so.",
@@ -163,7 +164,7 @@ impl Mover {
         Candidate {
             id: self.id,
             behaves_like: super::PATH_LIKE,
-            estimates: if self.id == Some("moving_reflector") { estimates } else { vec![] },
+            estimates: if self.id == Some(effects::moving_reflector::ID) { estimates } else { vec![] },
             choice: None,
             place,
             p_value: corrected(self.track.p_value, tried),
@@ -183,8 +184,8 @@ impl Mover {
     /// With quadrature, what is folded at the end of the unambiguous range looks as if it were there.
     fn look_alikes(&self, scene: &Scene) -> Vec<&'static str> {
         match self.id {
-            Some("range_alias") => vec!["moving_reflector"],
-            Some("moving_reflector") if !scene.evidence.is_real() => vec!["range_alias"],
+            Some(effects::range_alias::ID) => vec![effects::moving_reflector::ID],
+            Some(effects::moving_reflector::ID) if !scene.evidence.is_real() => vec![effects::range_alias::ID],
             _ => vec![],
         }
     }
@@ -239,9 +240,9 @@ fn named(scene: &Scene, sightings: &[Sighting]) -> Option<&'static str> {
     };
     let (with, against) = (apart(1.0), apart(-1.0));
     if with < 0.5 && with <= against {
-        Some("moving_reflector")
+        Some(effects::moving_reflector::ID)
     } else if against < 0.5 && against < 0.5 * with {
-        Some("range_alias")
+        Some(effects::range_alias::ID)
     } else {
         None
     }

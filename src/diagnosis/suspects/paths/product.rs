@@ -15,6 +15,7 @@ use crate::diagnosis::evidence::transform;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::receiver::harmonic;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Volume};
+use crate::effects::{self, Stage};
 
 /// Log-likelihood within which two explanations are not told apart.
 pub const CLOSE: f64 = 4.6;
@@ -33,8 +34,8 @@ const KINDS: [Kind; 3] = [Kind::Bounce(None), Kind::Bounce(Some(0)), Kind::Harmo
 impl Kind {
     fn id(self) -> &'static str {
         match self {
-            Self::Bounce(_) => "object_radar_object",
-            Self::Harmonic => "second_harmonic",
+            Self::Bounce(_) => effects::object_radar_object::ID,
+            Self::Harmonic => effects::second_harmonic::ID,
         }
     }
 
@@ -63,7 +64,7 @@ fn mean(channels: &[&[Complex64]]) -> Vec<Complex64> {
 
 pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
     // Where the receiver bends everything, or products of other kinds are there too, these two are not the cause.
-    let bent = ["adc_saturation", harmonic::QUADRATIC].iter().any(|id| scene.evidence.accepted.contains(id));
+    let bent = [effects::adc_saturation::ID, harmonic::QUADRATIC].iter().any(|id| scene.evidence.accepted.contains(id));
     if scene.evidence.is_real() || bent || scene.evidence.products().mixed().is_some() {
         return None;
     }
@@ -89,7 +90,7 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
     let (estimate, stage, statement) = match kind {
         Kind::Bounce(_) => (
             Estimate::normal("coefficient", value, deviation),
-            "propagation",
+            Stage::Propagation,
             format!(
                 "Returns go out a second time: at the sum of two ranges and two velocities lies {level_db:.0} dB (of the peak \
                  sample) of their product, with the array phase of one arrival, not twice that phase."
@@ -97,7 +98,7 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
         ),
         Kind::Harmonic => (
             Estimate::normal("level_db", level_db, denoised::PEAK_DB.hypot(8.7 * deviation / value.max(1e-12))),
-            "receiver",
+            Stage::Receiver,
             format!(
                 "everything has a second harmonic, at twice its beat frequency and velocity and with twice the phase of every \
                  receiver: {level_db:.1} dB at the strongest sample"

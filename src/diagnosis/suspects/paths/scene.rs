@@ -7,6 +7,7 @@ use crate::diagnosis::locate::{BODY_FACTOR, CELLS_PER_VALUE};
 use crate::diagnosis::power::{PowerModel, Template};
 use crate::diagnosis::statistics::median;
 use crate::diagnosis::suspects::clutter::still_power;
+use crate::effects;
 
 /// Doppler bins around zero in which static clutter leaves remains wherever the body was in some frame.
 pub const STILL_BINS: i64 = 2;
@@ -17,7 +18,7 @@ const SIDELOBE_SAFETY: f64 = 10.0;
 /// Sidelobes below this share of the noise are nothing.
 const SIDELOBE_LEVEL: f64 = 0.3;
 /// Whose undoing leaves leakage of the body at fixed ranges.
-const FILTERS: [&str; 2] = ["if_highpass", "if_lowpass"];
+const FILTERS: [&str; 2] = [effects::if_highpass::ID, effects::if_lowpass::ID];
 
 /// Powers over the noise, and what is expected of them without any further path, `[frame, doppler, range]`.
 pub struct Scene<'a> {

@@ -16,6 +16,7 @@ use super::scene::Scene;
 use super::track::{Sighting, Track};
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::{Candidate, Correction, Point};
+use crate::effects;
 
 /// Samples of all channels and frames that the bank is laid over, at most so many frames that last so long.
 const MOST_SAMPLES: usize = 1 << 21;
@@ -162,7 +163,7 @@ pub fn strongest(scene: &Scene) -> Option<Found> {
             left: 0.0,
             deviations: [deviations[0], deviations[1], deviations[2]],
         }),
-        id: named.then_some("moving_reflector"),
+        id: named.then_some(effects::moving_reflector::ID),
         gain: again,
         power: power / 2.25,
         sine_error: Some(deviations[3]),

@@ -10,6 +10,7 @@ use crate::diagnosis::evidence::{hann, transform};
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::steering::{power, steering};
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place};
+use crate::effects::{self, Stage};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::{Boundary, Room};
 
@@ -178,7 +179,7 @@ fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candi
     let power: f64 = amplitudes.iter().map(Complex64::norm_sqr).sum();
     let share = 1.0 / peak.ratio.sqrt();
     let mut estimates = vec![];
-    let mut place = Place::at("scene");
+    let mut place = Place::at(Stage::Scene);
     place.range_m = Some([peak.range_m - 0.5 * cell_m, peak.range_m + 0.5 * cell_m]);
     place.velocity_mps = Some([0.0, 0.0]);
     let mut whereabouts = String::new();
@@ -211,7 +212,7 @@ fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candi
         estimates.push(Estimate::normal("amplitude", amplitude, amplitude * share.hypot(0.2)));
     }
     Candidate {
-        id: Some("static_reflector"),
+        id: Some(effects::static_reflector::ID),
         behaves_like: super::PATH_LIKE,
         estimates,
         choice: None,

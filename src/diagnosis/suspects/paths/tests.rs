@@ -9,6 +9,7 @@ use super::{find, scene::Scene, sinusoidal};
 use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::misfit::Misfit;
 use crate::diagnosis::{BodyPrediction, Candidate, Cube, Evidence, Point, Split};
+use crate::effects;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::Room;
 
@@ -131,7 +132,11 @@ fn a_mirror_on_the_right_is_found_and_removed() {
     // Longer ways and a side turned away leave 0.21 of what a mirror of amplitude 1 would return of this body.
     let evidence = evidence(0.4 * 0.21, 0.0);
     let found = believed(&evidence);
-    assert_eq!((found.len(), found[0].id, found[0].choice.as_deref()), (1, Some("wall_ghost"), Some("right")), "{found:?}");
+    assert_eq!(
+        (found.len(), found[0].id, found[0].choice.as_deref()),
+        (1, Some(effects::wall_ghost::ID), Some("right")),
+        "{found:?}"
+    );
     let [low, high] = found[0].estimates[0].ci90[0];
     assert!(low < 0.4 && 0.4 < high, "{low} {high}");
     assert!(found[0].gain > 20.0);
@@ -143,7 +148,7 @@ fn a_mirror_on_the_right_is_found_and_removed() {
 fn an_oscillating_stranger_is_found_and_removed() {
     let evidence = evidence(0.0, 1.0);
     let found = believed(&evidence);
-    assert_eq!((found.len(), found[0].id), (1, Some("moving_reflector")), "{found:?}");
+    assert_eq!((found.len(), found[0].id), (1, Some(effects::moving_reflector::ID)), "{found:?}");
     let of = |name: &str| found[0].estimates.iter().find(|estimate| estimate.name == name).unwrap();
     assert!((of("rate_hz").values[0] - 0.8).abs() < 0.05 && (of("swing_m").values[0] - 0.12).abs() < 0.02, "{found:?}");
     let after = believed(&corrected(evidence, &found[0]));
@@ -183,7 +188,7 @@ fn a_sinusoidal_motion_too_weak_for_any_single_frame_is_found_by_all_of_them() {
     let scene = Scene::new(&weak).unwrap();
     let found = sinusoidal::strongest(&scene).unwrap().mover;
     let fit = found.pendulum.unwrap();
-    assert_eq!(found.id, Some("moving_reflector"));
+    assert_eq!(found.id, Some(effects::moving_reflector::ID));
     assert!(
         (fit.rate_hz - 0.8).abs() < 0.1 && (fit.excursion_m() - 0.12).abs() < 0.04 && (fit.mean_m - 1.0).abs() < 0.1,
         "{fit:?}"
@@ -195,9 +200,9 @@ fn a_sinusoidal_motion_too_weak_for_any_single_frame_is_found_by_all_of_them() {
 #[test]
 fn no_sinusoidal_motion_is_sought_in_noise_that_receivers_share() {
     let mut weak = made(0.0, 0.044, 1.0);
-    let oscillates = |evidence: &Evidence| find(evidence).iter().any(|found| found.id == Some("moving_reflector"));
+    let oscillates = |evidence: &Evidence| find(evidence).iter().any(|found| found.id == Some(effects::moving_reflector::ID));
     assert!(oscillates(&weak));
-    weak.accepted.push("correlated_noise");
+    weak.accepted.push(effects::correlated_noise::ID);
     assert!(!oscillates(&weak));
 }
 

@@ -15,6 +15,7 @@ use super::support::energy;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, OfSample, Place};
 use crate::diagnosis::statistics::{corrected, median};
 use crate::diagnosis::{Cube, Evidence, Volume};
+use crate::effects::{Stage, adc_saturation, impulsive_noise, interference};
 
 /// A sample's power over that of its surroundings, beyond which it is a burst's: e^−25 for noise.
 const HIGH: f64 = 25.0;
@@ -27,7 +28,7 @@ const NEXT: f64 = 6.0;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [frames, _, rx, loops, samples] = evidence.cube.dims;
-    if loops < 8 || evidence.accepted.iter().any(|id| ["interference", "impulsive_noise", "adc_saturation"].contains(id)) {
+    if loops < 8 || evidence.accepted.iter().any(|id| [interference::ID, impulsive_noise::ID, adc_saturation::ID].contains(id)) {
         return vec![];
     }
     let channels = evidence.cube.channels();
@@ -105,19 +106,19 @@ fn claim(bursts: &[Burst], hit: usize, rx: usize, crossings: Option<&Crossings>)
         chirps: list(bursts.iter().map(|burst| burst.chirp).collect()),
         samples: list(bursts.iter().flat_map(|burst| burst.first..=burst.last).collect()),
         rx: (!seen_by_all).then(|| bursts.iter().map(|b| b.channel % rx).collect::<BTreeSet<_>>().into_iter().collect()),
-        ..Place::at(if seen_by_all { "receiver" } else { "noise" })
+        ..Place::at(if seen_by_all { Stage::Receiver } else { Stage::Noise })
     };
     let lengths: f64 = hit as f64 / bursts.len() as f64;
     let single = lengths < 2.0;
     let (id, look_alikes) = match (seen_by_all, single) {
-        (true, false) => ("interference", vec![]),
-        (true, true) => ("interference", vec!["impulsive_noise"]),
-        (false, true) => ("impulsive_noise", vec![]),
-        (false, false) => ("impulsive_noise", vec!["interference"]),
+        (true, false) => (interference::ID, vec![]),
+        (true, true) => (interference::ID, vec![impulsive_noise::ID]),
+        (false, true) => (impulsive_noise::ID, vec![]),
+        (false, false) => (impulsive_noise::ID, vec![interference::ID]),
     };
     let count = places.len() as f64;
-    let estimates = if id == "interference" { vec![bursts_in_all(count, crossings)] } else { vec![] };
-    let statement = if id == "interference" {
+    let estimates = if id == interference::ID { vec![bursts_in_all(count, crossings)] } else { vec![] };
+    let statement = if id == interference::ID {
         format!(
             "{count} chirps hold a burst of {lengths:.0} samples that all receivers see at once and that neither the chirp before \
              nor after has: another radar crosses the band",
@@ -281,7 +282,7 @@ mod tests {
     fn what_hits_few_samples_is_taken_out_at_the_price_of_where_it_was_and_how_strong() {
         let (with, clean) = (evidence(100.0), Misfit::of(&evidence(0.0)).loglik_per_sample);
         let found = find(&with).pop().expect("bursts");
-        assert_eq!(found.id, Some("interference"));
+        assert_eq!(found.id, Some(interference::ID));
         let before = Misfit::of(&with).loglik_per_sample;
         let after = Misfit::after(&with, &with.with(&found)).loglik_per_sample;
         let recovered = (after - before) / (clean - before);

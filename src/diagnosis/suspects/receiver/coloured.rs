@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale};
+use crate::effects::{self, Stage};
 
 /// Cells of a Hann-windowed map per independent one, with reserve for the quantile's inefficiency.
 const SHARED: f64 = 4.0;
@@ -94,11 +95,11 @@ fn candidate(evidence: &Evidence, powers: Powers, top: &Top, fit: &Fit, p_value:
         Estimate { name, values: vec![value], ci90: vec![[value / factor, value * factor]] }
     };
     Candidate {
-        id: Some("coloured_noise"),
+        id: Some(effects::coloured_noise::ID),
         behaves_like: "noise over beat frequency",
         estimates: vec![of("knee_hz", knee, top.deviations[0]), of("power", power, top.deviations[1])],
         choice: None,
-        place: Place::at("noise"),
+        place: Place::at(Stage::Noise),
         p_value,
         gain,
         errs_alike: false,

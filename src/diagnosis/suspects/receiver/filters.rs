@@ -7,6 +7,7 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 use crate::diagnosis::finding::Estimate;
+use crate::effects;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
@@ -27,9 +28,9 @@ pub enum Shape {
 impl Shape {
     pub fn id(self) -> &'static str {
         match self {
-            Self::Highpass { .. } => "if_highpass",
-            Self::Lowpass { .. } => "if_lowpass",
-            Self::Delay { .. } => "if_delay",
+            Self::Highpass { .. } => effects::if_highpass::ID,
+            Self::Lowpass { .. } => effects::if_lowpass::ID,
+            Self::Delay { .. } => effects::if_delay::ID,
         }
     }
 

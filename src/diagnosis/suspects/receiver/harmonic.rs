@@ -7,11 +7,12 @@ use std::sync::Arc;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
 use crate::diagnosis::products::{Law, Product, without};
 use crate::diagnosis::{Cube, Evidence, denoised};
+use crate::effects::{self, Stage};
 
 pub const QUADRATIC: &str = "quadratic in the signal";
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    if evidence.is_real() || evidence.accepted.contains(&"adc_saturation") {
+    if evidence.is_real() || evidence.accepted.contains(&effects::adc_saturation::ID) {
         return vec![];
     }
     let known = |id: &str| evidence.accepted.contains(&id);
@@ -19,8 +20,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if let Some(laws) = products.mixed() {
         return if known(QUADRATIC) { vec![] } else { vec![nameless(evidence, laws)] };
     }
-    let square = products.square.filter(|_| !known("second_harmonic") && !known(QUADRATIC));
-    let cube = products.cube.filter(|_| !known("compression"));
+    let square = products.square.filter(|_| !known(effects::second_harmonic::ID) && !known(QUADRATIC));
+    let cube = products.cube.filter(|_| !known(effects::compression::ID));
     square.into_iter().chain(cube).map(|law| candidate(evidence, law)).collect()
 }
 
@@ -31,7 +32,7 @@ fn candidate(evidence: &Evidence, law: Law) -> Candidate {
     let level_db = 20.0 * level.log10();
     let (id, estimate, statement) = if product == Product::Cube {
         (
-            "compression",
+            effects::compression::ID,
             Estimate::normal("level", -share.re, (0.71 * scatter).hypot(2.0 * denoised::PEAK_DB / 8.7 * level)),
             format!(
                 "strong samples come out too small: the receiver compresses, the strongest sample by {:.2} %; its third-order \
@@ -41,7 +42,7 @@ fn candidate(evidence: &Evidence, law: Law) -> Candidate {
         )
     } else {
         (
-            "second_harmonic",
+            effects::second_harmonic::ID,
             Estimate::normal("level_db", level_db, denoised::PEAK_DB.hypot(8.7 * 0.71 * scatter / level)),
             format!(
                 "everything has a second harmonic, at twice its beat frequency and velocity: {level_db:.1} dB at the strongest \
@@ -76,7 +77,7 @@ fn nonlinear(evidence: &Evidence, behaves_like: &'static str, laws: Vec<Law>, st
         behaves_like,
         estimates: vec![],
         choice: None,
-        place: Place::at("receiver"),
+        place: Place::at(Stage::Receiver),
         p_value,
         gain,
         errs_alike: false,

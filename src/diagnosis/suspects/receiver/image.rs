@@ -15,6 +15,7 @@ use crate::diagnosis::evidence::spectrum;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
 use crate::diagnosis::statistics::{DECIBEL, chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
+use crate::effects::{self, Stage};
 
 /// Power of a parent over the noise.
 const STRONG: f64 = 100.0;
@@ -31,7 +32,7 @@ struct Sums {
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // Products of the signal are undone roughly: what they leave has images too.
-    let settled = ["iq_imbalance", QUADRATIC].iter().any(|id| evidence.accepted.contains(id));
+    let settled = [effects::iq_imbalance::ID, QUADRATIC].iter().any(|id| evidence.accepted.contains(id));
     if evidence.is_real() || settled {
         return vec![];
     }
@@ -78,11 +79,11 @@ fn candidate(evidence: &Evidence, mu: Complex64, scatter: f64, p_value: f64, gai
     let degree_error = (2.0 * scatter / std::f64::consts::SQRT_2).to_degrees();
     let total: f64 = evidence.cube.samples.iter().map(Complex64::norm_sqr).sum();
     Candidate {
-        id: Some("iq_imbalance"),
+        id: Some(effects::iq_imbalance::ID),
         behaves_like: "conjugate image",
         estimates: vec![Estimate::normal("gain_db", gain_db, db_error), Estimate::normal("phase_deg", phase_deg, degree_error)],
         choice: None,
-        place: Place::at("receiver"),
+        place: Place::at(Stage::Receiver),
         p_value,
         gain,
         errs_alike: false,

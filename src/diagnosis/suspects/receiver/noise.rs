@@ -14,6 +14,7 @@ use crate::diagnosis::evidence::beat::empty_bins;
 use crate::diagnosis::evidence::{hann, transform_under};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected, median};
+use crate::effects::{self, Stage};
 
 /// A cell's power over the noise, beyond which it is a mover's.
 const MOVER: f64 = 8.0;
@@ -44,11 +45,15 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if bins.len() < 8 || evidence.cube.dims[3] < 16 {
         return vec![];
     }
-    let filtered = ["if_highpass", "if_lowpass", "coloured_noise"].iter().any(|id| evidence.accepted.contains(id));
+    let filtered = [effects::if_highpass::ID, effects::if_lowpass::ID, effects::coloured_noise::ID]
+        .iter()
+        .any(|id| evidence.accepted.contains(id));
     let colour = if filtered { None } else { coloured(evidence, &bins) };
     // Receivers that were uncoupled again share the noise that each of them had for itself, and what a converter at its rail
     // cut off bursts and peaks is the same in all of them.
-    let known = ["correlated_noise", "mutual_coupling", "adc_saturation"].iter().any(|id| evidence.accepted.contains(id));
+    let known = [effects::correlated_noise::ID, effects::mutual_coupling::ID, effects::adc_saturation::ID]
+        .iter()
+        .any(|id| evidence.accepted.contains(id));
     let correlation = if known { None } else { correlated(evidence, &bins) };
     colour.into_iter().chain(correlation).collect()
 }
@@ -201,11 +206,11 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     let over = if alike { "mean" } else { "root mean square" };
     let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
     Some(Candidate {
-        id: Some("correlated_noise"),
+        id: Some(effects::correlated_noise::ID),
         behaves_like: "noise shared by receivers",
         estimates: vec![Estimate::normal("rho", rho, error)],
         choice: None,
-        place: Place::at("noise"),
+        place: Place::at(Stage::Noise),
         p_value,
         gain,
         errs_alike: false,

@@ -14,6 +14,7 @@ use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence, denoised};
+use crate::effects::{self, Stage};
 
 /// A leakage's cluster of returns ends here.
 const NEAR_M: f64 = 0.3;
@@ -37,20 +38,20 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let samples = evidence.cube.dims[4];
     let still: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
-    if !evidence.accepted.contains(&"ramp_edge_transient") {
+    if !evidence.accepted.contains(&effects::ramp_edge_transient::ID) {
         let edge: Vec<Candidate> = [false, true].into_iter().filter_map(|at_end| edge(evidence, &still, at_end)).collect();
         let edge: Vec<Candidate> = edge.into_iter().filter(|edge| edge.p_value < 1e-6).collect();
         if !edge.is_empty() {
             return edge;
         }
     }
-    if evidence.is_real() && !evidence.accepted.contains(&"dc_offset") {
+    if evidence.is_real() && !evidence.accepted.contains(&effects::dc_offset::ID) {
         let offset = offset(evidence, &still);
         if offset.is_some() {
             return offset.into_iter().collect();
         }
     }
-    if evidence.accepted.contains(&"tx_leakage") { vec![] } else { leakage(evidence, &still).into_iter().collect() }
+    if evidence.accepted.contains(&effects::tx_leakage::ID) { vec![] } else { leakage(evidence, &still).into_iter().collect() }
 }
 
 /// Held-out log-likelihood gained by taking a still term away, samples outside `range` untouched.
@@ -83,7 +84,7 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
     let (largest, mean) = (between.iter().fold(0.0f64, |a, &b| a.max(b)), between.iter().sum::<f64>() / between.len() as f64);
     let at = |i: usize| if at_end { samples - 1 - i } else { i };
     let count = (0..samples / 8).rev().find(|&i| power[at(i)] > WILD * largest)? + 1;
-    if evidence.accepted.contains(&"tx_leakage") && power[at(count - 1)] < ABRUPT * power[at(count)] {
+    if evidence.accepted.contains(&effects::tx_leakage::ID) && power[at(count - 1)] < ABRUPT * power[at(count)] {
         return None;
     }
     let wildest = (0..count).map(|i| power[at(i)]).fold(0.0, f64::max);
@@ -97,14 +98,14 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
     let level_db = 20.0 * (wildest.sqrt() / peak.max(1e-300)).log10();
     let affected = indices.clone();
     Some(Candidate {
-        id: Some("ramp_edge_transient"),
+        id: Some(effects::ramp_edge_transient::ID),
         behaves_like: "additive fast-time",
         estimates: vec![
             Estimate { name: "samples", values: vec![count as f64], ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]] },
             Estimate::normal("level_db", level_db, 8.7 * (mean / wildest).sqrt() + 0.3),
         ],
         choice: None,
-        place: Place { samples: Some(indices), ..Place::at("receiver") },
+        place: Place { samples: Some(indices), ..Place::at(Stage::Receiver) },
         p_value: corrected((-wildest / mean.max(1e-300)).exp(), samples as f64),
         gain: gain(evidence, &term),
         errs_alike: false,
@@ -153,11 +154,11 @@ fn offset(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
     let term: Vec<Vec<Complex64>> = (0..tx * rx).map(|c| vec![Complex64::from(values[c % rx]); samples]).collect();
     let deviation: Vec<f64> = (0..rx).map(|receiver| rest[receiver]).collect();
     Some(Candidate {
-        id: Some("dc_offset"),
+        id: Some(effects::dc_offset::ID),
         behaves_like: "additive fast-time",
         estimates: vec![Estimate::list("i", &values, &deviation), Estimate::list("q", &vec![0.0; rx], &vec![0.0; rx])],
         choice: None,
-        place: Place { range_m: Some([0.0, 0.0]), ..Place::at("receiver") },
+        place: Place { range_m: Some([0.0, 0.0]), ..Place::at(Stage::Receiver) },
         p_value: corrected((-0.5 * (smallest / swing.max(1e-300)).powi(2) * samples as f64).exp(), 1.0),
         gain: gain(evidence, &term),
         errs_alike: false,
@@ -286,17 +287,17 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
     let channels = still.len();
     let (near_spread, far_spread) = (near.spread(near.peak), near.spread(near.far));
     Some(Candidate {
-        id: Some("tx_leakage"),
+        id: Some(effects::tx_leakage::ID),
         behaves_like: "additive fast-time",
         estimates: vec![Estimate::normal("range_m", range, 0.3 * resolution), Estimate::normal("level_db", level_db, 1.0)],
         choice: None,
-        place: Place { range_m: Some([0.0, near.valley as f64 * near.bin_m]), ..Place::at("receiver") },
+        place: Place { range_m: Some([0.0, near.valley as f64 * near.bin_m]), ..Place::at(Stage::Receiver) },
         p_value: chi2_tail(2.0 * near.over_noise(near.peak) * channels as f64, 2.0 * channels as f64),
         gain: gain(evidence, &term),
         errs_alike: false,
         look_alikes: [
-            (near.as_reflectors() > SIGNIFICANCE, "static_reflector"),
-            (!evidence.is_real() && beat.may_be_constant() && !beat.may_be_leakage(), "dc_offset"),
+            (near.as_reflectors() > SIGNIFICANCE, effects::static_reflector::ID),
+            (!evidence.is_real() && beat.may_be_constant() && !beat.may_be_leakage(), effects::dc_offset::ID),
         ]
         .into_iter()
         .filter_map(|(holds, id)| holds.then_some(id))
@@ -370,7 +371,7 @@ mod tests {
     #[test]
     fn what_is_near_leaks_and_the_flank_of_what_lies_behind_does_not() {
         let found = said(0.1);
-        assert_eq!(found.iter().filter_map(|found| found.id).collect::<Vec<_>>(), ["tx_leakage"]);
+        assert_eq!(found.iter().filter_map(|found| found.id).collect::<Vec<_>>(), [effects::tx_leakage::ID]);
         assert!(found[0].gain > 100.0 && found[0].estimates[0].values[0] < 0.2, "{found:?}");
         assert!(said(NEAR_M + 0.1).is_empty(), "{:?}", said(NEAR_M + 0.1));
     }

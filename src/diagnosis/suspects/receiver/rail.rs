@@ -11,6 +11,7 @@ use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::clutter::still_power;
 use crate::diagnosis::{Cube, Evidence, Volume, denoised};
+use crate::effects::{self, Stage};
 
 /// Fewest components at the rail.
 const FEWEST: usize = 8;
@@ -116,11 +117,11 @@ fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
         None => Correction::None,
     };
     Candidate {
-        id: Some("adc_saturation"),
+        id: Some(effects::adc_saturation::ID),
         behaves_like: "amplitude",
         estimates: vec![Estimate { name: "level", values: vec![level], ci90: vec![ci90] }],
         choice: None,
-        place: Place { frames: pile.frames(), ..Place::at("receiver") },
+        place: Place { frames: pile.frames(), ..Place::at(Stage::Receiver) },
         p_value: corrected((-excess).exp(), 2.0),
         gain: excess * held_share,
         errs_alike: false,

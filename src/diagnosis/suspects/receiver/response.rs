@@ -18,6 +18,7 @@ use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Volume};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence};
+use crate::effects::Stage;
 
 /// Hypotheses within this many nats of the best are indistinguishable from it.
 const INDISTINGUISHABLE: f64 = 4.6;
@@ -151,7 +152,7 @@ impl<'a> Search<'a> {
             behaves_like: "beat-frequency gain",
             estimates,
             choice: None,
-            place: Place::at("receiver"),
+            place: Place::at(Stage::Receiver),
             p_value,
             gain: self.gain(shape, value),
             errs_alike: false,

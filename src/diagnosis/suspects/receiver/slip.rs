@@ -21,6 +21,7 @@ use crate::diagnosis::cube::halves;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::corrected;
+use crate::effects::Stage;
 
 /// Fewest frames, loops and samples from which a slip is estimable.
 const FEWEST: [usize; 3] = [4, 4, 32];
@@ -85,7 +86,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             most.abs(),
             if most > 0 { "later" } else { "earlier" }
         ),
-        place: Place { frames: Some(slipped), ..Place::at("receiver") },
+        place: Place { frames: Some(slipped), ..Place::at(Stage::Receiver) },
         curve: None,
         energy: changed,
         correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {

@@ -14,6 +14,7 @@ use crate::diagnosis::evidence::{hann, spectrum, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 use crate::diagnosis::{Cube, Evidence, denoised};
+use crate::effects::{self, Stage};
 
 /// Share of the power around a tone that it may leave, where little else is: a mover's Doppler changes, and it leaves more.
 const LEFT_OVER: f64 = 0.2;
@@ -30,7 +31,7 @@ const AROUND: i64 = 4;
 const UNLIKELY: f64 = 1e-4;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    if evidence.accepted.iter().filter(|id| **id == "spur").count() > 2 {
+    if evidence.accepted.iter().filter(|id| **id == effects::spur::ID).count() > 2 {
         return vec![];
     }
     aside(evidence).or_else(|| among_the_slow(evidence)).or_else(|| wanders(evidence)).into_iter().collect()
@@ -148,14 +149,14 @@ fn candidate(evidence: &Evidence, tone: Tone) -> Candidate {
     // The frequency nearest to zero that samples so.
     let frequency_hz = wrapped * rate;
     Candidate {
-        id: Some("spur"),
+        id: Some(effects::spur::ID),
         behaves_like: "tone",
         estimates: vec![
             Estimate::normal("frequency_hz", frequency_hz, deviation_bins(gain) * rate / samples as f64),
             Estimate::normal("level_db", level_db, denoised::PEAK_DB),
         ],
         choice: None,
-        place: Place::at("receiver"),
+        place: Place::at(Stage::Receiver),
         p_value,
         gain,
         errs_alike: false,

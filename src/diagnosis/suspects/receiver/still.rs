@@ -15,6 +15,7 @@ use super::support::energy;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::finding::{Candidate, Place};
 use crate::diagnosis::statistics::chi2_tail;
+use crate::effects::Stage;
 
 /// Share of what a free field explains that named elements must reach.
 const ENOUGH: f64 = 0.8;
@@ -87,7 +88,7 @@ fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, gain: f64) -> O
         behaves_like: "additive fast-time",
         estimates: vec![],
         choice: None,
-        place: Place::at("receiver"),
+        place: Place::at(Stage::Receiver),
         p_value,
         gain,
         errs_alike: false,
@@ -106,6 +107,7 @@ fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, gain: f64) -> O
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects;
     use crate::radar::Radar;
     use crate::room::Room;
 
@@ -123,7 +125,7 @@ mod tests {
         evidence.room = Some(Room { front_m: Some(4.0), back_m: Some(1.0), ..walls });
         let likelihood = |evidence: &Evidence| Field::new(evidence).expect("a field").free_likelihood();
         let found = find(&evidence);
-        let leaks: Vec<&Candidate> = found.iter().filter(|found| found.id == Some("tx_leakage")).collect();
+        let leaks: Vec<&Candidate> = found.iter().filter(|found| found.id == Some(effects::tx_leakage::ID)).collect();
         assert_eq!(leaks.len(), 1, "{found:?}");
         let [low, high] = leaks[0].place.range_m.expect("a range");
         assert!(low < 0.08 && 0.08 < high, "{low} to {high}");

@@ -11,6 +11,7 @@ use super::support::{beat_hz, energy, range_m};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence, denoised};
+use crate::effects::{self, Stage};
 
 /// Half the size of a board.
 const BOARD_M: f64 = 0.01;
@@ -124,9 +125,9 @@ impl Chosen<'_> {
         let error = vec![deviation * 3.0 / (samples as f64).sqrt(); rx];
         let (i, q) = (each(|a| a.re), each(|a| a.im));
         Claim {
-            id: "dc_offset",
+            id: effects::dc_offset::ID,
             estimates: vec![Estimate::list("i", &i, &error), Estimate::list("q", &q, &error)],
-            place: Place { range_m: Some([0.0, 0.0]), ..Place::at("receiver") },
+            place: Place { range_m: Some([0.0, 0.0]), ..Place::at(Stage::Receiver) },
             statement: format!(
                 "a constant was left out that each receiver adds to all its samples: {} codes in the largest, {:.1} dB \
                  relative to the signal's peak sample; it lies at beat frequency zero exactly and does not change over time",
@@ -190,9 +191,9 @@ impl Term {
         let level_deviation = denoised::PEAK_DB.hypot(0.3 * spread_db / (self.chirps.len() as f64).sqrt());
         let level_db = self.level_db;
         Claim {
-            id: "tx_leakage",
+            id: effects::tx_leakage::ID,
             estimates: vec![Estimate::normal("range_m", range, error), Estimate::normal("level_db", level_db, level_deviation)],
-            place: Place { range_m: Some([range - reach, range + reach]), ..Place::at("receiver") },
+            place: Place { range_m: Some([range - reach, range + reach]), ..Place::at(Stage::Receiver) },
             statement: format!(
                 "a return {range:.3} m away, nearer than anything in the room, that never changes: the transmitters leak into \
                  the receivers over the board, {level_db:.1} dB relative to the signal's peak sample, {spread_db:.1} dB apart between \
@@ -206,12 +207,12 @@ impl Term {
         let scene = (field.still.iter().map(|chirp| energy(chirp)).sum::<f64>() / (channels * samples) as f64).sqrt();
         let level_deviation = denoised::PEAK_DB.hypot(8.7 * 0.7 * scene / (self.level * (channels as f64).sqrt()));
         Claim {
-            id: "ramp_edge_transient",
+            id: effects::ramp_edge_transient::ID,
             estimates: vec![
                 Estimate { name: "samples", values: vec![count as f64], ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]] },
                 Estimate::normal("level_db", self.level_db, level_deviation),
             ],
-            place: Place { samples: Some(edge(samples, count, at_end).collect()), ..Place::at("receiver") },
+            place: Place { samples: Some(edge(samples, count, at_end).collect()), ..Place::at(Stage::Receiver) },
             statement: format!(
                 "the {} {} of every chirp hold{} a value that is added and never changes, up to {} codes \
                  ({:.1} dB relative to the signal's peak sample): the ADC runs into the {} of the ramp",
@@ -233,7 +234,7 @@ fn edge(samples: usize, count: usize, at_end: bool) -> Range<usize> {
 
 /// A converter at its rail bends everything; what remains of it has no shape of its own, least of all a filter's.
 pub fn is_bent(evidence: &Evidence) -> bool {
-    evidence.accepted.contains(&"adc_saturation")
+    evidence.accepted.contains(&effects::adc_saturation::ID)
 }
 
 /// Takes a still chirp away from every chirp of its channel.

@@ -16,6 +16,7 @@ use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Volume};
 use crate::diagnosis::statistics;
 use crate::diagnosis::suspects::undo;
+use crate::effects::{self, Stage};
 use crate::radar::SPEED_OF_LIGHT;
 
 /// Range at which a phase in proportion to the delay is stated.
@@ -94,7 +95,7 @@ pub(super) fn behaves_like(part: Part) -> &'static str {
 }
 
 pub(super) fn place(part: Part) -> Place {
-    Place::at(if part == Part::Delay { "waveform" } else { "receiver" })
+    Place::at(if part == Part::Delay { Stage::Waveform } else { Stage::Receiver })
 }
 
 /// A line in slow time.
@@ -123,7 +124,7 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
                  all channels alike: as mains ripple on a supply would do it.",
                 100.0 * amplitude
             ),
-            "receiver",
+            Stage::Receiver,
         ),
         Part::Phase | Part::Boresight => {
             // What moves along the boresight turns the returns by its cosine, whether or not the ranges tell it apart.
@@ -132,7 +133,7 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
             let deviation = line.amplitude_deviation.hypot(PATTERN * amplitude);
             let where_ = if part == Part::Phase { "the same at all ranges" } else { "the more the farther ahead they are" };
             (
-                Some("radar_vibration"),
+                Some(effects::radar_vibration::ID),
                 vec![
                     Estimate::normal("amplitude_m", amplitude * metres, deviation * metres),
                     Estimate::normal("frequency_hz", line.frequency_hz, line.frequency_deviation_hz),
@@ -143,7 +144,7 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
                     amplitude,
                     1e6 * amplitude * metres
                 ),
-                "scene",
+                Stage::Scene,
             )
         }
         Part::Delay => (
@@ -155,7 +156,7 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
                 amplitude * stated_delay_s(),
                 amplitude / (2.0 * PI)
             ),
-            "waveform",
+            Stage::Waveform,
         ),
     };
     Candidate {
@@ -196,7 +197,7 @@ pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -
     });
     let (id, estimates, statement) = match part {
         Part::Gain => (
-            Some("gain_drift"),
+            Some(effects::gain_drift::ID),
             vec![Estimate::normal("db", db, 8.686 * drift.deviation)],
             format!("The gain of the radar {how}, by {db:+.3} dB, the same at all ranges: all static returns share it."),
         ),
@@ -269,7 +270,7 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
     let chirps = settling.loops * transmitters;
     let (id, estimates, statement) = if named {
         (
-            Some("chirp_settling"),
+            Some(effects::chirp_settling::ID),
             vec![
                 Estimate::normal("depth", depth, settling.amplitude_deviation / settled),
                 Estimate::normal("chirps", chirps, settling.loops_deviation * transmitters),
@@ -310,7 +311,7 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
         choice: None,
         place: Place {
             chirps: named.then(|| (0..reach.min(field.loops) * evidence.radar.tx_m.len()).collect()),
-            ..Place::at("receiver")
+            ..Place::at(Stage::Receiver)
         },
         p_value: if named { settling.p_value } else { free.p_value },
         gain: if named { settling.held_out_gain } else { free.held_out_gain },
@@ -347,8 +348,8 @@ pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random
             let per_second = 1.0 / (2.0 * PI * evidence.radar.slope_hz_per_s);
             let jitter_s = two.distance * per_second;
             (
-                Some("chirp_start_jitter"),
-                if two.held_out_gain < random.held_out_gain + 4.6 { vec!["phase_noise"] } else { vec![] },
+                Some(effects::chirp_start_jitter::ID),
+                if two.held_out_gain < random.held_out_gain + 4.6 { vec![effects::phase_noise::ID] } else { vec![] },
                 vec![Estimate::normal("jitter_s", jitter_s, two.distance_error * per_second)],
                 format!(
                     "Chirps start at one of two times, {:.2} ns apart ({:.0} % of them late), at random: the phase of every return \
@@ -361,9 +362,9 @@ pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random
             )
         }
         (Part::Delay, two) => (
-            Some("phase_noise"),
+            Some(effects::phase_noise::ID),
             match two {
-                Some(two) if two.held_out_gain > random.held_out_gain - 4.6 => vec!["chirp_start_jitter"],
+                Some(two) if two.held_out_gain > random.held_out_gain - 4.6 => vec![effects::chirp_start_jitter::ID],
                 _ => vec![],
             },
             vec![Estimate::normal("per_chirp_rad", at_stated, error)],

@@ -16,6 +16,7 @@ use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, NINETY, Place, Volume};
 use crate::diagnosis::statistics::{self, DECIBEL};
 use crate::diagnosis::suspects::geometry;
+use crate::effects::Stage;
 
 /// Fewest receivers or transmitters of which one can be identified as odd.
 const FEWEST: usize = 3;
@@ -323,7 +324,7 @@ impl Judged {
             place: Place {
                 rx: matches!(self.unit, Axis::Receiver(_)).then(|| vec![index]),
                 tx: matches!(self.unit, Axis::Transmitter(_)).then(|| vec![index]),
-                ..Place::at("receiver")
+                ..Place::at(Stage::Receiver)
             },
             p_value: statistics::corrected(self.p_value, tried).max(f64::MIN_POSITIVE),
             gain: self.gain,

@@ -16,6 +16,7 @@ use crate::diagnosis::cube::{Cube, mean_chirp};
 use crate::diagnosis::evidence::{Evidence, HANN_LOBE, hann, transform_under};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Undo};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
+use crate::effects::Stage;
 
 /// Frames whose scatter says something.
 const FEWEST_FRAMES: usize = 4;
@@ -225,7 +226,7 @@ fn candidate(evidence: &Evidence, own: &Channel, has: &[usize], bin: usize, undo
             range_m: Some(range),
             tx: (transmitters.len() < tx).then_some(transmitters),
             rx: (receivers.len() < rx).then_some(receivers),
-            ..Place::at("receiver")
+            ..Place::at(Stage::Receiver)
         },
         p_value: 1.0,
         gain: 0.0,

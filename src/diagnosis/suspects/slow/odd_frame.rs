@@ -14,6 +14,7 @@ use crate::diagnosis::cube::halves;
 use crate::diagnosis::evidence::{Evidence, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::{corrected, median};
+use crate::effects::Stage;
 
 /// Fewest frames and channels among which one can be odd.
 const FEWEST_FRAMES: usize = 6;
@@ -91,7 +92,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             frames: Some(vec![frame]),
             rx: Some(vec![channel % receivers]),
             tx: (channels > receivers).then(|| vec![channel / receivers]),
-            ..Place::at("receiver")
+            ..Place::at(Stage::Receiver)
         },
         p_value,
         gain,

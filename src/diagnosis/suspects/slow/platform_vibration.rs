@@ -15,6 +15,7 @@ use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place, Volume};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::suspects::climb::climb;
+use crate::effects::{self, Stage};
 
 /// Bins over which the window spreads what is independent.
 const BINS_PER_VALUE: f64 = 2.0;
@@ -335,14 +336,14 @@ fn candidate(
     let chirps = (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
     let energy = 0.5 * chirps * patterns[1].iter().map(Complex64::norm_sqr).sum::<f64>();
     Candidate {
-        id: Some("radar_vibration"),
+        id: Some(effects::radar_vibration::ID),
         behaves_like: "slow-time phase",
         estimates: vec![
             Estimate::normal("amplitude_m", amplitude_m, deviation_m),
             Estimate::normal("frequency_hz", frequency, frequency_deviation),
         ],
         choice: None,
-        place: Place::at("scene"),
+        place: Place::at(Stage::Scene),
         p_value,
         gain,
         errs_alike: false,

@@ -6,6 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::diagnosis::cube::Loaded;
+use crate::effects;
 use crate::radar::Radar;
 
 /// Returns from all directions before the radar, some at every range, and what each of them does at some time: given
@@ -48,7 +49,7 @@ fn evidence(seed: u64, change: impl Fn(f64, f64, f64) -> Complex64) -> Evidence 
 fn a_radar_that_vibrates_before_returns_from_all_directions_is_known_and_undone() {
     let mut evidence = evidence(1, |t, ahead, _| Complex64::cis(0.3 * ahead * (TAU * 31.7 * t + 0.4).cos()));
     let found = find(&evidence).expect("nothing found");
-    assert_eq!(found.id, Some("radar_vibration"));
+    assert_eq!(found.id, Some(effects::radar_vibration::ID));
     assert!(found.p_value < 1e-9 && found.gain > 100.0, "{found:?}");
     let of = |name: &str| found.estimates.iter().find(|e| e.name == name).unwrap().values[0];
     assert!((of("frequency_hz") - 31.7).abs() < 0.1, "{}", of("frequency_hz"));

@@ -24,6 +24,7 @@ use super::selection::UNDECIDED;
 use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics;
+use crate::effects::{self, Stage};
 use crate::radar::SPEED_OF_LIGHT;
 
 /// Bins between two groups, across which windowed noise is hardly correlated.
@@ -390,14 +391,14 @@ fn candidate(evidence: &Evidence, course: &Course, deviations: &Deviations, shar
              {width_hz:.2} Hz{alias}; {ranges}: the radar itself vibrates, by {:.1} µm along its boresight (standard deviation).",
             1e6 * rms * metres
         );
-        (Some("radar_vibration"), estimates, text)
+        (Some(effects::radar_vibration::ID), estimates, text)
     };
     Candidate {
         id,
         behaves_like: candidates::behaves_like(shared.part),
         estimates,
         choice: None,
-        place: if id.is_some() { Place::at("scene") } else { candidates::place(shared.part) },
+        place: if id.is_some() { Place::at(Stage::Scene) } else { candidates::place(shared.part) },
         p_value: (-shared.log_bets).exp().min(1.0),
         gain: shared.log_bets,
         errs_alike: false,

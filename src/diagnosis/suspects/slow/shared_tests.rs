@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
+use crate::effects;
 use crate::radar::Radar;
 
 #[test]
@@ -71,7 +72,7 @@ fn a_phase_that_most_ranges_share_is_found_beside_what_moves_by_itself() {
     let shakes = |time_s: f64| 0.1 * [31.0, 37.7, 44.1].iter().map(|f| (TAU * f * time_s).sin()).sum::<f64>();
     for gap_s in [0.0, 0.02] {
         let found = find(&evidence(gap_s, 2, shakes, own)).expect("a shared phase");
-        assert_eq!(found.id, Some("radar_vibration"), "{}", found.statement);
+        assert_eq!(found.id, Some(effects::radar_vibration::ID), "{}", found.statement);
         assert!(found.p_value < 1e-6 && found.gain > 13.0, "{} {}", found.p_value, found.gain);
     }
     // Slower than the recording, it is a drift, which other laws describe.

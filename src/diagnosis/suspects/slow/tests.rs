@@ -10,6 +10,7 @@ use super::find;
 use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, NINETY};
+use crate::effects;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::Room;
 
@@ -90,7 +91,7 @@ fn a_ripple_of_the_gain_has_no_name_but_a_frequency() {
 fn a_common_phase_is_a_vibration_and_one_in_proportion_to_the_delay_is_none() {
     let sinusoid = |t: f64| (std::f64::consts::TAU * 83.0 * t).sin();
     let found = found_once(evidence(2, |t, _, _, _| Complex64::cis(0.05 * sinusoid(t))));
-    assert_eq!(found.id, Some("radar_vibration"));
+    assert_eq!(found.id, Some(effects::radar_vibration::ID));
     within(&found, "frequency_hz", 83.0);
     let found = found_once(evidence(3, |t, _, _, delay| Complex64::cis(2.5e6 * delay * sinusoid(t))));
     assert_eq!((found.id, found.behaves_like), (None, "delay-proportional phase"));
@@ -102,7 +103,7 @@ fn a_large_phase_excursion_is_read_as_an_angle() {
     let evidence = evidence(5, |t, _, _, _| Complex64::cis(sinusoid(t)));
     let metres = evidence.radar.wavelength_m() / (4.0 * std::f64::consts::PI);
     let found = found_once(evidence);
-    assert_eq!(found.id, Some("radar_vibration"));
+    assert_eq!(found.id, Some(effects::radar_vibration::ID));
     within(&found, "frequency_hz", 83.0);
     // Its interval is wide for what returns from where: its middle is known better.
     let amplitude = found.estimates.iter().find(|estimate| estimate.name == "amplitude_m").unwrap().values[0];
@@ -119,7 +120,7 @@ fn a_phase_that_grows_towards_the_boresight_is_a_vibration() {
     let mut evidence = evidence(21, |t, _, _, delay_s| sinusoid(t, delay_s));
     evidence.room = Some(room.clone());
     let found = found_once(evidence.changed());
-    assert_eq!(found.id, Some("radar_vibration"));
+    assert_eq!(found.id, Some(effects::radar_vibration::ID));
     within(&found, "frequency_hz", 27.0);
     // Its interval is wide, for where returns come from is not known; here they come from where the room says.
     let (amplitude, truth) = (&found.estimates[0], 0.1 * Radar::small(1).wavelength_m() / (2.0 * std::f64::consts::TAU));
@@ -138,7 +139,7 @@ fn one_strong_return_that_comes_late_is_no_gain_of_the_radar() {
         if !there { 1.0 } else { f64::from(u8::from(frame >= 7)) * 30.0 }
     };
     let found = find(&evidence(22, |_, frame, _, delay_s| late(frame, delay_s).into()));
-    assert!(found.iter().all(|candidate| candidate.id != Some("gain_drift")), "{found:?}");
+    assert!(found.iter().all(|candidate| candidate.id != Some(effects::gain_drift::ID)), "{found:?}");
 }
 
 #[test]
@@ -161,10 +162,10 @@ fn a_drift_is_distinguished_from_slow_parts_of_a_body() {
         if (14.0..30.0).contains(&bin) { 1.0 + 0.04 * turn } else { Complex64::ONE }
     };
     let wanders = |seed: u64| evidence(seed, |_, frame, _, delay_s| wandering(frame, delay_s));
-    assert!(best(&wanders(24)).is_none_or(|found| found.id != Some("gain_drift")));
+    assert!(best(&wanders(24)).is_none_or(|found| found.id != Some(effects::gain_drift::ID)));
     let drifts = evidence(25, |_, frame, _, delay_s| wandering(frame, delay_s) * (1.0 + 0.1 * frame as f64 / 11.0));
     let found = best(&drifts).expect("nothing found");
-    assert_eq!(found.id, Some("gain_drift"));
+    assert_eq!(found.id, Some(effects::gain_drift::ID));
     within(&found, "db", 20.0 * 1.1f64.log10());
 }
 
@@ -175,13 +176,13 @@ fn a_slow_turn_is_a_drift_and_no_vibration_at_the_rate_of_the_frames() {
     let slowly = |frame: usize| Complex64::cis(0.06 * (std::f64::consts::TAU * 0.04 * frame as f64 + 0.5).cos());
     let found = find(&evidence(26, |_, frame, _, _| slowly(frame)));
     assert!(found.iter().any(|found| found.behaves_like == "slow-time phase" && found.p_value < 5e-4), "{found:?}");
-    assert!(found.iter().all(|found| found.id != Some("radar_vibration")), "{found:?}");
+    assert!(found.iter().all(|found| found.id != Some(effects::radar_vibration::ID)), "{found:?}");
 }
 
 #[test]
 fn the_first_chirps_of_a_frame_settle() {
     let found = found_once(evidence(6, |_, _, index, _| (1.0 - 0.1 * (-(index as f64) / 5.0).exp()).into()));
-    assert_eq!(found.id, Some("chirp_settling"));
+    assert_eq!(found.id, Some(effects::chirp_settling::ID));
     within(&found, "depth", 0.1);
     within(&found, "chirps", 5.0);
 }
@@ -195,12 +196,12 @@ fn random_chirps_are_phase_noise_or_jitter() {
         move |_: f64, frame: usize, index: usize, delay: f64| Complex64::cis(scale * delay * values[frame * 32 + index])
     };
     let found = found_once(evidence(7, noisy(0.05 / at_stated, bell.clone())));
-    assert_eq!(found.id, Some("phase_noise"));
+    assert_eq!(found.id, Some(effects::phase_noise::ID));
     within(&found, "per_chirp_rad", 0.05);
     let two: Vec<f64> = bell.iter().map(|v| if *v > 0.0 { 1.0 } else { 0.0 }).collect();
     let slope = Radar::small(1).slope_hz_per_s;
     let found = found_once(evidence(8, noisy(std::f64::consts::TAU * slope * 1.2e-8, two)));
-    assert_eq!(found.id, Some("chirp_start_jitter"));
+    assert_eq!(found.id, Some(effects::chirp_start_jitter::ID));
     within(&found, "jitter_s", 1.2e-8);
 }
 

@@ -21,6 +21,7 @@ use crate::diagnosis::course::{Course, Of};
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
 use crate::diagnosis::statistics;
+use crate::effects::{self, Stage};
 
 /// Displacements of a chest in a breath and in a heartbeat, m.
 const LARGEST_BREATH_M: f64 = 0.03;
@@ -38,7 +39,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.body.is_some() || evidence.cube.dims[0] < FEWEST_FRAMES || evidence.split.block_loops.is_some() {
         return vec![];
     }
-    if evidence.accepted.iter().any(|id| ["breathing", "heartbeat"].contains(id)) {
+    if evidence.accepted.iter().any(|id| [effects::breathing::ID, effects::heartbeat::ID].contains(id)) {
         return vec![];
     }
     one(evidence).into_iter().collect()
@@ -90,9 +91,9 @@ fn change(data: &Frames, mean: &[Complex64], training: &[usize]) -> Vec<f64> {
 fn name(rhythm: &Rhythm, metres: f64) -> Option<&'static str> {
     let (rate, amplitude_m) = (rhythm.frequency_hz, rhythm.amplitude * metres);
     if (BREATHING_HZ[0]..=BREATHING_HZ[1]).contains(&rate) && amplitude_m < LARGEST_BREATH_M {
-        Some("breathing")
+        Some(effects::breathing::ID)
     } else if (HEART_HZ[0]..=HEART_HZ[1]).contains(&rate) && amplitude_m < LARGEST_HEARTBEAT_M {
-        Some("heartbeat")
+        Some(effects::heartbeat::ID)
     } else {
         None
     }
@@ -162,7 +163,7 @@ impl Motion<'_> {
                 r.frequency_hz,
                 1e3 * r.amplitude * self.metres,
                 100.0 * r.share,
-                if *id == "breathing" { "a breathing chest" } else { "a beating heart" }
+                if *id == effects::breathing::ID { "a breathing chest" } else { "a beating heart" }
             ),
             None => format!(
                 "At {range_m:.2} m something moves slowly, over {:.1} mm during the recording, without a rhythm that would show \
@@ -206,13 +207,13 @@ impl Motion<'_> {
             choice: None,
             place: Place {
                 range_m: Some([ends[0] as f64 * bin_m, ends[1] as f64 * bin_m]),
-                ..Place::at(if self.named.is_some() { "body" } else { "scene" })
+                ..Place::at(if self.named.is_some() { Stage::Body } else { Stage::Scene })
             },
             p_value,
             gain,
             errs_alike: true,
             // A curtain in the wind does the same; so does whatever oscillates there.
-            look_alikes: if self.named.is_some() { vec!["moving_reflector"] } else { vec![] },
+            look_alikes: if self.named.is_some() { vec![effects::moving_reflector::ID] } else { vec![] },
             statement,
             curve: Some(Curve {
                 title: format!("Displacement at {range_m:.2} m"),

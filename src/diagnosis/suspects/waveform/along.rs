@@ -24,7 +24,7 @@ use crate::diagnosis::power::PowerModel;
 use crate::diagnosis::speckle::{Look, groups};
 use crate::diagnosis::statistics::{DECIBEL, corrected};
 use crate::diagnosis::{BodyPrediction, Cube, Evidence};
-use crate::effects::legendre;
+use crate::effects::{self, Stage, legendre};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
 /// Parts of a chirp, and samples of a part, at least.
@@ -69,14 +69,14 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(chirps) = Chirps::new(evidence, model, body) else { return vec![] };
     let first = chirps.looks(0.0, [0.0; 2]);
     let mut found = vec![];
-    if !evidence.accepted.contains(&"chirp_droop") {
+    if !evidence.accepted.contains(&effects::chirp_droop::ID) {
         // What transmits tires; nothing gains power along a chirp.
         let falls = |found: &Estimated| found.values[0] < 0.0;
         found.extend(
             chirps.converged(&first, &[TILT]).filter(falls).map(|found| (found.likelihood, chirps.droop(evidence, &found))),
         );
     }
-    if !evidence.accepted.contains(&"chirp_nonlinearity") {
+    if !evidence.accepted.contains(&effects::chirp_nonlinearity::ID) {
         let once = chirps.converged(&first, &[BEND]);
         let changing = chirps
             .converged(&first, &[BEND, TREND])
@@ -216,11 +216,11 @@ impl Chirps {
         let deviation = 2.0 * DECIBEL * found.deviation(&DVector::from_element(1, 1.0));
         let total: f64 = evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum();
         Candidate {
-            id: Some("chirp_droop"),
+            id: Some(effects::chirp_droop::ID),
             behaves_like: "fast-time gain",
             estimates: vec![Estimate::normal("db", db, deviation)],
             choice: None,
-            place: Place::at("receiver"),
+            place: Place::at(Stage::Receiver),
             p_value: corrected(found.p_value, LOOKS),
             gain: found.gain,
             errs_alike: true,
@@ -257,11 +257,11 @@ impl Chirps {
         let at: Vec<f64> = (0..samples).map(|n| place(n, samples)).collect();
         let range_m = 0.5 * self.delay_s * SPEED_OF_LIGHT;
         Candidate {
-            id: named.then_some("chirp_nonlinearity"),
+            id: named.then_some(effects::chirp_nonlinearity::ID),
             behaves_like: "delay-proportional phase",
             estimates: if named { vec![peak] } else { vec![] },
             choice: None,
-            place: Place::at("waveform"),
+            place: Place::at(Stage::Waveform),
             p_value: corrected(found.p_value, LOOKS),
             gain: found.gain,
             errs_alike: true,

@@ -15,6 +15,7 @@ use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, blackman_harris, hann};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
 use crate::diagnosis::statistics;
+use crate::effects::{self, Stage};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
 /// Frequencies per bin.
@@ -107,7 +108,7 @@ fn support(evidence: &Evidence, frame: usize) -> [Option<[usize; 2]>; 2] {
 
 pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let radar = &evidence.radar;
-    if evidence.accepted.contains(&"chirp_ripple") || evidence.is_real() || evidence.split.held_out.is_empty() {
+    if evidence.accepted.contains(&effects::chirp_ripple::ID) || evidence.is_real() || evidence.split.held_out.is_empty() {
         return None;
     }
     let [frames, _, _, _, samples] = evidence.cube.dims;
@@ -201,7 +202,7 @@ impl Pair {
         let chirps = (frames * loops) as f64;
         let (radar_copy, turned_hz) = (radar.clone(), ripple_hz);
         Candidate {
-            id: named.then_some("chirp_ripple"),
+            id: named.then_some(effects::chirp_ripple::ID),
             behaves_like: "delay-proportional phase",
             estimates: if named {
                 vec![
@@ -212,7 +213,7 @@ impl Pair {
                 vec![]
             },
             choice: None,
-            place: Place::at("waveform"),
+            place: Place::at(Stage::Waveform),
             p_value,
             gain,
             errs_alike: false,
