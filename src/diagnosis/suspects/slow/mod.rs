@@ -22,6 +22,7 @@ mod tests;
 use field::{Field, Part};
 use num_complex::Complex64;
 
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::Candidate;
 use crate::diagnosis::statistics;
@@ -149,7 +150,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     // Of another kind it wins only where the recording cannot decide.
     let named = found.iter().filter(|found| found.candidate.id.is_some());
-    let names: Vec<(&str, f64, bool)> =
+    let names: Vec<(Behaviour, f64, bool)> =
         named.map(|found| (found.candidate.behaves_like, found.explained, found.loud && found.within_frames)).collect();
     // A law without a name must fit to the noise where one with a name explains nearly as much: how strong static returns turn
     // when the radar itself moves depends on where they are, which is known roughly.
@@ -159,7 +160,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let fits_better = |found: &Found| explained < NEARLY * found.explained && over_noise < HALF * found.over_noise;
     found.retain(|found| found.candidate.id.is_some() || !found.loud || fits_better(found));
     let taken = |other: &Found| {
-        let like_it = |like: &str, gain: f64| like == other.candidate.behaves_like && gain > NEARLY * other.explained;
+        let like_it = |like: Behaviour, gain: f64| like == other.candidate.behaves_like && gain > NEARLY * other.explained;
         // Where it leaves much itself it must explain clearly more.
         let more =
             |gain: f64, loud: bool| if loud { NEARLY * gain > other.explained } else { gain > other.explained - UNDECIDED };
