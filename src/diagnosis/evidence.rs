@@ -21,6 +21,7 @@ use super::cube::{Cube, Loaded, Split};
 use super::finding::{Undo, Volume};
 use super::prediction::BodyPrediction;
 use super::statistics;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::radar::{Radar, Sampling};
 use crate::room::Room;
 use power::PowerModel;
@@ -47,6 +48,8 @@ pub struct Evidence {
     pub body: Option<BodyPrediction>,
     /// Ids that were accepted, oldest first.
     pub accepted: Vec<&'static str>,
+    /// What was accepted without a name, oldest first.
+    pub accepted_unnamed: Vec<Behaviour>,
     /// What of it undid a fixed law of the samples, oldest first.
     pub(super) inverses: Vec<(Undo, Volume)>,
     /// Phases over time of what was accepted, oldest first.
@@ -74,6 +77,7 @@ impl Evidence {
             starts_s,
             body,
             accepted: vec![],
+            accepted_unnamed: vec![],
             inverses: vec![],
             courses: vec![],
             extremes,

@@ -9,6 +9,7 @@ use super::course::Course;
 use super::cube::Cube;
 use super::prediction::BodyPrediction;
 use super::statistics::chi2_tail;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::effects::{self, EffectSetting, Stage};
 use crate::radar::Radar;
 
@@ -169,8 +170,7 @@ const LIKELY: f64 = 0.05;
 pub struct Candidate {
     /// As in docs/report.md; none: outside the library.
     pub id: Option<&'static str>,
-    /// "slow-time gain", "additive fast-time", "path-like" and so on.
-    pub behaves_like: &'static str,
+    pub behaves_like: Behaviour,
     pub estimates: Vec<Estimate>,
     /// A boundary or a part of the body.
     pub choice: Option<String>,
@@ -262,7 +262,7 @@ impl std::fmt::Debug for Candidate {
         write!(
             f,
             "{} p {:.1e} gain {:.1} {:?} {}",
-            self.id.unwrap_or(self.behaves_like),
+            self.id.unwrap_or(self.behaves_like.words()),
             self.p_value,
             self.gain,
             self.estimates.iter().map(|e| (e.name, &e.values)).collect::<Vec<_>>(),
@@ -273,7 +273,7 @@ impl std::fmt::Debug for Candidate {
 
 /// Something without a name or numbers: for tests.
 #[cfg(test)]
-pub(crate) fn nameless(behaves_like: &'static str) -> Candidate {
+pub(crate) fn nameless(behaves_like: Behaviour) -> Candidate {
     Candidate {
         id: None,
         behaves_like,
@@ -298,7 +298,7 @@ mod tests {
     fn candidate(id: &'static str, estimates: Vec<Estimate>) -> Candidate {
         Candidate {
             id: Some(id),
-            behaves_like: "additive fast-time",
+            behaves_like: Behaviour::AdditiveFastTime,
             estimates,
             choice: None,
             place: Place::at(Stage::Receiver),

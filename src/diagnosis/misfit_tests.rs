@@ -1,6 +1,7 @@
 use std::sync::Arc;
 
 use super::*;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::{Candidate, Correction, Place, Volume};
 use crate::effects::Stage;
 use crate::radar::Radar;
@@ -21,7 +22,7 @@ fn without(image: Complex64) -> Candidate {
     };
     Candidate {
         id: None,
-        behaves_like: "image",
+        behaves_like: Behaviour::ConjugateImage,
         estimates: vec![],
         choice: None,
         place: Place::at(Stage::Receiver),

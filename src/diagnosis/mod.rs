@@ -6,6 +6,7 @@
 //! predicted, and all look again, until nobody has anything significant left to say.
 
 pub mod audit;
+pub mod behaviour;
 pub mod calibration;
 pub mod codes;
 pub mod config;

@@ -1,13 +1,13 @@
 //! What an accepted effect leaves behind: itself, where it could not be removed in full, and what a rough correction makes.
 
 use super::finding::{Candidate, Correction};
-use super::suspects::receiver::harmonic;
-use super::suspects::{excess, fluctuation, paths};
+use super::suspects::paths;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::effects::{self, Stage};
 
 /// What has no name is modelled roughly, and these are modelled most roughly of all: what they leave, up to this share of
 /// their gain, takes any shape; and they come after whatever gains more than it.
-const ROUGH: [&str; 2] = ["additive fast-time", harmonic::QUADRATIC];
+const ROUGH: [Behaviour; 2] = [Behaviour::AdditiveFastTime, Behaviour::Quadratic];
 pub const ROUGHLY: f64 = 0.1;
 
 /// What is undone chirp by chirp, each by its own estimate, leaves a little of everything that moves: paths below this share
@@ -17,9 +17,9 @@ const SLIGHTLY: f64 = 0.01;
 
 /// What a radar that vibrates leaves: turns of static clutter that are not quite undone, and their sidebands, up to this share of
 /// its gain (which counts what is left).
-const TURNS: [&str; 3] = ["slow-time phase", "delay-proportional phase", fluctuation::FLUCTUATES];
+const TURNS: [Behaviour; 3] = [Behaviour::SlowTimePhase, Behaviour::DelayProportionalPhase, Behaviour::ChangingAtOneRange];
 const SHAKEN: f64 = 0.5;
-const FADING: &str = "slow-time gain";
+const FADING: Behaviour = Behaviour::SlowTimeGain;
 
 /// What is cut out where it is plain, and goes on below the noise.
 const BURSTS: [&str; 2] = [effects::interference::ID, effects::impulsive_noise::ID];
@@ -89,7 +89,7 @@ pub fn is_product(candidate: &Candidate) -> bool {
 }
 
 fn is_path(candidate: &Candidate) -> bool {
-    candidate.behaves_like.starts_with(paths::PATH_LIKE) && candidate.id.is_none_or(|id| paths::MANY.contains(&id))
+    candidate.behaves_like.is_path() && candidate.id.is_none_or(|id| paths::MANY.contains(&id))
 }
 
 fn is_one_of(candidate: &Candidate, ids: &[&str]) -> bool {
@@ -112,7 +112,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
     // So of one return that is modulated, which reaches a little beyond its ranges.
     let around = accepted.place.range_m.map(|[near, far]| [near - NEAR_M, far + NEAR_M]);
-    let modulated = accepted.behaves_like == fluctuation::IS_MODULATED && !apart(around, candidate.place.range_m);
+    let modulated = accepted.behaves_like == Behaviour::Modulated && !apart(around, candidate.place.range_m);
     let shaken = vibrates && (turns || is_path(candidate)) || modulated && is_path(candidate);
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     // A course from frame to frame that has no name is modelled roughly: what is left of it turns all returns, too; where the strongest
@@ -121,7 +121,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let slow_path = is_path(candidate) && candidate.id.is_none();
     let of_drift = drifts && candidate.behaves_like == accepted.behaves_like;
     let alone = drifts && slow_path;
-    let roughly = is_rough(accepted) || candidate.behaves_like == excess::BEHAVES_LIKE || beside || of_drift;
+    let roughly = is_rough(accepted) || candidate.behaves_like == Behaviour::ExcessPower || beside || of_drift;
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it
     // and among its images, and what a part may carry, the last resort, is never sure there.
     let timed = accepted.place.stage == Some(Stage::Timing);
@@ -131,7 +131,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let products = is_product(accepted) && is_product(candidate);
     // What bursts leave below the noise of single samples is in all receivers at once.
     let bursts = is_one_of(accepted, &BURSTS) && candidate.id == Some(effects::correlated_noise::ID);
-    let path_like = accepted.behaves_like.starts_with(paths::PATH_LIKE);
+    let path_like = accepted.behaves_like.is_path();
     let faint = path_like && (is_one_of(candidate, &FAINT) || is_path(candidate));
     // What moves as no single reflector does was taken out along one track: what else of it moves with the body is left, and a line
     // where it stays longest.
@@ -175,15 +175,15 @@ mod tests {
     use super::*;
     use crate::diagnosis::Place;
 
-    fn of(id: Option<&'static str>, behaves_like: &'static str, gain: f64) -> Candidate {
+    fn of(id: Option<&'static str>, behaves_like: Behaviour, gain: f64) -> Candidate {
         let place = Place::at(Stage::Scene);
         Candidate { id, gain, place, ..crate::diagnosis::finding::nameless(behaves_like) }
     }
 
     #[test]
     fn a_path_leaves_faint_tones_and_paths_and_one_without_a_law_leaves_more_of_itself() {
-        let path = |id: Option<&'static str>, gain: f64| of(id, paths::PATH_LIKE, gain);
-        let spur = |gain: f64| of(Some(effects::spur::ID), "tone", gain);
+        let path = |id: Option<&'static str>, gain: f64| of(id, Behaviour::PathLike, gain);
+        let spur = |gain: f64| of(Some(effects::spur::ID), Behaviour::Tone, gain);
         let image = path(Some(effects::wall_ghost::ID), 1e4);
         assert!(is_left_by(&image, &spur(90.0)) && !is_left_by(&image, &spur(110.0)));
         // At another place: a second path may be there.

@@ -308,7 +308,7 @@ impl Findings {
                 None => unexplained.push(Unexplained {
                     place: candidate.place.clone(),
                     p_value: candidate.p_value,
-                    behaves_like: candidate.behaves_like.into(),
+                    behaves_like: candidate.behaves_like.words().into(),
                     fraction_of_energy_db: decibels(candidate.energy / moving_energy.max(f64::MIN_POSITIVE)),
                     statement: sentence(&candidate.statement),
                     held_out_loglik_gain: candidate.gain,

@@ -6,6 +6,7 @@
 
 mod precedence;
 
+use crate::diagnosis::behaviour::Behaviour;
 use crate::effects::{self, Stage};
 use std::collections::BTreeMap;
 
@@ -16,8 +17,7 @@ use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
 use super::remains::{ROUGHLY, is_by_chirp, is_left_by, is_of_receivers, is_of_remains, is_product, is_rough, is_same};
-use super::suspects::receiver::harmonic;
-use super::suspects::{SUSPECTS, Suspect, by_suspect, excess, paths, strongest_suspicion};
+use super::suspects::{SUSPECTS, Suspect, by_suspect, strongest_suspicion};
 use precedence::{is_displaced, is_echo, upstream};
 
 impl DiagnosisConfig {
@@ -199,7 +199,7 @@ impl Rounds<'_> {
     /// Of what was found: what is significant, and neither known already nor a name that may not be given.
     fn passing<'b>(&self, evidence: &Evidence, found: &'b [(usize, Candidate)]) -> Vec<&'b (usize, Candidate)> {
         // So they do where products were taken out roughly.
-        let bent = |effect: &Accepted| effect.candidate.behaves_like == harmonic::QUADRATIC;
+        let bent = |effect: &Accepted| effect.candidate.behaves_like == Behaviour::Quadratic;
         let mixed = evidence.products().mixed().is_some() || self.accepted.iter().any(bent);
         let by_chirp = self.accepted.iter().any(|effect| is_by_chirp(&effect.candidate));
         let may_be_named = |id: &str| {
@@ -352,12 +352,15 @@ impl Evidence {
     /// The same with one more effect taken into account.
     pub fn with(&self, candidate: &Candidate) -> Self {
         let mut next = self.clone().changed();
-        if candidate.behaves_like.starts_with(paths::PATH_LIKE) || candidate.behaves_like == excess::BEHAVES_LIKE {
+        if candidate.behaves_like.is_path() || candidate.behaves_like == Behaviour::ExcessPower {
             // Where paths were cut out there is not even noise left.
             next.noise = self.noise.clone();
         }
         next.correct(&candidate.correction);
-        next.accepted.push(candidate.id.unwrap_or(candidate.behaves_like));
+        match candidate.id {
+            Some(id) => next.accepted.push(id),
+            None => next.accepted_unnamed.push(candidate.behaves_like),
+        }
         next
     }
 

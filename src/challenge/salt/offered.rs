@@ -1,6 +1,7 @@
 //! Which effects can be put onto samples alone, in which unit their strength is, and why the others cannot.
 
 use crate::challenge::library::{Graded, every};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::effects::{self, Stage};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
@@ -11,23 +12,86 @@ pub struct Offered {
     pub id: &'static str,
     /// Of its strength.
     pub unit: &'static str,
-    /// What a report says of it without a name: beginnings of `behaves_like`.
-    pub family: &'static [&'static str],
+    pub family: Family,
 }
 
-const ADDED: &[&str] = &["additive", "sparse additive", "tone", "excess power", "fast-time gain"];
-const NONLINEAR: &[&str] = &["non-linear", "quadratic", "conjugate image", "image", "amplitude"];
-const SLOW: &[&str] = &["slow-time", "single frame", "static returns that", "a static return that", "delay-proportional phase"];
-const FAST: &[&str] = &["fast-time", "beat-frequency", "delay-proportional phase"];
-const CHANNEL: &[&str] = &[
-    "channel gain",
-    "slow-time gain of one channel",
-    "receivers that are coupled",
-    "phase between receivers",
-    "direction offset",
-];
-const NOISE: &[&str] = &["noise", "sparse additive", "excess power"];
-const CODES: &[&str] = &["quantisation", "slipped samples", "single frame", "amplitude", "damaged"];
+/// What a report says of an effect without a name.
+#[derive(Clone, Copy)]
+pub struct Family {
+    pub behaviours: &'static [Behaviour],
+    /// Or that the samples are damaged.
+    pub damaged: bool,
+}
+
+impl Family {
+    /// Whether the words of a report's `behaves_like` are one of these.
+    pub fn has(&self, words: &str) -> bool {
+        self.behaviours.iter().any(|behaviour| behaviour.words() == words)
+    }
+}
+
+const ADDED: Family = Family {
+    behaviours: &[
+        Behaviour::AdditiveFastTime,
+        Behaviour::SparseAdditive,
+        Behaviour::Tone,
+        Behaviour::ExcessPower,
+        Behaviour::FastTimeGain,
+    ],
+    damaged: false,
+};
+const NONLINEAR: Family = Family {
+    behaviours: &[Behaviour::NonLinear, Behaviour::Quadratic, Behaviour::ConjugateImage, Behaviour::Amplitude],
+    damaged: false,
+};
+const SLOW: Family = Family {
+    behaviours: &[
+        Behaviour::SlowTimeGain,
+        Behaviour::SlowTimePhase,
+        Behaviour::SlowTimeGainOfOneChannel,
+        Behaviour::SlowTimePatternOfOneReturn,
+        Behaviour::SlowTimeSettlingOfOneReturn,
+        Behaviour::SingleFrame,
+        Behaviour::FadingBehindTheBody,
+        Behaviour::ChangingAtOneRange,
+        Behaviour::Modulated,
+        Behaviour::DelayProportionalPhase,
+        Behaviour::DelayProportionalPhaseByReceiver,
+    ],
+    damaged: false,
+};
+const FAST: Family = Family {
+    behaviours: &[
+        Behaviour::FastTimeGain,
+        Behaviour::BeatFrequencyGain,
+        Behaviour::DelayProportionalPhase,
+        Behaviour::DelayProportionalPhaseByReceiver,
+    ],
+    damaged: false,
+};
+const CHANNEL: Family = Family {
+    behaviours: &[
+        Behaviour::ChannelGain,
+        Behaviour::SlowTimeGainOfOneChannel,
+        Behaviour::CoupledOnOneSide,
+        Behaviour::PhaseBetweenReceivers,
+        Behaviour::DirectionOffset,
+    ],
+    damaged: false,
+};
+const NOISE: Family = Family {
+    behaviours: &[
+        Behaviour::NoiseOverBeatFrequency,
+        Behaviour::NoiseSharedByReceivers,
+        Behaviour::SparseAdditive,
+        Behaviour::ExcessPower,
+    ],
+    damaged: false,
+};
+const CODES: Family = Family {
+    behaviours: &[Behaviour::Quantisation, Behaviour::SlippedSamples, Behaviour::SingleFrame, Behaviour::Amplitude],
+    damaged: true,
+};
 
 macro_rules! offered {
     ($($id:expr => $unit:literal $family:ident;)*) => {

@@ -59,7 +59,7 @@ pub fn outcome(planted: &Planted, report: &Result<Report, String>, background: &
     };
     let Ok(report) = report else { return outcome };
     outcome.verdict = report.verdict.clone();
-    let family = offered(planted.effect).map_or(&[][..], |offered| offered.family);
+    let family = offered(planted.effect).map(|offered| offered.family);
     for effect in &report.effects {
         if stands_for(effect, planted.effect) {
             if is_new(effect, background) {
@@ -72,7 +72,7 @@ pub fn outcome(planted: &Planted, report: &Result<Report, String>, background: &
         }
     }
     for rest in report.unexplained.iter().filter(|rest| is_new_rest(rest, background)) {
-        if family.iter().any(|beginning| rest.behaves_like.starts_with(beginning)) {
+        if family.is_some_and(|family| family.has(&rest.behaves_like)) {
             outcome.nameless |= !outcome.found;
             outcome.gain = larger(outcome.gain, rest.held_out_loglik_gain);
         } else {
@@ -81,7 +81,7 @@ pub fn outcome(planted: &Planted, report: &Result<Report, String>, background: &
     }
     if report.verdict == "damaged" {
         // Its integrity is all that is known of it then.
-        match family.contains(&"damaged") {
+        match family.is_some_and(|family| family.damaged) {
             true => outcome.nameless = true,
             false => outcome.wrong.push("damaged".into()),
         }

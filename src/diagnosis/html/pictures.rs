@@ -52,7 +52,7 @@ impl Pictures {
         for accepted in &explanation.accepted {
             if let Some(curve) = &accepted.candidate.curve {
                 chart(curve).save(&path)?;
-                let name = accepted.candidate.id.unwrap_or(accepted.candidate.behaves_like);
+                let name = accepted.candidate.id.unwrap_or(accepted.candidate.behaves_like.words());
                 pictures.curves.push((name.into(), picture(&path, "fitted curve")?));
             }
         }

@@ -6,7 +6,7 @@ use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction};
 use crate::diagnosis::misfit::Misfit;
 use crate::diagnosis::remains::{is_rough, is_same};
-use crate::diagnosis::suspects::{SUSPECTS, paths};
+use crate::diagnosis::suspects::SUSPECTS;
 use crate::effects::{self, Stage};
 
 /// What never changes and may be a return or added behind the mixer: what turns all returns distinguishes the two, and goes first.
@@ -31,7 +31,7 @@ fn is_on_all(candidate: &Candidate, evidence: &Evidence) -> bool {
 
 /// Whether it may be something else's echoes of the body.
 pub(super) fn is_echo(candidate: &Candidate) -> bool {
-    candidate.behaves_like.starts_with(paths::PATH_LIKE) || is_rough(candidate)
+    candidate.behaves_like.is_path() || is_rough(candidate)
 }
 
 /// What acts on every return makes echoes of the body too, which look like paths of their own, and of the room beyond its ranges; and a

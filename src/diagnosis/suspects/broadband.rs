@@ -9,8 +9,8 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::paths::PATH_LIKE;
 use super::region::{Region, mean_power, moves, power_gain, remove};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::{Evidence, HANN_LOBE, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
@@ -110,7 +110,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let training = evidence.split.training.clone();
     Some(Candidate {
         id: Some(effects::moving_reflector::ID),
-        behaves_like: PATH_LIKE,
+        behaves_like: Behaviour::PathLike,
         estimates: vec![],
         choice: None,
         place: Place {

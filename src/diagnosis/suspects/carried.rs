@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use super::{Suspect, paths};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::power::{LOBES, PowerModel, Template, fit_weights, log_likelihood, sum};
 use crate::diagnosis::prediction::{Centre, range_and_velocity};
@@ -173,7 +174,7 @@ fn candidate(
     };
     Candidate {
         id: Some(effects::carried_reflector::ID),
-        behaves_like: "return of one part of the body",
+        behaves_like: Behaviour::ReturnOfOnePart,
         estimates: vec![Estimate::normal("amplitude", relative, LEVEL_ERROR * relative)],
         choice: None,
         place: Place { body_part: Some(name.into()), ..place },

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use crate::diagnosis::Cube;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::codes::{BITS, Component};
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Place};
@@ -26,7 +27,6 @@ const ELSEWHERE_STUCK: f64 = 0.6;
 const CROSSED: f64 = 0.5;
 /// Samples that lie so close to one another that their codes may be alike.
 const ALIKE: usize = 4;
-pub const BEHAVES_LIKE: &str = "quantisation";
 
 /// p-value below which a bit is passed on.
 const PASSED_ON: f64 = 0.01;
@@ -73,7 +73,7 @@ fn share(component: &Component, bit: usize, noise: f64) -> Option<Share> {
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(components) = &evidence.codes else { return vec![] };
-    if evidence.accepted.contains(&BEHAVES_LIKE) || evidence.cube.channels() < 2 {
+    if evidence.accepted_unnamed.contains(&Behaviour::Quantisation) || evidence.cube.channels() < 2 {
         return vec![];
     }
     let tried = (components.len() * BITS) as f64;
@@ -135,7 +135,7 @@ fn candidate(evidence: &Evidence, component: &Component, bit: usize, share: f64,
     };
     Candidate {
         id: None,
-        behaves_like: BEHAVES_LIKE,
+        behaves_like: Behaviour::Quantisation,
         estimates: vec![],
         choice: None,
         place: Place { rx: Some(vec![rx]), ..Place::at(Stage::Receiver) },

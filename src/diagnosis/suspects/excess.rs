@@ -1,14 +1,13 @@
 //! What nobody else explains: a box of range, Doppler and frames with more power than body, room and noise have.
 
 use crate::diagnosis::Evidence;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::locate::{Residual, strongest};
 use crate::effects::Stage;
 
-pub const BEHAVES_LIKE: &str = "excess power";
-
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    if evidence.accepted.contains(&BEHAVES_LIKE) {
+    if evidence.accepted_unnamed.contains(&Behaviour::ExcessPower) {
         return vec![];
     }
     let Some(found) = Residual::new(evidence).and_then(|residual| strongest(evidence, &residual)) else { return vec![] };
@@ -23,7 +22,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let noise = evidence.noise().iter().sum::<f64>() / evidence.noise().len().max(1) as f64;
     vec![Candidate {
         id: None,
-        behaves_like: BEHAVES_LIKE,
+        behaves_like: Behaviour::ExcessPower,
         estimates: vec![],
         choice: None,
         place: Place { stage: Some(Stage::Propagation), ..place.clone() },

@@ -17,6 +17,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
 use crate::diagnosis::statistics::{DECIBEL, corrected};
@@ -34,8 +35,6 @@ const FEWEST_STRONG: usize = 5;
 /// What either finds at most by chance.
 const LEAST_LIKELY: f64 = 0.01;
 pub const ID: &str = effects::soft_occlusion::ID;
-pub use fluctuating::BEHAVES_LIKE as FLUCTUATES;
-pub use modulation::BEHAVES_LIKE as IS_MODULATED;
 
 /// Static clutter where the body never is.
 struct Free {
@@ -79,7 +78,7 @@ impl Free {
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let known = [FLUCTUATES, ID].iter().any(|id| evidence.accepted.contains(id));
+    let known = evidence.accepted.contains(&ID) || evidence.accepted_unnamed.contains(&Behaviour::ChangingAtOneRange);
     let by_frame = if known {
         None
     } else {
@@ -125,7 +124,7 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, gai
     let [low, high] = decibel.iter().fold([f64::MAX, f64::MIN], |[l, h], &v| [l.min(v), h.max(v)]);
     Candidate {
         id: Some(ID),
-        behaves_like: "static returns that fade behind the body",
+        behaves_like: Behaviour::FadingBehindTheBody,
         estimates: vec![],
         choice: None,
         place: Place {

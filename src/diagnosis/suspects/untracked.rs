@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use super::receiver::wandering;
 use super::region::{Region, STILL_BINS, joined, mean_power, moves, power_gain, remove, run};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::{Evidence, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics;
@@ -178,7 +179,7 @@ impl<'a> Mover<'a> {
         });
         Candidate {
             id: Some(effects::moving_reflector::ID),
-            behaves_like: super::paths::PATH_LIKE,
+            behaves_like: Behaviour::PathLike,
             estimates,
             choice: None,
             place: Place {

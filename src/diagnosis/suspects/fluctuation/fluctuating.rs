@@ -13,13 +13,13 @@ use num_complex::Complex64;
 use super::course::{Course, Data, Frames};
 use super::returns::{Returns, SPACING};
 use super::{Free, LEAST_LIKELY, around};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::evidence::{Evidence, blackman_harris};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::effects::Stage;
 
-pub const BEHAVES_LIKE: &str = "static returns that change at one range";
 /// So many times as much, as a share, as the other returns change together: else it is what all of them do.
 const ALONE: f64 = 4.0;
 /// Bins over which the taper spreads what is independent.
@@ -139,7 +139,7 @@ fn candidate(
     let range_m = change.bin as f64 * bin_m;
     Candidate {
         id: None,
-        behaves_like: BEHAVES_LIKE,
+        behaves_like: Behaviour::ChangingAtOneRange,
         estimates: vec![],
         choice: None,
         place: Place {

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use rustfft::FftPlanner;
 
 use super::sinusoid::Sinusoid;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::{corrected, fisher_tail};
@@ -49,7 +50,6 @@ const SURELY: f64 = 12.0;
 const ELSEWHERE: f64 = 0.01;
 const FEWEST_FRAMES: usize = 5;
 const REFINEMENTS: usize = 16;
-pub const BEHAVES_LIKE: &str = "a static return that is modulated";
 
 /// Chirps without what is static during a frame, by range, and when they were: what changes from frame to frame is no such
 /// modulation.
@@ -105,7 +105,10 @@ impl Line {
 
 pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let training = &evidence.split.training;
-    if training.len() < FEWEST_FRAMES || evidence.split.held_out.is_empty() || evidence.accepted.contains(&BEHAVES_LIKE) {
+    if training.len() < FEWEST_FRAMES
+        || evidence.split.held_out.is_empty()
+        || evidence.accepted_unnamed.contains(&Behaviour::Modulated)
+    {
         return None;
     }
     let chirps = Chirps::new(evidence)?;
@@ -455,7 +458,7 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Ca
     let frame_rate_hz = 1.0 / evidence.radar.frame_period_s;
     Some(Candidate {
         id: None,
-        behaves_like: BEHAVES_LIKE,
+        behaves_like: Behaviour::Modulated,
         estimates: vec![],
         choice: None,
         place: Place { range_m: Some([near_m, far_m]), ..Place::at(Stage::Scene) },

@@ -15,13 +15,12 @@ use super::change::{Change, Moves};
 use super::covariance::{Array, Cells, used};
 use super::found::{AS_WELL, Found, UNEVEN};
 use super::{coupling, mismatch, places, skew};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::power::{PowerModel, part_templates};
 use crate::diagnosis::suspects::clutter::still_power;
 use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place};
 use crate::effects::{self, Stage};
 
-/// What the gain of one channel that hops behaves like.
-pub const SLOW_GAIN_OF_ONE: &str = "slow-time gain of one channel";
 /// Expected power over the noise from which on a cell is used.
 const LEAST_POWER: f32 = 10.0;
 /// Chance below which receivers are not alike.
@@ -60,7 +59,8 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     let radar = &evidence.radar;
     let accepted = |id: &str| evidence.accepted.contains(&id);
     // One channel whose gain hopped was brought to its own mean, which need not be that of the others.
-    if accepted(SLOW_GAIN_OF_ONE) || accepted(effects::antenna_position::ID) {
+    let hopped = evidence.accepted_unnamed.contains(&Behaviour::SlowTimeGainOfOneChannel);
+    if hopped || accepted(effects::antenna_position::ID) {
         return vec![];
     }
     let Some(Observed { training, held_out, array }) = Observed::new(evidence, model, body) else { return vec![] };
@@ -193,7 +193,7 @@ fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, g
     let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
     Candidate {
         id: Some(effects::pose_offset::ID),
-        behaves_like: "direction offset",
+        behaves_like: Behaviour::DirectionOffset,
         estimates: vec![
             Estimate::list("offset_m", &[offset, 0.0, 0.0], &[deviation, 0.05, 0.2]),
             Estimate::normal("yaw_deg", 0.0, 1.0),

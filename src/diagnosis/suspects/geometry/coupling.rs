@@ -8,6 +8,7 @@ use num_complex::Complex64;
 use super::covariance::Array;
 use super::found::{AS_WELL, Found, LOOKS, UNEVEN};
 use super::mismatch;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, Volume, statistics};
@@ -63,7 +64,7 @@ pub fn one_way(evidence: &Evidence, array: &Array, alike: Option<&Found>) -> Opt
     let neighbours = candidate(evidence, strength, &found);
     let candidate = Candidate {
         id: None,
-        behaves_like: "receivers that are coupled to the neighbour on one side",
+        behaves_like: Behaviour::CoupledOnOneSide,
         statement: format!(
             "Each receiver also receives the signal of the one {side} it, {:.1} dB below its own, and not that of the one on \
              its other side: antennas that couple would do so alike to both sides.",
@@ -125,7 +126,7 @@ fn candidate(evidence: &Evidence, strength: Complex64, found: &Estimated) -> Can
     let mean_neighbours = 2.0 * (receivers as f64 - 1.0) / receivers as f64;
     Candidate {
         id: Some(effects::mutual_coupling::ID),
-        behaves_like: "channel gain",
+        behaves_like: Behaviour::ChannelGain,
         estimates: vec![Estimate::normal("level_db", level_db, statistics::DECIBEL * deviation / strength.norm())],
         choice: None,
         place: Place::at(Stage::Antenna),

@@ -13,8 +13,8 @@ use super::again;
 use super::change::{Change, Moves, frame_period_s};
 use super::fitted::{Fitted, refine};
 use super::trial::{Score, Trial};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::prediction::BEYOND;
-use crate::diagnosis::suspects::paths::PATH_LIKE;
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};
 use crate::effects::{Stage, clock_drift, clock_offset, frame_drop, pose_offset, range_bias, slope_error};
 
@@ -299,9 +299,9 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
     Candidate {
         id: Some(fit.id),
         behaves_like: match stage {
-            Stage::Timing => "time offset",
-            Stage::Propagation => PATH_LIKE,
-            _ => "range offset",
+            Stage::Timing => Behaviour::TimeOffset,
+            Stage::Propagation => Behaviour::PathLike,
+            _ => Behaviour::RangeOffset,
         },
         estimates,
         choice: place.boundary.clone(),

@@ -11,6 +11,7 @@ use num_complex::Complex64;
 
 use super::covariance::{Array, Cells};
 use super::found::{Found, LOOKS};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;
 use crate::diagnosis::statistics::{DECIBEL, corrected};
@@ -101,7 +102,7 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
         .sum();
     Candidate {
         id: Some(effects::channel_mismatch::ID),
-        behaves_like: "channel gain",
+        behaves_like: Behaviour::ChannelGain,
         statement: format!(
             "The receivers differ: against the first, {} {} dB of gain and {}° of phase, which no direction of the body explains.",
             if receivers == 2 { "the second has".to_string() } else { format!("receivers 1 to {} have", receivers - 1) },

@@ -17,14 +17,13 @@ mod trial;
 
 use change::Moves;
 use channels::Observed;
-pub use channels::SLOW_GAIN_OF_ONE;
 use trial::Trial;
 
 use nalgebra::DVector;
 
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;
-use crate::diagnosis::suspects::paths::OVER_THE_BODY;
 use crate::diagnosis::{Candidate, Evidence};
 
 /// Chance below which the body is elsewhere than predicted.
@@ -35,7 +34,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(model) = evidence.power() else { return vec![] };
     let Some(body) = evidence.body.as_ref() else { return vec![] };
     // Beside another mover that is stronger than the body, the body's place and time are not estimable.
-    let outshone = evidence.accepted.contains(&OVER_THE_BODY);
+    let outshone = evidence.accepted_unnamed.contains(&Behaviour::PathLikeOverTheBody);
     let mut found = if outshone { vec![] } else { displaced::find(&Trial::new(evidence, model, body)) };
     let displaced = found.iter().any(|found| found.p_value < DISPLACED && found.gain > 0.0);
     found.extend(channels::find(evidence, model, body, Moves::new(evidence.radar.centre_m()), displaced));
@@ -93,6 +92,7 @@ mod tests {
                 // What was taken into account must leave nothing behind, whoever asks.
                 let mut next = evidence.with(&candidate);
                 next.accepted.clear();
+                next.accepted_unnamed.clear();
                 for again in find(&next) {
                     println!("      again {again:?}");
                 }

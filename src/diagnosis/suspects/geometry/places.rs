@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::covariance::{Array, Cells};
 use super::found::{Found, LOOKS};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};
@@ -55,7 +56,7 @@ fn candidate(evidence: &Evidence, cells: &Cells, directions: &DMatrix<f64>, foun
     let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
     Candidate {
         id: Some(effects::antenna_position::ID),
-        behaves_like: "phase between receivers that grows with the direction",
+        behaves_like: Behaviour::PhaseBetweenReceivers,
         estimates: vec![Estimate::list("offset_m", offsets.as_slice(), &deviations)],
         choice: None,
         place: Place::at(Stage::Antenna),

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use super::bearing::{Bearing, Sums, along};
 use super::standing::Standing;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::suspects::undo;
 use crate::diagnosis::{Candidate, Correction, Cube, Evidence, Place, Volume};
 use crate::effects::Stage;
@@ -69,7 +70,7 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, gain: f64)
     let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
     Some(Candidate {
         id: None,
-        behaves_like: "delay-proportional phase by receiver",
+        behaves_like: Behaviour::DelayProportionalPhaseByReceiver,
         estimates: vec![],
         choice: None,
         place: Place { rx: Some((1..radar.rx_m.len()).collect()), ..Place::at(Stage::Receiver) },

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::fit::{Fit, against};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, HANN_LOBE, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
@@ -75,7 +76,7 @@ fn candidate(evidence: &Evidence, fit: &Fit, found: &[(Complex64, f64)], excess:
     let course = fit.course.clone();
     Candidate {
         id: Some(effects::iq_imbalance::ID),
-        behaves_like: "conjugate image",
+        behaves_like: Behaviour::ConjugateImage,
         estimates: vec![
             Estimate::normal("gain_db", gain_db, 2.0 * DECIBEL * deviation),
             Estimate::normal("phase_deg", phase_deg, (2.0 * deviation).to_degrees()),

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::fit::{Fit, against};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, HANN_LOBE, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
@@ -44,7 +45,7 @@ pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     let constant = offsets.clone();
     Some(Candidate {
         id: Some(effects::dc_offset::ID),
-        behaves_like: "additive fast-time",
+        behaves_like: Behaviour::AdditiveFastTime,
         estimates: vec![Estimate::list("i", &parts(|d| d.re), &deviations), Estimate::list("q", &parts(|d| d.im), &deviations)],
         choice: None,
         place: Place { range_m: Some([0.0, 0.0]), ..Place::at(Stage::Receiver) },

@@ -9,11 +9,11 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::course::{Course, powers};
 use crate::diagnosis::evidence::{Evidence, hann};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{DECIBEL, corrected, fisher_tail};
-use crate::diagnosis::suspects::paths::PATH_LIKE;
 use crate::diagnosis::suspects::paths::product::CLOSE;
 use crate::diagnosis::suspects::region::{Region, remove};
 use crate::diagnosis::suspects::vital::frames::{Frames, frames};
@@ -85,7 +85,7 @@ fn candidate(
     let power: f64 = amplitude.iter().map(|a| a.norm_sqr()).sum();
     Candidate {
         id: Some(KINDS[best.kind].0),
-        behaves_like: PATH_LIKE,
+        behaves_like: Behaviour::PathLike,
         estimates: vec![if KINDS[best.kind].1 {
             Estimate::normal("level_db", DECIBEL * value.ln(), DECIBEL * deviation / value.max(1e-12))
         } else {

@@ -7,10 +7,10 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::scene::Scene;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::locate::CELLS_PER_VALUE;
 use crate::diagnosis::statistics::corrected;
-use crate::diagnosis::suspects::receiver::harmonic;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Volume};
 use crate::effects::{self, Stage};
 use crate::radar::SPEED_OF_LIGHT;
@@ -85,7 +85,7 @@ pub fn matches(scene: &Scene, template: impl Fn(usize, usize) -> Vec<Complex64> 
 /// `body_multibounce`: the body once more, a fixed way later.
 pub fn multibounce(scene: &Scene, tried: f64) -> Option<Candidate> {
     // Products of the signal with itself repeat the body, too.
-    if scene.evidence.accepted.contains(&harmonic::QUADRATIC) {
+    if scene.evidence.accepted_unnamed.contains(&Behaviour::Quadratic) {
         return None;
     }
     let half_cells: Vec<usize> = (1..=MOST_HALF_CELLS.min(scene.bins)).collect();
@@ -145,7 +145,7 @@ pub fn multibounce(scene: &Scene, tried: f64) -> Option<Candidate> {
     let step_m = scene.range_m(0.125);
     Some(Candidate {
         id: Some(effects::body_multibounce::ID),
-        behaves_like: super::PATH_LIKE,
+        behaves_like: Behaviour::PathLike,
         estimates: vec![Estimate::normal("extra_m", extra_m, 0.4 * step_m)],
         choice: None,
         place,

@@ -6,6 +6,7 @@ use super::ghost::Ghost;
 use super::mover::energy;
 use super::removal::{empty_cells, patch};
 use super::scene::Scene;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::prediction::{SIDE_SPREAD, mirror_id, mirrored_return};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Candidate, Correction, Estimate, Place};
@@ -54,7 +55,7 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
         .sum();
     Candidate {
         id: Some(id),
-        behaves_like: super::PATH_LIKE,
+        behaves_like: Behaviour::PathLike,
         estimates: vec![coefficient],
         choice: Some(name.into()),
         place: Place { boundary: Some(name.into()), ..place },

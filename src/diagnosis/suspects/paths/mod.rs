@@ -19,6 +19,7 @@ mod track;
 #[cfg(test)]
 mod tests;
 
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::{Candidate, Evidence};
 use crate::effects;
 
@@ -47,10 +48,6 @@ const ALIKE: f64 = 0.25;
 const STRONGEST_WALL: f64 = 0.75;
 /// Kinds of answers that this family may give: every one is a chance to be wrong.
 const TRIED: f64 = 6.0;
-
-/// How behaviours of paths begin.
-pub const PATH_LIKE: &str = "path-like";
-pub const OVER_THE_BODY: &str = "path-like, over the body";
 
 /// Effects of which there may be several.
 pub const MANY: [&str; 3] = [effects::wall_ghost::ID, effects::floor_bounce::ID, effects::moving_reflector::ID];
@@ -103,13 +100,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
 fn over_the_body(scene: &Scene) -> Option<Candidate> {
     let mover = mover::Mover::new(scene, track::strongest(scene)?)?;
     let found = mover.candidate(scene, TRIED);
-    (mover.gain > LEAST_GAIN_UNNAMED).then(|| Candidate { behaves_like: OVER_THE_BODY, ..found })
+    (mover.gain > LEAST_GAIN_UNNAMED).then(|| Candidate { behaves_like: Behaviour::PathLikeOverTheBody, ..found })
 }
 
 /// A sinusoidal motion; without a name it is what has no law either.
 fn moves_sinusoidally(motion: &sinusoidal::Found, scene: &Scene) -> Candidate {
     let found = motion.candidate(scene, TRIED);
-    if found.id.is_some() { found } else { Candidate { behaves_like: OVER_THE_BODY, ..found } }
+    if found.id.is_some() { found } else { Candidate { behaves_like: Behaviour::PathLikeOverTheBody, ..found } }
 }
 
 /// Paths whose lengths change.

@@ -6,6 +6,7 @@ use super::pendulum::Pendulum;
 use super::removal::{empty_cells, patch};
 use super::scene::Scene;
 use super::track::{Sighting, Track};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::power::Template;
 use crate::diagnosis::statistics::{corrected, median};
 use crate::diagnosis::{Candidate, Correction, Estimate, Place};
@@ -163,7 +164,7 @@ impl Mover {
         let still = scene.evidence.still().to_vec();
         Candidate {
             id: self.id,
-            behaves_like: super::PATH_LIKE,
+            behaves_like: Behaviour::PathLike,
             estimates: if self.id == Some(effects::moving_reflector::ID) { estimates } else { vec![] },
             choice: None,
             place,

@@ -9,11 +9,11 @@ use rayon::prelude::*;
 
 use super::echo::{Fit, fit, matches};
 use super::scene::Scene;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::denoised;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::statistics::corrected;
-use crate::diagnosis::suspects::receiver::harmonic;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Volume};
 use crate::effects::{self, Stage};
 
@@ -64,7 +64,8 @@ fn mean(channels: &[&[Complex64]]) -> Vec<Complex64> {
 
 pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
     // Where the receiver bends everything, or products of other kinds are there too, these two are not the cause.
-    let bent = [effects::adc_saturation::ID, harmonic::QUADRATIC].iter().any(|id| scene.evidence.accepted.contains(id));
+    let bent = scene.evidence.accepted.contains(&effects::adc_saturation::ID)
+        || scene.evidence.accepted_unnamed.contains(&Behaviour::Quadratic);
     if scene.evidence.is_real() || bent || scene.evidence.products().mixed().is_some() {
         return None;
     }
@@ -108,7 +109,7 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
     let (kind, factor) = (*kind, found.factor);
     Some(Candidate {
         id: Some(kind.id()),
-        behaves_like: if kind == Kind::Harmonic { "non-linear" } else { "path-like" },
+        behaves_like: if kind == Kind::Harmonic { Behaviour::NonLinear } else { Behaviour::PathLike },
         estimates: vec![estimate],
         choice: None,
         place: Place::at(stage),

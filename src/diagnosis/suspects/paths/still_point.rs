@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::{hann, transform};
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::suspects::steering::{power, steering};
@@ -213,7 +214,7 @@ fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candi
     }
     Candidate {
         id: Some(effects::static_reflector::ID),
-        behaves_like: super::PATH_LIKE,
+        behaves_like: Behaviour::PathLike,
         estimates,
         choice: None,
         place,

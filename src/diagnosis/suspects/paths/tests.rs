@@ -227,5 +227,5 @@ fn away_from_the_body_looks_are_those_of_noise_and_where_it_is_a_tone_must_be_st
 fn something_far_stronger_than_the_body_is_seen_where_the_body_is() {
     // It oscillates where the body walks, 20 dB above all of it.
     let found = believed(&made(0.0, 60.0, 2.2));
-    assert!(found.iter().any(|found| found.behaves_like.starts_with(super::PATH_LIKE) && found.gain > 100.0), "{found:?}");
+    assert!(found.iter().any(|found| found.behaves_like.is_path() && found.gain > 100.0), "{found:?}");
 }

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::burst::Burst;
 use super::crossings::{self, Crossings};
 use super::support::energy;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, OfSample, Place};
 use crate::diagnosis::statistics::{corrected, median};
 use crate::diagnosis::{Cube, Evidence, Volume};
@@ -69,7 +70,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let volume = Volume { of_samples: Some(Arc::new(spread(evidence, &bursts, &powers))), ..Volume::KEPT };
     vec![Candidate {
         id: Some(id),
-        behaves_like: "sparse additive",
+        behaves_like: Behaviour::SparseAdditive,
         estimates,
         choice: None,
         place,

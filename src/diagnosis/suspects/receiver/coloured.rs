@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::diagnosis::Evidence;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale};
 use crate::effects::{self, Stage};
@@ -96,7 +97,7 @@ fn candidate(evidence: &Evidence, powers: Powers, top: &Top, fit: &Fit, p_value:
     };
     Candidate {
         id: Some(effects::coloured_noise::ID),
-        behaves_like: "noise over beat frequency",
+        behaves_like: Behaviour::NoiseOverBeatFrequency,
         estimates: vec![of("knee_hz", knee, top.deviations[0]), of("power", power, top.deviations[1])],
         choice: None,
         place: Place::at(Stage::Noise),

@@ -4,23 +4,23 @@
 
 use std::sync::Arc;
 
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
 use crate::diagnosis::products::{Law, Product, without};
 use crate::diagnosis::{Cube, Evidence, denoised};
 use crate::effects::{self, Stage};
-
-pub const QUADRATIC: &str = "quadratic in the signal";
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.is_real() || evidence.accepted.contains(&effects::adc_saturation::ID) {
         return vec![];
     }
     let known = |id: &str| evidence.accepted.contains(&id);
+    let bent = evidence.accepted_unnamed.contains(&Behaviour::Quadratic);
     let products = evidence.products();
     if let Some(laws) = products.mixed() {
-        return if known(QUADRATIC) { vec![] } else { vec![nameless(evidence, laws)] };
+        return if bent { vec![] } else { vec![nameless(evidence, laws)] };
     }
-    let square = products.square.filter(|_| !known(effects::second_harmonic::ID) && !known(QUADRATIC));
+    let square = products.square.filter(|_| !known(effects::second_harmonic::ID) && !bent);
     let cube = products.cube.filter(|_| !known(effects::compression::ID));
     square.into_iter().chain(cube).map(|law| candidate(evidence, law)).collect()
 }
@@ -50,7 +50,7 @@ fn candidate(evidence: &Evidence, law: Law) -> Candidate {
             ),
         )
     };
-    Candidate { id: Some(id), estimates: vec![estimate], ..nonlinear(evidence, "non-linear", vec![law], statement) }
+    Candidate { id: Some(id), estimates: vec![estimate], ..nonlinear(evidence, Behaviour::NonLinear, vec![law], statement) }
 }
 
 fn nameless(evidence: &Evidence, laws: Vec<Law>) -> Candidate {
@@ -65,11 +65,11 @@ fn nameless(evidence: &Evidence, laws: Vec<Law>) -> Candidate {
         level(Product::Magnitude),
         level(Product::Square)
     );
-    nonlinear(evidence, QUADRATIC, laws, statement)
+    nonlinear(evidence, Behaviour::Quadratic, laws, statement)
 }
 
 /// Without a name.
-fn nonlinear(evidence: &Evidence, behaves_like: &'static str, laws: Vec<Law>, statement: String) -> Candidate {
+fn nonlinear(evidence: &Evidence, behaves_like: Behaviour, laws: Vec<Law>, statement: String) -> Candidate {
     let (p_value, gain) = (laws.iter().map(|law| law.p_value).fold(1.0, f64::min), laws.iter().map(|law| law.gain).sum());
     let energy = evidence.cube.samples.iter().map(|&value| (value - without(&laws, value)).norm_sqr()).sum();
     Candidate {

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::harmonic::QUADRATIC;
 use super::support::beat_hz;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::beat::{LOBE, empty_bins};
 use crate::diagnosis::evidence::spectrum;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
@@ -32,7 +32,8 @@ struct Sums {
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // Products of the signal are undone roughly: what they leave has images too.
-    let settled = [effects::iq_imbalance::ID, QUADRATIC].iter().any(|id| evidence.accepted.contains(id));
+    let settled =
+        evidence.accepted.contains(&effects::iq_imbalance::ID) || evidence.accepted_unnamed.contains(&Behaviour::Quadratic);
     if evidence.is_real() || settled {
         return vec![];
     }
@@ -80,7 +81,7 @@ fn candidate(evidence: &Evidence, mu: Complex64, scatter: f64, p_value: f64, gai
     let total: f64 = evidence.cube.samples.iter().map(Complex64::norm_sqr).sum();
     Candidate {
         id: Some(effects::iq_imbalance::ID),
-        behaves_like: "conjugate image",
+        behaves_like: Behaviour::ConjugateImage,
         estimates: vec![Estimate::normal("gain_db", gain_db, db_error), Estimate::normal("phase_deg", phase_deg, degree_error)],
         choice: None,
         place: Place::at(Stage::Receiver),

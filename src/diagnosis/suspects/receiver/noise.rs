@@ -9,6 +9,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::coloured::coloured;
 use crate::diagnosis::Evidence;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::folds;
 use crate::diagnosis::evidence::beat::empty_bins;
 use crate::diagnosis::evidence::{hann, transform_under};
@@ -207,7 +208,7 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
     Some(Candidate {
         id: Some(effects::correlated_noise::ID),
-        behaves_like: "noise shared by receivers",
+        behaves_like: Behaviour::NoiseSharedByReceivers,
         estimates: vec![Estimate::normal("rho", rho, error)],
         choice: None,
         place: Place::at(Stage::Noise),

@@ -10,6 +10,7 @@ use rustfft::FftPlanner;
 use super::still_term::subtract;
 use super::support::{energy, range_m, ranges_m, tone};
 use super::zero_beat::ZeroBeat;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
@@ -99,7 +100,7 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
     let affected = indices.clone();
     Some(Candidate {
         id: Some(effects::ramp_edge_transient::ID),
-        behaves_like: "additive fast-time",
+        behaves_like: Behaviour::AdditiveFastTime,
         estimates: vec![
             Estimate { name: "samples", values: vec![count as f64], ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]] },
             Estimate::normal("level_db", level_db, 8.7 * (mean / wildest).sqrt() + 0.3),
@@ -155,7 +156,7 @@ fn offset(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
     let deviation: Vec<f64> = (0..rx).map(|receiver| rest[receiver]).collect();
     Some(Candidate {
         id: Some(effects::dc_offset::ID),
-        behaves_like: "additive fast-time",
+        behaves_like: Behaviour::AdditiveFastTime,
         estimates: vec![Estimate::list("i", &values, &deviation), Estimate::list("q", &vec![0.0; rx], &vec![0.0; rx])],
         choice: None,
         place: Place { range_m: Some([0.0, 0.0]), ..Place::at(Stage::Receiver) },
@@ -288,7 +289,7 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
     let (near_spread, far_spread) = (near.spread(near.peak), near.spread(near.far));
     Some(Candidate {
         id: Some(effects::tx_leakage::ID),
-        behaves_like: "additive fast-time",
+        behaves_like: Behaviour::AdditiveFastTime,
         estimates: vec![Estimate::normal("range_m", range, 0.3 * resolution), Estimate::normal("level_db", level_db, 1.0)],
         choice: None,
         place: Place { range_m: Some([0.0, near.valley as f64 * near.bin_m]), ..Place::at(Stage::Receiver) },

@@ -6,6 +6,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::declip::{Declip, FARTHEST};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::beat::empty_bins;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::corrected;
@@ -87,7 +88,8 @@ impl Pile {
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // It is looked for once, in the samples as they were recorded.
-    if !evidence.accepted.is_empty() || evidence.is_real() {
+    let untouched = evidence.accepted.is_empty() && evidence.accepted_unnamed.is_empty();
+    if !untouched || evidence.is_real() {
         return vec![];
     }
     let largest = evidence.extremes[1].max(-evidence.extremes[0]);
@@ -118,7 +120,7 @@ fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
     };
     Candidate {
         id: Some(effects::adc_saturation::ID),
-        behaves_like: "amplitude",
+        behaves_like: Behaviour::Amplitude,
         estimates: vec![Estimate { name: "level", values: vec![level], ci90: vec![ci90] }],
         choice: None,
         place: Place { frames: pile.frames(), ..Place::at(Stage::Receiver) },

@@ -14,6 +14,7 @@ use rustfft::FftPlanner;
 use super::field::{Field, add, orthonormal};
 use super::filters::{Filter, SHAPES, Shape, decay};
 use super::support::{beat_hz, dot, tone};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Volume};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
@@ -149,7 +150,7 @@ impl<'a> Search<'a> {
             * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
         Candidate {
             id: Some(shape.id()),
-            behaves_like: "beat-frequency gain",
+            behaves_like: Behaviour::BeatFrequencyGain,
             estimates,
             choice: None,
             place: Place::at(Stage::Receiver),

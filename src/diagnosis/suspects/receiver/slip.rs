@@ -17,6 +17,7 @@ use super::{
     support::{dot, energy},
 };
 use crate::diagnosis::Cube;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::halves;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Place};
@@ -32,13 +33,12 @@ const MOST_SHARE: usize = 8;
 const LEAVES: f64 = 0.25;
 /// Neighbouring samples of a mean chirp are alike: so many count as one.
 const ALIKE: f64 = 4.0;
-pub const BEHAVES_LIKE: &str = "slipped samples";
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [frames, _, _, loops, samples] = evidence.cube.dims;
     let channels = evidence.cube.channels();
     let enough = [frames, loops, samples].iter().zip(FEWEST).all(|(count, fewest)| *count >= fewest);
-    if !enough || evidence.accepted.contains(&BEHAVES_LIKE) {
+    if !enough || evidence.accepted_unnamed.contains(&Behaviour::SlippedSamples) {
         return vec![];
     }
     let means: Vec<Vec<[Vec<Complex64>; 2]>> = (0..frames)
@@ -72,7 +72,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let changed = slipped.iter().map(|&frame| moved(&evidence.cube, frame, late[frame])).sum();
     vec![Candidate {
         id: None,
-        behaves_like: BEHAVES_LIKE,
+        behaves_like: Behaviour::SlippedSamples,
         estimates: vec![],
         choice: None,
         p_value: corrected((-gain).exp(), tried).max(f64::MIN_POSITIVE),

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::line::{Line, Strongest, tone};
 use super::slow_spur::{self, SlowSpur};
 use super::wandering::{self, Wandering, deviation_bins};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::{hann, spectrum, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
@@ -150,7 +151,7 @@ fn candidate(evidence: &Evidence, tone: Tone) -> Candidate {
     let frequency_hz = wrapped * rate;
     Candidate {
         id: Some(effects::spur::ID),
-        behaves_like: "tone",
+        behaves_like: Behaviour::Tone,
         estimates: vec![
             Estimate::normal("frequency_hz", frequency_hz, deviation_bins(gain) * rate / samples as f64),
             Estimate::normal("level_db", level_db, denoised::PEAK_DB),

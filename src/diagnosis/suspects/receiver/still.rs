@@ -13,6 +13,7 @@ use super::response;
 use super::still_term::{Chosen, is_bent, subtract};
 use super::support::energy;
 use crate::diagnosis::Evidence;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Place};
 use crate::diagnosis::statistics::chi2_tail;
 use crate::effects::Stage;
@@ -85,7 +86,7 @@ fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, gain: f64) -> O
     let power_db = 10.0 * (energy_of_chirp / field.still.iter().map(|chirp| energy(chirp)).sum::<f64>().max(1e-300)).log10();
     Some(Candidate {
         id: None,
-        behaves_like: "additive fast-time",
+        behaves_like: Behaviour::AdditiveFastTime,
         estimates: vec![],
         choice: None,
         place: Place::at(Stage::Receiver),

@@ -8,6 +8,7 @@ use num_complex::Complex64;
 use super::elements::{Element, Images, columns, refine, templates, unknowns};
 use super::field::{Field, Fitted, add};
 use super::support::{beat_hz, energy, range_m};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence, denoised};
@@ -62,7 +63,7 @@ impl Chosen<'_> {
         let [frames, _, _, loops, _] = evidence.cube.dims;
         Some(Candidate {
             id: Some(id),
-            behaves_like: "additive fast-time",
+            behaves_like: Behaviour::AdditiveFastTime,
             estimates,
             choice: None,
             place,

@@ -10,6 +10,7 @@ use super::field::{Field, PATTERN, Part, ahead};
 use super::lines::Line;
 use super::random::Random;
 use super::settling::Settling;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::course::{Course, Of};
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::Evidence;
@@ -86,11 +87,11 @@ fn typical_delay_s(field: &Field) -> f64 {
     (sum / f64::max(weight, f64::MIN_POSITIVE)).sqrt()
 }
 
-pub(super) fn behaves_like(part: Part) -> &'static str {
+pub(super) fn behaves_like(part: Part) -> Behaviour {
     match part {
-        Part::Gain => "slow-time gain",
-        Part::Phase | Part::Boresight => "slow-time phase",
-        Part::Delay => "delay-proportional phase",
+        Part::Gain => Behaviour::SlowTimeGain,
+        Part::Phase | Part::Boresight => Behaviour::SlowTimePhase,
+        Part::Delay => Behaviour::DelayProportionalPhase,
     }
 }
 
@@ -306,7 +307,7 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
     let reach = (3.0 * settling.loops).ceil() as usize;
     Candidate {
         id,
-        behaves_like: "slow-time gain",
+        behaves_like: Behaviour::SlowTimeGain,
         estimates,
         choice: None,
         place: Place {

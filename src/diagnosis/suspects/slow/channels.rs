@@ -11,6 +11,7 @@ use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::steady::Steady;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::folds;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, NINETY, Place, Volume};
@@ -30,7 +31,6 @@ const GAP: usize = 2;
 const SAME: f64 = 0.8;
 /// Variance of a group's gain over that of independent bins: the window's noise bandwidth.
 const NEIGHBOURS: f64 = 2.0;
-pub use geometry::SLOW_GAIN_OF_ONE as BEHAVES_LIKE;
 
 /// Gains of one receiver or transmitter relative to the others.
 struct Relative {
@@ -318,7 +318,7 @@ impl Judged {
         let size = loops * samples * evidence.cube.channels();
         Candidate {
             id: None,
-            behaves_like: BEHAVES_LIKE,
+            behaves_like: Behaviour::SlowTimeGainOfOneChannel,
             estimates: vec![],
             choice: None,
             place: Place {

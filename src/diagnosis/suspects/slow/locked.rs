@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use rustfft::{FftDirection, FftPlanner};
 
 use super::settling::{Decay, ENOUGH};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::{Cube, mean_chirp};
 use crate::diagnosis::evidence::{Evidence, HANN_LOBE, hann, transform_under};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Undo};
@@ -219,7 +220,7 @@ fn candidate(evidence: &Evidence, own: &Channel, has: &[usize], bin: usize, undo
     let series = |name: &str, part: fn(&Complex64) -> f64| (name.into(), number.clone(), values.iter().map(part).collect());
     Candidate {
         id: None,
-        behaves_like: if settles { "slow-time settling of one return" } else { "slow-time pattern of one return" },
+        behaves_like: if settles { Behaviour::SlowTimeSettlingOfOneReturn } else { Behaviour::SlowTimePatternOfOneReturn },
         estimates: vec![],
         choice: None,
         place: Place {
@@ -311,7 +312,7 @@ mod tests {
     fn a_leakage_that_settles_is_found_in_its_channel_and_then_nothing() {
         let evidence = evidence(1, |_, index| settles(index).into(), |_| 0.0);
         let found = find(&evidence).pop().expect("a settling");
-        assert_eq!((found.id, found.behaves_like), (None, "slow-time settling of one return"), "{found:?}");
+        assert_eq!((found.id, found.behaves_like), (None, Behaviour::SlowTimeSettlingOfOneReturn), "{found:?}");
         assert!(found.p_value < 1e-9 && found.gain > 20.0, "{found:?}");
         let bin_m = evidence.radar.range_resolution_m();
         let [low, high] = found.place.range_m.unwrap();

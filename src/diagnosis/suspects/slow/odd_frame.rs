@@ -10,6 +10,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::diagnosis::Cube;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::halves;
 use crate::diagnosis::evidence::{Evidence, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Place};
@@ -26,7 +27,6 @@ const FROM_THE_NEXT: f64 = 2.0;
 const LEAST_SPREAD: f64 = 1e-3;
 /// Median absolute deviation to standard deviation of a normal law.
 const TO_DEVIATION: f64 = 1.4826;
-pub const BEHAVES_LIKE: &str = "single frame";
 
 /// Mean chirps of the even and of the odd loops less the channel's mean over the other frames.
 struct Deviation {
@@ -38,7 +38,11 @@ struct Deviation {
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [frames, _, receivers, loops, samples] = evidence.cube.dims;
     let channels = evidence.cube.channels();
-    if frames < FEWEST_FRAMES || channels < FEWEST_CHANNELS || loops < 4 || evidence.accepted.contains(&BEHAVES_LIKE) {
+    if frames < FEWEST_FRAMES
+        || channels < FEWEST_CHANNELS
+        || loops < 4
+        || evidence.accepted_unnamed.contains(&Behaviour::SingleFrame)
+    {
         return vec![];
     }
     let means: Vec<[Vec<Complex64>; 2]> = (0..frames * channels)
@@ -85,7 +89,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let size = loops * samples;
     vec![Candidate {
         id: None,
-        behaves_like: BEHAVES_LIKE,
+        behaves_like: Behaviour::SingleFrame,
         estimates: vec![],
         choice: None,
         place: Place {

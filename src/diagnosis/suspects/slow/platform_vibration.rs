@@ -10,6 +10,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::field::{PATTERN, ahead, free};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place, Volume};
@@ -337,7 +338,7 @@ fn candidate(
     let energy = 0.5 * chirps * patterns[1].iter().map(Complex64::norm_sqr).sum::<f64>();
     Candidate {
         id: Some(effects::radar_vibration::ID),
-        behaves_like: "slow-time phase",
+        behaves_like: Behaviour::SlowTimePhase,
         estimates: vec![
             Estimate::normal("amplitude_m", amplitude_m, deviation_m),
             Estimate::normal("frequency_hz", frequency, frequency_deviation),

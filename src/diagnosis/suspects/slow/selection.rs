@@ -1,7 +1,7 @@
 //! Which of the looks at one series keep their candidates: one cause shows in several.
 
 use super::lines;
-use crate::diagnosis::finding::Candidate;
+use crate::diagnosis::{behaviour::Behaviour, finding::Candidate};
 
 /// Share of the log-likelihood gain that what is simpler, or has a name, needs.
 const NEARLY: f64 = 0.8;
@@ -65,7 +65,7 @@ pub(super) fn selected(mut found: Vec<Found>, mut free: Vec<Found>) -> Vec<Found
 /// What has no name is left out where a name explains as much.
 fn keep_names(found: &mut Vec<Found>) {
     let of_name = |found: &Found| (found.candidate.behaves_like, found.explained, found.loud && found.within_frames);
-    let names: Vec<(&str, f64, bool)> = found.iter().filter(|found| found.is_named()).map(of_name).collect();
+    let names: Vec<(Behaviour, f64, bool)> = found.iter().filter(|found| found.is_named()).map(of_name).collect();
     // A law without a name must fit to the noise where one with a name explains nearly as much: how strong static returns turn
     // when the radar itself moves depends on where they are, which is known roughly.
     let explained = names.iter().map(|name| name.1).fold(0.0, f64::max);
@@ -75,7 +75,7 @@ fn keep_names(found: &mut Vec<Found>) {
     found.retain(|found| found.is_named() || !found.loud || fits_better(found));
     // Of another kind a name wins only where the recording cannot decide.
     let taken = |other: &Found| {
-        let like_it = |like: &str, gain: f64| like == other.candidate.behaves_like && gain > NEARLY * other.explained;
+        let like_it = |like: Behaviour, gain: f64| like == other.candidate.behaves_like && gain > NEARLY * other.explained;
         // Where it leaves much itself it must explain clearly more.
         let more =
             |gain: f64, loud: bool| if loud { NEARLY * gain > other.explained } else { gain > other.explained - UNDECIDED };

@@ -7,6 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::field::ahead;
 use super::find;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, NINETY};
@@ -83,7 +84,7 @@ fn nothing_is_found_where_nothing_changes() {
 #[test]
 fn a_ripple_of_the_gain_has_no_name_but_a_frequency() {
     let found = found_once(evidence(1, |t, _, _, _| (1.0 + 0.04 * (std::f64::consts::TAU * 100.0 * t + 0.4).sin()).into()));
-    assert_eq!((found.id, found.behaves_like), (None, "slow-time gain"));
+    assert_eq!((found.id, found.behaves_like), (None, Behaviour::SlowTimeGain));
     assert!(found.statement.contains("at 100.0") || found.statement.contains("at 99.9"), "{}", found.statement);
 }
 
@@ -94,7 +95,7 @@ fn a_common_phase_is_a_vibration_and_one_in_proportion_to_the_delay_is_none() {
     assert_eq!(found.id, Some(effects::radar_vibration::ID));
     within(&found, "frequency_hz", 83.0);
     let found = found_once(evidence(3, |t, _, _, delay| Complex64::cis(2.5e6 * delay * sinusoid(t))));
-    assert_eq!((found.id, found.behaves_like), (None, "delay-proportional phase"));
+    assert_eq!((found.id, found.behaves_like), (None, Behaviour::DelayProportionalPhase));
 }
 
 #[test]
@@ -175,7 +176,7 @@ fn a_drift_is_distinguished_from_slow_parts_of_a_body() {
 fn a_slow_turn_is_a_drift_and_no_vibration_at_the_rate_of_the_frames() {
     let slowly = |frame: usize| Complex64::cis(0.06 * (std::f64::consts::TAU * 0.04 * frame as f64 + 0.5).cos());
     let found = find(&evidence(26, |_, frame, _, _| slowly(frame)));
-    assert!(found.iter().any(|found| found.behaves_like == "slow-time phase" && found.p_value < 5e-4), "{found:?}");
+    assert!(found.iter().any(|found| found.behaves_like == Behaviour::SlowTimePhase && found.p_value < 5e-4), "{found:?}");
     assert!(found.iter().all(|found| found.id != Some(effects::radar_vibration::ID)), "{found:?}");
 }
 

@@ -17,6 +17,7 @@ use num_complex::Complex64;
 use rhythm::{BREATHING_HZ, HEART_HZ, Rhythm, rhythm};
 
 use super::region::{Region, remove};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::course::{Course, Of};
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
@@ -197,7 +198,7 @@ impl Motion<'_> {
             * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
         Candidate {
             id: self.named.as_ref().map(|n| n.0),
-            behaves_like: super::paths::PATH_LIKE,
+            behaves_like: Behaviour::PathLike,
             estimates: self.named.as_ref().map_or(vec![], |(_, r)| {
                 vec![
                     Estimate::normal("rate_hz", r.frequency_hz, r.frequency_deviation_hz),

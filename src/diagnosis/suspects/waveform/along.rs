@@ -18,6 +18,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::doppler_cells::{Cell, cells, place};
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Volume};
 use crate::diagnosis::power::PowerModel;
@@ -217,7 +218,7 @@ impl Chirps {
         let total: f64 = evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum();
         Candidate {
             id: Some(effects::chirp_droop::ID),
-            behaves_like: "fast-time gain",
+            behaves_like: Behaviour::FastTimeGain,
             estimates: vec![Estimate::normal("db", db, deviation)],
             choice: None,
             place: Place::at(Stage::Receiver),
@@ -258,7 +259,7 @@ impl Chirps {
         let range_m = 0.5 * self.delay_s * SPEED_OF_LIGHT;
         Candidate {
             id: named.then_some(effects::chirp_nonlinearity::ID),
-            behaves_like: "delay-proportional phase",
+            behaves_like: Behaviour::DelayProportionalPhase,
             estimates: if named { vec![peak] } else { vec![] },
             choice: None,
             place: Place::at(Stage::Waveform),

@@ -11,6 +11,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use rustfft::FftPlanner;
 
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, blackman_harris, hann};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
@@ -203,7 +204,7 @@ impl Pair {
         let (radar_copy, turned_hz) = (radar.clone(), ripple_hz);
         Candidate {
             id: named.then_some(effects::chirp_ripple::ID),
-            behaves_like: "delay-proportional phase",
+            behaves_like: Behaviour::DelayProportionalPhase,
             estimates: if named {
                 vec![
                     Estimate::normal("deviation_hz", deviation_hz, error.max(0.03 * deviation_hz)),
