@@ -60,7 +60,7 @@ pub fn open_setup(path: &Path, stated: &Stated) -> Result<Capture> {
     if setup.files.iter().any(|file| cascade::is_part(file)) {
         return cascade::open(&setup.files, &stated);
     }
-    open(&setup.files, &stated)
+    open(&parts::in_order(&setup.files)?, &stated)
 }
 
 fn read(config: &Path) -> Result<TiRadar> {

@@ -11,13 +11,17 @@ impl TiRadar {
     /// The same, if samples of it can be found in a stream.
     ///
     /// # Errors
-    /// No receiver, no chirp, no loop or no sample, more of them than the radar can be told, or samples that do not fill the lanes.
+    /// No receiver, no subframe, no chirp, no loop or no sample, more of them than the radar can be told, samples that last longer than
+    /// their chirp or that do not fill the lanes.
     pub fn checked(self) -> Result<Self> {
         let refuse = |field: &str, found: String, expected: String| {
             Err(Error::field(&self.file, field, found, expected).with_hint("take the description that was sent to the radar"))
         };
         if self.rx_mask == 0 {
             return refuse("receivers", "none".into(), "at least one receiver".into());
+        }
+        if self.bursts.is_empty() {
+            return refuse("subframes", "none".into(), "at least one subframe".into());
         }
         for burst in &self.bursts {
             if burst.chirps.is_empty() {
@@ -27,9 +31,16 @@ impl TiRadar {
                 return refuse("number of loops", burst.loops.to_string(), format!("1 to {MOST}"));
             }
             for chirp in &burst.chirps {
-                let samples = self.profile(chirp.profile)?.samples;
+                let profile = self.profile(chirp.profile)?;
+                let samples = profile.samples;
                 if !(1..=MOST).contains(&samples) {
                     return refuse("samples of a chirp", samples.to_string(), format!("1 to {MOST}"));
+                }
+                let sampled_s = profile.adc_start_s + samples as f64 / profile.sample_rate_hz;
+                let period_s = profile.idle_s + chirp.extra_idle_s + profile.ramp_end_s;
+                if !(sampled_s <= period_s && period_s.is_finite()) {
+                    let found = format!("{samples} in {:.2} us", 1e6 * sampled_s);
+                    return refuse("samples of a chirp", found, format!("as many as a chirp of {:.2} us has", 1e6 * period_s));
                 }
                 let group = self.lanes.count;
                 if self.lanes.sampling == Sampling::Complex && !self.lanes.interleaved && !samples.is_multiple_of(group) {
@@ -71,6 +82,20 @@ mod tests {
             lanes: Lanes { count: 2, interleaved: false, q_first: false, sampling: Sampling::Complex },
             notes: vec![],
         }
+    }
+
+    #[test]
+    fn samples_longer_than_their_chirp_and_frames_without_subframes_are_refused() {
+        // 6 us and 256 samples at 4 MHz, of a chirp of 70 us.
+        let error = radar(128, 257, 15).checked().unwrap_err().to_string();
+        assert!(
+            error.contains("`samples of a chirp` is 257 in 70.25 us, expected as many as a chirp of 70.00 us has"),
+            "{error}"
+        );
+        let error = TiRadar { bursts: vec![], ..radar(128, 256, 15) }.checked().unwrap_err().to_string();
+        assert!(error.contains("`subframes` is none, expected at least one subframe"), "{error}");
+        let error = TiRadar { profiles: vec![], ..radar(128, 256, 15) }.checked().unwrap_err().to_string();
+        assert!(error.contains("expected a profile that is described: there is none"), "{error}");
     }
 
     #[test]

@@ -70,7 +70,12 @@ impl TiRadar {
     pub(super) fn profile(&self, id: usize) -> Result<&Profile> {
         self.profiles.iter().find(|profile| profile.id == id).ok_or_else(|| {
             let known: Vec<_> = self.profiles.iter().map(|profile| profile.id.to_string()).collect();
-            Error::field(&self.file, "profile", format!("{id}, which nothing describes"), format!("one of {}", known.join(", ")))
+            let expected = if known.is_empty() {
+                "a profile that is described: there is none".into()
+            } else {
+                format!("one of {}", known.join(", "))
+            };
+            Error::field(&self.file, "profile", format!("{id}, which nothing describes"), expected)
         })
     }
 

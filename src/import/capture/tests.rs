@@ -227,6 +227,21 @@ fn chirps_at_uneven_steps_are_refused_and_one_transmitter_of_them_is_not() {
 }
 
 #[test]
+fn subframes_that_are_sampled_in_different_formats_are_refused() {
+    let advanced = "advFrameCfg 2 0 2 1 0\nsubFrameCfg 0 0 0 3 2 10 0 1 1 25\nsubFrameCfg 1 0 0 3 2 10 0 1 1 25\n";
+    let cfg = |buffers: &str| CFG.replace("frameCfg 0 2 4 2 50 1 0\n", advanced).replace("adcbufCfg -1 0 0 1 1", buffers);
+    let import = |cfg: String| {
+        let (_folder, bin) = capture_folder(&two_lane_words(), "profile.cfg", &cfg);
+        open(&[bin], &Stated { subframe: Some(0), ..isk() })
+    };
+    assert_eq!(import(cfg("adcbufCfg 0 0 0 1 1\nadcbufCfg 1 0 0 1 1")).unwrap().radar.dims(), [FRAMES, TX, RX, 2, SAMPLES]);
+    let error = import(cfg("adcbufCfg 0 0 0 1 1\nadcbufCfg 1 0 1 1 1")).err().unwrap().to_string();
+    assert!(error.contains("line 6: adcbufCfg") && error.contains("0 1 1 1 for subframe 1"), "{error}");
+    let error = import(cfg("adcbufCfg 0 0 0 1 1")).err().unwrap().to_string();
+    assert!(error.contains("leave out some of 2 subframes"), "{error}");
+}
+
+#[test]
 fn of_two_profiles_one_is_chosen() {
     let cfg = CFG
         .replace("frameCfg 0 2 4 2 50 1 0", "profileCfg 1 61 30 6 20 0 0 50 1 8 1000 0 0 30\nframeCfg 0 1 6 2 50 1 0")

@@ -83,15 +83,26 @@ pub fn read_radar(file: &Path) -> Result<TiRadar> {
         }
     }
     let mut notes: Vec<String> = profiles.iter().filter_map(|profile| check_ramp(file, profile)).collect();
-    let lanes = lanes(last("adcCfg")?, last("adcbufCfg")?, &mut notes)?;
-    if let Some(stream) = all("lvdsStreamCfg").pop() {
-        // lvdsStreamCfg <subframe> <header> <format> <software>
-        if stream.count_at(1)? == 1 {
-            return Err(stream.wrong("a header before the samples", "0: headers between the samples are not read"));
-        }
-        if stream.count_at(2)? != 1 {
-            return Err(stream.wrong(format!("data format {}", stream.count_at(2)?), "1: samples only"));
-        }
+    last("adcbufCfg")?;
+    let buffers = all("adcbufCfg");
+    // Without the subframe in SDK 1.
+    let buffer = of_subframes(&buffers, bursts.len(), |line| line.arguments.len() >= 5)?.ok_or_else(|| {
+        let found = format!("lines that leave out some of {} subframes", bursts.len());
+        Error::field(file, "adcbufCfg", found, "a line of every subframe, or one of -1 for all")
+    })?;
+    let lanes = lanes(last("adcCfg")?, buffer, &mut notes)?;
+    let streams = all("lvdsStreamCfg");
+    if !streams.is_empty() {
+        let stream = of_subframes(&streams, bursts.len(), |_| true)?.ok_or_else(|| {
+            let found = format!("lines that leave out some of {} subframes", bursts.len());
+            Error::field(
+                file,
+                "lvdsStreamCfg",
+                found,
+                "a line of every subframe, or one of -1 for all: all must be in the capture",
+            )
+        })?;
+        streamed(stream)?;
     }
     let radar = TiRadar {
         file: file.into(),
@@ -105,6 +116,49 @@ pub fn read_radar(file: &Path) -> Result<TiRadar> {
         notes,
     };
     radar.checked()
+}
+
+/// lvdsStreamCfg <subframe> <header> <format> <software>
+fn streamed(stream: &Line) -> Result<()> {
+    if stream.count_at(1)? == 1 {
+        return Err(stream.wrong("a header before the samples", "0: headers between the samples are not read"));
+    }
+    if stream.count_at(2)? != 1 {
+        return Err(stream.wrong(format!("data format {}", stream.count_at(2)?), "1: samples only"));
+    }
+    Ok(())
+}
+
+/// The line that holds for every subframe, of lines whose first argument is a subframe, or -1 for all: the last line of each counts.
+/// None where some subframe has none.
+///
+/// # Errors
+/// Subframes whose lines differ: the samples of all are read alike.
+fn of_subframes<'a>(lines: &[&'a Line<'a>], subframes: usize, named: impl Fn(&Line) -> bool) -> Result<Option<&'a Line<'a>>> {
+    let holds = |line: &Line, subframe: usize| -> Result<bool> {
+        let number = if named(line) { line.number_at(0)? } else { -1.0 };
+        Ok(number == -1.0 || number == subframe as f64)
+    };
+    let mut first: Option<&Line> = None;
+    for subframe in 0..subframes {
+        let mut own = None;
+        for &line in lines {
+            if holds(line, subframe)? {
+                own = Some(line);
+            }
+        }
+        let Some(own) = own else { return Ok(None) };
+        let settings = |line: &Line<'a>| line.arguments[usize::from(named(line)).min(line.arguments.len())..].to_vec();
+        match first {
+            None => first = Some(own),
+            Some(other) if settings(other) == settings(own) => {}
+            Some(other) => {
+                let expected = format!("those of line {}: one format of samples for all subframes", other.number);
+                return Err(own.wrong(format!("{} for subframe {subframe}", settings(own).join(" ")), &expected));
+            }
+        }
+    }
+    Ok(first)
 }
 
 /// profileCfg id start_GHz idle_us adc_start_us ramp_end_us power phase slope_MHz/us tx_start samples rate_ksps …
