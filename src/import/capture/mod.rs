@@ -29,6 +29,7 @@ mod stream;
 mod time_stamps;
 mod ti_cfg;
 mod ti_json;
+mod word_kind;
 mod words;
 
 use std::collections::BTreeMap;

@@ -3,6 +3,7 @@
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use super::word_kind;
 use crate::data::files;
 use crate::error::{Error, Result};
 
@@ -12,7 +13,10 @@ pub struct Words {
 }
 
 impl Words {
-    /// Holds every file's length. A file with half a word at its end is refused.
+    /// Holds every file's length.
+    ///
+    /// # Errors
+    /// A file with half a word at its end, or of wider numbers.
     pub fn open(paths: &[PathBuf]) -> Result<Self> {
         let files = paths.iter().map(|path| {
             let metadata = std::fs::metadata(path).map_err(|source| Error::read(path, source))?;
@@ -27,7 +31,18 @@ impl Words {
                 length => Ok((path.clone(), length / 2)),
             }
         });
-        Ok(Self { files: files.collect::<Result<_>>()? })
+        let words = Self { files: files.collect::<Result<_>>()? };
+        words.refuse_wider()?;
+        Ok(words)
+    }
+
+    /// Refuses numbers of more than 16 bits, which would be read as twice or four times as many words.
+    fn refuse_wider(&self) -> Result<()> {
+        let begin = self.read(0, self.len().min(word_kind::LOOKED_AT as u64) as usize)?;
+        let Some(kind) = word_kind::wider(&begin) else { return Ok(()) };
+        let read = format!("numpy.save(\"capture.npy\", numpy.fromfile(\"{}\", \"{kind}\"))", self.first().display());
+        Err(Error::field(self.first(), "samples", format!("numbers of type {kind}"), "16-bit integers")
+            .with_hint(format!("shape and keep them as an array, {read}, and import that with --layout")))
     }
 
     /// The first so many words of each file.
