@@ -373,3 +373,23 @@ fn real_captures_are_what_they_are_stated_to_be() {
         draft.publish(false).unwrap();
     }
 }
+
+#[test]
+fn samples_that_were_written_as_wider_numbers_are_refused_by_their_type() {
+    let error = |bin: &Path| capture::open(&[bin.into()], &Stated::default()).err().map(|error| error.to_string());
+    let (_folder, bin) = captured(CFG, |_| {});
+    assert_eq!(error(&bin), None);
+    let words = words();
+    for (kind, bytes) in [
+        ("<i4", words.iter().flat_map(|&word| i32::from(word).to_le_bytes()).collect::<Vec<u8>>()),
+        ("<f4", words.iter().flat_map(|&word| f32::from(word).to_le_bytes()).collect()),
+        ("<f8", words.iter().flat_map(|&word| (f64::from(word) / 32768.0).to_le_bytes()).collect()),
+    ] {
+        fs::write(&bin, bytes).unwrap();
+        let found = error(&bin).unwrap_or_default();
+        assert!(found.contains(&format!("`samples` is numbers of type {kind}, expected 16-bit integers")), "{kind}: {found}");
+    }
+    // A frame that another program kept as complex numbers of twice 64 bits, beside its capture.
+    let Some(frame) = support::shared("fixtures/raw/ti_iwr6843_mmwave_eyes/frame_1.bin") else { return };
+    assert!(error(&frame).unwrap_or_default().contains("numbers of type <f8"), "{:?}", error(&frame));
+}
