@@ -138,6 +138,8 @@ struct Settings {
     table: Table,
     board: Option<&'static Board>,
     transmitters: Option<Vec<usize>>,
+    /// Those that the array is taken to have, where it has fewer than the board and nothing says which.
+    assumed: Option<Vec<usize>>,
     /// Whether the layout counts transmitters only together with something else.
     is_by_chirp: bool,
     has_tx: bool,
@@ -166,6 +168,7 @@ impl Settings {
             table,
             board,
             transmitters: preset.and_then(|preset| preset.transmitters.clone()),
+            assumed: None,
             is_by_chirp: has(&[Axis::Chirp, Axis::Antenna]),
             has_tx: has(&[Axis::Tx, Axis::Chirp, Axis::Antenna]),
             has_rx: has(&[Axis::Rx, Axis::Antenna]),
@@ -180,7 +183,9 @@ impl Settings {
     fn place_antennas(&mut self, tx: Option<usize>, rx: Option<usize>) {
         let Some(board) = self.board else { return };
         let count = tx.unwrap_or(board.tx_half_wavelengths.len());
-        let senders = self.transmitters.clone().unwrap_or_else(|| (0..count).collect());
+        let senders = self.transmitters.clone().unwrap_or_else(|| board.senders(count));
+        let is_assumed = self.transmitters.is_none() && count < board.tx_half_wavelengths.len();
+        self.assumed = (is_assumed && !self.radar().contains_key("tx_m")).then(|| senders.clone()).or(self.assumed.take());
         let senders = senders.iter().map(|&tx| board.tx_m(tx)).collect::<Option<Vec<_>>>();
         let receivers = rx.unwrap_or(board.rx_half_wavelengths.len());
         let receivers = (0..receivers).map(|rx| board.rx_m(rx)).collect::<Option<Vec<_>>>();
@@ -233,6 +238,12 @@ impl Settings {
     }
 
     fn finish(self, notes: &mut Vec<String>) -> Result<Radar> {
+        if let Some(assumed) = &self.assumed {
+            notes.push(format!(
+                "not all transmitters of the board are in the array: numbers {assumed:?} are assumed (from 0, of one height where there \
+                 are so many); --set radar.tx_m states others"
+            ));
+        }
         finished(self.table, &self.name, notes)
     }
 }

@@ -158,6 +158,21 @@ impl Board {
         SPEED_OF_LIGHT / self.design_frequency_hz / 2.0
     }
 
+    /// Which transmitters an array of so many has, where nothing says so: of fewer than there are, those that are as high as the first
+    /// come first, in their order, as in TI's configurations of two (`profile_2d.cfg` of the SDK: masks 1 and 4).
+    pub fn senders(&self, count: usize) -> Vec<usize> {
+        let places = self.tx_half_wavelengths;
+        if count >= places.len() {
+            return (0..count).collect();
+        }
+        let apart = |tx: usize| (places[tx][1] - places[0][1]).abs();
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_by(|&a, &b| apart(a).total_cmp(&apart(b)));
+        order.truncate(count);
+        order.sort_unstable();
+        order
+    }
+
     /// Where a transmitter is, metres.
     pub fn tx_m(&self, tx: usize) -> Option<[f64; 3]> {
         self.tx_half_wavelengths.get(tx).map(|&[x, z]| [x * self.half_m(), 0.0, z * self.half_m()])
@@ -171,6 +186,15 @@ impl Board {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_two_transmitters_neither_is_raised_above_the_other() {
+        for (name, count, wanted) in
+            [("IWR6843ISK", 2, vec![0, 2]), ("IWR6843ISK", 3, vec![0, 1, 2]), ("IWR1642", 2, vec![0, 1]), ("AWR1843", 1, vec![0])]
+        {
+            assert_eq!(Board::named(name).unwrap().senders(count), wanted, "{count} of {name}");
+        }
+    }
 
     #[test]
     fn boards_are_found_as_people_write_them() {

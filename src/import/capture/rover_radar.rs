@@ -177,8 +177,7 @@ fn place_antennas(radar: &mut Table, board: Option<&Board>, [_, tx, rx, _]: [usi
         notes.push("no board was named: no receiver is taken to be fed from the opposite side".into());
         return;
     };
-    let senders: Vec<usize> = if tx == 2 && board.tx_half_wavelengths.len() == 3 { vec![0, 2] } else { (0..tx).collect() };
-    let of_tx = senders.iter().map(|&tx| board.tx_m(tx)).collect::<Option<Vec<_>>>();
+    let of_tx = board.senders(tx).into_iter().map(|tx| board.tx_m(tx)).collect::<Option<Vec<_>>>();
     let of_rx = (0..rx).map(|rx| board.rx_m(rx)).collect::<Option<Vec<_>>>();
     for (key, what, places) in [("tx_m", "transmitters", of_tx), ("rx_m", "receivers", of_rx)] {
         if let Some(places) = places.filter(|_| !radar.contains_key(key)) {
