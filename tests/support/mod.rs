@@ -312,10 +312,7 @@ pub fn check_backends(inputs: &[Input], tolerance: f64, function: impl Fn(&[Tens
         let gradients = (output.powi_scalar(2) * weights).sum().backward();
         (found, tensors.iter().map(|t| t.grad(&gradients).map(|g| values(&g)).unwrap_or_default()).collect())
     };
-    let others: Vec<_> = cpu_devices().into_iter().skip(1).chain(software_gpu()).collect();
-    if others.is_empty() {
-        skip("a build with a second backend");
-    }
+    let others = other_devices();
     let wanted = run(Device::flex());
     for (name, device) in others {
         let found = run(device);
@@ -324,6 +321,15 @@ pub fn check_backends(inputs: &[Input], tolerance: f64, function: impl Fn(&[Tens
             assert_close(&format!("{} on {name}", input.name), a, b, tolerance);
         }
     }
+}
+
+/// All backends of the build but flex; a test that compares with none of them is counted as skipped.
+pub fn other_devices() -> Vec<(&'static str, Device)> {
+    let others: Vec<_> = cpu_devices().into_iter().skip(1).chain(software_gpu()).collect();
+    if others.is_empty() {
+        skip("a build with a second backend");
+    }
+    others
 }
 
 /// wgpu on a software driver.
