@@ -37,7 +37,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     let mut settings = Settings::of(stated, &layout, &mut notes)?;
     if is_words(&files[0]) {
         let frame_files = preset.is_some_and(|preset| preset.frame_files);
-        let words = WordArray::open(&files, &layout, settings.lengths()?, frame_files, &mut notes)?;
+        let words = WordArray::open(&files, &layout, settings.lengths(&mut notes)?, frame_files, &mut notes)?;
         return one(&files[0], Cube::of_words(words, layout), settings, notes);
     }
     let variable = stated.variable.as_deref().or_else(|| preset?.variable.as_deref());
@@ -51,7 +51,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
             hint: Some("several files are joined where each is one frame; import others one by one".into()),
         });
     }
-    settings.fill(&cube);
+    settings.fill(&cube, &mut notes);
     let one_frame = settings.finish(&mut notes)?;
     cube.check(&one_frame)?;
     notes.push(format!("{} files, in the order of the numbers in their names, are the frames", files.len()));
@@ -70,7 +70,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
 }
 
 fn one(path: &Path, cube: Cube, mut settings: Settings, mut notes: Vec<String>) -> Result<Capture> {
-    settings.fill(&cube);
+    settings.fill(&cube, &mut notes);
     let radar = settings.finish(&mut notes)?;
     cube.check(&radar)?;
     notes.extend(half_scale_note(&cube)?);
@@ -138,8 +138,6 @@ struct Settings {
     table: Table,
     board: Option<&'static Board>,
     transmitters: Option<Vec<usize>>,
-    /// Those that the array is taken to have, where it has fewer than the board and nothing says which.
-    assumed: Option<Vec<usize>>,
     /// Whether the layout counts transmitters only together with something else.
     is_by_chirp: bool,
     has_tx: bool,
@@ -168,7 +166,6 @@ impl Settings {
             table,
             board,
             transmitters: preset.and_then(|preset| preset.transmitters.clone()),
-            assumed: None,
             is_by_chirp: has(&[Axis::Chirp, Axis::Antenna]),
             has_tx: has(&[Axis::Tx, Axis::Chirp, Axis::Antenna]),
             has_rx: has(&[Axis::Rx, Axis::Antenna]),
@@ -180,12 +177,17 @@ impl Settings {
     }
 
     /// The board's antennas, where no others are stated; `tx` and `rx`: how many an array has, where it says so.
-    fn place_antennas(&mut self, tx: Option<usize>, rx: Option<usize>) {
+    fn place_antennas(&mut self, tx: Option<usize>, rx: Option<usize>, notes: &mut Vec<String>) {
         let Some(board) = self.board else { return };
         let count = tx.unwrap_or(board.tx_half_wavelengths.len());
         let senders = self.transmitters.clone().unwrap_or_else(|| board.senders(count));
         let is_assumed = self.transmitters.is_none() && count < board.tx_half_wavelengths.len();
-        self.assumed = (is_assumed && !self.radar().contains_key("tx_m")).then(|| senders.clone()).or(self.assumed.take());
+        if is_assumed && !self.radar().contains_key("tx_m") {
+            notes.push(format!(
+                "not all transmitters of the board are in the array: numbers {senders:?} are assumed (from 0, of one height where there \
+                 are so many); --set radar.tx_m states others"
+            ));
+        }
         let senders = senders.iter().map(|&tx| board.tx_m(tx)).collect::<Option<Vec<_>>>();
         let receivers = rx.unwrap_or(board.rx_half_wavelengths.len());
         let receivers = (0..receivers).map(|rx| board.rx_m(rx)).collect::<Option<Vec<_>>>();
@@ -201,8 +203,8 @@ impl Settings {
     }
 
     /// Lengths that words alone do not say.
-    fn lengths(&mut self) -> Result<Lengths> {
-        self.place_antennas((!self.has_tx).then_some(1), (!self.has_rx).then_some(1));
+    fn lengths(&mut self, notes: &mut Vec<String>) -> Result<Lengths> {
+        self.place_antennas((!self.has_tx).then_some(1), (!self.has_rx).then_some(1), notes);
         let hint = "words alone do not say their lengths: give it with --set, or in a file with --config";
         let (tx, rx) = (self.antennas("tx_m"), self.antennas("rx_m"));
         let missing = |key: &str| Error::setting(format!("radar.{key}"), "missing", "a value").with_hint(hint);
@@ -219,14 +221,14 @@ impl Settings {
     }
 
     /// What the array itself says fills what is left open.
-    fn fill(&mut self, cube: &Cube) {
+    fn fill(&mut self, cube: &Cube, notes: &mut Vec<String>) {
         let by_axis = |axis: Axis| cube.has(axis).then(|| cube.length(axis));
         let (tx, rx) = if cube.has(Axis::Antenna) {
             (None, None)
         } else {
             (by_axis(Axis::Tx).or_else(|| (!self.is_by_chirp).then_some(1)), Some(cube.length(Axis::Rx)))
         };
-        self.place_antennas(tx, rx);
+        self.place_antennas(tx, rx, notes);
         let transmitters = self.antennas("tx_m").unwrap_or(1).max(1);
         let chirps = cube.length(Axis::Loop) * cube.length(Axis::Chirp);
         let loops = chirps / if cube.has(Axis::Chirp) { transmitters } else { 1 };
@@ -238,12 +240,6 @@ impl Settings {
     }
 
     fn finish(self, notes: &mut Vec<String>) -> Result<Radar> {
-        if let Some(assumed) = &self.assumed {
-            notes.push(format!(
-                "not all transmitters of the board are in the array: numbers {assumed:?} are assumed (from 0, of one height where there \
-                 are so many); --set radar.tx_m states others"
-            ));
-        }
         finished(self.table, &self.name, notes)
     }
 }

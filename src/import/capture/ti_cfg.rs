@@ -84,25 +84,12 @@ pub fn read_radar(file: &Path) -> Result<TiRadar> {
     }
     let mut notes: Vec<String> = profiles.iter().filter_map(|profile| check_ramp(file, profile)).collect();
     last("adcbufCfg")?;
-    let buffers = all("adcbufCfg");
     // Without the subframe in SDK 1.
-    let buffer = of_subframes(&buffers, bursts.len(), |line| line.arguments.len() >= 5)?.ok_or_else(|| {
-        let found = format!("lines that leave out some of {} subframes", bursts.len());
-        Error::field(file, "adcbufCfg", found, "a line of every subframe, or one of -1 for all")
-    })?;
+    let buffer = of_subframes(&all("adcbufCfg"), bursts.len(), |line| line.arguments.len() >= 5)?;
     let lanes = lanes(last("adcCfg")?, buffer, &mut notes)?;
     let streams = all("lvdsStreamCfg");
     if !streams.is_empty() {
-        let stream = of_subframes(&streams, bursts.len(), |_| true)?.ok_or_else(|| {
-            let found = format!("lines that leave out some of {} subframes", bursts.len());
-            Error::field(
-                file,
-                "lvdsStreamCfg",
-                found,
-                "a line of every subframe, or one of -1 for all: all must be in the capture",
-            )
-        })?;
-        streamed(stream)?;
+        streamed(of_subframes(&streams, bursts.len(), |_| true)?)?;
     }
     let radar = TiRadar {
         file: file.into(),
@@ -129,36 +116,35 @@ fn streamed(stream: &Line) -> Result<()> {
     Ok(())
 }
 
-/// The line that holds for every subframe, of lines whose first argument is a subframe, or -1 for all: the last line of each counts.
-/// None where some subframe has none.
+/// The line that holds for every subframe, of lines of one command whose first argument is a subframe (where it `is_named`), or -1 for
+/// all: the last one of each counts.
 ///
 /// # Errors
-/// Subframes whose lines differ: the samples of all are read alike.
-fn of_subframes<'a>(lines: &[&'a Line<'a>], subframes: usize, named: impl Fn(&Line) -> bool) -> Result<Option<&'a Line<'a>>> {
-    let holds = |line: &Line, subframe: usize| -> Result<bool> {
-        let number = if named(line) { line.number_at(0)? } else { -1.0 };
-        Ok(number == -1.0 || number == subframe as f64)
-    };
-    let mut first: Option<&Line> = None;
-    for subframe in 0..subframes {
-        let mut own = None;
-        for &line in lines {
-            if holds(line, subframe)? {
-                own = Some(line);
-            }
-        }
-        let Some(own) = own else { return Ok(None) };
-        let settings = |line: &Line<'a>| line.arguments[usize::from(named(line)).min(line.arguments.len())..].to_vec();
-        match first {
-            None => first = Some(own),
-            Some(other) if settings(other) == settings(own) => {}
-            Some(other) => {
-                let expected = format!("those of line {}: one format of samples for all subframes", other.number);
-                return Err(own.wrong(format!("{} for subframe {subframe}", settings(own).join(" ")), &expected));
-            }
+/// A subframe without a line; subframes whose lines differ: the samples of all are read alike.
+fn of_subframes<'a>(lines: &[&'a Line<'a>], subframes: usize, is_named: impl Fn(&Line) -> bool) -> Result<&'a Line<'a>> {
+    let settings = |line: &Line<'a>| line.arguments[usize::from(is_named(line)).min(line.arguments.len())..].to_vec();
+    // Last lines first.
+    let mut of_each = vec![None; subframes];
+    for &line in lines.iter().rev() {
+        let number = if is_named(line) { line.number_at(0)? } else { -1.0 };
+        for (_, own) in of_each.iter_mut().enumerate().filter(|(at, own)| own.is_none() && [-1.0, *at as f64].contains(&number)) {
+            *own = Some(line);
         }
     }
-    Ok(first)
+    let missing = || {
+        let found = format!("lines that leave out some of {subframes} subframes");
+        lines[0].wrong(found, "a line of every subframe, or one of -1 for all")
+    };
+    let of_each = of_each.into_iter().collect::<Option<Vec<&Line>>>().ok_or_else(missing)?;
+    let Some((first, others)) = of_each.split_first() else { return Err(missing()) };
+    match others.iter().position(|line| settings(line) != settings(first)) {
+        None => Ok(first),
+        Some(at) => {
+            let found = format!("{} for subframe {}", settings(others[at]).join(" "), at + 1);
+            let expected = format!("those of line {}: one format of samples for all subframes", first.number);
+            Err(others[at].wrong(found, &expected))
+        }
+    }
 }
 
 /// profileCfg id start_GHz idle_us adc_start_us ramp_end_us power phase slope_MHz/us tx_start samples rate_ksps …
