@@ -6,6 +6,7 @@
 pub mod bounds;
 pub mod complex;
 pub mod error;
+pub mod grid;
 pub mod text;
 // 1: what the user gives
 pub mod person;

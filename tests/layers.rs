@@ -10,7 +10,7 @@ use sources::{Module, Source, Sources};
 
 /// The journey; modules on one floor do not import each other.
 const FLOORS: [&[&str]; 31] = [
-    &["error", "complex", "text"],
+    &["error", "complex", "grid", "text"],
     &["bounds"],
     &["radar", "room"],
     &["person"],
@@ -50,6 +50,7 @@ const RECORDER_MAY_IMPORT: [&str; 7] = ["error", "bounds", "radar", "room", "per
 const PHYSICS: [&str; 12] = [
     "bounds",
     "complex",
+    "grid",
     "radar",
     "room",
     "body",

@@ -1,0 +1,115 @@
+//! Values over named axes, the last of which varies fastest.
+
+use std::ops::{Index, IndexMut};
+
+/// A dense array of `N` axes; an index that lies outside its axis panics and names the axis, instead of reading the next row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid<T, const N: usize> {
+    axes: [&'static str; N],
+    shape: [usize; N],
+    values: Vec<T>,
+}
+
+impl<T, const N: usize> Grid<T, N> {
+    /// # Panics
+    /// Where there are not as many values as the axes have places.
+    pub fn new(axes: [&'static str; N], shape: [usize; N], values: Vec<T>) -> Self {
+        assert_eq!(values.len(), shape.iter().product::<usize>(), "values over {axes:?} of {shape:?}");
+        Self { axes, shape, values }
+    }
+
+    /// A value for every place, made from its indices, in the order in which they are stored.
+    pub fn from_fn(axes: [&'static str; N], shape: [usize; N], mut value: impl FnMut([usize; N]) -> T) -> Self {
+        let mut at = [0; N];
+        let values = (0..shape.iter().product())
+            .map(|mut place| {
+                for axis in (0..N).rev() {
+                    at[axis] = place % shape[axis];
+                    place /= shape[axis];
+                }
+                value(at)
+            })
+            .collect();
+        Self { axes, shape, values }
+    }
+
+    pub fn shape(&self) -> [usize; N] {
+        self.shape
+    }
+
+    pub fn values(&self) -> &[T] {
+        &self.values
+    }
+
+    pub fn values_mut(&mut self) -> &mut [T] {
+        &mut self.values
+    }
+
+    pub fn into_values(self) -> Vec<T> {
+        self.values
+    }
+
+    /// All values below the first `M` indices, contiguous: a lane of the last axis for `M = N - 1`.
+    pub fn below<const M: usize>(&self, at: [usize; M]) -> &[T] {
+        let range = self.range(&at);
+        &self.values[range]
+    }
+
+    pub fn below_mut<const M: usize>(&mut self, at: [usize; M]) -> &mut [T] {
+        let range = self.range(&at);
+        &mut self.values[range]
+    }
+
+    fn range(&self, at: &[usize]) -> std::ops::Range<usize> {
+        let each: usize = self.shape[at.len()..].iter().product();
+        let first = at.iter().enumerate().fold(0, |first, (axis, &index)| {
+            let (name, length) = (self.axes[axis], self.shape[axis]);
+            assert!(index < length, "{name} {index} of {length}");
+            first * length + index
+        });
+        first * each..(first + 1) * each
+    }
+}
+
+impl<T: Clone, const N: usize> Grid<T, N> {
+    pub fn filled(axes: [&'static str; N], shape: [usize; N], value: T) -> Self {
+        Self { axes, shape, values: vec![value; shape.iter().product()] }
+    }
+}
+
+impl<T, const N: usize> Index<[usize; N]> for Grid<T, N> {
+    type Output = T;
+
+    fn index(&self, at: [usize; N]) -> &T {
+        &self.values[self.range(&at).start]
+    }
+}
+
+impl<T, const N: usize> IndexMut<[usize; N]> for Grid<T, N> {
+    fn index_mut(&mut self, at: [usize; N]) -> &mut T {
+        let place = self.range(&at).start;
+        &mut self.values[place]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_axis_varies_fastest() {
+        let grid = Grid::from_fn(["frame", "bin"], [2, 3], |[frame, bin]| 10 * frame + bin);
+        assert_eq!(grid.values(), [0, 1, 2, 10, 11, 12]);
+        assert_eq!((grid[[1, 2]], grid.below([1]), grid.below([]).len()), (12, &[10, 11, 12][..], 6));
+        let mut other = Grid::filled(["frame", "bin"], [2, 3], 0);
+        other[[1, 0]] = 4;
+        other.below_mut([1])[2] = 5;
+        assert_eq!(other, Grid::new(["frame", "bin"], [2, 3], vec![0, 0, 0, 4, 0, 5]));
+    }
+
+    #[test]
+    #[should_panic(expected = "bin 3 of 3")]
+    fn an_index_outside_its_axis_is_named() {
+        let _ = Grid::filled(["frame", "bin"], [2, 3], 0)[[0, 3]];
+    }
+}
