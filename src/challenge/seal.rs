@@ -19,7 +19,7 @@ use super::plan::{Plan, plans};
 use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
 use super::sealing::{self, commit, one_case, published, set_times};
 use super::secret::Secret;
-use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, write_recording};
+use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, settings, write_recording};
 use crate::effects;
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
@@ -196,7 +196,7 @@ pub fn measured(settings: &str, case: &Path) -> Result<Strength> {
 }
 
 fn settings_of(settings: &str, case: &Path) -> Result<RecorderConfig> {
-    toml::from_str(settings).map_err(|error| Error::Parse { path: case.into(), message: error.to_string() })
+    settings::read_text(settings).map_err(|error| Error::Parse { path: case.into(), message: error.to_string() })
 }
 
 /// Records the same scene, noise included, without its effects: what a perfect diagnosis would be left with.
@@ -266,7 +266,7 @@ mod tests {
                 "seed = 3\nmesh_error_m = 2e-3\nradar = \"small\"\n[surface]\nedge_m = 0.012\n[receiver]\nadc = false\n{effects}"
             )
         };
-        let scene = |effects: &str| RecorderConfig { frames: Some(4), ..toml::from_str(&text(effects)).unwrap() };
+        let scene = |effects: &str| RecorderConfig { frames: Some(4), ..settings::read_text(&text(effects)).unwrap() };
         let clean = draws(&scene("")).unwrap();
         let world = scene("").world(Path::new(".")).unwrap();
         let level = Some(Recorder::new(&world).unwrap().level());
@@ -299,7 +299,7 @@ mod tests {
     #[test]
     fn truths_name_effects_by_id_and_the_rest_by_nothing() {
         let text = "[iq_imbalance]\ngain_db = 0.5\nphase_deg = 2.0\n\n[[outside]]\nkind = \"lo_pulling\"\npeak_rad = 0.1\n";
-        let found = effects(&toml::from_str(text).unwrap());
+        let found = effects(&settings::read_text(text).unwrap());
         assert_eq!(found.len(), 2);
         assert_eq!((found[0]["name"].as_str(), found[0]["gain_db"].as_f64()), (Some("iq_imbalance"), Some(0.5)));
         assert_eq!((&found[1]["name"], found[1]["kind"].as_str()), (&Value::Null, Some("lo_pulling")));

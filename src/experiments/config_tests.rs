@@ -1,7 +1,7 @@
 use super::*;
 
 fn refused(change: impl FnOnce(&mut ReproduceConfig)) -> String {
-    let mut config: ReproduceConfig = toml::from_str("site = \"site.toml\"").unwrap();
+    let mut config: ReproduceConfig = crate::data::settings::read_text("site = \"site.toml\"").unwrap();
     config.check().unwrap();
     change(&mut config);
     config.check().unwrap_err().to_string()
@@ -43,6 +43,7 @@ fn nothing_tames_the_training_whose_stability_is_asked_for() {
 
 #[test]
 fn the_resolved_settings_are_read_again_as_they_are() {
-    let config: ReproduceConfig = toml::from_str("site = \"site.toml\"\nvariants = [\"ours\", \"coupled\"]").unwrap();
-    assert_eq!(toml::from_str::<ReproduceConfig>(&config.to_toml()).unwrap(), config);
+    let config: ReproduceConfig =
+        crate::data::settings::read_text("site = \"site.toml\"\nvariants = [\"ours\", \"coupled\"]").unwrap();
+    assert_eq!(crate::data::settings::read_text::<ReproduceConfig>(&config.to_toml()).unwrap(), config);
 }

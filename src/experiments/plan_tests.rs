@@ -20,7 +20,8 @@ fn place(name: &str) -> Place {
 }
 
 fn config() -> ReproduceConfig {
-    toml::from_str("site = \"unused\"\nsplit.unseen = \"s2\"\n[adaptation]\nframes = [0, 2]\nsteps = 10").unwrap()
+    crate::data::settings::read_text("site = \"unused\"\nsplit.unseen = \"s2\"\n[adaptation]\nframes = [0, 2]\nsteps = 10")
+        .unwrap()
 }
 
 fn planned(config: &ReproduceConfig) -> Plan {

@@ -112,7 +112,8 @@ mod tests {
 
     #[test]
     fn what_would_fail_after_hours_is_refused_at_once() {
-        let config = |more: &str| -> ReproduceConfig { toml::from_str(&format!("site = \"x\"\n{more}")).unwrap() };
+        let config =
+            |more: &str| -> ReproduceConfig { crate::data::settings::read_text(&format!("site = \"x\"\n{more}")).unwrap() };
         let board = Board { radar: Radar::small(8), room: Some(Room { front_m: Some(3.0), ..Room::default() }) };
         check(&config(""), "site", &board).unwrap();
         let far = Board { room: Some(Room { front_m: Some(500.0), ..Room::default() }), ..board.clone() };

@@ -47,7 +47,7 @@ fn a_reproduction_is_done_once_and_what_is_lost_is_made_again_as_it_was() {
     let recordings = folder.path().join("measured");
     site(&recordings);
     let text = format!("site = {recordings:?}\nsecond_room = {recordings:?}\n{CONFIG}");
-    let config: ReproduceConfig = toml::from_str(&text).unwrap();
+    let config: ReproduceConfig = crate::data::settings::read_text(&text).unwrap();
     config.check().unwrap();
     let out = folder.path().join("out");
     let plan = plan(&config, &out).unwrap();
@@ -122,7 +122,7 @@ fn stages_come_out_the_same_in_any_order() {
         loops_per_frame = 16";
     std::fs::write(&site, format!("extends = {base:?}\n{small}")).unwrap();
     let text = format!("site = {site:?}\nother_mesh = false\n{}", CONFIG.split("[adaptation]").next().unwrap());
-    let config: ReproduceConfig = toml::from_str(&text).unwrap();
+    let config: ReproduceConfig = crate::data::settings::read_text(&text).unwrap();
     config.check().unwrap();
     let [together, apart] = ["together", "apart"].map(|name| folder.path().join(name));
     let whole = plan(&config, &together).unwrap();
@@ -161,7 +161,7 @@ fn a_training_that_breaks_is_a_result() {
     site(&recordings);
     // So large a step takes every weight out of a float's range.
     let text = format!("site = {recordings:?}\n{CONFIG}\n    learning_rate = 1e38");
-    let config: ReproduceConfig = toml::from_str(&text).unwrap();
+    let config: ReproduceConfig = crate::data::settings::read_text(&text).unwrap();
     config.check().unwrap();
     let out = folder.path().join("out");
     let plan = plan(&config, &out).unwrap();

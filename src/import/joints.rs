@@ -40,7 +40,7 @@ struct Dialect {
 
 fn dialects() -> &'static [Dialect] {
     static TABLE: OnceLock<Table> = OnceLock::new();
-    let read = || toml::from_str(include_str!("dialects.toml")).expect("dialects.toml is tested");
+    let read = || crate::data::settings::read_text(include_str!("dialects.toml")).expect("dialects.toml is tested");
     &TABLE.get_or_init(read).dialect
 }
 

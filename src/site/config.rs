@@ -197,7 +197,7 @@ mod tests {
     #[test]
     fn what_cannot_be_a_site_is_refused_by_name() {
         let refused = |toml: &str| {
-            let config: SiteConfig = toml::from_str(toml).unwrap();
+            let config: SiteConfig = crate::data::settings::read_text(toml).unwrap();
             config.check().unwrap_err().to_string()
         };
         for (toml, told) in [

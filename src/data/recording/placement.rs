@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::settings::RecordingSettings;
-use crate::data::{atomic, files};
+use crate::data::{atomic, files, settings};
 use crate::error::{Error, Result};
 use crate::person::Placement;
 
@@ -14,7 +14,7 @@ use crate::person::Placement;
 pub fn write_placement(path: &Path, placement: &Placement) -> Result<()> {
     let text = files::read_text(path)?;
     let written = with_placement(&text, placement);
-    let parsed = |text: &str| toml::from_str::<RecordingSettings>(text).ok();
+    let parsed = |text: &str| settings::read_text::<RecordingSettings>(text).ok();
     let wanted = parsed(&text).map(|settings| RecordingSettings { motion: Some(placement.clone()), ..settings });
     if wanted.is_none() || parsed(&written) != wanted {
         return Err(Error::field(path, "motion", "no table of its own", "[motion] on a line of its own, its keys below")
@@ -75,13 +75,13 @@ mod tests {
         let placement = Placement { start_s: -0.25, origin_m: [0.5, 2.0, -1.1], ..Placement::default() };
         write_placement(&path, &placement).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
-        let settings: RecordingSettings = toml::from_str(&text).unwrap();
+        let settings: RecordingSettings = settings::read_text(&text).unwrap();
         assert_eq!(settings.motion.as_ref(), Some(&placement));
         assert!(text.contains("[radar] # the board") && text.contains("\n[files] # beside\n"), "{text}");
         // Where there was none, it is added.
         std::fs::write(&path, TEXT.split_once("[motion]").unwrap().0.to_string() + "[files]\nif = \"if.npy\"\n").unwrap();
         write_placement(&path, &placement).unwrap();
-        let settings: RecordingSettings = toml::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        let settings: RecordingSettings = settings::read_text(&std::fs::read_to_string(&path).unwrap()).unwrap();
         assert_eq!(settings.motion, Some(placement));
     }
 

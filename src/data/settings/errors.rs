@@ -3,37 +3,43 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use toml::{Spanned, Table, Value};
 
-use super::Source;
+use super::{Failure, Source};
 use crate::error::Error;
 
+/// What is no TOML, and where.
+pub(super) fn of_syntax(error: &toml::de::Error, source: &Source) -> Error {
+    match error.span() {
+        Some(span) => parse_error(source, span, error.message()),
+        None => Error::Parse { path: source.path.clone(), message: error.message().to_string() },
+    }
+}
+
 /// What a failed read means; `sources` are the files that went in, the one that wins first.
-pub(super) fn explain(error: &toml::de::Error, sources: &[Source], sets: &[String]) -> Error {
-    let keys = keys_of(error);
-    if let Some((key, known)) = unknown_key(error.message()) {
+pub(super) fn explain(failure: Failure, sources: &[Source], sets: &[String]) -> Error {
+    let Failure { keys, message } = &failure;
+    let origin = (1..=keys.len()).rev().map(|length| origin(&keys[..length], sources, sets)).find(Origin::is_known);
+    let origin = origin.unwrap_or(Origin::Nowhere);
+    if let Some((key, known)) = unknown_key(message) {
         let nearest = nearest(&key, known.iter().map(String::as_str)).map(str::to_string);
-        let whole = find_whole(&key, &keys, error, sources, sets);
-        let path = match origin(&whole, sources, sets) {
+        let path = match origin {
             Origin::Set => "--set".into(),
             Origin::File { source, .. } => source.path.clone(),
             Origin::Nowhere => sources[0].path.clone(),
         };
+        let mut whole = keys.clone();
+        // A table whose kind stands in it is read whole, before its keys are looked at.
+        if whole.last() != Some(&key) {
+            whole.push(key);
+        }
         return Error::UnknownKey { path, key: whole.join("."), nearest };
     }
-    // An error of one file knows its place; one of merged settings knows its key, and the place is looked up.
-    if let (Some(span), [source, ..]) = (error.span(), sources) {
-        return parse_error(source, span, error.message());
-    }
-    let message = match &keys[..] {
-        [] => error.message().to_string(),
-        keys => format!("`{}`: {}", keys.join("."), error.message()),
-    };
-    match origin(&keys, sources, sets) {
-        Origin::Set => Error::Parse { path: "--set".into(), message },
-        Origin::File { source, span } => parse_error(source, span, error.message()),
-        Origin::Nowhere => Error::Parse { path: sources[0].path.clone(), message },
+    match origin {
+        Origin::Set => Error::Parse { path: "--set".into(), message: failure.to_string() },
+        Origin::File { source, span } => parse_error(source, span, message),
+        Origin::Nowhere => Error::Parse { path: sources[0].path.clone(), message: failure.to_string() },
     }
 }
 
@@ -44,16 +50,6 @@ fn parse_error(source: &Source, span: Range<usize>, message: &str) -> Error {
     // TOML speaks of several things on several lines.
     let message = message.trim().replace('\n', ", ");
     Error::Parse { path: source.path.clone(), message: format!("line {line}, column {column}: {message}") }
-}
-
-/// The tables and the key that the error is about, where TOML says so: its text ends in "in `a.b.c`".
-fn keys_of(error: &toml::de::Error) -> Vec<String> {
-    let mut error = error.clone();
-    // With the text at hand TOML prints an excerpt instead of the keys.
-    error.set_input(None);
-    let text = error.to_string();
-    let keys = text.trim_end().rsplit_once("\nin `").and_then(|(_, keys)| keys.strip_suffix('`'));
-    keys.map(|keys| keys.split('.').map(str::to_string).collect()).unwrap_or_default()
 }
 
 /// From serde's "unknown field `x`, expected one of `a`, `b`" to the key and the known ones.
@@ -67,70 +63,6 @@ fn unknown_key(message: &str) -> Option<(String, Vec<String>)> {
 pub fn nearest<'a>(key: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let likeness = |known: &str| strsim::normalized_damerau_levenshtein(key, known).max(strsim::jaro_winkler(key, known) - 0.1);
     known.into_iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
-}
-
-/// The unknown key with the tables it lies in.
-fn find_whole(key: &str, keys: &[String], error: &toml::de::Error, sources: &[Source], sets: &[String]) -> Vec<String> {
-    if keys.last().is_some_and(|last| last == key) {
-        return keys.to_vec();
-    }
-    // A file's error has a place: whichever key lies there.
-    if let (Some(span), [source, ..]) = (error.span(), sources)
-        && let Ok(document) = DeTable::parse(&source.text)
-        && let Some(path) = key_at(document.get_ref(), &span)
-    {
-        return path;
-    }
-    let mut whole = keys.to_vec();
-    whole.push(key.to_string());
-    if matches!(origin(&whole, sources, sets), Origin::Nowhere) {
-        // Deeper than TOML said: take it where the settings have it.
-        let mut found = vec![];
-        let overrides =
-            sets.iter().filter_map(|set| Some(set.split_once('=')?.0.trim().split('.').map(str::to_string).collect()));
-        found.extend(overrides.filter(|path: &Vec<String>| path.iter().any(|part| part == key)));
-        for source in sources {
-            let table = toml::from_str::<Table>(&source.text).unwrap_or_default();
-            paths_to(key, &Value::Table(table), &mut vec![], &mut found);
-        }
-        if let Some(path) = found.into_iter().find(|path| path.starts_with(keys)) {
-            let end = path.iter().position(|part| part == key).map_or(path.len(), |position| position + 1);
-            return path[..end].to_vec();
-        }
-    }
-    whole
-}
-
-fn paths_to(key: &str, value: &Value, above: &mut Vec<String>, found: &mut Vec<Vec<String>>) {
-    let Value::Table(table) = value else { return };
-    for (name, value) in table {
-        above.push(name.clone());
-        if name == key {
-            found.push(above.clone());
-        }
-        paths_to(key, value, above, found);
-        above.pop();
-    }
-}
-
-/// The path to the key that is written at `span`.
-fn key_at(table: &DeTable, span: &Range<usize>) -> Option<Vec<String>> {
-    table.iter().find_map(|(name, value)| {
-        if name.span() == *span {
-            return Some(vec![name.get_ref().to_string()]);
-        }
-        let below = match value.get_ref() {
-            DeValue::Table(below) => key_at(below, span),
-            DeValue::Array(items) => {
-                items.iter().find_map(|item| item.get_ref().as_table().and_then(|below| key_at(below, span)))
-            }
-            _ => None,
-        };
-        below.map(|mut path| {
-            path.insert(0, name.get_ref().to_string());
-            path
-        })
-    })
 }
 
 /// The file that says something about a key, or about a table above it; `None` where `--set` does.
@@ -150,6 +82,12 @@ enum Origin<'a> {
     Set,
     File { source: &'a Source, span: Range<usize> },
     Nowhere,
+}
+
+impl Origin<'_> {
+    fn is_known(&self) -> bool {
+        !matches!(self, Self::Nowhere)
+    }
 }
 
 fn origin<'a>(keys: &[String], sources: &'a [Source], sets: &[String]) -> Origin<'a> {
@@ -174,10 +112,15 @@ fn origin<'a>(keys: &[String], sources: &'a [Source], sets: &[String]) -> Origin
 
 fn value_span(table: &DeTable, keys: &[String]) -> Option<Range<usize>> {
     let (first, rest) = keys.split_first()?;
-    let (_, value): (_, &Spanned<DeValue>) = table.iter().find(|(name, _)| name.get_ref() == first)?;
-    match (rest, value.get_ref()) {
+    let (_, value) = table.iter().find(|(name, _)| name.get_ref() == first)?;
+    span_below(value, rest)
+}
+
+fn span_below(value: &Spanned<DeValue>, keys: &[String]) -> Option<Range<usize>> {
+    match (keys, value.get_ref()) {
         ([], _) => Some(value.span()),
-        (rest, DeValue::Table(below)) => value_span(below, rest),
+        (keys, DeValue::Table(below)) => value_span(below, keys),
+        ([index, rest @ ..], DeValue::Array(items)) => span_below(items.get(index.parse::<usize>().ok()?)?, rest),
         _ => None,
     }
 }

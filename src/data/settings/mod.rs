@@ -2,8 +2,10 @@
 
 mod errors;
 mod numbers;
+mod reader;
 
 pub use errors::nearest;
+pub use reader::{Failure, read_table};
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,17 +22,21 @@ const EXTENDS: &str = "extends";
 /// Reads one TOML file as it is.
 pub fn read_toml<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let sources = [Source::read(path.as_ref())?];
-    let text = sources[0].text.as_str();
-    let explained = |error| errors::explain(&error, &sources, &[]);
-    numbers::refuse_impossible(&toml::from_str(text).map_err(explained)?, &sources, &[])?;
-    toml::from_str(text).map_err(explained)
+    let table = sources[0].parse()?;
+    numbers::refuse_impossible(&table, &sources, &[])?;
+    read_table(table).map_err(|failure| errors::explain(failure, &sources, &[]))
+}
+
+/// Reads settings out of a text that is no file of the user's.
+pub fn read_text<T: DeserializeOwned>(text: &str) -> std::result::Result<T, Failure> {
+    read_table(text.parse().map_err(|error: toml::de::Error| Failure { keys: vec![], message: error.to_string() })?)
 }
 
 /// Reads a config: the file, over the parents it extends, under `sets`, each `a.b.c=value`.
 pub fn read_settings<T: DeserializeOwned>(path: impl AsRef<Path>, sets: &[String]) -> Result<T> {
     let (table, sources) = resolve_with_sources(path.as_ref(), sets)?;
     numbers::refuse_impossible(&table, &sources, sets)?;
-    T::deserialize(table).map_err(|error| errors::explain(&error, &sources, sets))
+    read_table(table).map_err(|failure| errors::explain(failure, &sources, sets))
 }
 
 /// The config that `read_settings` would read, as a table without `extends`.
@@ -43,7 +49,7 @@ pub fn settings_from_table<T: DeserializeOwned>(mut table: Table, name: impl AsR
     apply_sets(&mut table, sets)?;
     let sources = [Source { path: name.as_ref().into(), text: String::new() }];
     numbers::refuse_impossible(&table, &sources, sets)?;
-    T::deserialize(table).map_err(|error| errors::explain(&error, &sources, sets))
+    read_table(table).map_err(|failure| errors::explain(failure, &sources, sets))
 }
 
 /// A file whose text went into the settings.
@@ -55,6 +61,10 @@ struct Source {
 impl Source {
     fn read(path: &Path) -> Result<Self> {
         Ok(Self { path: path.into(), text: files::read_text(path)? })
+    }
+
+    fn parse(&self) -> Result<Table> {
+        self.text.parse().map_err(|error| errors::of_syntax(&error, self))
     }
 }
 
@@ -75,8 +85,7 @@ fn resolve_with_sources(path: &Path, sets: &[String]) -> Result<(Table, Vec<Sour
         seen.push(identity);
         sources.push(source);
         let source = sources.last().expect("just pushed");
-        let mut table: Table =
-            toml::from_str(&source.text).map_err(|error| errors::explain(&error, &sources[sources.len() - 1..], &[]))?;
+        let mut table = source.parse()?;
         next = match table.remove(EXTENDS) {
             None => None,
             Some(Value::String(parent)) => Some(path.parent().unwrap_or(Path::new("")).join(parent)),

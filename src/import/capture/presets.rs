@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::Table;
 
 use super::Layout;
-use crate::data::settings::nearest;
+use crate::data::settings::{nearest, read_text};
 use crate::error::{Error, Result};
 
 const TABLE: &str = include_str!("presets.toml");
@@ -57,7 +57,7 @@ impl Preset {
     }
 
     fn all() -> BTreeMap<String, Self> {
-        toml::from_str(TABLE).expect("the table is tested")
+        read_text(TABLE).expect("the table is tested")
     }
 
     pub fn layout(&self) -> Result<Layout> {
