@@ -36,14 +36,14 @@ pub(super) fn stated_delay_s() -> f64 {
 pub(super) type Deviation = Arc<dyn Fn([usize; 3]) -> f64 + Send + Sync>;
 
 /// What a deviation is called, how large it is, and both in words.
-struct Told {
-    id: Option<&'static str>,
-    estimates: Vec<Estimate>,
-    statement: String,
+pub(super) struct Told {
+    pub id: Option<&'static str>,
+    pub estimates: Vec<Estimate>,
+    pub statement: String,
 }
 
 impl Told {
-    fn unnamed(statement: String) -> Self {
+    pub fn unnamed(statement: String) -> Self {
         Self { id: None, estimates: vec![], statement }
     }
 }
