@@ -288,34 +288,24 @@ impl Relative {
     }
 }
 
+impl Axis {
+    /// What it is and what the others are called, and its number.
+    fn words(self) -> (&'static str, usize, &'static str) {
+        match self {
+            Self::Receiver(rx) => ("receiver", rx, "receivers"),
+            Self::Transmitter(tx) => ("transmitter", tx, "transmitters"),
+        }
+    }
+}
+
 impl Judged {
     fn candidate(&self, evidence: &Evidence, tried: f64) -> Candidate {
         let [_, _, _, loops, samples] = evidence.cube.dims;
-        let known: Vec<usize> = (0..self.series.value.len()).filter(|&f| self.series.weight[f] > 0.0).collect();
-        let gains: Vec<Option<Complex64>> = (0..self.series.value.len())
-            .map(|f| (self.series.weight[f] > 0.0).then(|| Complex64::ONE + self.series.value[f]))
-            .map(|gain| gain.filter(|g| g.norm() > 0.05))
-            .collect();
+        let known = self.known();
         let decibel: Vec<f64> = known.iter().map(|&f| DECIBEL * (1.0 + self.series.value[f]).norm().max(1e-3).ln()).collect();
-        let degrees: Vec<f64> = known.iter().map(|&f| (1.0 + self.series.value[f]).arg().to_degrees()).collect();
-        let span = |values: &[f64]| {
-            let [low, high] = values.iter().fold([f64::MAX, f64::MIN], |[l, h], &v| [l.min(v), h.max(v)]);
-            high - low
-        };
-        let error = known.iter().map(|&f| (0.5 / self.series.weight[f]).sqrt()).sum::<f64>() / known.len().max(1) as f64;
-        let turn = span(&degrees);
-        let phase = if turn > 6.0 * error.to_degrees() { format!(", and its phase by {turn:.1}°") } else { String::new() };
-        let (what, index, others) = match self.unit {
-            Axis::Receiver(rx) => ("receiver", rx, "receivers"),
-            Axis::Transmitter(tx) => ("transmitter", tx, "transmitters"),
-        };
+        let (what, index, others) = self.unit.words();
         let own: f64 = self.members.iter().flat_map(|&c| &evidence.still()[c * samples..][..samples]).map(|v| v.norm_sqr()).sum();
         let square: f64 = known.iter().map(|&f| self.series.value[f].norm_sqr()).sum();
-        let times: Vec<f64> = known.iter().map(|&f| evidence.starts_s[f]).collect();
-        let members = self.members.clone();
-        // Of every frame, for all channels: the complex gain of one of them.
-        let spent = 2.0 * statistics::learned(known.iter().map(|&f| self.variance * self.series.weight[f]));
-        let size = loops * samples * evidence.cube.channels();
         Candidate {
             id: None,
             behaves_like: Behaviour::SlowTimeGainOfOneChannel,
@@ -330,30 +320,63 @@ impl Judged {
             gain: self.gain,
             errs_alike: false,
             look_alikes: vec![],
-            statement: format!(
-                "The gain of {what} {index} changes from frame to frame, over {:.2} ± {:.2} dB{phase}, at all ranges alike, while \
-                 the other {others} stay.",
-                span(&decibel),
-                NINETY * DECIBEL * error * std::f64::consts::SQRT_2
-            ),
+            statement: self.statement(&decibel),
             curve: Some(Curve {
                 title: format!("Static returns in {what} {index} relative to the other {others}"),
                 x_label: "time, s".into(),
                 y_label: "gain, dB".into(),
-                series: vec![("measured".into(), times, decibel)],
+                series: vec![("measured".into(), known.iter().map(|&f| evidence.starts_s[f]).collect(), decibel)],
             }),
             energy: own * square * loops as f64,
-            correction: Correction::Inverse(
-                Arc::new(move |cube| {
-                    cube.each_chirp(|[frame, channel, _], chirp| {
-                        if let Some(gain) = gains[frame].filter(|_| members.contains(&channel)) {
-                            chirp.iter_mut().for_each(|value| *value /= gain);
-                        }
-                    });
-                }),
-                Volume::BY_SAMPLE.spent(spent, size),
-            ),
+            correction: self.correction(evidence),
         }
+    }
+
+    /// Frames in which its gain is.
+    fn known(&self) -> Vec<usize> {
+        (0..self.series.value.len()).filter(|&f| self.series.weight[f] > 0.0).collect()
+    }
+
+    fn statement(&self, decibel: &[f64]) -> String {
+        let known = self.known();
+        let degrees: Vec<f64> = known.iter().map(|&f| (1.0 + self.series.value[f]).arg().to_degrees()).collect();
+        let span = |values: &[f64]| {
+            let [low, high] = values.iter().fold([f64::MAX, f64::MIN], |[l, h], &v| [l.min(v), h.max(v)]);
+            high - low
+        };
+        let error = known.iter().map(|&f| (0.5 / self.series.weight[f]).sqrt()).sum::<f64>() / known.len().max(1) as f64;
+        let turn = span(&degrees);
+        let phase = if turn > 6.0 * error.to_degrees() { format!(", and its phase by {turn:.1}°") } else { String::new() };
+        let (what, index, others) = self.unit.words();
+        format!(
+            "The gain of {what} {index} changes from frame to frame, over {:.2} ± {:.2} dB{phase}, at all ranges alike, while \
+             the other {others} stay.",
+            span(decibel),
+            NINETY * DECIBEL * error * std::f64::consts::SQRT_2
+        )
+    }
+
+    /// Divides by the gains, but where next to nothing is left.
+    fn correction(&self, evidence: &Evidence) -> Correction {
+        let [_, _, _, loops, samples] = evidence.cube.dims;
+        let of_frame = |f: usize| (self.series.weight[f] > 0.0).then(|| Complex64::ONE + self.series.value[f]);
+        let gains: Vec<Option<Complex64>> =
+            (0..self.series.value.len()).map(|f| of_frame(f).filter(|gain| gain.norm() > 0.05)).collect();
+        let members = self.members.clone();
+        // Of every frame, for all channels: the complex gain of one of them.
+        let known = self.known();
+        let spent = 2.0 * statistics::learned(known.iter().map(|&f| self.variance * self.series.weight[f]));
+        let size = loops * samples * evidence.cube.channels();
+        Correction::Inverse(
+            Arc::new(move |cube| {
+                cube.each_chirp(|[frame, channel, _], chirp| {
+                    if let Some(gain) = gains[frame].filter(|_| members.contains(&channel)) {
+                        chirp.iter_mut().for_each(|value| *value /= gain);
+                    }
+                });
+            }),
+            Volume::BY_SAMPLE.spent(spent, size),
+        )
     }
 }
 

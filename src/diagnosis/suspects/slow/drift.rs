@@ -47,6 +47,34 @@ impl Drift {
     pub fn change(&self) -> f64 {
         self.value(self.frames - 1) - self.value(0)
     }
+
+    /// Whether a step may be before a frame as well as after it: between the last training frame before it and the first one after it,
+    /// its date is open.
+    fn is_open(&self, training: &[usize], frame: usize) -> bool {
+        let Shape::Step(_, at) = self.shape else { return false };
+        let before = training.iter().copied().filter(|&f| f < at).max().unwrap_or(0);
+        let after = training.iter().copied().filter(|&f| f >= at).min().unwrap_or(self.frames);
+        before < frame && frame < after
+    }
+
+    /// What the training frames say of a frame.
+    fn predicted(&self, training: &[usize], frame: usize) -> f64 {
+        match self.shape {
+            Shape::Step([before, after], _) if self.is_open(training, frame) => 0.5 * (before + after),
+            _ => self.value(frame),
+        }
+    }
+
+    /// With a step's date read from the frames of which it was open as well: only once it is judged without it.
+    fn dated(self, series: &Series, training: &[usize]) -> Self {
+        let Shape::Step([before, after], at) = self.shape else { return self };
+        let late = |frame: usize| {
+            let mean = series.mean(frame);
+            (mean - after).abs() < (mean - before).abs()
+        };
+        let date = (0..self.frames).find(|&f| if self.is_open(training, f) { late(f) } else { f >= at }).unwrap_or(at);
+        Self { shape: Shape::Step([before, after], date), ..self }
+    }
 }
 
 fn place(frame: usize, frames: usize) -> f64 {
@@ -80,7 +108,52 @@ fn polynomial(points: &[Point], degree: usize, frames: usize) -> Option<(DVector
     Some((normal.solve(&right), normal))
 }
 
-/// The shape that explains the training frames best, more freedom paid for (BIC).
+/// A shape as it fits to some points.
+struct Fit {
+    shape: Shape,
+    misfit: f64,
+    /// Parameters beyond the constant.
+    freedom: f64,
+    /// Of its change.
+    variance: f64,
+}
+
+impl Fit {
+    /// More freedom is paid for (BIC).
+    fn price(&self, points: &[Point]) -> f64 {
+        self.misfit + self.freedom * (points.len() as f64).ln()
+    }
+}
+
+fn smooth(points: &[Point], degree: usize, frames: usize) -> Option<Fit> {
+    let (c, normal) = polynomial(points, degree, frames)?;
+    let misfit = points.iter().map(|(f, v, w)| w * (v - c.dot(&powers(*f, degree, frames))).powi(2)).sum();
+    let ends = DVector::from_fn(degree + 1, |power, _| if power % 2 == 1 { 2.0 } else { 0.0 });
+    let variance = ends.dot(&normal.solve(&ends));
+    Some(Fit { shape: Shape::Smooth(c.iter().copied().collect()), misfit, freedom: degree as f64, variance })
+}
+
+/// `at`: the first frame after it. None where a side has too few points.
+fn step(points: &[Point], at: usize) -> Option<Fit> {
+    let mut sums = [[0.0; 2]; 2];
+    for &(frame, value, weight) in points {
+        let side = &mut sums[usize::from(frame >= at)];
+        side[0] += weight * value;
+        side[1] += weight;
+    }
+    let few = points.iter().filter(|p| p.0 < at).count().min(points.iter().filter(|p| p.0 >= at).count());
+    // A date within a gap of the training frames is the same step.
+    let repeated = at > 1 && !points.iter().any(|p| p.0 == at - 1);
+    if few < 2 || repeated {
+        return None;
+    }
+    let sides = sums.map(|[sum, weight]| sum / weight);
+    let misfit = points.iter().map(|(f, v, w)| w * (v - sides[usize::from(*f >= at)]).powi(2)).sum();
+    // The date is a parameter too.
+    Some(Fit { shape: Shape::Step(sides, at), misfit, freedom: 2.0, variance: 1.0 / sums[0][1] + 1.0 / sums[1][1] })
+}
+
+/// The shape that explains the training frames best, more freedom paid for.
 ///
 /// `series`: of `part`, from all ranges.
 pub fn best(field: &Field, part: Part, series: &Series, training: &[usize], held_out: &[usize]) -> Option<Drift> {
@@ -88,52 +161,20 @@ pub fn best(field: &Field, part: Part, series: &Series, training: &[usize], held
     if points.len() < 5 {
         return None;
     }
-    let count = points.len() as f64;
+    let polynomials = (1..=DEGREE.min(points.len() - 4)).filter_map(|degree| smooth(&points, degree, field.frames));
+    let fits: Vec<Fit> = polynomials.chain((1..field.frames).filter_map(|at| step(&points, at))).collect();
+    let tried = fits.len() as f64;
+    let Fit { shape, misfit, freedom, variance } =
+        fits.into_iter().reduce(|best, fit| if fit.price(&points) < best.price(&points) { fit } else { best })?;
     let total: f64 = points.iter().map(|p| p.2).sum();
     let mean = points.iter().map(|p| p.1 * p.2).sum::<f64>() / total;
     let scatter: f64 = points.iter().map(|p| p.2 * (p.1 - mean).powi(2)).sum();
-    let mut tried = 0.0;
-    // Shape, misfit, free parameters beyond the constant, variance of its change.
-    let mut found: Option<(Shape, f64, f64, f64)> = None;
-    let mut offer = |shape: Shape, misfit: f64, freedom: f64, variance: f64| {
-        tried += 1.0;
-        let price = |misfit: f64, freedom: f64| misfit + freedom * count.ln();
-        if found.as_ref().is_none_or(|f| price(misfit, freedom) < price(f.1, f.2)) {
-            found = Some((shape, misfit, freedom, variance));
-        }
-    };
-    for degree in 1..=DEGREE.min(points.len() - 4) {
-        let Some((c, normal)) = polynomial(&points, degree, field.frames) else { continue };
-        let misfit = points.iter().map(|(f, v, w)| w * (v - c.dot(&powers(*f, degree, field.frames))).powi(2)).sum();
-        let ends = DVector::from_fn(degree + 1, |power, _| if power % 2 == 1 { 2.0 } else { 0.0 });
-        let variance = ends.dot(&normal.solve(&ends));
-        offer(Shape::Smooth(c.iter().copied().collect()), misfit, degree as f64, variance);
-    }
-    for at in 1..field.frames {
-        let mut sums = [[0.0; 2]; 2];
-        for &(frame, value, weight) in &points {
-            let side = &mut sums[usize::from(frame >= at)];
-            side[0] += weight * value;
-            side[1] += weight;
-        }
-        let few = points.iter().filter(|p| p.0 < at).count().min(points.iter().filter(|p| p.0 >= at).count());
-        // A date within a gap of the training frames is the same step.
-        let repeated = at > 1 && !points.iter().any(|p| p.0 == at - 1);
-        if few < 2 || repeated {
-            continue;
-        }
-        let sides = sums.map(|[sum, weight]| sum / weight);
-        let misfit = points.iter().map(|(f, v, w)| w * (v - sides[usize::from(*f >= at)]).powi(2)).sum();
-        // The date is a parameter too.
-        offer(Shape::Step(sides, at), misfit, 2.0, 1.0 / sums[0][1] + 1.0 / sums[1][1]);
-    }
-    let (shape, misfit, freedom, variance) = found?;
-    let freedom_left = (count - 1.0 - freedom).max(1.0);
+    let explained = (scatter - misfit).max(0.0);
+    let freedom_left = (points.len() as f64 - 1.0 - freedom).max(1.0);
     // Frames that scatter by more than the noise (the body's slow parts) make everything less sure.
     let excess = (misfit / freedom_left).max(1.0);
-    let ratio = (scatter - misfit).max(0.0) / freedom / (misfit / freedom_left).max(1.0);
-    let own = fisher_tail(ratio, freedom, freedom_left);
-    let unlike = unlike_the_body(field, part, &points, training, (scatter - misfit).max(0.0), freedom);
+    let own = fisher_tail(explained / freedom / excess, freedom, freedom_left);
+    let unlike = unlike_the_body(field, part, &points, training, explained, freedom);
     let p = unlike.map_or(own, |unlike| statistics::corrected(own.min(unlike), 2.0));
     let drift = Drift {
         shape,
@@ -142,30 +183,8 @@ pub fn best(field: &Field, part: Part, series: &Series, training: &[usize], held
         held_out_gain: 0.0,
         frames: field.frames,
     };
-    // Between the last training frame before a step and the first one after it, the date is open.
-    let open = |frame: usize| match drift.shape {
-        Shape::Step(_, at) => {
-            let before = training.iter().copied().filter(|&f| f < at).max().unwrap_or(0);
-            let after = training.iter().copied().filter(|&f| f >= at).min().unwrap_or(field.frames);
-            before < frame && frame < after
-        }
-        Shape::Smooth(_) => false,
-    };
-    let predicted = |frame: usize| match drift.shape {
-        Shape::Step([before, after], _) if open(frame) => 0.5 * (before + after),
-        _ => drift.value(frame),
-    };
-    let held_out_gain = series.gain(field, held_out, |frame, _, _| predicted(frame)) / excess;
-    // Judged without it, the date is then read from those frames as well.
-    if let Shape::Step([before, after], at) = drift.shape {
-        let late = |frame: usize| {
-            let mean = series.mean(frame);
-            (mean - after).abs() < (mean - before).abs()
-        };
-        let date = (0..field.frames).find(|&f| if open(f) { late(f) } else { f >= at }).unwrap_or(at);
-        return Some(Drift { shape: Shape::Step([before, after], date), held_out_gain, ..drift });
-    }
-    Some(Drift { held_out_gain, ..drift })
+    let held_out_gain = series.gain(field, held_out, |frame, _, _| drift.predicted(training, frame)) / excess;
+    Some(Drift { held_out_gain, ..drift.dated(series, training) })
 }
 
 /// Probability of a drift that moves the training frames' scatter by `scatter` (with `freedom` parameters), were it the body's

@@ -16,6 +16,7 @@ use crate::diagnosis::evidence::{Evidence, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Place};
 use crate::diagnosis::statistics::{corrected, median};
 use crate::effects::Stage;
+use crate::grid::Grid;
 
 /// Fewest frames and channels among which one can be odd.
 const FEWEST_FRAMES: usize = 6;
@@ -28,111 +29,171 @@ const LEAST_SPREAD: f64 = 1e-3;
 /// Median absolute deviation to standard deviation of a normal law.
 const TO_DEVIATION: f64 = 1.4826;
 
-/// Mean chirps of the even and of the odd loops less the channel's mean over the other frames.
+/// Mean chirps of the even and of the odd loops of every frame and channel.
+struct Means(Grid<[Vec<Complex64>; 2], 2>);
+
+/// The same less the channel's mean over the other frames.
 struct Deviation {
     halves: [Vec<Complex64>; 2],
     /// |spectrum|² of both halves' mean over the noise's expectation, by range.
     power: Vec<f64>,
 }
 
+type Deviations = Grid<Deviation, 2>;
+
+/// A frame of a channel that stands out.
+struct Odd {
+    /// Frame and channel.
+    at: [usize; 2],
+    score: f64,
+    deviations: Deviations,
+}
+
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let [frames, _, receivers, loops, samples] = evidence.cube.dims;
-    let channels = evidence.cube.channels();
+    let [frames, _, _, loops, _] = evidence.cube.dims;
     if frames < FEWEST_FRAMES
-        || channels < FEWEST_CHANNELS
+        || evidence.cube.channels() < FEWEST_CHANNELS
         || loops < 4
         || evidence.accepted_unnamed.contains(&Behaviour::SingleFrame)
     {
         return vec![];
     }
-    let means: Vec<[Vec<Complex64>; 2]> = (0..frames * channels)
-        .into_par_iter()
-        .map(|at| halves(evidence.cube.channel(at / channels, at % channels), samples))
-        .collect();
-    let deviations = |without: Option<usize>| -> Vec<Deviation> {
-        let of = |at: usize| {
-            let (frame, channel) = (at / channels, at % channels);
-            let others: Vec<usize> = (0..frames).filter(|&other| other != frame && Some(other) != without).collect();
-            let mut rest = vec![Complex64::ZERO; samples];
-            for half in others.iter().flat_map(|other| &means[other * channels + channel]) {
-                rest.iter_mut().zip(half).for_each(|(sum, value)| *sum += value / (2 * others.len()) as f64);
-            }
-            let halves = [0, 1].map(|half| means[at][half].iter().zip(&rest).map(|(a, b)| a - b).collect::<Vec<_>>());
-            let mean: Vec<Complex64> = halves[0].iter().zip(&halves[1]).map(|(a, b)| (a + b) / 2.0).collect();
-            let noise = evidence.noise()[channel].max(1e-300) / loops as f64;
-            Deviation { power: spectrum(&mean).iter().map(|value| value.norm_sqr() / noise).collect(), halves }
-        };
-        (0..frames * channels).into_par_iter().map(of).collect()
-    };
-    let largest = |scores: &[f64]| (0..scores.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b]));
-    // The odd one is in all others' means, too: it is judged against what they are without it.
-    let Some(odd) = largest(&scores(&deviations(None), channels)) else { return vec![] };
-    let (frame, channel) = (odd / channels, odd % channels);
-    let deviations = deviations(Some(frame));
-    let scores = scores(&deviations, channels);
-    let next = (0..scores.len()).filter(|&at| at != odd).map(|at| scores[at]).fold(0.0, f64::max);
-    if scores[odd] < STANDS_OUT.max(FROM_THE_NEXT * next) {
-        return vec![];
+    Odd::of(evidence).map(|odd| odd.candidate(evidence)).into_iter().collect()
+}
+
+impl Means {
+    fn of(evidence: &Evidence) -> Self {
+        let [frames, .., samples] = evidence.cube.dims;
+        let channels = evidence.cube.channels();
+        let means = (0..frames * channels)
+            .into_par_iter()
+            .map(|at| halves(evidence.cube.channel(at / channels, at % channels), samples))
+            .collect();
+        Self(Grid::new(["frame", "channel"], [frames, channels], means))
     }
-    // Scores of remains of movers have a longer tail than a normal law's.
-    let p_value = corrected((-scores[odd]).exp(), scores.len() as f64).max(f64::MIN_POSITIVE);
-    let total = |at: usize| deviations[at].power.iter().sum::<f64>();
-    let usual = (0..deviations.len()).filter(|&at| at != odd).map(total).sum::<f64>() / (deviations.len() - 1) as f64;
-    let ratio = total(odd) / usual.max(f64::MIN_POSITIVE);
-    // What the even chirps deviate by predicts the odd ones.
-    let [even, uneven] = &deviations[odd].halves;
-    let floor = (usual / samples as f64).max(1.0);
-    let noise = floor * evidence.noise()[channel].max(1e-300) / (0.5 * loops as f64);
-    let gain = uneven.iter().zip(even).map(|(a, b)| a.norm_sqr() - (a - b).norm_sqr()).sum::<f64>() / noise;
-    let change: Vec<Complex64> = even.iter().zip(uneven).map(|(a, b)| (a + b) / 2.0).collect();
-    let energy = change.iter().map(|value| value.norm_sqr()).sum::<f64>() * loops as f64;
-    let size = loops * samples;
-    vec![Candidate {
-        id: None,
-        behaves_like: Behaviour::SingleFrame,
-        estimates: vec![],
-        choice: None,
-        place: Place {
-            frames: Some(vec![frame]),
-            rx: Some(vec![channel % receivers]),
-            tx: (channels > receivers).then(|| vec![channel / receivers]),
-            ..Place::at(Stage::Receiver)
-        },
-        p_value,
-        gain,
-        errs_alike: false,
-        look_alikes: vec![],
-        statement: format!(
-            "In frame {frame} receiver {} sees the room otherwise than in all other frames, with {:.1} times the power of \
-             the usual deviation, and no other receiver does at those ranges: that frame of that receiver was corrupted or shifted.",
-            channel % receivers,
-            ratio
-        ),
-        curve: None,
-        energy,
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-            let start = odd * size;
-            for chirp in cube.samples[start..start + size].chunks_exact_mut(change.len()) {
-                chirp.iter_mut().zip(&change).for_each(|(value, change)| *value -= change);
-            }
-        })),
-    }]
+
+    /// `without`: a frame that the others are not compared with.
+    fn deviations(&self, evidence: &Evidence, without: Option<usize>) -> Deviations {
+        let shape @ [frames, channels] = self.0.shape();
+        let of = |at: usize| self.deviation(evidence, [at / channels, at % channels], without);
+        Grid::new(["frame", "channel"], shape, (0..frames * channels).into_par_iter().map(of).collect())
+    }
+
+    fn deviation(&self, evidence: &Evidence, at @ [frame, channel]: [usize; 2], without: Option<usize>) -> Deviation {
+        let (means, [.., loops, samples]) = (&self.0, evidence.cube.dims);
+        let others: Vec<usize> = (0..means.shape()[0]).filter(|&other| other != frame && Some(other) != without).collect();
+        let mut rest = vec![Complex64::ZERO; samples];
+        for half in others.iter().flat_map(|&other| &means[[other, channel]]) {
+            rest.iter_mut().zip(half).for_each(|(sum, value)| *sum += value / (2 * others.len()) as f64);
+        }
+        let halves = [0, 1].map(|half| means[at][half].iter().zip(&rest).map(|(a, b)| a - b).collect::<Vec<_>>());
+        let mean: Vec<Complex64> = halves[0].iter().zip(&halves[1]).map(|(a, b)| (a + b) / 2.0).collect();
+        let noise = evidence.noise()[channel].max(1e-300) / loops as f64;
+        Deviation { power: spectrum(&mean).iter().map(|value| value.norm_sqr() / noise).collect(), halves }
+    }
+}
+
+impl Odd {
+    fn of(evidence: &Evidence) -> Option<Self> {
+        let means = Means::of(evidence);
+        let largest = |scores: &[f64]| (0..scores.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b]));
+        // The odd one is in all others' means, too: it is judged against what they are without it.
+        let odd = largest(&scores(&means.deviations(evidence, None)))?;
+        let channels = evidence.cube.channels();
+        let at @ [frame, _] = [odd / channels, odd % channels];
+        let deviations = means.deviations(evidence, Some(frame));
+        let scores = scores(&deviations);
+        let next = (0..scores.len()).filter(|&at| at != odd).map(|at| scores[at]).fold(0.0, f64::max);
+        if scores[odd] < STANDS_OUT.max(FROM_THE_NEXT * next) {
+            return None;
+        }
+        Some(Self { at, score: scores[odd], deviations })
+    }
+
+    fn own(&self) -> &Deviation {
+        &self.deviations[self.at]
+    }
+
+    /// Power of all other deviations, mean over them.
+    fn usual(&self) -> f64 {
+        let [frames, channels] = self.deviations.shape();
+        let all = (0..frames).flat_map(|frame| (0..channels).map(move |channel| [frame, channel]));
+        let others = all.filter(|&at| at != self.at);
+        others.map(|at| self.deviations[at].total()).sum::<f64>() / (frames * channels - 1) as f64
+    }
+
+    /// Log-likelihood that the odd chirps gain, predicted by what the even ones deviate by.
+    fn gain(&self, evidence: &Evidence) -> f64 {
+        let [.., loops, samples] = evidence.cube.dims;
+        let [even, uneven] = &self.own().halves;
+        let floor = (self.usual() / samples as f64).max(1.0);
+        let noise = floor * evidence.noise()[self.at[1]].max(1e-300) / (0.5 * loops as f64);
+        uneven.iter().zip(even).map(|(a, b)| a.norm_sqr() - (a - b).norm_sqr()).sum::<f64>() / noise
+    }
+
+    fn candidate(&self, evidence: &Evidence) -> Candidate {
+        let [_, transmitters, receivers, loops, samples] = evidence.cube.dims;
+        let [frame, channel] = self.at;
+        let ratio = self.own().total() / self.usual().max(f64::MIN_POSITIVE);
+        let [even, uneven] = &self.own().halves;
+        let change: Vec<Complex64> = even.iter().zip(uneven).map(|(a, b)| (a + b) / 2.0).collect();
+        let energy = change.iter().map(|value| value.norm_sqr()).sum::<f64>() * loops as f64;
+        let size = loops * samples;
+        let start = (frame * evidence.cube.channels() + channel) * size;
+        Candidate {
+            id: None,
+            behaves_like: Behaviour::SingleFrame,
+            estimates: vec![],
+            choice: None,
+            place: Place {
+                frames: Some(vec![frame]),
+                rx: Some(vec![channel % receivers]),
+                tx: (transmitters > 1).then(|| vec![channel / receivers]),
+                ..Place::at(Stage::Receiver)
+            },
+            // Scores of remains of movers have a longer tail than a normal law's.
+            p_value: corrected((-self.score).exp(), self.deviations.values().len() as f64).max(f64::MIN_POSITIVE),
+            gain: self.gain(evidence),
+            errs_alike: false,
+            look_alikes: vec![],
+            statement: format!(
+                "In frame {frame} receiver {} sees the room otherwise than in all other frames, with {:.1} times the power of \
+                 the usual deviation, and no other receiver does at those ranges: that frame of that receiver was corrupted or shifted.",
+                channel % receivers,
+                ratio
+            ),
+            curve: None,
+            energy,
+            correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+                for chirp in cube.samples[start..start + size].chunks_exact_mut(change.len()) {
+                    chirp.iter_mut().zip(&change).for_each(|(value, change)| *value -= change);
+                }
+            })),
+        }
+    }
+}
+
+impl Deviation {
+    fn total(&self) -> f64 {
+        self.power.iter().sum()
+    }
 }
 
 /// How far every deviation is out of its frame's other channels', over the ranges, in deviations from the median:
 /// `[frame, channel]`.
-fn scores(deviations: &[Deviation], channels: usize) -> Vec<f64> {
+fn scores(deviations: &Deviations) -> Vec<f64> {
+    let [_, channels] = deviations.shape();
     let others = (channels - 1) as f64;
-    let raw = |at: usize| -> f64 {
-        let frame = at / channels * channels..(at / channels + 1) * channels;
+    let raw = |(at, deviation): (usize, &Deviation)| -> f64 {
+        let frame = deviations.below([at / channels]);
         let out = |(range, own): (usize, &f64)| {
-            let all: f64 = deviations[frame.clone()].iter().map(|deviation| deviation.power[range]).sum();
+            let all: f64 = frame.iter().map(|deviation| deviation.power[range]).sum();
             // The likelihood ratio of one power against so many others of one law, which is never below the noise's.
             (own / (all - own).max(others)).ln_1p()
         };
-        deviations[at].power.iter().enumerate().map(out).sum()
+        deviation.power.iter().enumerate().map(out).sum()
     };
-    let scores: Vec<f64> = (0..deviations.len()).map(raw).collect();
+    let scores: Vec<f64> = deviations.values().iter().enumerate().map(raw).collect();
     let middle = median(&mut scores.clone());
     let mut apart: Vec<f64> = scores.iter().map(|score| (score - middle).abs()).collect();
     let spread = TO_DEVIATION * median(&mut apart);

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::field::{Field, Part};
+use super::field::{Field, Part, Series};
 use crate::diagnosis::statistics;
 
 /// Deviation `amplitude · exp(−i / chirps)` of chirp i of every frame.
@@ -86,70 +86,121 @@ impl Decay {
     }
 }
 
-pub fn best(field: &Field, training: &[usize], held_out: &[usize]) -> Option<Settling> {
-    let loops = field.loops;
-    if loops < 8 {
-        return None;
-    }
-    let parts = [field.series(Part::Gain, |_| true), field.series(Part::Phase, |_| true)];
-    let weight: f64 = training.iter().map(|&f| parts[0].weight[f]).sum();
-    if weight <= 0.0 {
-        return None;
-    }
-    let mean = |index: usize| {
-        let of = |part: usize| {
-            training.iter().map(|&f| parts[part].weight[f] * parts[part].value[f * loops + index]).sum::<f64>() / weight
+/// The gain by the chirp's place in its frame, mean of the training frames.
+struct Pattern {
+    /// Gain and phase.
+    parts: [Series; 2],
+    /// `[loop]`
+    values: Vec<Complex64>,
+    /// Mean over the loops.
+    centre: Complex64,
+    /// Inverse variance of a part of a value.
+    weight: f64,
+}
+
+/// A decay of one length as it fits to a pattern.
+struct Fit {
+    amplitude: Complex64,
+    constant: Complex64,
+    /// Log-likelihood.
+    gain: f64,
+    /// Of the shape.
+    energy: f64,
+}
+
+impl Pattern {
+    /// None where nothing is known.
+    fn new(field: &Field, training: &[usize]) -> Option<Self> {
+        let loops = field.loops;
+        let parts = [field.series(Part::Gain, |_| true), field.series(Part::Phase, |_| true)];
+        let weight: f64 = training.iter().map(|&f| parts[0].weight[f]).sum();
+        if weight <= 0.0 {
+            return None;
+        }
+        let mean = |index: usize| {
+            let of = |series: &Series| {
+                training.iter().map(|&f| series.weight[f] * series.value[f * loops + index]).sum::<f64>() / weight
+            };
+            Complex64::new(of(&parts[0]), of(&parts[1]))
         };
-        Complex64::new(of(0), of(1))
-    };
-    let values: Vec<Complex64> = (0..loops).map(mean).collect();
-    let centre = values.iter().sum::<Complex64>() / loops as f64;
-    let held_gain = |model: &dyn Fn(usize) -> Complex64| {
-        parts[0].gain(field, held_out, |_, index, _| model(index).re)
-            + parts[1].gain(field, held_out, |_, index, _| model(index).im)
-    };
-    let fit = |length: f64| {
-        let Decay { amplitude, level, energy } = Decay::fit(&values, length);
-        (amplitude, centre - amplitude * level, 0.5 * weight * amplitude.norm_sqr() * energy, energy)
-    };
-    // Longer than half a frame is a slope.
-    let lengths: Vec<f64> = Decay::lengths(0.5 * loops as f64).collect();
-    let at = (0..lengths.len()).max_by(|&a, &b| fit(lengths[a]).2.total_cmp(&fit(lengths[b]).2))?;
-    let mut length = lengths[at];
-    let mut width = 0.05 * length;
-    while width > 1e-4 * length {
-        let longest = 0.5 * loops as f64;
-        let gain = |l: f64| if (0.3..=longest).contains(&l) { fit(l).2 } else { f64::NEG_INFINITY };
-        if gain(length + width) > gain(length) {
-            length += width;
-        } else if gain(length - width) > gain(length) {
-            length -= width;
-        } else {
-            width *= 0.5;
+        let values: Vec<Complex64> = (0..loops).map(mean).collect();
+        let centre = values.iter().sum::<Complex64>() / loops as f64;
+        Some(Self { parts, values, centre, weight })
+    }
+
+    fn fit(&self, length: f64) -> Fit {
+        let Decay { amplitude, level, energy } = Decay::fit(&self.values, length);
+        let gain = 0.5 * self.weight * amplitude.norm_sqr() * energy;
+        Fit { amplitude, constant: self.centre - amplitude * level, gain, energy }
+    }
+
+    /// Of the decay that fits best, in loops. Longer than half a frame is a slope.
+    fn length(&self) -> Option<f64> {
+        let longest = 0.5 * self.values.len() as f64;
+        let lengths: Vec<f64> = Decay::lengths(longest).collect();
+        let gains: Vec<f64> = lengths.iter().map(|&length| self.fit(length).gain).collect();
+        let at = (0..lengths.len()).max_by(|&a, &b| gains[a].total_cmp(&gains[b]))?;
+        let gain = |l: f64| if (0.3..=longest).contains(&l) { self.fit(l).gain } else { f64::NEG_INFINITY };
+        let mut length = lengths[at];
+        let mut width = 0.05 * length;
+        while width > 1e-4 * length {
+            if gain(length + width) > gain(length) {
+                length += width;
+            } else if gain(length - width) > gain(length) {
+                length -= width;
+            } else {
+                width *= 0.5;
+            }
+        }
+        Some(length)
+    }
+
+    /// Error of that length, by the curvature of the likelihood.
+    fn length_deviation(&self, length: f64) -> f64 {
+        let h = 0.1 * length;
+        let curvature = (2.0 * self.fit(length).gain - self.fit(length + h).gain - self.fit(length - h).gain) / (h * h);
+        if curvature > 0.0 { curvature.sqrt().recip() } else { length }
+    }
+
+    /// Log-likelihood that held-out frames gain by a function of the loop.
+    fn held_out_gain(&self, field: &Field, held_out: &[usize], model: impl Fn(usize) -> Complex64) -> f64 {
+        self.parts[0].gain(field, held_out, |_, index, _| model(index).re)
+            + self.parts[1].gain(field, held_out, |_, index, _| model(index).im)
+    }
+
+    /// Any function of the loop.
+    fn free(&self, field: &Field, held_out: &[usize]) -> Free {
+        let values: Vec<Complex64> = self.values.iter().map(|v| v - self.centre).collect();
+        let chi2: f64 = values.iter().map(|v| self.weight * v.norm_sqr()).sum();
+        Free {
+            p_value: statistics::chi2_tail(chi2, 2.0 * (values.len() - 1) as f64),
+            held_out_gain: self.held_out_gain(field, held_out, |index| values[index]),
+            values,
         }
     }
-    let (amplitude, constant, training_gain, energy) = fit(length);
-    let h = 0.1 * length;
-    let curvature = (2.0 * training_gain - fit(length + h).2 - fit(length - h).2) / (h * h);
-    // A decay has a length (about ten are apart) and a complex amplitude.
-    let p_value = statistics::corrected((-training_gain).exp(), 10.0);
-    let centred: Vec<Complex64> = values.iter().map(|v| v - centre).collect();
-    let chi2: f64 = centred.iter().map(|v| weight * v.norm_sqr()).sum();
-    let free = Free {
-        p_value: statistics::chi2_tail(chi2, 2.0 * (loops - 1) as f64),
-        held_out_gain: held_gain(&|index| centred[index]),
-        values: centred,
-    };
+}
+
+pub fn best(field: &Field, training: &[usize], held_out: &[usize]) -> Option<Settling> {
+    if field.loops < 8 {
+        return None;
+    }
+    let pattern = Pattern::new(field, training)?;
+    let length = pattern.length()?;
+    let Fit { amplitude, constant, gain, energy } = pattern.fit(length);
+    let free = pattern.free(field, held_out);
+    let decay = |index: usize| amplitude * (-(index as f64) / length).exp() + constant;
+    let hum = locked(field).map(|hertz| explained(field, &free.values, hertz)).fold(0.0, f64::max);
     Some(Settling {
         amplitude,
-        amplitude_deviation: (1.0 / (weight * energy)).sqrt(),
+        amplitude_deviation: (1.0 / (pattern.weight * energy)).sqrt(),
         loops: length,
-        loops_deviation: if curvature > 0.0 { curvature.sqrt().recip() } else { length },
+        loops_deviation: pattern.length_deviation(length),
         constant,
-        p_value,
-        training_gain,
-        hum_gain: 0.5 * weight * locked(field).map(|hertz| explained(field, &free.values, hertz)).fold(0.0, f64::max),
-        held_out_gain: held_gain(&|index| amplitude * (-(index as f64) / length).exp() + constant),
+        // A decay has a length (about ten are apart) and a complex amplitude.
+        p_value: statistics::corrected((-gain).exp(), 10.0),
+        training_gain: gain,
+        hum_gain: 0.5 * pattern.weight * hum,
+        held_out_gain: pattern.held_out_gain(field, held_out, decay),
         free,
     })
 }

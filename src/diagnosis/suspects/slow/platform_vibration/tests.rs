@@ -1,11 +1,15 @@
 //! A platform that vibrates, in made recordings.
 
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::*;
+use super::find;
 use crate::diagnosis::cube::Loaded;
+use crate::diagnosis::evidence::Evidence;
 use crate::effects;
 use crate::radar::Radar;
 

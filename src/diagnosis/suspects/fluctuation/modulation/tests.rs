@@ -1,6 +1,11 @@
 //! Returns whose amplitude is modulated, in made recordings.
 
-use super::*;
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use super::find;
+use crate::diagnosis::evidence::Evidence;
 use crate::radar::Radar;
 
 const MODULATION_HZ: f64 = 160.0;

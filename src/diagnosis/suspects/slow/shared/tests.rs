@@ -2,11 +2,15 @@
 
 use std::f64::consts::TAU;
 
+use num_complex::Complex64;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::*;
+use super::bets::log_bessel_0;
+use super::course::{Course, without_slow};
+use super::find;
+use crate::diagnosis::evidence::Evidence;
 use crate::effects;
 use crate::radar::Radar;
 

@@ -1,0 +1,82 @@
+//! Groups of ranges, and what a deviation means at them.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use crate::room::Room;
+
+/// Range cells whose gain is estimated together.
+#[derive(Clone, Debug)]
+pub struct Group {
+    /// Mean delay of its static returns, weighted by their power.
+    pub delay_s: f64,
+    /// Cosine to the boresight, mean over what the room has at that range; one where the room is not known.
+    pub ahead: f64,
+    /// Its beat-frequency bins.
+    pub bins: std::ops::Range<usize>,
+}
+
+/// Which part of the deviation is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Logarithm of the gain.
+    Gain,
+    /// Phase that is the same at all ranges.
+    Phase,
+    /// Phase in proportion to the delay: an error of the local oscillator. Stated per second of delay.
+    Delay,
+    /// Phase in proportion to the cosine to the boresight, along which the radar moves.
+    Boresight,
+}
+
+/// Share that is uncertain of an amplitude along the boresight: how much returns from where is not known.
+pub const PATTERN: f64 = 0.2;
+
+impl Part {
+    /// What a value of one means at some ranges.
+    pub fn lever(self, group: &Group) -> f64 {
+        match self {
+            Part::Gain | Part::Phase => 1.0,
+            Part::Delay => group.delay_s,
+            Part::Boresight => group.ahead,
+        }
+    }
+
+    /// A part that is read from the other component of the same deviations.
+    pub fn other(self) -> Self {
+        if self == Part::Gain { Part::Phase } else { Part::Gain }
+    }
+
+    /// The complex deviation that a value means there.
+    pub fn deviation(self, value: f64, group: &Group) -> Complex64 {
+        let value = value * self.lever(group);
+        if self == Part::Gain { value.into() } else { Complex64::new(0.0, value) }
+    }
+}
+
+/// Mean cosine to the boresight of what the room's surfaces before the radar return from a range: of the ring that each of them
+/// has there, as rough surfaces return by the sine of grazing (constant γ), seen by antennas of one gain in all directions.
+pub fn ahead(room: Option<&Room>, range_m: f64) -> f64 {
+    const DIRECTIONS: usize = 48;
+    let Some(room) = room else { return 1.0 };
+    let (low, high) = room.extent_m(range_m);
+    let (mut sum, mut all) = (0.0, 0.0);
+    for boundary in room.boundaries() {
+        let (axis, sign) = boundary.axis();
+        let Some(distance) = room.distance_m(boundary).filter(|&distance| distance < range_m) else { continue };
+        let radius = (range_m * range_m - distance * distance).sqrt();
+        for direction in 0..DIRECTIONS {
+            let (sine, cosine) = (TAU * (direction as f64 + 0.5) / DIRECTIONS as f64).sin_cos();
+            let mut place = [0.0; 3];
+            (place[axis], place[(axis + 1) % 3], place[(axis + 2) % 3]) = (sign * distance, radius * cosine, radius * sine);
+            let inside = (0..3).filter(|&other| other != axis).all(|other| (low[other]..=high[other]).contains(&place[other]));
+            let cosine = place[1] / range_m;
+            if inside && cosine > 0.0 {
+                let weight = distance / range_m;
+                (sum, all) = (sum + weight * cosine, all + weight);
+            }
+        }
+    }
+    if all > 0.0 { sum / all } else { 1.0 }
+}
