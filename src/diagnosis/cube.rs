@@ -75,6 +75,12 @@ impl Cube {
         &self.samples[start..start + length]
     }
 
+    pub fn channel_mut(&mut self, frame: usize, channel: usize) -> &mut [Complex64] {
+        let length = self.dims[3] * self.dims[4];
+        let start = (frame * self.channels() + channel) * length;
+        &mut self.samples[start..start + length]
+    }
+
     /// Changes every chirp; `f` gets frame, channel and loop.
     pub fn each_chirp(&mut self, f: impl Fn([usize; 3], &mut [Complex64]) + Sync) {
         let (loops, channels) = (self.dims[3], self.channels());

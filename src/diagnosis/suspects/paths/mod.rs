@@ -4,6 +4,7 @@ mod bank;
 mod beams;
 mod coloured;
 mod echo;
+mod factor;
 mod ghost;
 mod ground;
 mod image;
@@ -15,6 +16,7 @@ mod scene;
 mod sinusoidal;
 mod still_point;
 mod track;
+mod whereabouts;
 
 #[cfg(test)]
 mod tests;
