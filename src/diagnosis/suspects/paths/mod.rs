@@ -1,5 +1,6 @@
 //! Returns from where neither the body nor static clutter can be: mirror images, other movers, echoes.
 
+mod background;
 mod bank;
 mod beams;
 mod coloured;
@@ -13,6 +14,7 @@ mod pendulum;
 pub mod product;
 mod removal;
 mod scene;
+mod sidelobes;
 mod sinusoidal;
 mod still_point;
 mod track;

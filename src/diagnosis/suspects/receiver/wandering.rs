@@ -78,13 +78,10 @@ impl Wandering {
 
 /// The range whose strongest Doppler frequency beside zero stands out most in the median frame, and the chance of that.
 fn most_steady(evidence: &Evidence) -> Option<(usize, f64)> {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let loops = evidence.cube.dims[3];
     let (maps, training) = (evidence.maps(), &evidence.split.training);
     let power = |bin: usize| {
-        let of_frame = |&frame: &usize| {
-            let cell = (frame * loops + strongest_doppler(evidence, frame, bin)) * samples + bin;
-            f64::from(maps[cell])
-        };
+        let of_frame = |&frame: &usize| f64::from(maps[[frame, strongest_doppler(evidence, frame, bin), bin]]);
         median(&mut training.iter().map(of_frame).collect::<Vec<f64>>())
     };
     let bins = evidence.range_bins();
@@ -97,8 +94,8 @@ fn most_steady(evidence: &Evidence) -> Option<(usize, f64)> {
 }
 
 fn strongest_doppler(evidence: &Evidence, frame: usize, bin: usize) -> usize {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let power = |doppler: usize| evidence.maps()[(frame * loops + doppler) * samples + bin];
+    let loops = evidence.cube.dims[3];
+    let power = |doppler: usize| evidence.maps()[[frame, doppler, bin]];
     let moving = (0..loops).filter(|&doppler| doppler.min(loops - doppler) > STILL_BINS);
     moving.max_by(|&a, &b| power(a).total_cmp(&power(b))).unwrap_or(0)
 }
