@@ -13,12 +13,14 @@ mod mover;
 mod pendulum;
 pub mod product;
 mod removal;
+mod returns;
 mod scene;
 mod sidelobes;
 mod sinusoidal;
 mod still_point;
 mod track;
 mod whereabouts;
+mod whitened;
 
 #[cfg(test)]
 mod tests;
