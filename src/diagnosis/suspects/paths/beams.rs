@@ -11,6 +11,7 @@ use super::scene::Scene;
 use super::whitened::Whitened;
 use crate::diagnosis::Point;
 use crate::diagnosis::suspects::steering::{beam, power, sines, steering};
+use crate::grid::Grid;
 
 /// Samples after the body's covariance is undone, and what that leaves of a tone.
 pub struct Beams<'a> {
@@ -58,29 +59,17 @@ impl<'a> Beams<'a> {
         self.returns.body(frame)
     }
 
-    pub fn rows(&self) -> usize {
-        FINE * self.scene.loops
-    }
-
-    pub fn columns(&self) -> usize {
-        FINE * self.scene.bins
-    }
-
-    /// Of every cell of the fine grid in a prepared frame, `[beam][range · doppler]`.
-    pub fn looks(&self, frame: usize) -> Vec<Vec<Look>> {
-        let Some(made) = &self.frames[frame] else { return vec![] };
+    /// Of every cell of the fine grid in a prepared frame.
+    pub fn looks(&self, frame: usize) -> Grid<Look, 3> {
+        let made = self.frames[frame].as_ref().expect("frames are prepared before they are looked at");
         let cells: Vec<Vec<Complex64>> = made.channels.iter().map(|channel| self.fine.cells(channel)).collect();
-        let count = self.rows() * self.columns();
         let steering: Vec<Vec<Complex64>> = self.sines.iter().map(|&sine| self.steering(sine)).collect();
-        let mut looks: Vec<Vec<Look>> = steering.iter().map(|_| Vec::with_capacity(count)).collect();
+        let [_, _, rows] = made.expected.shape();
         let mut values = vec![Complex64::ZERO; cells.len()];
-        for cell in 0..count {
-            values.iter_mut().zip(&cells).for_each(|(value, cells)| *value = cells[cell]);
-            for (beam, (looks, steering)) in looks.iter_mut().zip(&steering).enumerate() {
-                looks.push(self.seen(made, cell, self.power(&values, steering), beam));
-            }
-        }
-        looks
+        Grid::from_fn(["beam", "range", "doppler"], made.expected.shape(), |[beam, column, row]| {
+            values.iter_mut().zip(&cells).for_each(|(value, cells)| *value = cells[column * rows + row]);
+            self.seen(made, [column, row], self.power(&values, &steering[beam]), beam)
+        })
     }
 
     /// At any place (cells of the transform, not wrapped) and direction in a prepared frame.
@@ -93,7 +82,7 @@ impl<'a> Beams<'a> {
     pub fn tone(&self, frame: usize, place: (f64, f64), sine: f64) -> Option<Vec<Complex64>> {
         let (made, values, cell) = self.values(frame, place)?;
         let rx_m = &self.scene.evidence.radar.rx_m;
-        let left = (self.scene.loops * self.scene.samples * rx_m.len()) as f64 * f64::from(made.share.values()[cell]);
+        let left = (self.scene.loops * self.scene.samples * rx_m.len()) as f64 * f64::from(made.share[cell]);
         let noise = self.scene.evidence.noise();
         let steering = self.steering(sine);
         let amplitudes = values.chunks_exact(rx_m.len()).flat_map(|values| {
@@ -103,14 +92,16 @@ impl<'a> Beams<'a> {
         Some(amplitudes.zip(noise).map(|(value, noise)| value * noise.sqrt()).collect())
     }
 
-    fn values(&self, frame: usize, (doppler, range): (f64, f64)) -> Option<(&Whitened, Vec<Complex64>, usize)> {
+    /// Of all channels, and the nearest cell of the fine grid, `[range, doppler]`.
+    fn values(&self, frame: usize, (doppler, range): (f64, f64)) -> Option<(&Whitened, Vec<Complex64>, [usize; 2])> {
         let made = self.frames.get(frame)?.as_ref()?;
         let (loops, samples) = (self.scene.loops, self.scene.samples);
+        let [_, columns, rows] = made.expected.shape();
         let column = (FINE as f64 * range).round();
-        if !(0.0..self.columns() as f64).contains(&column) {
+        if !(0.0..columns as f64).contains(&column) {
             return None;
         }
-        let row = ((FINE as f64 * doppler).round() as i64).rem_euclid(self.rows() as i64) as usize;
+        let row = ((FINE as f64 * doppler).round() as i64).rem_euclid(rows as i64) as usize;
         let turns = |cells: f64, length: usize| -> Vec<Complex64> {
             (0..length).map(|i| Complex64::cis(-TAU * cells * i as f64 / length as f64)).collect()
         };
@@ -119,7 +110,7 @@ impl<'a> Beams<'a> {
             let chirps = channel.chunks_exact(samples).zip(&slow);
             chirps.map(|(chirp, turn)| chirp.iter().zip(&fast).map(|(a, b)| a * b).sum::<Complex64>() * turn).sum()
         };
-        Some((made, made.channels.iter().map(of_channel).collect(), column as usize * self.rows() + row))
+        Some((made, made.channels.iter().map(of_channel).collect(), [column as usize, row]))
     }
 
     /// Energy over the noise in a beam of the whitened cells, mean over the transmitters.
@@ -137,9 +128,9 @@ impl<'a> Beams<'a> {
         (0..self.sines.len()).min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(0)
     }
 
-    fn seen(&self, made: &Whitened, cell: usize, power: f64, beam: usize) -> Look {
-        let share = f64::from(made.share.values()[cell]);
-        let expected = f64::from(made.expected.below([beam])[cell]);
+    fn seen(&self, made: &Whitened, [range, doppler]: [usize; 2], power: f64, beam: usize) -> Look {
+        let share = f64::from(made.share[[range, doppler]]);
+        let expected = f64::from(made.expected[[beam, range, doppler]]);
         Look { power: power / (share * share), expected, body: (1.0 - 1.0 / expected).clamp(0.0, 1.0) }
     }
 }
