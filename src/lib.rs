@@ -5,6 +5,7 @@
 // 0: what everyone needs
 pub mod bounds;
 pub mod complex;
+mod device;
 pub mod error;
 pub mod grid;
 pub mod text;

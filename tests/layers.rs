@@ -10,7 +10,7 @@ use sources::{Module, Source, Sources};
 
 /// The journey; modules on one floor do not import each other.
 const FLOORS: [&[&str]; 31] = [
-    &["error", "complex", "grid", "text"],
+    &["error", "complex", "device", "grid", "text"],
     &["bounds"],
     &["radar", "room"],
     &["person"],

@@ -43,6 +43,7 @@ impl Readings {
         let fields = (0..frames)
             .into_par_iter()
             .flat_map_iter(|frame| {
+                let map = maps.below([frame]);
                 let mut fields = vec![Complex32::default(); size * count];
                 for (channel, noise) in noise.iter().enumerate() {
                     let scale = 1.0 / noise.max(f64::MIN_POSITIVE).sqrt();
@@ -53,7 +54,7 @@ impl Readings {
                 // Where a filter has shaped the noise, the maps are flat.
                 for (cell, fields) in fields.chunks_exact_mut(count).enumerate() {
                     let mean = fields.iter().map(|field| field.norm_sqr()).sum::<f32>() / count as f32;
-                    let scale = (maps[frame * size + cell] / mean.max(f32::MIN_POSITIVE)).sqrt();
+                    let scale = (map[cell] / mean.max(f32::MIN_POSITIVE)).sqrt();
                     fields.iter_mut().for_each(|field| *field *= scale);
                 }
                 fields
@@ -72,7 +73,7 @@ impl Readings {
             middle_s: evidence.starts_s.iter().map(|start| start + half_s).collect(),
             split: evidence.split.clone(),
             room: evidence.room.clone(),
-            power: maps.to_vec(),
+            power: maps.values().to_vec(),
             fields,
             cells,
             radar,

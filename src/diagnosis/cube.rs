@@ -6,6 +6,7 @@ use rustfft::FftPlanner;
 
 use crate::data::Recording;
 use crate::error::{Error, Result};
+use crate::grid::Grid;
 use crate::radar::{Radar, Sampling};
 
 /// IF samples, `[frame, tx, rx, loop, sample]`. Samples of a receiver without quadrature are made analytic: their
@@ -73,6 +74,19 @@ impl Cube {
         let length = self.dims[3] * self.dims[4];
         let start = (frame * self.channels() + channel) * length;
         &self.samples[start..start + length]
+    }
+
+    pub fn channel_mut(&mut self, frame: usize, channel: usize) -> &mut [Complex64] {
+        let length = self.dims[3] * self.dims[4];
+        let start = (frame * self.channels() + channel) * length;
+        &mut self.samples[start..start + length]
+    }
+
+    /// A value of every frame and channel.
+    pub fn by_channel<T: Send>(&self, value: impl Fn(usize, usize) -> T + Sync) -> Grid<T, 2> {
+        let (frames, channels) = (self.dims[0], self.channels());
+        let values = (0..frames * channels).into_par_iter().map(|i| value(i / channels, i % channels)).collect();
+        Grid::new(["frame", "channel"], [frames, channels], values)
     }
 
     /// Changes every chirp; `f` gets frame, channel and loop.

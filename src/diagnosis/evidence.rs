@@ -22,6 +22,7 @@ use super::finding::{Undo, Volume};
 use super::prediction::BodyPrediction;
 use super::statistics;
 use crate::diagnosis::behaviour::Behaviour;
+use crate::grid::Grid;
 use crate::radar::{Radar, Sampling};
 use crate::room::Room;
 use power::PowerModel;
@@ -59,7 +60,7 @@ pub struct Evidence {
     pub codes: Option<Arc<Vec<Component>>>,
     pub(super) noise: OnceLock<Vec<f64>>,
     still: OnceLock<Vec<Complex64>>,
-    maps: OnceLock<Vec<f32>>,
+    maps: OnceLock<Grid<f32, 3>>,
     power: OnceLock<Option<Arc<PowerModel>>>,
     products: OnceLock<Products>,
     peak: OnceLock<f64>,
@@ -200,12 +201,12 @@ impl Evidence {
 
     /// Power of [`Self::range_doppler`] over the noise's variance, mean over the channels, `[frame, doppler, range]`.
     /// Noise that a filter (or undoing one) has shaped over the beat frequency is made flat.
-    pub fn maps(&self) -> &[f32] {
+    pub fn maps(&self) -> &Grid<f32, 3> {
         self.maps.get_or_init(|| {
             let mut maps = self.unshaped_maps();
             let samples = self.cube.dims[4];
             if let Some(shape) = self.noise_shape(&maps) {
-                maps.par_chunks_exact_mut(samples).for_each(|row| {
+                maps.values_mut().par_chunks_exact_mut(samples).for_each(|row| {
                     row.iter_mut().zip(&shape).for_each(|(value, shape)| *value /= *shape);
                 });
             }
@@ -214,18 +215,18 @@ impl Evidence {
     }
 
     /// The noise's variance in each range bin over its mean; `None` where it is flat.
-    fn noise_shape(&self, maps: &[f32]) -> Option<Vec<f32>> {
-        let [_, _, _, loops, samples] = self.cube.dims;
-        let rows: Vec<usize> = self
+    fn noise_shape(&self, maps: &Grid<f32, 3>) -> Option<Vec<f32>> {
+        let [_, loops, samples] = maps.shape();
+        let rows: Vec<&[f32]> = self
             .split
             .training
             .iter()
-            .flat_map(|&frame| (0..loops).map(move |doppler| (doppler, frame * loops + doppler)))
-            .filter(|&(doppler, _)| doppler.min(loops - doppler) > 2 || loops < 8)
-            .map(|(_, row)| row)
+            .flat_map(|&frame| (0..loops).map(move |doppler| [frame, doppler]))
+            .filter(|&[_, doppler]| doppler.min(loops - doppler) > 2 || loops < 8)
+            .map(|row| maps.below(row))
             .collect();
         let level = |range: usize| {
-            let mut values: Vec<f64> = rows.iter().map(|row| f64::from(maps[row * samples + range])).collect();
+            let mut values: Vec<f64> = rows.iter().map(|row| f64::from(row[range])).collect();
             let index = ((values.len().max(1) - 1) as f64 * 0.35) as usize;
             if values.is_empty() { 1.0 } else { *values.select_nth_unstable_by(index, f64::total_cmp).1 }
         };
@@ -241,10 +242,10 @@ impl Evidence {
         smooth[..self.range_bins()].iter().any(|shape| !(1.0 / SHAPED..SHAPED).contains(shape)).then_some(smooth)
     }
 
-    fn unshaped_maps(&self) -> Vec<f32> {
+    fn unshaped_maps(&self) -> Grid<f32, 3> {
         let [frames, _, _, loops, samples] = self.cube.dims;
         let (channels, noise) = (self.cube.channels(), self.noise().to_vec());
-        (0..frames)
+        let values = (0..frames)
             .into_par_iter()
             .flat_map_iter(|frame| {
                 let mut sum = vec![0.0f32; loops * samples];
@@ -255,7 +256,8 @@ impl Evidence {
                 }
                 sum
             })
-            .collect()
+            .collect();
+        Grid::new(["frame", "doppler", "range"], [frames, loops, samples], values)
     }
 }
 

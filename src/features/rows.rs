@@ -7,6 +7,8 @@
 
 use burn::tensor::{Device, IndexingUpdateOp, Int, Tensor, TensorData};
 
+use crate::device::is_cpu;
+
 /// Fixed row numbers into a table.
 #[derive(Clone, Debug)]
 pub struct RowIndex {
@@ -76,16 +78,6 @@ impl RowIndex {
     fn expanded(&self, feature: usize) -> Tensor<2, Int> {
         self.index.clone().reshape([self.picks, 1]).repeat_dim(1, feature)
     }
-}
-
-fn is_cpu(device: &Device) -> bool {
-    // Deprecated in 0.22, kept as the second implementation that tests compare with.
-    #[cfg(feature = "ndarray")]
-    #[allow(deprecated)]
-    if *device == Device::ndarray() {
-        return true;
-    }
-    *device == Device::flex()
 }
 
 /// For each point a weighted sum of a few rows: bilinear corners, or the vertices of a triangle.

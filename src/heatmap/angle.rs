@@ -5,7 +5,8 @@ use std::ops::Range;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::{Analysis, Axis, Gate, Map, doppler_turns_per_loop, range_bins};
+use super::{Analysis, Axis, Gate, Map, doppler_turns_per_loop};
+use crate::grid::Grid;
 
 /// The directions that a beam visits.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,14 +74,18 @@ impl Analysis {
     ///
     /// # Panics
     /// When `maps` are not those of all antennas.
-    pub fn beam(&self, maps: &[Complex64], direction: [f64; 3], doppler: usize, bins: Range<usize>) -> Vec<Complex64> {
-        let (loops, columns) = (self.radar.loops_per_frame, range_bins(self.radar.samples_per_chirp, self.radar.sampling));
+    pub fn beam(&self, maps: &Grid<Complex64, 3>, direction: [f64; 3], doppler: usize, bins: Range<usize>) -> Vec<Complex64> {
         let weights = self.steering(direction, doppler);
-        assert_eq!(maps.len(), weights.len() * loops * columns, "beam: {} cells, {} antennas", maps.len(), weights.len());
+        assert_eq!(
+            maps.shape()[0],
+            weights.len(),
+            "beam: maps of {} antennas, of which there are {}",
+            maps.shape()[0],
+            weights.len()
+        );
         let mut beam = vec![Complex64::default(); bins.len()];
         for (channel, weight) in weights.into_iter().enumerate() {
-            let start = (channel * loops + doppler) * columns;
-            let cells = &maps[start + bins.start..start + bins.end];
+            let cells = &maps.below([channel, doppler])[bins.clone()];
             beam.iter_mut().zip(cells).for_each(|(sum, value)| *sum += weight * value);
         }
         beam

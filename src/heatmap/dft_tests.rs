@@ -43,7 +43,7 @@ fn the_graph_agrees_with_the_fft_for_lengths_that_are_no_powers_of_two() {
                 let radar = Radar { sampling, loops_per_frame: loops, samples_per_chirp: samples, ..synthetic::radar() };
                 let dims = [2, 3, loops, samples];
                 let signal = noise(dims.iter().product(), 1);
-                let wanted = Analysis::new(&radar, &config).range_doppler_complex(&signal);
+                let wanted = Analysis::new(&radar, &config).range_doppler_complex(&signal).into_values();
                 for device in &devices {
                     for (dtype, tolerance) in [(DType::F32, 1e-6), (DType::F64, 1e-13)] {
                         let transform = RangeDoppler::new(loops, samples, sampling, &config, (device, dtype));
@@ -149,7 +149,7 @@ fn wgpu_agrees_with_the_fft_in_values_and_with_flex_in_gradients() {
     let radar = Radar { loops_per_frame: loops, samples_per_chirp: samples, ..synthetic::radar() };
     let config = HeatmapConfig::default();
     let signal = noise(2 * loops * samples, 5);
-    let wanted = Analysis::new(&radar, &config).range_doppler_complex(&signal);
+    let wanted = Analysis::new(&radar, &config).range_doppler_complex(&signal).into_values();
     let gradient = |device: Device| {
         let transform = RangeDoppler::new(loops, samples, Sampling::Complex, &config, &device);
         let signal = tensor(&signal, [2, loops, samples], &device, DType::F32);

@@ -7,6 +7,7 @@ use rustfft::{Fft, FftPlanner};
 use serde::{Deserialize, Serialize};
 
 use super::{Axis, HeatmapConfig, Map, Window, range_axis, range_bins, velocity_axis};
+use crate::grid::Grid;
 use crate::radar::{Radar, Sampling};
 
 /// Borrowed IF samples, `[frame, tx, rx, loop, sample]`; the imaginary parts of a real-sampled signal are ignored.
@@ -51,26 +52,27 @@ pub enum StaticRemoval {
 pub fn remove_static(samples: Samples<'_>, removal: StaticRemoval) -> Vec<Complex32> {
     let [frames, transmitters, receivers, loops, length] = samples.dims;
     let channels = transmitters * receivers;
-    let mut values = samples.values.to_vec();
-    let start = |frame: usize, channel: usize| (frame * channels + channel) * loops * length;
+    let shape = [frames, channels, loops, length];
+    let mut values = Grid::new(["frame", "channel", "loop", "sample"], shape, samples.values.to_vec());
+    // Frames that have one mean.
+    let groups: Vec<Vec<usize>> = match removal {
+        StaticRemoval::None => Vec::new(),
+        StaticRemoval::Loops => (0..frames).map(|frame| vec![frame]).collect(),
+        StaticRemoval::Frames => vec![(0..frames).collect()],
+    };
     for channel in 0..channels {
-        let groups: Vec<Vec<usize>> = match removal {
-            StaticRemoval::None => Vec::new(),
-            StaticRemoval::Loops => (0..frames).map(|frame| vec![start(frame, channel)]).collect(),
-            StaticRemoval::Frames => vec![(0..frames).map(|frame| start(frame, channel)).collect()],
-        };
-        for starts in groups {
-            let chirps: Vec<usize> =
-                starts.iter().flat_map(|start| (0..loops).map(move |index| start + index * length)).collect();
+        for group in &groups {
+            let chirps = || group.iter().flat_map(|&frame| (0..loops).map(move |index| (frame, index)));
+            let count = (group.len() * loops) as f64;
             for sample in 0..length {
-                let sum: Complex64 = chirps.iter().map(|chirp| widen(values[chirp + sample])).sum();
-                let mean = sum / chirps.len() as f64;
+                let sum: Complex64 = chirps().map(|(frame, index)| widen(values[[frame, channel, index, sample]])).sum();
+                let mean = sum / count;
                 let mean = Complex32::new(mean.re as f32, mean.im as f32);
-                chirps.iter().for_each(|chirp| values[chirp + sample] -= mean);
+                chirps().for_each(|(frame, index)| values[[frame, channel, index, sample]] -= mean);
             }
         }
     }
-    values
+    values.into_values()
 }
 
 pub(super) fn widen(value: Complex32) -> Complex64 {
@@ -137,8 +139,8 @@ impl Analysis {
         profiles
     }
 
-    /// Complex maps of every antenna: `[…, loop, sample]` to `[…, doppler, range]`, zero Doppler in the middle.
-    pub fn range_doppler_complex(&self, signal: &[Complex32]) -> Vec<Complex64> {
+    /// Complex maps of every antenna, zero Doppler in the middle, from `[…, loop, sample]`.
+    pub fn range_doppler_complex(&self, signal: &[Complex32]) -> Grid<Complex64, 3> {
         let loops = self.radar.loops_per_frame;
         let bins = range_bins(self.radar.samples_per_chirp, self.radar.sampling);
         let mut maps = self.range_profiles(signal);
@@ -155,23 +157,25 @@ impl Analysis {
                 }
             }
         }
-        maps
+        Grid::new(["antenna", "doppler", "range"], [maps.len() / (loops * bins), loops, bins], maps)
     }
 
     /// Range-Doppler power of one frame, `[doppler, range]`, averaged over its antennas.
     ///
     /// `frame`: `[tx, rx, loop, sample]`, or any subset of antennas.
     pub fn range_doppler(&self, frame: &[Complex32]) -> Map {
-        let (rows, columns) = (self.velocity_axis(), self.range_axis());
-        let cells = rows.len() * columns.len();
-        let maps = self.range_doppler_complex(frame);
-        let antennas = maps.len() / cells;
-        let mut power = vec![0.0; cells];
-        for map in maps.chunks_exact(cells) {
-            power.iter_mut().zip(map).for_each(|(sum, value)| *sum += value.norm_sqr() / antennas as f64);
-        }
-        Map::new(rows, columns, power)
+        Map::new(self.velocity_axis(), self.range_axis(), mean_power(&self.range_doppler_complex(frame)))
     }
+}
+
+/// Power of complex maps, `[doppler, range]`, averaged over the antennas.
+pub fn mean_power(maps: &Grid<Complex64, 3>) -> Vec<f64> {
+    let [antennas, loops, bins] = maps.shape();
+    let mut power = vec![0.0; loops * bins];
+    for map in maps.values().chunks_exact(loops * bins) {
+        power.iter_mut().zip(map).for_each(|(sum, value)| *sum += value.norm_sqr() / antennas as f64);
+    }
+    power
 }
 
 #[cfg(test)]
@@ -229,8 +233,7 @@ mod tests {
                     let map = analysis.range_doppler(&signal);
                     let [row, column] = map.peak();
                     let maps = analysis.range_doppler_complex(&signal);
-                    let (cells, cell) = (map.rows.len() * map.columns.len(), row * map.columns.len() + column);
-                    let between = maps[cells + cell] * maps[cell].conj();
+                    let between = maps[[1, row, column]] * maps[[0, row, column]].conj();
                     (map.columns.values[column], map.rows.values[row], between.arg())
                 })
                 .collect();

@@ -23,11 +23,11 @@ pub use crate::paths::Phasors;
 pub use noise::{Noise, NoiseConfig, NoiseLaw};
 pub use signals::{direct_signal, indirect_signal};
 
-use burn::backend::DispatchDevice;
-use burn::tensor::{DType, Device, Tensor};
+use burn::tensor::{DType, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::complex::Complex;
+use crate::device::{is_cpu, is_flex};
 
 /// How the coherent sum is computed (setting `sum`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -72,19 +72,6 @@ pub fn coherent_sum(phasors: &Phasors, samples: usize, form: SumForm) -> Complex
         _ if is_cpu(&device) => spread::sum(phasors, samples),
         _ => split::sum(phasors, samples),
     }
-}
-
-fn is_flex(device: &Device) -> bool {
-    matches!(device.clone().without_autodiff().as_dispatch(), DispatchDevice::Flex(_))
-}
-
-/// Whether the processor itself computes: flex, or ndarray where the build has it.
-pub(crate) fn is_cpu(device: &Device) -> bool {
-    #[cfg(feature = "ndarray")]
-    if matches!(device.clone().without_autodiff().as_dispatch(), DispatchDevice::NdArray(_)) {
-        return true;
-    }
-    is_flex(device)
 }
 
 #[cfg(test)]

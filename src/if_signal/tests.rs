@@ -1,6 +1,6 @@
 use std::f64::consts::TAU;
 
-use burn::tensor::TensorData;
+use burn::tensor::{Device, TensorData};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

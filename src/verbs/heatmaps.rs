@@ -65,13 +65,36 @@ impl Pictures {
         self.maps(measured)
             .into_iter()
             .zip(self.maps(simulated))
-            .map(|(Heatmap { name, title, map: measured }, simulated)| {
-                let file = folder.join(format!("{name}.png"));
-                let (measured, simulated) = (self.db(&measured, &measured), self.db(&simulated.map, &measured));
-                pictures::comparison(&file, title, &measured, &simulated, window(&measured))?;
-                Ok((title, file))
-            })
+            .map(|(measured, simulated)| self.compared(folder, &measured, &simulated))
             .collect()
+    }
+
+    /// The same of time-Doppler alone, where there are two frames.
+    pub fn compare_time_doppler(&self, folder: &Path, measured: &[Complex32], simulated: &[Complex32]) -> Result<Drawn> {
+        let of = |samples: &[Complex32]| {
+            let dims = self.dims(samples);
+            let moving = remove_static(Samples::new(samples, dims), StaticRemoval::Loops);
+            self.time_doppler(Samples::new(&moving, dims))
+        };
+        self.compared(folder, &of(measured), &of(simulated))
+    }
+
+    fn compared(&self, folder: &Path, measured: &Heatmap, simulated: &Heatmap) -> Result<Drawn> {
+        let file = folder.join(format!("{}.png", measured.name));
+        let [measured_db, simulated_db] = [measured, simulated].map(|heatmap| self.db(&heatmap.map, &measured.map));
+        pictures::comparison(&file, measured.title, &measured_db, &simulated_db, window(&measured_db))?;
+        Ok((measured.title, file))
+    }
+
+    fn dims(&self, samples: &[Complex32]) -> [usize; 5] {
+        let [_, tx, rx, loops, length] = self.radar.dims();
+        [samples.len() / (tx * rx * loops * length), tx, rx, loops, length]
+    }
+
+    /// `moving`: without what is static.
+    fn time_doppler(&self, moving: Samples<'_>) -> Heatmap {
+        let map = self.analysis.spectrogram(moving, &Gate::default());
+        Heatmap { name: "time_doppler", title: "Time-Doppler, static removed", map }
     }
 
     /// Decibels of a power map, with the floor of the settings below the strongest cell of another.
@@ -82,9 +105,7 @@ impl Pictures {
     /// Power of every heatmap of these samples, `[frame, tx, rx, loop, sample]`. Those over time need two frames, those over
     /// azimuth two antenna pairs.
     pub fn maps(&self, samples: &[Complex32]) -> Vec<Heatmap> {
-        let [_, tx, rx, loops, length] = self.radar.dims();
-        let frames = samples.len() / (tx * rx * loops * length);
-        let dims = [frames, tx, rx, loops, length];
+        let dims @ [frames, tx, rx, ..] = self.dims(samples);
         let still = Samples::new(samples, dims);
         let moving = remove_static(still, StaticRemoval::Loops);
         let moving = Samples::new(&moving, dims);
@@ -104,7 +125,8 @@ impl Pictures {
             add("range_azimuth", "Range-azimuth, middle frame, static removed", map);
         }
         if frames > 1 {
-            add("time_doppler", "Time-Doppler, static removed", self.analysis.spectrogram(moving, &everywhere));
+            let Heatmap { name, title, map } = self.time_doppler(moving);
+            add(name, title, map);
             add("time_range", "Time-range, static removed", self.analysis.time_range(moving, &everywhere));
             if tx * rx > 1 {
                 add("time_azimuth", "Time-azimuth, static removed", self.analysis.time_angle(moving, &scan, &everywhere));

@@ -6,16 +6,17 @@ use std::{
 };
 
 use burn::tensor::Device;
-use num_complex::Complex32;
 use serde_json::json;
 
-use super::{heatmaps::window, scores};
+use super::{
+    heatmaps::{Pictures, window},
+    scores,
+};
 use crate::{
     config::Config,
     data::atomic,
     error::Result,
     evaluation::{self, Evaluation, FrameMaps, Simulation, measured_frame},
-    heatmap::{Analysis, Gate, Samples, StaticRemoval, remove_static},
     metrics::MetricsConfig,
     pictures::{
         self, Chart, Series,
@@ -83,32 +84,16 @@ impl RunReport<'_> {
 
     /// Time-Doppler needs all frames at once; a long recording shows its first minute or so.
     fn draw_over_time(&self, recording: &LoadedRecording, simulation: &Simulation<'_>) -> Result<()> {
-        let radar = &recording.scene.radar;
         let stretch = recording.recording.whole_stretch()?;
         let frames = stretch.len().min(600);
         if frames < 2 {
             return Ok(());
         }
         let shown = || stretch.clone().take(frames);
-        let analysis = Analysis::new(radar, &self.config.training.heatmap);
-        let [_, tx, rx, loops, samples] = radar.dims();
-        let map = |signal: Vec<Complex32>| {
-            let dims = [frames, tx, rx, loops, samples];
-            let moving = remove_static(Samples::new(&signal, dims), StaticRemoval::Loops);
-            analysis.spectrogram(Samples::new(&moving, dims), &Gate::default())
-        };
-        let measured =
-            map(shown().map(|frame| measured_frame(&recording.recording, frame)).collect::<Result<Vec<_>>>()?.concat());
-        let simulated = map(shown().map(|frame| simulation.frame(frame)).collect::<Result<Vec<_>>>()?.concat());
-        let floor = self.config.training.heatmap.floor_amplitude(measured.max().sqrt());
-        let (measured, simulated) = (measured.db(floor), simulated.db(floor));
-        pictures::comparison(
-            &self.folder.join("time_doppler.png"),
-            "Time-Doppler, static removed",
-            &measured,
-            &simulated,
-            window(&measured),
-        )
+        let measured = shown().map(|frame| measured_frame(&recording.recording, frame)).collect::<Result<Vec<_>>>()?.concat();
+        let simulated = shown().map(|frame| simulation.frame(frame)).collect::<Result<Vec<_>>>()?.concat();
+        let pictures = Pictures::new(&recording.scene.radar, &self.config.training.heatmap);
+        pictures.compare_time_doppler(self.folder, &measured, &simulated).map(drop)
     }
 
     fn draw_loss(&self) -> Result<()> {

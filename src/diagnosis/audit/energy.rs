@@ -120,7 +120,7 @@ pub(super) fn fit(evidence: &Evidence, shown: impl Fn(usize) -> Option<usize>, c
                 predicted[row * samples + bin.rem_euclid(samples as i64) as usize] = true;
             }
         }
-        let map = &evidence.maps()[frame * loops * samples..][..loops * samples];
+        let map = evidence.maps().below([frame]);
         let mut sums = [Sums::default(); 2];
         for cell in moving.iter().flat_map(|row| row * samples..(row + 1) * samples) {
             sums[usize::from(!predicted[cell])].add(f64::from(map[cell]).max(1.0).ln());

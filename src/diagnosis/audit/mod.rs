@@ -117,7 +117,7 @@ pub fn undecidable(evidence: &Evidence, checks: &[Check]) -> Option<String> {
         return Some(format!("saturated: {:.0} % of the samples lie at the ends of the converter's range", 100.0 * at_rail));
     }
     let strongest = (0..evidence.cube.channels()).map(|channel| strongest_still(evidence, channel)).fold(0.0, f64::max);
-    let moving = evidence.maps().iter().copied().fold(0.0, f32::max);
+    let moving = evidence.maps().values().iter().copied().fold(0.0, f32::max);
     // The mean of many cells' strongest noise value is about its logarithm.
     if strongest < RETURN && moving < RETURN as f32 {
         return Some(format!(

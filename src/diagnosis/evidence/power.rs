@@ -75,12 +75,8 @@ impl PowerModel {
         let usable = usable(&cells);
         let maps = evidence.maps();
         let size = cells.loops * cells.samples;
-        let training: Vec<(&[f32], &[Template])> = evidence
-            .split
-            .training
-            .iter()
-            .map(|&frame| (&maps[frame * size..(frame + 1) * size], templates[frame].as_slice()))
-            .collect();
+        let training: Vec<(&[f32], &[Template])> =
+            evidence.split.training.iter().map(|&frame| (maps.below([frame]), templates[frame].as_slice())).collect();
         let weights = fit_weights(&training, &usable);
         let expected: Vec<Vec<f32>> = templates.iter().map(|parts| sum(parts, &weights, size)).collect();
         let support = expected.iter().map(|map| widened(map, &cells)).collect();
@@ -148,8 +144,8 @@ impl PowerModel {
         frames: &[usize],
         expected: impl Fn(usize) -> &'a [f32] + Sync,
     ) -> f64 {
-        let (maps, size) = (evidence.maps(), self.size());
-        frames.iter().map(|&frame| log_likelihood(&maps[frame * size..(frame + 1) * size], expected(frame), &self.usable)).sum()
+        let maps = evidence.maps();
+        frames.iter().map(|&frame| log_likelihood(maps.below([frame]), expected(frame), &self.usable)).sum()
     }
 }
 

@@ -58,9 +58,8 @@ pub fn strongest(evidence: &Evidence, residual: &Residual) -> Option<Strongest> 
     let sums = |frames: &[usize]| {
         let inside = frames.iter().filter(|frame| (found.low[0]..found.high[0]).contains(frame));
         let cells = inside.flat_map(|frame| {
-            (found.low[1]..found.high[1]).flat_map(move |doppler| {
-                (found.low[2]..found.high[2]).map(move |range| (frame * residual.dims[1] + doppler) * residual.dims[2] + range)
-            })
+            (found.low[1]..found.high[1])
+                .flat_map(move |doppler| (found.low[2]..found.high[2]).map(move |range| [*frame, doppler, range]))
         });
         cells.fold((0.0, 0.0), |(sum, count), cell| {
             let weight = f64::from(residual.count[cell]);
@@ -91,13 +90,10 @@ fn rank(found: &Box3) -> f64 {
 
 /// Dyadic boxes whose halves are merged axis by axis, with their sums.
 fn all(residual: &Residual) -> Vec<Box3> {
-    let [_, loops, samples] = residual.dims;
-    let count = |[frame, doppler, range]: [usize; 3]| f64::from(residual.count[(frame * loops + doppler) * samples + range]);
-    let sum = |at @ [frame, doppler, range]: [usize; 3]| {
-        f64::from(residual.ratio[(frame * loops + doppler) * samples + range]) * count(at)
-    };
-    let (sums, counts) = (Table::new(residual.dims, sum), Table::new(residual.dims, count));
-    let scales = residual.dims.map(intervals);
+    let count = |at: [usize; 3]| f64::from(residual.count[at]);
+    let sum = |at: [usize; 3]| f64::from(residual.ratio[at]) * count(at);
+    let (sums, counts) = (Table::new(residual.shape(), sum), Table::new(residual.shape(), count));
+    let scales = residual.shape().map(intervals);
     let mut boxes = vec![];
     for frames in &scales[0] {
         for dopplers in &scales[1] {
@@ -137,7 +133,7 @@ fn overlap(a: &Box3, b: &Box3) -> bool {
 }
 
 fn region(evidence: &Evidence, residual: &Residual, cells: &Cells, found: &Box3) -> Region {
-    let [frames, loops, _] = residual.dims;
+    let [frames, loops, _] = residual.shape();
     let mut place = Place::default();
     let mut axes = vec![];
     if found.high[0] - found.low[0] < frames {

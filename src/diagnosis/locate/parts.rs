@@ -63,16 +63,15 @@ pub fn by_wall(evidence: &Evidence) -> Vec<Seen> {
 }
 
 fn seen(residual: &Residual, name: String, map: &[Vec<(u32, f32)>]) -> Option<Seen> {
-    let size = residual.dims[1] * residual.dims[2];
     let (mut sum, mut weight, mut square) = (0.0, 0.0, 0.0);
     for (frame, cells) in map.iter().enumerate() {
+        let (ratios, counts) = (residual.ratio.below([frame]), residual.count.below([frame]));
         let peak = cells.iter().map(|cell| cell.1).fold(0.0, f32::max).max(f32::MIN_POSITIVE);
         for &(cell, power) in cells {
-            let at = frame * size + cell as usize;
             let own = f64::from(power / peak);
-            let count = f64::from(residual.count[at]);
+            let count = f64::from(counts[cell as usize]);
             if count > 0.0 {
-                sum += own * count * f64::from(residual.ratio[at]);
+                sum += own * count * f64::from(ratios[cell as usize]);
                 weight += own * count;
                 square += own * own * count;
             }

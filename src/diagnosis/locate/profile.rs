@@ -23,7 +23,7 @@ pub struct Profile {
 /// One curve per axis; empty for an empty recording.
 pub fn profiles(evidence: &Evidence) -> Vec<Profile> {
     let Some(residual) = Residual::new(evidence) else { return vec![] };
-    let [frames, loops, samples] = residual.dims;
+    let [frames, loops, samples] = residual.shape();
     let cells = Cells::new(&evidence.radar);
     let mut curves = vec![
         folded(&residual, "range", "m", residual.bins, |_, _, range| range, |i| i as f64 / cells.bins_per_m),
@@ -51,9 +51,9 @@ fn folded(
     index: impl Fn(usize, usize, usize) -> usize,
     at: impl Fn(usize) -> f64,
 ) -> Profile {
-    let [_, loops, samples] = residual.dims;
+    let [_, loops, samples] = residual.shape();
     let (mut sum, mut count) = (vec![0.0; length], vec![0.0; length]);
-    for (cell, (&ratio, &weight)) in residual.ratio.iter().zip(&residual.count).enumerate() {
+    for (cell, (&ratio, &weight)) in residual.ratio.values().iter().zip(residual.count.values()).enumerate() {
         if weight > 0.0 {
             let i = index(cell / (loops * samples), cell / samples % loops, cell % samples);
             sum[i] += f64::from(ratio * weight);

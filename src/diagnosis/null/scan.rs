@@ -18,6 +18,7 @@ use crate::diagnosis::Evidence;
 use crate::diagnosis::locate::{Table, intervals};
 use crate::diagnosis::power::STILL_BINS;
 use crate::diagnosis::statistics::{exponential_scale, gumbel_tail, median};
+use crate::grid::Grid;
 
 /// Draws of the null.
 const DRAWS: u64 = 99;
@@ -31,6 +32,9 @@ const NEIGHBOURS: usize = 5;
 const MOST_VALUES: usize = 4_000_000;
 /// Squared correlation of cells under a Hann window that are one and two apart.
 const CORRELATIONS: [f64; 2] = [4.0 / 9.0, 1.0 / 36.0];
+
+/// Axes of spectra.
+const SPECTRA: [&str; 4] = ["frame", "channel", "doppler", "range"];
 
 /// Chances of an excess as strong as the strongest in noise alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,11 +59,9 @@ pub fn scan(evidence: &Evidence, seed: u64) -> Option<Chances> {
 
 /// Which cells are looked at, and what is expected there.
 struct Cells {
-    /// Frames, loops and beat frequencies.
-    dims: [usize; 3],
     channels: usize,
-    /// Expected power over the noise's, `[frame, doppler, range]`; zero for cells that are not looked at.
-    expected: Vec<f32>,
+    /// Expected power over the noise's; zero for cells that are not looked at.
+    expected: Grid<f32, 3>,
     /// All frames, those that the levels are taken from, and those held out.
     parts: [Part; 3],
 }
@@ -74,8 +76,8 @@ struct Part {
 }
 
 impl Cells {
-    /// With the spectra, `[frame, channel, doppler, range]`.
-    fn of(evidence: &Evidence) -> Option<(Self, Vec<Complex32>)> {
+    /// With the spectra.
+    fn of(evidence: &Evidence) -> Option<(Self, Grid<Complex32, 4>)> {
         let [_, _, _, loops, samples] = evidence.cube.dims;
         let (channels, bins) = (evidence.cube.channels(), evidence.range_bins());
         let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
@@ -84,13 +86,9 @@ impl Cells {
         let mut frames: Vec<usize> = training.iter().copied().step_by(step).collect();
         let first_held_out = frames.len();
         frames.extend(held_out.iter().step_by(step));
-        let rows = |&frame: &usize| (0..loops).map(move |doppler| (frame, doppler));
-        let expected: Vec<f32> = frames
-            .iter()
-            .flat_map(rows)
-            .flat_map(|(frame, doppler)| (0..bins).map(move |range| (frame, doppler, range)))
-            .map(|(frame, doppler, range)| expected(evidence, frame, doppler, doppler * samples + range))
-            .collect();
+        let expected = Grid::from_fn(["frame", "doppler", "range"], [frames.len(), loops, bins], |[frame, doppler, range]| {
+            expected(evidence, frames[frame], doppler, doppler * samples + range)
+        });
         let of_frame = |&frame: &usize| {
             let maps = (0..channels).flat_map(move |channel| {
                 let map = evidence.range_doppler(frame, channel);
@@ -98,31 +96,32 @@ impl Cells {
             });
             maps.map(|value| Complex32::new(value.re as f32, value.im as f32))
         };
-        let spectra: Vec<Complex32> = frames.par_iter().flat_map_iter(of_frame).collect();
+        let values: Vec<Complex32> = frames.par_iter().flat_map_iter(of_frame).collect();
+        let spectra = Grid::new(SPECTRA, [frames.len(), channels, loops, bins], values);
         let parts = [0..frames.len(), 0..first_held_out, first_held_out..frames.len()].map(|part| {
             let dims = [part.len(), loops, bins];
-            let looked_at = |[frame, doppler, range]: [usize; 3]| {
-                f64::from(u8::from(expected[((part.start + frame) * loops + doppler) * bins + range] > 0.0))
-            };
+            let looked_at =
+                |[frame, doppler, range]: [usize; 3]| f64::from(u8::from(expected[[part.start + frame, doppler, range]] > 0.0));
             let counts = Table::new(dims, looked_at);
             let boxes = dims.map(|length| intervals(length).into_iter().map(Interval::from).collect());
             Part { frames: part.collect(), counts, boxes }
         });
-        let usable = expected.iter().any(|power| *power > 0.0) && spectra.iter().all(|value| value.is_finite());
-        usable.then_some((Self { dims: [frames.len(), loops, bins], channels, expected, parts }, spectra))
+        let seen = expected.values().iter().any(|power| *power > 0.0);
+        let usable = seen && spectra.values().iter().all(|value| value.is_finite());
+        usable.then_some((Self { channels, expected, parts }, spectra))
     }
 
-    /// White noise under Hann windows, `[frame, channel, doppler, range]`.
-    fn noise(&self, seed: u64, stream: u64) -> Vec<Complex32> {
+    /// White noise under Hann windows.
+    fn noise(&self, seed: u64, stream: u64) -> Grid<Complex32, 4> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(stream);
-        let [frames, loops, bins] = self.dims;
+        let [frames, loops, bins] = self.expected.shape();
         // White noise has a white transform, in which a Hann window is a difference of neighbours.
         let window = |before: Complex32, here: Complex32, after: Complex32| (here * 2.0 - before - after) * 6f32.sqrt().recip();
         let mut white = vec![Complex32::ZERO; loops * bins];
         let mut along = white.clone();
-        let mut values = vec![Complex32::ZERO; frames * self.channels * loops * bins];
-        for map in values.chunks_exact_mut(loops * bins) {
+        let mut values = Grid::filled(SPECTRA, [frames, self.channels, loops, bins], Complex32::ZERO);
+        for map in values.values_mut().chunks_exact_mut(loops * bins) {
             white.fill_with(|| Complex32::new(StandardNormal.sample(&mut random), StandardNormal.sample(&mut random)));
             for (along, white) in along.chunks_exact_mut(bins).zip(white.chunks_exact(bins)) {
                 for (range, value) in along.iter_mut().enumerate() {
@@ -140,21 +139,20 @@ impl Cells {
     }
 
     /// Largest log-likelihood ratios in all frames and in both parts of them.
-    fn strongest(&self, spectra: &[Complex32]) -> Option<[f64; 3]> {
+    fn strongest(&self, spectra: &Grid<Complex32, 4>) -> Option<[f64; 3]> {
         let beams = self.beams(spectra, &self.levels(spectra)?);
         Some(self.parts.each_ref().map(|part| self.largest(&beams, part)))
     }
 
     /// Of the noise's power in the training frames, `[channel, range]`. None where a channel has none.
-    fn levels(&self, spectra: &[Complex32]) -> Option<Vec<f64>> {
-        let [_, loops, bins] = self.dims;
+    fn levels(&self, spectra: &Grid<Complex32, 4>) -> Option<Vec<f64>> {
+        let [_, loops, bins] = self.expected.shape();
         let mut levels = Vec::with_capacity(self.channels * bins);
         for channel in 0..self.channels {
             let mut powers: Vec<Vec<f64>> = vec![vec![]; bins];
-            for row in self.parts[1].frames.iter().flat_map(|frame| (0..loops).map(move |doppler| (frame, doppler))) {
-                let (frame, doppler) = row;
-                let expected = &self.expected[(frame * loops + doppler) * bins..][..bins];
-                let spectrum = &spectra[((frame * self.channels + channel) * loops + doppler) * bins..][..bins];
+            for (frame, doppler) in self.parts[1].frames.iter().flat_map(|&frame| (0..loops).map(move |doppler| (frame, doppler)))
+            {
+                let (expected, spectrum) = (self.expected.below([frame, doppler]), spectra.below([frame, channel, doppler]));
                 for ((powers, &expected), value) in powers.iter_mut().zip(expected).zip(spectrum) {
                     if expected > 0.0 {
                         powers.push(f64::from(value.norm_sqr() / expected));
@@ -176,38 +174,40 @@ impl Cells {
         Some(levels)
     }
 
-    /// Whitened power in every beam, and the mean of all last: `[beam][frame, doppler, range]`.
-    fn beams(&self, spectra: &[Complex32], levels: &[f64]) -> Vec<Vec<f32>> {
-        let [_, loops, bins] = self.dims;
-        let (channels, size) = (self.channels, loops * bins);
+    /// Whitened power in every beam, and the mean of all last.
+    fn beams(&self, spectra: &Grid<Complex32, 4>, levels: &[f64]) -> Grid<f32, 4> {
+        let [frames, loops, bins] = self.expected.shape();
+        let channels = self.channels;
         let scales: Vec<f32> = levels.iter().map(|level| (level * channels as f64).sqrt().recip() as f32).collect();
         let fft = FftPlanner::new().plan_fft_forward(channels);
         let mut scratch = vec![Complex32::ZERO; fft.get_inplace_scratch_len()];
         let mut column = vec![Complex32::ZERO; channels];
-        let mut beams = vec![vec![0.0; self.expected.len()]; channels + 1];
-        for (cell, &expected) in self.expected.iter().enumerate().filter(|(_, expected)| **expected > 0.0) {
-            let (frame, place) = (cell / size, cell % size);
+        let mut beams = Grid::filled(["beam", "frame", "doppler", "range"], [channels + 1, frames, loops, bins], 0.0);
+        let rows = (0..frames).flat_map(|frame| (0..loops).map(move |doppler| (frame, doppler)));
+        let cells = rows.flat_map(|(frame, doppler)| (0..bins).map(move |range| [frame, doppler, range]));
+        for at @ [frame, doppler, range] in cells.filter(|&at| self.expected[at] > 0.0) {
+            let expected = self.expected[at];
             for (channel, value) in column.iter_mut().enumerate() {
-                *value = spectra[(frame * channels + channel) * size + place] * scales[channel * bins + place % bins];
+                *value = spectra[[frame, channel, doppler, range]] * scales[channel * bins + range];
             }
             fft.process_with_scratch(&mut column, &mut scratch);
-            for (beam, value) in beams.iter_mut().zip(&column) {
-                beam[cell] = value.norm_sqr() / expected;
+            for (beam, value) in column.iter().enumerate() {
+                beams[[beam, frame, doppler, range]] = value.norm_sqr() / expected;
             }
-            beams[channels][cell] = column.iter().map(|value| value.norm_sqr()).sum::<f32>() / (expected * channels as f32);
+            beams[[channels, frame, doppler, range]] =
+                column.iter().map(|value| value.norm_sqr()).sum::<f32>() / (expected * channels as f32);
         }
         beams
     }
 
     /// Of all boxes of some frames, in all beams.
-    fn largest(&self, beams: &[Vec<f32>], part: &Part) -> f64 {
-        let [_, loops, bins] = self.dims;
+    fn largest(&self, beams: &Grid<f32, 4>, part: &Part) -> f64 {
+        let [_, loops, bins] = self.expected.shape();
         let [in_frames, in_doppler, in_range] = &part.boxes;
         let mut largest = 0.0f64;
-        for (beam, powers) in beams.iter().enumerate() {
+        for beam in 0..=self.channels {
             let together = if beam == self.channels { self.channels as f64 } else { 1.0 };
-            let power =
-                |[frame, doppler, range]: [usize; 3]| f64::from(powers[(part.frames[frame] * loops + doppler) * bins + range]);
+            let power = |[frame, doppler, range]: [usize; 3]| f64::from(beams[[beam, part.frames[frame], doppler, range]]);
             let sums = Table::new([part.frames.len(), loops, bins], power);
             for frames in in_frames {
                 for doppler in in_doppler {

@@ -134,7 +134,7 @@ fn of_body(skin: &[Vec<Template>], weights: &[f64]) -> f64 {
 /// Weights that training frames make most likely, and the log-likelihoods of training and held-out frames.
 fn fitted(evidence: &Evidence, model: &PowerModel, templates: &[Vec<Template>]) -> (Vec<f64>, [f64; 2]) {
     let (maps, size, usable) = (evidence.maps(), model.size(), model.usable());
-    let map = |frame: usize| &maps[frame * size..(frame + 1) * size];
+    let map = |frame: usize| maps.below([frame]);
     let training: Vec<(&[f32], &[Template])> =
         evidence.split.training.iter().map(|&frame| (map(frame), templates[frame].as_slice())).collect();
     let weights = fit_weights(&training, usable);

@@ -23,15 +23,13 @@ pub fn moves(doppler: usize, loops: usize) -> bool {
 
 /// Mean of a cell of the maps, `doppler · samples + range`, over some frames.
 pub fn mean_power(evidence: &Evidence, frames: &[usize], cell: usize) -> f64 {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
     let maps = evidence.maps();
-    frames.iter().map(|&frame| f64::from(maps[frame * loops * samples + cell])).sum::<f64>() / frames.len().max(1) as f64
+    frames.iter().map(|&frame| f64::from(maps.below([frame])[cell])).sum::<f64>() / frames.len().max(1) as f64
 }
 
 /// Log-likelihood that a cell's power in a frame, a mean over the channels of exponential laws, gains by an expected mean over noise alone.
 pub fn power_gain(evidence: &Evidence, frame: usize, cell: usize, expected: f64) -> f64 {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let (power, expected) = (f64::from(evidence.maps()[frame * loops * samples + cell]), expected.max(1.0));
+    let (power, expected) = (f64::from(evidence.maps().below([frame])[cell]), expected.max(1.0));
     evidence.cube.channels() as f64 * (power * (1.0 - 1.0 / expected) - expected.ln())
 }
 

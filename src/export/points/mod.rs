@@ -19,7 +19,7 @@ use super::{Source, contents};
 use crate::bounds;
 use crate::data::arrays::Values;
 use crate::error::{Error, Result};
-use crate::heatmap::{Analysis, HeatmapConfig};
+use crate::heatmap::{Analysis, HeatmapConfig, mean_power};
 use crate::radar::Radar;
 use cfar::{Cfar, Detection};
 use direction::Search;
@@ -149,12 +149,7 @@ impl Finder {
     /// The points of a frame, `[tx, rx, loop, sample]`, in the order of velocity, then range.
     pub fn points(&self, frame: &[num_complex::Complex32], config: &PointsConfig) -> Vec<Point> {
         let maps = self.analysis.range_doppler_complex(frame);
-        let cells = self.velocities_mps.len() * self.ranges_m.len();
-        let antennas = (maps.len() / cells) as f64;
-        let mut power = vec![0.0; cells];
-        for map in maps.chunks_exact(cells) {
-            power.iter_mut().zip(map).for_each(|(sum, value)| *sum += value.norm_sqr() / antennas);
-        }
+        let power = mean_power(&maps);
         let mut found = self.cfar.detect(&power);
         let within = |cell: &Detection| {
             let range = self.ranges_m[cell.bin];

@@ -38,10 +38,7 @@ fn alarms(radar: &Radar, config: &PointsConfig, frames: usize, seed: u64) -> [us
             );
         }
         let maps = finder.analysis.range_doppler_complex(&frame);
-        let mut power = vec![0.0; rows * bins];
-        for map in maps.chunks_exact(rows * bins) {
-            power.iter_mut().zip(map).for_each(|(sum, value)| *sum += value.norm_sqr() / (tx * rx) as f64);
-        }
+        let power = crate::heatmap::mean_power(&maps);
         found += finder.cfar.detect(&power).iter().filter(|cell| apart(cell.row, cell.bin)).count();
     }
     [found, tested * frames]

@@ -11,8 +11,9 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::bearing::{Bearing, PHASE_FLOOR_RAD, Sums, along, bearing};
+use super::cells::{Cells, used};
 use super::change::{Change, Moves};
-use super::covariance::{Array, Cells, used};
+use super::covariance::Array;
 use super::found::{AS_WELL, Found, UNEVEN};
 use super::{coupling, mismatch, places, skew};
 use crate::diagnosis::behaviour::Behaviour;
@@ -190,7 +191,7 @@ fn likelihood_gain(training: &[Sums], held_out: &[Sums], amplitudes: &[Complex64
 fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, gain: f64) -> Candidate {
     let (offset, deviation) = (bearing.sine * range_m, bearing.deviation.hypot(0.5 * PHASE_FLOOR_RAD / PI) * range_m);
     let change = Change::Offset([offset, 0.0, 0.0]);
-    let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
+    let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
     Candidate {
         id: Some(effects::pose_offset::ID),
         behaves_like: Behaviour::DirectionOffset,
@@ -221,7 +222,7 @@ fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, g
 mod tests {
     use nalgebra::{DMatrix, DVector};
 
-    use super::super::covariance::{four_receivers, walking};
+    use super::super::walking::{four_receivers, walking};
     use super::*;
     use crate::diagnosis::cube::Loaded;
     use crate::diagnosis::statistics;

@@ -78,7 +78,7 @@ pub fn one_way(evidence: &Evidence, array: &Array, alike: Option<&Found>) -> Opt
     Some(Found { candidate, likelihood: found.likelihood, explains_all: false })
 }
 
-/// `shared`: for every number that is sought, the parts of [`Numbers::coupling`](super::covariance::Numbers::coupling) that it is.
+/// `shared`: for every number that is sought, the parts of [`Numbers::coupling`](super::numbers::Numbers::coupling) that it is.
 fn estimate(array: &Array, shared: &[&[usize]]) -> Option<(Estimated, Coupling)> {
     let numbers = array.cells.numbers();
     // Of two receivers, each has one neighbour.

@@ -56,68 +56,98 @@ pub fn find(trial: &Trial) -> Vec<Candidate> {
         return vec![];
     }
     let every: Vec<usize> = (0..evidence.cube.dims[0]).collect();
-    let coarse: Vec<usize> = training.iter().copied().step_by(training.len().div_ceil(10)).collect();
     let null = trial.score(Change::Range(0.0), &every, true);
-    let body = trial.body;
-    let period = frame_period_s(body);
-    let range_m = mean_range_m(trial);
+    let fitted = alternatives(trial, &null);
+    let Some(best) = best(trial, &fitted, &null) else { return vec![] };
+    let p_value = p_value(best, &null, training);
+    let held_out = predicted(trial, best, &null) / best.inflation;
+    // What may be nothing by its own interval is nothing.
+    let nothing = best.value.abs() < 1.645 * deviation(trial, best);
+    if p_value > 0.05 || held_out <= 0.0 || nothing {
+        return vec![];
+    }
+    vec![candidate(trial, best, look_alikes(trial, &fitted, best), p_value, held_out)]
+}
 
-    let interesting = |fit: &Option<Fitted>| fit.as_ref().is_some_and(|fit| p_value(fit, &null, training) < 0.05);
-    let mut fitted = vec![];
-    let at = best_of(trial, &coarse, RANGE_GRID_M.into_iter(), Change::Range);
-    let range = refine(trial, range_bias::ID, at, 0.03, RANGE_FLOOR_M, Change::Range);
-    if interesting(&range) {
-        let offset = range.as_ref().map_or(0.0, |range| range.value);
-        let along = |offset: f64| Change::Offset([0.0, offset, 0.0]);
-        fitted.extend(refine(trial, slope_error::ID, offset / range_m, 0.03 / range_m, RANGE_FLOOR_M / range_m, Change::Scale));
-        fitted.extend(range);
-        fitted.extend(refine(trial, pose_offset::ID, offset, 0.03, RANGE_FLOOR_M, along));
-    }
-    let at = best_of(trial, &coarse, CLOCK_GRID.into_iter().map(|step| step * period), Change::Clock);
-    let clock = refine(trial, clock_offset::ID, at, 0.12 * period, CLOCK_FLOOR_S, Change::Clock);
-    let duration = (body.middle_s[every.len() - 1] - body.middle_s[0]).max(period);
-    let rate = best_of(trial, &coarse, DRIFT_GRID.into_iter(), Change::Drift);
-    if interesting(&clock) || rate != 0.0 {
-        let floor = 2.0 * CLOCK_FLOOR_S / duration;
-        fitted.extend(refine(trial, clock_drift::ID, rate, 0.24 * period / duration, floor, Change::Drift));
-    }
-    fitted.extend(clock);
+/// What could be changed to fit better, each fitted, but for what was accepted before.
+fn alternatives(trial: &Trial, null: &Score) -> Vec<Fitted> {
+    let accepted = &trial.evidence.accepted;
+    let training = &trial.evidence.split.training;
+    let coarse: Vec<usize> = training.iter().copied().step_by(training.len().div_ceil(10)).collect();
+    let mut fitted = displacements(trial, &coarse, null);
+    fitted.extend(clocks(trial, &coarse, null));
     fitted.extend(again::best(trial, &coarse));
-    fitted.extend(lost_frames(trial, &null));
+    fitted.extend(lost_frames(trial, null));
     // Clocks that were set right leave a motion that is known less well, which looks like another error of the clocks.
-    if TIMING.iter().any(|id| evidence.accepted.contains(id)) {
+    if TIMING.iter().any(|id| accepted.contains(id)) {
         fitted.retain(|fit| !TIMING.contains(&fit.id));
     }
     // A ramp's slope is wrong by no more than the library allows it.
     let most_slope = slope_error::INFO.parameters[0].most;
-    fitted.retain(|fit| !evidence.accepted.contains(&fit.id) && (fit.id != slope_error::ID || fit.value.abs() <= most_slope));
+    fitted.retain(|fit| !accepted.contains(&fit.id) && (fit.id != slope_error::ID || fit.value.abs() <= most_slope));
+    fitted
+}
 
-    // Alternatives are compared where all of them know the motion, where there is such a frame.
+/// Worth a closer look.
+fn is_interesting(trial: &Trial, fit: Option<&Fitted>, null: &Score) -> bool {
+    fit.is_some_and(|fit| p_value(fit, null, &trial.evidence.split.training) < 0.05)
+}
+
+/// Along the line of sight: all ranges, their scale, where the body stands.
+fn displacements(trial: &Trial, coarse: &[usize], null: &Score) -> Vec<Fitted> {
+    let range_m = mean_range_m(trial);
+    let at = best_of(trial, coarse, RANGE_GRID_M.into_iter(), Change::Range);
+    let range = refine(trial, range_bias::ID, at, 0.03, RANGE_FLOOR_M, Change::Range);
+    let Some(range) = range.filter(|range| is_interesting(trial, Some(range), null)) else { return vec![] };
+    let offset = range.value;
+    let along = |offset: f64| Change::Offset([0.0, offset, 0.0]);
+    let scale = refine(trial, slope_error::ID, offset / range_m, 0.03 / range_m, RANGE_FLOOR_M / range_m, Change::Scale);
+    let stands = refine(trial, pose_offset::ID, offset, 0.03, RANGE_FLOOR_M, along);
+    scale.into_iter().chain([range]).chain(stands).collect()
+}
+
+/// The motion's clock: its rate, where that may be the cause, and its offset.
+fn clocks(trial: &Trial, coarse: &[usize], null: &Score) -> Vec<Fitted> {
+    let body = trial.body;
+    let period = frame_period_s(body);
+    let at = best_of(trial, coarse, CLOCK_GRID.into_iter().map(|step| step * period), Change::Clock);
+    let clock = refine(trial, clock_offset::ID, at, 0.12 * period, CLOCK_FLOOR_S, Change::Clock);
+    let duration = (body.middle_s[trial.evidence.cube.dims[0] - 1] - body.middle_s[0]).max(period);
+    let rate = best_of(trial, coarse, DRIFT_GRID.into_iter(), Change::Drift);
+    let mut fitted = vec![];
+    if is_interesting(trial, clock.as_ref(), null) || rate != 0.0 {
+        let floor = 2.0 * CLOCK_FLOOR_S / duration;
+        fitted.extend(refine(trial, clock_drift::ID, rate, 0.24 * period / duration, floor, Change::Drift));
+    }
+    fitted.extend(clock);
+    fitted
+}
+
+/// Of several alternatives, compared where all of them know the motion, where there is such a frame.
+fn best<'a>(trial: &Trial, fitted: &'a [Fitted], null: &Score) -> Option<&'a Fitted> {
+    let training = &trial.evidence.split.training;
     let known = |frame: &usize| fitted.iter().all(|fit| fit.score.known[*frame]);
     let common: Vec<usize> = training.iter().copied().filter(known).collect();
     let common = if common.is_empty() { training } else { &common };
     // A pose has four parameters of which one is fitted: it must be better by what the others could gain.
     let gain = |fit: &Fitted| {
         let occam = if fit.id == pose_offset::ID { 1.5 * (training.len() as f64).ln() * fit.inflation } else { 0.0 };
-        fit.score.gain_over(&null, common) - occam
+        fit.score.gain_over(null, common) - occam
     };
-    let Some(best) = (0..fitted.len()).max_by(|&a, &b| gain(&fitted[a]).total_cmp(&gain(&fitted[b]))) else { return vec![] };
-    let best_fit = &fitted[best];
-    let p_value = p_value(best_fit, &null, training);
-    let held_out = predicted(trial, best_fit, &null) / best_fit.inflation;
-    // What may be nothing by its own interval is nothing.
-    let nothing = best_fit.value.abs() < 1.645 * deviation(trial, best_fit);
-    if p_value > 0.05 || held_out <= 0.0 || nothing {
-        return vec![];
-    }
-    let close =
-        |fit: &&Fitted| fit.id != best_fit.id && best_fit.score.gain_over(&fit.score, &every) / best_fit.inflation < ALIKE_NATS;
+    fitted.iter().max_by(|a, b| gain(a).total_cmp(&gain(b)))
+}
+
+/// What this recording hardly tells from the best alternative.
+fn look_alikes(trial: &Trial, fitted: &[Fitted], best: &Fitted) -> Vec<&'static str> {
+    let evidence = trial.evidence;
+    let every: Vec<usize> = (0..evidence.cube.dims[0]).collect();
+    let close = |fit: &&Fitted| fit.id != best.id && best.score.gain_over(&fit.score, &every) / best.inflation < ALIKE_NATS;
     let mut look_alikes: Vec<&'static str> = fitted.iter().filter(close).map(|fit| fit.id).collect();
     // A body that stands aside may stand nearer or farther as well.
-    if ALONG.contains(&best_fit.id) && evidence.accepted.contains(&pose_offset::ID) && !look_alikes.contains(&pose_offset::ID) {
+    if ALONG.contains(&best.id) && evidence.accepted.contains(&pose_offset::ID) && !look_alikes.contains(&pose_offset::ID) {
         look_alikes.push(pose_offset::ID);
     }
-    vec![candidate(trial, best_fit, look_alikes, p_value, held_out)]
+    look_alikes
 }
 
 /// The best of some values on a few frames, with the parts' weights of each: those of a body in the wrong place are far off.
@@ -242,11 +272,10 @@ fn deviation(trial: &Trial, fit: &Fitted) -> f64 {
     fit.deviation.hypot(0.5 * fit.floor).hypot(rough)
 }
 
-fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, gain: f64) -> Candidate {
-    let evidence = trial.evidence;
-    let deviation = deviation(trial, fit).hypot(SCENE * fit.floor);
+/// Numbers, stage and statement of a change. `deviation`: of its value.
+fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> (Vec<Estimate>, Stage, String) {
     let normal = |name| vec![Estimate::normal(name, fit.value, deviation)];
-    let (estimates, stage, statement) = match fit.score.change {
+    match fit.score.change {
         Change::Range(_) => (
             normal("offset_m"),
             Stage::Scene,
@@ -289,13 +318,18 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
             Stage::Timing,
             format!("From frame {at} on the body is {count} frame(s) later in its motion: frames were lost there."),
         ),
-    };
-    let place = match fit.score.change {
+    }
+}
+
+fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, gain: f64) -> Candidate {
+    let (evidence, change) = (trial.evidence, fit.score.change);
+    let (estimates, stage, statement) = described(trial, fit, deviation(trial, fit).hypot(SCENE * fit.floor));
+    let place = match change {
         Change::Drop { at, .. } => Place { frames: Some((at..evidence.cube.dims[0]).collect()), ..Place::at(stage) },
         Change::Again(echo) => again::place(trial, echo),
         _ => Place::at(stage),
     };
-    let (moves, change) = (Moves::new(evidence.radar.centre_m()), fit.score.change);
+    let moves = Moves::new(evidence.radar.centre_m());
     Candidate {
         id: Some(fit.id),
         behaves_like: match stage {
@@ -319,7 +353,7 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
 
 /// Energy that is misplaced: all that moves.
 fn energy(evidence: &Evidence) -> f64 {
-    let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
+    let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
     total * evidence.noise().iter().sum::<f64>()
 }
 

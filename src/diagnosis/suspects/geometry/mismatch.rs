@@ -9,7 +9,8 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::covariance::{Array, Cells};
+use super::cells::Cells;
+use super::covariance::Array;
 use super::found::{Found, LOOKS};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::estimated::Estimated;
@@ -135,7 +136,7 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
 #[cfg(test)]
 mod tests {
     use super::super::bearing::Bearing;
-    use super::super::covariance::walking;
+    use super::super::walking::walking;
     use super::*;
     use crate::diagnosis::cube::Loaded;
 

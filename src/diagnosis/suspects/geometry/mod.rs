@@ -2,6 +2,7 @@
 
 mod again;
 mod bearing;
+mod cells;
 mod change;
 mod channels;
 mod coupling;
@@ -10,10 +11,13 @@ mod displaced;
 mod fitted;
 mod found;
 mod mismatch;
+mod numbers;
 mod places;
 mod skew;
 mod standing;
 mod trial;
+#[cfg(test)]
+mod walking;
 
 use change::Moves;
 use channels::Observed;

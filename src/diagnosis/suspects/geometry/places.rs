@@ -7,7 +7,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::covariance::{Array, Cells};
+use super::cells::Cells;
+use super::covariance::Array;
 use super::found::{Found, LOOKS};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::estimated::Estimated;
@@ -53,7 +54,7 @@ fn candidate(evidence: &Evidence, cells: &Cells, directions: &DMatrix<f64>, foun
         .collect();
     let list = offsets.iter().map(|offset| format!("{:.0}", 1e6 * offset)).collect::<Vec<_>>().join(", ");
     let growth = found.values.norm();
-    let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
+    let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
     Candidate {
         id: Some(effects::antenna_position::ID),
         behaves_like: Behaviour::PhaseBetweenReceivers,

@@ -67,7 +67,7 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, gain: f64)
     let beat_hz = 2.0 * radar.slope_hz_per_s * mean_m / SPEED_OF_LIGHT;
     let turns: Vec<f64> = places.iter().map(|x| -size * wave * x / beat_hz).collect();
     let farthest = turns.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-    let total: f64 = evidence.maps().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
+    let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
     Some(Candidate {
         id: None,
         behaves_like: Behaviour::DelayProportionalPhaseByReceiver,

@@ -47,9 +47,10 @@ impl Score {
 
 impl<'a> Trial<'a> {
     pub fn new(evidence: &'a Evidence, model: &'a PowerModel, body: &'a BodyPrediction) -> Self {
-        let (maps, size) = (evidence.maps(), model.size());
-        let empty = maps
-            .par_chunks_exact(size)
+        let empty = evidence
+            .maps()
+            .values()
+            .par_chunks_exact(model.size())
             .map(|map| {
                 let usable = map.iter().zip(model.usable()).filter(|(_, usable)| **usable);
                 usable.map(|(&power, _)| heavy_tailed(power, 1.0)).sum()
@@ -61,7 +62,7 @@ impl<'a> Trial<'a> {
     /// `among`: frames to look at; others stay zero and outside. `refit`: the weights, else those of the unchanged body
     /// are kept.
     pub fn score(&self, change: Change, among: &[usize], refit: bool) -> Score {
-        let (maps, size) = (self.evidence.maps(), self.model.size());
+        let maps = self.evidence.maps();
         let made: Vec<(usize, Reach, bool)> = among
             .par_iter()
             .map(|&frame| {
@@ -69,7 +70,7 @@ impl<'a> Trial<'a> {
                 let again = if let Change::Again(echo) = change { Some(echo) } else { None };
                 let points = self.body.with_echoes(&self.evidence.radar, points, again);
                 let templates = part_templates(&self.evidence.radar, &self.model.cells, &points, self.body.parts.len());
-                (frame, Reach::new(&maps[frame * size..(frame + 1) * size], &templates, self.model.usable()), inside)
+                (frame, Reach::new(maps.below([frame]), &templates, self.model.usable()), inside)
             })
             .collect();
         let mut weights = self.model.weights.clone();

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::coloured::FINE;
 use super::pendulum::{Law, at};
 use super::scene::Scene;
+use crate::grid::Grid;
 
 /// Energies of the motion in a frame over the noise that are tried: up to those of a body that is near.
 pub const LEVELS: [f32; 6] = [3.0, 12.0, 60.0, 600.0, 6e3, 6e4];
@@ -40,26 +41,33 @@ pub struct SinusoidalMotion {
     pub log_power: f64,
 }
 
-/// Log-likelihoods gained by a motion's energy in a place, `[frame][beam][doppler · range]` for each level.
+/// Log-likelihoods gained by a motion's energy in a place, frame by frame, for each level.
 pub struct Table {
     pub sines: Vec<f64>,
-    pub rows: i64,
-    pub columns: i64,
     /// Of the middle of every frame.
     pub times_s: Vec<f64>,
-    pub cells: Vec<Vec<Vec<Gains>>>,
+    pub cells: Vec<Grid<Gains, 3>>,
     /// The same, of the best of the cells around.
-    pub around: Vec<Vec<Vec<Gains>>>,
+    pub around: Vec<Grid<Gains, 3>>,
 }
+
+/// Axes of a table's frames, on the fine grid.
+pub const CELLS: [&str; 3] = ["beam", "doppler", "range"];
 
 pub type Gains = [f32; LEVELS.len()];
 
 impl Table {
+    /// Doppler and range cells of the fine grid.
+    fn size(&self) -> [usize; 2] {
+        self.cells.first().map_or([0, 0], |cells| [cells.shape()[1], cells.shape()[2]])
+    }
+
     fn gain(&self, places: &[(i64, i64)], beam: usize) -> (f32, usize) {
         let mut sums = [0.0f32; LEVELS.len()];
+        let [rows, columns] = self.size().map(|length| length as i64);
         for (cells, &(doppler, range)) in self.cells.iter().zip(places) {
-            if (0..self.columns).contains(&range) {
-                let cell = &cells[beam][(doppler.rem_euclid(self.rows) * self.columns + range) as usize];
+            if (0..columns).contains(&range) {
+                let cell = &cells[[beam, doppler.rem_euclid(rows) as usize, range as usize]];
                 sums.iter_mut().zip(cell).for_each(|(sum, gain)| *sum += gain);
             }
         }
@@ -69,8 +77,9 @@ impl Table {
     /// Of a law at every range that it may be laid to.
     fn along(&self, places: &[(i64, i64)], beam: usize, sums: &mut [Gains]) {
         sums.fill([0.0; LEVELS.len()]);
+        let rows = self.size()[0] as i64;
         for (cells, &(doppler, step)) in self.around.iter().zip(places) {
-            let row = &cells[beam][(doppler.rem_euclid(self.rows) * self.columns) as usize..][..self.columns as usize];
+            let row = cells.below([beam, doppler.rem_euclid(rows) as usize]);
             let (from, to) = (step.max(0) as usize, (-step).max(0) as usize);
             for (sum, gain) in sums.iter_mut().skip(to).zip(row.iter().skip(from)) {
                 sum.iter_mut().zip(gain).for_each(|(sum, gain)| *sum += gain);
@@ -92,7 +101,7 @@ impl Table {
         let rates: Vec<f64> = rates(scene, length_s).collect();
         let of_rate = |&rate_hz: &f64| -> (Vec<(f32, SinusoidalMotion)>, f64) {
             let (mut kept, mut tried): (Vec<(f32, SinusoidalMotion)>, f64) = (vec![], 0.0);
-            let mut sums = vec![[0.0; LEVELS.len()]; self.columns as usize];
+            let mut sums = vec![[0.0; LEVELS.len()]; self.size()[1]];
             for (excursion_m, bins) in excursions(scene, rate_hz, 1) {
                 // Neighbours are two cells of the fine grid apart.
                 let phases = (0.5 * TAU * FINE as f64 * bins.max(excursion_m * scene.model.cells.bins_per_m)).ceil();
@@ -148,10 +157,11 @@ impl Table {
     /// is not steady about a thing that stands still, which never moves.
     pub fn standing(&self, ranges: RangeInclusive<i64>) -> Option<(Standing, f64)> {
         let places = |doppler: i64, range: i64| vec![(doppler, range); self.times_s.len()];
+        let [rows, columns] = self.size().map(|length| length as i64);
         let mut best: Option<Standing> = None;
         let mut tried = 0.0;
-        for range in ranges.filter(|range| (0..self.columns).contains(range)) {
-            for doppler in 0..self.rows {
+        for range in ranges.filter(|range| (0..columns).contains(range)) {
+            for doppler in 0..rows {
                 for (beam, &sine) in self.sines.iter().enumerate() {
                     tried += LEVELS.len() as f64;
                     let (gain, level) = self.gain(&places(doppler, range), beam);
@@ -252,19 +262,19 @@ pub fn climb<const N: usize, T: Copy>(
     (now, best)
 }
 
-/// By level, of every cell and its neighbours, `[doppler · range]`.
-pub fn around(cells: &[Gains], rows: usize) -> Vec<Gains> {
-    let columns = cells.len() / rows;
-    let better = |best: &mut Gains, other: &Gains| best.iter_mut().zip(other).for_each(|(best, gain)| *best = best.max(*gain));
-    let mut along = cells.to_vec();
-    for (cell, best) in along.iter_mut().enumerate() {
-        let (row, column) = (cell / columns, cell % columns);
-        (column.saturating_sub(1)..(column + 2).min(columns)).for_each(|near| better(best, &cells[row * columns + near]));
-    }
-    let mut around = along.clone();
-    for (cell, best) in around.iter_mut().enumerate() {
-        let (row, column) = (cell / columns, cell % columns);
-        [(row + 1) % rows, (row + rows - 1) % rows].into_iter().for_each(|near| better(best, &along[near * columns + column]));
-    }
-    around
+/// By level, the best of every cell and its neighbours.
+pub fn around(cells: &Grid<Gains, 3>) -> Grid<Gains, 3> {
+    let [_, rows, columns] = cells.shape();
+    let best = |mut best: Gains, other: &Gains| {
+        best.iter_mut().zip(other).for_each(|(best, gain)| *best = best.max(*gain));
+        best
+    };
+    let along = Grid::from_fn(CELLS, cells.shape(), |[beam, row, column]| {
+        let near = column.saturating_sub(1)..(column + 2).min(columns);
+        cells.below([beam, row])[near].iter().fold(cells[[beam, row, column]], best)
+    });
+    Grid::from_fn(CELLS, cells.shape(), |[beam, row, column]| {
+        let near = [(row + 1) % rows, (row + rows - 1) % rows];
+        near.into_iter().fold(along[[beam, row, column]], |now, near| best(now, &along[[beam, near, column]]))
+    })
 }

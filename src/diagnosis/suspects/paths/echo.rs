@@ -6,14 +6,16 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::factor::{Fit, Match, fit, matches};
+use super::mover::energy;
 use super::scene::Scene;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::transform;
-use crate::diagnosis::locate::CELLS_PER_VALUE;
+use crate::diagnosis::finding::Undo;
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Volume};
 use crate::effects::{self, Stage};
-use crate::radar::SPEED_OF_LIGHT;
+use crate::radar::{Radar, SPEED_OF_LIGHT};
 
 /// Delays that are tried, half cells of range.
 const MOST_HALF_CELLS: usize = 60;
@@ -24,156 +26,115 @@ const STRONGEST_COPY: f64 = 0.7;
 /// And not as weak as what sidelobes share with the main lobe.
 const WEAKEST_COPY: f64 = 0.02;
 
-/// What one complex factor of a template gains.
-pub struct Fit {
-    pub factor: Complex64,
-    pub training: f64,
-    pub held_out: f64,
-    /// Standard deviation of the factor's real and imaginary part.
-    pub deviation: f64,
-}
-
-/// Sums of conj(template) · measured and |template|², over the noise, of one frame.
-#[derive(Clone, Copy, Default)]
-pub struct Match {
-    product: Complex64,
-    energy: f64,
-}
-
-pub fn fit(scene: &Scene, matches: &[Match]) -> Fit {
-    let split = &scene.evidence.split;
-    let sum = |frames: &[usize]| {
-        frames.iter().fold(Match::default(), |sum, &frame| Match {
-            product: sum.product + matches[frame].product,
-            energy: sum.energy + matches[frame].energy,
-        })
-    };
-    let (training, held_out) = (sum(&split.training), sum(&split.held_out));
-    let factor = training.product / training.energy.max(f64::MIN_POSITIVE);
-    // |z|² − |z − κ q|², over the noise.
-    let gain = |m: Match| (2.0 * (factor.conj() * m.product).re - factor.norm_sqr() * m.energy) / CELLS_PER_VALUE;
-    Fit {
-        factor,
-        training: gain(training),
-        held_out: gain(held_out),
-        deviation: (CELLS_PER_VALUE / (2.0 * training.energy.max(f64::MIN_POSITIVE))).sqrt(),
-    }
-}
-
-/// Per frame, templates `[doppler, range]` of every channel against what is measured, in free cells.
-pub fn matches(scene: &Scene, template: impl Fn(usize, usize) -> Vec<Complex64> + Sync) -> Vec<Match> {
-    let noise = scene.evidence.noise();
-    (0..scene.frames())
-        .into_par_iter()
-        .map(|frame| {
-            let (taken, base) = (scene.reached(frame), scene.base(frame));
-            let mut sum = Match::default();
-            for (channel, noise) in noise.iter().enumerate() {
-                let measured = scene.evidence.range_doppler(frame, channel);
-                let map = template(frame, channel);
-                for cell in (0..taken.len()).filter(|&cell| !taken[cell]) {
-                    let weight = 1.0 / (noise.max(f64::MIN_POSITIVE) * scene.shape[cell % scene.samples] * f64::from(base[cell]));
-                    sum.product += map[cell].conj() * measured[cell] * weight;
-                    sum.energy += map[cell].norm_sqr() * weight;
-                }
-            }
-            sum
-        })
-        .collect()
-}
-
 /// `body_multibounce`: the body once more, a fixed way later.
 pub fn multibounce(scene: &Scene, tried: f64) -> Option<Candidate> {
     // Products of the signal with itself repeat the body, too.
     if scene.evidence.accepted_unnamed.contains(&Behaviour::Quadratic) {
         return None;
     }
-    let half_cells: Vec<usize> = (1..=MOST_HALF_CELLS.min(scene.bins)).collect();
-    let sums = shifted_matches(scene, half_cells.len());
-    let best = half_cells
-        .iter()
-        .filter(|shift| **shift >= LEAST_HALF_CELLS)
-        .map(|&shift| (shift, fit(scene, &sums.iter().map(|by_shift| by_shift[shift - 1]).collect::<Vec<_>>())))
-        .max_by(|a, b| a.1.training.total_cmp(&b.1.training))?;
-    let coarse = best.1;
-    if coarse.held_out < super::LEAST_GAIN {
-        return None;
-    }
-    // Between half cells by the templates themselves.
-    let radar = &scene.evidence.radar;
-    let later = |extra_m: f64| {
-        let rate = std::f64::consts::TAU * radar.slope_hz_per_s * 2.0 * extra_m / SPEED_OF_LIGHT / radar.sample_rate_hz;
-        matches(scene, |frame, channel| {
-            let copy: Vec<Complex64> = (scene.evidence.moving(frame, channel).iter().enumerate())
-                .map(|(i, value)| value * Complex64::cis(rate * (i % scene.samples) as f64))
-                .collect();
-            let mut map = transform(&copy, scene.samples);
-            for (cell, value) in map.iter_mut().enumerate() {
-                // The copy's noise is no template.
-                let source = (cell % scene.samples) as f64 - extra_m * scene.model.cells.bins_per_m;
-                let source = source.round().rem_euclid(scene.samples as f64) as usize % scene.samples;
-                if !scene.model.support(frame)[cell / scene.samples * scene.samples + source] {
-                    *value = Complex64::ZERO;
-                }
-            }
-            map
-        })
-    };
-    let (extra_m, found) = (-3..=3)
-        .map(|step| scene.range_m(0.5 * best.0 as f64 + f64::from(step) / 8.0))
-        .filter(|extra_m| *extra_m > 0.0)
-        .map(|extra_m| (extra_m, fit(scene, &later(extra_m))))
-        .max_by(|a, b| a.1.training.total_cmp(&b.1.training))?;
-    let p_value = corrected((-(found.training + found.held_out).max(0.0)).exp(), tried * MOST_HALF_CELLS as f64);
-    if found.held_out < super::LEAST_GAIN || p_value > 1e-3 || !(WEAKEST_COPY..STRONGEST_COPY).contains(&found.factor.norm()) {
-        return None;
-    }
+    let copy = Bounce::between(scene, half_cells(scene)?)?;
+    let p_value = corrected((-(copy.fit.training + copy.fit.held_out).max(0.0)).exp(), tried * MOST_HALF_CELLS as f64);
+    let is_likely = copy.fit.held_out >= super::LEAST_GAIN && p_value <= 1e-3;
+    let is_bounce = (WEAKEST_COPY..STRONGEST_COPY).contains(&copy.fit.factor.norm());
     // Nothing comes before its cause: what looks the same in front of the body is a distortion.
-    if fit(scene, &later(-extra_m)).held_out > 0.2 * found.held_out {
-        return None;
-    }
-    let (factor, still) = (found.factor, scene.evidence.still().to_vec());
-    let rate = std::f64::consts::TAU * radar.slope_hz_per_s * 2.0 * extra_m / SPEED_OF_LIGHT / radar.sample_rate_hz;
-    let samples = scene.samples;
-    let body: f64 = (0..scene.frames())
-        .flat_map(|frame| (0..scene.size()).map(move |cell| (frame, cell)))
-        .filter(|&(frame, cell)| scene.model.support(frame)[cell])
-        .map(|(frame, cell)| f64::from(scene.map(frame)[cell] - 1.0))
-        .sum();
-    let mut place = Place::at(Stage::Propagation);
-    place.range_m = None;
-    let step_m = scene.range_m(0.125);
-    Some(Candidate {
-        id: Some(effects::body_multibounce::ID),
-        behaves_like: Behaviour::PathLike,
-        estimates: vec![Estimate::normal("extra_m", extra_m, 0.4 * step_m)],
-        choice: None,
-        place,
-        p_value,
-        gain: found.held_out,
-        errs_alike: false,
-        look_alikes: vec![],
-        statement: format!(
-            "The body's return comes a second time, {extra_m:.2} m behind itself and {:.0} dB weaker, with the body's own Doppler: \
-             it bounced between parts of the body.",
-            -20.0 * factor.norm().max(1e-12).log10()
-        ),
-        curve: None,
-        energy: factor.norm_sqr() * super::mover::energy(scene, body / 2.25),
-        correction: Correction::Inverse(
-            Arc::new(move |cube: &mut Cube| {
-                cube.each_chirp(|[_, channel, _], chirp| {
-                    let still = &still[channel * samples..][..samples];
-                    for (n, value) in chirp.iter_mut().enumerate() {
-                        // The measured signal holds the copy, too: undo 1 + κ D, to third order.
-                        let copy = factor * Complex64::cis(rate * n as f64);
-                        *value -= (*value - still[n]) * copy * (1.0 - copy + copy * copy);
-                    }
-                });
-            }),
-            Volume::BY_SAMPLE,
-        ),
+    let found = is_likely && is_bounce && fit(scene, &later(scene, -copy.extra_m)).held_out <= 0.2 * copy.fit.held_out;
+    found.then(|| copy.candidate(scene, p_value))
+}
+
+/// How many half cells of range later the copy is that explains most.
+fn half_cells(scene: &Scene) -> Option<usize> {
+    let most = MOST_HALF_CELLS.min(scene.bins);
+    let sums = shifted_matches(scene, most);
+    let of_shift = |shift: usize| fit(scene, &sums.iter().map(|by_shift| by_shift[shift - 1]).collect::<Vec<_>>());
+    let (shift, best) =
+        (LEAST_HALF_CELLS..=most).map(|shift| (shift, of_shift(shift))).max_by(|a, b| a.1.training.total_cmp(&b.1.training))?;
+    (best.held_out >= super::LEAST_GAIN).then_some(shift)
+}
+
+/// Phase per sample that a longer way adds.
+fn rate(radar: &Radar, extra_m: f64) -> f64 {
+    std::f64::consts::TAU * radar.slope_hz_per_s * 2.0 * extra_m / SPEED_OF_LIGHT / radar.sample_rate_hz
+}
+
+/// By frame: what is measured against what moves, so much farther.
+fn later(scene: &Scene, extra_m: f64) -> Vec<Match> {
+    let (samples, rate) = (scene.samples, rate(&scene.evidence.radar, extra_m));
+    matches(scene, |frame, channel| {
+        let copy: Vec<Complex64> = (scene.evidence.moving(frame, channel).iter().enumerate())
+            .map(|(i, value)| value * Complex64::cis(rate * (i % samples) as f64))
+            .collect();
+        let mut map = transform(&copy, samples);
+        for (cell, value) in map.iter_mut().enumerate() {
+            // The copy's noise is no template.
+            let source = (cell % samples) as f64 - extra_m * scene.model.cells.bins_per_m;
+            let source = source.round().rem_euclid(samples as f64) as usize % samples;
+            if !scene.model.support(frame)[cell / samples * samples + source] {
+                *value = Complex64::ZERO;
+            }
+        }
+        map
     })
+}
+
+/// The body's return once more, so much farther.
+struct Bounce {
+    extra_m: f64,
+    fit: Fit,
+}
+
+impl Bounce {
+    /// Between half cells by the templates themselves.
+    fn between(scene: &Scene, half_cells: usize) -> Option<Self> {
+        (-3..=3)
+            .map(|step| scene.range_m(0.5 * half_cells as f64 + f64::from(step) / 8.0))
+            .filter(|extra_m| *extra_m > 0.0)
+            .map(|extra_m| Self { extra_m, fit: fit(scene, &later(scene, extra_m)) })
+            .max_by(|a, b| a.fit.training.total_cmp(&b.fit.training))
+    }
+
+    fn candidate(&self, scene: &Scene, p_value: f64) -> Candidate {
+        let (extra_m, factor) = (self.extra_m, self.fit.factor);
+        let body: f64 = (0..scene.frames())
+            .flat_map(|frame| (0..scene.size()).map(move |cell| (frame, cell)))
+            .filter(|&(frame, cell)| scene.model.support(frame)[cell])
+            .map(|(frame, cell)| f64::from(scene.map(frame)[cell] - 1.0))
+            .sum();
+        let step_m = scene.range_m(0.125);
+        Candidate {
+            id: Some(effects::body_multibounce::ID),
+            behaves_like: Behaviour::PathLike,
+            estimates: vec![Estimate::normal("extra_m", extra_m, 0.4 * step_m)],
+            choice: None,
+            place: Place::at(Stage::Propagation),
+            p_value,
+            gain: self.fit.held_out,
+            errs_alike: false,
+            look_alikes: vec![],
+            statement: format!(
+                "The body's return comes a second time, {extra_m:.2} m behind itself and {:.0} dB weaker, with the body's own \
+                 Doppler: it bounced between parts of the body.",
+                -20.0 * factor.norm().max(1e-12).log10()
+            ),
+            curve: None,
+            energy: factor.norm_sqr() * energy(scene, body / 2.25),
+            correction: Correction::Inverse(self.undo(scene), Volume::BY_SAMPLE),
+        }
+    }
+
+    fn undo(&self, scene: &Scene) -> Undo {
+        let (factor, rate, samples) = (self.fit.factor, rate(&scene.evidence.radar, self.extra_m), scene.samples);
+        let still = scene.evidence.still().to_vec();
+        Arc::new(move |cube: &mut Cube| {
+            cube.each_chirp(|[_, channel, _], chirp| {
+                let still = &still[channel * samples..][..samples];
+                for (n, value) in chirp.iter_mut().enumerate() {
+                    // The measured signal holds the copy, too: undo 1 + κ D, to third order.
+                    let copy = factor * Complex64::cis(rate * n as f64);
+                    *value -= (*value - still[n]) * copy * (1.0 - copy + copy * copy);
+                }
+            });
+        })
+    }
 }
 
 /// By frame and shift (half cells of range, from one on): the body's cells against those so far behind them.

@@ -3,12 +3,13 @@
 
 use rayon::prelude::*;
 
-use super::bank::{Gains, LEVELS, SinusoidalMotion, Table, around, climb, laws, widths};
+use super::bank::{CELLS, Gains, LEVELS, SinusoidalMotion, Table, around, climb, laws, widths};
 use super::beams::{Beams, Look};
 use super::mover::middle_s;
 use super::pendulum::{Law, at};
 use super::scene::Scene;
 use crate::diagnosis::cube::folds;
+use crate::grid::Grid;
 
 /// Degrees of freedom of the heavy tail of the body's powers about their mean.
 const TAIL: f64 = 8.0;
@@ -62,22 +63,19 @@ impl Ground<'_> {
     }
 
     pub fn table(&self, frames: &[usize]) -> Table {
-        let (rows, columns) = (self.beams.rows(), self.beams.columns());
-        let of_frame = |&frame: &usize| -> (Vec<Vec<Gains>>, Vec<Vec<Gains>>) {
-            let of_beam = |looks: Vec<Look>| {
-                let gains = |cell: usize| {
-                    let gained = self.gained(looks[cell]);
-                    LEVELS.map(|level| gained(level.into()) as f32)
-                };
-                let cells: Vec<Gains> = (0..rows * columns).map(|cell| gains(cell % columns * rows + cell / columns)).collect();
-                let around = around(&cells, rows);
-                (cells, around)
-            };
-            self.beams.looks(frame).into_iter().map(of_beam).unzip()
+        let of_frame = |&frame: &usize| -> (Grid<Gains, 3>, Grid<Gains, 3>) {
+            let looks = self.beams.looks(frame);
+            let [beams, ranges, dopplers] = looks.shape();
+            let cells = Grid::from_fn(CELLS, [beams, dopplers, ranges], |[beam, doppler, range]| {
+                let gained = self.gained(looks[[beam, range, doppler]]);
+                LEVELS.map(|level| gained(level.into()) as f32)
+            });
+            let around = around(&cells);
+            (cells, around)
         };
         let (cells, around) = frames.par_iter().map(of_frame).unzip();
         let times_s = frames.iter().map(|&frame| middle_s(self.scene, frame)).collect();
-        Table { sines: self.beams.sines.clone(), rows: rows as i64, columns: columns as i64, times_s, cells, around }
+        Table { sines: self.beams.sines.clone(), times_s, cells, around }
     }
 
     pub fn place(&self, law: Law, frame: usize) -> (f64, f64) {

@@ -1,9 +1,11 @@
 //! Returns from where neither the body nor static clutter can be: mirror images, other movers, echoes.
 
+mod background;
 mod bank;
 mod beams;
 mod coloured;
 mod echo;
+mod factor;
 mod ghost;
 mod ground;
 mod image;
@@ -11,10 +13,14 @@ mod mover;
 mod pendulum;
 pub mod product;
 mod removal;
+mod returns;
 mod scene;
+mod sidelobes;
 mod sinusoidal;
 mod still_point;
 mod track;
+mod whereabouts;
+mod whitened;
 
 #[cfg(test)]
 mod tests;

@@ -6,11 +6,13 @@ use super::pendulum::Pendulum;
 use super::removal::{empty_cells, patch};
 use super::scene::Scene;
 use super::track::{Sighting, Track};
+use super::whereabouts::{Whereabouts, bounds};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::power::Template;
 use crate::diagnosis::statistics::{corrected, median};
 use crate::diagnosis::{Candidate, Correction, Estimate, Place};
 use crate::effects::{self, Stage};
+use crate::radar::Radar;
 
 /// Sightings are good to this share of a cell, and no better than that: the windows' law holds for a steady tone.
 const CELL_ERROR: f64 = 0.12;
@@ -70,109 +72,21 @@ impl Mover {
     }
 
     pub fn candidate(&self, scene: &Scene, tried: f64) -> Candidate {
-        let sightings = &self.track.sightings;
-        let whole = self.pendulum;
-        let ranges = bounds(sightings.iter().map(|s| s.range_m));
-        let velocities = bounds(sightings.iter().map(|s| s.velocity_mps));
-        let cell_m = scene.range_m(1.0);
-        let (mean_m, mean_error) = match &whole {
-            Some(fit) => (fit.mean_m, fit.deviations[0].max(0.05 * cell_m)),
-            None => (0.5 * (ranges[0] + ranges[1]), 0.3 * (ranges[1] - ranges[0]) + 0.2 * cell_m),
-        };
-        let sines: Vec<f64> = sightings.iter().filter_map(|s| s.sine).collect();
-        let mut estimates = vec![];
-        let mut place = Place::at(if self.id == Some(effects::range_alias::ID) { Stage::Propagation } else { Stage::Scene });
-        place.range_m = Some([ranges[0] - 0.5 * cell_m, ranges[1] + 0.5 * cell_m]);
-        place.velocity_mps = Some(velocities);
-        let mut whereabouts = String::new();
-        if !sines.is_empty() {
-            let sine = median(&mut sines.clone());
-            let spread = median(&mut sines.iter().map(|s| (s - sine).abs()).collect::<Vec<_>>()) * 1.48;
-            let sine_error = self.sine_error.unwrap_or(spread / (sines.len() as f64).sqrt() * 1.25) + 0.01;
-            let azimuth = sine.clamp(-1.0, 1.0).asin();
-            let (x, y) = (mean_m * sine, mean_m * azimuth.cos());
-            let at = scene.evidence.radar.position_m;
-            // A line of receivers does not resolve the height: as far up or down as it is off here shortens y.
-            let height = 0.5;
-            estimates.push(Estimate {
-                name: "position_m",
-                values: vec![at[0] + x, at[1] + y, at[2]],
-                ci90: vec![
-                    around(at[0] + x, 1.645 * (mean_m * sine_error).hypot(mean_error * sine.abs())),
-                    [
-                        at[1] + y - 1.645 * (mean_error + mean_m * sine_error * sine.abs()) - 0.5 * height * height / y.max(0.5),
-                        at[1] + y + 1.645 * (mean_error + mean_m * sine_error * sine.abs()),
-                    ],
-                    around(at[2], 1.0),
-                ],
-            });
-            place.position_m = Some([at[0] + x, at[1] + y, at[2]]);
-            let degrees = azimuth.to_degrees();
-            let error = (1.645 * sine_error / azimuth.cos().max(0.1)).to_degrees().max(2.0);
-            place.azimuth_deg = Some([degrees - error, degrees + error]);
-            whereabouts = format!(" at {degrees:.0}° azimuth (its height is not seen)");
-        }
-        let motion = match &whole {
-            Some(fit) => {
-                estimates.push(Estimate::normal("rate_hz", fit.rate_hz, fit.deviations[2].max(0.005)));
-                let excursion = fit.excursion_m();
-                let error = 1.645 * fit.deviations[1].max(0.03 * excursion);
-                // Only the part along the line of sight is seen.
-                estimates.push(Estimate {
-                    name: "swing_m",
-                    values: vec![excursion],
-                    ci90: vec![[excursion - error, 1.1 * excursion + error]],
-                });
-                format!("oscillates by ±{:.0} mm along the line of sight {:.2} times a second", 1e3 * excursion, fit.rate_hz)
-            }
-            None => format!("moves between {:.2} and {:.2} m", ranges[0], ranges[1]),
-        };
-        let frames: Vec<usize> = sightings.iter().map(|s| s.frame).collect();
-        let everywhere = frames.len() == scene.frames();
-        place.frames = (!everywhere).then_some(frames);
-        let alias = match self.id {
-            Some(effects::range_alias::ID) => {
-                " Its range falls when its Doppler says that it recedes: it lies beyond the unambiguous range and is folded back."
-            }
-            None => " Its range and its Doppler do not belong together: no single reflector moves so.",
-            _ => "",
-        };
-        let statement = format!(
-            "Something {:.2} m away{whereabouts} {motion}, {:.0} dB above the noise; {}.{alias}",
-            mean_m,
-            10.0 * self.power.log10(),
-            self.unlike
-        );
-        let cells: Vec<(usize, Vec<usize>)> = (0..scene.frames())
-            .filter_map(|frame| {
-                let seen = sightings.iter().find(|s| s.frame == frame);
-                let at = match (seen, &whole) {
-                    (Some(seen), _) => (seen.range_m, seen.velocity_mps),
-                    (None, Some(fit)) => fit.at(middle_s(scene, frame)),
-                    (None, None) => return None,
-                };
-                let power = seen.map_or(self.power, |s| s.power);
-                let expected = scene.model.template([(at.0, at.1, power)].into_iter());
-                // Over the body, what is mostly the body's stays: emptied, it would look like a body that returns less.
-                let body = scene.model.expected(frame);
-                let is_bodys = |cell: usize| !scene.over_body || body[cell] > expected[cell];
-                let reached = scene.model.support(frame).iter().enumerate();
-                let kept: Vec<bool> = reached.map(|(cell, reached)| *reached && is_bodys(cell)).collect();
-                Some((frame, patch(&expected, scene.map(frame), &kept, scene.samples, 0.05)))
-            })
-            .collect();
-        let still = scene.evidence.still().to_vec();
+        let (evidence, sightings) = (scene.evidence, &self.track.sightings);
+        let seen = Whereabouts::new(scene, sightings, self.pendulum.as_ref(), self.sine_error);
+        let (cells, still) = (self.cells(scene), evidence.still().to_vec());
+        let is_reflector = self.id == Some(effects::moving_reflector::ID);
         Candidate {
             id: self.id,
             behaves_like: Behaviour::PathLike,
-            estimates: if self.id == Some(effects::moving_reflector::ID) { estimates } else { vec![] },
+            estimates: if is_reflector { self.estimates(&seen, &evidence.radar) } else { vec![] },
             choice: None,
-            place,
+            place: self.place(scene, &seen),
             p_value: corrected(self.track.p_value, tried),
             gain: self.gain,
             errs_alike: false,
             look_alikes: self.look_alikes(scene),
-            statement,
+            statement: self.statement(&seen),
             curve: None,
             energy: energy(scene, sightings.iter().map(|s| s.power).sum()),
             correction: Correction::Samples(Arc::new(move |cube| {
@@ -182,6 +96,77 @@ impl Mover {
             })),
         }
     }
+
+    fn place(&self, scene: &Scene, seen: &Whereabouts) -> Place {
+        let stage = if self.id == Some(effects::range_alias::ID) { Stage::Propagation } else { Stage::Scene };
+        let frames: Vec<usize> = self.track.sightings.iter().map(|s| s.frame).collect();
+        let everywhere = frames.len() == scene.frames();
+        Place { frames: (!everywhere).then_some(frames), ..seen.place(&scene.evidence.radar, stage) }
+    }
+
+    /// As of a reflector that moves.
+    fn estimates(&self, seen: &Whereabouts, radar: &Radar) -> Vec<Estimate> {
+        let mut estimates: Vec<Estimate> = seen.position(radar).into_iter().collect();
+        if let Some(fit) = &self.pendulum {
+            estimates.push(Estimate::normal("rate_hz", fit.rate_hz, fit.deviations[2].max(0.005)));
+            let excursion = fit.excursion_m();
+            let error = 1.645 * fit.deviations[1].max(0.03 * excursion);
+            // Only the part along the line of sight is seen.
+            estimates.push(Estimate {
+                name: "swing_m",
+                values: vec![excursion],
+                ci90: vec![[excursion - error, 1.1 * excursion + error]],
+            });
+        }
+        estimates
+    }
+
+    fn statement(&self, seen: &Whereabouts) -> String {
+        let motion = match &self.pendulum {
+            Some(fit) => format!(
+                "oscillates by ±{:.0} mm along the line of sight {:.2} times a second",
+                1e3 * fit.excursion_m(),
+                fit.rate_hz
+            ),
+            None => format!("moves between {:.2} and {:.2} m", seen.ranges_m[0], seen.ranges_m[1]),
+        };
+        let alias = match self.id {
+            Some(effects::range_alias::ID) => {
+                " Its range falls when its Doppler says that it recedes: it lies beyond the unambiguous range and is folded back."
+            }
+            None => " Its range and its Doppler do not belong together: no single reflector moves so.",
+            _ => "",
+        };
+        format!(
+            "Something {:.2} m away{} {motion}, {:.0} dB above the noise; {}.{alias}",
+            seen.mean_m,
+            seen.towards(),
+            10.0 * self.power.log10(),
+            self.unlike
+        )
+    }
+
+    /// Cells `[doppler · samples + range]` of the frames in which it is seen, or follows from its law.
+    fn cells(&self, scene: &Scene) -> Vec<(usize, Vec<usize>)> {
+        let of_frame = |frame: usize| {
+            let seen = self.track.sightings.iter().find(|s| s.frame == frame);
+            let (range_m, velocity_mps) = match (seen, &self.pendulum) {
+                (Some(seen), _) => (seen.range_m, seen.velocity_mps),
+                (None, Some(fit)) => fit.at(middle_s(scene, frame)),
+                (None, None) => return None,
+            };
+            let power = seen.map_or(self.power, |s| s.power);
+            let expected = scene.model.template([(range_m, velocity_mps, power)].into_iter());
+            // Over the body, what is mostly the body's stays: emptied, it would look like a body that returns less.
+            let body = scene.model.expected(frame);
+            let is_bodys = |cell: usize| !scene.over_body || body[cell] > expected[cell];
+            let reached = scene.model.support(frame).iter().enumerate();
+            let kept: Vec<bool> = reached.map(|(cell, reached)| *reached && is_bodys(cell)).collect();
+            Some((frame, patch(&expected, scene.map(frame), &kept, scene.samples, 0.05)))
+        };
+        (0..scene.frames()).filter_map(of_frame).collect()
+    }
+
     /// With quadrature, what is folded at the end of the unambiguous range looks as if it were there.
     fn look_alikes(&self, scene: &Scene) -> Vec<&'static str> {
         match self.id {
@@ -289,12 +274,4 @@ fn template(scene: &Scene, frame: usize, pendulum: Option<&Pendulum>, training: 
         }
     };
     scene.visible(frame, &map)
-}
-
-fn bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
-}
-
-fn around(value: f64, error: f64) -> [f64; 2] {
-    [value - error, value + error]
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::echo::{Fit, fit, matches};
+use super::factor::{Fit, fit, matches};
 use super::scene::Scene;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::mean_chirp;
@@ -69,72 +69,83 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
     if scene.evidence.is_real() || bent || scene.evidence.products().mixed().is_some() {
         return None;
     }
-    let clean: Vec<Vec<Vec<Complex64>>> = (0..scene.frames()).map(|frame| denoised::frame(scene.evidence, frame)).collect();
-    let known = |kind: Kind| scene.evidence.accepted.contains(&kind.id());
-    let mut fits: Vec<(Kind, Fit, f64)> = KINDS
-        .into_iter()
-        .filter(|kind| !known(*kind))
-        .map(|kind| {
-            let (found, energy) = fitted(scene, &clean, kind);
-            (kind, found, energy)
-        })
-        .collect();
-    fits.sort_by(|a, b| b.1.held_out.total_cmp(&a.1.held_out));
-    let (kind, found, energy) = fits.first()?;
-    let p_value = corrected((-(found.training + found.held_out).max(0.0)).exp(), tried);
-    if found.held_out < super::LEAST_GAIN || p_value > 1e-3 {
+    let products = products(scene);
+    let (best, others) = products.split_first()?;
+    let p_value = corrected((-(best.fit.training + best.fit.held_out).max(0.0)).exp(), tried);
+    if best.fit.held_out < super::LEAST_GAIN || p_value > 1e-3 {
         return None;
     }
-    let peak = scene.evidence.peak();
-    let (value, deviation) = (found.factor.norm() * peak, peak * found.deviation.max(0.05 * found.factor.norm()));
-    let level_db = 20.0 * value.max(1e-12).log10();
-    let (estimate, stage, statement) = match kind {
-        Kind::Bounce(_) => (
-            Estimate::normal("coefficient", value, deviation),
-            Stage::Propagation,
-            format!(
-                "Returns go out a second time: at the sum of two ranges and two velocities lies {level_db:.0} dB (of the peak \
-                 sample) of their product, with the array phase of one arrival, not twice that phase."
-            ),
-        ),
-        Kind::Harmonic => (
-            Estimate::normal("level_db", level_db, denoised::PEAK_DB.hypot(8.7 * deviation / value.max(1e-12))),
-            Stage::Receiver,
-            format!(
-                "everything has a second harmonic, at twice its beat frequency and velocity and with twice the phase of every \
-                 receiver: {level_db:.1} dB at the strongest sample"
-            ),
-        ),
-    };
-    let (kind, factor) = (*kind, found.factor);
-    Some(Candidate {
-        id: Some(kind.id()),
-        behaves_like: if kind == Kind::Harmonic { Behaviour::NonLinear } else { Behaviour::PathLike },
-        estimates: vec![estimate],
-        choice: None,
-        place: Place::at(stage),
-        p_value,
-        gain: found.held_out,
-        errs_alike: false,
-        look_alikes: fits
-            .iter()
-            .skip(1)
-            .filter(|other| found.held_out - other.1.held_out < CLOSE)
-            .map(|other| other.0.id())
-            .collect(),
-        statement,
-        curve: None,
-        energy: *energy,
-        correction: Correction::Inverse(
-            Arc::new(move |cube: &mut Cube| remove(cube, kind, factor)),
-            // A product with what other receivers observe turns with them, and stretches nothing on average.
-            if kind == Kind::Harmonic { Volume::BY_SAMPLE } else { Volume::KEPT },
-        ),
-    })
+    let close = others.iter().filter(|other| best.fit.held_out - other.fit.held_out < CLOSE);
+    Some(best.candidate(scene, p_value, close.map(|other| other.kind.id()).collect()))
 }
 
-/// The factor of the product, and the energy that it stands for.
-fn fitted(scene: &Scene, clean: &[Vec<Vec<Complex64>>], kind: Kind) -> (Fit, f64) {
+/// Of all kinds that are not known yet, the best first.
+fn products(scene: &Scene) -> Vec<Product> {
+    let clean: Vec<Vec<Vec<Complex64>>> = (0..scene.frames()).map(|frame| denoised::frame(scene.evidence, frame)).collect();
+    let unknown = KINDS.into_iter().filter(|kind| !scene.evidence.accepted.contains(&kind.id()));
+    let mut products: Vec<Product> = unknown.map(|kind| fitted(scene, &clean, kind)).collect();
+    products.sort_by(|a, b| b.fit.held_out.total_cmp(&a.fit.held_out));
+    products
+}
+
+/// A product with its factor, and the energy that it stands for.
+struct Product {
+    kind: Kind,
+    fit: Fit,
+    energy: f64,
+}
+
+impl Product {
+    fn candidate(&self, scene: &Scene, p_value: f64, look_alikes: Vec<&'static str>) -> Candidate {
+        let (kind, factor) = (self.kind, self.fit.factor);
+        let (estimate, statement) = self.described(scene.evidence.peak());
+        let (behaves_like, stage, volume) = match kind {
+            // A product with what other receivers observe turns with them, and stretches nothing on average.
+            Kind::Bounce(_) => (Behaviour::PathLike, Stage::Propagation, Volume::KEPT),
+            Kind::Harmonic => (Behaviour::NonLinear, Stage::Receiver, Volume::BY_SAMPLE),
+        };
+        Candidate {
+            id: Some(kind.id()),
+            behaves_like,
+            estimates: vec![estimate],
+            choice: None,
+            place: Place::at(stage),
+            p_value,
+            gain: self.fit.held_out,
+            errs_alike: false,
+            look_alikes,
+            statement,
+            curve: None,
+            energy: self.energy,
+            correction: Correction::Inverse(Arc::new(move |cube: &mut Cube| remove(cube, kind, factor)), volume),
+        }
+    }
+
+    /// Its size and a statement. `peak`: the strongest sample's amplitude.
+    fn described(&self, peak: f64) -> (Estimate, String) {
+        let size = self.fit.factor.norm();
+        let (value, deviation) = (size * peak, peak * self.fit.deviation.max(0.05 * size));
+        let level_db = 20.0 * value.max(1e-12).log10();
+        match self.kind {
+            Kind::Bounce(_) => (
+                Estimate::normal("coefficient", value, deviation),
+                format!(
+                    "Returns go out a second time: at the sum of two ranges and two velocities lies {level_db:.0} dB (of the peak \
+                     sample) of their product, with the array phase of one arrival, not twice that phase."
+                ),
+            ),
+            Kind::Harmonic => (
+                Estimate::normal("level_db", level_db, denoised::PEAK_DB.hypot(8.7 * deviation / value.max(1e-12))),
+                format!(
+                    "everything has a second harmonic, at twice its beat frequency and velocity and with twice the phase of every \
+                     receiver: {level_db:.1} dB at the strongest sample"
+                ),
+            ),
+        }
+    }
+}
+
+fn fitted(scene: &Scene, clean: &[Vec<Vec<Complex64>>], kind: Kind) -> Product {
     let mut products: Vec<Vec<Vec<Complex64>>> = clean.par_iter().map(|frame| kind.product(frame)).collect();
     let samples = scene.samples;
     let judge = |products: &[Vec<Vec<Complex64>>]| {
@@ -166,7 +177,7 @@ fn fitted(scene: &Scene, clean: &[Vec<Vec<Complex64>>], kind: Kind) -> (Fit, f64
         (products, found) = (refined, again);
     }
     let energy = products.iter().flatten().flatten().map(|value| (found.factor * value).norm_sqr()).sum();
-    (found, energy)
+    Product { kind, fit: found, energy }
 }
 
 /// Undoes it in two steps, which are enough for what is small.

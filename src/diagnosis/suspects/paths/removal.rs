@@ -20,8 +20,7 @@ pub fn empty_cells(cube: &mut Cube, still: &[Complex64], frame: usize, cells: &[
     let [_, _, _, loops, samples] = cube.dims;
     let (slow, fast) = (hann(loops), hann(samples));
     let Some(factor) = cholesky(&gram(cells, &slow, &fast), cells.len()) else { return };
-    let channels = cube.channels();
-    for channel in 0..channels {
+    for channel in 0..cube.channels() {
         let still = &still[channel * samples..][..samples];
         let moving: Vec<Complex64> = cube
             .channel(frame, channel)
@@ -30,14 +29,12 @@ pub fn empty_cells(cube: &mut Cube, still: &[Complex64], frame: usize, cells: &[
             .collect();
         let map = transform(&moving, samples);
         let amounts = solve(&factor, cells.iter().map(|&cell| map[cell]).collect());
-        let size = loops * samples;
-        let start = (frame * channels + channel) * size;
+        let found = cube.channel_mut(frame, channel);
         for (cell, amount) in cells.iter().zip(amounts) {
             let (doppler, range) = (cell / samples, cell % samples);
             let tone: Vec<Complex64> = (0..samples).map(|n| turn(range * n, samples) * fast[n]).collect();
-            for (i, window) in slow.iter().enumerate() {
+            for (i, (window, chirp)) in slow.iter().zip(found.chunks_exact_mut(samples)).enumerate() {
                 let weight = amount * turn(doppler * i, loops) * window;
-                let chirp = &mut cube.samples[start + i * samples..][..samples];
                 chirp.iter_mut().zip(&tone).for_each(|(value, tone)| *value -= weight * tone);
             }
         }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::bank::{LEAST_BINS, SinusoidalMotion, Standing};
+use super::bank::{LEAST_BINS, SinusoidalMotion, Standing, Table};
 use super::beams::Beams;
 use super::ground::{DEVIATIONS, Ground, STRONGER};
 use super::mover::{LARGEST_EXCURSION_M, Mover, middle_s};
@@ -35,6 +35,7 @@ const SAME_DIRECTION: f64 = 0.35;
 const PARALLEL: f64 = 0.3;
 /// What chance does more often is no motion.
 const LEAST_LIKELY: f64 = 1e-2;
+
 pub struct Found {
     pub mover: Mover,
     tones: Vec<Tone>,
@@ -60,8 +61,7 @@ impl Found {
             for tone in &tones {
                 let (slow, fast) = (turns(tone.place.0, dims[3]), turns(tone.place.1, dims[4]));
                 for (channel, amplitude) in tone.amplitudes.iter().enumerate() {
-                    let start = (tone.frame * tone.amplitudes.len() + channel) * dims[3] * dims[4];
-                    for (chirp, turn) in cube.samples[start..].chunks_exact_mut(dims[4]).zip(&slow) {
+                    for (chirp, turn) in cube.channel_mut(tone.frame, channel).chunks_exact_mut(dims[4]).zip(&slow) {
                         let amplitude = amplitude * turn;
                         chirp.iter_mut().zip(&fast).for_each(|(value, turn)| *value -= amplitude * turn);
                     }
@@ -74,102 +74,170 @@ impl Found {
 
 /// None where nothing gains.
 pub fn strongest(scene: &Scene) -> Option<Found> {
-    let split = &scene.evidence.split;
-    let start_s = middle_s(scene, *split.training.first()?);
-    let in_span = |frame: &usize| middle_s(scene, *frame) - start_s < LONGEST_S;
-    let most = MOST_FRAMES.min(MOST_SAMPLES / (scene.size() * scene.evidence.cube.channels()));
-    let training: Vec<usize> = split.training.iter().copied().filter(in_span).take(most).collect();
-    let last = *training.last()?;
-    let length_s = middle_s(scene, last) - start_s;
-    if length_s <= 0.0 || training.len() < FEWEST_FRAMES {
+    let mut search = Search::new(scene)?;
+    let table = search.ground.table(&search.training);
+    let (guesses, tried) = table.bank(scene, search.length_s);
+    let best = search.best(guesses)?;
+    let p_value = search.p_value(best, &table, tried)?;
+    if p_value > LEAST_LIKELY || excursion_m(best.motion) > LARGEST_EXCURSION_M {
         return None;
     }
-    let held_out: Vec<usize> = split.held_out.iter().copied().filter(|frame| *frame <= last + 1).collect();
-    let mut ground = Ground { scene, beams: Beams::new(scene) };
-    ground.beams.prepare(&training);
-    ground.beams.prepare(&held_out);
-    let table = ground.table(&training);
-    let (guesses, tried) = table.bank(scene, length_s);
-    let judged = |guess: SinusoidalMotion| {
-        let (motion, gain) = ground.fitted(guess, &training, length_s);
-        (motion, gain, ground.gain(motion, &held_out))
-    };
-    let fits = guesses.iter().map(|guess| judged(*guess));
-    let mut found = fits.max_by(|a, b| (a.1 + a.2).total_cmp(&(b.1 + b.2)))?;
-    // Beside the body the side lobes of what oscillates within it say more than it says there itself.
-    if let Some(stronger) = ground.stronger_elsewhere(found.0, &training) {
-        found = Some(judged(stronger)).filter(|other| other.2 > 0.0).unwrap_or(found);
-    }
-    let (best, gain, again) = found;
-    // A likelihood ratio is large by chance no more often than its inverse says: that of all frames, one of all that were tried.
-    // Where a static return is not steady, it must be beaten.
-    let ranges = table.places(scene, best.law).into_iter().map(|place| place.1);
-    let ranges = ranges.clone().min()? - BESIDE..=ranges.max()? + BESIDE;
-    // Where it stands out from what oscillates it is no side lobe of that.
-    let outstands = |standing: &Standing| {
-        ground.strength(&training, |_| standing.place, standing.sine)[0] + STRONGER
-            > ground.strength(&training, |frame| ground.place(best.law, frame), best.sine)[0]
-    };
-    let standing = table.standing(ranges).filter(|(standing, _)| outstands(standing)).map_or((0.0, 0.0), |(standing, tried)| {
-        let of_frame = |&frame: &usize| ground.gain_at(frame, standing.place, standing.sine, standing.power);
-        (standing.gain + held_out.iter().map(of_frame).sum::<f64>(), tried.ln())
-    });
-    let p_value = (tried.ln() + (standing.0 - standing.1).max(0.0) - gain - again).min(0.0).exp();
-    if again <= 0.0
-        || standing.0 > NEARLY * (gain + again)
-        || p_value > LEAST_LIKELY
-        || best.law[1].hypot(best.law[2]) > LARGEST_EXCURSION_M
-    {
-        return None;
-    }
-    // Two laws: the one that its bounded gains favour, and the one that stands out most.
-    let mut laws = [best, ground.sharpened(best, &training, length_s)];
-    // A long recording gives a more precise rate than a part of it, which must not be off by a turn at once.
-    let (every, mut count) = (&split.training, training.len());
-    if count < every.len() {
-        let all: Vec<usize> = (0..scene.frames()).collect();
-        ground.beams.prepare(&all);
-    }
-    while count < every.len() {
-        count = (2 * count).min(every.len());
-        let (longer, length_s) = (&every[..count], middle_s(scene, every[count - 1]) - start_s);
-        laws = [ground.fitted(laws[0], longer, length_s).0, ground.closer(laws[1], longer, length_s)];
-    }
-    ground.beams.prepare(&split.held_out);
-    let predicted = laws.map(|law| (split.held_out_share() * ground.predicted(law, start_s), law));
-    let (again, best) = predicted.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let deviations = ground.deviations(best, &every[..count], middle_s(scene, every[count - 1]) - start_s);
+    let (gain, motion) = search.predicted(best.motion)?;
+    let deviations = search.deviations(motion);
     // What may as well not move at all, or is always in the cell of a static return, only fluctuates.
-    let excursion_m = best.law[1].hypot(best.law[2]);
-    let bins = TAU * best.law[3] * excursion_m * scene.model.cells.doppler_per_mps;
-    if DEVIATIONS * deviations[1] > excursion_m || bins.max(excursion_m * scene.model.cells.bins_per_m) < LEAST_BINS {
+    let (excursion_m, cells) = (excursion_m(motion), &scene.model.cells);
+    let bins = TAU * motion.law[3] * excursion_m * cells.doppler_per_mps;
+    if DEVIATIONS * deviations[1] > excursion_m || bins.max(excursion_m * cells.bins_per_m) < LEAST_BINS {
         return None;
     }
-    let named = !ground.moves_with_the_body(best);
-    let [mean_m, sine_m, cosine_m, rate_hz] = best.law;
-    let power = best.log_power.exp();
-    let sightings = (0..scene.frames()).map(|frame| {
-        let (range_m, velocity_mps) = at(best.law, middle_s(scene, frame));
+    Some(search.found(motion, deviations, gain, p_value))
+}
+
+fn excursion_m(motion: SinusoidalMotion) -> f64 {
+    motion.law[1].hypot(motion.law[2])
+}
+
+/// A motion with its log-likelihood gains.
+#[derive(Clone, Copy)]
+struct Judged {
+    motion: SinusoidalMotion,
+    training: f64,
+    held_out: f64,
+}
+
+impl Judged {
+    fn gain(&self) -> f64 {
+        self.training + self.held_out
+    }
+}
+
+/// A stretch of the recording that the bank is laid over.
+struct Search<'a> {
+    ground: Ground<'a>,
+    training: Vec<usize>,
+    held_out: Vec<usize>,
+    start_s: f64,
+    length_s: f64,
+}
+
+impl<'a> Search<'a> {
+    /// None where too few frames are in the stretch.
+    fn new(scene: &'a Scene<'a>) -> Option<Self> {
+        let split = &scene.evidence.split;
+        let start_s = middle_s(scene, *split.training.first()?);
+        let in_span = |frame: &usize| middle_s(scene, *frame) - start_s < LONGEST_S;
+        let most = MOST_FRAMES.min(MOST_SAMPLES / (scene.size() * scene.evidence.cube.channels()));
+        let training: Vec<usize> = split.training.iter().copied().filter(in_span).take(most).collect();
+        let last = *training.last()?;
+        let length_s = middle_s(scene, last) - start_s;
+        if length_s <= 0.0 || training.len() < FEWEST_FRAMES {
+            return None;
+        }
+        let held_out: Vec<usize> = split.held_out.iter().copied().filter(|frame| *frame <= last + 1).collect();
+        let mut ground = Ground { scene, beams: Beams::new(scene) };
+        ground.beams.prepare(&training);
+        ground.beams.prepare(&held_out);
+        Some(Self { ground, training, held_out, start_s, length_s })
+    }
+
+    fn judged(&self, guess: SinusoidalMotion) -> Judged {
+        let (motion, training) = self.ground.fitted(guess, &self.training, self.length_s);
+        Judged { motion, training, held_out: self.ground.gain(motion, &self.held_out) }
+    }
+
+    fn best(&self, guesses: Vec<SinusoidalMotion>) -> Option<Judged> {
+        let fits = guesses.into_iter().map(|guess| self.judged(guess));
+        let best = fits.max_by(|a, b| a.gain().total_cmp(&b.gain()))?;
+        // Beside the body the side lobes of what oscillates within it say more than it says there itself.
+        let stronger = self.ground.stronger_elsewhere(best.motion, &self.training).map(|stronger| self.judged(stronger));
+        Some(stronger.filter(|stronger| stronger.held_out > 0.0).unwrap_or(best))
+    }
+
+    /// A likelihood ratio is large by chance no more often than its inverse says: that of all frames, one of all that were tried.
+    /// Where a static return is not steady, it must be beaten. None where that return explains as much.
+    fn p_value(&self, best: Judged, table: &Table, tried: f64) -> Option<f64> {
+        let (standing, chances) = self.standing(best.motion, table)?;
+        if best.held_out <= 0.0 || standing > NEARLY * best.gain() {
+            return None;
+        }
+        let nats = tried.ln() + (standing - chances).max(0.0) - best.training - best.held_out;
+        Some(nats.min(0.0).exp())
+    }
+
+    /// What a static return near a motion gains, and the logarithm of how many were tried.
+    fn standing(&self, motion: SinusoidalMotion, table: &Table) -> Option<(f64, f64)> {
+        let ground = &self.ground;
+        let ranges = table.places(ground.scene, motion.law).into_iter().map(|place| place.1);
+        let ranges = ranges.clone().min()? - BESIDE..=ranges.max()? + BESIDE;
+        // Where it stands out from what oscillates it is no side lobe of that.
+        let outstands = |standing: &Standing| {
+            ground.strength(&self.training, |_| standing.place, standing.sine)[0] + STRONGER
+                > ground.strength(&self.training, |frame| ground.place(motion.law, frame), motion.sine)[0]
+        };
+        let found = table.standing(ranges).filter(|(standing, _)| outstands(standing));
+        Some(found.map_or((0.0, 0.0), |(standing, tried)| {
+            let of_frame = |&frame: &usize| ground.gain_at(frame, standing.place, standing.sine, standing.power);
+            (standing.gain + self.held_out.iter().map(of_frame).sum::<f64>(), tried.ln())
+        }))
+    }
+
+    /// Of the whole recording, every part predicted by the others: the share of its gain that held-out frames have, and the motion.
+    fn predicted(&mut self, best: SinusoidalMotion) -> Option<(f64, SinusoidalMotion)> {
+        // Two laws: the one that its bounded gains favour, and the one that stands out most.
+        let laws = [best, self.ground.sharpened(best, &self.training, self.length_s)];
+        let laws = self.of_the_whole(laws);
+        let split = &self.ground.scene.evidence.split;
+        self.ground.beams.prepare(&split.held_out);
+        let predicted = laws.map(|law| (split.held_out_share() * self.ground.predicted(law, self.start_s), law));
+        predicted.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// A long recording gives a more precise rate than a part of it, which must not be off by a turn at once.
+    fn of_the_whole(&mut self, mut laws: [SinusoidalMotion; 2]) -> [SinusoidalMotion; 2] {
+        let scene = self.ground.scene;
+        let (every, mut count) = (&scene.evidence.split.training, self.training.len());
+        if count < every.len() {
+            let all: Vec<usize> = (0..scene.frames()).collect();
+            self.ground.beams.prepare(&all);
+        }
+        while count < every.len() {
+            count = (2 * count).min(every.len());
+            let (longer, length_s) = (&every[..count], middle_s(scene, every[count - 1]) - self.start_s);
+            laws = [self.ground.fitted(laws[0], longer, length_s).0, self.ground.closer(laws[1], longer, length_s)];
+        }
+        laws
+    }
+
+    /// Of mean, excursion, rate and direction, from all training frames.
+    fn deviations(&self, motion: SinusoidalMotion) -> [f64; 4] {
+        let scene = self.ground.scene;
+        let every = &scene.evidence.split.training;
+        let end_s = every.last().map_or(self.start_s, |&last| middle_s(scene, last));
+        self.ground.deviations(motion, every, end_s - self.start_s)
+    }
+
+    fn found(&self, motion: SinusoidalMotion, deviations: [f64; 4], gain: f64, p_value: f64) -> Found {
+        let scene = self.ground.scene;
+        let [mean_m, sine_m, cosine_m, rate_hz] = motion.law;
+        let [mean_error_m, excursion_error_m, rate_error_hz, sine_error] = deviations;
         // At the peak after two Hann windows.
-        Sighting { frame, range_m, velocity_mps, power: power / 2.25, sine: Some(best.sine) }
-    });
-    let mover = Mover {
-        track: Track { sightings: sightings.collect(), p_value },
-        pendulum: Some(Pendulum {
-            mean_m,
-            sine_m,
-            cosine_m,
-            rate_hz,
-            left: 0.0,
-            deviations: [deviations[0], deviations[1], deviations[2]],
-        }),
-        id: named.then_some(effects::moving_reflector::ID),
-        gain: again,
-        power: power / 2.25,
-        sine_error: Some(deviations[3]),
-        unlike: "its frames follow one sinusoidal motion, which nothing else around it does",
-    };
-    Some(Found { mover, tones: ground.tones(best) })
+        let power = motion.log_power.exp() / 2.25;
+        let sightings = (0..scene.frames()).map(|frame| {
+            let (range_m, velocity_mps) = at(motion.law, middle_s(scene, frame));
+            Sighting { frame, range_m, velocity_mps, power, sine: Some(motion.sine) }
+        });
+        let deviations = [mean_error_m, excursion_error_m, rate_error_hz];
+        let mover = Mover {
+            track: Track { sightings: sightings.collect(), p_value },
+            pendulum: Some(Pendulum { mean_m, sine_m, cosine_m, rate_hz, left: 0.0, deviations }),
+            id: (!self.ground.moves_with_the_body(motion)).then_some(effects::moving_reflector::ID),
+            gain,
+            power,
+            sine_error: Some(sine_error),
+            unlike: "its frames follow one sinusoidal motion, which nothing else around it does",
+        };
+        Found { mover, tones: self.ground.tones(motion) }
+    }
 }
 
 impl Ground<'_> {

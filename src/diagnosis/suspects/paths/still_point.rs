@@ -35,6 +35,7 @@ type Spectra = Vec<Vec<Complex64>>;
 
 struct Peak {
     range_m: f64,
+    cell_m: f64,
     sine: Option<f64>,
     /// Over the mean of the ranges around it.
     ratio: f64,
@@ -112,7 +113,7 @@ fn strongest(evidence: &Evidence, room: &Room, spectra: &Spectra, steady: &[bool
         let ratio = power / mean(spectra, &around);
         let p_value = tail(ratio, around.len());
         if best.as_ref().is_none_or(|best| p_value < best.p_value) {
-            best = Some(Peak { range_m, sine, ratio, around, bin, p_value });
+            best = Some(Peak { range_m, cell_m, sine, ratio, around, bin, p_value });
         }
     }
     best.map(|best| (best, tried))
@@ -166,75 +167,125 @@ fn known_m(room: &Room) -> Vec<f64> {
     known
 }
 
-fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candidate {
-    let radar = &evidence.radar;
-    let [frames, _, _, loops, samples] = evidence.cube.dims;
-    let cell_m = SPEED_OF_LIGHT * radar.sample_rate_hz / (2.0 * radar.slope_hz_per_s * samples as f64);
-    let rate = std::f64::consts::TAU * peak.range_m / cell_m / samples as f64;
-    let tone: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(rate * n as f64)).collect();
-    // Through the window, so that other ranges do not leak in.
-    let window: Vec<f64> = hann(samples).iter().map(|w| w * w).collect();
-    let amplitudes: Vec<Complex64> = (evidence.still().chunks_exact(samples))
-        .map(|mean| mean.iter().zip(&tone).zip(&window).map(|((value, tone), w)| value * tone.conj() * w).sum())
-        .collect();
-    let power: f64 = amplitudes.iter().map(Complex64::norm_sqr).sum();
-    let share = 1.0 / peak.ratio.sqrt();
-    let mut estimates = vec![];
-    let mut place = Place::at(Stage::Scene);
-    place.range_m = Some([peak.range_m - 0.5 * cell_m, peak.range_m + 0.5 * cell_m]);
-    place.velocity_mps = Some([0.0, 0.0]);
-    let mut whereabouts = String::new();
-    if let Some(sine) = peak.sine {
-        let (at, range) = (radar.centre_m(), peak.range_m);
-        let error_m = 0.3 * cell_m;
-        let sine_error = 0.03 + 0.3 * share;
-        let (x, y) = (range * sine, range * (1.0 - sine * sine).max(0.0).sqrt());
+/// What a peak is in the samples: one tone of the same amplitude in every chirp of a channel.
+struct Tone {
+    turns: Vec<Complex64>,
+    /// `[channel]`
+    amplitudes: Vec<Complex64>,
+}
+
+impl Tone {
+    fn of(evidence: &Evidence, peak: &Peak) -> Self {
+        let samples = evidence.cube.dims[4];
+        let rate = std::f64::consts::TAU * peak.range_m / peak.cell_m / samples as f64;
+        let turns: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(rate * n as f64)).collect();
+        // Through the window, so that other ranges do not leak in.
+        let window: Vec<f64> = hann(samples).iter().map(|w| w * w).collect();
+        let amplitudes = (evidence.still().chunks_exact(samples))
+            .map(|mean| mean.iter().zip(&turns).zip(&window).map(|((value, turn), w)| value * turn.conj() * w).sum())
+            .collect();
+        Self { turns, amplitudes }
+    }
+
+    /// Of all channels.
+    fn power(&self) -> f64 {
+        self.amplitudes.iter().map(Complex64::norm_sqr).sum()
+    }
+
+    /// Over what moves in a channel's samples.
+    fn relative(&self, evidence: &Evidence, peak: &Peak) -> Option<Estimate> {
+        let amplitude = (self.power() / self.amplitudes.len() as f64).sqrt() / body_rms(evidence)?;
+        // The clutter below it adds in any phase; the level of a body differs from frame to frame.
+        Some(Estimate::normal("amplitude", amplitude, amplitude * peak.share().hypot(0.2)))
+    }
+
+    fn remove(&self, cube: &mut Cube) {
+        cube.each_chirp(|[_, channel, _], chirp| {
+            chirp.iter_mut().zip(&self.turns).for_each(|(value, turn)| *value -= self.amplitudes[channel] * turn);
+        });
+    }
+}
+
+impl Peak {
+    /// Amplitude of the clutter around it over its own.
+    fn share(&self) -> f64 {
+        1.0 / self.ratio.sqrt()
+    }
+
+    /// Of the sine.
+    fn sine_error(&self) -> f64 {
+        0.03 + 0.3 * self.share()
+    }
+
+    fn place(&self, radar: &Radar) -> Place {
+        let azimuths = |sine: f64| [degrees(sine - self.sine_error()), degrees(sine + self.sine_error())];
+        Place {
+            range_m: Some([self.range_m - 0.5 * self.cell_m, self.range_m + 0.5 * self.cell_m]),
+            velocity_mps: Some([0.0, 0.0]),
+            position_m: self.sine.map(|sine| self.position_m(radar, sine)),
+            azimuth_deg: self.sine.map(azimuths),
+            ..Place::at(Stage::Scene)
+        }
+    }
+
+    fn position_m(&self, radar: &Radar, sine: f64) -> [f64; 3] {
+        let (at, range) = (radar.centre_m(), self.range_m);
+        [at[0] + range * sine, at[1] + range * (1.0 - sine * sine).max(0.0).sqrt(), at[2]]
+    }
+
+    fn position(&self, radar: &Radar) -> Option<Estimate> {
+        let (sine, sine_error) = (self.sine?, self.sine_error());
+        let (at, range) = (radar.centre_m(), self.range_m);
+        let [x, y, z] = self.position_m(radar, sine);
+        let error_m = 0.3 * self.cell_m;
         // A line of receivers does not see the height; as far up or down as it is off, y is shorter.
         let height = 1.0f64;
-        let bounds = |off: f64| (range * range * (1.0 - (sine.abs() + off).clamp(0.0, 1.0).powi(2))).max(0.0);
-        let lowest = (bounds(sine_error) - height * height).max(0.0).sqrt() - error_m;
-        estimates.push(Estimate {
+        let square = |off: f64| (range * range * (1.0 - (sine.abs() + off).clamp(0.0, 1.0).powi(2))).max(0.0);
+        let lowest = (square(sine_error) - height * height).max(0.0).sqrt() - error_m;
+        Some(Estimate {
             name: "position_m",
-            values: vec![at[0] + x, at[1] + y, at[2]],
+            values: vec![x, y, z],
             ci90: vec![
-                [at[0] + x - range * sine_error - error_m, at[0] + x + range * sine_error + error_m],
-                [at[1] + lowest, at[1] + bounds(-sine_error).sqrt() + error_m],
-                [at[2] - height, at[2] + height],
+                [x - range * sine_error - error_m, x + range * sine_error + error_m],
+                [at[1] + lowest, at[1] + square(-sine_error).sqrt() + error_m],
+                [z - height, z + height],
             ],
-        });
-        place.position_m = Some([at[0] + x, at[1] + y, at[2]]);
-        let degrees = |sine: f64| sine.clamp(-1.0, 1.0).asin().to_degrees();
-        place.azimuth_deg = Some([degrees(sine - sine_error), degrees(sine + sine_error)]);
-        whereabouts = format!(" at {:.0}° azimuth (its height is not seen)", degrees(sine));
+        })
     }
-    if let Some(level) = body_rms(evidence) {
-        let amplitude = (power / amplitudes.len() as f64).sqrt() / level;
-        // The clutter below it adds in any phase; the level of a body differs from frame to frame.
-        estimates.push(Estimate::normal("amplitude", amplitude, amplitude * share.hypot(0.2)));
+
+    fn statement(&self) -> String {
+        let towards =
+            self.sine.map_or(String::new(), |sine| format!(" at {:.0}° azimuth (its height is not seen)", degrees(sine)));
+        format!(
+            "A static return {:.2} m away{towards}: all receivers see one direction, {:.0} dB above the clutter of \
+             the ranges around it, in every frame, and no boundary, edge or corner of the room is there.",
+            self.range_m,
+            10.0 * self.ratio.log10()
+        )
     }
+}
+
+fn degrees(sine: f64) -> f64 {
+    sine.clamp(-1.0, 1.0).asin().to_degrees()
+}
+
+fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candidate {
+    let (radar, [frames, _, _, loops, samples]) = (&evidence.radar, evidence.cube.dims);
+    let tone = Tone::of(evidence, peak);
     Candidate {
         id: Some(effects::static_reflector::ID),
         behaves_like: Behaviour::PathLike,
-        estimates,
+        estimates: peak.position(radar).into_iter().chain(tone.relative(evidence, peak)).collect(),
         choice: None,
-        place,
+        place: peak.place(radar),
         p_value,
         gain,
         errs_alike: false,
         look_alikes: vec![],
-        statement: format!(
-            "A static return {:.2} m away{whereabouts}: all receivers see one direction, {:.0} dB above the clutter of \
-             the ranges around it, in every frame, and no boundary, edge or corner of the room is there.",
-            peak.range_m,
-            10.0 * peak.ratio.log10()
-        ),
+        statement: peak.statement(),
         curve: None,
-        energy: power * (frames * loops * samples) as f64,
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-            cube.each_chirp(|[_, channel, _], chirp| {
-                chirp.iter_mut().zip(&tone).for_each(|(value, tone)| *value -= amplitudes[channel] * tone);
-            });
-        })),
+        energy: tone.power() * (frames * loops * samples) as f64,
+        correction: Correction::Samples(Arc::new(move |cube| tone.remove(cube))),
     }
 }
 

@@ -212,7 +212,7 @@ fn away_from_the_body_looks_are_those_of_noise_and_where_it_is_a_tone_must_be_st
     let scene = Scene::new(&alone).unwrap();
     let mut beams = Beams::new(&scene);
     beams.prepare(&[4]);
-    let looks: Vec<Look> = beams.looks(4).into_iter().flatten().collect();
+    let looks: Vec<Look> = beams.looks(4).into_values();
     let (among, away): (Vec<&Look>, Vec<&Look>) = looks.iter().partition(|look| look.body > 0.9);
     let ratios: Vec<f64> = away.iter().filter(|look| look.body < 0.02).map(|look| look.power / look.expected).collect();
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;

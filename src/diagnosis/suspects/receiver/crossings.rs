@@ -101,9 +101,8 @@ pub fn find(evidence: &Evidence) -> Option<Crossings> {
 
 /// Doppler rows, about zero, in which anything moves in a frame.
 fn band_rows(evidence: &Evidence, frame: usize) -> usize {
-    let (loops, samples) = (evidence.cube.dims[3], evidence.cube.dims[4]);
-    let map = &evidence.maps()[frame * loops * samples..(frame + 1) * loops * samples];
-    let moves = |doppler: &usize| map[doppler * samples..][..evidence.range_bins()].iter().any(|power| *power > MOVING);
+    let (maps, loops) = (evidence.maps(), evidence.cube.dims[3]);
+    let moves = |&doppler: &usize| maps.below([frame, doppler])[..evidence.range_bins()].iter().any(|power| *power > MOVING);
     let last = (0..loops).filter(moves).map(|doppler| doppler.min(loops - doppler)).max().unwrap_or(0);
     2 * (last + MARGIN) + 1
 }

@@ -105,8 +105,7 @@ impl<'a> Line<'a> {
 
     /// Over what is expected; zero where nothing can be said.
     fn power(&self, frame: usize, [doppler, range]: [usize; 2]) -> f64 {
-        let [_, _, _, loops, samples] = self.evidence.cube.dims;
-        let at = (frame * loops + doppler) * samples + range;
+        let at = [frame, doppler, range];
         match &self.residual {
             Some(residual) if !self.empty[range] => f64::from(if residual.count[at] > 0.0 { residual.ratio[at] } else { 0.0 }),
             _ => f64::from(self.evidence.maps()[at]),

@@ -130,10 +130,10 @@ struct Tone {
 
 /// The Doppler frequency at which a range is strong in most frames.
 fn steadiest(evidence: &Evidence, training: &[usize], bin: usize) -> Option<[usize; 2]> {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
     let maps = evidence.maps();
+    let [_, loops, _] = maps.shape();
     let quartile = |doppler: usize| {
-        let of_frame = |&frame: &usize| maps[(frame * loops + doppler) * samples + bin];
+        let of_frame = |&frame: &usize| maps[[frame, doppler, bin]];
         let mut powers: Vec<f32> = training.iter().map(of_frame).collect();
         powers.sort_by(f32::total_cmp);
         powers[powers.len() / 4]

@@ -16,6 +16,7 @@ use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 use crate::diagnosis::{Cube, Evidence, denoised};
 use crate::effects::{self, Stage};
+use crate::grid::Grid;
 
 /// Share of the power around a tone that it may leave, where little else is: a mover's Doppler changes, and it leaves more.
 const LEFT_OVER: f64 = 0.2;
@@ -70,20 +71,20 @@ fn aside(evidence: &Evidence) -> Option<Candidate> {
         .held_out
         .iter()
         .map(|&frame| {
-            let of_frame = &amplitudes[frame * channels..(frame + 1) * channels];
+            let of_frame = amplitudes.below([frame]);
             // An amplitude per frame and channel is fitted: one nat each is chance.
             of_frame.iter().zip(noise).map(|(a, noise)| a.norm_sqr() * count / noise.max(1e-300) - 1.0).sum::<f64>()
         })
         .sum();
     let correction = Correction::Samples(Arc::new(move |cube: &mut Cube| {
-        let channels = cube.channels();
         let amplitudes = amplitudes_of(cube, slow, fast);
         cube.each_chirp(|[frame, channel, chirp], values| {
-            let amplitude = amplitudes[frame * channels + channel];
+            let amplitude = amplitudes[[frame, channel]];
             values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(slow, fast, chirp, n));
         });
     }));
     let how = "where nothing of the room or the body can stay";
+    let amplitudes = amplitudes.into_values();
     Some(candidate(evidence, Tone { slow, fast, amplitudes, p_value, gain, how, correction }))
 }
 
@@ -114,15 +115,15 @@ fn wanders(evidence: &Evidence) -> Option<Candidate> {
     }
     let turns = slow.clone();
     let correction = Correction::Samples(Arc::new(move |cube: &mut Cube| {
-        let channels = cube.channels();
         let amplitudes = wandering::amplitudes(cube, &turns, fast);
         cube.each_chirp(|[frame, channel, chirp], values| {
-            let amplitude = amplitudes[frame * channels + channel];
+            let amplitude = amplitudes[[frame, channel]];
             values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(turns[frame], fast, chirp, n));
         });
     }));
     let how = "at one beat frequency, where whatever turns like that and moves would have left its range";
     let mean = slow.iter().sum::<f64>() / slow.len() as f64;
+    let amplitudes = amplitudes.into_values();
     Some(candidate(evidence, Tone { slow: mean, fast, amplitudes, p_value, gain, how, correction }))
 }
 
@@ -183,7 +184,7 @@ struct Around {
     deviation: f64,
 }
 
-fn around(evidence: &Evidence, (slow, fast): (f64, f64), amplitudes: &[Complex64]) -> Around {
+fn around(evidence: &Evidence, (slow, fast): (f64, f64), amplitudes: &Grid<Complex64, 2>) -> Around {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let channels = evidence.cube.channels();
     let near = |turns: f64, length: usize| -> Vec<usize> {
@@ -200,7 +201,7 @@ fn around(evidence: &Evidence, (slow, fast): (f64, f64), amplitudes: &[Complex64
         .map(|&frame| {
             let of_channel = |channel: usize| {
                 let map = evidence.range_doppler(frame, channel);
-                let (amplitude, noise) = (amplitudes[frame * channels + channel], evidence.noise()[channel]);
+                let (amplitude, noise) = (amplitudes[[frame, channel]], evidence.noise()[channel]);
                 [0.0, 1.0].map(|share| -> f64 {
                     let powers = cells.iter().map(|&cell| (map[cell] - share * amplitude * tone[cell]).norm_sqr() - noise);
                     powers.sum::<f64>() / noise.max(1e-300)
@@ -249,27 +250,21 @@ fn is_sideband(evidence: &Evidence, slow: f64, fast: f64) -> bool {
     median(&mut evidence.split.training.par_iter().map(coherence).collect::<Vec<f64>>()) > SIDEBAND
 }
 
-/// Least squares of the tone in every frame and channel, `[frame][channel]`, once static clutter is away.
-fn amplitudes_of(cube: &Cube, slow: f64, fast: f64) -> Vec<Complex64> {
-    let [frames, _, _, _, samples] = cube.dims;
-    let channels = cube.channels();
-    (0..frames * channels)
-        .into_par_iter()
-        .map(|index| {
-            let signal = cube.channel(index / channels, index % channels);
-            let loops = signal.len() / samples;
-            let in_chirp: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(-TAU * fast * n as f64)).collect();
-            let window = hann(samples);
-            let slow_window = hann(loops);
-            let mut sum = Complex64::ZERO;
-            for (chirp, values) in signal.chunks_exact(samples).enumerate() {
-                let of_chirp: Complex64 =
-                    values.iter().zip(&in_chirp).zip(&window).map(|((value, turn), weight)| value * turn * *weight).sum();
-                sum += of_chirp * Complex64::cis(-TAU * slow * chirp as f64) * slow_window[chirp];
-            }
-            sum / (window.iter().sum::<f64>() * slow_window.iter().sum::<f64>())
-        })
-        .collect()
+/// Least squares of the tone in every frame and channel, once static clutter is away.
+fn amplitudes_of(cube: &Cube, slow: f64, fast: f64) -> Grid<Complex64, 2> {
+    let [_, _, _, loops, samples] = cube.dims;
+    let in_chirp: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(-TAU * fast * n as f64)).collect();
+    let (window, slow_window) = (hann(samples), hann(loops));
+    let weight = window.iter().sum::<f64>() * slow_window.iter().sum::<f64>();
+    cube.by_channel(|frame, channel| {
+        let mut sum = Complex64::ZERO;
+        for (chirp, values) in cube.channel(frame, channel).chunks_exact(samples).enumerate() {
+            let of_chirp: Complex64 =
+                values.iter().zip(&in_chirp).zip(&window).map(|((value, turn), weight)| value * turn * *weight).sum();
+            sum += of_chirp * Complex64::cis(-TAU * slow * chirp as f64) * slow_window[chirp];
+        }
+        sum / weight
+    })
 }
 
 /// Frequencies over slow and fast time, turns per chirp and per sample, where the tone is strongest.
@@ -282,7 +277,7 @@ fn refined(evidence: &Evidence, start: (f64, f64)) -> (f64, f64) {
         .flat_map(|&frame| (0..channels).flat_map(move |channel| evidence.cube.channel(frame, channel).to_vec()))
         .collect();
     let few = Cube::new([few.len() / (channels * loops * samples), 1, channels, loops, samples], few);
-    let power = |slow: f64, fast: f64| amplitudes_of(&few, slow, fast).iter().map(Complex64::norm_sqr).sum::<f64>();
+    let power = |slow: f64, fast: f64| amplitudes_of(&few, slow, fast).values().iter().map(Complex64::norm_sqr).sum::<f64>();
     let mut best = start;
     let mut step = (0.25 / loops as f64, 0.25 / samples as f64);
     for _ in 0..9 {

@@ -12,6 +12,7 @@ use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, hann};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median, normal_tails};
 use crate::diagnosis::suspects::climb::climb;
+use crate::grid::Grid;
 
 /// Doppler bins around zero where a Hann window leaves static clutter.
 const STILL_BINS: usize = 2;
@@ -31,8 +32,7 @@ pub struct Wandering {
     /// Turns per loop, by frame; per sample.
     pub slow: Vec<f64>,
     pub fast: f64,
-    /// `[frame][channel]`
-    pub amplitudes: Vec<Complex64>,
+    pub amplitudes: Grid<Complex64, 2>,
     pub p_value: f64,
     pub gain: f64,
 }
@@ -53,9 +53,8 @@ pub fn find(evidence: &Evidence) -> Option<Wandering> {
         return None;
     }
     let count = (loops * samples) as f64;
-    let channels = evidence.cube.channels();
     let of_frame = |&frame: &usize| -> f64 {
-        let own = &amplitudes[frame * channels..][..channels];
+        let own = amplitudes.below([frame]);
         // A frequency per frame and an amplitude per frame and channel are fitted: one nat each is chance.
         own.iter().zip(evidence.noise()).map(|(a, noise)| a.norm_sqr() * count / noise.max(1e-300) - 1.0).sum::<f64>() - 1.0
     };
@@ -78,13 +77,10 @@ impl Wandering {
 
 /// The range whose strongest Doppler frequency beside zero stands out most in the median frame, and the chance of that.
 fn most_steady(evidence: &Evidence) -> Option<(usize, f64)> {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let loops = evidence.cube.dims[3];
     let (maps, training) = (evidence.maps(), &evidence.split.training);
     let power = |bin: usize| {
-        let of_frame = |&frame: &usize| {
-            let cell = (frame * loops + strongest_doppler(evidence, frame, bin)) * samples + bin;
-            f64::from(maps[cell])
-        };
+        let of_frame = |&frame: &usize| f64::from(maps[[frame, strongest_doppler(evidence, frame, bin), bin]]);
         median(&mut training.iter().map(of_frame).collect::<Vec<f64>>())
     };
     let bins = evidence.range_bins();
@@ -97,8 +93,8 @@ fn most_steady(evidence: &Evidence) -> Option<(usize, f64)> {
 }
 
 fn strongest_doppler(evidence: &Evidence, frame: usize, bin: usize) -> usize {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let power = |doppler: usize| evidence.maps()[(frame * loops + doppler) * samples + bin];
+    let loops = evidence.cube.dims[3];
+    let power = |doppler: usize| evidence.maps()[[frame, doppler, bin]];
     let moving = (0..loops).filter(|&doppler| doppler.min(loops - doppler) > STILL_BINS);
     moving.max_by(|&a, &b| power(a).total_cmp(&power(b))).unwrap_or(0)
 }
@@ -163,10 +159,9 @@ impl Way {
         let halves = training.split_at(training.len() / 2);
         let [early, late] = [halves.0, halves.1].map(|frames| beat(evidence, frames, slow, fast) * samples as f64);
         let amplitudes = amplitudes(&evidence.cube, slow, fast);
-        let channels = evidence.cube.channels();
         let energy = |frames: &[usize]| -> f64 {
             let of_frame = |&frame: &usize| -> f64 {
-                let own = &amplitudes[frame * channels..][..channels];
+                let own = amplitudes.below([frame]);
                 own.iter().zip(evidence.noise()).map(|(a, noise)| a.norm_sqr() / noise.max(1e-300)).sum()
             };
             frames.iter().map(of_frame).sum::<f64>() * (loops * samples) as f64
@@ -206,13 +201,13 @@ pub fn deviation_bins(energy: f64) -> f64 {
 }
 
 /// Whether the range has much of other velocities, as what turns or walks has.
-fn leaves_much(evidence: &Evidence, slow: &[f64], fast: f64, tone: &[Complex64]) -> bool {
+fn leaves_much(evidence: &Evidence, slow: &[f64], fast: f64, tone: &Grid<Complex64, 2>) -> bool {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let channels = evidence.cube.channels();
     let weight: f64 = hann(samples).iter().sum();
     let (mut left, mut all) = (0.0, 0.0);
     for (frame, channel) in evidence.split.training.iter().flat_map(|&frame| (0..channels).map(move |channel| (frame, channel))) {
-        let amplitude = tone[frame * channels + channel];
+        let amplitude = tone[[frame, channel]];
         let noise = evidence.noise()[channel] / (weight * weight);
         for (index, value) in of_chirps(evidence.cube.channel(frame, channel), samples, fast).into_iter().enumerate() {
             left += (value - amplitude * Complex64::cis(TAU * slow[frame] * index as f64)).norm_sqr() - noise;
@@ -223,7 +218,7 @@ fn leaves_much(evidence: &Evidence, slow: &[f64], fast: f64, tone: &[Complex64])
 }
 
 /// Whether more than noise lies at the opposite Doppler frequency of the same range once the tone is away.
-fn has_opposite(evidence: &Evidence, slow: &[f64], fast: f64, tone: &[Complex64]) -> bool {
+fn has_opposite(evidence: &Evidence, slow: &[f64], fast: f64, tone: &Grid<Complex64, 2>) -> bool {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let channels = evidence.cube.channels();
     let (window, taper) = (hann(loops), hann(samples));
@@ -236,7 +231,7 @@ fn has_opposite(evidence: &Evidence, slow: &[f64], fast: f64, tone: &[Complex64]
                 / window.iter().sum::<f64>();
         let of_channel = |channel: usize| {
             let chirps = of_chirps(evidence.cube.channel(frame, channel), samples, fast);
-            let left = along(&chirps, -turn) - tone[frame * channels + channel] * leak;
+            let left = along(&chirps, -turn) - tone[[frame, channel]] * leak;
             left.norm_sqr() * weight * weight / evidence.noise()[channel].max(1e-300)
         };
         (0..channels).map(of_channel).sum()
@@ -265,13 +260,10 @@ fn along(chirps: &[Complex64], slow: f64) -> Complex64 {
     chirps.iter().enumerate().map(turned).sum::<Complex64>() / window.iter().sum::<f64>()
 }
 
-/// Of the tone in every frame and channel, `[frame][channel]`, beside static clutter.
-pub fn amplitudes(cube: &Cube, slow: &[f64], fast: f64) -> Vec<Complex64> {
-    let ([frames, _, _, _, samples], channels) = (cube.dims, cube.channels());
-    (0..frames * channels)
-        .into_par_iter()
-        .map(|i| along(&of_chirps(cube.channel(i / channels, i % channels), samples, fast), slow[i / channels]))
-        .collect()
+/// Of the tone in every frame and channel, beside static clutter.
+pub fn amplitudes(cube: &Cube, slow: &[f64], fast: f64) -> Grid<Complex64, 2> {
+    let samples = cube.dims[4];
+    cube.by_channel(|frame, channel| along(&of_chirps(cube.channel(frame, channel), samples, fast), slow[frame]))
 }
 
 #[cfg(test)]
