@@ -1,5 +1,6 @@
 //! Which worlds can be recorded.
 
+use super::effects::EffectsConfig;
 use super::world::World;
 use crate::bounds;
 use crate::error::{Error, Result};
@@ -46,5 +47,12 @@ impl World {
             return Err(Error::setting("furniture", format!("{bad:?}"), "a finite position and a cross-section of at least 0"));
         }
         Ok(())
+    }
+}
+
+impl EffectsConfig {
+    /// Refuses what cannot work in this world; `key` names the table in messages.
+    pub fn check(&self, world: &World, key: &str) -> Result<()> {
+        self.check_in(&world.context(), key)
     }
 }

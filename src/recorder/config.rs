@@ -6,9 +6,10 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Deserializer, Serialize, de};
 
-use super::effects::{Clock, EffectsConfig};
+use super::effects::EffectsConfig;
 use super::material::Material;
 use super::receiver::ReceiverConfig;
+use super::stages::Clock;
 use super::surface::SurfaceConfig;
 use super::timeline::Interpolation;
 use super::world::{Reflector, WallsConfig, World};

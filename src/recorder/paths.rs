@@ -4,14 +4,20 @@ use num_complex::Complex64;
 
 use super::amplitude::{Laws, WallLaw};
 use super::body::{MovingBody, smooth_field};
-use super::effects::{MirrorPlan, Physiology, Shadow, Signal, Stages, garment_m, reflectivity_db, static_points, vibration};
+use super::draws::Draw;
+use super::effects::{Shadow, StaticReflector};
 use super::mirror::Mirror;
+use super::physiology::Physiology;
 use super::scatter::Scatter;
+use super::signal::Signal;
+use super::stages::{MirrorPlan, Stages, vibration};
 use super::surface::elements;
 use super::surroundings::Surroundings;
+use super::vector::Vector;
 use super::visibility::Obstacle;
-use super::world::{Draw, World};
+use super::world::World;
 use crate::error::Result;
+use crate::person::Person;
 use crate::radar::Radar;
 
 /// Reflection laws of a world.
@@ -25,20 +31,34 @@ pub fn laws(world: &World) -> Laws {
     }
 }
 
+/// What the body's surface does beside its motion; `rest` is the rest pose, `[vertex, xyz]`.
+fn physiology(world: &World, person: &Person, rest: &[Vector]) -> Result<Physiology> {
+    let (effects, draws) = (&world.effects, world.draws());
+    let mut swells = vec![];
+    if let Some(breathing) = &effects.breathing {
+        swells.push(breathing.swell(&draws, person)?);
+    }
+    if let Some(heartbeat) = &effects.heartbeat {
+        swells.push(heartbeat.swell(&draws, person, rest)?);
+    }
+    Ok(Physiology { swells, stands: effects.pose_offset.as_ref().map(|pose| pose.stands()) })
+}
+
 /// The body in front of the true `radar`; its signals have the stages' guard samples.
 pub fn body_scatter(world: &World, stages: &Stages, radar: &Radar) -> Result<Option<Scatter>> {
     let Some(person) = &world.person else { return Ok(None) };
     let mut body = MovingBody::new(person, world.interpolation)?;
     body.displace(world.mesh_error_m, &mut world.random(Draw::MeshError));
-    body.physiology = Physiology::new(world, person, body.rest())?;
+    body.physiology = physiology(world, person, body.rest())?;
     let surface = &world.surface;
     let mut reflectivity = smooth_field(body.rest(), surface.variation_scale_m, &mut world.random(Draw::Reflectivity));
     reflectivity.iter_mut().for_each(|db| *db *= surface.variation_db);
-    if let Some(part) = reflectivity_db(&world.effects, person)? {
-        reflectivity.iter_mut().zip(part).for_each(|(db, part)| *db += part);
+    if let Some(part) = &world.effects.part_reflectivity {
+        reflectivity.iter_mut().zip(part.added_db(person)?).for_each(|(db, part)| *db += part);
     }
     let mut elements = elements(body.rest(), &body.faces, &reflectivity, surface, &mut world.random(Draw::Elements));
-    if let Some(garment) = garment_m(&world.effects, person)? {
+    if let Some(cloth) = &world.effects.clothing_delay {
+        let garment = cloth.extra_m(person)?;
         for element in &mut elements {
             let corners = body.faces[element.face as usize].map(|vertex| garment[vertex]);
             element.extra_m = (0..3).map(|corner| element.point[corner] * corners[corner]).sum();
@@ -64,7 +84,8 @@ pub struct Paths {
 impl Paths {
     /// `wide` is the radar of `scatter` with its guard samples; `level` what static reflectors are relative to.
     pub fn new(world: &World, scatter: Option<Scatter>, wide: &Radar, level: f64) -> Result<Self> {
-        let points = static_points(&world.effects, world.radar.centre_m(), level);
+        let point = |still: &StaticReflector| still.point(world.radar.centre_m(), level);
+        let points: Vec<_> = world.effects.static_reflector.iter().map(point).collect();
         let surroundings = Surroundings::new(world, wide, &laws(world), &points)?;
         let shadow_width = world.effects.soft_occlusion.as_ref().map(|shadow| shadow.width);
         Ok(Self { scatter, surroundings, shadow_width })

@@ -15,7 +15,7 @@ pub struct Physiology {
 
 /// A part of the surface that moves along its normals.
 #[derive(Clone, Debug)]
-pub(super) struct Swell {
+pub struct Swell {
     /// `[vertex]`, 0 to 1.
     pub(super) weights: Vec<f64>,
     pub(super) amplitude_m: f64,

@@ -4,11 +4,14 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::chirp::{Chirp, widened};
-use super::effects::{Chain, EffectsConfig, Mover, Signal, Stage, Stages, codes, movers, shape_noise, twice_bounced, vibration};
+use super::draws::Draw;
+use super::effects::EffectsConfig;
 use super::paths::{Paths, body_scatter};
 use super::receiver::{Level, Receiver, noise_for_snr, rail, random_phase};
 use super::scatter::Scatter;
-use super::world::{Draw, World};
+use super::signal::Signal;
+use super::stages::{Chain, Mover, Stage, Stages, damage, movers, shape_noise, vibration};
+use super::world::World;
 use crate::data::{IfFrame, IfLayout};
 use crate::error::Result;
 use crate::radar::Radar;
@@ -136,8 +139,8 @@ impl Recorder {
                 paths.add_surroundings(&self.stages, &mut beam)?;
                 Ok(beam)
             };
-            let factor = effect.coefficient / self.peak;
-            let again = twice_bounced(&beam(out)?, &beam(back)?, &self.stages.radar, &self.stages.resampler, factor);
+            let (radar, resampler) = (&self.stages.radar, &self.stages.resampler);
+            let again = effect.twice_bounced(&beam(out)?, &beam(back)?, radar, resampler, self.peak);
             signal.values.iter_mut().zip(again.values).for_each(|(value, bounce)| *value += bounce);
         }
         let mut signal = self.stages.apply(&self.world, self.peak, signal);
@@ -156,7 +159,7 @@ impl Recorder {
             shape_noise(&self.world, self.receiver.noise_codes, &mut noise);
         }
         let mut written = self.receiver.convert(&field, &noise.values, [tx, rx, loops, samples]);
-        codes(&self.world, frame, &mut written);
+        damage(&self.world.effects, frame, &mut written);
         Ok(written)
     }
 

@@ -12,10 +12,14 @@ use rayon::prelude::*;
 
 use super::amplitude::Laws;
 use super::chirp::Chirp;
-use super::effects::{Clock, OUTSIDE, Outside, Shadow, Signal, SinusoidalMotion, vibration};
+use super::draws::Draw;
+use super::effects::{Outside, Shadow};
 use super::mirror::Mirror;
+use super::signal::Signal;
+use super::sinusoid::SinusoidalMotion;
+use super::stages::{Clock, vibration};
 use super::vector::{Vector, add, distance, dot, scale, subtract, unit};
-use super::world::{Draw, World};
+use super::world::World;
 use crate::error::{Error, Result};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::Boundary;
@@ -101,7 +105,7 @@ impl Surroundings {
             self.varying.push(Varying::Moving { motion, sums: sums.to_vec() });
         }
         for (entry, effect) in world.effects.outside.iter().enumerate() {
-            let phase_rad = world.phase(OUTSIDE + entry as u64, 0);
+            let phase_rad = Outside::phase_rad(&world.draws(), entry);
             match *effect {
                 Outside::LampModulation { position_m, radius_m, rate_hz, depth } => {
                     let near = self.near(entry, position_m, radius_m)?;

@@ -1,8 +1,10 @@
 //! `truth.json`: what a recording holds beyond the baseline, and nothing else.
 
+use std::cell::LazyCell;
+
 use serde_json::{Value, json};
 
-use super::effects;
+use super::stages::Stages;
 use super::surface::Returns;
 use super::world::World;
 use crate::room::Boundary;
@@ -31,7 +33,8 @@ pub fn truth(world: &World, action: Option<&str>) -> Value {
     if world.antenna_exponent > 0.0 && world.effects.antenna_pattern.is_none() {
         effects.push(json!({ "id": "antenna_exponent", "name": "antenna_pattern", "exponent": world.antenna_exponent }));
     }
-    effects.extend(effects::listed(world));
+    let stages = LazyCell::new(|| Stages::new(world));
+    effects.extend(world.effects.truth(&world.context(), &|frame| stages.chirp_errors(world, frame)));
     json!({
         "action": action,
         "tier": if world.surface.returns == Returns::Random { "B" } else { "A" },

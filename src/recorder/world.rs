@@ -1,13 +1,12 @@
 //! Everything that a recording is made of, each part switched separately.
 
-use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::effects_config::EffectsConfig;
+use super::draws::{Draw, Draws};
+use super::effects::{Context, EffectsConfig};
 use super::material::Material;
 use super::receiver::ReceiverConfig;
-use super::streams::is_noise;
 use super::surface::SurfaceConfig;
 use super::timeline::Interpolation;
 use crate::error::Result;
@@ -114,24 +113,6 @@ impl Default for World {
     }
 }
 
-/// What random numbers are drawn for; each has its own stream, so that one switch does not move the others.
-#[derive(Clone, Copy, Debug)]
-pub enum Draw {
-    MeshError,
-    Reflectivity,
-    Elements,
-    Clutter,
-    Gain,
-    Noise {
-        frame: usize,
-    },
-    /// What an effect draws in a frame.
-    Effect {
-        id: u64,
-        frame: usize,
-    },
-}
-
 impl World {
     /// Isotropic antennas in empty space, a perfectly uniform body, an ideal receiver.
     pub fn empty() -> Self {
@@ -153,35 +134,25 @@ impl World {
         self.room.boundaries().into_iter().filter(chosen).collect()
     }
 
-    pub fn random(&self, draw: Draw) -> ChaCha8Rng {
-        let stream = match draw {
-            Draw::MeshError => 1,
-            Draw::Reflectivity => 2,
-            Draw::Elements => 3,
-            Draw::Clutter => 4,
-            Draw::Gain => 5,
-            Draw::Noise { frame } => 1000 + frame as u64,
-            Draw::Effect { id, frame } => ((1 + id) << 40) + frame as u64,
-        };
-        let again = match draw {
-            Draw::Noise { .. } => true,
-            Draw::Effect { id, .. } => is_noise(id),
-            _ => false,
-        };
-        let redraw = match draw {
-            Draw::MeshError | Draw::Noise { .. } => self.redraw,
-            Draw::Reflectivity | Draw::Elements => self.other_skin,
-            _ => 0,
-        };
-        let seed = if again { self.noise_seed.unwrap_or(self.seed) } else { self.seed };
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(stream + (redraw << 24));
-        rng
+    pub fn draws(&self) -> Draws {
+        Draws { seed: self.seed, noise_seed: self.noise_seed, redraw: self.redraw, other_skin: self.other_skin }
     }
 
-    /// A phase that an effect has, radians; `index` tells its instances apart.
-    pub fn phase(&self, id: u64, index: usize) -> f64 {
-        self.random(Draw::Effect { id, frame: (1 << 30) + index }).random_range(0.0..std::f64::consts::TAU)
+    pub fn random(&self, draw: Draw) -> ChaCha8Rng {
+        self.draws().random(draw)
+    }
+
+    /// What the effects meet.
+    pub fn context(&self) -> Context<'_> {
+        Context {
+            radar: &self.radar,
+            room: &self.room,
+            person: self.person.as_ref(),
+            receiver: &self.receiver,
+            draws: self.draws(),
+            effects: &self.effects,
+            index: 0,
+        }
     }
 
     /// Refuses a radar that cannot be recorded with.

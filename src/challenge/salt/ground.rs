@@ -8,7 +8,7 @@ use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::cube::most_frames;
 use crate::error::Result;
 use crate::radar::Sampling;
-use crate::recorder::effects::Ground;
+use crate::recorder::stages::Ground;
 
 /// Means and extremes of the two components over a recording.
 struct Extent {

@@ -37,7 +37,7 @@ use crate::data::{IfLayout, Recording, Scratch, Shard};
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
 use crate::recorder::EffectsConfig;
-use crate::recorder::effects::{Ground, Onto};
+use crate::recorder::stages::{Ground, Onto};
 
 /// Where the recording itself, and where the copies are answered.
 pub const BACKGROUND: &str = "background";

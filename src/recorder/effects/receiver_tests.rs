@@ -6,6 +6,7 @@ use super::*;
 use crate::radar::{Radar, Sampling};
 use crate::recorder::receiver::{ReceiverConfig, range_doppler_power};
 use crate::recorder::record::Recorder;
+use crate::recorder::world::World;
 
 fn db(ratio: f64) -> f64 {
     20.0 * ratio.log10()

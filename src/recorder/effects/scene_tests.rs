@@ -7,6 +7,7 @@ use super::*;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::recorder::record::Recorder;
 use crate::recorder::test_support::{bare_world, gliding, plate, sphere};
+use crate::recorder::world::World;
 use crate::room::{Boundary, Room};
 
 fn extra(with: &World, without: &World, frame: usize) -> Vec<Complex64> {

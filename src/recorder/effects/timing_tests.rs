@@ -2,6 +2,7 @@ use super::test_support::*;
 use super::*;
 use crate::radar::Radar;
 use crate::recorder::RecorderConfig;
+use crate::recorder::stages::Clock;
 
 fn same(a: &[num_complex::Complex64], b: &[num_complex::Complex64]) {
     let db = difference_db(a, b, energy(b));
