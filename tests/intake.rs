@@ -283,17 +283,32 @@ fn a_capture_that_is_cut_off_gives_its_whole_frames_or_an_error() {
     drop(folder);
 }
 
+/// A packet of zeros in every frame, and in the only one; the only one without the packet.
 #[test]
 fn nothing_whole_is_nothing_imported() {
-    // A packet of zeros in every frame.
-    let (folder, bin) = captured(CFG, |words| {
-        (0..FRAMES).for_each(|frame| words[frame * LOOPS * CHIRP + 300 * frame..][..PACKET].fill(0));
-    });
-    let draft = capture::draft(opened(&bin), &folder.path().join("out"), Default::default(), &mut |_, _| ()).unwrap();
-    assert!(draft.findings.iter().any(|finding| !finding.ok && finding.kind == Kind::Lost && !finding.chirps.is_empty()));
-    let error = draft.publish(false).unwrap_err();
-    assert!(error.to_string().contains("lost chirps in every frame"), "{error}");
-    assert_eq!(names(folder.path()), ["adc_data.bin", "radar.cfg"]);
+    let refused = |frames: usize, change: &dyn Fn(&mut Vec<i16>)| {
+        let (folder, bin) = captured(CFG, |words| {
+            words.truncate(frames * LOOPS * CHIRP);
+            change(words);
+        });
+        let error = capture::open(std::slice::from_ref(&bin), &Stated::default())
+            .and_then(|capture| capture::import(capture, &folder.path().join("out"), Default::default(), &mut |_, _| ()))
+            .unwrap_err();
+        assert_eq!(names(folder.path()), ["adc_data.bin", "radar.cfg"]);
+        assert!(error.hint().is_some(), "{error}");
+        error.to_string()
+    };
+    for frames in [FRAMES, 1] {
+        let error = refused(frames, &|words| {
+            (0..frames).for_each(|frame| words[frame * LOOPS * CHIRP + 3 * CHIRP + 300 * frame..][..PACKET].fill(0));
+        });
+        let spot = "the first from frame 0, loop 3, tx 0, rx 0, sample 0 on, expected one frame at least that is whole";
+        assert!(error.contains("adc_data.bin: `samples` is lost chirps in every frame: exact zeros in"), "{error}");
+        assert!(error.contains(spot), "{error}");
+    }
+    let error = refused(1, &|words| drop(words.drain(3 * CHIRP..3 * CHIRP + PACKET)));
+    let bytes = 2 * (LOOPS * CHIRP - PACKET);
+    assert!(error.contains(&format!("`samples` is {bytes} bytes, expected at least 32768 bytes, one frame of")), "{error}");
 }
 
 /// A MAT-file of version 5 with one complex array of int16, as MATLAB lays it out: first axis fastest, all real parts first.

@@ -189,6 +189,11 @@ fn time_stamps_that_contradict_the_frame_period_are_refused_and_gaps_are_marked(
     // Frame 1 is one that `valid` says is not whole.
     assert_eq!((gap.radar.frames, &gap.lost[..]), (5, &[1, 2, 3][..]));
     near(gap.radar.frame_period_s, 0.0333);
+    let asked = |frames: usize| Stated { sets: vec![format!("radar.frames={frames}")], ..Stated::default() };
+    let first = opened(&trace, &asked(1));
+    assert_eq!((first.radar.frames, &first.lost[..]), (1, &[][..]));
+    let expected = format!("`radar.frames` is 4, expected at most 3, as many as {} holds", sensor.join("iq").display());
+    refused(&trace, &asked(4), &expected);
     write_times(&sensor, &[10.0, 10.0333, 9.0]);
     let note = format!("{}: time stamps go back after frame 1: they do not say when frames came", ts.display());
     let back = opened(&trace, &Stated::default());

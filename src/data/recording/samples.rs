@@ -114,7 +114,7 @@ impl IfFrame {
     }
 
     /// The first sample that is not finite, as `tx 0, rx 1, loop 2, sample 3`.
-    pub(super) fn first_non_finite(&self) -> Option<String> {
+    pub fn first_non_finite(&self) -> Option<String> {
         let bad = |values: &[f32]| values.iter().position(|value| !value.is_finite());
         let position = bad(&self.re).into_iter().chain(self.im.as_deref().and_then(bad)).min()?;
         let [_, n_rx, loops, samples] = self.dims;

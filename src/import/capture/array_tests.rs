@@ -1,7 +1,7 @@
 //! Captures that others have turned into arrays.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::tests::*;
 use super::{Capture, Layout, Stated, import, open};
@@ -59,6 +59,48 @@ fn an_array_is_read_in_any_order_of_axes() {
     assert_frames(&mut open(std::slice::from_ref(&path), &stated("tx loop rx sample iq frame")).unwrap(), code);
     let error = open(&[path], &stated("frame chirp rx sample")).err().unwrap();
     assert!(error.to_string().contains("int16 [3, 4, 4, 8, 2, 2]") && error.hint().is_some(), "{error}");
+}
+
+/// The import's error, of an array of `frame chirp sample rx` or of its frames in files of their own.
+fn refused(sources: &[PathBuf], layout: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let keys =
+        ["start_frequency_hz=77e9", "slope_hz_per_s=60e12", "sample_rate_hz=4e6", "chirp_period_s=60e-6", "frame_period_s=0.1"];
+    let stated = Stated {
+        board: Some("AWR1843".into()),
+        layout: Some(Layout::parse(layout).unwrap()),
+        sets: keys.map(|key| format!("radar.{key}")).to_vec(),
+        ..Stated::default()
+    };
+    let capture = open(sources, &stated).unwrap();
+    let error = import(capture, &folder.path().join("out"), Default::default(), &mut |_, _| {}).err().unwrap();
+    assert!(error.hint().is_some(), "{error}");
+    error.to_string()
+}
+
+#[test]
+fn a_sample_that_is_not_finite_is_named_by_the_users_file_and_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    // Transmitters take turns: chirp 7 is loop 2 of transmitter 1.
+    let frame = |bad: f64| {
+        let mut values = numbers(3, LOOPS * TX * SAMPLES * RX, -1.0, 1.0);
+        values[(7 * SAMPLES + 5) * RX + 3] = bad;
+        values
+    };
+    for bad in [f64::NAN, f64::NEG_INFINITY, 1e39] {
+        let whole = folder.path().join("cube.npy");
+        let values = [frame(0.0), frame(bad)].concat();
+        write_npy(&whole, &[2, LOOPS * TX, SAMPLES, RX], Values::F64(&values)).unwrap();
+        let place = "tx 1, rx 3, loop 2, sample 5, expected finite samples";
+        let error = refused(std::slice::from_ref(&whole), "frame chirp sample rx");
+        assert_eq!(error, format!("{}: `cube` is NaN or infinite at frame 1, {place}", whole.display()));
+        let files = [0.0, bad].map(|bad| {
+            let file = folder.path().join(format!("part_{}.npy", usize::from(bad != 0.0)));
+            write_npy(&file, &[LOOPS * TX, SAMPLES, RX], Values::F64(&frame(bad))).unwrap();
+            file
+        });
+        assert_eq!(refused(&files, "chirp sample rx"), format!("{}: `part_1` is NaN or infinite at {place}", files[1].display()));
+    }
 }
 
 #[test]
@@ -172,6 +214,9 @@ fn time_stamps_say_which_frames_were_lost() {
         "{:?}",
         capture.notes
     );
+    let sets = vec!["radar.frames=13".to_string()];
+    let first = opened(&Stated { sets, ..Stated::default() }).unwrap();
+    assert_eq!((first.radar.frames, &first.lost[..]), (15, &[12, 13][..]));
     let recording = import_all(capture, &folder.path().join("recording"));
     assert_eq!(recording.whole_frames().collect::<Vec<_>>(), (0..12).chain(14..22).collect::<Vec<_>>());
     for (frame, read) in [(11, 11), (14, 12), (21, 19)] {

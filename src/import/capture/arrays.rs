@@ -8,7 +8,7 @@ use super::boards::Board;
 use super::container;
 use super::cube::{Cube, half_scale_note};
 use super::layout::{Axis, Layout};
-use super::radar_table::{finished, radar_table, rows, table_of};
+use super::radar_table::{finished, place_antennas, radar_table, table_of};
 use super::words::{Lengths, WordArray};
 use super::{Capture, Stated, coloradar};
 use crate::data::entries::entries;
@@ -188,14 +188,7 @@ impl Settings {
                  are so many); --set radar.tx_m states others"
             ));
         }
-        let senders = senders.iter().map(|&tx| board.tx_m(tx)).collect::<Option<Vec<_>>>();
-        let receivers = rx.unwrap_or(board.rx_half_wavelengths.len());
-        let receivers = (0..receivers).map(|rx| board.rx_m(rx)).collect::<Option<Vec<_>>>();
-        for (key, places) in [("rx_m", receivers), ("tx_m", senders)] {
-            if let Some(places) = places {
-                self.radar().entry(key).or_insert_with(|| rows(places));
-            }
-        }
+        place_antennas(self.radar(), board, &senders, rx.unwrap_or(board.rx_half_wavelengths.len()));
     }
 
     fn antennas(&mut self, key: &str) -> Option<usize> {

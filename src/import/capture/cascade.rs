@@ -13,11 +13,12 @@ use std::path::{Path, PathBuf};
 use toml::Value;
 
 use super::boards::{Board, CASCADE};
-use super::cascade_index::{Index, hold_together};
+use super::cascade_index::{Index, grid, hold_together};
 use super::descriptions::descriptions;
 use super::schedule::Selection;
 use super::stream::Words;
 use super::ti_json::{CASCADED, RECEIVERS};
+use super::time_stamps::Grid;
 use super::{Capture, Stated, radar_table, ti_json};
 use crate::data::entries::entries;
 use crate::data::{IfFrame, IfLayout};
@@ -59,23 +60,32 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     }
     let config = &configs[0];
     if config.extension().is_some_and(|extension| extension == "toml") {
-        let mut radar = radar_of(config, &stated, &mut notes)?;
+        let (mut radar, asked) = radar_of(config, &stated, &mut notes)?;
         let words_per_frame = (radar.samples_per_chirp * radar.tx_m.len() * radar.loops_per_frame * RECEIVERS * 2) as u64;
-        let (frames, streams) = streams(&parts, words_per_frame, config, &mut notes)?;
-        radar.frames = frames;
+        let Found { frames, streams, grid } = found(&parts, words_per_frame, config, &mut notes)?;
+        radar.frames = asked.unwrap_or(frames);
+        radar_table::hold_frames(&radar, frames, &parts[0][0])?;
         let chirp = (radar.samples_per_chirp * RECEIVERS * 2) as u64;
         let senders = radar.tx_m.len() as u64;
         let start = |index: u64| (0..senders).map(|tx| (index * senders + tx) * chirp).collect();
         let starts = (0..radar.loops_per_frame as u64).map(start).collect();
-        return Ok(capture(parts, streams, radar, words_per_frame, starts, false, notes));
+        return Ok(placed(grid, capture(parts, streams, radar, words_per_frame, starts, false, notes)));
     }
     let radar = ti_json::read_cascade(config)?;
     let words_per_frame = radar.words_per_frame()?;
-    let (frames, streams) = streams(&parts, words_per_frame, config, &mut notes)?;
+    let Found { frames, streams, grid } = found(&parts, words_per_frame, config, &mut notes)?;
     let Selection { radar: found, words_per_frame, starts, notes: more, .. } = radar.select(&stated, &|_, _| Ok(frames))?;
     notes.extend(more);
     let shaped = radar_table::apply(found, &stated.sets)?;
-    Ok(capture(parts, streams, shaped, words_per_frame, starts, radar.lanes.q_first, notes))
+    Ok(placed(grid, capture(parts, streams, shaped, words_per_frame, starts, radar.lanes.q_first, notes)))
+}
+
+/// Frames where they came, as far as the indices say.
+fn placed(grid: Option<Grid>, capture: Capture) -> Capture {
+    match grid {
+        Some(grid) => grid.place(&capture.source.clone(), capture),
+        None => capture,
+    }
 }
 
 fn capture(
@@ -149,49 +159,54 @@ fn parts(sources: &[PathBuf]) -> Result<Vec<[PathBuf; CASCADED]>> {
         .collect()
 }
 
-/// How many frames there are, and every device's words of them.
-fn streams(
-    parts: &[[PathBuf; CASCADED]],
-    words_per_frame: u64,
-    config: &Path,
-    notes: &mut Vec<String>,
-) -> Result<(usize, [Words; CASCADED])> {
-    let (mut frames, mut streams) = (0, [const { Vec::new() }; CASCADED]);
+/// What the files hold.
+struct Found {
+    frames: usize,
+    /// Every device's words of them.
+    streams: [Words; CASCADED],
+    /// When they came; none where the indices do not say.
+    grid: Option<Grid>,
+}
+
+fn found(parts: &[[PathBuf; CASCADED]], words_per_frame: u64, config: &Path, notes: &mut Vec<String>) -> Result<Found> {
+    let mut indices = Vec::with_capacity(parts.len());
     for part in parts {
         let of_devices = part.iter().map(|data| Index::of(data, 2 * words_per_frame, config, notes));
         let of_devices = of_devices.collect::<Result<Vec<_>>>()?;
-        hold_together(&of_devices, notes)?;
-        frames += of_devices[0].frames;
-        for (stream, index) in streams.iter_mut().zip(of_devices) {
-            stream.push((index.data, index.frames as u64 * words_per_frame));
-        }
+        hold_together(&of_devices)?;
+        indices.push(of_devices);
     }
+    let frames = indices.iter().map(|of_devices| of_devices[0].frames).sum();
     if frames == 0 {
         let expected = format!("at least {} bytes, one frame of {}", 2 * words_per_frame, config.display());
         return Err(Error::field(&parts[0][0], "samples", "no whole frame", expected)
             .with_hint("the description belongs to another capture, or the capture was cut off"));
     }
-    Ok((frames, streams.map(Words::of)))
+    let grid = grid(&indices, notes)?;
+    let of_device = |device: usize| {
+        let part = |part: &Vec<Index>| (part[device].data.clone(), part[device].frames as u64 * words_per_frame);
+        Words::of(indices.iter().map(part).collect())
+    };
+    Ok(Found { frames, streams: std::array::from_fn(of_device), grid })
 }
 
 /// The radar of a TOML file; antennas that it does not state are the board's, in the firing order of mmWave Studio's script for TDM
-/// (`Cascade_Configuration_MIMO.lua`): transmitter 12 first.
-fn radar_of(config: &Path, stated: &Stated, notes: &mut Vec<String>) -> Result<Radar> {
+/// (`Cascade_Configuration_MIMO.lua`): transmitter 12 first. Besides, how many frames it states.
+fn radar_of(config: &Path, stated: &Stated, notes: &mut Vec<String>) -> Result<(Radar, Option<usize>)> {
     let mut table = radar_table::table_of(Some(config), &stated.sets)?;
     let radar = radar_table::radar_table(&mut table)?;
     let board = Board::named(stated.board.as_deref().unwrap_or(CASCADE))?;
     notes.push(format!("antennas of the {} ({})", board.name, board.source));
-    let rx = (0..RECEIVERS * CASCADED).map_while(|rx| board.rx_m(rx)).collect();
-    radar.entry("rx_m").or_insert_with(|| radar_table::rows(rx));
-    if !radar.contains_key("tx_m") {
+    let senders: Vec<usize> = (0..board.tx_half_wavelengths.len()).rev().collect();
+    let receivers = board.rx_half_wavelengths.len().min(RECEIVERS * CASCADED);
+    if radar_table::place_antennas(radar, board, &senders, receivers).contains(&"tx_m") {
         notes.push(
             "radar.tx_m is not stated: transmitters fire from the board's last to its first, as mmWave Studio's script has it"
                 .into(),
         );
-        let tx = (0..board.tx_half_wavelengths.len()).rev().filter_map(|tx| board.tx_m(tx)).collect();
-        radar.insert("tx_m".into(), radar_table::rows(tx));
     }
-    radar.insert("frames".into(), Value::Integer(1));
+    let states_frames = radar.contains_key("frames");
+    radar.entry("frames").or_insert(Value::Integer(1));
     if !radar.contains_key("full_scale_codes") {
         radar.insert("full_scale_codes".into(), Value::Float(f64::from(i16::MAX)));
     }
@@ -199,7 +214,8 @@ fn radar_of(config: &Path, stated: &Stated, notes: &mut Vec<String>) -> Result<R
     if radar.rx_m.len() != RECEIVERS * CASCADED {
         return Err(Error::setting("radar.rx_m", format!("{} receivers", radar.rx_m.len()), "16, four a device"));
     }
-    Ok(radar)
+    let frames = states_frames.then_some(radar.frames);
+    Ok((radar, frames))
 }
 
 #[cfg(test)]

@@ -98,38 +98,49 @@ impl Index {
         }
         Ok(())
     }
-
-    /// When frames came; none where the stamps do not say.
-    fn grid(&self) -> Option<Grid> {
-        let times = self.times.as_ref().filter(|times| times.len() > 2)?;
-        // Counted from the first one's, so that a float holds them.
-        let since = |time: &u64| i128::from(*time) - i128::from(times[0]);
-        Grid::of(&times.iter().map(|time| since(time) as f64).collect::<Vec<_>>()).ok()
-    }
 }
 
-/// Whether the files of all devices hold the same frames.
+/// Whether the files of all devices hold as many frames.
 ///
 /// # Errors
-/// Another number of frames in one of them, or frames that came at other times.
-pub fn hold_together(devices: &[Index], notes: &mut Vec<String>) -> Result<()> {
+/// Another number of frames in one of them.
+pub fn hold_together(devices: &[Index]) -> Result<()> {
     let (master, slaves) = devices.split_first().expect("a cascade has a master");
-    if let Some(slave) = slaves.iter().find(|slave| slave.frames != master.frames) {
-        let expected = format!("{}, as in {}", master.frames, master.data.display());
-        return Err(Error::field(&slave.data, "frames", slave.frames.to_string(), expected).with_hint(
-            "a file is cut off or of another capture, or a device lost frames: those after them do not belong together",
-        ));
-    }
-    let Some(wanted) = master.grid() else { return Ok(()) };
-    for slave in slaves {
-        let Some(grid) = slave.grid() else { continue };
+    let Some(slave) = slaves.iter().find(|slave| slave.frames != master.frames) else { return Ok(()) };
+    let expected = format!("{}, as in {}", master.frames, master.data.display());
+    Err(Error::field(&slave.data, "frames", slave.frames.to_string(), expected)
+        .with_hint("a file is cut off or of another capture, or a device lost frames: those after them do not belong together"))
+}
+
+/// When the frames of a device came, over all parts of the capture; none where an index is missing.
+fn times(parts: &[Vec<Index>], device: usize) -> Option<Vec<f64>> {
+    let times: Option<Vec<&Vec<u64>>> = parts.iter().map(|part| part[device].times.as_ref()).collect();
+    let times: Vec<u64> = times?.into_iter().flatten().copied().collect();
+    // Counted from the first one's, so that a float holds them.
+    let since = |time: &u64| i128::from(*time) - i128::from(times[0]);
+    Some(times.iter().map(|time| since(time) as f64).collect())
+}
+
+/// When the frames of a capture came, by the master's indices; none where they do not say.
+///
+/// # Errors
+/// A device whose frames came at other times.
+pub fn grid(parts: &[Vec<Index>], notes: &mut Vec<String>) -> Result<Option<Grid>> {
+    let master = &parts[0][0].data;
+    let Some(wanted) = times(parts, 0).and_then(|times| Grid::read(master, &times, notes)) else { return Ok(None) };
+    for device in 1..parts[0].len() {
+        let Some(grid) = times(parts, device).and_then(|times| Grid::of(&times).ok()) else { continue };
         if let Some(at) = grid.slots.iter().zip(&wanted.slots).position(|(own, wanted)| own != wanted) {
+            let ends = parts.iter().scan(0, |end, part| {
+                *end += part[device].frames;
+                Some(*end)
+            });
+            let part = ends.take_while(|end| *end <= at).count();
             let found = format!("frame {at} in frame period {}", grid.slots[at]);
-            let expected = format!("period {}, as in {}", wanted.slots[at], master.data.display());
-            return Err(Error::field(&slave.data, "time stamps", found, expected)
+            let expected = format!("period {}, as in {}", wanted.slots[at], parts[part][0].data.display());
+            return Err(Error::field(&parts[part][device].data, "time stamps", found, expected)
                 .with_hint("a device lost frames: those after them do not belong together"));
         }
     }
-    notes.extend(wanted.note(&master.data, "those that are there are taken to be evenly spaced"));
-    Ok(())
+    Ok(Some(wanted))
 }

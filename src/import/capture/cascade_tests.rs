@@ -143,6 +143,16 @@ fn the_radar_is_that_of_the_description_or_of_a_file_of_settings() {
     assert_eq!(by_file.radar.dims(), described.dims());
     let found = (by_file.frame)(2).unwrap().sample(7, 13, 5, 3);
     assert_eq!([found.re, found.im], code([2, 5, 7, 13, 3]).map(f32::from));
+    let asked = |frames: usize| {
+        let sets = vec![format!("radar.frames={frames}")];
+        open(&[folder.path().into()], &Stated { sets, ..stated.clone() }).map(|capture| capture.radar.frames)
+    };
+    assert_eq!(asked(2).unwrap(), 2);
+    let error = asked(4).unwrap_err().to_string();
+    assert!(
+        error.starts_with("`radar.frames` is 4, expected at most 3, as many as ") && error.contains("master_0000"),
+        "{error}"
+    );
 }
 
 /// The strongest range, Doppler bin and sine of the azimuth of a frame, over the level antennas.
@@ -318,23 +328,31 @@ fn an_index_that_contradicts_itself_or_its_file_is_refused() {
     refused(folder.path(), &["slave1_0000_data.bin", "2", "3, as in"]);
 }
 
-/// Files are made before the capture, so that what follows the last frame of the index is not of it; frames that all devices lost are noted.
+/// Files are made before the capture, so that what follows the last frame of the index is not of it; frames that all devices lost, within a
+/// part or between two, are put in as lost.
 #[test]
-fn what_follows_the_index_is_left_out_and_lost_frames_are_noted() {
-    let folder = capture(&[3], code);
-    for device in DEVICES {
-        let data = folder.path().join(format!("{device}_0000_data.bin"));
-        let mut bytes = fs::read(&data).unwrap();
-        bytes.extend([0; 4096]);
-        fs::write(&data, bytes).unwrap();
-        let mut late = fs::read(idx(folder.path(), device)).unwrap();
-        late[24 + 2 * 48 + 32..24 + 2 * 48 + 40].copy_from_slice(&300_000u64.to_le_bytes());
-        fs::write(idx(folder.path(), device), late).unwrap();
-    }
-    let capture = opened(folder.path()).unwrap();
-    assert_eq!(capture.radar.frames, FRAMES);
-    for part in ["4096 bytes after the last frame", "1 frames were lost"] {
-        assert!(capture.notes.iter().any(|note| note.contains(part)), "{part}: {:?}", capture.notes);
+fn what_follows_the_index_is_left_out_and_lost_frames_keep_their_places() {
+    for (parts, late) in [(&[3][..], "0000"), (&[2, 1], "0001")] {
+        let folder = capture(parts, code);
+        for device in DEVICES {
+            let of = |end: &str| folder.path().join(format!("{device}_{late}_{end}.bin"));
+            let bytes = [fs::read(of("data")).unwrap(), vec![0; 4096]].concat();
+            fs::write(of("data"), bytes).unwrap();
+            let mut index = fs::read(of("idx")).unwrap();
+            let last = index.len() - 16;
+            index[last..last + 8].copy_from_slice(&300_000u64.to_le_bytes());
+            fs::write(of("idx"), index).unwrap();
+        }
+        let mut capture = opened(folder.path()).unwrap();
+        assert_eq!((capture.radar.frames, &capture.lost[..]), (FRAMES + 1, &[2][..]), "{parts:?}");
+        let found = [2, 3].map(|frame| (capture.frame)(frame).unwrap().sample(4, 6, 3, 17));
+        assert_eq!(found.map(|found| [found.re, found.im]), [[0.0; 2], code([2, 3, 4, 6, 17]).map(f32::from)]);
+        for part in ["4096 bytes after the last frame", "1 frames were lost, the first after frame 1"] {
+            assert!(capture.notes.iter().any(|note| note.contains(part)), "{part}: {:?}", capture.notes);
+        }
+        let stated = Stated { sets: vec!["radar.frames=2".into()], ..Stated::default() };
+        let first = open(&[folder.path().into()], &stated).unwrap();
+        assert_eq!((first.radar.frames, &first.lost[..]), (2, &[][..]));
     }
 }
 

@@ -148,6 +148,9 @@ impl Cube {
     }
 
     /// The samples of a frame as `[tx, rx, loop, sample]`.
+    ///
+    /// # Errors
+    /// A file that cannot be read; a sample that is not finite.
     pub fn frame(&self, index: usize) -> Result<IfFrame> {
         let (re, im) = self.numbers(index)?;
         let n_tx = self.transmitters.get();
@@ -185,7 +188,18 @@ impl Cube {
             }
         }
         let quadrature = self.sampling() == Sampling::Complex;
-        Ok(IfFrame::new([n_tx, n_rx, loops, samples], real, quadrature.then_some(imaginary)))
+        let frame = IfFrame::new([n_tx, n_rx, loops, samples], real, quadrature.then_some(imaginary));
+        match frame.first_non_finite() {
+            None => Ok(frame),
+            Some(place) => Err(self.not_finite(index, &place)),
+        }
+    }
+
+    /// The error for a sample that is NaN or infinite, also one that is too large for single precision.
+    fn not_finite(&self, frame: usize, place: &str) -> Error {
+        let frame = if self.has(Axis::Frame) { format!("frame {frame}, ") } else { String::new() };
+        self.wrong(format!("NaN or infinite at {frame}{place}"), "finite samples".into())
+            .with_hint("no converter writes such a sample: correct what wrote the file, or leave this frame out")
     }
 
     /// A frame's numbers in the array's order without its axis of frames; the imaginary parts of complex ones apart.

@@ -32,7 +32,7 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
     let radar = radar(&config, &shape, board, cube.frames(), &mut notes)?;
     let (layout, radar) = stored_as(&cube, radar, &mut notes)?;
     let radar = apply(radar, &stated.sets)?;
-    cube.check(&radar)?;
+    cube.check(&Radar { frames: cube.frames(), ..radar.clone() })?;
     notes.extend(half_scale_note(&cube)?);
     let grid = grid(&folder, &source, cube.frames(), &mut notes)?;
     if let Some((stamps, grid)) = &grid {

@@ -159,13 +159,10 @@ impl Draft {
             lost.append(&mut self.lost);
             self.staged.set_valid(&Valid::without(&self.staged.recording.radar, lost))?;
             if self.staged.recording.whole_frames().next().is_none() {
-                return Err(Error::field(
-                    &self.source,
-                    "samples",
-                    "lost chirps in every frame",
-                    "one frame at least that is whole",
-                )
-                .with_hint("too much was lost to use this capture: record again"));
+                let found = ["lost chirps in every frame".into()].into_iter().chain(integrity::damage(&self.findings));
+                let found = found.collect::<Vec<_>>().join(": ");
+                return Err(Error::field(&self.source, "samples", found, "one frame at least that is whole")
+                    .with_hint("too much was lost to use this capture: record again"));
             }
         }
         let mut recording = self.staged.publish()?;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use toml::{Table, Value};
 
+use super::boards::Board;
 use crate::data::read_toml;
 use crate::data::settings::{apply_sets, settings_from_table};
 use crate::error::{Error, Result};
@@ -26,6 +27,21 @@ pub fn radar_table(table: &mut Table) -> Result<&mut Table> {
 /// Places as a setting.
 pub fn rows(places: Vec<[f64; 3]>) -> Value {
     Value::Array(places.into_iter().map(|place| Value::Array(place.map(Value::Float).to_vec())).collect())
+}
+
+/// A board's antennas, its transmitters by number, where the table states no others. Which keys were filled; none of an array that has
+/// more antennas than the board.
+pub fn place_antennas(radar: &mut Table, board: &Board, transmitters: &[usize], receivers: usize) -> Vec<&'static str> {
+    let tx = transmitters.iter().map(|&tx| board.tx_m(tx)).collect::<Option<Vec<_>>>();
+    let rx = (0..receivers).map(|rx| board.rx_m(rx)).collect::<Option<Vec<_>>>();
+    let mut filled = vec![];
+    for (key, places) in [("tx_m", tx), ("rx_m", rx)] {
+        if let Some(places) = places.filter(|_| !radar.contains_key(key)) {
+            radar.insert(key.into(), rows(places));
+            filled.push(key);
+        }
+    }
+    filled
 }
 
 /// The radar of a table that says all but perhaps when the ADC starts.
@@ -56,6 +72,16 @@ pub fn apply(radar: Radar, sets: &[String]) -> Result<Radar> {
     settings.radar.check("radar")?;
     keeps_its_shape(&radar, &settings.radar)?;
     Ok(settings.radar)
+}
+
+/// Refuses more frames than a capture holds; fewer can be taken.
+pub fn hold_frames(radar: &Radar, frames: usize, source: &Path) -> Result<()> {
+    if radar.frames <= frames {
+        return Ok(());
+    }
+    let expected = format!("at most {frames}, as many as {} holds", source.display());
+    Err(Error::setting("radar.frames", radar.frames, expected)
+        .with_hint("leave it out to take all frames; the settings may be of another capture"))
 }
 
 /// Where a sample lies follows from what was read: of frames and loops fewer can be taken, all else must stay.

@@ -71,11 +71,12 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
     let words = Words::open(&[sensor.join(SAMPLES)])?;
     let block = shape.iter().try_fold(1u64, |all, &length| all.checked_mul(length as u64)).unwrap_or(u64::MAX);
     let frames = whole_frames(&words, block, shape, meta.file())?;
-    let lost = lost(sensor, &meta, frames, &mut notes)?;
+    let mut lost = lost(sensor, &meta, frames, &mut notes)?;
     let stamps = sensor.join(STAMPS);
     let grid = Grid::read(&stamps, &times(sensor, &meta, frames)?, &mut notes);
     let found = Frames { meta: meta.file(), stamps: &stamps, shape, frames, grid: grid.as_ref() };
     let (radar, inverted_rx) = radar_of(sensor, &found, stated, &mut notes)?;
+    lost.retain(|frame| *frame < radar.frames);
     let lanes = Lanes { count: 2, interleaved: false, q_first: true, sampling: radar.sampling };
     let [_, n_tx, n_rx, loops, samples] = radar.dims();
     let frame = move |index: usize| {

@@ -12,7 +12,7 @@ use toml::{Table, Value};
 use super::Stated;
 use super::boards::Board;
 use super::json::Json;
-use super::radar_table::{finished, radar_table, rows, table_of};
+use super::radar_table::{finished, hold_frames, place_antennas, radar_table, table_of};
 use super::time_stamps::Grid;
 use crate::data::files;
 use crate::error::{Error, Result};
@@ -55,13 +55,22 @@ pub fn radar_of(sensor: &Path, found: &Frames, stated: &Stated, notes: &mut Vec<
         None
     };
     let radar = radar_table(&mut table)?;
+    // Of a trace that broke off, `config.yaml` counts more than there are.
+    radar.entry("frames").or_insert(Value::Integer(found.frames as i64));
     fill_from_config(radar, &config, sensor, notes)?;
     if let Some(intrinsics) = &intrinsics {
         fill_from_properties(radar, &properties_of(intrinsics)?);
     }
     fill_from_channels(radar, found, notes)?;
     let board = stated.board.as_ref().map(|name| Board::named(name)).transpose()?;
-    place_antennas(radar, board, found.shape, notes);
+    let [_, tx, rx, _] = found.shape;
+    match board {
+        None => notes.push("no board was named: no receiver is taken to be fed from the opposite side".into()),
+        Some(board) => notes.extend(place_antennas(radar, board, &board.senders(tx), rx).into_iter().map(|key| {
+            let (what, name, source) = (if key == "tx_m" { "transmitters" } else { "receivers" }, board.name, board.source);
+            format!("{what} of the {name} ({source}), in the order in which a rover fires them")
+        })),
+    }
     if let Some(intrinsics) = &intrinsics {
         fill_from_resolutions(radar, intrinsics, found.shape, notes)?;
     }
@@ -160,7 +169,6 @@ fn fill_from_channels(radar: &mut Table, found: &Frames, notes: &mut Vec<String>
         return Err(Error::field(found.meta, "iq.shape", format!("{:?}", found.shape), expected));
     }
     let samples = if is_real { words } else { words / 2 };
-    radar.insert("frames".into(), Value::Integer(found.frames as i64));
     radar.entry("loops_per_frame").or_insert(Value::Integer(loops as i64));
     radar.entry("samples_per_chirp").or_insert(Value::Integer(samples as i64));
     radar.entry("full_scale_codes").or_insert(Value::Float(f64::from(i16::MAX)));
@@ -169,22 +177,6 @@ fn fill_from_channels(radar: &mut Table, found: &Frames, notes: &mut Vec<String>
         radar.insert(PERIOD.into(), Value::Float(spacing_s));
     }
     Ok(())
-}
-
-/// The board's antennas, where no others are stated.
-fn place_antennas(radar: &mut Table, board: Option<&Board>, [_, tx, rx, _]: [usize; 4], notes: &mut Vec<String>) {
-    let Some(board) = board else {
-        notes.push("no board was named: no receiver is taken to be fed from the opposite side".into());
-        return;
-    };
-    let of_tx = board.senders(tx).into_iter().map(|tx| board.tx_m(tx)).collect::<Option<Vec<_>>>();
-    let of_rx = (0..rx).map(|rx| board.rx_m(rx)).collect::<Option<Vec<_>>>();
-    for (key, what, places) in [("tx_m", "transmitters", of_tx), ("rx_m", "receivers", of_rx)] {
-        if let Some(places) = places.filter(|_| !radar.contains_key(key)) {
-            radar.insert(key.into(), rows(places));
-            notes.push(format!("{what} of the {} ({}), in the order in which a rover fires them", board.name, board.source));
-        }
-    }
 }
 
 /// The slope and the chirp period that the resolutions of `radar.json` leave, where nothing states them.
@@ -237,6 +229,7 @@ fn hold_against_channels(radar: &Radar, found: &Frames, stated: &Stated, notes: 
         return Err(Error::field(found.meta, "iq.shape", format!("{:?}", found.shape), expected)
             .with_hint("the settings or the board are of another capture"));
     }
+    hold_frames(radar, found.frames, &found.meta.with_file_name("iq"))?;
     let Some(grid) = found.grid else { return Ok(()) };
     grid.hold(found.stamps, radar.frame_period_s, stated.has_set("radar.frame_period_s"), notes)
 }

@@ -89,7 +89,9 @@ impl Grid {
     /// Puts the frames of a capture where they came. Those that were lost between them are zeros and marked as lost.
     ///
     /// Where more were lost than are there, the clock may have been set, or the capture paused: then frames stay one after the other.
-    pub fn place(&self, stamps: &Path, mut capture: Capture) -> Capture {
+    pub fn place(mut self, stamps: &Path, mut capture: Capture) -> Capture {
+        // The first ones, where fewer were asked for.
+        self.slots.truncate(capture.radar.frames);
         let frames = self.slots.len() + self.lost();
         if self.lost() > self.slots.len() {
             let done =
@@ -99,7 +101,7 @@ impl Grid {
         }
         let done = "they are zeros here and marked as lost (valid.npy), so that the others keep their times";
         capture.notes.extend(self.note(stamps, done));
-        let slots = self.slots.clone();
+        let slots = self.slots;
         let gaps = (0..frames).filter(|frame| slots.binary_search(frame).is_err());
         capture.lost = capture.lost.iter().map(|&frame| slots[frame]).chain(gaps).collect();
         capture.lost.sort_unstable();
