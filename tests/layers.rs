@@ -47,7 +47,7 @@ const FLOORS: [&[&str]; 31] = [
 const RECORDER_MAY_IMPORT: [&str; 7] = ["error", "bounds", "radar", "room", "person", "data", "recorder"];
 
 /// Physics modules know no file, clock or terminal.
-const PHYSICS: [&str; 12] = [
+const PHYSICS: [&str; 13] = [
     "bounds",
     "complex",
     "grid",
