@@ -9,8 +9,8 @@ use std::process::{Command, Output};
 
 use hybridsim::data::{Recording, Valid};
 use hybridsim::diagnosis::cube::Loaded;
-use hybridsim::import::capture::{self, Capture, Layout, Preset, Stated};
-use hybridsim::integrity::{self, Kind};
+use hybridsim::import::capture::{self, Layout, Preset, Stated};
+use hybridsim::integrity;
 use hybridsim::recorder::{self, RecorderConfig};
 
 const FRAMES: usize = 16;
@@ -73,10 +73,6 @@ fn captured(cfg: &str, change: impl FnOnce(&mut Vec<i16>)) -> (tempfile::TempDir
     fs::write(&bin, words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>()).unwrap();
     fs::write(folder.path().join("radar.cfg"), cfg).unwrap();
     (folder, bin)
-}
-
-fn opened(bin: &Path) -> Capture {
-    capture::open(&[bin.into()], &Stated::default()).unwrap()
 }
 
 fn hybridsim(arguments: &[&str], folder: &Path) -> Output {
