@@ -1,6 +1,6 @@
 //! Values over named axes, the last of which varies fastest.
 
-use std::ops::{Index, IndexMut};
+use std::ops::{Index, IndexMut, Range};
 
 /// A dense array of `N` axes; an index that lies outside its axis panics and names the axis, instead of reading the next row.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,25 +50,43 @@ impl<T, const N: usize> Grid<T, N> {
     }
 
     /// All values below the first `M` indices, contiguous: a lane of the last axis for `M = N - 1`.
+    #[inline]
     pub fn below<const M: usize>(&self, at: [usize; M]) -> &[T] {
-        let range = self.range(&at);
+        let range = self.range(at);
         &self.values[range]
     }
 
+    #[inline]
     pub fn below_mut<const M: usize>(&mut self, at: [usize; M]) -> &mut [T] {
-        let range = self.range(&at);
+        let range = self.range(at);
         &mut self.values[range]
     }
 
-    fn range(&self, at: &[usize]) -> std::ops::Range<usize> {
-        let each: usize = self.shape[at.len()..].iter().product();
-        let first = at.iter().enumerate().fold(0, |first, (axis, &index)| {
-            let (name, length) = (self.axes[axis], self.shape[axis]);
-            assert!(index < length, "{name} {index} of {length}");
-            first * length + index
-        });
-        first * each..(first + 1) * each
+    #[inline]
+    fn range<const M: usize>(&self, at: [usize; M]) -> Range<usize> {
+        let each: usize = self.shape[M..].iter().product();
+        let first = self.place(at) * each;
+        first..first + each
     }
+
+    /// Of the first `M` axes. Inner loops come here: nothing but the product and the bounds.
+    #[inline]
+    fn place<const M: usize>(&self, at: [usize; M]) -> usize {
+        let mut place = 0;
+        for axis in 0..M {
+            if at[axis] >= self.shape[axis] {
+                outside(self.axes[axis], at[axis], self.shape[axis]);
+            }
+            place = place * self.shape[axis] + at[axis];
+        }
+        place
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn outside(axis: &str, index: usize, length: usize) -> ! {
+    panic!("{axis} {index} of {length}")
 }
 
 impl<T: Clone, const N: usize> Grid<T, N> {
@@ -80,14 +98,16 @@ impl<T: Clone, const N: usize> Grid<T, N> {
 impl<T, const N: usize> Index<[usize; N]> for Grid<T, N> {
     type Output = T;
 
+    #[inline]
     fn index(&self, at: [usize; N]) -> &T {
-        &self.values[self.range(&at).start]
+        &self.values[self.place(at)]
     }
 }
 
 impl<T, const N: usize> IndexMut<[usize; N]> for Grid<T, N> {
+    #[inline]
     fn index_mut(&mut self, at: [usize; N]) -> &mut T {
-        let place = self.range(&at).start;
+        let place = self.place(at);
         &mut self.values[place]
     }
 }

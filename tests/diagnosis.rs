@@ -22,7 +22,7 @@ fn report(folder: &Path) -> Report {
 
 /// A small recording; `text` is TOML over the recorder's defaults.
 fn recorded(folder: &Path, text: &str) -> PathBuf {
-    let config: RecorderConfig = toml::from_str(&format!("{text}\n{RADAR}")).unwrap();
+    let config: RecorderConfig = hybridsim::data::settings::read_text(&format!("{text}\n{RADAR}")).unwrap();
     let out = folder.join("recording");
     recorder::record_to(&config, Path::new("."), &out, &mut |_, _| {}).unwrap();
     out

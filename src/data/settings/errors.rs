@@ -20,15 +20,9 @@ pub(super) fn of_syntax(error: &toml::de::Error, source: &Source) -> Error {
 /// What a failed read means; `sources` are the files that went in, the one that wins first.
 pub(super) fn explain(failure: Failure, sources: &[Source], sets: &[String]) -> Error {
     let Failure { keys, message } = &failure;
-    let origin = (1..=keys.len()).rev().map(|length| origin(&keys[..length], sources, sets)).find(Origin::is_known);
-    let origin = origin.unwrap_or(Origin::Nowhere);
     if let Some((key, known)) = unknown_key(message) {
         let nearest = nearest(&key, known.iter().map(String::as_str)).map(str::to_string);
-        let path = match origin {
-            Origin::Set => "--set".into(),
-            Origin::File { source, .. } => source.path.clone(),
-            Origin::Nowhere => sources[0].path.clone(),
-        };
+        let path = file_of(keys, sources, sets).unwrap_or_else(|| "--set".into());
         let mut whole = keys.clone();
         // A table whose kind stands in it is read whole, before its keys are looked at.
         if whole.last() != Some(&key) {
@@ -36,7 +30,7 @@ pub(super) fn explain(failure: Failure, sources: &[Source], sets: &[String]) -> 
         }
         return Error::UnknownKey { path, key: whole.join("."), nearest };
     }
-    match origin {
+    match nearest_origin(keys, sources, sets) {
         Origin::Set => Error::Parse { path: "--set".into(), message: failure.to_string() },
         Origin::File { source, span } => parse_error(source, span, message),
         Origin::Nowhere => Error::Parse { path: sources[0].path.clone(), message: failure.to_string() },
@@ -67,14 +61,11 @@ pub fn nearest<'a>(key: &str, known: impl IntoIterator<Item = &'a str>) -> Optio
 
 /// The file that says something about a key, or about a table above it; `None` where `--set` does.
 pub(super) fn file_of(keys: &[String], sources: &[Source], sets: &[String]) -> Option<PathBuf> {
-    for length in (1..=keys.len()).rev() {
-        match origin(&keys[..length], sources, sets) {
-            Origin::Set => return None,
-            Origin::File { source, .. } => return Some(source.path.clone()),
-            Origin::Nowhere => {}
-        }
+    match nearest_origin(keys, sources, sets) {
+        Origin::Set => None,
+        Origin::File { source, .. } => Some(source.path.clone()),
+        Origin::Nowhere => sources.first().map(|source| source.path.clone()),
     }
-    sources.first().map(|source| source.path.clone())
 }
 
 /// Who said something about a key.
@@ -84,16 +75,13 @@ enum Origin<'a> {
     Nowhere,
 }
 
-impl Origin<'_> {
-    fn is_known(&self) -> bool {
-        !matches!(self, Self::Nowhere)
-    }
+/// Who said something about a key, or about the innermost table above it of which anybody did.
+fn nearest_origin<'a>(keys: &[String], sources: &'a [Source], sets: &[String]) -> Origin<'a> {
+    let mut origins = (1..=keys.len()).rev().map(|length| origin(&keys[..length], sources, sets));
+    origins.find(|origin| !matches!(origin, Origin::Nowhere)).unwrap_or(Origin::Nowhere)
 }
 
 fn origin<'a>(keys: &[String], sources: &'a [Source], sets: &[String]) -> Origin<'a> {
-    if keys.is_empty() {
-        return Origin::Nowhere;
-    }
     let whole = keys.join(".");
     let names = |set: &String| {
         let rest = set.split_once('=').and_then(|(key, _)| key.trim().strip_prefix(whole.as_str()));

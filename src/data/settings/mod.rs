@@ -5,7 +5,7 @@ mod numbers;
 mod reader;
 
 pub use errors::nearest;
-pub use reader::{Failure, read_table};
+pub use reader::Failure;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,6 +15,7 @@ use toml::{Table, Value};
 
 use crate::data::files;
 use crate::error::{Error, Result};
+use reader::read_table;
 
 /// The key with which a config names its parent.
 const EXTENDS: &str = "extends";

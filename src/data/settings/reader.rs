@@ -1,6 +1,6 @@
-//! Settings out of a table. All settings are read by this one deserialiser: a struct is compiled anew for every kind of deserialiser
-//! that it meets, and one that asks each value for its own kind alone needs a fifth of the code of `toml`'s, which offers every kind to
-//! every struct. Errors keep the keys that lead to them.
+//! Settings out of a table, with one deserialiser for all of them: a struct is compiled anew for every kind of deserialiser that it meets.
+//! This one asks each value for its own kind alone, where `toml`'s offers every kind to every struct, and its failures keep the keys that
+//! lead to them.
 
 use std::fmt::{self, Display};
 

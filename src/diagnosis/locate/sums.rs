@@ -1,35 +1,35 @@
-//! Sums over boxes of frame, Doppler and range.
-
-use crate::grid::Grid;
+//! Sums over boxes of frame, Doppler and range; the innermost loop of the scans, which therefore indexes by hand.
 
 /// Sums over everything before, `[frame + 1, doppler + 1, range + 1]`: a box costs eight look-ups.
 pub struct Table {
-    sums: Grid<f64, 3>,
+    dims: [usize; 3],
+    sums: Vec<f64>,
 }
 
 impl Table {
     /// `of`: value of frame, Doppler and range.
     pub fn new(dims: [usize; 3], of: impl Fn([usize; 3]) -> f64) -> Self {
         let [frames, loops, bins] = dims;
-        let mut sums = Grid::filled(["frame", "doppler", "range"], dims.map(|length| length + 1), 0.0);
+        let (wide, deep) = (bins + 1, (loops + 1) * (bins + 1));
+        let mut sums = vec![0.0; (frames + 1) * deep];
         for frame in 0..frames {
             for doppler in 0..loops {
                 let mut row = 0.0;
                 for range in 0..bins {
                     row += of([frame, doppler, range]);
-                    let before = sums[[frame + 1, doppler, range + 1]] + row;
-                    sums[[frame + 1, doppler + 1, range + 1]] =
-                        before + sums[[frame, doppler + 1, range + 1]] - sums[[frame, doppler, range + 1]];
+                    let at = (frame + 1) * deep + (doppler + 1) * wide + range + 1;
+                    sums[at] = row + sums[at - wide] + sums[at - deep] - sums[at - deep - wide];
                 }
             }
         }
-        Self { sums }
+        Self { dims, sums }
     }
 
     /// Of a half-open box.
     pub fn inside(&self, low: [usize; 3], high: [usize; 3]) -> f64 {
+        let (wide, deep) = (self.dims[2] + 1, (self.dims[1] + 1) * (self.dims[2] + 1));
         let before = |frame: usize| {
-            let at = |doppler: usize, range: usize| self.sums[[frame, doppler, range]];
+            let at = |doppler: usize, range: usize| self.sums[frame * deep + doppler * wide + range];
             at(high[1], high[2]) - at(low[1], high[2]) - at(high[1], low[2]) + at(low[1], low[2])
         };
         before(high[0]) - before(low[0])

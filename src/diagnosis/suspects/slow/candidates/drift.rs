@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::{Deviation, STATED_AT_M, Told, behaves_like, correction, energy, place, stated_delay_s};
+use super::{Description, Deviation, STATED_AT_M, behaves_like, correction, energy, place, stated_delay_s};
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Curve, Estimate, Place};
 use crate::diagnosis::suspects::slow::drift::{Drift, Shape};
@@ -13,7 +13,7 @@ use crate::effects;
 pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -> Candidate {
     let shape = drift.clone();
     let deviation: Deviation = Arc::new(move |[frame, _, _]| shape.value(frame));
-    let Told { id, estimates, statement } = told(field, part, drift);
+    let Description { id, estimates, statement } = describe(field, part, drift);
     Candidate {
         id,
         behaves_like: behaves_like(part),
@@ -37,7 +37,7 @@ pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -
     }
 }
 
-fn told(field: &Field, part: Part, drift: &Drift) -> Told {
+fn describe(field: &Field, part: Part, drift: &Drift) -> Description {
     let change = match drift.shape {
         Shape::Smooth(_) => drift.change(),
         Shape::Step([before, after], _) => after - before,
@@ -50,7 +50,7 @@ fn told(field: &Field, part: Part, drift: &Drift) -> Told {
     match part {
         Part::Gain => {
             let db = gain_db(field, drift);
-            Told {
+            Description {
                 id: Some(effects::gain_drift::ID),
                 estimates: vec![Estimate::normal("db", db, 8.686 * drift.deviation)],
                 statement: format!(
@@ -59,9 +59,9 @@ fn told(field: &Field, part: Part, drift: &Drift) -> Told {
             }
         }
         Part::Phase | Part::Boresight => {
-            Told::unnamed(format!("The phase of all static returns {how}, by {change:+.4} rad, the same at all ranges."))
+            Description::unnamed(format!("The phase of all static returns {how}, by {change:+.4} rad, the same at all ranges."))
         }
-        Part::Delay => Told::unnamed(format!(
+        Part::Delay => Description::unnamed(format!(
             "The phase of the static returns {how} in proportion to the delay, by {:+.4} rad at {STATED_AT_M} m: the carrier \
              changes by {:+.0} Hz.",
             change * stated_delay_s(),

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::{Deviation, STATED_AT_M, Told, behaves_like, correction, energy, stated_delay_s};
+use super::{Description, Deviation, STATED_AT_M, behaves_like, correction, energy, stated_delay_s};
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Estimate, NINETY, Place};
 use crate::diagnosis::statistics;
@@ -16,7 +16,7 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
     let scale = if part == Part::Gain { 1.0 / (1.0 + line.constant) } else { 1.0 };
     let deviation = deviation(evidence, line, scale);
     let wave = Wave { line, amplitude: scale * line.amplitude(), hertz: hertz(line) };
-    let (stage, Told { id, estimates, statement }) = match part {
+    let (stage, Description { id, estimates, statement }) = match part {
         Part::Gain => (Stage::Receiver, wave.ripple()),
         Part::Phase | Part::Boresight => (Stage::Scene, wave.vibration(evidence, field, part)),
         Part::Delay => (Stage::Waveform, wave.oscillator()),
@@ -64,8 +64,8 @@ struct Wave<'a> {
 
 impl Wave<'_> {
     /// Of the receiver's gain.
-    fn ripple(&self) -> Told {
-        Told::unnamed(format!(
+    fn ripple(&self) -> Description {
+        Description::unnamed(format!(
             "The gain of the whole receiver is modulated by {:.2} % (amplitude) at {}, at all ranges and in \
              all channels alike: as mains ripple on a supply would do it.",
             100.0 * self.amplitude,
@@ -74,12 +74,12 @@ impl Wave<'_> {
     }
 
     /// Of the radar itself. What moves along the boresight turns the returns by its cosine, whether or not the ranges tell it apart.
-    fn vibration(&self, evidence: &Evidence, field: &Field, part: Part) -> Told {
+    fn vibration(&self, evidence: &Evidence, field: &Field, part: Part) -> Description {
         let along = if part == Part::Phase { field.mean_ahead() } else { 1.0 };
         let metres = evidence.radar.wavelength_m() / (4.0 * PI * along);
         let deviation = self.line.amplitude_deviation.hypot(PATTERN * self.amplitude);
         let where_ = if part == Part::Phase { "the same at all ranges" } else { "the more the farther ahead they are" };
-        Told {
+        Description {
             id: Some(effects::radar_vibration::ID),
             estimates: vec![
                 Estimate::normal("amplitude_m", self.amplitude * metres, deviation * metres),
@@ -96,8 +96,8 @@ impl Wave<'_> {
     }
 
     /// Of the local oscillator's frequency.
-    fn oscillator(&self) -> Told {
-        Told::unnamed(format!(
+    fn oscillator(&self) -> Description {
+        Description::unnamed(format!(
             "The phase of every return oscillates at {} in proportion to its delay, by {:.4} rad at \
              {STATED_AT_M} m: the local oscillator's frequency is modulated by {:.0} Hz.",
             self.hertz,

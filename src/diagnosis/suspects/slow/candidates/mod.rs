@@ -36,13 +36,13 @@ pub(super) fn stated_delay_s() -> f64 {
 pub(super) type Deviation = Arc<dyn Fn([usize; 3]) -> f64 + Send + Sync>;
 
 /// What a deviation is called, how large it is, and both in words.
-pub(super) struct Told {
+pub(super) struct Description {
     pub id: Option<&'static str>,
     pub estimates: Vec<Estimate>,
     pub statement: String,
 }
 
-impl Told {
+impl Description {
     pub fn unnamed(statement: String) -> Self {
         Self { id: None, estimates: vec![], statement }
     }

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::{Deviation, STATED_AT_M, Told, behaves_like, correction, energy, place, stated_delay_s};
+use super::{Description, Deviation, STATED_AT_M, behaves_like, correction, energy, place, stated_delay_s};
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Estimate};
 use crate::diagnosis::statistics;
@@ -15,7 +15,7 @@ use crate::effects;
 pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random) -> Candidate {
     let (deviation, spent) = most_probable(field, part, random);
     let one = random.held_out_gain;
-    let (Told { id, estimates, statement }, look_alikes, gain) = match (part, &random.two) {
+    let (Description { id, estimates, statement }, look_alikes, gain) = match (part, &random.two) {
         (Part::Delay, Some(two)) if two.held_out_gain > one => {
             let rivals = if two.held_out_gain < one + UNDECIDED { vec![effects::phase_noise::ID] } else { vec![] };
             (start_jitter(evidence, two), rivals, two.held_out_gain)
@@ -54,10 +54,10 @@ fn most_probable(field: &Field, part: Part, random: &Random) -> (Deviation, f64)
     (Arc::new(move |[frame, _, index]| values[frame * loops + index]), spent)
 }
 
-fn start_jitter(evidence: &Evidence, two: &Two) -> Told {
+fn start_jitter(evidence: &Evidence, two: &Two) -> Description {
     let per_second = 1.0 / (2.0 * PI * evidence.radar.slope_hz_per_s);
     let jitter_s = two.distance * per_second;
-    Told {
+    Description {
         id: Some(effects::chirp_start_jitter::ID),
         estimates: vec![Estimate::normal("jitter_s", jitter_s, two.distance_error * per_second)],
         statement: format!(
@@ -70,10 +70,10 @@ fn start_jitter(evidence: &Evidence, two: &Two) -> Told {
     }
 }
 
-fn phase_noise(random: &Random) -> Told {
+fn phase_noise(random: &Random) -> Description {
     let at_stated = random.deviation * stated_delay_s();
     let error = random.deviation_error * stated_delay_s();
-    Told {
+    Description {
         id: Some(effects::phase_noise::ID),
         estimates: vec![Estimate::normal("per_chirp_rad", at_stated, error)],
         statement: format!(
@@ -84,10 +84,10 @@ fn phase_noise(random: &Random) -> Told {
 }
 
 /// The same at all ranges.
-fn common(part: Part, random: &Random) -> Told {
+fn common(part: Part, random: &Random) -> Description {
     let (what, size, unit) =
         if part == Part::Gain { ("gain", 100.0 * random.deviation, "%") } else { ("phase", random.deviation, "rad") };
-    Told::unnamed(format!(
+    Description::unnamed(format!(
         "The {what} of all static returns jitters at random from chirp to chirp, by {size:.4} {unit} (standard deviation), the same at \
          all ranges."
     ))

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::Told;
+use super::Description;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place, Volume};
@@ -22,7 +22,7 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
     let deviation = deviation(settling);
     let square: f64 = (0..field.loops).map(|i| deviation(i).norm_sqr()).sum::<f64>() * field.frames as f64;
     let energy = square * evidence.still().iter().map(|v| v.norm_sqr()).sum::<f64>();
-    let Told { id, estimates, statement } = if named { decay(settling, transmitters as f64) } else { pattern(settling) };
+    let Description { id, estimates, statement } = if named { decay(settling, transmitters as f64) } else { pattern(settling) };
     let curve = curve(settling, transmitters, &deviation);
     let reach = (3.0 * settling.loops).ceil() as usize;
     Candidate {
@@ -58,12 +58,12 @@ fn deviation(settling: &Settling) -> OfLoop {
     }
 }
 
-fn decay(settling: &Settling, transmitters: f64) -> Told {
+fn decay(settling: &Settling, transmitters: f64) -> Description {
     // The deviation is from the mean over the frame, the depth from where the gain settles.
     let settled = 1.0 + settling.constant.re;
     let depth = -settling.amplitude.re / settled;
     let chirps = settling.loops * transmitters;
-    Told {
+    Description {
         id: Some(effects::chirp_settling::ID),
         estimates: vec![
             Estimate::normal("depth", depth, settling.amplitude_deviation / settled),
@@ -78,9 +78,9 @@ fn decay(settling: &Settling, transmitters: f64) -> Told {
     }
 }
 
-fn pattern(settling: &Settling) -> Told {
+fn pattern(settling: &Settling) -> Description {
     let largest = settling.free.values.iter().map(|v| v.norm()).fold(0.0, f64::max);
-    Told::unnamed(format!(
+    Description::unnamed(format!(
         "The gain depends on the chirp's place in its frame, by up to {:.2} %, in every frame and at all ranges alike.",
         100.0 * largest
     ))

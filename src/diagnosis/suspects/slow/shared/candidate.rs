@@ -11,7 +11,7 @@ use super::deviations::Deviation;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics;
-use crate::diagnosis::suspects::slow::candidates::{self, Told};
+use crate::diagnosis::suspects::slow::candidates::{self, Description};
 use crate::diagnosis::suspects::slow::field::{PATTERN, Part};
 use crate::effects::{self, Stage};
 
@@ -29,7 +29,7 @@ struct Phase {
 
 pub fn candidate(evidence: &Evidence, course: &Course, deviations: &[Deviation], shared: &Shared) -> Candidate {
     let phase = Phase::new(course, &spectra(deviations, course, shared.part), &shared.members);
-    let Told { id, estimates, statement } =
+    let Description { id, estimates, statement } =
         if shared.part == Part::Delay { phase.of_delay(shared) } else { phase.of_vibration(evidence, course, shared) };
     let Phase { course: phases, rms, spent, .. } = phase;
     let loops = course.loops;
@@ -72,15 +72,15 @@ impl Phase {
         Self { course: phases, rms, spent, frequency_hz, width_hz }
     }
 
-    fn of_delay(&self, shared: &Shared) -> Told {
+    fn of_delay(&self, shared: &Shared) -> Description {
         let at_3_m = self.rms * candidates::stated_delay_s();
-        Told::unnamed(format!(
+        Description::unnamed(format!(
             "The phase of the static returns varies in proportion to their delay, by {at_3_m:.4} rad (standard deviation) at 3 m; {}.",
             ranges(shared)
         ))
     }
 
-    fn of_vibration(&self, evidence: &Evidence, course: &Course, shared: &Shared) -> Told {
+    fn of_vibration(&self, evidence: &Evidence, course: &Course, shared: &Shared) -> Description {
         let Self { rms, frequency_hz, width_hz, .. } = *self;
         let metres = evidence.radar.wavelength_m() / (4.0 * PI);
         let amplitude_m = SQRT_2 * rms * metres;
@@ -89,7 +89,7 @@ impl Phase {
         } else {
             format!(" (or that beside a multiple of {:.2} Hz, the rate of the frames)", course.frame_s.recip())
         };
-        Told {
+        Description {
             id: Some(effects::radar_vibration::ID),
             estimates: vec![
                 Estimate::normal("amplitude_m", amplitude_m, amplitude_m * PATTERN),
