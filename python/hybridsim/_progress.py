@@ -35,8 +35,8 @@ Watcher = bool | Callable[[Progress], object]
 """``True`` shows progress on standard error, ``False`` is silent, a function is called with every :class:`Progress`."""
 
 
-class Teller:
-    """Turns what a verb tells into :class:`Progress` and warnings. Called in the thread that called the verb."""
+class Notifier:
+    """Turns what a verb says into :class:`Progress` and warnings. Called in the thread that called the verb."""
 
     def __init__(self, watcher: Watcher) -> None:
         self._watch: Callable[[Progress], object] | None
@@ -47,7 +47,7 @@ class Teller:
             self._watch = watcher if callable(watcher) else None
         self._what, self._done, self._of = "", 0, 0
 
-    def __enter__(self) -> Teller:
+    def __enter__(self) -> Notifier:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from . import _hybridsim
-from ._progress import Teller, Watcher
+from ._progress import Notifier, Watcher
 from ._types import WHOLE, Settings, Shard, StrPath, path, sets
 
 LIMIT_S = 900.0
@@ -58,8 +58,8 @@ def seal(
         hybridsim.Error: settings that cannot be a challenge; a folder that is committed to, or was begun with another seed.
         hybridsim.BusyError: another process seals the same part, or all of it.
     """
-    with Teller(progress) as tell:
-        done = _hybridsim.challenge_seal(os.fspath(config), os.fspath(out), seed, shard, commit, sets(set), tell)
+    with Notifier(progress) as notify:
+        done = _hybridsim.challenge_seal(os.fspath(config), os.fspath(out), seed, shard, commit, sets(set), notify)
     return None if done is None else dict(json.loads(done))
 
 
@@ -96,8 +96,8 @@ def run(
         hybridsim.BusyError: another process answers the same part, or all of it.
     """
     how = _how(shard, most, limit_s, set, device)
-    with Teller(progress) as tell:
-        return dict(json.loads(_hybridsim.challenge_run(os.fspath(challenge), os.fspath(out), how, tell)))
+    with Notifier(progress) as notify:
+        return dict(json.loads(_hybridsim.challenge_run(os.fspath(challenge), os.fspath(out), how, notify)))
 
 
 def twins(
@@ -121,8 +121,8 @@ def twins(
     The others are those of :func:`run`.
     """
     how = _how(shard, most, limit_s, set, device)
-    with Teller(progress) as tell:
-        return _hybridsim.challenge_twins(os.fspath(challenge), os.fspath(answers), os.fspath(out), how, tell)
+    with Notifier(progress) as notify:
+        return _hybridsim.challenge_twins(os.fspath(challenge), os.fspath(answers), os.fspath(out), how, notify)
 
 
 def score(
@@ -151,9 +151,9 @@ def score(
         hybridsim.Error: truths or answers that are not what was committed to.
     """
     out = Path(answers) / "score" if out is None else out
-    with Teller(progress) as tell:
+    with Notifier(progress) as notify:
         done = _hybridsim.challenge_score(
-            os.fspath(challenge), os.fspath(answers), path(twins), measure, os.fspath(out), tell
+            os.fspath(challenge), os.fspath(answers), path(twins), measure, os.fspath(out), notify
         )
     return dict(json.loads(done))
 

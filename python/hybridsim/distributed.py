@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from . import _hybridsim
 from . import challenge as _challenge
 from ._errors import BusyError, Note
-from ._progress import Teller
+from ._progress import Notifier
 from ._recording import Recording
 from ._types import Settings, StrPath, sets
 from ._verbs import reproduce as _reproduce
@@ -40,8 +40,8 @@ def site(
     """:func:`hybridsim.site`; a unit is a sequence with its second take. All are looked at before the first is recorded."""
     paths = _absolute(config, out)
     how: dict[str, Any] = {"set": sets(set), "as_stated": as_stated}
-    with Teller(False) as tell:
-        count = len(_hybridsim.site_look(*paths, sets(set), as_stated, tell))
+    with Notifier(False) as notify:
+        count = len(_hybridsim.site_look(*paths, sets(set), as_stated, notify))
     units = [_submit(client, _site.site, *paths, shard=shard, **how) for shard in _shards(count)]
     return _submit(client, _site.site, *paths, after=units, **how).result()  # type: ignore[no-any-return]
 

@@ -6,7 +6,7 @@
 
 mod buffer;
 mod errors;
-mod told;
+mod notice;
 mod verbs;
 mod work;
 

@@ -1,4 +1,4 @@
-//! Work that Python can watch and end: it runs on a thread of its own, while the thread that asked hears what is told, calls
+//! Work that Python can watch and end: it runs on a thread of its own, while the thread that asked receives the notices, calls
 //! Python, and looks for Ctrl-C.
 
 use std::{
@@ -16,11 +16,11 @@ use std::{
 use hybridsim::{
     Result,
     data::{program, unfinished},
-    verbs::Tell,
+    verbs::Notify,
 };
 use pyo3::{exceptions::PyRuntimeError, prelude::*};
 
-use crate::{errors::raised, told::Message};
+use crate::{errors::raised, notice::Message};
 
 /// How often Ctrl-C is looked for: people notice 100 ms (Nielsen, Usability Engineering, 1993, sec. 5.5).
 const LOOK: Duration = Duration::from_millis(50);
@@ -33,35 +33,35 @@ const STACK_BYTES: usize = 8 << 20;
 /// What unwinds from work that is to end.
 struct Ended;
 
-/// Does `work` without Python's lock, telling `tell(kind, text, number)` in the calling thread.
+/// Does `work` without Python's lock, calling `notify(kind, text, number)` in the calling thread.
 ///
 /// # Errors
-/// The work's error; KeyboardInterrupt; whatever `tell` raises. After the latter two the work ends at what it tells next, and
+/// The work's error; KeyboardInterrupt; whatever `notify` raises. After the latter two the work ends at its next notice, and
 /// leaves nothing half-written.
 pub fn run<T: Send + 'static>(
     py: Python<'_>,
-    tell: &Bound<'_, PyAny>,
-    work: impl FnOnce(&mut Tell<'_>) -> Result<T> + Send + 'static,
+    notify: &Bound<'_, PyAny>,
+    work: impl FnOnce(&mut Notify<'_>) -> Result<T> + Send + 'static,
 ) -> PyResult<T> {
     let ended = Arc::new(AtomicBool::new(false));
     let (sender, mut receiver) = mpsc::channel();
     let flag = ended.clone();
-    let told = move || {
+    let working = move || {
         catch_unwind(AssertUnwindSafe(|| {
-            work(&mut |told| {
+            work(&mut |notice| {
                 if flag.load(Ordering::Relaxed) {
                     resume_unwind(Box::new(Ended));
                 }
-                Message::of(&told).into_iter().for_each(|message| drop(sender.send(message)));
+                Message::of(&notice).into_iter().for_each(|message| drop(sender.send(message)));
             })
         }))
     };
-    let worker = thread::Builder::new().name("hybridsim".into()).stack_size(STACK_BYTES).spawn(told)?;
+    let worker = thread::Builder::new().name("hybridsim".into()).stack_size(STACK_BYTES).spawn(working)?;
     loop {
         let receiver = &mut receiver;
-        let heard = py.detach(move || receiver.recv_timeout(LOOK));
-        let gone = matches!(heard, Err(RecvTimeoutError::Disconnected));
-        let answered = heard.map_or(Ok(()), |message: Message| message.call(py, tell));
+        let received = py.detach(move || receiver.recv_timeout(LOOK));
+        let gone = matches!(received, Err(RecvTimeoutError::Disconnected));
+        let answered = received.map_or(Ok(()), |message: Message| message.call(py, notify));
         if let Err(error) = answered.and_then(|()| py.check_signals()) {
             ended.store(true, Ordering::Relaxed);
             py.detach(|| {

@@ -34,10 +34,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let search = Search { lag_s: arguments.lag, frames: arguments.frames };
     let what = Align { recording: &arguments.recording, search, apply: arguments.apply, out: &arguments.out };
     let mut shown = Shown::new(common.quiet);
-    let alignment = verbs::align::align(&what, &mut |told| shown.show(told))?;
+    let alignment = verbs::align::align(&what, &mut |notice| shown.show(notice))?;
     shown.finish();
     say!("{}", alignment.sentence);
-    super::tell(&alignment.lines());
+    super::print(&alignment.lines());
     for alternative in &alignment.alternatives {
         let values: Vec<String> = alternative.values.iter().map(|(name, value)| format!("{name} {value:.3}")).collect();
         say!("  or: {} (chance {:.2}, {} frames)", values.join(", "), alternative.p_value, alternative.frames);

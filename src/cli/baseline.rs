@@ -28,7 +28,7 @@ use crate::{
     heatmap::HeatmapConfig,
     person::Person,
     verbs::{
-        Told,
+        Notice,
         heatmaps::same_radar,
         simulated::{self, Sequence},
     },
@@ -102,8 +102,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         measured: Some(&recording),
     };
     let mut shown = Shown::new(common.quiet);
-    let mut tell = |told: Told<'_>| shown.show(told);
-    simulated::write(folder.path(), &sequence, &HeatmapConfig::default(), &mut tell, &mut |frame| {
+    let mut notify = |notice: Notice<'_>| shown.show(notice);
+    simulated::write(folder.path(), &sequence, &HeatmapConfig::default(), &mut notify, &mut |frame| {
         let start = Instant::now();
         let signal = rendering.frame(frame);
         seconds += start.elapsed().as_secs_f64();

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use clap::Args;
 
 use super::{Common, progress::Shown};
-use crate::{catalogue, effects, error::Result, verbs::Told};
+use crate::{catalogue, effects, error::Result, verbs::Notice};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -24,13 +24,13 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         (None, None) => say!("{}", catalogue::table().trim_end()),
         (None, Some(folder)) => {
             let mut shown = Shown::new(common.quiet);
-            shown.show(Told::Begun { what: "recording signatures", steps: effects::library().len() });
+            shown.show(Notice::Begun { what: "recording signatures", steps: effects::library().len() });
             let shown = Mutex::new((0, shown));
             catalogue::write(folder, &|| {
                 let mut shown = shown.lock().expect("nothing panics while it is shown");
                 shown.0 += 1;
                 let done = shown.0;
-                shown.1.show(Told::Done(done));
+                shown.1.show(Notice::Done(done));
             })?;
             shown.into_inner().expect("nothing panics while it is shown").1.finish();
             say!("pages: {}", folder.join("index.md").display());

@@ -13,7 +13,7 @@ use super::{
 use crate::{
     data::Shard,
     error::Result,
-    verbs::{Tell, challenge},
+    verbs::{Notify, challenge},
 };
 
 #[derive(Args)]
@@ -109,16 +109,16 @@ fn seal(arguments: &Seal, common: &Common) -> Result<()> {
     kept("cases that are sealed");
     let Seal { config, out, seed, shard } = arguments;
     let what = challenge::Seal { config, sets: &common.set, seed: seed.as_deref(), out };
-    let commitment = shown(common, |tell| challenge::commit(&what, shard.unwrap_or(Shard::ALL), tell))?;
+    let commitment = shown(common, |notify| challenge::commit(&what, shard.unwrap_or(Shard::ALL), notify))?;
     say!("sealed {} cases in {}", commitment.cases, out.display());
     say!("publish before anybody diagnoses: root {}", commitment.root);
     Ok(())
 }
 
-/// Does a step and shows what it tells.
-fn shown<T>(common: &Common, step: impl FnOnce(&mut Tell<'_>) -> Result<T>) -> Result<T> {
+/// Does a step and shows what it says.
+fn shown<T>(common: &Common, step: impl FnOnce(&mut Notify<'_>) -> Result<T>) -> Result<T> {
     let mut shown = Shown::new(common.quiet);
-    let done = step(&mut |told| shown.show(told));
+    let done = step(&mut |notice| shown.show(notice));
     shown.finish();
     done
 }
@@ -126,7 +126,7 @@ fn shown<T>(common: &Common, step: impl FnOnce(&mut Tell<'_>) -> Result<T>) -> R
 fn answer(arguments: &Run, common: &Common) -> Result<()> {
     let config = arguments.how.config(common)?;
     kept("answers");
-    let answers = shown(common, |tell| challenge::run(&arguments.challenge, &arguments.out, &config, tell))?;
+    let answers = shown(common, |notify| challenge::run(&arguments.challenge, &arguments.out, &config, notify))?;
     say!("{} reports, {} failures in {}", answers.reports.len(), answers.failures.len(), arguments.out.display());
     if answers.complete {
         say!("publish before the truths are opened: {}", answers.sha256);
@@ -140,7 +140,7 @@ fn twins(arguments: &Twins, common: &Common) -> Result<()> {
     let config = arguments.how.config(common)?;
     kept("reports of twins");
     let Twins { challenge, answers, out, .. } = arguments;
-    let done = shown(common, |tell| challenge::twins(challenge, answers, out, &config, tell))?;
+    let done = shown(common, |notify| challenge::twins(challenge, answers, out, &config, notify))?;
     say!("{done} twins diagnosed in {}", out.display());
     Ok(())
 }
@@ -149,7 +149,7 @@ fn score(arguments: &Score, common: &Common) -> Result<()> {
     let Score { challenge, answers, twins, measure, out } = arguments;
     let out = out.clone().unwrap_or_else(|| answers.join("score"));
     let what = challenge::Scoring { challenge, answers, twins: twins.as_deref(), measure: *measure, out: &out };
-    let scored = shown(common, |tell| challenge::score(&what, tell))?;
+    let scored = shown(common, |notify| challenge::score(&what, notify))?;
     say!("{}", scored.markdown());
     say!("results: {}", out.join("results.md").display());
     Ok(())

@@ -103,7 +103,7 @@ fn show_recording(folder: &Path, common: &Common) -> Result<Recording> {
 
 /// What a recording is, that all of its samples can be read, and what they say of themselves.
 fn show(recording: &Recording, common: &Common) -> Result<()> {
-    tell(recording, common)?;
+    report(recording, common)?;
     // Every whole frame is read once, so that a truncated or lying file shows here.
     let findings = integrity::inspect(recording, recording.radar.frames)?;
     say!("  samples            {}, all {} frames can be read", recording.number_type(), recording.whole_frames().count());
@@ -112,7 +112,7 @@ fn show(recording: &Recording, common: &Common) -> Result<()> {
 }
 
 /// What is stated of a recording, and whether it can be.
-fn tell(recording: &Recording, common: &Common) -> Result<()> {
+fn report(recording: &Recording, common: &Common) -> Result<()> {
     describe(recording);
     for note in &recording.notes {
         remark!("note: {note}");

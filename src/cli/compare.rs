@@ -60,11 +60,11 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     progress.finish();
     for (name, found) in &evaluations {
         say!("{name}");
-        super::tell(&scores::of_frames(found));
+        super::print(&scores::of_frames(found));
     }
     if let (true, Some(summary)) = (evaluations.len() > 1, scores::summary(&evaluations)) {
         say!("together");
-        super::tell(&scores::of_sequences(&summary));
+        super::print(&scores::of_sequences(&summary));
     }
     if let Some(out) = out {
         atomic::write_text(out.path().join("metrics.json"), &scores::json(&evaluations))?;

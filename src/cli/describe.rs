@@ -56,7 +56,7 @@ fn describe_body(path: &Path, common: &Common) -> Result<()> {
     show_extent("rest pose", &model.template);
     let facts = BodyFacts::of_mesh(&model.template, &model.faces);
     show_surface(&facts);
-    plausible::tell(Facts { body: Some(facts), ..Facts::default() }, &Sources::one(path), common)
+    plausible::report(Facts { body: Some(facts), ..Facts::default() }, &Sources::one(path), common)
 }
 
 fn describe_meshes(path: &Path, common: &Common) -> Result<()> {
@@ -73,7 +73,7 @@ fn describe_meshes(path: &Path, common: &Common) -> Result<()> {
     if !meshes.faces.is_empty() {
         show_surface(&facts);
     }
-    plausible::tell(Facts { body: Some(facts), ..Facts::default() }, &Sources::one(path), common)
+    plausible::report(Facts { body: Some(facts), ..Facts::default() }, &Sources::one(path), common)
 }
 
 fn show_surface(facts: &BodyFacts) {
@@ -111,7 +111,7 @@ fn describe_motion(path: &Path, common: &Common) -> Result<()> {
     let person = Person::Skinned { model, motion, placement };
     let facts = plausible::facts(None, None, Some(&person))?;
     show_course(&facts);
-    plausible::tell(facts, &Sources::one(path), common)
+    plausible::report(facts, &Sources::one(path), common)
 }
 
 fn show_motion(motion: &Motion, model: &BodyModel) {

@@ -43,13 +43,13 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         out: &arguments.out,
     };
     let mut shown = Shown::new(common.quiet);
-    let diagnosis = verbs::diagnose::diagnose(&what, &device, common.as_stated, &mut |told| shown.show(told))?;
+    let diagnosis = verbs::diagnose::diagnose(&what, &device, common.as_stated, &mut |notice| shown.show(notice))?;
     shown.finish();
-    tell_result(&diagnosis, &arguments.out);
+    print_result(&diagnosis, &arguments.out);
     Ok(())
 }
 
-fn tell_result(diagnosis: &Diagnosis, out: &Path) {
+fn print_result(diagnosis: &Diagnosis, out: &Path) {
     let mut text = format!("{}\n", diagnosis::html::lead(&diagnosis.report));
     for effect in &diagnosis.report.effects {
         let _ = writeln!(text, "  {:<24} {:>4.0} %  {}", effect.id, 100.0 * effect.probability, effect.statement);
@@ -58,5 +58,5 @@ fn tell_result(diagnosis: &Diagnosis, out: &Path) {
         let _ = writeln!(text, "  {:<24}         {}", "(no name)", unexplained.statement);
     }
     let _ = writeln!(text, "report: {}", out.join("report.html").display());
-    super::tell(&text);
+    super::print(&text);
 }

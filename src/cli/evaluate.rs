@@ -86,12 +86,12 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         progress.finish();
         drawn.push(pictures?);
         say!("{}", folder.display());
-        super::tell(&scores::of_frames(&evaluation));
+        super::print(&scores::of_frames(&evaluation));
         evaluations.push((folder.display().to_string(), evaluation));
     }
     if let (true, Some(summary)) = (evaluations.len() > 1, scores::summary(&evaluations)) {
         say!("together");
-        super::tell(&scores::of_sequences(&summary));
+        super::print(&scores::of_sequences(&summary));
     }
     if let Some(out) = &arguments.out.out {
         atomic::write_text(out.join("metrics.json"), &scores::json(&evaluations))?;

@@ -40,7 +40,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         out: &arguments.out,
     };
     let mut shown = Shown::new(common.quiet);
-    let [recordings, frames] = verbs::export::export(&what, &mut |told| shown.show(told))?;
+    let [recordings, frames] = verbs::export::export(&what, &mut |notice| shown.show(notice))?;
     shown.finish();
     let recordings = if recordings == 1 { "1 recording".to_string() } else { format!("{recordings} recordings") };
     say!("{recordings}, {frames} frames as {}: {}", arguments.to.name, arguments.out.display());

@@ -13,7 +13,7 @@ use crate::{
     error::{Error, Result},
     import::capture::{Layout, Preset, Stated},
     verbs::{
-        Tell, Told,
+        Notice, Notify,
         import::{Import, Seen, import},
     },
 };
@@ -78,16 +78,16 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let labels = labels.collect::<Result<BTreeMap<_, _>>>()?;
     let what = Import { sources: &arguments.sources, stated: &stated, labels, as_stated: common.as_stated, out: &arguments.out };
     let against = if common.as_stated { Against::Kept } else { Against::Refused };
-    let mut show = |seen: Seen<'_>, _: &mut Tell<'_>| match seen {
+    let mut show = |seen: Seen<'_>, _: &mut Notify<'_>| match seen {
         Seen::Written(recording) => check::describe(recording),
         Seen::Looked(recording, findings) => conventions::show(&recording.radar, findings, against),
     };
     let (mut bar, mut length) = (None, 0);
-    let recording = import(what, &mut show, &mut |told| match told {
-        Told::Begun { what, steps } => (bar, length) = (Some(Progress::new(what, steps, common.quiet)), steps),
-        Told::Done(steps) if steps == length => bar.take().into_iter().for_each(Progress::finish),
-        Told::Done(steps) => bar.iter().for_each(|bar| bar.set(steps)),
-        told => notes(told),
+    let recording = import(what, &mut show, &mut |notice| match notice {
+        Notice::Begun { what, steps } => (bar, length) = (Some(Progress::new(what, steps, common.quiet)), steps),
+        Notice::Done(steps) if steps == length => bar.take().into_iter().for_each(Progress::finish),
+        Notice::Done(steps) => bar.iter().for_each(|bar| bar.set(steps)),
+        notice => notes(notice),
     })?;
     say!("imported: {}", recording.folder.display());
     Ok(())

@@ -111,8 +111,8 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let out = arguments.out.out.clone().unwrap_or_else(|| "runs/inferred".into());
     let folder = AtomicFolder::create(&out)?;
     let mut shown = Shown::new(common.quiet);
-    let ready = Ready::new(&arguments.asked(), &device, common.as_stated, &mut |told| shown.show(told))?;
-    ready.write(folder.path(), &mut |told| shown.show(told))?;
+    let ready = Ready::new(&arguments.asked(), &device, common.as_stated, &mut |notice| shown.show(notice))?;
+    ready.write(folder.path(), &mut |notice| shown.show(notice))?;
     shown.finish();
     folder.finish()?;
     say!("simulated {} frames: {}", ready.radar.frames, out.display());

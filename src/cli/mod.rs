@@ -5,7 +5,7 @@
 
 /// A line on standard output.
 macro_rules! say {
-    ($($text:tt)*) => { $crate::cli::tell(&format!("{}\n", format_args!($($text)*))) };
+    ($($text:tt)*) => { $crate::cli::print(&format!("{}\n", format_args!($($text)*))) };
 }
 
 /// A line on standard error.
@@ -56,7 +56,7 @@ use crate::{
 pub use device::{available, device, devices};
 
 /// Text on standard output. Whoever reads may have closed the pipe: what was made is made.
-fn tell(text: &str) {
+fn print(text: &str) {
     if let Err(error) = std::io::Write::write_all(&mut std::io::stdout(), shown(text).as_bytes())
         && error.kind() != std::io::ErrorKind::BrokenPipe
     {

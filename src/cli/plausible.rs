@@ -33,6 +33,6 @@ pub(super) fn scene(
     plausible::scene(radar, room, person, sources, common.as_stated, &mut notes)
 }
 
-pub(super) fn tell(facts: Facts, sources: &Sources, common: &Common) -> Result<()> {
+pub(super) fn report(facts: Facts, sources: &Sources, common: &Common) -> Result<()> {
     plausible::judge(facts, sources, common.as_stated, &mut notes)
 }

@@ -4,7 +4,7 @@ use std::{io::IsTerminal, time::Duration};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::{experiments::Event as StageEvent, text::shown, training::Event, verbs::Told};
+use crate::{experiments::Event as StageEvent, text::shown, training::Event, verbs::Notice};
 
 /// Shows how far a task is, with the time that remains.
 pub struct Progress {
@@ -115,14 +115,14 @@ impl TrainingProgress {
     }
 }
 
-/// Notes of a verb on standard error; all else that it tells is for [`Shown`].
-pub fn notes(told: Told<'_>) {
-    if let Told::Note(note) = told {
+/// Notes of a verb on standard error; all else that it says is for [`Shown`].
+pub fn notes(notice: Notice<'_>) {
+    if let Notice::Note(note) = notice {
         remark!("note: {note}");
     }
 }
 
-/// Shows what a verb tells.
+/// Shows what a verb says.
 pub struct Shown {
     progress: Option<Progress>,
     training: TrainingProgress,
@@ -134,18 +134,18 @@ impl Shown {
         Self { progress: None, training: TrainingProgress::new(quiet), quiet }
     }
 
-    pub fn show(&mut self, told: Told<'_>) {
-        match told {
-            Told::Note(_) => notes(told),
-            Told::Begun { what, steps } => self.progress = Some(Progress::new(what, steps, self.quiet)),
-            Told::Done(steps) => self.progress.iter().for_each(|progress| progress.set(steps)),
-            Told::Line(text) => self.progress.iter().for_each(|progress| progress.line(text)),
-            Told::At(text) => self.progress.iter().for_each(|progress| progress.message(text.into())),
+    pub fn show(&mut self, notice: Notice<'_>) {
+        match notice {
+            Notice::Note(_) => notes(notice),
+            Notice::Begun { what, steps } => self.progress = Some(Progress::new(what, steps, self.quiet)),
+            Notice::Done(steps) => self.progress.iter().for_each(|progress| progress.set(steps)),
+            Notice::Line(text) => self.progress.iter().for_each(|progress| progress.line(text)),
+            Notice::At(text) => self.progress.iter().for_each(|progress| progress.message(text.into())),
             // Whatever was made to train on is made.
-            Told::Run { .. } => self.progress.take().into_iter().for_each(Progress::finish),
-            Told::Training(event) => self.training.show(event),
+            Notice::Run { .. } => self.progress.take().into_iter().for_each(Progress::finish),
+            Notice::Training(event) => self.training.show(event),
             // A reproduction shows its own.
-            Told::Stage(_) | Told::Still => {}
+            Notice::Stage(_) | Notice::Still => {}
         }
     }
 

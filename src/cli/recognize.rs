@@ -56,7 +56,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let result = result?;
     recognition::write(&result, &config, folder)?;
-    super::tell(&recognition::text(&result));
+    super::print(&recognition::text(&result));
     say!("\nresult: {}", arguments.out.display());
     Ok(())
 }

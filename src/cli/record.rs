@@ -8,7 +8,7 @@ use super::{Common, Out, progress::Shown};
 use crate::{
     config::Config,
     error::Result,
-    verbs::{self, Told},
+    verbs::{self, Notice},
 };
 
 #[derive(Args)]
@@ -23,13 +23,13 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let config = Config::read(&arguments.config, &common.set)?;
     let record = config.record(&arguments.config)?;
     let mut shown = Shown::new(common.quiet);
-    let mut tell = |told: Told<'_>| shown.show(told);
+    let mut notify = |notice: Notice<'_>| shown.show(notice);
     let folder = match &arguments.out.out {
         Some(out) => {
-            verbs::record::make(record, &arguments.config, out, common.as_stated, &mut tell)?;
+            verbs::record::make(record, &arguments.config, out, common.as_stated, &mut notify)?;
             out.clone()
         }
-        None => verbs::record::recorded(record, &arguments.config, common.as_stated, &mut tell)?,
+        None => verbs::record::recorded(record, &arguments.config, common.as_stated, &mut notify)?,
     };
     shown.finish();
     say!("recording: {}", folder.display());

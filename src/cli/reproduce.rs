@@ -8,7 +8,7 @@ use super::{Common, Out, devices, interrupt, progress::StageProgress, progress::
 use crate::{
     error::Result,
     verbs::{
-        Told,
+        Notice,
         reproduce::{Planned, Reproduce},
     },
 };
@@ -46,18 +46,18 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         format!("{kept}; go on with: {}", interrupt::typed())
     });
     let mut progress = StageProgress::new(common.quiet);
-    let mut tell = |told: Told<'_>| match told {
-        Told::Stage(event) => progress.show(event),
+    let mut notify = |notice: Notice<'_>| match notice {
+        Notice::Stage(event) => progress.show(event),
         other => notes(other),
     };
     match arguments.stages.as_slice() {
         [] => {
-            planned.run(&command(arguments, common), &devices, common.as_stated, &mut tell)?;
+            planned.run(&command(arguments, common), &devices, common.as_stated, &mut notify)?;
             progress.finish();
             say!("results: {}", out.join("results.md").display());
         }
         beginnings => {
-            let [done, of] = planned.run_some(beginnings, &devices, common.as_stated, &mut tell)?;
+            let [done, of] = planned.run_some(beginnings, &devices, common.as_stated, &mut notify)?;
             progress.finish();
             say!("{done} of {of} stages are done: {}", out.display());
         }
@@ -88,6 +88,6 @@ fn list(planned: &Planned) -> Result<()> {
         text += &format!("{state}  {}\n", stage.folder);
     }
     text += &format!("{done} of {} stages are done, in {total_s:.0} s\n", stages.len());
-    super::tell(&text);
+    super::print(&text);
     Ok(())
 }

@@ -28,7 +28,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let what = Site { config: &arguments.config, sets: &common.set, out: &arguments.out, shard };
     interrupt::kept(|| format!("the recordings that are whole are kept; go on with: {}", interrupt::typed()));
     let mut shown = Shown::new(common.quiet);
-    let made = site::record(&what, common.as_stated, &mut |told| shown.show(told))?;
+    let made = site::record(&what, common.as_stated, &mut |notice| shown.show(notice))?;
     shown.finish();
     say!("site: {}", arguments.out.display());
     say!("{} of {} sequences: {} recorded, {} kept", made.sequences, made.of, made.recorded, made.kept);

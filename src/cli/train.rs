@@ -8,7 +8,7 @@ use super::{Common, Out, devices, interrupt, progress::Shown, scores};
 use crate::{
     data::files,
     error::Result,
-    verbs::{self, Told, train::Start},
+    verbs::{self, Notice, train::Start},
 };
 
 #[derive(Args)]
@@ -32,23 +32,23 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     let devices = devices(&common.device)?;
     let mut shown = Shown::new(common.quiet);
-    let trained = verbs::train::train(&start, &devices, common.as_stated, &mut |told| {
-        if let Told::Run { folder, epochs } = told {
-            tell_how_to_go_on(folder, epochs, common);
+    let trained = verbs::train::train(&start, &devices, common.as_stated, &mut |notice| {
+        if let Notice::Run { folder, epochs } = notice {
+            print_how_to_go_on(folder, epochs, common);
         }
-        shown.show(told);
+        shown.show(notice);
     })?;
     shown.finish();
     for (folder, evaluation) in &trained.evaluations {
         say!("{}", folder.display());
-        super::tell(&scores::of_frames(evaluation));
+        super::print(&scores::of_frames(evaluation));
     }
     say!("report: {}", trained.folder.join("report.html").display());
     Ok(())
 }
 
 /// If it is interrupted: which epoch the checkpoint is of, and the command that goes on from it.
-fn tell_how_to_go_on(run_folder: &Path, epochs: usize, common: &Common) {
+fn print_how_to_go_on(run_folder: &Path, epochs: usize, common: &Common) {
     let (folder, device) = (run_folder.to_path_buf(), common.device.clone());
     let as_stated = if common.as_stated { " --as-stated" } else { "" };
     interrupt::kept(move || {

@@ -28,8 +28,8 @@ pub enum Event<'a> {
 ///
 /// # Errors
 /// Whatever a stage refuses; what was done before stays done.
-pub fn run(plan: &Plan, store: &Store, devices: &[Device], tell: &mut dyn FnMut(Event)) -> Result<Vec<Record>> {
-    run_some(plan, &(0..plan.stages.len()).collect(), store, devices, tell)
+pub fn run(plan: &Plan, store: &Store, devices: &[Device], notify: &mut dyn FnMut(Event)) -> Result<Vec<Record>> {
+    run_some(plan, &(0..plan.stages.len()).collect(), store, devices, notify)
 }
 
 /// The same for some stages, which must hold all that they need ([`Plan::needed`]).
@@ -41,11 +41,11 @@ pub fn run_some(
     wanted: &BTreeSet<usize>,
     store: &Store,
     devices: &[Device],
-    tell: &mut dyn FnMut(Event),
+    notify: &mut dyn FnMut(Event),
 ) -> Result<Vec<Record>> {
     let mut bench = Bench::new(devices);
     let of = wanted.len();
-    wanted.iter().enumerate().map(|(index, &stage)| one(plan, stage, [index, of], store, &mut bench, tell)).collect()
+    wanted.iter().enumerate().map(|(index, &stage)| one(plan, stage, [index, of], store, &mut bench, notify)).collect()
 }
 
 /// One stage, whose parents are done; of a stage that has pieces ([`Stage::pieces`]) also only some, which are kept for whoever
@@ -59,7 +59,7 @@ pub fn run_one(
     pieces: Shard,
     store: &Store,
     devices: &[Device],
-    tell: &mut dyn FnMut(Event),
+    notify: &mut dyn FnMut(Event),
 ) -> Result<()> {
     let Stage { key, task, parents, .. } = &plan.stages[stage];
     if let Some(&parent) = parents.iter().find(|&&parent| store.done(&plan.stages[parent].key).is_none()) {
@@ -69,16 +69,16 @@ pub fn run_one(
         });
     }
     if pieces.of == 1 {
-        return one(plan, stage, [0, 1], store, &mut Bench::new(devices), tell).map(drop);
+        return one(plan, stage, [0, 1], store, &mut Bench::new(devices), notify).map(drop);
     }
     let Task::Site { config, settings_folder } = task else {
         return Err(Error::Usage { message: format!("{}: has no pieces", key.folder()), hint: None });
     };
     let known = store.done(key).is_some();
-    tell(Event::Stage { index: 0, of: 1, name: &key.name, known });
+    notify(Event::Stage { index: 0, of: 1, name: &key.name, known });
     if !known {
         let (folder, _) = store.begin(key)?;
-        record(config, settings_folder, &folder, pieces, &mut |done, of, _| tell(Event::Step { done, of }))?;
+        record(config, settings_folder, &folder, pieces, &mut |done, of, _| notify(Event::Step { done, of }))?;
     }
     Ok(())
 }
@@ -90,20 +90,20 @@ fn one(
     [index, of]: [usize; 2],
     store: &Store,
     bench: &mut Bench,
-    tell: &mut dyn FnMut(Event),
+    notify: &mut dyn FnMut(Event),
 ) -> Result<Record> {
     let stage = &plan.stages[stage];
     let name = stage.key.name.as_str();
     let known = store.done(&stage.key);
-    tell(Event::Stage { index, of, name, known: known.is_some() });
+    notify(Event::Stage { index, of, name, known: known.is_some() });
     if let Some(record) = known {
         return Ok(record);
     }
     let parents = stage.parents.iter().map(|&parent| plan.stages[parent].key.folder()).collect();
     let record = store.perform(&stage.key, stage.settings.clone(), parents, &mut |folder| {
-        work(stage, folder, bench, &mut |done, of| tell(Event::Step { done, of }))
+        work(stage, folder, bench, &mut |done, of| notify(Event::Step { done, of }))
     })?;
-    tell(Event::Done { name, seconds: record.seconds });
+    notify(Event::Done { name, seconds: record.seconds });
     Ok(record)
 }
 

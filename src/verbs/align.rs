@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Tell, Told, claimed, plausible};
+use super::{Notice, Notify, claimed, plausible};
 use crate::{
     alignment::{self, Alignment, Search, Verdict, tracks::Track},
     data::{Recording, atomic, recording::SETTINGS_FILE, write_placement},
@@ -30,7 +30,7 @@ const STEPS: usize = 4;
 /// # Errors
 /// A recording without a body, with falling chirps or damaged samples; meshes where the placement is to be written; a folder that cannot
 /// be written.
-pub fn align(what: &Align<'_>, tell: &mut Tell<'_>) -> Result<Alignment> {
+pub fn align(what: &Align<'_>, notify: &mut Notify<'_>) -> Result<Alignment> {
     let _claim = claimed(what.out)?;
     for earlier in ["align.json", "align.png", "motion.toml"].map(|name| what.out.join(name)) {
         if earlier.exists() {
@@ -39,7 +39,7 @@ pub fn align(what: &Align<'_>, tell: &mut Tell<'_>) -> Result<Alignment> {
     }
     let recording = Recording::open(what.recording)?;
     // Where and when the body is stated to be is in question here: no place is refused.
-    plausible::recording(&recording, true, tell)?;
+    plausible::recording(&recording, true, notify)?;
     let is_skinned = matches!(recording.person(), Some(Person::Skinned { .. }));
     if what.apply && !is_skinned {
         return Err(Error::Usage {
@@ -47,19 +47,19 @@ pub fn align(what: &Align<'_>, tell: &mut Tell<'_>) -> Result<Alignment> {
             hint: Some("align.json says by what to move the vertices and pose times".into()),
         });
     }
-    tell(Told::Begun { what: "aligning", steps: STEPS });
+    notify(Notice::Begun { what: "aligning", steps: STEPS });
     let mut steps = 0;
     let mut line = |text: &str| {
         steps += 1;
-        tell(Told::Line(text));
-        tell(Told::Done(steps));
+        notify(Notice::Line(text));
+        notify(Notice::Done(steps));
     };
     let alignment = alignment::align(&recording, &what.search, &mut line)?;
     write(what.out, &alignment, is_skinned)?;
     if what.apply && alignment.verdict == Verdict::Aligned {
         write_placement(&recording.folder.join(SETTINGS_FILE), &alignment.motion)?;
     } else if what.apply {
-        tell(Told::Note("--apply: nothing was written, as no single placement explains the recording"));
+        notify(Notice::Note("--apply: nothing was written, as no single placement explains the recording"));
     }
     Ok(alignment)
 }

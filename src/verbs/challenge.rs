@@ -12,7 +12,7 @@ use std::{
     time::Duration,
 };
 
-use super::{Tell, Told, claimed};
+use super::{Notice, Notify, claimed};
 use crate::{
     challenge::{
         ChallengeConfig,
@@ -57,47 +57,47 @@ pub fn begin(what: &Seal<'_>) -> Result<usize> {
 ///
 /// # Errors
 /// As [`begin`], and whatever the recorder refuses.
-pub fn cases(what: &Seal<'_>, shard: Shard, tell: &mut Tell<'_>) -> Result<()> {
+pub fn cases(what: &Seal<'_>, shard: Shard, notify: &mut Notify<'_>) -> Result<()> {
     let config = ChallengeConfig::read(what.config, what.sets)?;
     let _claim = filled(what.out, shard)?;
-    sealing(&config, shard, tell);
-    told_here(tell, |progress| seal::cases(&config, what.seed, what.out, shard, progress)).map(drop)
+    sealing(&config, shard, notify);
+    notified_here(notify, |progress| seal::cases(&config, what.seed, what.out, shard, progress)).map(drop)
 }
 
 /// Records the cases of a shard that are not there yet, and commits to them.
 ///
 /// # Errors
 /// As [`cases`]; a commitment that is there already.
-pub fn commit(what: &Seal<'_>, shard: Shard, tell: &mut Tell<'_>) -> Result<Commitment> {
+pub fn commit(what: &Seal<'_>, shard: Shard, notify: &mut Notify<'_>) -> Result<Commitment> {
     let config = ChallengeConfig::read(what.config, what.sets)?;
     let _claim = filled(what.out, shard)?;
-    sealing(&config, shard, tell);
-    told_here(tell, |progress| seal::seal(&config, what.seed, what.out, shard, progress))
+    sealing(&config, shard, notify);
+    notified_here(notify, |progress| seal::seal(&config, what.seed, what.out, shard, progress))
 }
 
-fn sealing(config: &ChallengeConfig, shard: Shard, tell: &mut Tell<'_>) {
+fn sealing(config: &ChallengeConfig, shard: Shard, notify: &mut Notify<'_>) {
     let steps = (0..config.cases).filter(|&index| shard.holds(index)).count();
-    tell(Told::Begun { what: "sealing", steps });
+    notify(Notice::Begun { what: "sealing", steps });
 }
 
 /// Has the cases diagnosed that have no answer yet.
 ///
 /// # Errors
 /// A challenge that cannot be read; answers that cannot be written.
-pub fn run(challenge: &Path, out: &Path, config: &RunConfig, tell: &mut Tell<'_>) -> Result<Answers> {
+pub fn run(challenge: &Path, out: &Path, config: &RunConfig, notify: &mut Notify<'_>) -> Result<Answers> {
     let _claim = filled(out, config.shard)?;
-    tell(Told::Begun { what: "diagnosing", steps: answer::waiting(challenge, out, config)? });
-    answer::run(challenge, out, config, &mut counted(tell))
+    notify(Notice::Begun { what: "diagnosing", steps: answer::waiting(challenge, out, config)? });
+    answer::run(challenge, out, config, &mut counted(notify))
 }
 
 /// Diagnoses every scene once more without its effects; how many.
 ///
 /// # Errors
 /// Answers that are not complete; truths that are not what was committed to; reports that cannot be written.
-pub fn twins(challenge: &Path, answers: &Path, out: &Path, config: &RunConfig, tell: &mut Tell<'_>) -> Result<usize> {
+pub fn twins(challenge: &Path, answers: &Path, out: &Path, config: &RunConfig, notify: &mut Notify<'_>) -> Result<usize> {
     let _claim = filled(out, config.shard)?;
-    tell(Told::Begun { what: "twins", steps: answer::waiting(challenge, out, config)? });
-    twins::run(challenge, answers, out, config, &mut counted(tell))
+    notify(Notice::Begun { what: "twins", steps: answer::waiting(challenge, out, config)? });
+    twins::run(challenge, answers, out, config, &mut counted(notify))
 }
 
 /// What is held against each other.
@@ -116,11 +116,12 @@ pub struct Scoring<'a> {
 ///
 /// # Errors
 /// Answers or truths that are not what was committed to; a folder that cannot be written.
-pub fn score(what: &Scoring<'_>, tell: &mut Tell<'_>) -> Result<Score> {
+pub fn score(what: &Scoring<'_>, notify: &mut Notify<'_>) -> Result<Score> {
     let steps = Commitment::read_all(what.challenge)?.iter().map(|part| part.cases).sum();
     let _claim = claimed(what.out)?;
-    tell(Told::Begun { what: "scoring", steps });
-    let scored = told_here(tell, |progress| score::score(what.challenge, what.answers, what.twins, what.measure, progress))?;
+    notify(Notice::Begun { what: "scoring", steps });
+    let scored =
+        notified_here(notify, |progress| score::score(what.challenge, what.answers, what.twins, what.measure, progress))?;
     scored.write(what.out)?;
     Ok(scored)
 }
@@ -133,20 +134,20 @@ pub fn filled(folder: &Path, shard: Shard) -> Result<Claim> {
 }
 
 /// Tells how many are done, or that it still works.
-fn counted<'a>(tell: &'a mut Tell<'_>) -> impl FnMut(usize) + 'a {
+fn counted<'a>(notify: &'a mut Notify<'_>) -> impl FnMut(usize) + 'a {
     let mut known = 0;
     move |done| match std::mem::replace(&mut known, done) == done {
-        true => tell(Told::Still),
-        false => tell(Told::Done(done)),
+        true => notify(Notice::Still),
+        false => notify(Notice::Done(done)),
     }
 }
 
-/// Does work whose progress several threads tell, and tells it in this one. Where whoever listens unwinds, the work ends at its next step.
-fn told_here<T: Send>(tell: &mut Tell<'_>, work: impl FnOnce(&(dyn Fn(usize) + Sync)) -> T + Send) -> T {
+/// Does work whose progress several threads report, and passes the notices on in this one. Where whoever listens unwinds, the work ends at its next step.
+fn notified_here<T: Send>(notify: &mut Notify<'_>, work: impl FnOnce(&(dyn Fn(usize) + Sync)) -> T + Send) -> T {
     let (sender, receiver) = mpsc::channel();
     let ended = &AtomicBool::new(false);
     thread::scope(|scope| {
-        let told = move || {
+        let working = move || {
             work(&|done| {
                 if ended.load(Ordering::Relaxed) {
                     resume_unwind(Box::new("ended by whoever listens"));
@@ -154,12 +155,13 @@ fn told_here<T: Send>(tell: &mut Tell<'_>, work: impl FnOnce(&(dyn Fn(usize) + S
                 let _ = sender.send(done);
             })
         };
-        let worker = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, told).expect("a thread can be started");
+        let worker =
+            thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, working).expect("a thread can be started");
         let received = catch_unwind(AssertUnwindSafe(|| {
             loop {
                 match receiver.recv_timeout(LOOK) {
-                    Ok(done) => tell(Told::Done(done)),
-                    Err(RecvTimeoutError::Timeout) => tell(Told::Still),
+                    Ok(done) => notify(Notice::Done(done)),
+                    Err(RecvTimeoutError::Timeout) => notify(Notice::Still),
                     Err(RecvTimeoutError::Disconnected) => break,
                 }
             }
@@ -180,10 +182,10 @@ mod tests {
     #[test]
     fn what_many_threads_do_is_told_in_one_and_ends_when_it_unwinds() {
         let (mut received, here) = (0, thread::current().id());
-        let sum = told_here(
-            &mut |told| {
+        let sum = notified_here(
+            &mut |notice| {
                 assert_eq!(thread::current().id(), here);
-                if let Told::Done(done) = told {
+                if let Notice::Done(done) = notice {
                     received += done;
                 }
             },
@@ -193,7 +195,7 @@ mod tests {
 
         let begun = std::sync::atomic::AtomicUsize::new(0);
         let caught = catch_unwind(AssertUnwindSafe(|| {
-            told_here(&mut |_| resume_unwind(Box::new("enough")), |progress| {
+            notified_here(&mut |_| resume_unwind(Box::new("enough")), |progress| {
                 for done in 0..1000 {
                     begun.store(done, Ordering::Relaxed);
                     thread::sleep(Duration::from_millis(10));

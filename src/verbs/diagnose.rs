@@ -4,7 +4,7 @@ use std::path::Path;
 
 use burn::tensor::Device;
 
-use super::{Tell, Told, claimed, plausible};
+use super::{Notice, Notify, claimed, plausible};
 use crate::{
     config::Config,
     data::{Recording, atomic, files},
@@ -31,7 +31,7 @@ pub struct Diagnose<'a> {
 ///
 /// # Errors
 /// A recording or checkpoint that cannot be read, or cannot be meant; a folder that cannot be written.
-pub fn diagnose(what: &Diagnose<'_>, device: &Device, as_stated: bool, tell: &mut Tell<'_>) -> Result<Diagnosis> {
+pub fn diagnose(what: &Diagnose<'_>, device: &Device, as_stated: bool, notify: &mut Notify<'_>) -> Result<Diagnosis> {
     // What would be refused after the diagnosis is refused before it; an earlier answer must not pass for this one's.
     if let Some(checkpoint) = what.checkpoint {
         checkpoint::read_state(checkpoint)?;
@@ -43,14 +43,14 @@ pub fn diagnose(what: &Diagnose<'_>, device: &Device, as_stated: bool, tell: &mu
         }
     }
     let recording = Recording::open(what.recording)?;
-    plausible::recording(&recording, as_stated, tell)?;
+    plausible::recording(&recording, as_stated, notify)?;
     let settings = &what.config.diagnosis;
-    tell(Told::Begun { what: "diagnosing", steps: settings.most + 2 * settings.epochs });
+    notify(Notice::Begun { what: "diagnosing", steps: settings.most + 2 * settings.epochs });
     let mut steps = 0;
     let mut line = |text: &str| {
         steps += 1;
-        tell(Told::Line(text));
-        tell(Told::Done(steps));
+        notify(Notice::Line(text));
+        notify(Notice::Done(steps));
     };
     let mut diagnosis = diagnosis::diagnose(&recording, settings, &mut line)?;
     let simulated = simulate(what, device, &mut diagnosis, &mut line)?;

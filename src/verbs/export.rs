@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Tell, Told};
+use super::{Notice, Notify};
 use crate::{
     data::atomic::AtomicFolder,
     error::Result,
@@ -30,14 +30,14 @@ pub struct Export<'a> {
 /// # Errors
 /// Settings, a board or a label that are none; a recording that cannot be read, or that the layout cannot hold; a folder that is not
 /// empty or cannot be written.
-pub fn export(what: &Export<'_>, tell: &mut Tell<'_>) -> Result<[usize; 2]> {
+pub fn export(what: &Export<'_>, notify: &mut Notify<'_>) -> Result<[usize; 2]> {
     let config = ExportConfig::new(what.sets)?;
     let board = what.board.map(Board::named).transpose()?;
     let folder = AtomicFolder::create(what.out)?;
     let dataset = Dataset::open(what.sources, what.target, board, config, what.split_by.clone())?;
-    tell(Told::Begun { what: "exporting", steps: dataset.frames() });
-    let notes = write_dataset(&dataset, folder.path(), &mut |done, _| tell(Told::Done(done)))?;
+    notify(Notice::Begun { what: "exporting", steps: dataset.frames() });
+    let notes = write_dataset(&dataset, folder.path(), &mut |done, _| notify(Notice::Done(done)))?;
     folder.finish()?;
-    notes.iter().for_each(|note| tell(Told::Note(note)));
+    notes.iter().for_each(|note| notify(Notice::Note(note)));
     Ok([dataset.shards.len(), dataset.frames()])
 }

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{Tell, Told, plausible};
+use super::{Notice, Notify, plausible};
 use crate::{
     data::{Recording, atomic::AtomicFolder},
     error::Result,
@@ -36,18 +36,18 @@ pub enum Seen<'a> {
 ///
 /// # Errors
 /// A capture that is not understood, cannot be, or contradicts what is stated of it; a folder that cannot be written. Nothing is left then.
-pub fn import(what: Import<'_>, seen: &mut dyn FnMut(Seen<'_>, &mut Tell<'_>), tell: &mut Tell<'_>) -> Result<Recording> {
+pub fn import(what: Import<'_>, seen: &mut dyn FnMut(Seen<'_>, &mut Notify<'_>), notify: &mut Notify<'_>) -> Result<Recording> {
     // What cannot be written is said before anything is read.
     AtomicFolder::create(what.out).map(drop)?;
     let capture = capture::open(what.sources, what.stated)?;
-    tell(Told::Begun { what: "importing", steps: capture.radar.frames });
-    let draft = capture::draft(capture, what.out, what.labels, &mut |done, _| tell(Told::Done(done)))?;
-    seen(Seen::Written(draft.recording()), tell);
-    let told = draft.recording().notes.clone();
-    told.iter().for_each(|note| tell(Told::Note(note)));
-    plausible::recording(draft.recording(), what.as_stated, tell)?;
-    seen(Seen::Looked(draft.recording(), &draft.findings), tell);
+    notify(Notice::Begun { what: "importing", steps: capture.radar.frames });
+    let draft = capture::draft(capture, what.out, what.labels, &mut |done, _| notify(Notice::Done(done)))?;
+    seen(Seen::Written(draft.recording()), notify);
+    let known = draft.recording().notes.clone();
+    known.iter().for_each(|note| notify(Notice::Note(note)));
+    plausible::recording(draft.recording(), what.as_stated, notify)?;
+    seen(Seen::Looked(draft.recording(), &draft.findings), notify);
     let recording = draft.publish(what.as_stated)?;
-    recording.notes.iter().filter(|note| !told.contains(note)).for_each(|note| tell(Told::Note(note)));
+    recording.notes.iter().filter(|note| !known.contains(note)).for_each(|note| notify(Notice::Note(note)));
     Ok(recording)
 }

@@ -1,6 +1,6 @@
 //! The verbs without a terminal: what the program and the Python module do alike.
 //!
-//! A verb asks whether what it is given can be, works, and tells what happens through [`Tell`]; it prints nothing. Whoever listens
+//! A verb asks whether what it is given can be, works, and says what happens through [`Notify`]; it prints nothing. Whoever listens
 //! may end the work by unwinding (`std::panic::resume_unwind`): what is unfinished is dropped on the way, so that nothing
 //! half-written stays.
 
@@ -29,8 +29,8 @@ use crate::{
     experiments, training,
 };
 
-/// What a verb tells while it works.
-pub enum Told<'a> {
+/// What a verb says while it works.
+pub enum Notice<'a> {
     /// What was assumed, or is odd about what was given.
     Note(&'a str),
     /// Work of so many steps begins.
@@ -57,7 +57,7 @@ pub enum Told<'a> {
 }
 
 /// Who receives it.
-pub type Tell<'a> = dyn FnMut(Told<'_>) + 'a;
+pub type Notify<'a> = dyn FnMut(Notice<'_>) + 'a;
 
 /// A folder that results are added to, made and tried before the work; nobody else works there until this is dropped.
 pub fn claimed(folder: &Path) -> Result<Claim> {

@@ -1,10 +1,10 @@
-//! The plausibility of what a verb is given, told before anything is computed.
+//! The plausibility of what a verb is given, reported before anything is computed.
 //!
 //! `as_stated`: the user keeps his word, and what cannot be is noted in place of being refused.
 
 use std::path::{Path, PathBuf};
 
-use super::{Tell, Told};
+use super::{Notice, Notify};
 use crate::{
     data::{Recording, Shard, entries::recordings_in},
     error::Result,
@@ -20,9 +20,9 @@ use crate::{
 ///
 /// # Errors
 /// A first frame that cannot be read; what cannot be, unless it is taken as stated.
-pub fn recording(recording: &Recording, as_stated: bool, tell: &mut Tell<'_>) -> Result<()> {
+pub fn recording(recording: &Recording, as_stated: bool, notify: &mut Notify<'_>) -> Result<()> {
     let (facts, sources) = of_recording(recording)?;
-    judge(facts, &sources, as_stated, tell)
+    judge(facts, &sources, as_stated, notify)
 }
 
 /// What the checks look at in a recording, and the files it was read from.
@@ -51,8 +51,8 @@ pub fn of_recording(recording: &Recording) -> Result<(Facts, Sources)> {
 ///
 /// # Errors
 /// A recording that cannot be read; as [`recording`].
-pub fn folder(folder: &Path, as_stated: bool, tell: &mut Tell<'_>) -> Result<()> {
-    recording(&Recording::open(folder)?, as_stated, tell)
+pub fn folder(folder: &Path, as_stated: bool, notify: &mut Notify<'_>) -> Result<()> {
+    recording(&Recording::open(folder)?, as_stated, notify)
 }
 
 /// The same of a scene that is not recorded yet.
@@ -65,19 +65,19 @@ pub fn scene(
     person: Option<&Person>,
     sources: &Sources,
     as_stated: bool,
-    tell: &mut Tell<'_>,
+    notify: &mut Notify<'_>,
 ) -> Result<()> {
-    judge(facts(radar, room, person)?, sources, as_stated, tell)
+    judge(facts(radar, room, person)?, sources, as_stated, notify)
 }
 
 /// The same of a site: of its config file, or of its folder of recordings.
 ///
 /// # Errors
 /// As [`sequences`] and [`recording`].
-pub fn site(path: &Path, as_stated: bool, tell: &mut Tell<'_>) -> Result<()> {
+pub fn site(path: &Path, as_stated: bool, notify: &mut Notify<'_>) -> Result<()> {
     match path.is_dir() {
-        true => recordings_in(path)?.iter().try_for_each(|recording| folder(recording, as_stated, tell)),
-        false => sequences(&SiteConfig::read(path, &[])?, path, as_stated, Shard::ALL, tell),
+        true => recordings_in(path)?.iter().try_for_each(|recording| folder(recording, as_stated, notify)),
+        false => sequences(&SiteConfig::read(path, &[])?, path, as_stated, Shard::ALL, notify),
     }
 }
 
@@ -85,10 +85,10 @@ pub fn site(path: &Path, as_stated: bool, tell: &mut Tell<'_>) -> Result<()> {
 ///
 /// # Errors
 /// Settings that cannot be a site; as [`recording`].
-pub fn sequences(config: &SiteConfig, path: &Path, as_stated: bool, shard: Shard, tell: &mut Tell<'_>) -> Result<()> {
+pub fn sequences(config: &SiteConfig, path: &Path, as_stated: bool, shard: Shard, notify: &mut Notify<'_>) -> Result<()> {
     for (name, findings) in site::implausible(config, path.parent().unwrap_or(Path::new("")), as_stated, shard)? {
         let sources = Sources::one(format!("{} ({name})", path.display()));
-        tell_verdict(Verdict::new(findings, &sources, as_stated), tell)?;
+        notify_verdict(Verdict::new(findings, &sources, as_stated), notify)?;
     }
     Ok(())
 }
@@ -100,12 +100,12 @@ pub fn facts(radar: Option<&Radar>, room: Option<&Room>, person: Option<&Person>
 }
 
 /// Tells what is to be noted; the first refusal is the error.
-pub fn judge(mut facts: Facts, sources: &Sources, as_stated: bool, tell: &mut Tell<'_>) -> Result<()> {
+pub fn judge(mut facts: Facts, sources: &Sources, as_stated: bool, notify: &mut Notify<'_>) -> Result<()> {
     facts.as_stated = as_stated;
-    tell_verdict(Verdict::new(findings(&facts), sources, as_stated), tell)
+    notify_verdict(Verdict::new(findings(&facts), sources, as_stated), notify)
 }
 
-fn tell_verdict(verdict: Verdict, tell: &mut Tell<'_>) -> Result<()> {
-    verdict.notes.iter().for_each(|note| tell(Told::Note(note)));
+fn notify_verdict(verdict: Verdict, notify: &mut Notify<'_>) -> Result<()> {
+    verdict.notes.iter().for_each(|note| notify(Notice::Note(note)));
     verdict.into_result()
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use super::{Tell, Told, plausible};
+use super::{Notice, Notify, plausible};
 use crate::{
     data::{Recording, atomic::AtomicFolder, hex},
     error::Result,
@@ -17,12 +17,12 @@ use crate::{
 ///
 /// # Errors
 /// As [`make`].
-pub fn recorded(config: &RecorderConfig, config_path: &Path, as_stated: bool, tell: &mut Tell<'_>) -> Result<PathBuf> {
+pub fn recorded(config: &RecorderConfig, config_path: &Path, as_stated: bool, notify: &mut Notify<'_>) -> Result<PathBuf> {
     let text = toml::to_string(config).expect("settings are plain data");
     let digest = Sha256::digest(format!("{} {text}", env!("CARGO_PKG_VERSION")));
     let folder = Path::new("runs/recordings").join(hex(&digest[..6]));
     if !folder.is_dir() {
-        make(config, config_path, &folder, as_stated, tell)?;
+        make(config, config_path, &folder, as_stated, notify)?;
     }
     Ok(folder)
 }
@@ -36,14 +36,21 @@ pub fn make(
     config_path: &Path,
     folder: &Path,
     as_stated: bool,
-    tell: &mut Tell<'_>,
+    notify: &mut Notify<'_>,
 ) -> Result<Recording> {
     // What cannot be written is said before anything is worked out.
     AtomicFolder::create(folder).map(drop)?;
     let settings_folder = config_path.parent().unwrap_or(Path::new(""));
-    config.motion_notes(settings_folder)?.iter().for_each(|note| tell(Told::Note(note)));
+    config.motion_notes(settings_folder)?.iter().for_each(|note| notify(Notice::Note(note)));
     let world = config.world(settings_folder)?;
-    plausible::scene(Some(&world.radar), Some(&world.room), world.person.as_ref(), &Sources::one(config_path), as_stated, tell)?;
-    tell(Told::Begun { what: "recording", steps: world.radar.frames });
-    recorder::record_to(config, settings_folder, folder, &mut |done, _| tell(Told::Done(done)))
+    plausible::scene(
+        Some(&world.radar),
+        Some(&world.room),
+        world.person.as_ref(),
+        &Sources::one(config_path),
+        as_stated,
+        notify,
+    )?;
+    notify(Notice::Begun { what: "recording", steps: world.radar.frames });
+    recorder::record_to(config, settings_folder, folder, &mut |done, _| notify(Notice::Done(done)))
 }

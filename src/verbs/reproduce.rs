@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use burn::tensor::Device;
 
-use super::{Tell, Told, plausible};
+use super::{Notice, Notify, plausible};
 use crate::{
     data::{Shard, atomic, files},
     error::{Error, Result},
@@ -85,11 +85,11 @@ impl Planned {
     ///
     /// # Errors
     /// What cannot be, unless it is taken as stated.
-    pub fn look(&self, devices: &[Device], as_stated: bool, tell: &mut Tell<'_>) -> Result<()> {
+    pub fn look(&self, devices: &[Device], as_stated: bool, notify: &mut Notify<'_>) -> Result<()> {
         let config = &self.config;
         let scene = config.second_scene.as_ref().map(|scene| &scene.site);
         for site in std::iter::once(&config.site).chain(&config.second_room).chain(scene) {
-            plausible::site(site, as_stated, tell)?;
+            plausible::site(site, as_stated, notify)?;
         }
         if let Some(lpips) = &config.comparison.lpips {
             // A file that is none is refused now, not after the trainings.
@@ -102,10 +102,10 @@ impl Planned {
     ///
     /// # Errors
     /// As [`Self::look`]; whatever a stage refuses; what was done before stays done.
-    pub fn run(&self, command: &str, devices: &[Device], as_stated: bool, tell: &mut Tell<'_>) -> Result<()> {
-        self.look(devices, as_stated, tell)?;
+    pub fn run(&self, command: &str, devices: &[Device], as_stated: bool, notify: &mut Notify<'_>) -> Result<()> {
+        self.look(devices, as_stated, notify)?;
         let store = self.store(devices)?;
-        let records = experiments::run(&self.plan, &store, devices, &mut |event| tell(Told::Stage(&event)))?;
+        let records = experiments::run(&self.plan, &store, devices, &mut |event| notify(Notice::Stage(&event)))?;
         let results = results::collect(&self.plan, &store, &records)?;
         report::write(&self.out, &self.config, &results, command)
     }
@@ -119,12 +119,12 @@ impl Planned {
         beginnings: &[String],
         devices: &[Device],
         as_stated: bool,
-        tell: &mut Tell<'_>,
+        notify: &mut Notify<'_>,
     ) -> Result<[usize; 2]> {
         let wanted = self.plan.needed(beginnings)?;
-        self.look(devices, as_stated, tell)?;
+        self.look(devices, as_stated, notify)?;
         let store = self.store(devices)?;
-        experiments::run_some(&self.plan, &wanted, &store, devices, &mut |event| tell(Told::Stage(&event)))?;
+        experiments::run_some(&self.plan, &wanted, &store, devices, &mut |event| notify(Notice::Stage(&event)))?;
         let done = self.plan.stages.iter().filter(|stage| store.done(&stage.key).is_some()).count();
         Ok([done, self.plan.stages.len()])
     }
@@ -134,7 +134,7 @@ impl Planned {
     ///
     /// # Errors
     /// A folder that no stage has; a parent that is not done; another process that does the same; whatever the stage refuses.
-    pub fn run_one(&self, folder: &str, pieces: Shard, devices: &[Device], tell: &mut Tell<'_>) -> Result<()> {
+    pub fn run_one(&self, folder: &str, pieces: Shard, devices: &[Device], notify: &mut Notify<'_>) -> Result<()> {
         let stage = self.plan.find(folder)?;
         let name = format!("stage-{}", self.plan.stages[stage].key.hash);
         let piece = match pieces {
@@ -142,7 +142,7 @@ impl Planned {
             Shard { number, of } => format!("{name}-{number}-of-{of}"),
         };
         let store = Store::open_for(&self.out, device_name(devices), &piece)?;
-        experiments::run_one(&self.plan, stage, pieces, &store, devices, &mut |event: Event| tell(Told::Stage(&event)))
+        experiments::run_one(&self.plan, stage, pieces, &store, devices, &mut |event: Event| notify(Notice::Stage(&event)))
     }
 
     /// Of the whole reproduction.

@@ -9,7 +9,7 @@ use burn::tensor::Device;
 use num_complex::Complex32;
 
 use super::{
-    Tell, Told, heatmaps, notes, plausible,
+    Notice, Notify, heatmaps, notes, plausible,
     simulated::{self, Sequence},
 };
 use crate::{
@@ -115,7 +115,7 @@ impl Ready {
     ///
     /// # Errors
     /// A checkpoint, motion, body or recording that cannot be read, or cannot be meant; more frames than the motion lasts.
-    pub fn new(asked: &Simulate, device: &Device, as_stated: bool, tell: &mut Tell<'_>) -> Result<Self> {
+    pub fn new(asked: &Simulate, device: &Device, as_stated: bool, notify: &mut Notify<'_>) -> Result<Self> {
         let (mut simulator, state) = checkpoint::open(&asked.checkpoint, device)?;
         asked.without.switch_off(&mut simulator)?;
         if let Some(part) = asked.only {
@@ -123,16 +123,16 @@ impl Ready {
         }
         let (only, clean) = (asked.only, asked.clean);
         if let What::Recording(folder) = &asked.what {
-            plausible::folder(folder, as_stated, tell)?;
+            plausible::folder(folder, as_stated, notify)?;
             let loaded = LoadedRecording::open(folder, &state.simulator, false)?;
             heatmaps::same_radar(&loaded.folder, &loaded.scene.radar, &state.site.radar)?;
-            notes::of(&loaded).iter().for_each(|note| tell(Told::Note(note)));
+            notes::of(&loaded).iter().for_each(|note| notify(Notice::Note(note)));
             let mut radar = loaded.recording.radar.clone();
             radar.frames = count(asked.frames, radar.frames, radar.frames)?;
             let labels = loaded.recording.labels.clone();
             return Ok(Self { simulator, state, radar, measured: Some(loaded), own: None, labels, clean, only });
         }
-        let (person, labels) = new_person(asked, &state, tell)?;
+        let (person, labels) = new_person(asked, &state, notify)?;
         let (mut radar, room) = (state.site.radar.clone(), state.site.room.as_ref());
         radar.frames = count(asked.frames, FRAMES, frames_within(&person, &radar)?)?;
         let file = |file: Option<&PathBuf>| file.unwrap_or(&asked.checkpoint).clone();
@@ -145,7 +145,7 @@ impl Ready {
             motion: file(motion),
             ..Sources::one(asked.checkpoint.join("checkpoint.toml"))
         };
-        plausible::scene(Some(&radar), room, Some(&person), &sources, as_stated, tell)?;
+        plausible::scene(Some(&radar), room, Some(&person), &sources, as_stated, notify)?;
         let scene = Scene::new(&radar, room, Some(&person), &state.simulator)?;
         Ok(Self { simulator, state, radar, measured: None, own: Some((scene, person)), labels, clean, only })
     }
@@ -170,13 +170,13 @@ impl Ready {
     ///
     /// # Errors
     /// A frame outside the motion.
-    pub fn samples(&self, tell: &mut Tell<'_>) -> Result<Vec<Complex32>> {
-        tell(Told::Begun { what: "simulating", steps: self.radar.frames });
+    pub fn samples(&self, notify: &mut Notify<'_>) -> Result<Vec<Complex32>> {
+        notify(Notice::Begun { what: "simulating", steps: self.radar.frames });
         let simulation = self.simulation();
         let mut samples = Vec::with_capacity(self.radar.dims().iter().product());
         for frame in 0..self.radar.frames {
             samples.extend(simulation.frame(frame)?);
-            tell(Told::Done(frame + 1));
+            notify(Notice::Done(frame + 1));
         }
         Ok(samples)
     }
@@ -185,7 +185,7 @@ impl Ready {
     ///
     /// # Errors
     /// A frame outside the motion; a folder that cannot be written.
-    pub fn write(&self, folder: &Path, tell: &mut Tell<'_>) -> Result<()> {
+    pub fn write(&self, folder: &Path, notify: &mut Notify<'_>) -> Result<()> {
         let measured = self.measured.as_ref().map(|loaded| &loaded.recording);
         let sequence = Sequence {
             radar: &self.radar,
@@ -195,7 +195,7 @@ impl Ready {
             measured,
         };
         let simulation = self.simulation();
-        simulated::write(folder, &sequence, &self.state.heatmap, tell, &mut |frame| simulation.frame(frame))
+        simulated::write(folder, &sequence, &self.state.heatmap, notify, &mut |frame| simulation.frame(frame))
     }
 }
 
@@ -212,7 +212,7 @@ fn refuse_effects(part: Part, simulator: &Simulator) -> Result<()> {
 }
 
 /// The person that is asked for, where the training person stood, and the labels that are true of the motion.
-fn new_person(asked: &Simulate, state: &CheckpointState, tell: &mut Tell<'_>) -> Result<(Person, BTreeMap<String, String>)> {
+fn new_person(asked: &Simulate, state: &CheckpointState, notify: &mut Notify<'_>) -> Result<(Person, BTreeMap<String, String>)> {
     let model: BodyModel = match &asked.body {
         Some(path) => read_body(path)?,
         None => procedural::person(&PersonConfig::default())?,
@@ -234,7 +234,7 @@ fn new_person(asked: &Simulate, state: &CheckpointState, tell: &mut Tell<'_>) ->
             };
             config.up = up.or(config.up);
             let (motion, notes) = import::read_motion(path, &model, &config)?;
-            notes.iter().for_each(|note| tell(Told::Note(note)));
+            notes.iter().for_each(|note| notify(Notice::Note(note)));
             // A captured motion starts wherever its recorder's floor had its origin: its path is centred instead, with the
             // feet's height left as captured.
             recentre(&motion, &mut placement);

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use num_complex::Complex32;
 
 use super::{
-    Tell, Told,
+    Notice, Notify,
     heatmaps::{Drawn, Pictures},
 };
 use crate::{
@@ -35,11 +35,11 @@ pub fn write(
     folder: &Path,
     sequence: &Sequence<'_>,
     heatmap: &HeatmapConfig,
-    tell: &mut Tell<'_>,
+    notify: &mut Notify<'_>,
     frame: &mut dyn FnMut(usize) -> Result<Vec<Complex32>>,
 ) -> Result<()> {
     let radar = sequence.radar;
-    tell(Told::Begun { what: "simulating", steps: radar.frames });
+    notify(Notice::Begun { what: "simulating", steps: radar.frames });
     let contents = RecordingContents {
         radar,
         room: sequence.room,
@@ -54,7 +54,7 @@ pub fn write(
     write_recording(folder.join("recording"), &contents, &mut |index| {
         let signal = frame(index)?;
         simulated.extend_from_slice(&signal);
-        tell(Told::Done(index + 1));
+        notify(Notice::Done(index + 1));
         let im = (radar.sampling == Sampling::Complex).then(|| signal.iter().map(|value| value.im).collect());
         Ok(IfFrame::new([tx, rx, loops, samples], signal.iter().map(|value| value.re).collect(), im))
     })?;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Tell, Told, plausible};
+use super::{Notice, Notify, plausible};
 use crate::{
     data::{Claim, Shard},
     error::Result,
@@ -25,32 +25,32 @@ pub struct Site<'a> {
 /// # Errors
 /// Settings that cannot be a site, or a sequence of the shard that cannot be; a recording that was made with others; a folder that
 /// cannot be written.
-pub fn record(what: &Site<'_>, as_stated: bool, tell: &mut Tell<'_>) -> Result<site::Site> {
+pub fn record(what: &Site<'_>, as_stated: bool, notify: &mut Notify<'_>) -> Result<site::Site> {
     let config = SiteConfig::read(what.config, what.sets)?;
     let _claim = Claim::part(what.out, what.shard)?;
-    plausible::sequences(&config, what.config, as_stated, what.shard, tell)?;
+    plausible::sequences(&config, what.config, as_stated, what.shard, notify)?;
     let (mut begun, mut at_hand) = (false, String::new());
     let mut progress = |done: usize, of: usize, name: &str| {
         if !std::mem::replace(&mut begun, true) {
-            tell(Told::Begun { what: "recording", steps: of });
+            notify(Notice::Begun { what: "recording", steps: of });
         }
         if name != at_hand {
             at_hand = name.into();
-            tell(Told::At(name));
+            notify(Notice::At(name));
         }
-        tell(Told::Done(done));
+        notify(Notice::Done(done));
     };
     site::record(&config, what.config.parent().unwrap_or(Path::new("")), what.out, what.shard, &mut progress)
 }
 
-/// Looks at all sequences, and records nothing: what would be refused is refused, what is odd is told. Their recordings, in
+/// Looks at all sequences, and records nothing: what would be refused is refused, what is odd is said. Their recordings, in
 /// the order of the shards.
 ///
 /// # Errors
 /// Settings that cannot be a site, or a sequence that cannot be.
-pub fn look(what: &Site<'_>, as_stated: bool, tell: &mut Tell<'_>) -> Result<Vec<PathBuf>> {
+pub fn look(what: &Site<'_>, as_stated: bool, notify: &mut Notify<'_>) -> Result<Vec<PathBuf>> {
     let config = SiteConfig::read(what.config, what.sets)?;
-    plausible::sequences(&config, what.config, as_stated, Shard::ALL, tell)?;
+    plausible::sequences(&config, what.config, as_stated, Shard::ALL, notify)?;
     let sequences = site::sequences(&config, what.config.parent().unwrap_or(Path::new("")))?;
     Ok(sequences.into_iter().map(|sequence| what.out.join("recordings").join(sequence.name)).collect())
 }

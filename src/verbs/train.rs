@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use burn::tensor::Device;
 
-use super::{Tell, Told, claimed, notes, plausible, record, report::RunReport};
+use super::{Notice, Notify, claimed, notes, plausible, record, report::RunReport};
 use crate::{
     config::Config,
     data::{atomic, files},
@@ -35,7 +35,7 @@ pub struct Trained {
 ///
 /// # Errors
 /// A config, recordings or checkpoints that cannot be used; a run folder that holds a run, or that cannot be written.
-pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, tell: &mut Tell<'_>) -> Result<Trained> {
+pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, notify: &mut Notify<'_>) -> Result<Trained> {
     let (config_path, run_folder, sets, begun) = match *start {
         Start::Resume { run, sets } => (run.join("config.toml"), run.to_path_buf(), sets, true),
         Start::Config { path, sets, out, go_on } => {
@@ -63,20 +63,20 @@ pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, tell: &mut 
         holds_no_run(&run_folder)?;
     }
     let _claim = resumed.map_or_else(|| claimed(&run_folder), Ok)?;
-    has_recordings(&mut config, &config_path, as_stated, tell)?;
+    has_recordings(&mut config, &config_path, as_stated, notify)?;
     let config_toml = config.to_toml();
     if resume.is_some() && by_config {
         is_the_same(&run_folder.join("config.toml"), &config_toml)?;
     }
     atomic::write_text(run_folder.join("config.toml"), &config_toml)?;
-    tell(Told::Run { folder: &run_folder, epochs: config.training.epochs });
+    notify(Notice::Run { folder: &run_folder, epochs: config.training.epochs });
 
     let started = std::time::Instant::now();
     let load = if as_stated { load_recordings_as_stated } else { load_recordings };
     let recordings = load(&config.data.recordings, &config.simulator)?;
-    recordings.iter().flat_map(notes::of).for_each(|note| tell(Told::Note(&note)));
+    recordings.iter().flat_map(notes::of).for_each(|note| notify(Notice::Note(&note)));
     let trainer = config.trainer(&recordings, &config_toml, &run_folder, devices)?;
-    let outcome = trainer.run(resume.as_deref(), &mut |event| tell(Told::Training(&event)))?;
+    let outcome = trainer.run(resume.as_deref(), &mut |event| notify(Notice::Training(&event)))?;
 
     let refined = refine::read(&run_folder)?;
     let recordings =
@@ -105,15 +105,15 @@ fn holds_no_run(folder: &Path) -> Result<()> {
 }
 
 /// Records where a config names no recordings, and finds those that it names.
-fn has_recordings(config: &mut Config, config_path: &Path, as_stated: bool, tell: &mut Tell<'_>) -> Result<()> {
+fn has_recordings(config: &mut Config, config_path: &Path, as_stated: bool, notify: &mut Notify<'_>) -> Result<()> {
     if config.data.recordings.is_empty() {
-        let recorded = record::recorded(config.record(config_path)?, config_path, as_stated, tell)?;
+        let recorded = record::recorded(config.record(config_path)?, config_path, as_stated, notify)?;
         config.data.recordings = vec![recorded];
     }
     absolute(&mut config.data.recordings)?;
     absolute(config.training.start_from.as_mut_slice())?;
     for recording in &config.data.recordings {
-        plausible::folder(recording, as_stated, tell)?;
+        plausible::folder(recording, as_stated, notify)?;
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ import os
 from typing import Any
 
 from .. import _hybridsim
-from .._progress import Teller, Watcher
+from .._progress import Notifier, Watcher
 from .._recording import Recording
 from .._types import StrPath
 
@@ -37,8 +37,8 @@ def align(
         hybridsim.Error: a recording without a body, with falling chirps, or with damaged samples.
     """
     folder = recording.folder if isinstance(recording, Recording) else recording
-    with Teller(progress) as tell:
+    with Notifier(progress) as notify:
         result: dict[str, Any] = json.loads(
-            _hybridsim.align(os.fspath(folder), os.fspath(out), lag_s, frames, apply, tell)
+            _hybridsim.align(os.fspath(folder), os.fspath(out), lag_s, frames, apply, notify)
         )
     return result

@@ -4,7 +4,7 @@ import json
 import os
 
 from .. import _hybridsim
-from .._progress import Teller, Watcher
+from .._progress import Notifier, Watcher
 from .._recording import Recording
 from .._types import Check, Finding, Radar, StrPath
 
@@ -23,7 +23,7 @@ def check(recording: Recording | StrPath, *, as_stated: bool = False, progress: 
         hybridsim.Error: a recording that cannot be read.
     """
     folder = recording.folder if isinstance(recording, Recording) else recording
-    with Teller(progress) as tell:
-        about = json.loads(_hybridsim.check(os.fspath(folder), as_stated, tell))
+    with Notifier(progress) as notify:
+        about = json.loads(_hybridsim.check(os.fspath(folder), as_stated, notify))
     findings = [Finding(**finding) for finding in about["findings"]]
     return Check(findings, about["notes"], Radar._from(about["radar"]))

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 from .. import _hybridsim
-from .._progress import Teller, Watcher
+from .._progress import Notifier, Watcher
 from .._recording import Recording
 from .._types import Report, Settings, StrPath, path, sets
 
@@ -37,9 +37,9 @@ def diagnose(
         hybridsim.Error: a recording or checkpoint that cannot be read, or cannot be meant.
     """
     folder = recording.folder if isinstance(recording, Recording) else recording
-    with Teller(progress) as tell:
+    with Notifier(progress) as notify:
         sentence, report = _hybridsim.diagnose(
-            os.fspath(folder), os.fspath(out), path(checkpoint), path(config), sets(set), device, as_stated, tell
+            os.fspath(folder), os.fspath(out), path(checkpoint), path(config), sets(set), device, as_stated, notify
         )
     kept = Path(out) / "simulator" / "with" / "best"
     return Report(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .. import _hybridsim
-from .._progress import Teller, Watcher
+from .._progress import Notifier, Watcher
 from .._recording import Recording
 from .._types import Settings, StrPath, sets
 
@@ -39,6 +39,6 @@ def export(
     """
     several = [sources] if isinstance(sources, (Recording, str, os.PathLike)) else list(sources)
     folders = [os.fspath(source.folder if isinstance(source, Recording) else source) for source in several]
-    with Teller(progress) as tell:
-        _hybridsim.export(folders, to, os.fspath(out), board, split_by, sets(set), tell)
+    with Notifier(progress) as notify:
+        _hybridsim.export(folders, to, os.fspath(out), board, split_by, sets(set), notify)
     return Path(out)

@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable, Mapping
 
 from .. import _hybridsim
-from .._progress import Teller, Watcher
+from .._progress import Notifier, Watcher
 from .._recording import Recording
 from .._types import Settings, StrPath, paths, sets
 
@@ -52,7 +52,7 @@ def import_(
     Raises:
         hybridsim.Error: a source of no known kind, a description that is missing or does not fit the samples.
     """
-    with Teller(progress) as tell:
+    with Notifier(progress) as notify:
         notes = _hybridsim.import_(
             paths(sources),
             os.fspath(out),
@@ -67,7 +67,7 @@ def import_(
             dict(labels or {}),
             sets(set),
             as_stated,
-            tell,
+            notify,
         )
     recording = Recording(out)
     recording.notes = notes

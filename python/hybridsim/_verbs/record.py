@@ -3,7 +3,7 @@ from __future__ import annotations
 import os
 
 from .. import _hybridsim
-from .._progress import Teller, Watcher
+from .._progress import Notifier, Watcher
 from .._recording import Recording
 from .._types import Settings, StrPath, sets
 
@@ -23,6 +23,6 @@ def record(
     Raises:
         hybridsim.Error: settings that describe no world, or one that cannot be.
     """
-    with Teller(progress) as tell:
-        _hybridsim.record(os.fspath(config), os.fspath(out), sets(set), as_stated, tell)
+    with Notifier(progress) as notify:
+        _hybridsim.record(os.fspath(config), os.fspath(out), sets(set), as_stated, notify)
     return Recording(out)

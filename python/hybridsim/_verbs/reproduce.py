@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import _hybridsim
-from .._progress import Teller, Watcher
+from .._progress import Notifier, Watcher
 from .._types import WHOLE, Settings, Shard, Stage, StrPath, sets
 
 
@@ -28,8 +28,8 @@ def stages(
     Raises:
         hybridsim.Error: settings that cannot work, sites that cannot be.
     """
-    with Teller(progress) as tell:
-        listed = _hybridsim.stages(os.fspath(config), os.fspath(out), sets(set), device, as_stated, tell)
+    with Notifier(progress) as notify:
+        listed = _hybridsim.stages(os.fspath(config), os.fspath(out), sets(set), device, as_stated, notify)
     return [Stage(*one) for one in listed]
 
 
@@ -68,11 +68,11 @@ def reproduce(
         hybridsim.BusyError: another process does the same stage, or all of it.
     """
     asked = os.fspath(config), os.fspath(out)
-    with Teller(progress) as tell:
+    with Notifier(progress) as notify:
         if stage is not None:
-            _hybridsim.reproduce_stage(*asked, stage, shard, sets(set), device, tell)
+            _hybridsim.reproduce_stage(*asked, stage, shard, sets(set), device, notify)
             return None
         some, more = list(stages), "".join(f", {one!r}" for one in sets(set))
         command = f"hybridsim.reproduce({asked[0]!r}, set=[{more[2:]}], device={device!r})"
-        _hybridsim.reproduce(*asked, some, sets(set), command, device, as_stated, tell)
+        _hybridsim.reproduce(*asked, some, sets(set), command, device, as_stated, notify)
     return None if some else dict(json.loads((Path(out) / "results.json").read_text()))

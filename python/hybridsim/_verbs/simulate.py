@@ -8,7 +8,7 @@ from typing import Any, overload
 from numpy.typing import NDArray
 
 from .. import _hybridsim
-from .._progress import Teller, Watcher
+from .._progress import Notifier, Watcher
 from .._recording import Recording, array
 from .._types import Radar, StrPath, path
 
@@ -107,7 +107,7 @@ def simulate(
         recording = recording.folder
     every = without_effects is True
     without = [] if isinstance(without_effects, bool) else list(without_effects)
-    with Teller(progress) as tell:
+    with Notifier(progress) as notify:
         about, numbers = _hybridsim.simulate(
             os.fspath(checkpoint),
             path(motion),
@@ -125,7 +125,7 @@ def simulate(
             path(out),
             device,
             as_stated,
-            tell,
+            notify,
         )
     if out is not None:
         return Recording(Path(out) / "recording")

@@ -3,7 +3,7 @@ from __future__ import annotations
 import os
 
 from .. import _hybridsim
-from .._progress import Teller, Watcher
+from .._progress import Notifier, Watcher
 from .._recording import Recording
 from .._types import WHOLE, Settings, Shard, StrPath, sets
 
@@ -34,6 +34,6 @@ def site(
         hybridsim.Error: settings that cannot be a site; a recording that was made with others.
         hybridsim.BusyError: another process records the same part, or all of it.
     """
-    with Teller(progress) as tell:
-        folders = _hybridsim.site(os.fspath(config), os.fspath(out), shard, sets(set), as_stated, tell)
+    with Notifier(progress) as notify:
+        folders = _hybridsim.site(os.fspath(config), os.fspath(out), shard, sets(set), as_stated, notify)
     return [Recording(folder) for folder in sorted(folders)]

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from .. import _hybridsim
-from .._progress import Teller, Watcher
+from .._progress import Notifier, Watcher
 from .._types import Run, Settings, StrPath, path, sets
 
 
@@ -34,7 +34,7 @@ def train(
     Raises:
         hybridsim.Error: settings or recordings that cannot be used; a loss that became NaN.
     """
-    with Teller(progress) as tell:
-        about = _hybridsim.train(path(config), path(resume), path(out), sets(set), go_on, device, as_stated, tell)
+    with Notifier(progress) as notify:
+        about = _hybridsim.train(path(config), path(resume), path(out), sets(set), go_on, device, as_stated, notify)
     found = json.loads(about)
     return Run(**{**found, "folder": Path(found["folder"])})

@@ -19,10 +19,10 @@ pub fn align(
     lag_s: f64,
     frames: usize,
     apply: bool,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<String> {
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let what = Align { recording: &recording, search: Search { lag_s, frames }, apply, out: &out };
-        Ok(serde_json::to_string(&work(&what, tell)?).expect("plain data"))
+        Ok(serde_json::to_string(&work(&what, notify)?).expect("plain data"))
     })
 }

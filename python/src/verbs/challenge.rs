@@ -40,14 +40,14 @@ pub fn challenge_seal(
     shard: (usize, usize),
     committing: bool,
     sets: Vec<String>,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<Option<String>> {
     let shard = part(py, shard)?;
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let what = Seal { config: &config, sets: &sets, seed: seed.as_deref(), out: &out };
         match committing {
-            true => commit(&what, shard, tell).map(|commitment| Some(json!(commitment).to_string())),
-            false => cases(&what, shard, tell).map(|()| None),
+            true => commit(&what, shard, notify).map(|commitment| Some(json!(commitment).to_string())),
+            false => cases(&what, shard, notify).map(|()| None),
         }
     })
 }
@@ -74,9 +74,9 @@ impl How {
 
 /// Has cases diagnosed; the answers, as JSON.
 #[pyfunction]
-pub fn challenge_run(py: Python<'_>, challenge: PathBuf, out: PathBuf, how: How, tell: &Bound<'_, PyAny>) -> PyResult<String> {
+pub fn challenge_run(py: Python<'_>, challenge: PathBuf, out: PathBuf, how: How, notify: &Bound<'_, PyAny>) -> PyResult<String> {
     let config = how.config(py)?;
-    run(py, tell, move |tell| Ok(json!(answer(&challenge, &out, &config, tell)?).to_string()))
+    run(py, notify, move |notify| Ok(json!(answer(&challenge, &out, &config, notify)?).to_string()))
 }
 
 /// Has the scenes diagnosed without their effects; how many.
@@ -87,10 +87,10 @@ pub fn challenge_twins(
     answers: PathBuf,
     out: PathBuf,
     how: How,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<usize> {
     let config = how.config(py)?;
-    run(py, tell, move |tell| twins(&challenge, &answers, &out, &config, tell))
+    run(py, notify, move |notify| twins(&challenge, &answers, &out, &config, notify))
 }
 
 /// Opens the truths and scores; the score, as JSON.
@@ -102,10 +102,10 @@ pub fn challenge_score(
     twins: Option<PathBuf>,
     measure: bool,
     out: PathBuf,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<String> {
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let what = Scoring { challenge: &challenge, answers: &answers, twins: twins.as_deref(), measure, out: &out };
-        Ok(json!(score(&what, tell)?).to_string())
+        Ok(json!(score(&what, notify)?).to_string())
     })
 }

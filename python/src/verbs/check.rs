@@ -8,7 +8,7 @@ use hybridsim::{
     plausibility::{Kind, findings},
     radar::checks,
     room::Room,
-    verbs::{Told, plausible},
+    verbs::{Notice, plausible},
 };
 use pyo3::prelude::*;
 use serde_json::{Value, json};
@@ -17,12 +17,12 @@ use crate::{verbs::read::radar_json, work::run};
 
 /// All findings about a recording, as JSON: the radar's rules, its plausibility, the integrity of its samples.
 #[pyfunction]
-pub fn check(py: Python<'_>, path: PathBuf, as_stated: bool, tell: &Bound<'_, PyAny>) -> PyResult<String> {
-    run(py, tell, move |tell| {
+pub fn check(py: Python<'_>, path: PathBuf, as_stated: bool, notify: &Bound<'_, PyAny>) -> PyResult<String> {
+    run(py, notify, move |notify| {
         let recording = Recording::open(&path)?;
-        tell(Told::Begun { what: "checking", steps: 3 });
+        notify(Notice::Begun { what: "checking", steps: 3 });
         let mut all = radar_rules(&recording);
-        tell(Told::Done(1));
+        notify(Notice::Done(1));
         let (mut facts, sources) = plausible::of_recording(&recording)?;
         facts.as_stated = as_stated;
         all.extend(findings(&facts).into_iter().map(|finding| {
@@ -36,7 +36,7 @@ pub fn check(py: Python<'_>, path: PathBuf, as_stated: bool, tell: &Bound<'_, Py
                 "file": sources.of(finding.part),
             })
         }));
-        tell(Told::Done(2));
+        notify(Notice::Done(2));
         // Every frame is read once, so that a truncated or lying file shows here.
         all.extend(integrity::inspect(&recording, recording.radar.frames)?.into_iter().map(|finding| {
             json!({
@@ -49,7 +49,7 @@ pub fn check(py: Python<'_>, path: PathBuf, as_stated: bool, tell: &Bound<'_, Py
                 "p_value": finding.p_value,
             })
         }));
-        tell(Told::Done(3));
+        notify(Notice::Done(3));
         let about = json!({ "radar": radar_json(&recording.radar), "notes": recording.notes, "findings": all });
         Ok(about.to_string())
     })

@@ -24,15 +24,15 @@ pub fn diagnose(
     sets: Vec<String>,
     device: String,
     as_stated: bool,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<(String, String)> {
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let config = match config {
             Some(path) => Config::read(&path, &sets)?,
             None => Config::defaults(&sets)?,
         };
         let what = Diagnose { recording: &recording, checkpoint: checkpoint.as_deref(), config: &config, out: &out };
-        let diagnosis = work(&what, &device_of(&device)?, as_stated, tell)?;
+        let diagnosis = work(&what, &device_of(&device)?, as_stated, notify)?;
         let report = serde_json::to_string(&diagnosis.report).expect("plain data");
         Ok((lead(&diagnosis.report).to_string(), report))
     })

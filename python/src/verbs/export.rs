@@ -21,12 +21,12 @@ pub fn export(
     board: Option<String>,
     split_by: Option<String>,
     sets: Vec<String>,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<(usize, usize)> {
     let target: Target = target.parse().map_err(|error| raised(py, &error))?;
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let what = Export { sources: &sources, target, board: board.as_deref(), split_by, sets: &sets, out: &out };
-        let [recordings, frames] = work(&what, tell)?;
+        let [recordings, frames] = work(&what, notify)?;
         Ok((recordings, frames))
     })
 }

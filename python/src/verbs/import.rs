@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 use hybridsim::{
     import::capture::{Layout, Preset, Stated},
     verbs::{
-        self, Tell, Told,
+        self, Notice, Notify,
         import::{Import, Seen},
     },
 };
@@ -31,20 +31,20 @@ pub fn import(
     labels: BTreeMap<String, String>,
     sets: Vec<String>,
     as_stated: bool,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<String>> {
     let layout = layout.map(|text| Layout::parse(&text)).transpose().map_err(|error| raised(py, &error))?;
     let preset = preset.map(|name| Preset::named(&name)).transpose().map_err(|error| raised(py, &error))?;
     let stated = Stated { configs, board, layout, variable, preset, profile, subframe, tx, sets };
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let what = Import { sources: &sources, stated: &stated, labels, as_stated, out: &out };
-        let mut show = |seen: Seen<'_>, tell: &mut Tell<'_>| {
+        let mut show = |seen: Seen<'_>, notify: &mut Notify<'_>| {
             if let Seen::Looked(_, findings) = seen {
                 for finding in findings.iter().filter(|finding| !finding.ok) {
-                    tell(Told::Note(&format!("{}: {}", finding.name(), finding.found)));
+                    notify(Notice::Note(&format!("{}: {}", finding.name(), finding.found)));
                 }
             }
         };
-        verbs::import::import(what, &mut show, tell).map(|recording| recording.notes)
+        verbs::import::import(what, &mut show, notify).map(|recording| recording.notes)
     })
 }

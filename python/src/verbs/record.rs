@@ -15,11 +15,11 @@ pub fn record(
     out: PathBuf,
     sets: Vec<String>,
     as_stated: bool,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<()> {
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let settings = Config::read(&config, &sets)?;
         let record = settings.record(&config)?;
-        verbs::record::make(record, &config, &out, as_stated, tell).map(drop)
+        verbs::record::make(record, &config, &out, as_stated, notify).map(drop)
     })
 }

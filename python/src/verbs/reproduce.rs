@@ -20,11 +20,11 @@ pub fn stages(
     sets: Vec<String>,
     device: String,
     as_stated: bool,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<(String, Vec<usize>, usize, Option<f64>)>> {
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let planned = Planned::new(&Reproduce { config: &config, sets: &sets, lpips: None, out: &out })?;
-        planned.look(&devices(&device)?, as_stated, tell)?;
+        planned.look(&devices(&device)?, as_stated, notify)?;
         Ok(planned.stages()?.into_iter().map(|stage| (stage.folder, stage.parents, stage.pieces, stage.seconds)).collect())
     })
 }
@@ -41,14 +41,14 @@ pub fn reproduce(
     command: String,
     device: String,
     as_stated: bool,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<()> {
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let planned = Planned::new(&Reproduce { config: &config, sets: &sets, lpips: None, out: &out })?;
         let devices = devices(&device)?;
         match beginnings.is_empty() {
-            true => planned.run(&command, &devices, as_stated, tell),
-            false => planned.run_some(&beginnings, &devices, as_stated, tell).map(drop),
+            true => planned.run(&command, &devices, as_stated, notify),
+            false => planned.run_some(&beginnings, &devices, as_stated, notify).map(drop),
         }
     })
 }
@@ -64,11 +64,11 @@ pub fn reproduce_stage(
     shard: (usize, usize),
     sets: Vec<String>,
     device: String,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<()> {
     let shard = part(py, shard)?;
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let planned = Planned::again(&Reproduce { config: &config, sets: &sets, lpips: None, out: &out })?;
-        planned.run_one(&folder, shard, &devices(&device)?, tell)
+        planned.run_one(&folder, shard, &devices(&device)?, notify)
     })
 }

@@ -39,7 +39,7 @@ pub fn simulate(
     out: Option<PathBuf>,
     device_name: String,
     as_stated: bool,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<(String, Option<Numbers>)> {
     let asked = || -> hybridsim::Result<Simulate> {
         let what = what(motion, motion_config, up, action, recording)?;
@@ -48,20 +48,20 @@ pub fn simulate(
         Ok(Simulate { checkpoint, what, body, distance_m, frames, clean, only, without })
     };
     let asked = asked().map_err(|error| raised(py, &error))?;
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let device = device(&device_name)?;
         // What cannot be written is said before anything is worked out.
         let folder = out.map(AtomicFolder::create).transpose()?;
-        let ready = Ready::new(&asked, &device, as_stated, tell)?;
+        let ready = Ready::new(&asked, &device, as_stated, notify)?;
         let radar = radar_json(&ready.radar).to_string();
         match folder {
             Some(folder) => {
-                ready.write(folder.path(), tell)?;
+                ready.write(folder.path(), notify)?;
                 folder.finish()?;
                 Ok((radar, None))
             }
             None => {
-                let samples: Vec<Complex32> = ready.samples(tell)?;
+                let samples: Vec<Complex32> = ready.samples(notify)?;
                 let numbers = match ready.radar.sampling {
                     Sampling::Complex => samples.into(),
                     Sampling::Real => samples.iter().map(|sample| sample.re).collect::<Vec<f32>>().into(),

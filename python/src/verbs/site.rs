@@ -23,12 +23,12 @@ pub fn site(
     shard: (usize, usize),
     sets: Vec<String>,
     as_stated: bool,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<PathBuf>> {
     let shard = part(py, shard)?;
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let what = Site { config: &config, sets: &sets, out: &out, shard };
-        record(&what, as_stated, tell)?;
+        record(&what, as_stated, notify)?;
         recordings(&what)
     })
 }
@@ -41,9 +41,9 @@ pub fn site_look(
     out: PathBuf,
     sets: Vec<String>,
     as_stated: bool,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<PathBuf>> {
-    run(py, tell, move |tell| look(&Site { config: &config, sets: &sets, out: &out, shard: Shard::ALL }, as_stated, tell))
+    run(py, notify, move |notify| look(&Site { config: &config, sets: &sets, out: &out, shard: Shard::ALL }, as_stated, notify))
 }
 
 /// A part of some work.

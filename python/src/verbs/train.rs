@@ -24,9 +24,9 @@ pub fn train(
     go_on: bool,
     device: String,
     as_stated: bool,
-    tell: &Bound<'_, PyAny>,
+    notify: &Bound<'_, PyAny>,
 ) -> PyResult<String> {
-    run(py, tell, move |tell| {
+    run(py, notify, move |notify| {
         let start = match (&config, &resume) {
             (Some(path), None) => Start::Config { path, sets: &sets, out: out.as_deref(), go_on },
             (None, Some(run)) if out.is_none() && !go_on => Start::Resume { run, sets: &sets },
@@ -37,7 +37,7 @@ pub fn train(
                 });
             }
         };
-        let trained = work(&start, &devices(&device)?, as_stated, tell)?;
+        let trained = work(&start, &devices(&device)?, as_stated, notify)?;
         let scores: Map<String, Value> =
             trained.evaluations.iter().map(|(folder, evaluation)| (folder.display().to_string(), json!(evaluation))).collect();
         let about = json!({

@@ -1,6 +1,6 @@
-//! What a verb tells, on its way from the thread that works to the one that asked.
+//! What a verb says, on its way from the thread that works to the one that asked.
 
-use hybridsim::{experiments::Event as Stage, training::Event, verbs::Told};
+use hybridsim::{experiments::Event as Stage, training::Event, verbs::Notice};
 use pyo3::{prelude::*, types::PyTuple};
 use serde_json::json;
 
@@ -18,21 +18,21 @@ pub enum Message {
 }
 
 impl Message {
-    /// What Python is told of it; `None`: nothing.
-    pub fn of(told: &Told<'_>) -> Vec<Self> {
-        match told {
-            Told::Note(text) => vec![Self::Note((*text).into())],
-            Told::Begun { what, steps } => vec![Self::Begun { what: (*what).into(), steps: *steps }],
-            Told::Done(steps) => vec![Self::Done(*steps)],
-            Told::Line(text) | Told::At(text) => vec![Self::Line((*text).into())],
-            Told::Run { .. } | Told::Still => vec![],
-            Told::Stage(event) => of_stage(event),
-            Told::Training(event) => of_training(event),
+    /// What Python gets of it; `None`: nothing.
+    pub fn of(notice: &Notice<'_>) -> Vec<Self> {
+        match notice {
+            Notice::Note(text) => vec![Self::Note((*text).into())],
+            Notice::Begun { what, steps } => vec![Self::Begun { what: (*what).into(), steps: *steps }],
+            Notice::Done(steps) => vec![Self::Done(*steps)],
+            Notice::Line(text) | Notice::At(text) => vec![Self::Line((*text).into())],
+            Notice::Run { .. } | Notice::Still => vec![],
+            Notice::Stage(event) => of_stage(event),
+            Notice::Training(event) => of_training(event),
         }
     }
 
-    /// `tell(kind, text, number)`
-    pub fn call(self, py: Python<'_>, tell: &Bound<'_, PyAny>) -> PyResult<()> {
+    /// `notify(kind, text, number)`
+    pub fn call(self, py: Python<'_>, notify: &Bound<'_, PyAny>) -> PyResult<()> {
         let (kind, text, number) = match self {
             Self::Note(text) => ("note", text, 0),
             Self::Begun { what, steps } => ("begun", what, steps),
@@ -40,7 +40,7 @@ impl Message {
             Self::Line(text) => ("line", text, 0),
             Self::Epoch(text) => ("epoch", text, 0),
         };
-        tell.call1(PyTuple::new(
+        notify.call1(PyTuple::new(
             py,
             [kind.into_pyobject(py)?.into_any(), text.into_pyobject(py)?.into_any(), number.into_pyobject(py)?.into_any()],
         )?)?;
