@@ -117,8 +117,16 @@ fn a_capture_as_it_is_stated_is_kept_and_the_table_says_so() {
     assert_eq!(rows(&check), rows(&table));
     for finding in integrity::inspect(&kept, FRAMES).unwrap() {
         assert!(finding.ok, "{finding:?}");
-        let decided =
-            ["byte_order", "number_format", "loop_length", "chirp_start", "frame_boundary", "integrity_word_order", "iq_order"];
+        let decided = [
+            "byte_order",
+            "number_format",
+            "chirp_length",
+            "loop_length",
+            "chirp_start",
+            "frame_boundary",
+            "integrity_word_order",
+            "iq_order",
+        ];
         assert!(finding.decided || !decided.contains(&finding.check), "{finding:?}");
     }
 }
@@ -126,7 +134,7 @@ fn a_capture_as_it_is_stated_is_kept_and_the_table_says_so() {
 type Change = fn(&mut Vec<i16>);
 
 /// Each wrong convention: a change of the words or of the description, the check that refuses, and words of its message.
-const WRONG: [(&str, &str, Change, &str, &str); 7] = [
+const WRONG: [(&str, &str, Change, &str, &str); 9] = [
     (
         "bytes",
         CFG,
@@ -152,6 +160,22 @@ const WRONG: [(&str, &str, Change, &str, &str); 7] = [
         |_| {},
         "loop length",
         "shifted by 512 samples",
+    ),
+    (
+        "samples and loops exchanged",
+        "channelCfg 15 1 0\nadcCfg 2 1\nadcbufCfg -1 0 0 1 1\nprofileCfg 0 77 48 6 60 0 0 60.012 1 16 4400 0 0 30\n\
+         chirpCfg 0 0 0 0 0 0 0 1\nframeCfg 0 0 128 16 100 1 0\n",
+        |_| {},
+        "chirp length",
+        "begins anew every 128 samples, not every 16",
+    ),
+    (
+        "twice the samples",
+        "channelCfg 15 1 0\nadcCfg 2 1\nadcbufCfg -1 0 0 1 1\nprofileCfg 0 77 28 6 80 0 0 40.012 1 256 4400 0 0 30\n\
+         chirpCfg 0 0 0 0 0 0 0 1\nframeCfg 0 0 8 16 100 1 0\n",
+        |_| {},
+        "chirp length",
+        "begins anew every 128 samples, not every 256",
     ),
 ];
 

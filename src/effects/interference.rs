@@ -38,7 +38,7 @@ pub static INFO: EffectInfo = EffectInfo {
 };
 
 /// With the lists `frame`, `chirp`, `first` and `length`, the bursts that they name, `re` and `im` for each of them. With
-/// `bursts` alone, as many in every frame, at random but the same whenever the frame is simulated. All receivers hear
+/// `bursts` alone, as many in every frame, at random but the same whenever the frame is simulated. All receivers get
 /// a burst alike: the other radar is taken to be on boresight.
 ///
 /// `[tx, rx, loop, sample]` → the same.

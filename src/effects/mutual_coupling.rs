@@ -44,6 +44,6 @@ pub fn apply(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Comp
     let silent = signal.clone().narrow(1, 0, 1).scale_by(0.0);
     let from_before = Complex::cat(vec![silent.clone(), signal.clone().narrow(1, 0, rx - 1)], 1);
     let from_after = Complex::cat(vec![signal.clone().narrow(1, 1, rx - 1), silent], 1);
-    let heard = from_before.add(from_after).mul(Complex::new(one(strength.re), one(strength.im)));
-    signal.add(heard)
+    let coupled = from_before.add(from_after).mul(Complex::new(one(strength.re), one(strength.im)));
+    signal.add(coupled)
 }

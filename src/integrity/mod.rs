@@ -7,6 +7,7 @@
 //! One frame is in memory at a time.
 
 mod boundary;
+mod chirp_length;
 mod copies;
 mod devices;
 mod iq_order;
@@ -26,7 +27,7 @@ use crate::error::Result;
 use crate::radar::Radar;
 use stream::{Schedule, Stream};
 
-/// Chance that one check fails on a recording that is whole and as stated, at most. Twelve checks at this level add up to about the
+/// Chance that one check fails on a recording that is whole and as stated, at most. Thirteen checks at this level add up to about the
 /// family-wise 1 % that a diagnosis allows itself (`diagnosis.alarm`).
 pub const ALARM: f64 = 1e-3;
 
@@ -91,7 +92,7 @@ trait Inspector {
 /// Samples that cannot be read.
 pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>> {
     let schedule = Schedule::of(&recording.radar, recording.room.as_ref());
-    let mut inspectors: [Box<dyn Inspector>; 12] = [
+    let mut inspectors: [Box<dyn Inspector>; 13] = [
         Box::new(runs::Runs::new(schedule)),
         Box::new(copies::Copies::new(schedule)),
         Box::new(numbers::Numbers::new(numbers::BYTE_ORDER)),
@@ -99,6 +100,7 @@ pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>
         Box::new(shift::Shift::new(schedule)),
         // Chirps in the order of firing repeat as a longer loop does: the special case first.
         Box::new(transmitters::Transmitters::new(schedule)),
+        Box::new(chirp_length::ChirpLength::new(schedule)),
         Box::new(period::Period::new(schedule)),
         Box::new(start::Start::new(schedule)),
         Box::new(boundary::Boundary::new(schedule)),

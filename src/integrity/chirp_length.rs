@@ -1,0 +1,242 @@
+//! Chirps of another length than is stated, by a whole factor: samples and chirps exchanged, a description of another capture.
+//!
+//! Within a chirp each sample is predicted by those before it (linear prediction, J. Makhoul, Proc. IEEE 63, 1975), across the start of
+//! a chirp it is not. The squared error of the prediction is exponentially distributed around its mean: that of starts, or that within
+//! chirps, for which the largest one within the stated chirp stands. A start inside a stated chirp, and a stated start that is none,
+//! are likelihood ratios of these two laws, with one look for each start that differs: a static scene repeats all others.
+//! Where chirps are longer than stated, so are loops: the stream then correlates more with itself after several loops than after one, a
+//! likelihood ratio as in `loop_length`, which adds to the other one. Bonferroni over the factors.
+
+use nalgebra::{Complex, DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::stream::{Schedule, Stream};
+use super::{ALARM, Finding, Inspector, Kind};
+
+const CHECK: &str = "chirp_length";
+const EXPECTED: &str = "a chirp of samples_per_chirp";
+/// Frames that are looked at: the length is the same in all.
+const FRAMES: usize = 4;
+/// Samples that predict the next one, at most, and as a share of a chirp.
+const ORDER: usize = 8;
+const SHARE: usize = 16;
+/// Largest factor that is tried, either way.
+const MOST: usize = 8;
+
+pub(super) struct ChirpLength {
+    schedule: Schedule,
+    /// Squared error of the prediction by chirp of the frame and by sample, summed over frames: `[chirp, sample]`.
+    errors: Vec<f64>,
+    /// Squared correlation of the stream with itself after so many loops, summed over frames.
+    squares: [f64; MOST + 1],
+    frames: usize,
+}
+
+impl ChirpLength {
+    pub fn new(schedule: Schedule) -> Self {
+        Self { schedule, errors: vec![], squares: [0.0; MOST + 1], frames: 0 }
+    }
+
+    fn order(&self) -> usize {
+        (self.schedule.samples / SHARE).clamp(2, ORDER)
+    }
+
+    fn chirps(&self) -> usize {
+        self.schedule.loops * self.schedule.channels()
+    }
+
+    /// Mean error by sample, for each chirp modulo `length`; the first chirp of a frame has none before it and is left out.
+    fn folded(&self, length: usize) -> Vec<(usize, Vec<f64>)> {
+        let chirps: Vec<&[f64]> = self.errors.chunks_exact(self.schedule.samples).collect();
+        let of_chirp = |first: usize| {
+            let alike: Vec<&&[f64]> = chirps.iter().skip(first).step_by(length).collect();
+            let mean = |sample: usize| alike.iter().map(|errors| errors[sample]).sum::<f64>() / alike.len() as f64;
+            (first % length, (0..self.schedule.samples).map(mean).collect())
+        };
+        (1..chirps.len().min(length + 1)).map(of_chirp).collect()
+    }
+
+    /// Log-likelihood of starts inside stated chirps against none, where a stated chirp is `factor` chirps.
+    fn of_shorter(&self, factor: usize) -> f64 {
+        let (samples, order) = (self.schedule.samples, self.order());
+        let places: Vec<usize> = (1..factor).map(|part| part * samples / factor).collect();
+        let is_near = |sample: usize| places.iter().any(|place| (*place..place + order).contains(&sample));
+        let channels = self.folded(self.schedule.channels());
+        let start = channels.iter().map(|(_, errors)| errors[0]).sum::<f64>() / channels.len() as f64;
+        let of_channel = |(_, errors): &(usize, Vec<f64>)| {
+            let inner = largest((order..samples).filter(|sample| !is_near(*sample)).map(|sample| errors[sample]));
+            places.iter().map(|place| log_ratio(errors[*place], start, inner)).sum::<f64>()
+        };
+        channels.iter().map(of_channel).sum()
+    }
+
+    /// Log-likelihood of stated starts that are none, where `factor` stated chirps are a chirp.
+    fn of_longer(&self, factor: usize) -> f64 {
+        let order = self.order();
+        let channels = self.schedule.channels();
+        let folded = self.folded(least_common_multiple(factor, channels));
+        let (starts, others): (Vec<_>, Vec<_>) = folded.iter().partition(|(chirp, _)| chirp % factor == 0);
+        let start = starts.iter().map(|(_, errors)| errors[0]).sum::<f64>() / starts.len() as f64;
+        let of_chirp = |errors: &Vec<f64>| -log_ratio(errors[0], start, largest(errors[order..].iter().copied()));
+        let sum: f64 = others.iter().map(|(_, errors)| of_chirp(errors)).sum();
+        // As many looks as channels, at most; those of other loops repeat them.
+        let looks = sum * others.len().min(channels) as f64 / others.len() as f64;
+        // The errors of a prediction that is no better across starts than within say nothing.
+        if looks > 0.0 { looks + self.of_longer_loops(factor) } else { looks }
+    }
+
+    fn of_longer_loops(&self, factor: usize) -> f64 {
+        // A stream that repeats itself exactly leaves nothing: less than a millionth is not told apart.
+        let left = |loops: usize| (1.0 - self.squares[loops] / self.frames as f64).max(1e-6);
+        (self.schedule.loops / factor * self.frames) as f64 * (left(1) / left(factor)).ln()
+    }
+}
+
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(f64::MIN_POSITIVE, f64::max)
+}
+
+/// Of an exponentially distributed value with one mean against another, where the first is larger; else nothing.
+fn log_ratio(value: f64, start: f64, inner: f64) -> f64 {
+    let start = start.max(inner);
+    value / inner - value / start - (start / inner).ln()
+}
+
+fn least_common_multiple(a: usize, b: usize) -> usize {
+    let (mut divisor, mut rest) = (a, b);
+    while rest > 0 {
+        (divisor, rest) = (rest, divisor % rest);
+    }
+    a / divisor * b
+}
+
+/// Weights of the samples before one, nearest first, that predict it best within chirps (least squares).
+fn prediction(values: &[Complex64], samples: usize, order: usize) -> Option<Vec<Complex64>> {
+    let (mut normal, mut right) = (DMatrix::zeros(order, order), DVector::zeros(order));
+    for window in values.chunks_exact(samples).flat_map(|chirp| chirp.windows(order + 1)) {
+        for row in 0..order {
+            let own = window[order - 1 - row].conj();
+            right[row] += own * window[order];
+            for column in 0..order {
+                normal[(row, column)] += own * window[order - 1 - column];
+            }
+        }
+    }
+    // Rounding alone: a tone is predicted by fewer samples.
+    let floor = 1e-9 * normal.trace().re / order as f64;
+    normal += DMatrix::identity(order, order) * Complex::from(floor);
+    normal.lu().solve(&right).map(|weights| weights.iter().copied().collect())
+}
+
+/// Squared correlation of values with themselves so many later.
+fn correlation(values: &[Complex64], shift: usize) -> f64 {
+    let pairs = || values.iter().zip(&values[shift..]);
+    let (own, later) = pairs().fold((0.0, 0.0), |(own, later), (a, b)| (own + a.norm_sqr(), later + b.norm_sqr()));
+    let both: Complex64 = pairs().map(|(a, b)| a.conj() * b).sum();
+    if own * later > 0.0 { (both.norm_sqr() / (own * later)).min(1.0) } else { 0.0 }
+}
+
+impl Inspector for ChirpLength {
+    fn see(&mut self, stream: &Stream) {
+        let (samples, order) = (self.schedule.samples, self.order());
+        if self.frames == FRAMES || samples <= 2 * order || self.chirps() < 2 {
+            return;
+        }
+        let mean = stream.values.iter().map(|v| Complex64::new(v.re.into(), v.im.into())).sum::<Complex64>();
+        let mean = mean / stream.values.len() as f64;
+        let values: Vec<Complex64> = stream.values.iter().map(|v| Complex64::new(v.re.into(), v.im.into()) - mean).collect();
+        let Some(weights) = prediction(&values, samples, order) else { return };
+        self.frames += 1;
+        self.errors.resize(values.len(), 0.0);
+        for (place, window) in values.windows(order + 1).enumerate() {
+            let predicted: Complex64 =
+                weights.iter().zip(window[..order].iter().rev()).map(|(weight, value)| weight * value).sum();
+            self.errors[place + order] += (window[order] - predicted).norm_sqr();
+        }
+        for loops in 1..=MOST.min(self.schedule.loops - 1) {
+            self.squares[loops] += correlation(&values, loops * self.schedule.period());
+        }
+    }
+
+    fn conclude(self: Box<Self>) -> Option<Finding> {
+        if self.frames == 0 {
+            return None;
+        }
+        let Schedule { samples, loops, .. } = self.schedule;
+        let is_shorter = |factor: &usize| samples % factor == 0 && samples / factor > 2 * self.order();
+        let shorter = (2..=MOST).filter(is_shorter).map(|factor| (samples / factor, self.of_shorter(factor)));
+        let longer = (2..=MOST).filter(|factor| 2 * factor <= loops).map(|factor| (samples * factor, self.of_longer(factor)));
+        let tried: Vec<(usize, f64)> = shorter.chain(longer).collect();
+        let Some(&(length, best)) = tried.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else {
+            return Some(Finding::undecided(CHECK, EXPECTED, "a chirp is too short"));
+        };
+        let log_p = (tried.len() as f64).ln() - best;
+        if log_p < ALARM.ln() {
+            let found = format!(
+                "the signal begins anew every {length} samples, not every {samples}: the number of samples is another capture's, or samples \
+                 and chirps were exchanged"
+            );
+            return Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p));
+        }
+        // No other length is as likely as the stated one, by as much.
+        if best + (tried.len() as f64).ln() < ALARM.ln() {
+            return Some(Finding::as_stated(CHECK, EXPECTED, format!("the signal begins anew every {samples} samples")));
+        }
+        Some(Finding::undecided(CHECK, EXPECTED, "the signal does not begin anew clearly enough, or in too few channels"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::IfFrame;
+    use crate::support::numbers;
+
+    const RX: usize = 4;
+
+    /// A static room of tones under noise, other in every receiver, in chirps of `sent` samples, cut into those of `stated`.
+    fn seen(sent: usize, stated: usize, noise: f64) -> Finding {
+        const ALL: usize = 32 * 128;
+        let phases = numbers(3, RX * 20, 0.0, std::f64::consts::TAU);
+        let drawn = numbers(4, 2 * RX * ALL, -noise, noise);
+        let value = |place: usize| {
+            let (rx, sample) = (place / sent % RX, place % sent);
+            let tone = |bin: usize| {
+                let turns = (bin as f64 + 0.3) * sample as f64 / 128.0;
+                Complex64::from_polar(1.0 / (1 + bin) as f64, std::f64::consts::TAU * turns + phases[rx * 20 + bin])
+            };
+            (0..20).map(tone).sum::<Complex64>() + Complex64::new(drawn[2 * place], drawn[2 * place + 1])
+        };
+        let loops = ALL / stated;
+        let schedule = Schedule { tx: 1, rx: RX, loops, samples: stated, is_real: false, is_falling: false, farthest_bin: None };
+        let (mut re, mut im) = (vec![], vec![]);
+        for (rx, index) in (0..RX).flat_map(|rx| (0..loops).map(move |index| (rx, index))) {
+            for place in (0..stated).map(|sample| (index * RX + rx) * stated + sample) {
+                let value = value(place);
+                re.push(value.re as f32);
+                im.push(value.im as f32);
+            }
+        }
+        let mut inspector = Box::new(ChirpLength::new(schedule));
+        inspector.see(&Stream::of(schedule, 0, &IfFrame::new([1, RX, loops, stated], re, Some(im))));
+        inspector.conclude().unwrap()
+    }
+
+    #[test]
+    fn chirps_of_another_length_are_found_and_the_stated_ones_are_not_accused() {
+        let stated = seen(128, 128, 0.05);
+        assert!(stated.ok && stated.decided, "{stated:?}");
+        for other in [32, 64, 256, 512] {
+            let found = seen(128, other, 0.05);
+            assert!(found.is_refusal() && found.found.contains("every 128 samples, not"), "{other}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn noise_decides_nothing() {
+        for stated in [64, 128, 256] {
+            let found = seen(128, stated, 100.0);
+            assert!(found.ok && !found.decided, "{found:?}");
+        }
+    }
+}
