@@ -134,7 +134,7 @@ fn a_capture_as_it_is_stated_is_kept_and_the_table_says_so() {
 type Change = fn(&mut Vec<i16>);
 
 /// Each wrong convention: a change of the words or of the description, the check that refuses, and words of its message.
-const WRONG: [(&str, &str, Change, &str, &str); 9] = [
+const WRONG: [(&str, &str, Change, &str, &str); 10] = [
     (
         "bytes",
         CFG,
@@ -151,6 +151,13 @@ const WRONG: [(&str, &str, Change, &str, &str); 9] = [
         "I and Q are exchanged",
     ),
     ("one lane", CFG, |words| words.as_chunks_mut::<4>().0.iter_mut().for_each(|four| four.swap(1, 2)), "word order", "I I Q Q"),
+    (
+        "lanes",
+        CFG,
+        |words| words.as_chunks_mut::<4>().0.iter_mut().for_each(|[a, b, c, d]| ([*a, *b], [*c, *d]) = ([*b, *a], [*d, *c])),
+        "lane order",
+        "two lanes were exchanged",
+    ),
     ("header", CFG, |words| drop(words.drain(..2 * 40)), "chirp start", "a header lies before the first sample"),
     ("loops", CFG, |words| drop(words.drain(..5 * CHIRP)), "frame boundary", "between the loops 10 and 11"),
     (

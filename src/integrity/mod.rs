@@ -1,6 +1,7 @@
 //! Whether a recording's samples are whole and are what they are stated to be, before any physics is asked: packets of zeros, values
-//! that stand still, copies, a stream that moved, numbers of another byte order or sign, chirps and frames that begin elsewhere,
-//! transmitters that were not separated, words in the wrong order, devices of a cascade and I and Q exchanged.
+//! that stand still, copies, a stream that moved, numbers of another byte order or sign, chirps of another length, chirps and frames
+//! that begin elsewhere,
+//! transmitters that were not separated, words in the wrong order, lanes, devices of a cascade and I and Q exchanged.
 //!
 //! The checks know the converter's stream and the radar's schedule, and where it is stated the size of the room, nothing of a body.
 //! Each has a law that says how often a recording that is as stated would look so; a check fails where that is rarer than [`ALARM`].
@@ -11,6 +12,7 @@ mod chirp_length;
 mod copies;
 mod devices;
 mod iq_order;
+mod lanes;
 mod numbers;
 mod period;
 mod runs;
@@ -27,7 +29,7 @@ use crate::error::Result;
 use crate::radar::Radar;
 use stream::{Schedule, Stream};
 
-/// Chance that one check fails on a recording that is whole and as stated, at most. Thirteen checks at this level add up to about the
+/// Chance that one check fails on a recording that is whole and as stated, at most. Fourteen checks at this level add up to about the
 /// family-wise 1 % that a diagnosis allows itself (`diagnosis.alarm`).
 pub const ALARM: f64 = 1e-3;
 
@@ -92,7 +94,7 @@ trait Inspector {
 /// Samples that cannot be read.
 pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>> {
     let schedule = Schedule::of(&recording.radar, recording.room.as_ref());
-    let mut inspectors: [Box<dyn Inspector>; 13] = [
+    let mut inspectors: [Box<dyn Inspector>; 14] = [
         Box::new(runs::Runs::new(schedule)),
         Box::new(copies::Copies::new(schedule)),
         Box::new(numbers::Numbers::new(numbers::BYTE_ORDER)),
@@ -105,6 +107,7 @@ pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>
         Box::new(start::Start::new(schedule)),
         Box::new(boundary::Boundary::new(schedule)),
         Box::new(words::Words::new(schedule)),
+        Box::new(lanes::Lanes::new(schedule)),
         Box::new(devices::Devices::new(schedule, &recording.radar)),
         Box::new(iq_order::IqOrder::new(schedule)),
     ];

@@ -24,7 +24,7 @@ use super::{ALARM, Finding, Inspector, Kind};
 const CHECK: &str = "integrity_word_order";
 const EXPECTED: &str = "I and Q of one sample side by side";
 /// Bins beside 0 and a quarter of the sampling rate where the window makes the tones of a group one.
-const GUARD: usize = 3;
+pub(super) const GUARD: usize = 3;
 /// Amplitude of the image of an unbalanced receiver, at most: 20 dB below, as of 1.5 dB and 6 degrees together. `iq_imbalance` of the
 /// diagnosis finds much weaker ones.
 const IMAGE: f64 = 0.1;
@@ -92,6 +92,11 @@ fn judged(groups: usize, as_they_are: [usize; 3], as_exchanged: [usize; 3], shar
     Finding::undecided(CHECK, EXPECTED, shares)
 }
 
+/// Whether a group holds less in its far half once its words are exchanged, and less than half of its energy.
+pub(super) fn looks_exchanged(away: f64, away_after: f64, whole: f64) -> bool {
+    away_after < away.min(0.5 * whole)
+}
+
 impl Inspector for Words {
     fn see(&mut self, stream: &Stream) {
         stream.loops().for_each(|samples| self.sum.add(samples));
@@ -125,8 +130,8 @@ impl Inspector for Words {
             let by_phases = |product: f64| [product > IMAGE, product < -IMAGE];
             let [up, down] = by_phases(product[bin]);
             let [other_up, other_down] = by_phases(exchanged_product[bin]);
-            let of = [away_after < away_before.min(0.5 * whole), up, down];
-            let of_others = [away_before < away_after.min(0.5 * whole), other_up, other_down];
+            let of = [looks_exchanged(away_before, away_after, whole), up, down];
+            let of_others = [looks_exchanged(away_after, away_before, whole), other_up, other_down];
             (0..3).for_each(|test| as_they_are[test] += usize::from(of[test]));
             (0..3).for_each(|test| as_exchanged[test] += usize::from(of_others[test]));
             (far, all, far_after) = (far + away_before, all + whole, far_after + away_after);
