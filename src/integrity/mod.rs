@@ -1,7 +1,7 @@
 //! Whether a recording's samples are whole and are what they are stated to be, before any physics is asked: packets of zeros, values
 //! that stand still, copies, a stream that moved, numbers of another byte order or sign, chirps of another length, chirps and frames
-//! that begin elsewhere,
-//! transmitters that were not separated, words in the wrong order, lanes, devices of a cascade and I and Q exchanged.
+//! that begin elsewhere, transmitters that were not separated, words in the wrong order, lanes, devices of a cascade and I and Q
+//! exchanged.
 //!
 //! The checks know the converter's stream and the radar's schedule, and where it is stated the size of the room, nothing of a body.
 //! Each has a law that says how often a recording that is as stated would look so; a check fails where that is rarer than [`ALARM`].
