@@ -20,6 +20,8 @@ const FRAMES: usize = 4;
 /// Samples that predict the next one, at most, and as a share of a chirp.
 const ORDER: usize = 8;
 const SHARE: usize = 16;
+/// What repeats itself after several loops, a fan, correlates as longer loops do: the starts alone must say so at this level.
+const ALONE: f64 = 0.05;
 /// Largest factor that is tried, either way.
 const MOST: usize = 8;
 
@@ -81,8 +83,7 @@ impl ChirpLength {
         let sum: f64 = others.iter().map(|(_, errors)| of_chirp(errors)).sum();
         // As many looks as channels, at most; those of other loops repeat them.
         let looks = sum * others.len().min(channels) as f64 / others.len() as f64;
-        // The errors of a prediction that is no better across starts than within say nothing.
-        if looks > 0.0 { looks + self.of_longer_loops(factor) } else { looks }
+        if looks > -ALONE.ln() { looks + self.of_longer_loops(factor) } else { looks.min(0.0) }
     }
 
     fn of_longer_loops(&self, factor: usize) -> f64 {
