@@ -35,7 +35,7 @@ fn recording() -> &'static Path {
     let (_, folder) = ONCE.get_or_init(|| {
         let parent = tempfile::tempdir().unwrap();
         let config: RecorderConfig = hybridsim::data::settings::read_text(&format!(
-            "seed = 41\nmesh_error_m = 2e-3\n[radar]\nstart_frequency_hz = 77.0e9\nslope_hz_per_s = 60.012e12\nsample_rate_hz = 4.4e6\n\
+            "seed = 41\nmesh_error_m = 2e-3\n[surface]\nedge_m = 0.012\n[radar]\nstart_frequency_hz = 77.0e9\nslope_hz_per_s = 60.012e12\nsample_rate_hz = 4.4e6\n\
              samples_per_chirp = {SAMPLES}\nloops_per_frame = {LOOPS}\nadc_start_s = 6.0e-6\nchirp_period_s = 108.0e-6\n\
              frame_period_s = 0.1\nframes = {FRAMES}\ntx_m = [[-0.0153, 0.0, 0.0]]\n\
              rx_m = [[0.0, 0.0, 0.0], [0.0019, 0.0, 0.0], [0.0038, 0.0, 0.0], [0.0057, 0.0, 0.0]]"

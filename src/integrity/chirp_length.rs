@@ -7,7 +7,7 @@
 //! Where chirps are longer than stated, so are loops: the stream then correlates more with itself after several loops than after one, a
 //! likelihood ratio as in `loop_length`, which adds to the other one. Bonferroni over the factors.
 
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::stream::{Schedule, Stream};
@@ -113,7 +113,7 @@ fn least_common_multiple(a: usize, b: usize) -> usize {
 
 /// Weights of the samples before one, nearest first, that predict it best within chirps (least squares).
 fn prediction(values: &[Complex64], samples: usize, order: usize) -> Option<Vec<Complex64>> {
-    let (mut normal, mut right) = (DMatrix::zeros(order, order), DVector::zeros(order));
+    let (mut normal, mut right) = (DMatrix::<Complex64>::zeros(order, order), DVector::<Complex64>::zeros(order));
     for window in values.chunks_exact(samples).flat_map(|chirp| chirp.windows(order + 1)) {
         for row in 0..order {
             let own = window[order - 1 - row].conj();
@@ -125,7 +125,7 @@ fn prediction(values: &[Complex64], samples: usize, order: usize) -> Option<Vec<
     }
     // Rounding alone: a tone is predicted by fewer samples.
     let floor = 1e-9 * normal.trace().re / order as f64;
-    normal += DMatrix::identity(order, order) * Complex::from(floor);
+    normal += DMatrix::identity(order, order) * Complex64::from(floor);
     normal.lu().solve(&right).map(|weights| weights.iter().copied().collect())
 }
 
