@@ -1,7 +1,7 @@
 //! What is said of damaged samples and of conventions that are wrong, and that nothing is said where all is well: each check has a
 //! recording on which it fails and one on which it does not.
 
-mod support;
+use crate::support;
 #[path = "support/damage.rs"]
 mod damage;
 

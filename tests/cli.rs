@@ -1,6 +1,6 @@
 //! The program as its user meets it: help, results, errors with their hints, exit status.
 
-mod support;
+use crate::support;
 
 use std::{
     path::{Path, PathBuf},

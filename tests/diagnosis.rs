@@ -1,6 +1,6 @@
 //! What `diagnose` says about recordings whose truth is known, and about those of which nothing can be said.
 
-mod support;
+use crate::support;
 
 use std::path::{Path, PathBuf};
 

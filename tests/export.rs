@@ -1,6 +1,6 @@
 //! Recordings that go out and come back: every sample equal, and every change to a file noticed.
 
-mod support;
+use crate::support;
 
 use std::{
     fs,

@@ -1,7 +1,7 @@
 //! Captures at the door: what is refused and with which words, what is kept, what is lost and known to be. Each wrong convention has a
 //! capture that is refused for it alone, and the capture as it was taken is not.
 
-mod support;
+use crate::support;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! The pages that verbs leave, in a browser: nothing is missing, nothing is said on its console, and nothing is wider than the window
 //! of a desktop or of a phone.
 
-mod support;
+use crate::support;
 
 use std::{
     path::{Path, PathBuf},

@@ -1,6 +1,6 @@
 //! A scene that cannot be is refused by every verb with the same sentence, and scenes that can be are not.
 
-mod support;
+use crate::support;
 
 use std::{
     path::{Path, PathBuf},

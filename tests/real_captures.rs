@@ -3,7 +3,7 @@
 //! The wanted numbers were found with NumPy, independently of this crate. The recordings lie in `$HYBRIDSIM_SHARED`, or in
 //! `../shared` beside the crate; without them these tests count as skipped.
 
-mod support;
+use crate::support;
 
 use hybridsim::data::Recording;
 use hybridsim::evaluation::measured_frame;

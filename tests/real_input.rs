@@ -1,6 +1,6 @@
 //! Recordings, bodies and motions made by others: `../shared`, or where HYBRIDSIM_SHARED points to.
 
-mod support;
+use crate::support;
 
 use std::{path::Path, process::Command};
 

@@ -1,6 +1,6 @@
 //! What tests share: gradients against central differences, agreement between backends, seeded numbers.
 //!
-//! Unit tests reach it as `crate::support`, integration tests with `mod support;`. It knows nothing of the crate.
+//! Unit tests reach it as `crate::support`, integration tests as `crate::support` of their program. It knows nothing of the crate.
 //!
 //! A function under test takes flat tensors (`Tensor<1>`, one per input, f64) that it reshapes itself, and returns
 //! anything flattened. Not one sum of its outputs is differentiated but a weighted one, so that errors of opposite
