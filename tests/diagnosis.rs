@@ -255,7 +255,7 @@ fn a_recorder_that_slips_and_repeats_itself_has_damaged_the_recording() {
 #[test]
 fn conventions_come_before_physics() {
     let folder = tempfile::tempdir().unwrap();
-    let plain = recorded(folder.path(), "seed = 3");
+    let plain = recorded(folder.path(), "seed = 3\n[surface]\nedge_m = 0.012");
     assert!(report(&plain).audit.iter().all(|check| check.ok), "{:?}", report(&plain).audit);
     // I and Q the other way round: conjugated samples.
     let swapped = folder.path().join("swapped");
@@ -268,7 +268,7 @@ fn conventions_come_before_physics() {
 #[test]
 fn a_recording_that_says_nothing_gets_that_answer() {
     let folder = tempfile::tempdir().unwrap();
-    let plain = recorded(folder.path(), "seed = 4");
+    let plain = recorded(folder.path(), "seed = 4\n[surface]\nedge_m = 0.012");
     let noise = folder.path().join("noise");
     let drawn = support::numbers(5, 2 * 8 * 2 * 32 * 64, -1.0, 1.0);
     rewritten(&plain, &noise, &|frame, re, im| {
@@ -321,7 +321,7 @@ fn a_recording_that_says_nothing_gets_that_answer() {
 #[test]
 fn a_body_in_the_wrong_place_is_reported_not_fitted_away() {
     let folder = tempfile::tempdir().unwrap();
-    let plain = recorded(folder.path(), "seed = 5");
+    let plain = recorded(folder.path(), "seed = 5\n[surface]\nedge_m = 0.012");
     let header = folder.path().join("recording/recording.toml");
     let text = std::fs::read_to_string(&header).unwrap();
     let reason = |text: String| {
@@ -395,7 +395,7 @@ fn what_was_not_found_has_a_limit_that_a_louder_one_exceeds() {
     let asked = |name: &str, effects: &str| {
         let folder = folder.path().join(name);
         std::fs::create_dir(&folder).unwrap();
-        let recording = Recording::open(recorded(&folder, &format!("seed = 6\n{effects}"))).unwrap();
+        let recording = Recording::open(recorded(&folder, &format!("seed = 6\n{effects}\n[surface]\nedge_m = 0.012"))).unwrap();
         diagnose(&recording, &limits, &mut |_| {}).unwrap()
     };
     let limit = |report: &Report, id: &str| {

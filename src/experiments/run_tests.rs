@@ -12,6 +12,7 @@ fn site(folder: &Path) {
         for action in [Action::Lunge, Action::WalkBackForthArmswing] {
             let mut config = RecorderConfig { seed: 3, frames: Some(4), ..RecorderConfig::default() };
             (config.person.subject, config.person.action) = (subject.into(), action);
+            config.surface.edge_m = 1.2e-2;
             let name = format!("{subject}_{}_1", action.name());
             record_to(&config, Path::new("."), &folder.join(name), &mut |_, _| {}).unwrap();
         }
