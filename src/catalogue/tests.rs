@@ -44,3 +44,24 @@ fn an_unknown_effect_is_refused_with_the_nearest() {
     assert!(described("if_highpass").unwrap().contains("corner_hz"));
     assert_eq!(table().lines().filter(|line| line.starts_with("  ")).count(), effects::library().len());
 }
+
+/// docs/report.md lists what a report can name by its stage: all of the library, and nothing else.
+#[test]
+fn the_page_of_the_report_lists_every_effect_at_its_stage() {
+    let page = std::fs::read_to_string(docs().join("report.md")).unwrap();
+    let (_, table) = page.split_once("| stage | id: parameters |").unwrap();
+    let mut listed: Vec<(String, String)> = vec![];
+    for row in table.lines().skip(2).take_while(|line| line.starts_with('|')) {
+        let mut cells = row.trim_matches('|').splitn(2, '|').map(str::trim);
+        let (stage, effects) = (cells.next().unwrap(), cells.next().unwrap());
+        // `id`: `parameters` · `id`, `id`: `parameters`
+        for ids in effects.split(" · ").map(|entry| entry.split(": ").next().unwrap()) {
+            listed.extend(ids.split(", ").map(|id| (stage.to_string(), id.trim_matches('`').to_string())));
+        }
+    }
+    let mut known: Vec<(String, String)> =
+        effects::library().iter().map(|info| (info.stage.name().to_string(), info.id.to_string())).collect();
+    listed.sort();
+    known.sort();
+    assert_eq!(listed, known);
+}
