@@ -94,12 +94,14 @@ fn all(residual: &Residual) -> Vec<Box3> {
     let sum = |at: [usize; 3]| f64::from(residual.ratio[at]) * count(at);
     let (sums, counts) = (Table::new(residual.shape(), sum), Table::new(residual.shape(), count));
     let scales = residual.shape().map(intervals);
-    let mut boxes = vec![];
+    let (mut boxes, mut sum_before, mut count_before) = (vec![], vec![], vec![]);
     for frames in &scales[0] {
         for dopplers in &scales[1] {
+            sums.along((*frames).into(), (*dopplers).into(), &mut sum_before);
+            counts.along((*frames).into(), (*dopplers).into(), &mut count_before);
             for ranges in scales[2].iter().filter(|range| range.0 < residual.bins) {
                 let (low, high) = ([frames.0, dopplers.0, ranges.0], [frames.1, dopplers.1, ranges.1.min(residual.bins)]);
-                let (sum, count) = (sums.inside(low, high), counts.inside(low, high));
+                let [sum, count] = [&sum_before, &count_before].map(|before| before[high[2]] - before[low[2]]);
                 if count <= 0.05 {
                     continue;
                 }

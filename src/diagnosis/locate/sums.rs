@@ -1,6 +1,6 @@
 //! Sums over boxes of frame, Doppler and range; the innermost loop of the scans, which therefore indexes by hand.
 
-/// Sums over everything before, `[frame + 1, doppler + 1, range + 1]`: a box costs eight look-ups.
+/// Sums over everything before, `[frame + 1, doppler + 1, range + 1]`: from which boxes are differences.
 pub struct Table {
     dims: [usize; 3],
     sums: Vec<f64>,
@@ -25,14 +25,15 @@ impl Table {
         Self { dims, sums }
     }
 
-    /// Of a half-open box.
-    pub fn inside(&self, low: [usize; 3], high: [usize; 3]) -> f64 {
+    /// Of half-open intervals of frame and Doppler, up to each range: a box is the difference of two of these, `[range + 1]`.
+    pub fn along(&self, frames: [usize; 2], dopplers: [usize; 2], line: &mut Vec<f64>) {
         let (wide, deep) = (self.dims[2] + 1, (self.dims[1] + 1) * (self.dims[2] + 1));
-        let before = |frame: usize| {
-            let at = |doppler: usize, range: usize| self.sums[frame * deep + doppler * wide + range];
-            at(high[1], high[2]) - at(low[1], high[2]) - at(high[1], low[2]) + at(low[1], low[2])
-        };
-        before(high[0]) - before(low[0])
+        let row = |frame: usize, doppler: usize| &self.sums[frame * deep + doppler * wide..][..wide];
+        let [[first, last], [low, high]] = [frames, dopplers];
+        let later = row(last, high).iter().zip(row(last, low)).map(|(high, low)| high - low);
+        let earlier = row(first, high).iter().zip(row(first, low)).map(|(high, low)| high - low);
+        line.clear();
+        line.extend(later.zip(earlier).map(|(later, earlier)| later - earlier));
     }
 }
 
@@ -57,14 +58,16 @@ mod tests {
     fn a_box_is_the_sum_of_its_cells() {
         let of = |[frame, doppler, range]: [usize; 3]| (frame * 100 + doppler * 10 + range) as f64;
         let table = Table::new([3, 4, 5], of);
+        let mut line = vec![];
         for frames in intervals(3) {
             for dopplers in intervals(4) {
+                table.along(frames.into(), dopplers.into(), &mut line);
                 for ranges in intervals(5) {
                     let cells = (frames.0..frames.1).flat_map(|frame| {
                         (dopplers.0..dopplers.1)
                             .flat_map(move |doppler| (ranges.0..ranges.1).map(move |range| [frame, doppler, range]))
                     });
-                    let sum = table.inside([frames.0, dopplers.0, ranges.0], [frames.1, dopplers.1, ranges.1]);
+                    let sum = line[ranges.1] - line[ranges.0];
                     assert!((sum - cells.map(of).sum::<f64>()).abs() < 1e-9);
                 }
             }

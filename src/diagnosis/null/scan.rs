@@ -205,15 +205,18 @@ impl Cells {
         let [_, loops, bins] = self.expected.shape();
         let [in_frames, in_doppler, in_range] = &part.boxes;
         let mut largest = 0.0f64;
+        let (mut sums_before, mut counts_before) = (vec![], vec![]);
         for beam in 0..=self.channels {
             let together = if beam == self.channels { self.channels as f64 } else { 1.0 };
             let power = |[frame, doppler, range]: [usize; 3]| f64::from(beams[[beam, part.frames[frame], doppler, range]]);
             let sums = Table::new([part.frames.len(), loops, bins], power);
             for frames in in_frames {
                 for doppler in in_doppler {
+                    let of = ([frames.low, frames.high], [doppler.low, doppler.high]);
+                    part.counts.along(of.0, of.1, &mut counts_before);
+                    sums.along(of.0, of.1, &mut sums_before);
                     for range in in_range {
-                        let (low, high) = ([frames.low, doppler.low, range.low], [frames.high, doppler.high, range.high]);
-                        let (count, sum) = (part.counts.inside(low, high), sums.inside(low, high));
+                        let [count, sum] = [&counts_before, &sums_before].map(|before| before[range.high] - before[range.low]);
                         if sum <= count || count < 0.5 {
                             continue;
                         }
