@@ -73,11 +73,11 @@ impl<T, const N: usize> Grid<T, N> {
     #[inline]
     fn place<const M: usize>(&self, at: [usize; M]) -> usize {
         let mut place = 0;
-        for axis in 0..M {
-            if at[axis] >= self.shape[axis] {
-                outside(self.axes[axis], at[axis], self.shape[axis]);
+        for ((index, &length), axis) in at.into_iter().zip(&self.shape).zip(&self.axes) {
+            if index >= length {
+                outside(axis, index, length);
             }
-            place = place * self.shape[axis] + at[axis];
+            place = place * length + index;
         }
         place
     }
