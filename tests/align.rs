@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use hybridsim::alignment::{Alignment, Search, Verdict, align};
+use hybridsim::data::settings::read_text;
 use hybridsim::data::{Recording, recording::RecordingSettings, write_motion, write_placement};
 use hybridsim::person::Placement;
 use hybridsim::person::actions::{self, Action, StyleConfig};
@@ -52,8 +53,7 @@ fn recorded(folder: &Path, text: &str, receivers: usize, stated: &Placement) -> 
 }
 
 fn recorded_by(folder: &Path, text: &str, change: impl Fn(&mut Radar), stated: &Placement) -> PathBuf {
-    let mut config: RecorderConfig =
-        hybridsim::data::settings::read_text(&format!("seed = 5\nmesh_error_m = 2e-3\n{text}\n{RADAR}")).unwrap();
+    let mut config: RecorderConfig = read_text(&format!("seed = 5\nmesh_error_m = 2e-3\n{text}\n{RADAR}")).unwrap();
     config.person.placement = Some(truth());
     let mut radar = config.radar.radar().unwrap();
     change(&mut radar);
@@ -193,8 +193,7 @@ fn the_program_writes_what_it_found_and_agrees_with_it_afterwards() {
     assert!(text.starts_with("The placement as stated is wrong: the motion starts 0.3"), "{text}");
     assert!(out.join("align.png").is_file());
     let snippet: toml::Table = std::fs::read_to_string(out.join("motion.toml")).unwrap().parse().unwrap();
-    let settings: RecordingSettings =
-        hybridsim::data::settings::read_text(&std::fs::read_to_string(recording.join("recording.toml")).unwrap()).unwrap();
+    let settings: RecordingSettings = read_text(&std::fs::read_to_string(recording.join("recording.toml")).unwrap()).unwrap();
     let written: Placement = snippet["motion"].clone().try_into().unwrap();
     assert_eq!(settings.motion, Some(written.clone()));
     assert!((written.start_s - truth().start_s).abs() < 0.03);

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use damage::{Damage, damaged};
 use hybridsim::data::Recording;
+use hybridsim::data::settings::read_text;
 use hybridsim::diagnosis::audit::{Check, audit};
 use hybridsim::diagnosis::cube::Loaded;
 use hybridsim::diagnosis::report::{Report, Verdict};
@@ -36,8 +37,7 @@ fn recorded_as(timing: &str, folder: &Path, text: &str, antennas: &str) -> PathB
         "[radar]\nstart_frequency_hz = 77.0e9\nslope_hz_per_s = 60.012e12\nsample_rate_hz = 4.4e6\nsamples_per_chirp = 128\n\
          adc_start_s = 6.0e-6\n{timing}\nframes = 12\n{antennas}"
     );
-    let config: RecorderConfig =
-        hybridsim::data::settings::read_text(&format!("{text}\n[surface]\nedge_m = 0.012\n{radar}")).unwrap();
+    let config: RecorderConfig = read_text(&format!("{text}\n[surface]\nedge_m = 0.012\n{radar}")).unwrap();
     let out = folder.join("recording");
     recorder::record_to(&config, Path::new("."), &out, &mut |_, _| {}).unwrap();
     out

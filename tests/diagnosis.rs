@@ -4,6 +4,7 @@ use crate::support;
 
 use std::path::{Path, PathBuf};
 
+use hybridsim::data::settings::read_text;
 use hybridsim::data::{IfLayout, Recording, RecordingContents, write_recording};
 use hybridsim::diagnosis::report::{Report, Verdict};
 use hybridsim::diagnosis::statistics::{poisson_tail, uniform_chance};
@@ -22,7 +23,7 @@ fn report(folder: &Path) -> Report {
 
 /// A small recording; `text` is TOML over the recorder's defaults.
 fn recorded(folder: &Path, text: &str) -> PathBuf {
-    let config: RecorderConfig = hybridsim::data::settings::read_text(&format!("{text}\n{RADAR}")).unwrap();
+    let config: RecorderConfig = read_text(&format!("{text}\n{RADAR}")).unwrap();
     let out = folder.join("recording");
     recorder::record_to(&config, Path::new("."), &out, &mut |_, _| {}).unwrap();
     out

@@ -7,6 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use hybridsim::data::settings::read_text;
 use hybridsim::data::{Recording, Valid};
 use hybridsim::diagnosis::cube::Loaded;
 use hybridsim::import::capture::{self, Layout, Preset, Stated};
@@ -20,21 +21,35 @@ const SAMPLES: usize = 128;
 /// Words of one chirp of all receivers.
 const CHIRP: usize = 2 * RX * SAMPLES;
 
-const CFG: &str = "channelCfg 15 1 0
-adcCfg 2 1
-adcbufCfg -1 0 0 1 1
-profileCfg 0 77 48 6 60 0 0 60.012 1 128 4400 0 0 30
-chirpCfg 0 0 0 0 0 0 0 1
-frameCfg 0 0 16 16 100 1 0
-sensorStart
-";
+/// Settings of a board of four receivers that fires one transmitter: times before and of a ramp in µs, slope in MHz/µs.
+macro_rules! cfg {
+    ($idle:literal, $ramp:literal, $slope:literal, $samples:literal, $loops:literal) => {
+        concat!(
+            "channelCfg 15 1 0\nadcCfg 2 1\nadcbufCfg -1 0 0 1 1\n",
+            "profileCfg 0 77 ",
+            $idle,
+            " 6 ",
+            $ramp,
+            " 0 0 ",
+            $slope,
+            " 1 ",
+            $samples,
+            " 4400 0 0 30\n",
+            "chirpCfg 0 0 0 0 0 0 0 1\nframeCfg 0 0 ",
+            $loops,
+            " 16 100 1 0\nsensorStart\n"
+        )
+    };
+}
+
+const CFG: &str = cfg!("48", "60", "60.012", "128", "16");
 
 /// Somebody who walks in a room.
 fn recording() -> &'static Path {
     static ONCE: std::sync::OnceLock<(tempfile::TempDir, PathBuf)> = std::sync::OnceLock::new();
     let (_, folder) = ONCE.get_or_init(|| {
         let parent = tempfile::tempdir().unwrap();
-        let config: RecorderConfig = hybridsim::data::settings::read_text(&format!(
+        let config: RecorderConfig = read_text(&format!(
             "seed = 41\nmesh_error_m = 2e-3\n[surface]\nedge_m = 0.012\n[radar]\nstart_frequency_hz = 77.0e9\nslope_hz_per_s = 60.012e12\nsample_rate_hz = 4.4e6\n\
              samples_per_chirp = {SAMPLES}\nloops_per_frame = {LOOPS}\nadc_start_s = 6.0e-6\nchirp_period_s = 108.0e-6\n\
              frame_period_s = 0.1\nframes = {FRAMES}\ntx_m = [[-0.0153, 0.0, 0.0]]\n\
@@ -160,26 +175,17 @@ const WRONG: [(&str, &str, Change, &str, &str); 10] = [
     ),
     ("header", CFG, |words| drop(words.drain(..2 * 40)), "chirp start", "a header lies before the first sample"),
     ("loops", CFG, |words| drop(words.drain(..5 * CHIRP)), "frame boundary", "between the loops 10 and 11"),
-    (
-        "another capture's",
-        "channelCfg 15 1 0\nadcCfg 2 1\nadcbufCfg -1 0 0 1 1\nprofileCfg 0 77 48 6 60 0 0 60.012 1 90 4400 0 0 30\n\
-         chirpCfg 0 0 0 0 0 0 0 1\nframeCfg 0 0 16 16 100 1 0\n",
-        |_| {},
-        "loop length",
-        "shifted by 512 samples",
-    ),
+    ("another capture's", cfg!("48", "60", "60.012", "90", "16"), |_| {}, "loop length", "shifted by 512 samples"),
     (
         "samples and loops exchanged",
-        "channelCfg 15 1 0\nadcCfg 2 1\nadcbufCfg -1 0 0 1 1\nprofileCfg 0 77 48 6 60 0 0 60.012 1 16 4400 0 0 30\n\
-         chirpCfg 0 0 0 0 0 0 0 1\nframeCfg 0 0 128 16 100 1 0\n",
+        cfg!("48", "60", "60.012", "16", "128"),
         |_| {},
         "chirp length",
         "begins anew every 128 samples, not every 16",
     ),
     (
         "twice the samples",
-        "channelCfg 15 1 0\nadcCfg 2 1\nadcbufCfg -1 0 0 1 1\nprofileCfg 0 77 28 6 80 0 0 40.012 1 256 4400 0 0 30\n\
-         chirpCfg 0 0 0 0 0 0 0 1\nframeCfg 0 0 8 16 100 1 0\n",
+        cfg!("28", "80", "40.012", "256", "8"),
         |_| {},
         "chirp length",
         "begins anew every 128 samples, not every 256",

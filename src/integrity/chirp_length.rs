@@ -10,6 +10,7 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
+use super::period::repeating;
 use super::stream::{Schedule, Stream};
 use super::{ALARM, Finding, Inspector, Kind};
 
@@ -58,12 +59,11 @@ impl ChirpLength {
         (1..chirps.len().min(length + 1)).map(of_chirp).collect()
     }
 
-    /// Log-likelihood of starts inside stated chirps against none, where a stated chirp is `factor` chirps.
-    fn of_shorter(&self, factor: usize) -> f64 {
+    /// Log-likelihood of starts inside stated chirps against none, where a stated chirp is `factor` chirps; of the errors by channel.
+    fn of_shorter(&self, factor: usize, channels: &[(usize, Vec<f64>)]) -> f64 {
         let (samples, order) = (self.schedule.samples, self.order());
         let places: Vec<usize> = (1..factor).map(|part| part * samples / factor).collect();
         let is_near = |sample: usize| places.iter().any(|place| (*place..place + order).contains(&sample));
-        let channels = self.folded(self.schedule.channels());
         let start = channels.iter().map(|(_, errors)| errors[0]).sum::<f64>() / channels.len() as f64;
         let of_channel = |(_, errors): &(usize, Vec<f64>)| {
             let inner = largest((order..samples).filter(|sample| !is_near(*sample)).map(|sample| errors[sample]));
@@ -76,7 +76,9 @@ impl ChirpLength {
     fn of_longer(&self, factor: usize) -> f64 {
         let order = self.order();
         let channels = self.schedule.channels();
-        let folded = self.folded(least_common_multiple(factor, channels));
+        // The least common multiple: each stated chirp of a loop at each of its places within a chirp.
+        let length = (1..factor).map(|loops| loops * channels).find(|length| length % factor == 0).unwrap_or(factor * channels);
+        let folded = self.folded(length);
         let (starts, others): (Vec<_>, Vec<_>) = folded.iter().partition(|(chirp, _)| chirp % factor == 0);
         let start = starts.iter().map(|(_, errors)| errors[0]).sum::<f64>() / starts.len() as f64;
         let of_chirp = |errors: &Vec<f64>| -log_ratio(errors[0], start, largest(errors[order..].iter().copied()));
@@ -87,9 +89,8 @@ impl ChirpLength {
     }
 
     fn of_longer_loops(&self, factor: usize) -> f64 {
-        // A stream that repeats itself exactly leaves nothing: less than a millionth is not told apart.
-        let left = |loops: usize| (1.0 - self.squares[loops] / self.frames as f64).max(1e-6);
-        (self.schedule.loops / factor * self.frames) as f64 * (left(1) / left(factor)).ln()
+        let looks = self.schedule.loops / factor * self.frames;
+        repeating(looks as f64, [1, factor].map(|loops| self.squares[loops] / self.frames as f64))
     }
 }
 
@@ -101,14 +102,6 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 fn log_ratio(value: f64, start: f64, inner: f64) -> f64 {
     let start = start.max(inner);
     value / inner - value / start - (start / inner).ln()
-}
-
-fn least_common_multiple(a: usize, b: usize) -> usize {
-    let (mut divisor, mut rest) = (a, b);
-    while rest > 0 {
-        (divisor, rest) = (rest, divisor % rest);
-    }
-    a / divisor * b
 }
 
 /// Weights of the samples before one, nearest first, that predict it best within chirps (least squares).
@@ -143,9 +136,7 @@ impl Inspector for ChirpLength {
         if self.frames == FRAMES || samples <= 2 * order || self.chirps() < 2 {
             return;
         }
-        let mean = stream.values.iter().map(|v| Complex64::new(v.re.into(), v.im.into())).sum::<Complex64>();
-        let mean = mean / stream.values.len() as f64;
-        let values: Vec<Complex64> = stream.values.iter().map(|v| Complex64::new(v.re.into(), v.im.into()) - mean).collect();
+        let values = stream.centred();
         let Some(weights) = prediction(&values, samples, order) else { return };
         self.frames += 1;
         self.errors.resize(values.len(), 0.0);
@@ -165,7 +156,8 @@ impl Inspector for ChirpLength {
         }
         let Schedule { samples, loops, .. } = self.schedule;
         let is_shorter = |factor: &usize| samples % factor == 0 && samples / factor > 2 * self.order();
-        let shorter = (2..=MOST).filter(is_shorter).map(|factor| (samples / factor, self.of_shorter(factor)));
+        let channels = self.folded(self.schedule.channels());
+        let shorter = (2..=MOST).filter(is_shorter).map(|factor| (samples / factor, self.of_shorter(factor, &channels)));
         let longer = (2..=MOST).filter(|factor| 2 * factor <= loops).map(|factor| (samples * factor, self.of_longer(factor)));
         let tried: Vec<(usize, f64)> = shorter.chain(longer).collect();
         let Some(&(length, best)) = tried.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else {

@@ -1,17 +1,14 @@
 //! Two lanes exchanged: every second sample before its neighbour.
 //!
 //! Exchanged neighbours turn a tone of ω rad a sample into two, at ω and at ω + π (of real samples: at π − ω), and the share sin²ω of
-//! its energy goes to the other one, which is in the other half of the band. So in a group of these two, exchanging what was right
-//! leaves in the far half more than was there, or more than half of the group. If it leaves less in nearly all groups, the lanes were
-//! exchanged: the sign test of `integrity_word_order` over the groups of the still chirps' mean spectrum. Where neither the samples
-//! as read nor the exchanged ones look exchanged, as where returns fill the whole band alike, nothing can be decided.
+//! its energy goes to the other one, which is in the other half of the band: the sign test of `exchange.rs` over these groups. Where
+//! neither the samples as read nor the exchanged ones look exchanged, as where returns fill the whole band alike, nothing can be decided.
 
 use num_complex::Complex64;
 
-use super::still::{Sum, spectrum};
+use super::exchange::{Halves, bins};
+use super::still::Sum;
 use super::stream::{Schedule, Stream};
-use super::tails::log_binomial_tail;
-use super::words::{GUARD, looks_exchanged};
 use super::{ALARM, Finding, Inspector, Kind};
 
 const CHECK: &str = "integrity_lane_order";
@@ -28,18 +25,14 @@ impl Lanes {
     }
 
     /// Bins of each group: in the half where near returns are, and in the other one.
-    fn groups(&self) -> Vec<[usize; 2]> {
-        let samples = self.schedule.samples;
+    fn groups(&self) -> Vec<[[usize; 1]; 2]> {
+        let Schedule { samples, is_real, is_falling, .. } = self.schedule;
         let half = samples / 2;
-        let bins = GUARD..(half / 2).saturating_sub(GUARD - 1);
-        let mut groups: Vec<[usize; 2]> = match self.schedule.is_real {
-            true => bins.map(|bin| [bin, half - bin]).collect(),
-            false => bins.flat_map(|bin| [[bin, half + bin], [half - bin, samples - bin]]).collect(),
-        };
-        if self.schedule.is_falling && !self.schedule.is_real {
-            groups.iter_mut().for_each(|group| group.reverse());
+        if is_real {
+            return bins(samples).map(|bin| [[bin], [half - bin]]).collect();
         }
-        groups
+        let rising = bins(samples).flat_map(|bin| [[[bin], [half + bin]], [[half - bin], [samples - bin]]]);
+        rising.map(|[near, away]| if is_falling { [away, near] } else { [near, away] }).collect()
     }
 }
 
@@ -59,30 +52,17 @@ impl Inspector for Lanes {
             return None;
         }
         let chirps: Vec<Vec<Complex64>> = self.sum.chirps().map(exchanged).collect();
-        let as_read = spectrum(self.sum.chirps(), samples);
-        let reordered = spectrum(chirps.iter().map(Vec::as_slice), samples);
-        let (mut as_they_are, mut as_exchanged) = (0, 0);
-        let (mut all, mut far, mut far_after) = (0.0, 0.0, 0.0);
-        let groups = self.groups();
-        for [near, away] in &groups {
-            let (whole, before, after) = (as_read[*near] + as_read[*away], as_read[*away], reordered[*away]);
-            as_they_are += usize::from(looks_exchanged(before, after, whole));
-            as_exchanged += usize::from(looks_exchanged(after, before, whole));
-            (all, far, far_after) = (all + whole, far + before, far_after + after);
+        let halves = Halves::of(&self.sum, &chirps, samples, self.groups().into_iter());
+        let shares = halves.text("neighbouring samples");
+        let log_p = halves.log_p(halves.as_they_are);
+        if log_p < ALARM.ln() {
+            let found = format!(
+                "{shares}, in {} of {} groups of frequencies less: two lanes were exchanged",
+                halves.as_they_are, halves.groups
+            );
+            return Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p));
         }
-        let share = |energy: f64| 100.0 * energy / f64::max(all, f64::MIN_POSITIVE);
-        let shares = format!(
-            "the far half of the spectrum holds {:.1} % of the still energy, and {:.1} % with neighbouring samples exchanged",
-            share(far),
-            share(far_after)
-        );
-        let log_p = |count: usize| log_binomial_tail(count, groups.len(), 0.5);
-        if log_p(as_they_are) < ALARM.ln() {
-            let found =
-                format!("{shares}, in {as_they_are} of {} groups of frequencies less: two lanes were exchanged", groups.len());
-            return Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p(as_they_are)));
-        }
-        if log_p(as_exchanged) < ALARM.ln() {
+        if halves.log_p(halves.as_exchanged) < ALARM.ln() {
             return Some(Finding::as_stated(CHECK, EXPECTED, shares));
         }
         Some(Finding::undecided(CHECK, EXPECTED, shares))
@@ -92,35 +72,14 @@ impl Inspector for Lanes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::IfFrame;
-    use crate::support::numbers;
+    use crate::integrity::exchange::scene::{SAMPLES, SCHEDULE, stream};
 
-    const RX: usize = 4;
-    const LOOPS: usize = 4;
-    const SAMPLES: usize = 128;
-
-    /// Static returns of an amplitude at each bin, of other phases in every channel; neighbours exchanged or not.
+    /// Static returns of an amplitude at each bin; neighbours exchanged or not.
     fn seen(amplitude: impl Fn(usize) -> f64, is_real: bool, are_exchanged: bool) -> Finding {
-        let schedule = Schedule { tx: 1, rx: RX, loops: LOOPS, samples: SAMPLES, is_real, is_falling: false, farthest_bin: None };
-        let noise = numbers(9, 2 * RX * LOOPS * SAMPLES, -3.0, 3.0);
-        let phases = numbers(10, RX * SAMPLES, 0.0, std::f64::consts::TAU);
-        let (mut re, mut im) = (vec![], vec![]);
-        for chirp in 0..RX * LOOPS {
-            let value = |sample: usize| {
-                let tone = |bin: usize| {
-                    let phase = std::f64::consts::TAU * (bin * sample) as f64 / SAMPLES as f64;
-                    Complex64::from_polar(amplitude(bin), phase + phases[chirp / LOOPS * SAMPLES + bin])
-                };
-                let place = chirp * SAMPLES + sample;
-                (0..SAMPLES).map(tone).sum::<Complex64>() + Complex64::new(noise[2 * place], noise[2 * place + 1])
-            };
-            let values: Vec<Complex64> = (0..SAMPLES).map(value).collect();
-            let values = if are_exchanged { exchanged(&values) } else { values };
-            re.extend(values.iter().map(|value| value.re as f32));
-            im.extend(values.iter().map(|value| value.im as f32));
-        }
+        let schedule = Schedule { is_real, ..SCHEDULE };
+        let sent = |chirp: &[Complex64]| if are_exchanged { exchanged(chirp) } else { chirp.to_vec() };
         let mut inspector = Box::new(Lanes::new(schedule));
-        inspector.see(&Stream::of(schedule, 0, &IfFrame::new([1, RX, LOOPS, SAMPLES], re, (!is_real).then_some(im))));
+        inspector.see(&stream(schedule, amplitude, |value| value, sent));
         inspector.conclude().unwrap()
     }
 

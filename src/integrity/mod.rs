@@ -11,6 +11,7 @@ mod boundary;
 mod chirp_length;
 mod copies;
 mod devices;
+mod exchange;
 mod iq_order;
 mod lanes;
 mod numbers;

@@ -38,8 +38,7 @@ impl Period {
 fn correlations(stream: &Stream) -> Vec<f64> {
     let length = stream.values.len();
     let padded = (2 * length).next_power_of_two();
-    let mean = stream.values.iter().map(|v| Complex64::new(v.re.into(), v.im.into())).sum::<Complex64>() / length as f64;
-    let mut values: Vec<Complex64> = stream.values.iter().map(|v| Complex64::new(v.re.into(), v.im.into()) - mean).collect();
+    let mut values = stream.centred();
     let mut energy = vec![0.0];
     values.iter().for_each(|value| energy.push(energy[energy.len() - 1] + value.norm_sqr()));
     values.resize(padded, Complex64::ZERO);
@@ -53,6 +52,13 @@ fn correlations(stream: &Stream) -> Vec<f64> {
         if both > 0.0 { (values[shift] / padded as f64).norm_sqr() / both } else { 0.0 }
     };
     (0..=length / 2).map(|shift| square(shift).min(1.0)).collect()
+}
+
+/// Log-likelihood of a stream that repeats itself with the second of two squared correlations against the first.
+pub(super) fn repeating(looks: f64, [stated, other]: [f64; 2]) -> f64 {
+    // A stream that repeats itself exactly leaves nothing: less than a millionth is not told apart.
+    let left = |square: f64| (1.0 - square).max(1e-6);
+    looks * (left(stated) / left(other)).ln()
 }
 
 impl Inspector for Period {
@@ -78,14 +84,12 @@ impl Inspector for Period {
         let Some(&best) = shifts.iter().max_by(|a, b| square(**a).total_cmp(&square(**b))) else {
             return Some(Finding::undecided(CHECK, EXPECTED, "a chirp is too short"));
         };
-        // A stream that repeats itself exactly leaves nothing: less than a millionth is not told apart.
-        let left = |shift: usize| (1.0 - square(shift)).max(1e-6);
         let looks = (loops * self.frames) as f64;
         let tried = (shifts.len() as f64).ln();
-        let log_p = tried - looks * (left(period) / left(best)).ln();
+        let log_p = tried - repeating(looks, [square(period), square(best)]);
         // Twice a length is as good as the length itself: the shortest peak is reported that is no worse than the best one.
         let is_peak = |shift: usize| square(shift) >= square(shift - 1).max(square((shift + 1).min(self.squares.len() - 1)));
-        let is_as_good = |shift: usize| tried - looks * (left(shift) / left(best)).ln() >= ALARM.ln();
+        let is_as_good = |shift: usize| tried - repeating(looks, [square(shift), square(best)]) >= ALARM.ln();
         let best = shifts.iter().copied().find(|&shift| is_peak(shift) && is_as_good(shift)).unwrap_or(best);
         let found = format!(
             "shifted by the {period} samples of a loop, the stream correlates to {:.2} with itself",

@@ -1,6 +1,6 @@
 //! A frame as the converter sent it.
 
-use num_complex::Complex32;
+use num_complex::{Complex32, Complex64};
 
 use crate::data::IfFrame;
 use crate::radar::{Radar, Sampling};
@@ -94,6 +94,13 @@ impl Stream {
             }
         }
         Self { frame, schedule, values }
+    }
+
+    /// All values without their mean.
+    pub fn centred(&self) -> Vec<Complex64> {
+        let values = || self.values.iter().map(|v| Complex64::new(v.re.into(), v.im.into()));
+        let mean = values().sum::<Complex64>() / self.values.len() as f64;
+        values().map(|value| value - mean).collect()
     }
 
     /// `[tx, rx, sample]` of each loop.

@@ -3,7 +3,7 @@
 //! Read in the wrong order, a tone of ω rad a sample becomes four, at ±ω and ±(π − ω), and the share cos²ω / 2 of its energy leaves its
 //! half of the spectrum. So in a group of these four, of which N lies in the far half and E in all, the far half holds at least
 //! min(N, E / 2) after exchanging words that were right, but for what tones of one group have in common; that has either sign alike. If
-//! it holds less in nearly all groups, the words were wrong: a sign test over the groups of the still chirps' mean spectrum.
+//! it holds less in nearly all groups, the words were wrong (the sign test of `exchange.rs`).
 //!
 //! Where that says neither, as static returns fill both halves, the phases decide: of tones A at ω and B at −ω the product X(ω)
 //! X(−ω) is A B as it was sent, whose phase is any, and with words exchanged it has the part j cos ω ((1 − sin ω)|A|² + (1 + sin
@@ -16,15 +16,13 @@
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
-use super::still::{Sum, spectrum, transformed};
+use super::exchange::{Halves, bins};
+use super::still::{Sum, transformed};
 use super::stream::{Schedule, Stream};
-use super::tails::log_binomial_tail;
 use super::{ALARM, Finding, Inspector, Kind};
 
 const CHECK: &str = "integrity_word_order";
 const EXPECTED: &str = "I and Q of one sample side by side";
-/// Bins beside 0 and a quarter of the sampling rate where the window makes the tones of a group one.
-pub(super) const GUARD: usize = 3;
 /// Amplitude of the image of an unbalanced receiver, at most: 20 dB below, as of 1.5 dB and 6 degrees together. `iq_imbalance` of the
 /// diagnosis finds much weaker ones.
 const IMAGE: f64 = 0.1;
@@ -65,24 +63,25 @@ fn products<'a>(chirps: impl Iterator<Item = &'a [Complex64]>, samples: usize) -
     sums.into_iter().map(|(product, power)| product / f64::max(power, f64::MIN_POSITIVE)).collect()
 }
 
-/// What the tests say: the groups in which the words as they are, and the exchanged ones, look exchanged, by power and by phases of either
-/// sign.
-fn judged(groups: usize, as_they_are: [usize; 3], as_exchanged: [usize; 3], shares: String) -> Finding {
-    let log_p = |count: usize, share: f64| log_binomial_tail(count, groups, 0.5) - share.ln();
+/// What the tests say: by power, and by the groups in which the words as they are, and the exchanged ones, have a phase that images of
+/// exchanged words have, of either sign.
+fn judged(halves: &Halves, as_they_are: [usize; 2], as_exchanged: [usize; 2]) -> Finding {
+    let shares = halves.text("every second pair of words");
+    let log_p = |count: usize, share: f64| halves.log_p(count) - share.ln();
     let wrong = |count: usize, share: f64, what: &str| {
         let found = format!(
-            "{shares}, in {count} of {groups} groups of frequencies {what}: I I Q Q was read as I Q I Q, or the other way round"
+            "{shares}, in {count} of {} groups of frequencies {what}: I I Q Q was read as I Q I Q, or the other way round",
+            halves.groups
         );
         Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p(count, share))
     };
-    let [fewer, ..] = as_they_are;
-    if log_p(fewer, BY_POWER) < ALARM.ln() {
-        return wrong(fewer, BY_POWER, "less");
+    if log_p(halves.as_they_are, BY_POWER) < ALARM.ln() {
+        return wrong(halves.as_they_are, BY_POWER, "less");
     }
-    if log_p(as_exchanged[0], BY_POWER) < ALARM.ln() {
+    if log_p(halves.as_exchanged, BY_POWER) < ALARM.ln() {
         return Finding::as_stated(CHECK, EXPECTED, shares);
     }
-    let [in_step, in_step_exchanged] = [as_they_are, as_exchanged].map(|[_, up, down]| up.max(down));
+    let [in_step, in_step_exchanged] = [as_they_are, as_exchanged].map(|[up, down]| up.max(down));
     if log_p(in_step, BY_PHASES) < ALARM.ln() {
         return wrong(in_step, BY_PHASES, "a phase that images of exchanged words have");
     }
@@ -90,11 +89,6 @@ fn judged(groups: usize, as_they_are: [usize; 3], as_exchanged: [usize; 3], shar
         return Finding::as_stated(CHECK, EXPECTED, shares);
     }
     Finding::undecided(CHECK, EXPECTED, shares)
-}
-
-/// Whether a group holds less in its far half once its words are exchanged, and less than half of its energy.
-pub(super) fn looks_exchanged(away: f64, away_after: f64, whole: f64) -> bool {
-    away_after < away.min(0.5 * whole)
 }
 
 impl Inspector for Words {
@@ -109,75 +103,32 @@ impl Inspector for Words {
             return None;
         }
         let chirps: Vec<Vec<Complex64>> = self.sum.chirps().map(exchanged).collect();
-        let as_read = spectrum(self.sum.chirps(), samples);
-        let reordered = spectrum(chirps.iter().map(Vec::as_slice), samples);
-        let product = products(self.sum.chirps(), samples);
-        let exchanged_product = products(chirps.iter().map(Vec::as_slice), samples);
-        // Groups in which the words as read and the exchanged ones look exchanged: by power; by phases, of either sign.
-        let (mut groups, mut as_they_are, mut as_exchanged) = (0, [0; 3], [0; 3]);
-        let (mut far, mut all, mut far_after) = (0.0, 0.0, 0.0);
         let half = samples / 2;
-        for bin in GUARD..(half / 2).saturating_sub(GUARD - 1) {
-            let mut halves = [[bin, half - bin], [samples - bin, half + bin]];
-            if self.schedule.is_falling {
-                halves.reverse();
-            }
-            let [near, away] = halves;
-            let sum = |power: &[f64], bins: [usize; 2]| bins.into_iter().map(|bin| power[bin]).sum::<f64>();
-            let (away_before, whole) = (sum(&as_read, away), sum(&as_read, near) + sum(&as_read, away));
-            let away_after = sum(&reordered, away);
-            groups += 1;
-            let by_phases = |product: f64| [product > IMAGE, product < -IMAGE];
-            let [up, down] = by_phases(product[bin]);
-            let [other_up, other_down] = by_phases(exchanged_product[bin]);
-            let of = [looks_exchanged(away_before, away_after, whole), up, down];
-            let of_others = [looks_exchanged(away_after, away_before, whole), other_up, other_down];
-            (0..3).for_each(|test| as_they_are[test] += usize::from(of[test]));
-            (0..3).for_each(|test| as_exchanged[test] += usize::from(of_others[test]));
-            (far, all, far_after) = (far + away_before, all + whole, far_after + away_after);
-        }
-        let shares = format!(
-            "the far half of the spectrum holds {:.1} % of the still energy, and {:.1} % with every second pair of words exchanged",
-            100.0 * far / f64::max(all, f64::MIN_POSITIVE),
-            100.0 * far_after / f64::max(all, f64::MIN_POSITIVE)
-        );
-        Some(judged(groups, as_they_are, as_exchanged, shares))
+        let groups = bins(samples).map(|bin| {
+            let halves = [[bin, half - bin], [samples - bin, half + bin]];
+            if self.schedule.is_falling { [halves[1], halves[0]] } else { halves }
+        });
+        let halves = Halves::of(&self.sum, &chirps, samples, groups);
+        let in_step = |products: Vec<f64>| {
+            let count = |is_so: fn(f64) -> bool| bins(samples).filter(|bin| is_so(products[*bin])).count();
+            [count(|product| product > IMAGE), count(|product| product < -IMAGE)]
+        };
+        let as_they_are = in_step(products(self.sum.chirps(), samples));
+        let as_exchanged = in_step(products(chirps.iter().map(Vec::as_slice), samples));
+        Some(judged(&halves, as_they_are, as_exchanged))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::IfFrame;
-    use crate::support::numbers;
+    use crate::integrity::exchange::scene::{SCHEDULE, stream};
 
-    const RX: usize = 4;
-    const LOOPS: usize = 4;
-    const SAMPLES: usize = 128;
-    const SCHEDULE: Schedule =
-        Schedule { tx: 1, rx: RX, loops: LOOPS, samples: SAMPLES, is_real: false, is_falling: false, farthest_bin: None };
-
-    /// Static returns of an amplitude at each bin, of other phases in every channel, through a receiver; words exchanged or not.
+    /// Static returns of an amplitude at each bin through a receiver; words exchanged or not.
     fn seen(amplitude: impl Fn(usize) -> f64, receiver: impl Fn(Complex64) -> Complex64, are_exchanged: bool) -> Finding {
-        let noise = numbers(9, 2 * RX * LOOPS * SAMPLES, -3.0, 3.0);
-        let phases = numbers(10, RX * SAMPLES, 0.0, std::f64::consts::TAU);
-        let (mut re, mut im) = (vec![], vec![]);
-        for chirp in 0..RX * LOOPS {
-            let value = |sample: usize| {
-                let tone = |bin: usize| {
-                    let phase = std::f64::consts::TAU * (bin * sample) as f64 / SAMPLES as f64;
-                    Complex64::from_polar(amplitude(bin), phase + phases[chirp / LOOPS * SAMPLES + bin])
-                };
-                let place = chirp * SAMPLES + sample;
-                receiver((0..SAMPLES).map(tone).sum()) + Complex64::new(noise[2 * place], noise[2 * place + 1])
-            };
-            let values: Vec<Complex64> = (0..SAMPLES).map(value).collect();
-            let values = if are_exchanged { exchanged(&values) } else { values };
-            re.extend(values.iter().map(|value| value.re as f32));
-            im.extend(values.iter().map(|value| value.im as f32));
-        }
+        let sent = |chirp: &[Complex64]| if are_exchanged { exchanged(chirp) } else { chirp.to_vec() };
         let mut inspector = Box::new(Words::new(SCHEDULE));
-        inspector.see(&Stream::of(SCHEDULE, 0, &IfFrame::new([1, RX, LOOPS, SAMPLES], re, Some(im))));
+        inspector.see(&stream(SCHEDULE, amplitude, receiver, sent));
         inspector.conclude().unwrap()
     }
 

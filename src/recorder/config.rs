@@ -280,12 +280,13 @@ fn embedded(subject: &str) -> Result<BodyModel> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::settings::read_text;
 
     #[test]
     fn the_default_settings_survive_a_round_trip_and_describe_a_world() {
         let config = RecorderConfig::default();
         let text = toml::to_string(&config).unwrap();
-        assert_eq!(crate::data::settings::read_text::<RecorderConfig>(&text).unwrap(), config);
+        assert_eq!(read_text::<RecorderConfig>(&text).unwrap(), config);
         let world = RecorderConfig { frames: Some(2), ..config }.world(Path::new(".")).unwrap();
         assert_eq!(world.radar.frames, 2);
         assert!(world.image_walls().is_empty() && world.furniture.is_empty());
@@ -293,14 +294,14 @@ mod tests {
 
     #[test]
     fn a_radar_is_a_name_or_a_table_and_mistakes_are_named() {
-        let named: RecorderConfig = crate::data::settings::read_text("radar = \"mmmesh\"").unwrap();
+        let named: RecorderConfig = read_text("radar = \"mmmesh\"").unwrap();
         assert_eq!(named.radar.radar().unwrap().samples_per_chirp, 256);
         let unknown = RadarChoice::Preset("bmmesh".into()).radar().unwrap_err().to_string();
         assert!(unknown.contains("`mmmesh`"), "{unknown}");
         let table =
             toml::to_string(&RecorderConfig { radar: RadarChoice::Full(Box::new(Radar::small(3))), ..RecorderConfig::default() });
-        assert_eq!(crate::data::settings::read_text::<RecorderConfig>(&table.unwrap()).unwrap().radar.radar().unwrap().frames, 3);
-        let message = crate::data::settings::read_text::<RecorderConfig>("[radar]\nslope = 1.0").unwrap_err().to_string();
+        assert_eq!(read_text::<RecorderConfig>(&table.unwrap()).unwrap().radar.radar().unwrap().frames, 3);
+        let message = read_text::<RecorderConfig>("[radar]\nslope = 1.0").unwrap_err().to_string();
         assert!(message.contains("unknown field `slope`"), "{message}");
     }
 

@@ -1,37 +1,40 @@
-//! Sums over boxes of frame, Doppler and range; the innermost loop of the scans, which therefore indexes by hand.
+//! Sums over boxes of frame, Doppler and range.
 
-/// Sums over everything before, `[frame + 1, doppler + 1, range + 1]`: from which boxes are differences.
+use crate::grid::Grid;
+
+/// Sums over everything before, `[frame + 1, doppler + 1, range + 1]`, from which boxes are differences. Scans come here: by whole rows.
 pub struct Table {
-    dims: [usize; 3],
-    sums: Vec<f64>,
+    sums: Grid<f64, 3>,
 }
 
 impl Table {
     /// `of`: value of frame, Doppler and range.
     pub fn new(dims: [usize; 3], of: impl Fn([usize; 3]) -> f64) -> Self {
         let [frames, loops, bins] = dims;
-        let (wide, deep) = (bins + 1, (loops + 1) * (bins + 1));
-        let mut sums = vec![0.0; (frames + 1) * deep];
+        let mut sums = Grid::filled(["frame", "doppler", "range"], dims.map(|length| length + 1), 0.0);
+        let mut line = vec![0.0; bins + 1];
         for frame in 0..frames {
             for doppler in 0..loops {
                 let mut row = 0.0;
-                for range in 0..bins {
+                let [beside, earlier, both] =
+                    [[frame + 1, doppler], [frame, doppler + 1], [frame, doppler]].map(|at| &sums.below(at)[1..]);
+                let before = beside.iter().zip(earlier).zip(both);
+                for (range, (sum, ((beside, earlier), both))) in line[1..].iter_mut().zip(before).enumerate() {
                     row += of([frame, doppler, range]);
-                    let at = (frame + 1) * deep + (doppler + 1) * wide + range + 1;
-                    sums[at] = row + sums[at - wide] + sums[at - deep] - sums[at - deep - wide];
+                    *sum = row + beside + earlier - both;
                 }
+                sums.below_mut([frame + 1, doppler + 1]).copy_from_slice(&line);
             }
         }
-        Self { dims, sums }
+        Self { sums }
     }
 
     /// Of half-open intervals of frame and Doppler, up to each range: a box is the difference of two of these, `[range + 1]`.
     pub fn along(&self, frames: [usize; 2], dopplers: [usize; 2], line: &mut Vec<f64>) {
-        let (wide, deep) = (self.dims[2] + 1, (self.dims[1] + 1) * (self.dims[2] + 1));
-        let row = |frame: usize, doppler: usize| &self.sums[frame * deep + doppler * wide..][..wide];
-        let [[first, last], [low, high]] = [frames, dopplers];
-        let later = row(last, high).iter().zip(row(last, low)).map(|(high, low)| high - low);
-        let earlier = row(first, high).iter().zip(row(first, low)).map(|(high, low)| high - low);
+        let [earlier, later] = frames.map(|frame| {
+            let [low, high] = dopplers.map(|doppler| self.sums.below([frame, doppler]));
+            high.iter().zip(low).map(|(high, low)| high - low)
+        });
         line.clear();
         line.extend(later.zip(earlier).map(|(later, earlier)| later - earlier));
     }

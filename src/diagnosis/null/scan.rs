@@ -212,9 +212,9 @@ impl Cells {
             let sums = Table::new([part.frames.len(), loops, bins], power);
             for frames in in_frames {
                 for doppler in in_doppler {
-                    let of = ([frames.low, frames.high], [doppler.low, doppler.high]);
-                    part.counts.along(of.0, of.1, &mut counts_before);
-                    sums.along(of.0, of.1, &mut sums_before);
+                    let [frames, dopplers] = [frames, doppler].map(|interval| [interval.low, interval.high]);
+                    part.counts.along(frames, dopplers, &mut counts_before);
+                    sums.along(frames, dopplers, &mut sums_before);
                     for range in in_range {
                         let [count, sum] = [&counts_before, &sums_before].map(|before| before[range.high] - before[range.low]);
                         if sum <= count || count < 0.5 {

@@ -273,20 +273,19 @@ mod waveform_tests;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::settings::read_text;
     use crate::recorder::World;
 
     #[test]
     fn the_table_survives_a_round_trip_and_mistakes_are_named() {
         let text = "[if_highpass]\ncorner_hz = 3.5e5\norder = 2\n\n[[moving_reflector]]\nposition_m = [0.0, 3.0, 0.0]\nswing_m = 0.1\n\
                     rate_hz = 0.9\namplitude = 0.02\n\n[[outside]]\nkind = \"mains_gain_ripple\"\nrate_hz = 100.0\ndepth = 0.05\n";
-        let config: EffectsConfig = crate::data::settings::read_text(text).unwrap();
+        let config: EffectsConfig = read_text(text).unwrap();
         assert!(config.if_highpass.as_ref().unwrap().settled);
-        assert_eq!(crate::data::settings::read_text::<EffectsConfig>(&toml::to_string(&config).unwrap()).unwrap(), config);
-        let unknown = crate::data::settings::read_text::<EffectsConfig>("[if_highpass]\ncorner = 1.0").unwrap_err().to_string();
+        assert_eq!(read_text::<EffectsConfig>(&toml::to_string(&config).unwrap()).unwrap(), config);
+        let unknown = read_text::<EffectsConfig>("[if_highpass]\ncorner = 1.0").unwrap_err().to_string();
         assert!(unknown.contains("unknown field `corner`"), "{unknown}");
-        let unknown =
-            crate::data::settings::read_text::<EffectsConfig>("[[outside]]\nkind = \"gain_hop\"\nrx = 0\ndb = 1.0\nextra = 1")
-                .unwrap_err();
+        let unknown = read_text::<EffectsConfig>("[[outside]]\nkind = \"gain_hop\"\nrx = 0\ndb = 1.0\nextra = 1").unwrap_err();
         assert!(unknown.to_string().contains("unknown field `extra`"), "{unknown}");
         let wrong = EffectsConfig { slope_error: Some(SlopeError { relative: f64::NAN }), ..EffectsConfig::default() };
         let message = wrong.check(&World::default(), "effects").unwrap_err().to_string();

@@ -5,6 +5,7 @@ use num_complex::Complex64;
 use super::decibels::from_db;
 use super::test_support::*;
 use super::*;
+use crate::data::settings::read_text;
 use crate::recorder::receiver::ReceiverConfig;
 use crate::recorder::record::Recorder;
 use crate::recorder::truth;
@@ -136,7 +137,7 @@ fn everything_at_once_records_finite_samples_and_is_listed() {
         [[outside]]\nkind = \"lamp_modulation\"\nposition_m = [1.0, 3.0, 0.0]\nradius_m = 1.5\nrate_hz = 120.0\ndepth = 0.1
         [[outside]]\nkind = \"thermal_curvature\"\npeak_hz = 1e5";
     let text: String = text.lines().map(|line| line.trim_start().to_string() + "\n").collect();
-    let mut world = skinned_world(crate::data::settings::read_text(&text).unwrap());
+    let mut world = skinned_world(read_text(&text).unwrap());
     world.radar.tx_m = vec![[-0.01, 0.0, 0.0], [-0.012, 0.0, 0.0]];
     world.room = crate::room::Room { right_m: Some(1.5), floor_m: Some(1.0), ..Default::default() };
     world.receiver = ReceiverConfig::default();

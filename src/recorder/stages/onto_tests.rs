@@ -1,6 +1,7 @@
 //! What is put onto clean samples is what the recorder makes of the same scene.
 
 use super::*;
+use crate::data::settings::read_text;
 use crate::recorder::{Recorder, RecorderConfig};
 
 /// A small recorder world without noise, and the same with effects and with the board's gain of the first.
@@ -11,10 +12,10 @@ fn worlds(effects: &str, sampling: &str) -> [Recorder; 2] {
          loops_per_frame = 4\nadc_start_s = 6e-6\nchirp_period_s = 72e-6\nframe_period_s = 0.1\nframes = 3\n\
          tx_m = [[0.0, 0.0, 0.0]]\nrx_m = [[0.0, 0.0, 0.0], [0.001916, 0.0, 0.0]]\n"
     );
-    let clean: RecorderConfig = crate::data::settings::read_text(&text).unwrap();
+    let clean: RecorderConfig = read_text(&text).unwrap();
     let clean = clean.world(std::path::Path::new(".")).unwrap();
     let plain = Recorder::new(&clean).unwrap();
-    let effects: EffectsConfig = crate::data::settings::read_text(effects).unwrap();
+    let effects: EffectsConfig = read_text(effects).unwrap();
     let receiver = ReceiverConfig { level: Some(plain.level()), ..clean.receiver };
     let planted = Recorder::new(&World { effects, receiver, ..clean }).unwrap();
     [plain, planted]
@@ -119,15 +120,15 @@ fn added_noise_has_the_density_and_the_correlation_that_the_effects_state() {
         salted.re.iter().map(|&value| f64::from(value).powi(2)).sum::<f64>() / salted.re.len() as f64
     };
     // 4 · 0.5 / 0.5, and 4 · 0.1 · (36 − 1).
-    let correlated: EffectsConfig = crate::data::settings::read_text("[correlated_noise]\nrho = 0.5").unwrap();
-    let impulsive: EffectsConfig = crate::data::settings::read_text("[impulsive_noise]\nrate = 0.1\nstrength = 6.0").unwrap();
+    let correlated: EffectsConfig = read_text("[correlated_noise]\nrho = 0.5").unwrap();
+    let impulsive: EffectsConfig = read_text("[impulsive_noise]\nrate = 0.1\nstrength = 6.0").unwrap();
     assert!((power(correlated) / 4.0 - 1.0).abs() < 0.1);
     assert!((power(impulsive) / 14.0 - 1.0).abs() < 0.1);
     // Σ (knee/f)² over the bins, of which the zero counts as half a bin.
     let bin_hz = radar.sample_rate_hz / 64.0;
     let coloured = format!("[coloured_noise]\nknee_hz = {bin_hz}\npower = 2.0");
     let wanted: f64 = (0..64).map(|bin: i32| f64::from(bin.min(64 - bin)).max(0.5).powi(-2)).sum::<f64>() / 64.0 * 4.0;
-    assert!((power(crate::data::settings::read_text(&coloured).unwrap()) / wanted - 1.0).abs() < 0.1);
+    assert!((power(read_text(&coloured).unwrap()) / wanted - 1.0).abs() < 0.1);
 }
 
 #[test]
@@ -143,9 +144,7 @@ fn a_lower_rail_clips_and_offset_binary_swings_about_its_own_zero() {
     };
     let ground = Ground { peak: 100.0, largest_component: 100.0, sigma: 1.0, zero: 2048.0.into(), rail: Some([0.0, 4095.0]) };
     let frame = IfFrame::new([1, 1, 1, 4], vec![2148.0, 1948.0, 2058.0, 2048.0], None);
-    let of = |effects: &str| {
-        Onto::new(&radar, &crate::data::settings::read_text(effects).unwrap(), 1, &ground).unwrap().apply(0, &frame).re
-    };
+    let of = |effects: &str| Onto::new(&radar, &read_text(effects).unwrap(), 1, &ground).unwrap().apply(0, &frame).re;
     assert_eq!(of("[adc_saturation]\nlevel = 2.0"), [2098.0, 1998.0, 2058.0, 2048.0]);
     // The droop is of the signal, not of the code that stands for zero; 20 dB over three steps.
     assert_eq!(of("[chirp_droop]\ndb = 20.0"), [2148.0, 2002.0, 2050.0, 2048.0]);
@@ -156,9 +155,7 @@ fn a_lower_rail_clips_and_offset_binary_swings_about_its_own_zero() {
 fn what_a_radar_cannot_have_is_refused() {
     let radar = Radar { sampling: Sampling::Real, ..Radar::small(2) };
     let ground = Ground { peak: 1.0, largest_component: 1.0, sigma: 1.0, zero: Complex64::ZERO, rail: None };
-    let of = |effects: &str| {
-        Onto::new(&radar, &crate::data::settings::read_text(effects).unwrap(), 1, &ground).unwrap_err().to_string()
-    };
+    let of = |effects: &str| Onto::new(&radar, &read_text(effects).unwrap(), 1, &ground).unwrap_err().to_string();
     assert!(of("[iq_imbalance]\ngain_db = 1.0\nphase_deg = 0.0").contains("without quadrature"));
     assert!(of("[[outside]]\nkind = \"lsb_stuck\"\nrx = 0\nbit = 1").contains("lsb_stuck"));
 }
