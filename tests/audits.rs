@@ -101,6 +101,10 @@ fn transmitters_that_were_not_separated_are_told() {
     let to = folder.path().join("unseparated");
     damaged(&whole, &to, Damage::Unseparated);
     only(&inspected(&to), "integrity_transmitters");
+    let to = folder.path().join("one");
+    damaged(&whole, &to, Damage::OneTransmitter);
+    let one = only(&inspected(&to), "transmitter_count");
+    assert!(one.found.contains("loops of 2 kinds take turns"), "{}", one.found);
 }
 
 /// Noise that stays below the converter's step, a converter at its rail and a receiver that sees nothing but itself are no damage.

@@ -1,12 +1,13 @@
 //! Whether a recording's samples are whole and are what they are stated to be, before any physics is asked: packets of zeros, values
 //! that stand still, copies, a stream that moved, numbers of another byte order or sign, chirps of another length, chirps and frames
-//! that begin elsewhere, transmitters that were not separated, words in the wrong order, lanes, devices of a cascade and I and Q
+//! that begin elsewhere, transmitters that were not separated or not counted, words in the wrong order, lanes, devices of a cascade and I and Q
 //! exchanged.
 //!
 //! The checks know the converter's stream and the radar's schedule, and where it is stated the size of the room, nothing of a body.
 //! Each has a law that says how often a recording that is as stated would look so; a check fails where that is rarer than [`ALARM`].
 //! One frame is in memory at a time.
 
+mod alternation;
 mod boundary;
 mod chirp_length;
 mod copies;
@@ -30,7 +31,7 @@ use crate::error::Result;
 use crate::radar::Radar;
 use stream::{Schedule, Stream};
 
-/// Chance that one check fails on a recording that is whole and as stated, at most. Fourteen checks at this level add up to about the
+/// Chance that one check fails on a recording that is whole and as stated, at most. Fifteen checks at this level add up to about the
 /// family-wise 1 % that a diagnosis allows itself (`diagnosis.alarm`).
 pub const ALARM: f64 = 1e-3;
 
@@ -95,7 +96,7 @@ trait Inspector {
 /// Samples that cannot be read.
 pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>> {
     let schedule = Schedule::of(&recording.radar, recording.room.as_ref());
-    let mut inspectors: [Box<dyn Inspector>; 14] = [
+    let mut inspectors: [Box<dyn Inspector>; 15] = [
         Box::new(runs::Runs::new(schedule)),
         Box::new(copies::Copies::new(schedule)),
         Box::new(numbers::Numbers::new(numbers::BYTE_ORDER)),
@@ -103,6 +104,7 @@ pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>
         Box::new(shift::Shift::new(schedule)),
         // Chirps in the order of firing repeat as a longer loop does: the special case first.
         Box::new(transmitters::Transmitters::new(schedule)),
+        Box::new(alternation::Alternation::new(schedule)),
         Box::new(chirp_length::ChirpLength::new(schedule)),
         Box::new(period::Period::new(schedule)),
         Box::new(start::Start::new(schedule)),

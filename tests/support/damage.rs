@@ -21,6 +21,8 @@ pub enum Damage {
     HalfFrames,
     /// Chirps in the order of firing fill the tx axis.
     Unseparated,
+    /// One transmitter is stated where several fired in turn.
+    OneTransmitter,
     /// This frame is the one before it.
     RepeatedFrame(usize),
     /// The second half of this frame's loops is its first half.
@@ -87,7 +89,7 @@ impl Words {
         let (length, half) = (self.frame_length(), self.frame_length() / 2);
         let [_, tx, rx, loops, samples] = self.dims;
         match damage {
-            Damage::None => {}
+            Damage::None | Damage::OneTransmitter => {}
             Damage::WordOrder => self.exchange(),
             Damage::ZeroPackets(count) => {
                 self.exchange();
@@ -138,8 +140,14 @@ pub fn damaged(from: &Path, to: &Path, damage: Damage) {
     let recording = Recording::open(from).unwrap();
     let mut words = Words::of(&recording);
     words.damage(damage);
+    let mut radar = recording.radar.clone();
+    if damage == Damage::OneTransmitter {
+        radar.loops_per_frame *= radar.tx_m.len();
+        radar.tx_m.truncate(1);
+        words.dims = radar.dims();
+    }
     let contents = RecordingContents {
-        radar: &recording.radar,
+        radar: &radar,
         room: recording.room.as_ref(),
         person: recording.person(),
         body_file: None,
