@@ -1,13 +1,13 @@
 //! Times the direct and the indirect signal, from positions to samples, as JSON lines.
 //!
-//! `cargo bench --bench coherent_sum [-- unit | scaling]`. Every case runs in a process of its own, so that its peak
+//! `cargo bench --bench coherent_sum [-- unit | scaling | DEVICE]`; a device as of `--device`, such as `wgpu`, does the unit. Every case runs in a process of its own, so that its peak
 //! memory is its own. Several forms are timed in one run, because only numbers of one run can be compared.
 
 use std::time::Instant;
 
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use hybridsim::complex::Complex;
-use hybridsim::if_signal::{SumForm, direct_signal, indirect_signal};
+use hybridsim::if_signal::{SumForm, ToWalls, direct_signal, indirect_signal};
 use hybridsim::paths::{Amplitude, Dechirp, Displacement, Points};
 use hybridsim::radar::{Radar, SPEED_OF_LIGHT};
 use rand::{RngExt, SeedableRng};
@@ -40,7 +40,7 @@ fn main() {
         Some("unit") => unit().iter().for_each(run_apart),
         Some("scaling") => scaling().iter().for_each(run_apart),
         None => unit().iter().chain(&scaling()).for_each(run_apart),
-        Some(other) => panic!("unknown argument {other}: unit or scaling"),
+        Some(device) => of_device(device).iter().for_each(run_apart),
     }
 }
 
@@ -83,6 +83,17 @@ fn unit() -> Vec<Case> {
     }
     // The definition, on a sixteenth of the chirps and one receiver: 64 times less.
     cases.push(Case { bench: "1/64 unit".into(), form: SumForm::Exact, chirps: 8, receivers: 1, ..base() });
+    cases
+}
+
+/// The unit on another device.
+fn of_device(device: &str) -> Vec<Case> {
+    let mut cases = vec![];
+    for form in [SumForm::Fused, SumForm::Tensor] {
+        for mode in ["forward", "amplitudes", "positions"] {
+            cases.push(Case { backend: device.into(), form, mode: mode.into(), ..base() });
+        }
+    }
     cases
 }
 
@@ -168,6 +179,7 @@ fn peak_mb() -> u64 {
 
 /// A person's worth of moving points two to four metres away, and points at rest on the walls.
 struct World {
+    device: Device,
     radar: Radar,
     moving: Part,
     still: Part,
@@ -202,12 +214,7 @@ impl World {
             rx_m: (0..case.receivers).map(|rx| [(rx as f64 - 6.0) * wavelength / 2.0, 0.0, 0.0]).collect(),
             full_scale_codes: None,
         };
-        let device = match case.backend.as_str() {
-            #[cfg(feature = "ndarray")]
-            #[allow(deprecated)]
-            "ndarray" => Device::ndarray(),
-            _ => Device::flex(),
-        };
+        let device = hybridsim::cli::device(&case.backend).expect("a device of this build");
         let mut random = ChaCha8Rng::seed_from_u64(0);
         let mut part = |count: usize, speed: f64, chirps: usize| {
             let mut uniform = |low: f64, high: f64| random.random_range(low..=high);
@@ -224,7 +231,7 @@ impl World {
         moving.prepare(&radar, &device);
         still.prepare(&radar, &device);
         let proxies = (0..case.walls).map(|wall| [2.5 * (wall as f64 - 2.5), 3.0 + 0.5 * wall as f64, 0.3]).collect();
-        Self { radar, moving, still, proxies }
+        Self { device, radar, moving, still, proxies }
     }
 
     /// Forward, or forward and backward with the loss Σ|X|².
@@ -239,7 +246,8 @@ impl World {
                 parts.push(direct_signal(points, &self.radar, 0, case.dechirp, case.form));
             }
             for &proxy in &self.proxies {
-                parts.push(indirect_signal(points, proxy, &self.radar, 0, case.dechirp, case.form));
+                let to_walls = ToWalls { points, walls: &[(0, 0..part.reference_m.len())] };
+                parts.extend(indirect_signal(&[to_walls], &[proxy], &self.radar, 0, case.dechirp, case.form));
             }
             for part in parts {
                 signal = Some(match signal {
@@ -249,14 +257,15 @@ impl World {
             }
         }
         let signal = signal.expect("a signal");
-        if tracked.is_empty() {
-            std::hint::black_box(signal.re.into_data());
-            return;
-        }
-        let gradients = signal.power().sum().backward();
-        for tensor in tracked {
-            std::hint::black_box(tensor.grad(&gradients).expect("a gradient").into_data());
-        }
+        let results = if tracked.is_empty() {
+            vec![signal.re.into_data(), signal.im.into_data()]
+        } else {
+            let gradients = signal.power().sum().backward();
+            tracked.into_iter().map(|tensor| tensor.grad(&gradients).expect("a gradient").into_data()).collect()
+        };
+        std::hint::black_box(results);
+        // What has been asked of a GPU is not yet done.
+        self.device.sync().expect("the device's work");
     }
 
     /// Of two chirps at the first receiver, against f64 on the host.

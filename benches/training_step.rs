@@ -3,7 +3,8 @@
 //! `cargo bench --bench training_step`. SMPL's size, about 6,890 vertices; mmMesh's public code has the others: 5,000 room
 //! points, 128 chirps, 256 samples; 6 walls. Once with one of the board's three transmitters, once with all of them, 4
 //! receivers each. The graph convolution is drawn in every step, not in a half of them as in training. Visibility is computed
-//! once per frame and kept, so it is timed apart.
+//! once per frame and kept, so it is timed apart. `-- wgpu` times another device; a step ends when the device has done it. `of_step_s`
+//! are the parts of a step, each waited for, which costs a little more than the whole.
 
 use std::time::Instant;
 
@@ -98,16 +99,33 @@ fn measure(paths: PathModel, transmitters: usize, pose: Pose, device: &Device) {
         shifts_m: Some(leaf(6).reshape([2, 3])),
     };
     let mut optimizer = ModuleOptimizer::from(AdamConfig::new().build());
-    let step_s = median(|| {
+    let sync = || device.sync().expect("the device's work");
+    let mut step = |lap: &mut dyn FnMut(&str)| {
         let current = simulator.take().expect("put back below");
         let surfaces = current.surfaces(&constants, Mode::Training { seed: 3 });
+        lap("surfaces");
         let learning = (pose == Pose::Learning).then(pose_tensors);
         let clean = current.signal_of_pose(&scene, &view, &surfaces, learning.as_ref());
+        lap("signal");
         let signal = current.with_noise(&scene.radar, clean, 1);
         let loss = power_db(transform.map(signal).power(), 1e-6).powi_scalar(2).mean();
+        lap("noise and loss");
         let mut gradients = loss.backward();
         let gradients = GradientsParams::from_module(&mut gradients, &current);
+        lap("gradients");
         simulator = Some(optimizer.step(1e-3, current, gradients));
+        lap("optimiser");
+    };
+    let step_s = median(|| {
+        step(&mut |_| ());
+        sync();
+    });
+    let mut of_step_s = serde_json::Map::new();
+    let mut started = Instant::now();
+    step(&mut |part| {
+        sync();
+        of_step_s.insert(part.into(), started.elapsed().as_secs_f64().into());
+        started = Instant::now();
     });
     println!(
         "{}",
@@ -115,7 +133,7 @@ fn measure(paths: PathModel, transmitters: usize, pose: Pose, device: &Device) {
             "bench": "training_step", "paths": paths, "pose": format!("{pose:?}").to_lowercase(), "device": format!("{device:?}"), "vertices": vertices,
             "room_points": scene.patches.position_m.len(), "walls": scene.proxies.len(),
             "transmitters": transmitters, "receivers": scene.radar.rx_m.len(), "graph_used": config.graph.used, "visible_body": view.direct.body.len(),
-            "parameters": plain.num_params(), "step_s": step_s, "inference_s": inference_s, "visibility_s": visibility_s,
+            "parameters": plain.num_params(), "step_s": step_s, "of_step_s": of_step_s, "inference_s": inference_s, "visibility_s": visibility_s,
             "peak_mb": peak_mb(),
         })
     );

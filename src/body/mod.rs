@@ -19,6 +19,8 @@ mod golden;
 #[cfg(test)]
 pub(crate) mod test_bodies;
 
+use std::ops::Range;
+
 use burn::tensor::{DType, Device, Tensor};
 
 pub use correction::{PoseCorrection, PoseTensors};
@@ -54,6 +56,11 @@ impl Displacement {
     /// `[point, chirp]`.
     pub fn dims(&self) -> [usize; 2] {
         self.x.dims()
+    }
+
+    /// Of some of the points.
+    pub fn rows(&self, rows: Range<usize>) -> Self {
+        self.clone().map(|axis| axis.slice_dim(0, rows.clone()))
     }
 
     /// The same done to all three components.

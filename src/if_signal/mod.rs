@@ -7,8 +7,8 @@
 //! - `exact`: the definition, in blocks; slow; the reference of tests.
 //! - `spread`: the tensor form on CPUs: moments by scatter-add, transform by a DFT matrix.
 //! - `split`: the tensor form on GPUs: exp(j2π sweep s_n) split over n = a·√N + b, then a batched matrix product.
-//! - `fused`: all of it as one kernel on flex in f32, with its own backward pass; from displacements on, where
-//!   [`direct_signal`] and [`indirect_signal`] are called, so that no phase becomes a tensor.
+//! - `fused`: all of it as kernels in f32, on flex over a range grid, on GPUs of the definition, with their own backward passes; from
+//!   displacements on, where [`direct_signal`] and [`indirect_signal`] are called, so that no phase becomes a tensor.
 
 mod cis;
 mod exact;
@@ -21,13 +21,13 @@ mod spread;
 
 pub use crate::paths::Phasors;
 pub use noise::{Noise, NoiseConfig, NoiseLaw};
-pub use signals::{direct_signal, indirect_signal};
+pub use signals::{ToWalls, direct_signal, indirect_signal};
 
 use burn::tensor::{DType, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::complex::Complex;
-use crate::device::{is_cpu, is_flex};
+use crate::device::{is_cpu, is_flex, is_gpu};
 
 /// How the coherent sum is computed (setting `sum`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,7 +38,7 @@ pub enum SumForm {
     Auto,
     /// Tensor operations only; works everywhere, in f32 and f64.
     Tensor,
-    /// The fused kernel on flex in f32; elsewhere the tensor form.
+    /// The fused kernels on flex and GPUs in f32; elsewhere the tensor form.
     Fused,
     /// The definition.
     Exact,
@@ -47,7 +47,9 @@ pub enum SumForm {
 impl SumForm {
     /// Whether the fused kernel takes tensors like this one.
     fn is_fused(self, like: &Tensor<2>) -> bool {
-        matches!(self, Self::Auto | Self::Fused) && is_flex(&like.device()) && like.dtype() == DType::F32
+        matches!(self, Self::Auto | Self::Fused)
+            && (is_flex(&like.device()) || is_gpu(&like.device()))
+            && like.dtype() == DType::F32
     }
 }
 

@@ -1,10 +1,12 @@
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use burn::tensor::{DType, Device, TensorData};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
+use crate::if_signal::tests::fused_devices;
 use crate::paths::{Amplitude, Displacement};
 use crate::radar::SPEED_OF_LIGHT;
 
@@ -71,7 +73,10 @@ impl Scene {
         let points = Points { reference_m: &self.reference_m, displacement: &displacement, amplitude: &amplitude };
         match how.proxy_m {
             None => direct_signal(points, &how.radar, how.tx, how.dechirp, how.form),
-            Some(proxy_m) => indirect_signal(points, proxy_m, &how.radar, how.tx, how.dechirp, how.form),
+            Some(proxy_m) => {
+                let to_walls = ToWalls { points, walls: &[(0, 0..self.reference_m.len())] };
+                indirect_signal(&[to_walls], &[proxy_m], &how.radar, how.tx, how.dechirp, how.form).expect("a wall")
+            }
         }
     }
 }
@@ -165,9 +170,11 @@ fn cases() -> Vec<(Scene, How)> {
 fn signals_agree_with_the_mixers_phase_in_f64() {
     for (scene, how) in cases() {
         let wanted = truth(&scene, &how);
-        for (form, dtype) in [(SumForm::Tensor, DType::F64), (SumForm::Tensor, DType::F32), (SumForm::Fused, DType::F32)] {
+        let tensor = [DType::F64, DType::F32].map(|dtype| (SumForm::Tensor, dtype, Device::flex()));
+        let fused = fused_devices().into_iter().map(|(_, device)| (SumForm::Fused, DType::F32, device));
+        for (form, dtype, device) in tensor.into_iter().chain(fused) {
             let how = How { form, ..how.clone() };
-            let error = relative_error(&values(&scene.signal(scene.tensors(&Device::flex(), dtype), true, &how)), &wanted);
+            let error = relative_error(&values(&scene.signal(scene.tensors(&device, dtype), true, &how)), &wanted);
             let tolerance = match (how.dechirp, dtype) {
                 (Dechirp::Exact, _) => 2e-4,
                 // What the softening of the legs changes.
@@ -175,14 +182,14 @@ fn signals_agree_with_the_mixers_phase_in_f64() {
                 (Dechirp::Paper, _) => 2e-5,
             };
             println!(
-                "{} chirps, wall {}, {:?}, {form:?}, {dtype:?}: {error:.1e}",
+                "{} chirps, wall {}, {:?}, {form:?}, {dtype:?}, {device:?}: {error:.1e}",
                 scene.chirps,
                 how.proxy_m.is_some(),
                 how.dechirp
             );
             assert!(
                 error < tolerance,
-                "{} chirps, wall {}, {:?}, {form:?}, {dtype:?}: {error:.1e}",
+                "{} chirps, wall {}, {:?}, {form:?}, {dtype:?}, {device:?}: {error:.1e}",
                 scene.chirps,
                 how.proxy_m.is_some(),
                 how.dechirp
@@ -192,8 +199,8 @@ fn signals_agree_with_the_mixers_phase_in_f64() {
 }
 
 /// Gradients of a weighted sum of the samples to x, y, z, re and im.
-fn gradients(scene: &Scene, complex: bool, how: &How, dtype: DType) -> Vec<Vec<f64>> {
-    let tensors = scene.tensors(&Device::flex().autodiff(), dtype);
+fn gradients(scene: &Scene, complex: bool, how: &How, dtype: DType, device: &Device) -> Vec<Vec<f64>> {
+    let tensors = scene.tensors(&device.clone().autodiff(), dtype);
     let signal = scene.signal(tensors.clone(), complex, how);
     let (dims, device) = (signal.dims(), signal.device());
     let weights = |part: usize| -> Tensor<3> {
@@ -216,15 +223,16 @@ fn fused_gradients_agree_with_the_tensor_form_in_f64() {
     for (scene, how) in cases() {
         for complex in [false, true] {
             let tensor = How { form: SumForm::Tensor, ..how.clone() };
-            let wanted = gradients(&scene, complex, &tensor, DType::F64);
-            for how in [&how, &tensor] {
-                let found = gradients(&scene, complex, how, DType::F32);
+            let wanted = gradients(&scene, complex, &tensor, DType::F64, &Device::flex());
+            let fused = fused_devices().into_iter().map(|(_, device)| (&how, device));
+            for (how, device) in fused.chain([(&tensor, Device::flex())]) {
+                let found = gradients(&scene, complex, how, DType::F32, &device);
                 for (input, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
                     let error = relative_error(found, wanted);
                     if error.is_nan() || error > 5e-5 {
                         let wall = how.proxy_m.is_some();
                         failures.push(format!(
-                            "{} chirps, wall {wall}, {:?} {:?}, input {input}: {error:.1e}",
+                            "{} chirps, wall {wall}, {:?} {:?} on {device:?}, input {input}: {error:.1e}",
                             scene.chirps, how.dechirp, how.form
                         ));
                     }
@@ -240,7 +248,7 @@ pub(crate) fn gradients_agree_with_central_differences_of_a_micrometre() {
         let radar = radar(24, 2);
         let scene = Scene::new(3, 4, 1, &radar);
         let how = How { radar, tx: 0, proxy_m, dechirp: Dechirp::Exact, form: SumForm::Tensor };
-        let found = gradients(&scene, true, &how, DType::F64);
+        let found = gradients(&scene, true, &how, DType::F64, &Device::flex());
         for input in 0..5 {
             let wanted: Vec<f64> = (0..scene.inputs[input].len())
                 .map(|i| {
@@ -263,6 +271,46 @@ pub(crate) fn gradients_agree_with_central_differences_of_a_micrometre() {
             crate::support::compared(&wanted);
             let error = relative_error(&found[input], &wanted);
             assert!(error < 1e-5, "wall {}, input {input}: {error:.1e}", proxy_m.is_some());
+        }
+    }
+}
+
+/// Three walls, of which the second sees nobody, in one call, against each of them in f64: values, and gradients to the displacement.
+#[test]
+fn the_points_of_several_walls_are_summed_apart() {
+    let radar = radar(48, 2);
+    let scene = Scene::new(70, 20, 1, &radar);
+    let walls_m = [PROXY_M, [-2.0, 1.0, 0.1], [0.5, 6.0, -0.3]];
+    let rows = [(0, 0..25), (1, 25..25), (2, 25..70)];
+    let answer = |device: Device, dtype: DType, form: SumForm, walls: &[(usize, Range<usize>)]| {
+        let [x, y, z, re, _] = scene.tensors(&device.autodiff(), dtype);
+        let displacement = Displacement { x: x.clone(), y, z };
+        let amplitude = Amplitude::real(re.clone());
+        let part = |rows: Range<usize>| (displacement.rows(rows.clone()), amplitude.rows(rows));
+        let of = |walls: &[(usize, Range<usize>)]| {
+            let all = walls[0].1.start..walls[walls.len() - 1].1.end;
+            let (displacement, amplitude) = part(all.clone());
+            let reference_m = &scene.reference_m[all.clone()];
+            let points = Points { reference_m, displacement: &displacement, amplitude: &amplitude };
+            let walls: Vec<_> = walls.iter().map(|(wall, rows)| (*wall, rows.start - all.start..rows.end - all.start)).collect();
+            indirect_signal(&[ToWalls { points, walls: &walls }], &walls_m, &radar, 1, Dechirp::Exact, form).unwrap()
+        };
+        let signal = match form {
+            SumForm::Fused => of(walls),
+            _ => walls.iter().map(|wall| of(std::slice::from_ref(wall))).reduce(Complex::add).unwrap(),
+        };
+        let gradients = signal.clone().power().sum().backward();
+        let host = |tensor: Tensor<2>| tensor.into_data().convert::<f64>().try_into_vec::<f64>().unwrap();
+        (values(&signal), host(x.grad(&gradients).unwrap()), host(re.grad(&gradients).unwrap()))
+    };
+    let wanted = answer(Device::flex(), DType::F64, SumForm::Tensor, &rows);
+    for (name, device) in fused_devices() {
+        let found = answer(device, DType::F32, SumForm::Fused, &rows);
+        for (what, found, wanted) in
+            [("values", &found.0, &wanted.0), ("x", &found.1, &wanted.1), ("amplitude", &found.2, &wanted.2)]
+        {
+            let error = relative_error(found, wanted);
+            assert!(error < 5e-5, "{name}, {what}: {error:.1e}");
         }
     }
 }
@@ -313,12 +361,13 @@ fn a_point_on_an_antenna_is_finite_in_value_and_gradient() {
     scene.reference_m = vec![radar.tx_position_m(0), radar.rx_position_m(0), PROXY_M];
     scene.inputs[..3].iter_mut().for_each(|axis| axis.fill(0.0));
     for proxy_m in [None, Some(PROXY_M)] {
-        for form in [SumForm::Tensor, SumForm::Fused] {
+        let fused = fused_devices().into_iter().map(|(_, device)| (SumForm::Fused, device));
+        for (form, device) in fused.chain([(SumForm::Tensor, Device::flex())]) {
             let how = How { radar: radar.clone(), tx: 0, proxy_m, dechirp: Dechirp::Exact, form };
-            let signal = scene.signal(scene.tensors(&Device::flex(), DType::F32), true, &how);
+            let signal = scene.signal(scene.tensors(&device, DType::F32), true, &how);
             assert!(values(&signal).iter().all(|value| value.is_finite()), "{form:?}");
-            for (input, gradient) in gradients(&scene, true, &how, DType::F32).into_iter().enumerate() {
-                assert!(gradient.iter().all(|value| value.is_finite()), "{form:?}, input {input}: {gradient:?}");
+            for (input, gradient) in gradients(&scene, true, &how, DType::F32, &device).into_iter().enumerate() {
+                assert!(gradient.iter().all(|value| value.is_finite()), "{form:?}, {device:?}, input {input}: {gradient:?}");
             }
         }
     }

@@ -81,6 +81,15 @@ fn relative_error(found: &[f64], wanted: &[f64]) -> f64 {
     (square(&mut found.iter().zip(wanted).map(|(f, w)| f - w)) / square(&mut wanted.iter().copied())).sqrt()
 }
 
+/// Where the fused kernels run, in f32.
+pub(crate) fn fused_devices() -> Vec<(&'static str, Device)> {
+    vec![
+        ("flex", Device::flex()),
+        #[cfg(feature = "wgpu")]
+        ("wgpu", Device::wgpu(burn::tensor::DeviceKind::Cpu)),
+    ]
+}
+
 type Form = fn(&Phasors, usize) -> Complex<2>;
 const FORMS: [(&str, Form); 4] = [("exact", exact::sum), ("spread", spread::sum), ("split", split::sum), ("fused", fused::sum)];
 
@@ -113,7 +122,12 @@ fn every_form_agrees_with_the_definition_in_f64() {
             };
             for (name, form) in FORMS {
                 check(format!("{name} f32"), form(&returns.phasors(&Device::flex(), DType::F32, complex), samples), 3e-5);
-                if name != "fused" {
+                if name == "fused" {
+                    for (device_name, device) in &fused_devices()[1..] {
+                        let name = format!("fused on {device_name}");
+                        check(name, form(&returns.phasors(device, DType::F32, complex), samples), 3e-5);
+                    }
+                } else {
                     check(format!("{name} f64"), form(&returns.phasors(&Device::flex(), DType::F64, complex), samples), 1e-11);
                 }
             }
@@ -190,10 +204,9 @@ fn f32_gradients_of_every_form_agree_with_the_exact_ones_in_f64() {
     for (points, chirps, samples, speed) in [(200, 32, 64, 0.02), (50, 37, 85, 0.02), (60, 40, 96, 3.0), (900, 1, 255, 0.0)] {
         let returns = returns(points, chirps, samples, speed);
         for complex in [false, true] {
-            let inputs = |dtype| returns.phasors(&Device::flex().autodiff(), dtype, complex);
-            let wanted = gradients(&inputs(DType::F64), samples, exact::sum);
-            for (name, form) in FORMS {
-                let found = gradients(&inputs(DType::F32), samples, form);
+            let inputs = |device: &Device, dtype| returns.phasors(&device.clone().autodiff(), dtype, complex);
+            let wanted = gradients(&inputs(&Device::flex(), DType::F64), samples, exact::sum);
+            let mut check = |name: &str, found: Vec<Vec<f64>>| {
                 assert_eq!(found.len(), wanted.len());
                 for (index, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
                     let error = relative_error(found, wanted);
@@ -203,6 +216,12 @@ fn f32_gradients_of_every_form_agree_with_the_exact_ones_in_f64() {
                         failures.push(format!("{points} x {chirps} x {samples}, {name}, input {index}: {error:.1e}"));
                     }
                 }
+            };
+            for (name, form) in FORMS {
+                check(name, gradients(&inputs(&Device::flex(), DType::F32), samples, form));
+            }
+            for (name, device) in &fused_devices()[1..] {
+                check(&format!("fused on {name}"), gradients(&inputs(device, DType::F32), samples, fused::sum));
             }
         }
     }
@@ -240,10 +259,11 @@ fn auto_and_fused_fall_back_where_the_kernel_cannot_run() {
 fn a_delay_that_is_no_number_reaches_the_samples_of_its_chirp() {
     let mut returns = returns(20, 20, 32, 0.02);
     returns.sweep[3 * 20 + 5] = f64::NAN;
-    let signal = fused::sum(&returns.phasors(&Device::flex(), DType::F32, false), 32);
-    let found = values(&signal);
-    for chirp in 0..20 {
-        assert_eq!(found[chirp * 32].is_nan(), chirp == 5, "chirp {chirp}");
+    for (name, device) in fused_devices() {
+        let found = values(&fused::sum(&returns.phasors(&device, DType::F32, false), 32));
+        for chirp in 0..20 {
+            assert_eq!(found[chirp * 32].is_nan(), chirp == 5, "{name}, chirp {chirp}");
+        }
     }
 }
 
@@ -258,10 +278,10 @@ fn the_forms_are_settings_in_lower_case() {
 
 #[cfg(feature = "wgpu")]
 #[test]
-fn wgpu_agrees_with_flex_in_values_and_gradients() {
+fn the_tensor_form_on_wgpu_agrees_with_flex_in_values_and_gradients() {
     use burn::tensor::DeviceKind;
     let returns = returns(60, 6, 32, 0.05);
-    let sum: Form = |phasors, samples| coherent_sum(phasors, samples, SumForm::Auto);
+    let sum: Form = |phasors, samples| coherent_sum(phasors, samples, SumForm::Tensor);
     let device = Device::wgpu(DeviceKind::Cpu);
     let error = relative_error(&values(&sum(&returns.phasors(&device, DType::F32, true), 32)), &returns.sum(32, true));
     assert!(error < 1e-4, "values: {error:.1e}");

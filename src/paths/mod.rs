@@ -12,8 +12,7 @@ mod waveform;
 
 pub use crate::body::Displacement;
 pub use direct::DirectPaths;
-pub(crate) use indirect::onward;
-pub use indirect::{IndirectPaths, Onward};
+pub use indirect::WallReceiver;
 pub(crate) use leg::SOFTENING_M;
 pub use leg::{Leg, Motion, leg};
 pub use waveform::{Amplitude, Dechirp, Waveform, phasors};

@@ -1,5 +1,7 @@
 //! What a chirp makes of a path's length: phase and sweep.
 
+use std::ops::Range;
+
 use burn::tensor::{Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +32,12 @@ pub struct Amplitude {
 impl Amplitude {
     pub fn real(re: Tensor<2>) -> Self {
         Self { re, im: None }
+    }
+
+    /// Of some of the points.
+    pub fn rows(&self, rows: Range<usize>) -> Self {
+        let rows = |part: &Tensor<2>| part.clone().slice_dim(0, rows.clone());
+        Self { re: rows(&self.re), im: self.im.as_ref().map(rows) }
     }
 }
 

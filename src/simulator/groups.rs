@@ -1,8 +1,10 @@
 //! Scatterers that a viewpoint sees, in the groups that move together.
 
+use std::ops::Range;
+
 use burn::tensor::{DType, Device, Tensor};
 
-use super::{FrameView, Scene, Surface, point_tensors::column};
+use super::{FrameView, Scene, Seen, Surface, point_tensors::column};
 use crate::{
     body::{Displacement, PosedFrame},
     paths::Amplitude,
@@ -42,6 +44,45 @@ pub(super) enum Scattering {
 pub(super) enum Kind {
     Body,
     Room,
+}
+
+/// The points that several walls see, one wall after the other; a point that two walls see stands there twice.
+pub(super) struct WallPoints {
+    pub seen: Seen,
+    /// (wall, its rows among the body's points and the room's), of walls that see any.
+    body: Vec<(usize, Range<usize>)>,
+    room: Vec<(usize, Range<usize>)>,
+}
+
+impl WallPoints {
+    pub fn new(view: &FrameView, walls: &[usize]) -> Self {
+        let joined = |of: fn(&Seen) -> &Vec<usize>| {
+            let (mut points, mut rows) = (vec![], vec![]);
+            for &wall in walls {
+                let start = points.len();
+                points.extend_from_slice(of(&view.proxies[wall]));
+                if points.len() > start {
+                    rows.push((wall, start..points.len()));
+                }
+            }
+            (points, rows)
+        };
+        let ((body, body_rows), (room, room_rows)) = (joined(|seen| &seen.body), joined(|seen| &seen.room));
+        Self { seen: Seen { body, room }, body: body_rows, room: room_rows }
+    }
+
+    /// (wall, its rows in the group of a kind).
+    pub fn rows(&self, kind: Kind) -> &[(usize, Range<usize>)] {
+        match kind {
+            Kind::Body => &self.body,
+            Kind::Room => &self.room,
+        }
+    }
+
+    /// What belongs to the wall of every row.
+    pub fn of_walls<T: Clone>(&self, kind: Kind, value: impl Fn(usize) -> T) -> Vec<T> {
+        self.rows(kind).iter().flat_map(|(wall, rows)| vec![value(*wall); rows.len()]).collect()
+    }
 }
 
 impl Visible<'_> {

@@ -1,14 +1,17 @@
-//! Places and values of points as tensors, and the directions from points to a place.
+//! Places and values of points as tensors, and the directions from points to places.
 
 use burn::tensor::{DType, Device, Tensor, TensorData};
 
 use crate::features::RowIndex;
 
-/// Unit vectors from points to a place, `[point, 1, xyz]`.
-pub(super) fn towards(points: impl ExactSizeIterator<Item = [f64; 3]>, place: [f64; 3], device: &Device) -> Tensor<3> {
+pub(super) fn way(from: [f64; 3], to: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|axis| to[axis] - from[axis])
+}
+
+/// Unit vectors along ways from points, `[point, 1, xyz]`.
+pub(super) fn towards(ways: impl ExactSizeIterator<Item = [f64; 3]>, device: &Device) -> Tensor<3> {
     vectors(
-        points.map(|point| {
-            let way: [f64; 3] = std::array::from_fn(|axis| place[axis] - point[axis]);
+        ways.map(|way| {
             let length = way.iter().map(|value| value * value).sum::<f64>().sqrt().max(1e-9);
             way.map(|value| value / length)
         }),
@@ -20,13 +23,7 @@ pub(super) fn towards(points: impl ExactSizeIterator<Item = [f64; 3]>, place: [f
 ///
 /// # Gradient
 /// Flows to `moved_m`.
-pub(super) fn directions(
-    points: impl ExactSizeIterator<Item = [f64; 3]>,
-    moved_m: Tensor<2>,
-    place: [f64; 3],
-    device: &Device,
-) -> Tensor<3> {
-    let ways = points.map(|point| std::array::from_fn(|axis| place[axis] - point[axis]));
+pub(super) fn directions(ways: impl ExactSizeIterator<Item = [f64; 3]>, moved_m: Tensor<2>, device: &Device) -> Tensor<3> {
     let way = vectors(ways, device) - moved_m.unsqueeze_dim(1);
     // The small number keeps value and gradient finite in the place itself.
     let length = (way.clone().square().sum_dim(2) + 1e-18).sqrt();

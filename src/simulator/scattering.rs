@@ -4,14 +4,14 @@ use burn::tensor::{Device, Tensor};
 
 use super::{
     Amplitudes, FrameView, Gains, PathModel, Scene, Seen, Simulator, Surface, Surfaces, Weights,
-    groups::{Group, Kind, Scattering, Visible},
+    groups::{Group, Kind, Scattering, Visible, WallPoints},
     point_tensors::rows,
-    sight::{Attitude, Sight},
+    sight::{Attitude, Places, Sight},
 };
 use crate::{
     body::{Displacement, PosedFrame},
     complex::Complex,
-    if_signal::indirect_signal,
+    if_signal::{ToWalls, indirect_signal},
     paths::{Amplitude, Points},
     radar::Radar,
     scatterers::{
@@ -36,9 +36,10 @@ impl Simulator {
             _ => (Scattering::Microfacets, receivers_m),
         };
         let groups = self.groups((scene, view, posed), surfaces, &view.direct, scattering);
+        let place = Places::Same(place);
         match self.config.equations.amplitudes {
             Amplitudes::Frame => {
-                let answers: Vec<_> = groups.iter().map(|group| (group, self.of_frame(group, place))).collect();
+                let answers: Vec<_> = groups.iter().map(|group| (group, self.of_frame(group, &place))).collect();
                 self.transmitters(scene, |tx, device| {
                     let parts = answers.iter().map(|(group, amplitude)| {
                         let seen = self.as_seen(group, tx, device, |_| amplitude.clone());
@@ -59,9 +60,9 @@ impl Simulator {
         let radar = &group.visible.scene.radar;
         let attitude = group.attitude_at(tx, device);
         let receivers = (0..radar.rx_m.len()).map(|rx| {
-            let place = radar.rx_position_m(rx);
+            let place = Places::Same(radar.rx_position_m(rx));
             let seen = self.as_seen(group, tx, device, |displacement| {
-                self.answer(group, &attitude, group.sight_at(displacement, tx, place))
+                self.answer(group, &attitude, group.sight_at(displacement, tx, &place))
             });
             if self.effects.is_empty() {
                 return self.direct_of(group, seen, tx, &Radar { rx_m: vec![radar.rx_m[rx]], ..radar.clone() });
@@ -99,33 +100,42 @@ impl Simulator {
         surfaces: &Surfaces,
         posed: Option<&PosedFrame<'_>>,
     ) -> Complex<4> {
+        // One evaluation for the points of all walls; amplitudes at every chirp are too large for that.
         let frame = self.config.equations.amplitudes == Amplitudes::Frame;
-        let walls: Vec<(usize, Group<'_>, Option<Tensor<2>>)> = (0..scene.proxies.len())
-            .flat_map(|wall| {
-                let groups = self.groups((scene, view, posed), surfaces, &view.proxies[wall], Scattering::Patches);
-                groups.into_iter().map(move |group| (wall, group))
+        let at_once = if frame { scene.proxies.len() } else { 1 };
+        let walls: Vec<usize> = (0..scene.proxies.len()).collect();
+        let blocks: Vec<WallPoints> = walls.chunks(at_once).map(|walls| WallPoints::new(view, walls)).collect();
+        let groups: Vec<_> = blocks
+            .iter()
+            .flat_map(|block| {
+                let groups = self.groups((scene, view, posed), surfaces, &block.seen, Scattering::Patches);
+                groups.into_iter().map(move |group| (block, group))
             })
-            .map(|(wall, group)| {
-                let amplitude = frame.then(|| self.of_frame(&group, scene.proxies[wall].position_m));
-                (wall, group, amplitude)
+            .map(|(block, group)| {
+                let places = Places::Each(block.of_walls(group.visible.kind, |wall| scene.proxies[wall].position_m));
+                let amplitude = frame.then(|| self.of_frame(&group, &places));
+                (block, group, places, amplitude)
             })
             .collect();
+        let places_m: Vec<[f64; 3]> = scene.proxies.iter().map(|proxy| proxy.position_m).collect();
         self.transmitters(scene, |tx, device| {
-            let parts = walls.iter().map(|(wall, group, amplitude)| {
-                let place = scene.proxies[*wall].position_m;
+            let seen = groups.iter().map(|(_, group, places, amplitude)| {
                 let (displacement, weighed) = self.as_seen(group, tx, device, |displacement| match amplitude {
                     Some(amplitude) => amplitude.clone(),
                     None => {
                         let attitude = group.attitude_at(tx, device);
-                        self.answer(group, &attitude, group.sight_at(displacement, tx, place))
+                        self.answer(group, &attitude, group.sight_at(displacement, tx, places))
                     }
                 });
-                let amplitude = Amplitude::real(weighed);
-                let points =
-                    Points { reference_m: &group.visible.reference_m, displacement: &displacement, amplitude: &amplitude };
-                indirect_signal(points, place, &scene.radar, tx, self.config.dechirp, self.config.sum)
+                (displacement, Amplitude::real(weighed))
             });
-            parts.reduce(Complex::add)
+            let seen: Vec<(Displacement, Amplitude)> = seen.collect();
+            let to_walls = groups.iter().zip(&seen).map(|((block, group, ..), (displacement, amplitude))| ToWalls {
+                points: Points { reference_m: &group.visible.reference_m, displacement, amplitude },
+                walls: block.rows(group.visible.kind),
+            });
+            let to_walls: Vec<ToWalls> = to_walls.collect();
+            indirect_signal(&to_walls, &places_m, &scene.radar, tx, self.config.dechirp, self.config.sum)
         })
     }
 
@@ -187,10 +197,10 @@ impl Simulator {
         }
     }
 
-    /// What a group returns towards a place, once for a frame, `[point, 1]`.
-    fn of_frame(&self, group: &Group<'_>, place: [f64; 3]) -> Tensor<2> {
+    /// What a group returns towards places, once for a frame, `[point, 1]`.
+    fn of_frame(&self, group: &Group<'_>, places: &Places) -> Tensor<2> {
         let device = self.device();
-        self.answer(group, &group.visible.attitude(&device), group.visible.sight(place, &device))
+        self.answer(group, &group.visible.attitude(&device), group.visible.sight(places, &device))
     }
 
     /// Weighted L_p or SH_{p,k}, `[point, chirp]` or `[point, 1]`.

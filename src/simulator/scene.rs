@@ -9,7 +9,10 @@ use burn::tensor::{DType, Device, Tensor};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::{SimulatorConfig, point_tensors::directions};
+use super::{
+    SimulatorConfig,
+    point_tensors::{directions, way},
+};
 use crate::{
     body::{BodyFrame, Displacement, PoseCorrection, PoseTensors, PosedBody, PosedFrame, Posing, Sampling, facets},
     error::Result,
@@ -162,7 +165,7 @@ impl Scene {
     /// # Gradient
     /// Flows to `moved_m` (`[point, xyz]`, metres from the references).
     pub fn towards_radar(&self, reference_m: &[[f64; 3]], moved_m: Tensor<2>, device: &Device) -> Tensor<2> {
-        directions(reference_m.iter().copied(), moved_m, self.radar.centre_m(), device).squeeze_dim(1)
+        directions(reference_m.iter().map(|&point| way(point, self.radar.centre_m())), moved_m, device).squeeze_dim(1)
     }
 
     /// Of chosen points of the body the canonical axis that lies flattest on the surface.

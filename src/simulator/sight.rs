@@ -4,7 +4,7 @@ use burn::tensor::{DType, Device, Tensor};
 
 use super::{
     groups::{Group, Kind, Scattering, Visible},
-    point_tensors::{column, directions, towards, vectors},
+    point_tensors::{column, directions, towards, vectors, way},
 };
 use crate::body::Displacement;
 
@@ -22,6 +22,22 @@ pub(super) struct Sight {
     pub outgoing: Tensor<3>,
 }
 
+/// Where the points of a group send their echoes.
+pub(super) enum Places {
+    Same([f64; 3]),
+    /// `[point]`
+    Each(Vec<[f64; 3]>),
+}
+
+impl Places {
+    fn of(&self, row: usize) -> [f64; 3] {
+        match self {
+            Self::Same(place) => *place,
+            Self::Each(places) => places[row],
+        }
+    }
+}
+
 impl Visible<'_> {
     /// In the middle of the frame.
     pub fn attitude(&self, device: &Device) -> Attitude {
@@ -37,17 +53,17 @@ impl Visible<'_> {
         }
     }
 
-    /// In the middle of the frame, from the transmitters' centre to a place.
-    pub fn sight(&self, place: [f64; 3], device: &Device) -> Sight {
+    /// In the middle of the frame, from the transmitters' centre to places, one per point.
+    pub fn sight(&self, places: &Places, device: &Device) -> Sight {
         let [transmitters_m, _] = self.scene.radar.antenna_centres_m();
-        let towards = |place| {
-            let references = self.reference_m.iter().copied();
+        let towards = |places: &Places| {
+            let ways = self.reference_m.iter().enumerate().map(|(row, &point)| way(point, places.of(row)));
             match self.posed {
-                Some(posed) => directions(references, posed.middle_m(self.points), place, device),
-                None => towards(references, place, device),
+                Some(posed) => directions(ways, posed.middle_m(self.points), device),
+                None => towards(ways, device),
             }
         };
-        Sight { incident: towards(transmitters_m), outgoing: towards(place) }
+        Sight { incident: towards(&Places::Same(transmitters_m)), outgoing: towards(places) }
     }
 }
 
@@ -71,12 +87,13 @@ impl Group<'_> {
         }
     }
 
-    /// At the chirps of a transmitter, from it to a place. Gradient flows to the displacement.
-    pub fn sight_at(&self, displacement: &Displacement, tx: usize, place: [f64; 3]) -> Sight {
+    /// At the chirps of a transmitter, from it to places. Gradient flows to the displacement.
+    pub fn sight_at(&self, displacement: &Displacement, tx: usize, places: &Places) -> Sight {
         let reference_m = &self.visible.reference_m;
+        let transmitter = Places::Same(self.visible.scene.radar.tx_position_m(tx));
         Sight {
-            incident: towards_moved(reference_m, displacement, self.visible.scene.radar.tx_position_m(tx)),
-            outgoing: towards_moved(reference_m, displacement, place),
+            incident: towards_moved(reference_m, displacement, &transmitter),
+            outgoing: towards_moved(reference_m, displacement, places),
         }
     }
 }
@@ -84,11 +101,11 @@ impl Group<'_> {
 /// Added to squared lengths, m²: a point at the place itself has a finite gradient.
 const TINY_M2: f64 = 1e-12;
 
-/// Unit vectors from displaced points to a place, `[point, chirp, xyz]`.
-fn towards_moved(reference_m: &[[f64; 3]], displacement: &Displacement, place: [f64; 3]) -> Tensor<3> {
+/// Unit vectors from displaced points to places, `[point, chirp, xyz]`.
+fn towards_moved(reference_m: &[[f64; 3]], displacement: &Displacement, places: &Places) -> Tensor<3> {
     let Displacement { x, y, z } = displacement;
     let way = [x, y, z].into_iter().enumerate().map(|(axis, u)| {
-        let still = column(reference_m.iter().map(|point| place[axis] - point[axis]), &u.device());
+        let still = column(reference_m.iter().enumerate().map(|(row, point)| places.of(row)[axis] - point[axis]), &u.device());
         debug_assert_eq!(u.dtype(), DType::F32);
         still - u.clone()
     });

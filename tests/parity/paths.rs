@@ -2,7 +2,7 @@
 
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use hybridsim::complex::Complex;
-use hybridsim::if_signal::{SumForm, direct_signal, indirect_signal};
+use hybridsim::if_signal::{SumForm, ToWalls, direct_signal, indirect_signal};
 use hybridsim::paths::{Amplitude, Dechirp, Displacement, Points};
 use hybridsim::radar::Radar;
 use num_complex::Complex64;
@@ -95,7 +95,9 @@ fn the_indirect_signal_by_way_of_each_wall_is_that_of_numpy() {
         let (cells, signal_length) = (scene.dims[0] * scene.dims[1], wanted.len() / 2);
         for (wall, proxy_m) in golden.points("in_proxy_m").into_iter().enumerate() {
             let amplitude = scene.amplitude(&amplitudes[wall * cells..(wall + 1) * cells]);
-            let found = indirect_signal(scene.points(&amplitude), proxy_m, &radar_of_paths(), 0, Dechirp::Paper, form);
+            let points = scene.points(&amplitude);
+            let to_walls = ToWalls { points, walls: &[(0, 0..points.reference_m.len())] };
+            let found = indirect_signal(&[to_walls], &[proxy_m], &radar_of_paths(), 0, Dechirp::Paper, form).unwrap();
             let error = error_db(found, &wanted[wall * signal_length..(wall + 1) * signal_length]);
             assert!(error < tolerance_db, "wall {wall} {form:?} {dtype:?}: {error:.1} dB, at most {tolerance_db} dB");
         }

@@ -11,13 +11,13 @@ use burn_autodiff::grads::Gradients;
 use burn_autodiff::ops::{Backward, Ops, OpsKind};
 use burn_flex::FlexTensor;
 
-use super::kernel;
+use super::kernel::{self, Output};
 use super::moving::{self, Geometry, Moving, Tensors};
 use super::phasors::{self, Inputs};
 
-/// Sums have shape `[2, rx, chirp, sample]`: real parts, then imaginary parts. A real amplitude stands in for its
+/// Sums have shape `[2, output, chirp, sample]`: real parts, then imaginary parts. A real amplitude stands in for its
 /// imaginary part, which counts only if `complex`. Gradients come in the order of the tensors.
-#[backend_extension(Flex, Autodiff)]
+#[backend_extension(Flex, Cube: cfg(any(feature = "wgpu", feature = "cuda")), Autodiff)]
 pub trait RadarOps: Backend {
     /// Of phasors, all `[point, chirp]`, at one receiver.
     fn sum_of_phasors(
@@ -87,7 +87,8 @@ fn with_phasors<T>(tensors: [FlexTensor; 4], complex: bool, of: impl FnOnce(Inpu
         expect(name, tensor, [points, chirps]);
     }
     let im = complex.then(|| im.storage());
-    of(Inputs { re: re.storage(), im, phase: phase.storage(), sweep: sweep.storage(), points, chirps })
+    let outputs = [Output { path: 0, points: 0..points }];
+    of(Inputs { outputs, re: re.storage(), im, phase: phase.storage(), sweep: sweep.storage(), points, chirps })
 }
 
 fn with_moving<T>(tensors: [FlexTensor; 5], geometry: Arc<Geometry>, complex: bool, of: impl FnOnce(Moving) -> T) -> T {
@@ -156,7 +157,7 @@ impl RadarOps for Flex {
         samples: usize,
     ) -> FlexTensor {
         let [_, chirps] = shape(&x);
-        let shape = [2, geometry.receivers(), chirps, samples];
+        let shape = [2, geometry.outputs().len(), chirps, samples];
         with_moving([x, y, z, re, im], geometry, complex, |moving| tensor(kernel::sum(&moving, samples), shape))
     }
 

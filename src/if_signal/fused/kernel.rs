@@ -1,5 +1,7 @@
 //! The sum over all returns, and its adjoint, on all cores: which points and chirps are worked on together.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::lanes::{LANES, Lanes, ZERO, zip};
@@ -12,13 +14,24 @@ const CHUNK: usize = 2048;
 /// Tasks from which on the points need not be shared out.
 const ENOUGH_TASKS: usize = 8;
 
-/// Where returns come from. Several receivers may see the same points.
+/// One sum: of the paths of some points.
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// Which of the paths of each point.
+    pub path: usize,
+    pub points: Range<usize>,
+}
+
+/// Where returns come from.
 pub trait Returns: Sync {
     fn points(&self) -> usize;
     fn chirps(&self) -> usize;
-    fn receivers(&self) -> usize;
+    /// Paths of each point.
+    fn paths(&self) -> usize;
+    /// What is summed apart. Every point's paths are in one sum each, or in none.
+    fn outputs(&self) -> &[Output];
     /// Chirps from `chirp` on; those beyond the last repeat it.
-    fn load<const FUSED: bool>(&self, receiver: usize, point: usize, chirp: usize) -> Return;
+    fn load<const FUSED: bool>(&self, path: usize, point: usize, chirp: usize) -> Return;
 }
 
 /// Where the gradients to a range of points go.
@@ -28,28 +41,29 @@ pub trait Sink: Send {
     /// Before anything else.
     fn open(&mut self);
     /// At the chirps from `chirp` on, for a point counted from the first of this range.
-    fn put<const FUSED: bool>(&mut self, receiver: usize, local: usize, chirp: usize, gradient: &Return);
-    /// After the last chirp of a receiver.
-    fn close<const FUSED: bool>(&mut self, receiver: usize);
+    fn put<const FUSED: bool>(&mut self, path: usize, local: usize, chirp: usize, gradient: &Return);
+    /// After the last chirp of a path of all points.
+    fn close<const FUSED: bool>(&mut self, path: usize);
 }
 
-/// Both parts of the sum, `[2, receiver, chirp, sample]`.
+/// Both parts of the sums, `[2, output, chirp, sample]`.
 pub fn sum(returns: &impl Returns, samples: usize) -> Vec<f32> {
     let plan = Plan::new(samples);
-    let (points, chirps, receivers) = (returns.points(), returns.chirps(), returns.receivers());
+    let (chirps, outputs) = (returns.chirps(), returns.outputs());
     let blocks = chirps.div_ceil(LANES);
-    let parts = if blocks * receivers >= ENOUGH_TASKS { 1 } else { points.div_ceil(CHUNK).max(1) };
-    let chunk = points.div_ceil(parts).max(1);
+    let most = outputs.iter().map(|output| output.points.len()).max().unwrap_or(0);
+    let parts = if blocks * outputs.len() >= ENOUGH_TASKS { 1 } else { most.div_ceil(CHUNK).max(1) };
+    let chunk = most.div_ceil(parts).max(1);
 
-    let mut out = vec![0.0; 2 * receivers * chirps * samples];
-    let (out_re, out_im) = out.split_at_mut(receivers * chirps * samples);
-    let by_block = |part| blocks_of(part, receivers, chirps * samples, LANES * samples);
+    let mut out = vec![0.0; 2 * outputs.len() * chirps * samples];
+    let (out_re, out_im) = out.split_at_mut(outputs.len() * chirps * samples);
+    let by_block = |part| blocks_of(part, outputs.len(), chirps * samples, LANES * samples);
     by_block(out_re).into_par_iter().zip(by_block(out_im)).enumerate().for_each(|(task, (re, im))| {
         let part = |part: usize| {
             let mut grid = plan.empty();
-            let points = part * chunk..((part + 1) * chunk).min(points);
-            let (receiver, chirp) = (task / blocks, task % blocks * LANES);
-            widest(Fill { plan: &plan, returns, points, receiver, chirp, grid: &mut grid });
+            let (Output { path, points }, chirp) = (&outputs[task / blocks], task % blocks * LANES);
+            let points = points.start + part * chunk..(points.start + (part + 1) * chunk).min(points.end);
+            widest(Fill { plan: &plan, returns, points, path: *path, chirp, grid: &mut grid });
             grid
         };
         let mut grid = match parts {
@@ -68,8 +82,8 @@ pub fn sum(returns: &impl Returns, samples: usize) -> Vec<f32> {
 struct Fill<'a, R> {
     plan: &'a Plan,
     returns: &'a R,
-    points: std::ops::Range<usize>,
-    receiver: usize,
+    points: Range<usize>,
+    path: usize,
     chirp: usize,
     grid: &'a mut [Lanes],
 }
@@ -79,10 +93,10 @@ impl<R: Returns> Work for Fill<'_, R> {
 
     #[inline(always)]
     fn run<const FUSED: bool>(self) {
-        let Self { plan, returns, points, receiver, chirp, grid } = self;
+        let Self { plan, returns, points, path, chirp, grid } = self;
         let width = LANES.min(returns.chirps() - chirp);
         for point in points {
-            plan.spread::<FUSED>(&returns.load::<FUSED>(receiver, point, chirp), width, grid);
+            plan.spread::<FUSED>(&returns.load::<FUSED>(path, point, chirp), width, grid);
         }
     }
 }
@@ -113,19 +127,19 @@ impl Work for Collect<'_> {
     }
 }
 
-/// The adjoint of [`sum`]: from the gradient to both parts of the sum, `[2, receiver, chirp, sample]`, those to the
+/// The adjoint of [`sum`]: from the gradient to both parts of the sums, `[2, output, chirp, sample]`, those to the
 /// returns. The sinks cover the points in order.
 pub fn gradients(returns: &impl Returns, upstream: &[f32], samples: usize, sinks: Vec<impl Sink>) {
     let plan = Plan::new(samples);
-    let (chirps, receivers) = (returns.chirps(), returns.receivers());
+    let (chirps, outputs) = (returns.chirps(), returns.outputs().len());
     let blocks = chirps.div_ceil(LANES);
-    let (up_re, up_im) = upstream.split_at(receivers * chirps * samples);
-    let grids: Vec<Scratch> = (0..receivers * blocks)
+    let (up_re, up_im) = upstream.split_at(outputs * chirps * samples);
+    let grids: Vec<Scratch> = (0..outputs * blocks)
         .into_par_iter()
         .map(|task| {
-            let (receiver, chirp) = (task / blocks, task % blocks * LANES);
+            let (output, chirp) = (task / blocks, task % blocks * LANES);
             let width = LANES.min(chirps - chirp);
-            let start = (receiver * chirps + chirp) * samples;
+            let start = (output * chirps + chirp) * samples;
             let [re, im] = [up_re, up_im].map(|part| &part[start..start + width * samples]);
             let mut grid = plan.empty();
             widest(Distribute { plan: &plan, re, im, grid: &mut grid });
@@ -194,16 +208,19 @@ impl<R: Returns, S: Sink> Work for Drain<'_, R, S> {
         let chirps = returns.chirps();
         let blocks = chirps.div_ceil(LANES);
         sink.open();
-        for receiver in 0..returns.receivers() {
-            for block in 0..blocks {
-                let (chirp, grid) = (block * LANES, &grids[receiver * blocks + block]);
-                for local in 0..sink.points() {
-                    let value = returns.load::<FUSED>(receiver, start + local, chirp);
-                    let gradient = plan.interpolate::<FUSED>(&value, LANES.min(chirps - chirp), grid);
-                    sink.put::<FUSED>(receiver, local, chirp, &gradient);
+        for path in 0..returns.paths() {
+            for (index, output) in returns.outputs().iter().enumerate().filter(|(_, output)| output.path == path) {
+                let points = output.points.start.max(start)..output.points.end.min(start + sink.points());
+                for block in 0..blocks {
+                    let (chirp, grid) = (block * LANES, &grids[index * blocks + block]);
+                    for point in points.clone() {
+                        let value = returns.load::<FUSED>(path, point, chirp);
+                        let gradient = plan.interpolate::<FUSED>(&value, LANES.min(chirps - chirp), grid);
+                        sink.put::<FUSED>(path, point - start, chirp, &gradient);
+                    }
                 }
             }
-            sink.close::<FUSED>(receiver);
+            sink.close::<FUSED>(path);
         }
     }
 }
@@ -213,10 +230,10 @@ pub fn points_per_sink(points: usize) -> usize {
     points.div_ceil(4 * rayon::current_num_threads()).max(64)
 }
 
-/// Every receiver's stretch of `per_receiver` numbers in blocks of `size`, the last of them shorter.
-fn blocks_of(values: &mut [f32], receivers: usize, per_receiver: usize, size: usize) -> Vec<&mut [f32]> {
-    debug_assert_eq!(values.len(), receivers * per_receiver);
-    values.chunks_mut(per_receiver).flat_map(|receiver| receiver.chunks_mut(size)).collect()
+/// Every output's stretch of `per_output` numbers in blocks of `size`, the last of them shorter.
+fn blocks_of(values: &mut [f32], outputs: usize, per_output: usize, size: usize) -> Vec<&mut [f32]> {
+    debug_assert_eq!(values.len(), outputs * per_output);
+    values.chunks_mut(per_output).flat_map(|output| output.chunks_mut(size)).collect()
 }
 
 fn add(mut a: Scratch, b: Scratch) -> Scratch {

@@ -1,12 +1,13 @@
 //! Returns given as phasors, and the gradients to these.
 
-use super::kernel::{self, Returns, Sink};
+use super::kernel::{self, Output, Returns, Sink};
 use super::lanes::{ZERO, load, store};
 use super::plan::Return;
 
 /// Tensors `[point, chirp]` in row-major order.
-#[derive(Clone, Copy)]
 pub struct Inputs<'a> {
+    /// All points in one.
+    pub outputs: [Output; 1],
     pub re: &'a [f32],
     pub im: Option<&'a [f32]>,
     pub phase: &'a [f32],
@@ -24,8 +25,12 @@ impl Returns for Inputs<'_> {
         self.chirps
     }
 
-    fn receivers(&self) -> usize {
+    fn paths(&self) -> usize {
         1
+    }
+
+    fn outputs(&self) -> &[Output] {
+        &self.outputs
     }
 
     #[inline(always)]

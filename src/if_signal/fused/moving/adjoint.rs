@@ -40,7 +40,7 @@ struct Back<'a> {
     first: usize,
     /// `[point][leg][chirp]`, to the legs' changes.
     to_legs: Scratch,
-    /// `[point][chirp]`, of the receiver at hand.
+    /// `[point][chirp]`, of the path at hand.
     to_sweep: Scratch,
     axes: [&'a mut [f32]; 3],
     re: &'a mut [f32],
@@ -66,13 +66,14 @@ impl Sink for Back<'_> {
         self.to_legs = Scratch::new((size * self.moving.geometry.legs()).div_ceil(LANES));
         self.to_legs.fill(ZERO);
         self.to_sweep = Scratch::new(size.div_ceil(LANES));
+        self.to_sweep.fill(ZERO);
     }
 
     #[inline(always)]
-    fn put<const FUSED: bool>(&mut self, receiver: usize, local: usize, chirp: usize, gradient: &Return) {
+    fn put<const FUSED: bool>(&mut self, index: usize, local: usize, chirp: usize, gradient: &Return) {
         let Moving { geometry, tensors, .. } = self.moving;
         let (point, width, chirps) = (self.first + local, tensors.chirps - chirp, tensors.chirps);
-        let path = self.moving.path::<FUSED>(receiver, point, chirp);
+        let path = self.moving.path::<FUSED>(index, point, chirp);
         let spread = |gradient: Lanes| zip(gradient, path.spreading, |g, w| g * w);
         Self::to_amplitude(self.re, tensors.amplitude_chirps, local, chirp, width, spread(gradient.re));
         let mut to_spreading = zip(gradient.re, self.moving.amplitude(tensors.re, point, chirp), |g, a| g * a);
@@ -82,11 +83,11 @@ impl Sink for Back<'_> {
         }
         // The spreading is 1/(a·b + ε): to either length it falls by its square times the other one.
         let to_product = zip(to_spreading, path.spreading, |g, w| -g * w * w);
-        let turns_per_metre = geometry.at_rest[receiver][point].turns_per_metre;
+        let turns_per_metre = geometry.at_rest(index, point).turns_per_metre;
         let common = zip(gradient.phase, gradient.sweep, |phase, sweep| {
             multiply_add::<FUSED>(phase, turns_per_metre, sweep * geometry.sweep_per_metre)
         });
-        for (leg, other) in [(0, 1), (receiver + 1, 0)] {
+        for (leg, other) in [(0, 1), (index + 1, 0)] {
             let to_leg = fma::<FUSED>(to_product, path.lengths_m[other], common);
             accumulate(self.to_legs.as_flattened_mut(), (local * geometry.legs() + leg) * chirps + chirp, width, to_leg);
         }
@@ -94,19 +95,19 @@ impl Sink for Back<'_> {
     }
 
     #[inline(always)]
-    fn close<const FUSED: bool>(&mut self, receiver: usize) {
+    fn close<const FUSED: bool>(&mut self, path: usize) {
         let (chirps, legs) = (self.moving.tensors.chirps, self.moving.geometry.legs());
         let per_step = self.moving.geometry.sweep_per_step;
         if per_step != 0.0 && chirps > 1 {
             let rows = self.to_legs.as_flattened_mut().chunks_mut(legs * chirps);
             for (sweep, to_legs) in self.to_sweep.as_flattened().chunks_exact(chirps).zip(rows).take(self.axes[0].len() / chirps)
             {
-                for leg in [0, receiver + 1] {
+                for leg in [0, path + 1] {
                     add_difference_adjoint(sweep, per_step, &mut to_legs[leg * chirps..][..chirps]);
                 }
             }
         }
-        if receiver + 1 == self.moving.receivers() {
+        if path + 1 == self.moving.paths() {
             self.close_legs::<FUSED>();
         }
     }
