@@ -22,8 +22,8 @@ pub use adjoint::gradients;
 /// A point's legs are that from the transmitter, then one for each of its paths.
 #[derive(Debug)]
 pub struct Geometry {
-    /// From each leg's antenna to the points at rest, `[leg, 3, point]`, the legs' lengths then, `[leg, point]`, and phase, sweep and
-    /// turns per metre at rest, `[path, 3, point]`: one after the other, as GPUs take them.
+    /// From each leg's antenna to the points at rest, and how long, `[leg, point, 4]`, then phase, sweep and turns per metre at rest,
+    /// `[path, point, 3]`: one after the other, as GPUs take them.
     constants: Vec<f32>,
     points: usize,
     paths: usize,
@@ -35,9 +35,8 @@ pub struct Geometry {
 impl Geometry {
     /// Receivers that see all points: a path of each point to each.
     pub fn array(reference_m: &[[f64; 3]], tx_m: [f64; 3], receivers_m: &[[f64; 3]], waveform: &Waveform) -> Self {
-        let paths = receivers_m.iter().map(|&receiver_m| vec![(receiver_m, waveform); reference_m.len()]).collect();
         let outputs = (0..receivers_m.len()).map(|path| Output { path, points: 0..reference_m.len() }).collect();
-        Self::new(reference_m, tx_m, paths, outputs, waveform)
+        Self::new(reference_m, tx_m, receivers_m.len(), |path, _| (receivers_m[path], waveform), outputs, waveform)
     }
 
     /// Receivers that see some points each, and together all of them once: one path of each point.
@@ -47,49 +46,37 @@ impl Geometry {
         let next = receivers.iter().try_fold(0, |next, (points, ..)| (points.start == next).then_some(points.end));
         assert_eq!(next, Some(reference_m.len()), "coherent sum: the receivers' points do not follow one another to the last");
         let outputs = receivers.iter().map(|(points, ..)| Output { path: 0, points: points.clone() }).collect();
-        Self::new(reference_m, tx_m, vec![to], outputs, waveform)
+        Self::new(reference_m, tx_m, 1, |_, point| to[point], outputs, waveform)
     }
 
-    /// `paths`: `[path][point]`, the receiver and what a chirp makes of the length; waveforms differ in what follows the receiver.
-    fn new(
+    /// `to`: the receiver of a path of a point, and what a chirp makes of its length; waveforms differ in what follows the receiver.
+    fn new<'a>(
         reference_m: &[[f64; 3]],
         tx_m: [f64; 3],
-        paths: Vec<Vec<([f64; 3], &Waveform)>>,
+        paths: usize,
+        to: impl Fn(usize, usize) -> ([f64; 3], &'a Waveform) + Sync,
         outputs: Vec<Output>,
         waveform: &Waveform,
     ) -> Self {
-        let count = paths.len();
-        let legs: Vec<LegRows> = (0..=count)
-            .into_par_iter()
-            .map(|leg| match leg {
-                0 => LegRows::new(reference_m.iter().map(|&x| (x, tx_m))),
-                _ => LegRows::new(reference_m.iter().zip(&paths[leg - 1]).map(|(&x, &(receiver_m, _))| (x, receiver_m))),
-            })
-            .collect();
-        let at_rest = paths.par_iter().zip(&legs[1..]).map(|(path, to_receiver)| {
-            let lengths = legs[0].lengths_m.iter().zip(&to_receiver.lengths_m);
-            let mut rows = [(); 3].map(|()| Vec::with_capacity(reference_m.len()));
-            for ((from_tx, to_receiver), (_, waveform)) in lengths.zip(path) {
-                let AtRest { phase_turns, sweep_turns, turns_per_metre } = waveform.at_rest(from_tx + to_receiver);
-                let values = [phase_turns, sweep_turns, turns_per_metre];
-                rows.iter_mut().zip(values).for_each(|(row, value)| row.push(value as f32));
-            }
-            rows
+        let points = reference_m.len();
+        let mut constants = vec![0.0; (4 * (paths + 1) + 3 * paths) * points];
+        let (legs, at_rest) = constants.split_at_mut(4 * (paths + 1) * points);
+        legs.par_chunks_exact_mut(4).enumerate().with_min_len(1024).for_each(|(row, leg)| {
+            let (index, point) = (row / points, row % points);
+            let antenna_m = if index == 0 { tx_m } else { to(index - 1, point).0 };
+            let x = reference_m[point];
+            let offset_m = [0, 1, 2].map(|axis| (x[axis] - antenna_m[axis]) as f32);
+            leg.copy_from_slice(&[offset_m[0], offset_m[1], offset_m[2], distance(x, antenna_m) as f32]);
         });
-        let at_rest: Vec<[Vec<f32>; 3]> = at_rest.collect();
-        let mut constants = Vec::with_capacity((4 * (count + 1) + 3 * count) * reference_m.len());
-        legs.iter().flat_map(|leg| &leg.offsets_m).for_each(|row| constants.extend_from_slice(row));
-        legs.iter().for_each(|leg| constants.extend(leg.lengths_m.iter().map(|&length| length as f32)));
-        at_rest.iter().flatten().for_each(|row| constants.extend_from_slice(row));
+        at_rest.par_chunks_exact_mut(3).enumerate().with_min_len(1024).for_each(|(row, path)| {
+            let (index, point) = (row / points, row % points);
+            let (receiver_m, waveform) = to(index, point);
+            let length_m = distance(reference_m[point], tx_m) + distance(reference_m[point], receiver_m);
+            let AtRest { phase_turns, sweep_turns, turns_per_metre } = waveform.at_rest(length_m);
+            path.copy_from_slice(&[phase_turns as f32, sweep_turns as f32, turns_per_metre as f32]);
+        });
         let (per_metre, per_step) = waveform.sweep_factors();
-        Self {
-            constants,
-            points: reference_m.len(),
-            paths: count,
-            outputs,
-            sweep_per_metre: per_metre as f32,
-            sweep_per_step: per_step as f32,
-        }
+        Self { constants, points, paths, outputs, sweep_per_metre: per_metre as f32, sweep_per_step: per_step as f32 }
     }
 
     pub fn points(&self) -> usize {
@@ -119,19 +106,24 @@ impl Geometry {
         self.paths + 1
     }
 
-    /// From a leg's antenna to a point at rest.
+    /// From a leg's antenna to a point at rest, and how long.
+    #[inline(always)]
+    fn leg(&self, point: usize, leg: usize) -> &[f32; 4] {
+        self.constants[4 * (leg * self.points + point)..][..4].try_into().expect("four numbers")
+    }
+
     #[inline(always)]
     fn offset_m(&self, point: usize, leg: usize) -> [f32; 3] {
-        [0, 1, 2].map(|axis| self.constants[(3 * leg + axis) * self.points + point])
+        let [x, y, z, _] = *self.leg(point, leg);
+        [x, y, z]
     }
 
-    /// A leg's length at rest.
     #[inline(always)]
     fn length_m(&self, point: usize, leg: usize) -> f32 {
-        self.constants[(3 * self.legs() + leg) * self.points + point]
+        self.leg(point, leg)[3]
     }
 
-    /// The same, and its square softened.
+    /// A leg's length at rest, and its square softened.
     #[inline(always)]
     fn length<const FUSED: bool>(&self, point: usize, leg: usize) -> (f32, f32) {
         let length = self.length_m(point, leg);
@@ -140,9 +132,9 @@ impl Geometry {
 
     #[inline(always)]
     fn at_rest(&self, path: usize, point: usize) -> PathAtRest {
-        let first = 4 * self.legs() + 3 * path;
+        let row = 4 * self.legs() * self.points + 3 * (path * self.points + point);
         let [phase_turns, sweep_turns, turns_per_metre] =
-            [0, 1, 2].map(|row| self.constants[(first + row) * self.points + point]);
+            *<&[f32; 3]>::try_from(&self.constants[row..][..3]).expect("three numbers");
         PathAtRest { phase_turns, sweep_turns, turns_per_metre }
     }
 }
@@ -152,25 +144,6 @@ struct PathAtRest {
     phase_turns: f32,
     sweep_turns: f32,
     turns_per_metre: f32,
-}
-
-/// One leg of all points: from its antenna to the points at rest.
-struct LegRows {
-    offsets_m: [Vec<f32>; 3],
-    lengths_m: Vec<f64>,
-}
-
-impl LegRows {
-    /// Of points and their antennas.
-    fn new(ends: impl ExactSizeIterator<Item = ([f64; 3], [f64; 3])>) -> Self {
-        let mut offsets_m = [(); 3].map(|()| Vec::with_capacity(ends.len()));
-        let mut lengths_m = Vec::with_capacity(ends.len());
-        for (point, antenna) in ends {
-            offsets_m.iter_mut().enumerate().for_each(|(axis, row)| row.push((point[axis] - antenna[axis]) as f32));
-            lengths_m.push(distance(point, antenna));
-        }
-        Self { offsets_m, lengths_m }
-    }
 }
 
 /// |v+u|² − |v|².

@@ -4,21 +4,16 @@
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-/// Where a constant is in the row of a geometry: offsets `[leg, 3, point]`, lengths `[leg, point]`, then phase, sweep and turns per metre
-/// at rest `[path, 3, point]`; as `Geometry` has them.
+/// Where a leg begins in the row of a geometry: offset and length `[leg, point, 4]`, then phase, sweep and turns per metre at rest
+/// `[path, point, 3]`; as `Geometry` has them.
 #[cube]
-fn offset_at(leg: usize, axis: usize, point: usize, points: usize) -> usize {
-    (3 * leg + axis) * points + point
-}
-
-#[cube]
-fn length_at(leg: usize, point: usize, points: usize, legs: usize) -> usize {
-    (3 * legs + leg) * points + point
+fn leg_at(leg: usize, point: usize, points: usize) -> usize {
+    4 * (leg * points + point)
 }
 
 #[cube]
 fn at_rest_at(path: usize, which: usize, point: usize, points: usize, legs: usize) -> usize {
-    (4 * legs + 3 * path + which) * points + point
+    4 * legs * points + 3 * (path * points + point) + which
 }
 
 /// What a chirp's central difference takes of another chirp; as [`crate::paths::difference`].
@@ -65,13 +60,9 @@ struct Leg {
 }
 
 #[cube]
-fn leg_of(constants: &[f32], leg: usize, point: usize, points: usize, legs: usize) -> Leg {
-    Leg {
-        x: constants[offset_at(leg, 0usize, point, points)],
-        y: constants[offset_at(leg, 1usize, point, points)],
-        z: constants[offset_at(leg, 2usize, point, points)],
-        length: constants[length_at(leg, point, points, legs)],
-    }
+fn leg_of(constants: &[f32], leg: usize, point: usize, points: usize) -> Leg {
+    let first = leg_at(leg, point, points);
+    Leg { x: constants[first], y: constants[first + 1], z: constants[first + 2], length: constants[first + 3] }
 }
 
 /// |v + u|² − |v|², and |v + u| softened.
@@ -124,8 +115,8 @@ pub fn phasors(
     let point = at / chirps % points;
     let path = at / chirps / points;
     let legs = paths + 1;
-    let from_tx = leg_of(constants, 0usize, point, points, legs);
-    let to_receiver = leg_of(constants, path + 1, point, points, legs);
+    let from_tx = leg_of(constants, 0usize, point, points);
+    let to_receiver = leg_of(constants, path + 1, point, points);
     let first = point * chirps;
     let (dx, dy, dz) = (x[first + chirp], y[first + chirp], z[first + chirp]);
     let a = change_of(&from_tx, dx, dy, dz, softening);
@@ -201,7 +192,7 @@ pub fn adjoint(
     let amplitude_chirps = amplitude_chirps as usize;
     let amplitude = point * amplitude_chirps + chirp % amplitude_chirps;
     let (dx, dy, dz) = (x[at], y[at], z[at]);
-    let from_tx = leg_of(constants, 0usize, point, points, legs);
+    let from_tx = leg_of(constants, 0usize, point, points);
     let a = from_tx.length + change_of(&from_tx, dx, dy, dz, softening);
     let mut sum_x = 0.0f32;
     let mut sum_y = 0.0f32;
@@ -211,7 +202,7 @@ pub fn adjoint(
     let mut to_first = 0.0f32;
     for path in 0..paths {
         let here = (path * points + point) * chirps;
-        let to_receiver = leg_of(constants, path + 1, point, points, legs);
+        let to_receiver = leg_of(constants, path + 1, point, points);
         let b = to_receiver.length + change_of(&to_receiver, dx, dy, dz, softening);
         let spreading = 1.0f32 / (a * b + near_field);
         let g_re = of_re[here + chirp];
