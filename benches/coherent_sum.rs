@@ -1,7 +1,7 @@
 //! Times the direct and the indirect signal, from positions to samples, as JSON lines.
 //!
-//! `cargo bench --bench coherent_sum [-- unit | scaling | DEVICE]`; a device as of `--device`, such as `wgpu`, does the unit. Every case runs in a process of its own, so that its peak
-//! memory is its own. Several forms are timed in one run, because only numbers of one run can be compared.
+//! `cargo bench --bench coherent_sum [-- unit | scaling | DEVICE]`; a device as of `--device`, such as `wgpu`, does the unit. Every case
+//! runs in a process of its own, so that its peak memory is its own. Several forms are timed in one run, because only numbers of one run can be compared.
 
 use std::time::Instant;
 
@@ -69,12 +69,7 @@ fn base() -> Case {
 }
 
 fn unit() -> Vec<Case> {
-    let mut cases = vec![];
-    for form in [SumForm::Fused, SumForm::Tensor] {
-        for mode in ["forward", "amplitudes", "positions"] {
-            cases.push(Case { form, mode: mode.into(), ..base() });
-        }
-    }
+    let mut cases = of_device("flex");
     for mode in ["forward", "positions"] {
         cases.push(Case { mode: mode.into(), dechirp: Dechirp::Paper, ..base() });
         cases.push(Case { bench: "unit, room at rest".into(), mode: mode.into(), still: 5000, ..base() });
@@ -86,7 +81,7 @@ fn unit() -> Vec<Case> {
     cases
 }
 
-/// The unit on another device.
+/// The unit in both forms.
 fn of_device(device: &str) -> Vec<Case> {
     let mut cases = vec![];
     for form in [SumForm::Fused, SumForm::Tensor] {

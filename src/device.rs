@@ -7,16 +7,6 @@ pub(crate) fn is_flex(device: &Device) -> bool {
     matches!(device.clone().without_autodiff().as_dispatch(), DispatchDevice::Flex(_))
 }
 
-/// Whether a GPU computes, or what stands in for one: every backend of CubeCL.
-pub(crate) fn is_gpu(device: &Device) -> bool {
-    #[cfg(any(feature = "wgpu", feature = "cuda"))]
-    if matches!(device.clone().without_autodiff().as_dispatch(), DispatchDevice::Cube(_)) {
-        return true;
-    }
-    let _ = device;
-    false
-}
-
 /// Whether the processor itself computes: flex, or ndarray where the build has it.
 pub(crate) fn is_cpu(device: &Device) -> bool {
     #[cfg(feature = "ndarray")]
@@ -24,4 +14,9 @@ pub(crate) fn is_cpu(device: &Device) -> bool {
         return true;
     }
     is_flex(device)
+}
+
+/// Whether a GPU computes, or what stands in for one: every backend of CubeCL.
+pub(crate) fn is_gpu(device: &Device) -> bool {
+    !is_cpu(device)
 }

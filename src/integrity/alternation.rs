@@ -92,25 +92,33 @@ impl Alternation {
 /// The kinds' common factor `[kind]`, which leaves least of most cells: the first eigenvector of the means' products, in which each cell
 /// counts by what the factor before left of it and by its noise (a Lorentzian M-estimate by iteratively reweighted least squares: P. W.
 /// Holland and R. E. Welsch, Commun. Stat. A6, 1977). One strong return that moves by itself does not outweigh the others. Means
-/// `[kind][cell]`, energy of noise in them `[cell]`.
-fn common(means: &[Vec<Complex64>], noise: &[f64]) -> Vec<Complex64> {
-    let kinds = means.len();
-    let cells: Vec<DVector<Complex64>> =
-        (0..noise.len()).map(|cell| DVector::from_iterator(kinds, means.iter().map(|means| means[cell]))).collect();
+/// `[kind, cell]`, their energies and that of noise in them `[cell]`.
+fn common(means: &DMatrix<Complex64>, energies: &[f64], noise: &[f64]) -> DVector<Complex64> {
+    let kinds = means.nrows();
     // At first each counts alike.
-    let mut left: Vec<f64> = cells.iter().map(|cell| cell.norm_squared()).collect();
+    let mut left = energies.to_vec();
     let mut factor = DVector::zeros(kinds);
     for _ in 0..ITERATIONS {
         let mut products = DMatrix::<Complex64>::zeros(kinds, kinds);
-        for ((cell, left), noise) in cells.iter().zip(&left).zip(noise) {
+        for ((cell, left), noise) in means.column_iter().zip(&left).zip(noise) {
             let weight = 1.0 / (left + noise).max(f64::MIN_POSITIVE);
-            products.gerc(weight.into(), cell, cell, Complex64::ONE);
+            products.gerc(weight.into(), &cell, &cell, Complex64::ONE);
         }
         let eigen = SymmetricEigen::new(products);
         factor = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
-        left = cells.iter().map(|cell| (cell.norm_squared() - factor.dotc(cell).norm_sqr()).max(0.0)).collect();
+        let along = means.column_iter().map(|cell| factor.dotc(&cell).norm_sqr());
+        left = energies.iter().zip(along).map(|(energy, along)| (energy - along).max(0.0)).collect();
     }
-    factor.iter().copied().collect()
+    factor
+}
+
+/// Means of the loops of each kind, `[kind, cell]`, from spectra `[loop][cell]`.
+fn means(spectra: &[Complex64], cells: usize, kinds: usize) -> DMatrix<Complex64> {
+    let mut means = DMatrix::zeros(kinds, cells);
+    for (index, values) in spectra.chunks_exact(cells).enumerate() {
+        means.row_mut(index % kinds).iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+    }
+    means * Complex64::from(kinds as f64 * cells as f64 / spectra.len() as f64)
 }
 
 /// Windowed range spectra `[loop, channel, bin]`: Hann, so that a strong return does not take the place of the others.
@@ -135,18 +143,7 @@ impl Inspector for Alternation {
         self.frames += 1;
         let spectra = spectra(stream);
         let cells = self.schedule.channels() * samples;
-        let means = |kinds: usize| {
-            let mut means = vec![vec![Complex64::ZERO; cells]; kinds];
-            for (index, values) in spectra.chunks_exact(cells).enumerate() {
-                means[index % kinds]
-                    .iter_mut()
-                    .zip(values)
-                    .for_each(|(sum, value)| *sum += value * (kinds as f64 / loops as f64));
-            }
-            means
-        };
-        let energies = |means: &[Vec<Complex64>], cell: usize| means.iter().map(|means| means[cell].norm_sqr()).sum::<f64>();
-        let mean = means(1).remove(0);
+        let mean = means(&spectra, cells, 1);
         let mut energy = vec![0.0; cells];
         for values in spectra.chunks_exact(cells) {
             energy.iter_mut().zip(values).for_each(|(sum, value)| *sum += value.norm_sqr());
@@ -155,16 +152,18 @@ impl Inspector for Alternation {
             self.still[cell % samples] += loops as f64 * value.norm_sqr();
         }
         for turns in &mut self.turns {
-            let (means, each) = (means(turns.kinds), (loops / turns.kinds) as f64);
-            let noise = |cell: usize| (energy[cell] - each * energies(&means, cell)).max(0.0) / (loops - turns.kinds) as f64;
-            let of_means = (turns.kinds - 1) as f64 / each;
-            let factor = common(&means, &(0..cells).map(|cell| of_means * noise(cell)).collect::<Vec<f64>>());
-            for cell in 0..cells {
-                let (bin, of_kinds) = (cell % samples, each * energies(&means, cell));
-                let along: Complex64 = factor.iter().zip(&means).map(|(factor, means)| factor.conj() * means[cell]).sum();
-                turns.between[bin] += (of_kinds - loops as f64 * mean[cell].norm_sqr()).max(0.0);
-                turns.beyond[bin] += (of_kinds - each * along.norm_sqr()).max(0.0);
-                turns.within[bin] += (energy[cell] - of_kinds).max(0.0);
+            let each = (loops / turns.kinds) as f64;
+            let means = means(&spectra, cells, turns.kinds);
+            let of_kinds: Vec<f64> = means.column_iter().map(|cell| cell.norm_squared()).collect();
+            let within: Vec<f64> = energy.iter().zip(&of_kinds).map(|(all, kinds)| (all - each * kinds).max(0.0)).collect();
+            let of_means = (turns.kinds - 1) as f64 / each / (loops - turns.kinds) as f64;
+            let noise: Vec<f64> = within.iter().map(|within| of_means * within).collect();
+            let factor = common(&means, &of_kinds, &noise);
+            for (cell, values) in means.column_iter().enumerate() {
+                let bin = cell % samples;
+                turns.between[bin] += (each * of_kinds[cell] - loops as f64 * mean[cell].norm_sqr()).max(0.0);
+                turns.beyond[bin] += each * (of_kinds[cell] - factor.dotc(&values).norm_sqr()).max(0.0);
+                turns.within[bin] += within[cell];
             }
         }
     }

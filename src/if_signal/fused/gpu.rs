@@ -15,13 +15,11 @@ use burn_cubecl::ops::numeric::empty_device_contiguous_dtype;
 use burn_cubecl::tensor::CubeTensor;
 use burn_cubecl::{CubeBackend, kernel::into_contiguous};
 
+use super::LARGEST;
 use super::extension::RadarOps;
 use super::kernel::Output;
 use super::moving::Geometry;
-use crate::paths::{NEAR_FIELD_M2, SOFTENING_M};
 
-/// Numbers of one tensor that a kernel writes at most: WebGPU's default `maxStorageBufferBindingSize`, 128 MiB.
-pub const LARGEST: usize = 1 << 25;
 /// Cubes that fill a large GPU: 132 multiprocessors of 2,048 units (NVIDIA H100). Fixed, so that equal inputs give equal sums on every
 /// device.
 const CUBES: usize = 132 * 2048 / sum::UNITS;
@@ -46,10 +44,6 @@ impl Phasors {
         let [re, im, phase, sweep] = [re, im, phase, sweep].map(into_contiguous);
         let outputs = vec![Output { path: 0, points: 0..points }];
         Self { re, im, phase, sweep, paths: 1, points, chirps, outputs, complex }
-    }
-
-    fn sizes(&self, samples: usize) -> [u32; 4] {
-        [self.outputs.len(), self.points, self.chirps, samples].map(|count| count as u32)
     }
 
     /// Points of the largest sum.
@@ -77,8 +71,7 @@ impl Phasors {
         let per_chunk = most.div_ceil(chunks).next_multiple_of(sum::LANES).max(sum::LANES);
         let chunks = most.div_ceil(per_chunk).max(1);
         let out = empty(&self.phase, [chunks, 2, outputs, chirps, samples]);
-        let [o, p, c, n] = self.sizes(samples);
-        let cubes = CubeCount::Static(rows as u32, o, (chunks * blocks) as u32);
+        let cubes = cubes(rows, outputs, chunks * blocks);
         let ranges = self.outputs();
         // Every index is held to these sizes.
         unsafe {
@@ -92,11 +85,11 @@ impl Phasors {
                 self.sweep.into_buffer_arg(),
                 ranges,
                 out.clone().into_buffer_arg(),
-                o,
-                p,
-                c,
-                n,
-                per_chunk as u32,
+                outputs,
+                self.points,
+                chirps,
+                samples,
+                per_chunk,
                 self.complex,
             );
         }
@@ -111,8 +104,7 @@ impl Phasors {
         let gradient = |on: bool| empty(&self.phase, if on { [paths, points, chirps] } else { [1; 3] });
         let found = [gradient(true), gradient(complex), gradient(true), gradient(true)];
         let [to_re, to_im, to_phase, to_sweep] = found.clone().map(CubeTensor::into_buffer_arg);
-        let [o, p, c, n] = self.sizes(samples);
-        let cubes = CubeCount::Static(chirps.div_ceil(sum::CHIRPS) as u32, o, self.most().div_ceil(sum::LANES) as u32);
+        let cubes = cubes(chirps.div_ceil(sum::CHIRPS), self.outputs.len(), self.most().div_ceil(sum::LANES));
         let ranges = self.outputs();
         unsafe {
             sum::gradients::launch_unchecked(
@@ -129,10 +121,10 @@ impl Phasors {
                 to_im,
                 to_phase,
                 to_sweep,
-                o,
-                p,
-                c,
-                n,
+                self.outputs.len(),
+                points,
+                chirps,
+                samples,
                 complex,
             );
         }
@@ -165,38 +157,44 @@ impl Moving {
         Self { tensors, geometry, chirps, amplitude_chirps, complex }
     }
 
+    /// As the kernels take them.
+    fn displaced(&self) -> geometry::DisplacedLaunch {
+        let [x, y, z, re, im, constants] = self.tensors.clone().map(CubeTensor::into_buffer_arg);
+        let (paths, points) = (self.geometry.paths(), self.geometry.points());
+        let (per_metre, per_step) = self.geometry.sweep_factors();
+        geometry::DisplacedLaunch::new(
+            x,
+            y,
+            z,
+            re,
+            im,
+            constants,
+            paths,
+            points,
+            self.chirps,
+            self.amplitude_chirps,
+            per_metre,
+            per_step,
+        )
+    }
+
     fn phasors(&self) -> Phasors {
         let (paths, points, chirps) = (self.geometry.paths(), self.geometry.points(), self.chirps);
         let like = &self.tensors[0];
         let part = |on: bool| empty(like, if on { [paths, points, chirps] } else { [1; 3] });
         let found = [part(true), part(self.complex), part(true), part(true)];
         let [to_re, to_im, to_phase, to_sweep] = found.clone().map(CubeTensor::into_buffer_arg);
-        let [x, y, z, re, im, constants] = self.tensors.clone().map(CubeTensor::into_buffer_arg);
         let dim = CubeDim::new_1d(sum::UNITS as u32);
-        let (per_metre, per_step) = self.geometry.sweep_factors();
         unsafe {
             geometry::phasors::launch_unchecked(
                 &like.client,
                 calculate_cube_count_elemwise(&like.client, paths * points * chirps, dim),
                 dim,
-                x,
-                y,
-                z,
-                re,
-                im,
-                constants,
+                self.displaced(),
                 to_re,
                 to_im,
                 to_phase,
                 to_sweep,
-                paths as u32,
-                points as u32,
-                chirps as u32,
-                self.amplitude_chirps as u32,
-                per_metre,
-                per_step,
-                (SOFTENING_M * SOFTENING_M) as f32,
-                NEAR_FIELD_M2 as f32,
                 self.complex,
             );
         }
@@ -207,27 +205,20 @@ impl Moving {
 
     /// To x, y, z, re and im, shaped as these.
     fn gradients(self, upstream: CubeTensor) -> [CubeTensor; 5] {
-        let (paths, points, chirps) = (self.geometry.paths(), self.geometry.points(), self.chirps);
+        let (points, chirps) = (self.geometry.points(), self.chirps);
         let of = self.phasors().gradients(upstream).map(CubeTensor::into_buffer_arg);
         let [of_re, of_im, of_phase, of_sweep] = of;
         let like = &self.tensors[0];
         let gradient = |on: bool| empty(like, if on { [points, chirps] } else { [1; 2] });
         let found = [gradient(true), gradient(true), gradient(true), gradient(true), gradient(self.complex)];
         let [to_x, to_y, to_z, to_re, to_im] = found.clone().map(CubeTensor::into_buffer_arg);
-        let [x, y, z, re, im, constants] = self.tensors.clone().map(CubeTensor::into_buffer_arg);
         let dim = CubeDim::new_1d(sum::UNITS as u32);
-        let (per_metre, per_step) = self.geometry.sweep_factors();
         unsafe {
             geometry::adjoint::launch_unchecked(
                 &like.client,
                 calculate_cube_count_elemwise(&like.client, points * chirps, dim),
                 dim,
-                x,
-                y,
-                z,
-                re,
-                im,
-                constants,
+                self.displaced(),
                 of_re,
                 of_im,
                 of_phase,
@@ -237,14 +228,6 @@ impl Moving {
                 to_z,
                 to_re,
                 to_im,
-                paths as u32,
-                points as u32,
-                chirps as u32,
-                self.amplitude_chirps as u32,
-                per_metre,
-                per_step,
-                (SOFTENING_M * SOFTENING_M) as f32,
-                NEAR_FIELD_M2 as f32,
                 self.complex,
             );
         }
@@ -257,6 +240,10 @@ impl Moving {
         let im = if self.complex { of_amplitude(im) } else { re.clone() };
         [x, y, z, re, im]
     }
+}
+
+fn cubes(x: usize, y: usize, z: usize) -> CubeCount {
+    CubeCount::Static(x as u32, y as u32, z as u32)
 }
 
 fn empty<const D: usize>(like: &CubeTensor, shape: [usize; D]) -> CubeTensor {

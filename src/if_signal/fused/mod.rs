@@ -23,9 +23,13 @@ use burn::backend::Dispatch;
 use burn::tensor::{Device, Tensor};
 
 use crate::complex::Complex;
+use crate::device::is_gpu;
 use crate::paths::{Phasors, Points, Waveform};
 use extension::RadarOps;
 use moving::Geometry;
+
+/// Numbers of one tensor that a GPU writes at most: WebGPU's default `maxStorageBufferBindingSize`, 128 MiB.
+const LARGEST: usize = 1 << 25;
 
 /// Flex or a GPU in f32 only; the caller sees to it. `[chirp, sample]`.
 pub fn sum(phasors: &Phasors, samples: usize) -> Complex<2> {
@@ -73,17 +77,11 @@ pub fn signals_apart(
 }
 
 /// A GPU holds the phasors of all receivers at once: of so many that a tensor stays within its bound.
-#[cfg(any(feature = "wgpu", feature = "cuda"))]
 fn receivers_at_once(device: &Device, phasors: usize, samples: usize) -> usize {
-    if !crate::device::is_gpu(device) {
-        return usize::MAX;
+    match is_gpu(device) {
+        true => (LARGEST / phasors.max(2 * samples).max(1)).max(1),
+        false => usize::MAX,
     }
-    (gpu::LARGEST / phasors.max(2 * samples).max(1)).max(1)
-}
-
-#[cfg(not(any(feature = "wgpu", feature = "cuda")))]
-fn receivers_at_once(_: &Device, _: usize, _: usize) -> usize {
-    usize::MAX
 }
 
 /// `[output, chirp, sample]`

@@ -61,17 +61,18 @@ impl Geometry {
         let points = reference_m.len();
         let mut constants = vec![0.0; (4 * (paths + 1) + 3 * paths) * points];
         let (legs, at_rest) = constants.split_at_mut(4 * (paths + 1) * points);
-        legs.par_chunks_exact_mut(4).enumerate().with_min_len(1024).for_each(|(row, leg)| {
-            let (index, point) = (row / points, row % points);
-            let antenna_m = if index == 0 { tx_m } else { to(index - 1, point).0 };
-            let x = reference_m[point];
-            let offset_m = [0, 1, 2].map(|axis| (x[axis] - antenna_m[axis]) as f32);
-            leg.copy_from_slice(&[offset_m[0], offset_m[1], offset_m[2], distance(x, antenna_m) as f32]);
-        });
-        at_rest.par_chunks_exact_mut(3).enumerate().with_min_len(1024).for_each(|(row, path)| {
+        let (from_tx, to_receivers) = legs.split_at_mut(4 * points);
+        let from_tx_m: Vec<f64> = from_tx
+            .par_chunks_exact_mut(4)
+            .zip(reference_m)
+            .with_min_len(1024)
+            .map(|(leg, point_m)| write_leg(leg, tx_m, *point_m))
+            .collect();
+        let rows = to_receivers.par_chunks_exact_mut(4).zip(at_rest.par_chunks_exact_mut(3)).enumerate();
+        rows.with_min_len(1024).for_each(|(row, (leg, path))| {
             let (index, point) = (row / points, row % points);
             let (receiver_m, waveform) = to(index, point);
-            let length_m = distance(reference_m[point], tx_m) + distance(reference_m[point], receiver_m);
+            let length_m = from_tx_m[point] + write_leg(leg, receiver_m, reference_m[point]);
             let AtRest { phase_turns, sweep_turns, turns_per_metre } = waveform.at_rest(length_m);
             path.copy_from_slice(&[phase_turns as f32, sweep_turns as f32, turns_per_metre as f32]);
         });
@@ -137,6 +138,14 @@ impl Geometry {
             *<&[f32; 3]>::try_from(&self.constants[row..][..3]).expect("three numbers");
         PathAtRest { phase_turns, sweep_turns, turns_per_metre }
     }
+}
+
+/// Offset and length of the leg from an antenna to a point; the length is that of the leg in f64.
+fn write_leg(leg: &mut [f32], antenna_m: [f64; 3], point_m: [f64; 3]) -> f64 {
+    let offset_m = [0, 1, 2].map(|axis| (point_m[axis] - antenna_m[axis]) as f32);
+    let length_m = distance(point_m, antenna_m);
+    leg.copy_from_slice(&[offset_m[0], offset_m[1], offset_m[2], length_m as f32]);
+    length_m
 }
 
 #[derive(Clone, Copy, Debug)]

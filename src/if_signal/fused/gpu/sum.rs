@@ -48,17 +48,13 @@ pub fn add_up(
     sweep: &[f32],
     outputs: &[u32],
     out: &mut [f32],
-    count_outputs: u32,
-    points: u32,
-    chirps: u32,
-    samples: u32,
-    per_chunk: u32,
+    count_outputs: usize,
+    points: usize,
+    chirps: usize,
+    samples: usize,
+    per_chunk: usize,
     #[comptime] complex: bool,
 ) {
-    let points = points as usize;
-    let chirps = chirps as usize;
-    let samples = samples as usize;
-    let per_chunk = per_chunk as usize;
     let at = UNIT_POS_X as usize;
     let first_chirp = CUBE_POS_X as usize * CHIRPS;
     let output = CUBE_POS_Y as usize;
@@ -141,7 +137,7 @@ pub fn add_up(
 
     let chirp = first_chirp + row;
     if chirp < chirps {
-        let whole = count_outputs as usize * chirps * samples;
+        let whole = count_outputs * chirps * samples;
         let to = chunk * 2 * whole + (output * chirps + chirp) * samples;
         #[unroll]
         for stripe in 0..STRIPES {
@@ -171,15 +167,12 @@ pub fn gradients(
     to_im: &mut [f32],
     to_phase: &mut [f32],
     to_sweep: &mut [f32],
-    count_outputs: u32,
-    points: u32,
-    chirps: u32,
-    samples: u32,
+    count_outputs: usize,
+    points: usize,
+    chirps: usize,
+    samples: usize,
     #[comptime] complex: bool,
 ) {
-    let points = points as usize;
-    let chirps = chirps as usize;
-    let samples = samples as usize;
     let at = UNIT_POS_X as usize;
     let row = at % CHIRPS;
     let first_chirp = CUBE_POS_X as usize * CHIRPS;
@@ -189,7 +182,7 @@ pub fn gradients(
     let point = outputs[3 * output + 1] as usize + CUBE_POS_Z as usize * LANES + at / CHIRPS;
     let inside = point < outputs[3 * output + 2] as usize && chirp < chirps;
     let from = (path * points + point) * chirps + chirp;
-    let whole = count_outputs as usize * chirps * samples;
+    let whole = count_outputs * chirps * samples;
     // Of the sample that this unit loads.
     let load_row = at / LANES;
     let load_lane = at % LANES;

@@ -66,7 +66,6 @@ impl Sink for Back<'_> {
         self.to_legs = Scratch::new((size * self.moving.geometry.legs()).div_ceil(LANES));
         self.to_legs.fill(ZERO);
         self.to_sweep = Scratch::new(size.div_ceil(LANES));
-        self.to_sweep.fill(ZERO);
     }
 
     #[inline(always)]
