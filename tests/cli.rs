@@ -208,6 +208,36 @@ fn baselines_write_recordings_with_the_labels_of_what_they_imitate() {
     assert_refused(&refused(&["mmgpe", &recorded, "--gain", "-1"]), 2, &["--gain"]);
 }
 
+/// Record, diagnose, add, train: one command.
+#[test]
+fn a_simulator_is_trained_with_what_the_diagnosis_finds() {
+    let folder = tempfile::tempdir().unwrap();
+    let highpass = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/highpass.toml").display().to_string();
+    let recorded = hybridsim(&["record", &highpass, "-q", "--out", "recorded"], folder.path());
+    assert!(recorded.status.success(), "{}", err(&recorded));
+    let data = format!("data.recordings=[{:?}]", folder.path().join("recorded").display().to_string());
+    let train = |name: &str, more: &[&str]| -> f64 {
+        let config = test_config();
+        let arguments = ["train", &config, "-q", "--device", "flex", "--out", name, "--set", &data, "--set", "training.epochs=2"];
+        let output = hybridsim(&[&arguments, more].concat(), folder.path());
+        assert!(output.status.success(), "{}", err(&output));
+        let metrics = std::fs::read_to_string(folder.path().join(name).join("metrics.json")).unwrap();
+        let metrics: serde_json::Value = serde_json::from_str(&metrics).unwrap();
+        metrics["history"][1]["validation_loss"].as_f64().unwrap()
+    };
+    let without = train("without", &[]);
+    let with = train("with", &["--diagnose", "--set", "diagnosis.limits=false", "--set", "diagnosis.epochs=0"]);
+    assert!(with < without, "{with} {without}");
+    let text = |path: &str| std::fs::read_to_string(folder.path().join("with").join(path)).unwrap();
+    let found: serde_json::Value = serde_json::from_str(&text("diagnosis/effects.json")).unwrap();
+    assert_eq!(found[0]["id"], "if_highpass");
+    assert!(text("config.toml").contains("if_highpass") && text("diagnosis/report.json").contains("if_highpass"));
+    assert!(text("report.md").contains("found: if_highpass (`diagnosis/report.html`)"), "{}", text("report.md"));
+    assert!(!folder.path().join("without/diagnosis").exists());
+    let resumed = hybridsim(&["train", "--resume", "with", "--diagnose"], folder.path());
+    assert_refused(&resumed, 2, &["--diagnose", "--resume"]);
+}
+
 #[test]
 fn effects_are_part_of_the_checkpoint_and_can_be_left_out() {
     let folder = tempfile::tempdir().unwrap();

@@ -78,6 +78,7 @@ def train(
     out: str | None,
     sets: list[str],
     go_on: bool,
+    diagnose: bool,
     device: str,
     as_stated: bool,
     notify: Notify,

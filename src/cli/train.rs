@@ -19,6 +19,9 @@ pub(crate) struct Arguments {
     /// Continue a run folder that was interrupted
     #[arg(long, value_name = "RUN", conflicts_with_all = ["config", "out"])]
     resume: Option<PathBuf>,
+    /// Diagnose the first recording, and train with the effects that were found
+    #[arg(long, conflicts_with = "resume")]
+    diagnose: bool,
     #[command(flatten)]
     out: Out,
 }
@@ -27,7 +30,9 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let sets = &common.set;
     let start = match (&arguments.resume, &arguments.config) {
         (Some(run), _) => Start::Resume { run, sets },
-        (None, Some(path)) => Start::Config { path, sets, out: arguments.out.out.as_deref(), go_on: false },
+        (None, Some(path)) => {
+            Start::Config { path, sets, out: arguments.out.out.as_deref(), go_on: false, diagnose: arguments.diagnose }
+        }
         (None, None) => unreachable!("clap asks for one of them"),
     };
     let devices = devices(&common.device)?;

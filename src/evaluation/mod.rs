@@ -2,7 +2,8 @@
 //!
 //! [`evaluate`] asks a simulator for its frames, [`compare`] takes them from a second recording folder: a simulation by
 //! whatever method, or the same truth recorded again with other noise, which is the best that any simulator can do.
-//! Both score frame by frame; [`over_sequences`] says how sure the mean of several recordings is.
+//! Both score frame by frame; [`over_sequences`] says how sure the mean of several recordings is, [`over_draws`] that of several
+//! recordings by a simulator that was trained several times.
 
 mod compare;
 mod frames;
@@ -11,7 +12,7 @@ mod simulation;
 
 pub use compare::{ComparisonConfig, compare, compare_frames, refuse_different};
 pub use frames::{FrameMaps, measured_frame};
-pub use sequences::{SequenceSummary, over_sequences};
+pub use sequences::{SequenceSummary, by_sequence, over_draws, over_sequences};
 pub use simulation::{Simulation, evaluate};
 
 use serde::{Deserialize, Serialize};

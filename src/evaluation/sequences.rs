@@ -25,16 +25,22 @@ pub struct SequenceSummary {
 /// # Panics
 /// When they were not made with the same decibels and network.
 pub fn over_sequences(evaluations: &[Evaluation]) -> Option<SequenceSummary> {
-    let first = evaluations.first()?;
+    over_draws(&[evaluations])
+}
+
+/// The same where what simulated has been drawn (trained) several times: `draws[draw][sequence]`. Means are over both, and intervals
+/// know that both are taken at random ([`Spread::crossed`]); counts are those of one draw.
+///
+/// # Panics
+/// When they were not made with the same decibels and network, or draws differ in their number of sequences.
+pub fn over_draws(draws: &[&[Evaluation]]) -> Option<SequenceSummary> {
+    let first = draws.first()?.first()?;
     let alike = |other: &Evaluation| other.span_db == first.span_db && other.lpips == first.lpips;
-    assert!(evaluations.iter().all(alike), "over_sequences: evaluations with different settings");
-    let region = |of: fn(&Evaluation) -> Option<&ScoreSummary>| {
-        let summaries: Vec<&ScoreSummary> = evaluations.iter().filter_map(of).collect();
-        ScoreSummary::over(&summaries)
-    };
+    assert!(draws.iter().copied().flatten().all(alike), "over_draws: evaluations with different settings");
+    let region = |of: fn(&Evaluation) -> Option<&ScoreSummary>| ScoreSummary::over(&by_sequence(draws, of));
     Some(SequenceSummary {
-        sequences: evaluations.len(),
-        frames: evaluations.iter().map(|evaluation| evaluation.frames).sum(),
+        sequences: draws[0].len(),
+        frames: draws[0].iter().map(|evaluation| evaluation.frames).sum(),
         span_db: first.span_db,
         global: region(|evaluation| evaluation.global.as_ref()),
         moving: region(|evaluation| evaluation.moving.as_ref()),
@@ -43,15 +49,29 @@ pub fn over_sequences(evaluations: &[Evaluation]) -> Option<SequenceSummary> {
     })
 }
 
+/// What every draw has of a sequence, `[sequence][draw]`; sequences of which one draw has nothing are left out.
+///
+/// # Panics
+/// When draws differ in their number of sequences.
+pub fn by_sequence<'a, T>(draws: &[&'a [Evaluation]], of: impl Fn(&'a Evaluation) -> Option<T>) -> Vec<Vec<T>> {
+    let sequences = draws.first().map_or(0, |draw| draw.len());
+    assert!(draws.iter().all(|draw| draw.len() == sequences), "by_sequence: draws of different recordings");
+    (0..sequences).filter_map(|sequence| draws.iter().map(|draw| of(&draw[sequence])).collect()).collect()
+}
+
 impl ScoreSummary {
-    /// Over the means of sequences.
-    fn over(sequences: &[&Self]) -> Option<Self> {
-        let spread = |of: fn(&Self) -> Spread| Spread::of(sequences.iter().map(|sequence| of(sequence).mean));
+    /// Over the means of sequences, `[sequence][draw]`.
+    fn over(sequences: &[Vec<&Self>]) -> Option<Self> {
+        let spread = |of: fn(&Self) -> Option<Spread>| {
+            let mean = |summary: &&Self| Some(of(summary)?.mean);
+            let rows: Vec<Vec<f64>> = sequences.iter().filter_map(|draws| draws.iter().map(mean).collect()).collect();
+            Spread::crossed(&rows)
+        };
         Some(Self {
-            psnr_db: spread(|sequence| sequence.psnr_db)?,
-            ssim: spread(|sequence| sequence.ssim)?,
-            mean_absolute_error_db: spread(|sequence| sequence.mean_absolute_error_db)?,
-            lpips: Spread::of(sequences.iter().filter_map(|sequence| sequence.lpips.map(|lpips| lpips.mean))),
+            psnr_db: spread(|summary| Some(summary.psnr_db))?,
+            ssim: spread(|summary| Some(summary.ssim))?,
+            mean_absolute_error_db: spread(|summary| Some(summary.mean_absolute_error_db))?,
+            lpips: spread(|summary| summary.lpips),
         })
     }
 }

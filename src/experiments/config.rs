@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::few::FewConfig;
 use super::variants::Variant;
 use crate::body::{Sampling, SurfaceConfig};
 use crate::data::read_settings;
@@ -194,6 +195,11 @@ impl StabilityConfig {
 pub struct ReproduceConfig {
     #[serde(default)]
     pub seed: u64,
+    /// So many times is every variant trained, scored and recognised: with `seed`, `seed + 1` and so on, and classifiers with their
+    /// own seeds after `recognition.seed`. The second room, the second scene, the long trainings, the pictures and the additional
+    /// subject are those of the first.
+    #[serde(default = "once")]
+    pub seeds: usize,
     /// A site's config file, or a folder of recordings with the labels `subject` and `action`; relative to this file.
     pub site: PathBuf,
     /// The same for another room.
@@ -203,6 +209,8 @@ pub struct ReproduceConfig {
     pub second_scene: Option<SecondSceneConfig>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stability: Option<StabilityConfig>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub few_measured: Option<FewConfig>,
     #[serde(default)]
     pub split: SubjectSplit,
     #[serde(default = "all_variants")]
@@ -236,6 +244,10 @@ pub struct ReproduceConfig {
     pub adaptation: AdaptationConfig,
     #[serde(default)]
     pub comparison: ComparisonConfig,
+}
+
+fn once() -> usize {
+    1
 }
 
 fn all_variants() -> Vec<Variant> {
@@ -306,6 +318,9 @@ impl ReproduceConfig {
         for &variant in &self.variants {
             variant.settings(&self.simulator, &self.dense_surface).check()?;
         }
+        if !(1..=100).contains(&self.seeds) {
+            return Err(Error::setting("seeds", self.seeds, "1 to 100"));
+        }
         if !self.variants.contains(&Variant::Ours) {
             return Err(Error::setting("variants", format!("{:?}", self.variants), "a list with `ours`")
                 .with_hint("the others are compared with it, and some start from it"));
@@ -323,6 +338,13 @@ impl ReproduceConfig {
         }
         if let Some(stability) = &self.stability {
             stability.check()?;
+        }
+        if let Some(few) = &self.few_measured {
+            few.check(&self.variants)?;
+            if !self.protocols.contains(&Protocol::OtherSubjects) {
+                return Err(Error::setting("protocols", format!("{:?}", self.protocols), "a list with `other_subjects`")
+                    .with_hint("`few_measured` learns from the other subjects' motions"));
+            }
         }
         if self.training.split != Split::Last || self.training.validation_fraction == 0.0 {
             return Err(Error::setting(

@@ -20,6 +20,19 @@ fn what_cannot_be_reproduced_is_refused_by_name() {
     assert!(scene(&["bow", "jab"], &["jab"]).contains("`second_scene.evaluated` is jab"));
     let stability = StabilityConfig { epochs: 0, ..Default::default() };
     assert!(refused(|config| config.stability = Some(stability)).contains("`stability.epochs` is 0"));
+    assert!(refused(|config| config.seeds = 0).contains("`seeds` is 0"));
+    let few = |recordings: Vec<usize>| FewConfig { recordings, simulated_by: Variant::Physical };
+    assert!(refused(|config| config.few_measured = Some(few(vec![1, 0]))).contains("`few_measured.recordings` is [1, 0]"));
+    let error = refused(|config| {
+        config.few_measured = Some(few(vec![1]));
+        config.variants = vec![Variant::Ours];
+    });
+    assert!(error.contains("`few_measured.simulated_by` is physical"), "{error}");
+    let error = refused(|config| {
+        config.few_measured = Some(few(vec![1]));
+        config.protocols = vec![Protocol::SameMotions];
+    });
+    assert!(error.contains("`protocols`") && error.contains("`other_subjects`"), "{error}");
     assert!(refused(|config| config.variants = vec![Variant::Coupled]).contains("`variants`"));
     assert!(refused(|config| config.training.split = Split::Random).contains("`training.split`"));
     assert!(refused(|config| config.training.frames = Some(3)).contains("`training.frames`"));

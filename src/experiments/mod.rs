@@ -2,6 +2,7 @@
 //! was measured, and what comes out is scored and learned from. Recording folders are all that methods exchange.
 //!
 //! - [`config`]: what is asked for
+//! - [`few`]: what a classifier learns from few recordings
 //! - [`takes`], [`variants`]: who does what in which recording; ours and its ablations
 //! - [`preflight`]: what cannot work is refused before anything is recorded
 //! - [`task`], [`mod@plan`]: every stage with what it depends on, before any of them runs
@@ -10,6 +11,7 @@
 
 mod cells;
 pub mod config;
+pub mod few;
 pub mod figures;
 mod further;
 pub mod pairs;

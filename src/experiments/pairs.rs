@@ -18,14 +18,30 @@ pub struct Behind {
 }
 
 impl Behind {
-    /// The first less the second; none where the two were not scored on as many recordings. The caller sees to it that they
-    /// are the same.
-    pub fn of(first: &[Evaluation], second: &[Evaluation]) -> Option<Self> {
+    /// The first less the second, `[draw][recording]`; what was drawn once is held against every draw of the other. None where
+    /// the two were not scored on as many recordings, or were drawn several times but not equally often. The caller sees to it
+    /// that the recordings are the same.
+    pub fn of(first: &[Vec<Evaluation>], second: &[Vec<Evaluation>]) -> Option<Self> {
+        let draws = first.len().max(second.len());
+        let [first, second] = [first, second].map(|found| -> Option<Vec<&[Evaluation]>> {
+            match found {
+                [once] => Some(vec![once; draws]),
+                found => (found.len() == draws).then(|| found.iter().map(Vec::as_slice).collect()),
+            }
+        });
+        let (first, second) = (first?, second?);
+        let recordings = first.first()?.len();
+        if recordings == 0 || first.iter().chain(&second).any(|draw| draw.len() != recordings) {
+            return None;
+        }
         let region = |of: fn(&Evaluation) -> Option<&ScoreSummary>| {
-            let pairs = first.iter().zip(second).filter_map(|(first, second)| Some((of(first)?, of(second)?)));
-            Spread::of(pairs.map(|(first, second)| first.psnr_db.mean - second.psnr_db.mean))
+            let difference = |recording: usize| -> Option<Vec<f64>> {
+                let psnr = |draw: &[Evaluation]| Some(of(&draw[recording])?.psnr_db.mean);
+                first.iter().zip(&second).map(|(first, second)| Some(psnr(first)? - psnr(second)?)).collect()
+            };
+            Spread::crossed(&(0..recordings).filter_map(difference).collect::<Vec<_>>())
         };
-        (!first.is_empty() && first.len() == second.len()).then(|| Self {
+        Some(Self {
             global: region(|evaluation| evaluation.global.as_ref()),
             moving: region(|evaluation| evaluation.moving.as_ref()),
             person: region(|evaluation| evaluation.person.as_ref()),
@@ -59,8 +75,14 @@ impl On {
 pub fn asked_for(methods: &[Method]) -> Vec<(Method, Method, On)> {
     let noisy = Method::ReceiverNoise;
     let dense = Method::Variant(Variant::DenseSurface);
+    let physical = Method::Variant(Variant::Physical);
     let (lobes, dense_lobes) = (noisy(BaselineName::Mmgpe), noisy(BaselineName::MmgpeSurface));
     let mut pairs = vec![
+        (physical, dense_lobes, On::UnseenHuman),
+        (physical, dense, On::UnseenHuman),
+        (physical, Method::Variant(Variant::Likelihood), On::UnseenHuman),
+        (physical, Method::OtherMesh, On::UnseenHuman),
+        (Method::Variant(Variant::Likelihood), lobes, On::UnseenHuman),
         (dense, dense_lobes, On::UnseenHuman),
         (dense, lobes, On::UnseenHuman),
         (dense, Method::OtherMesh, On::UnseenHuman),

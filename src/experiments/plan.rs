@@ -5,6 +5,7 @@
 //! experiments and the figures.
 
 mod first_site;
+mod few;
 mod further;
 mod method;
 mod place;
@@ -18,6 +19,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use super::config::{Protocol, ReproduceConfig, SubjectSplit};
+use super::few::Material;
 use super::preflight::{self, Board};
 use super::stage::{Key, stage_folder};
 use super::takes::{Take, check_split};
@@ -26,7 +28,7 @@ use super::variants::Variant;
 use crate::data::{files, hex};
 use crate::error::{Error, Result};
 use crate::site::{self, SiteConfig};
-pub use method::Method;
+pub use method::{Drawn, Method};
 
 /// One stage.
 #[derive(Clone, Debug)]
@@ -41,7 +43,7 @@ pub struct Stage {
 /// The action on which the paper looks at the graph convolution more closely (table 6).
 pub const ARM_SWING: &str = "walk_back_forth_armswing";
 
-/// The stages whose results belong to one method.
+/// The stages whose results belong to one draw of a method.
 #[derive(Clone, Debug, Default)]
 pub struct MethodStages {
     pub train: Option<usize>,
@@ -63,8 +65,11 @@ pub struct MethodStages {
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
     pub stages: Vec<Stage>,
-    /// In the order of the tables.
-    pub methods: Vec<(Method, MethodStages)>,
+    /// In the order of the tables, with one entry for each draw: those of trained simulators have [`ReproduceConfig::seeds`], all
+    /// others one.
+    pub methods: Vec<(Method, Vec<MethodStages>)>,
+    /// Classifiers that learned from a few recordings of each action, one stage for each draw.
+    pub few: Vec<(usize, Material, Vec<usize>)>,
     pub diagnosis: Option<usize>,
     /// With the graph convolution, and without.
     pub stability: Vec<(Variant, usize)>,
@@ -187,9 +192,12 @@ fn plan_of(config: &ReproduceConfig, root: &Path, sequences: &Sequences) -> Resu
     let second = config.second_room.as_deref().map(|site| planner.place("second_room", site)).transpose()?;
     let scene = config.second_scene.as_ref().map(|scene| planner.place("second_scene", &scene.site)).transpose()?;
     let trained = planner.all(&first, second.as_ref())?;
-    planner.beyond(&first, scene.as_ref(), &trained[&Variant::Ours])?;
+    planner.beyond(&first, scene.as_ref(), &trained[&Variant::Ours][0])?;
     Ok(planner.plan)
 }
+
+/// The trainings of every variant, one for each draw.
+type Trainings = BTreeMap<Variant, Vec<Trained>>;
 
 /// A training stage and the checkpoint that it leaves.
 #[derive(Clone, Debug)]
@@ -199,7 +207,7 @@ struct Trained {
 }
 
 impl Planner<'_> {
-    fn all(&mut self, first: &Place, second: Option<&Place>) -> Result<BTreeMap<Variant, Trained>> {
+    fn all(&mut self, first: &Place, second: Option<&Place>) -> Result<Trainings> {
         let SubjectSplit { training, unseen, additional } = &self.config.split;
         check_split(&first.takes, training, unseen, additional.as_deref())?;
         if let Some(second) = second
@@ -214,8 +222,8 @@ impl Planner<'_> {
             preflight::check_adaptation(self.config, &first.board, &second.board, second.of_subject(training).count())?;
         }
         let trained = self.trainings(first)?;
-        let adapted = second.map(|second| self.adaptations(second, &trained[&Variant::Ours]));
-        self.methods(first, &trained);
+        let adapted = second.map(|second| self.adaptations(second, &trained[&Variant::Ours][0]));
+        self.methods(first, &trained)?;
         if let (Some(second), Some(adapted)) = (second, adapted) {
             self.second_room(second, &adapted);
         }
@@ -251,11 +259,12 @@ impl Planner<'_> {
         stage_folder(self.root, &self.plan.stages[stage].key)
     }
 
-    fn trainings(&mut self, place: &Place) -> Result<BTreeMap<Variant, Trained>> {
+    fn trainings(&mut self, place: &Place) -> Result<Trainings> {
         let config = self.config;
         let (recordings, names) = training_takes(config, place);
-        let mut trained: BTreeMap<Variant, Trained> = BTreeMap::new();
-        for &variant in &config.variants {
+        let mut trained: Trainings = BTreeMap::new();
+        let draws = (0..config.seeds).flat_map(|draw| config.variants.iter().map(move |&variant| (variant, draw)));
+        for (variant, draw) in draws {
             let simulator = Box::new(variant.settings(&config.simulator, &config.dense_surface));
             let mut parents = vec![];
             let mut effects = None;
@@ -269,12 +278,13 @@ impl Planner<'_> {
                 names: names.clone(),
                 simulator,
                 training: Box::new(variant.training(&config.training)),
-                seed: config.seed,
+                seed: config.seed + draw as u64,
                 effects,
                 start_from: None,
             };
-            let stage = self.add(format!("train/{}", variant.trained_as().id()), parents, Some(place), task);
-            trained.insert(variant, Trained { stage, checkpoint: self.folder(stage).join("last") });
+            let drawn = Drawn { method: Method::Variant(variant.trained_as()), draw };
+            let stage = self.add(format!("train/{}", drawn.id()), parents, Some(place), task);
+            trained.entry(variant).or_default().push(Trained { stage, checkpoint: self.folder(stage).join("last") });
         }
         Ok(trained)
     }

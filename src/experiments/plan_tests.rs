@@ -32,6 +32,10 @@ fn planned(config: &ReproduceConfig) -> Plan {
 }
 
 fn method(plan: &Plan, wanted: Method) -> &MethodStages {
+    &draws(plan, wanted)[0]
+}
+
+fn draws(plan: &Plan, wanted: Method) -> &[MethodStages] {
     &plan.methods.iter().find(|(method, _)| *method == wanted).unwrap().1
 }
 
@@ -74,8 +78,80 @@ fn nothing_is_learned_from_what_it_is_tested_on() {
             _ => {}
         }
     }
-    // Eleven variants less the one that shares its training, and the second room's two; five baselines under two kinds of noise.
-    assert_eq!((trainings, classifiers), (10 + 2, 2 * (2 * 5 + 11 + 1)));
+    // Thirteen variants less the one that shares its training, and the second room's two; five baselines under two kinds of noise.
+    assert_eq!((trainings, classifiers), (12 + 2, 2 * (2 * 5 + 13 + 1)));
+}
+
+/// Each draw has trainings, simulations, scores and classifiers of its own; what does not learn is there once.
+#[test]
+fn what_learns_is_drawn_as_often_as_asked_for() {
+    let once = planned(&config());
+    let plan = planned(&ReproduceConfig { seeds: 3, ..config() });
+    assert!(once.stages.iter().all(|stage| plan.stages.iter().any(|other| other.key == stage.key)), "the first draw stays");
+    let ours = draws(&plan, Method::Variant(Variant::Ours));
+    assert_eq!((ours.len(), draws(&plan, Method::Again).len()), (3, 1));
+    assert_eq!(draws(&plan, Method::Baseline(crate::experiments::config::BaselineName::TwoBounce)).len(), 1);
+    assert_eq!(draws(&plan, Method::Variant(Variant::GcnAtInference))[2].train, ours[2].train);
+    let seeds = |stages: &MethodStages| {
+        let task = |stage: usize| &plan.stages[stage].task;
+        let (train, simulate) = (task(stages.train.unwrap()), task(stages.simulate[0]));
+        let learned = task(stages.recognition[&Protocol::SameMotions]);
+        let Task::Train { seed: trained, .. } = train else { unreachable!() };
+        let Task::Simulate { seed: simulated, checkpoint, .. } = simulate else { unreachable!() };
+        let Task::Recognise { train, recognition, .. } = learned else { unreachable!() };
+        assert!(checkpoint.starts_with(Path::new("/out/stages").join(plan.stages[stages.train.unwrap()].key.folder())));
+        let of_draw = |folder: &PathBuf| {
+            stages.simulate.iter().any(|&s| folder.starts_with(stage_folder(Path::new("/out"), &plan.stages[s].key)))
+        };
+        assert!(train.iter().all(of_draw));
+        [*trained, *simulated, recognition.seed]
+    };
+    assert_eq!(ours.iter().map(seeds).collect::<Vec<_>>(), [[0, 0, 1], [1, 1, 2], [2, 2, 3]]);
+    for stages in ours {
+        assert_eq!((&stages.cross_takes, stages.intra.len()), (&ours[0].cross_takes, 2));
+    }
+}
+
+#[test]
+fn few_recordings_are_others_and_more_of_them_hold_the_fewer() {
+    let few = |recordings: Vec<usize>| {
+        let few_measured = Some(crate::experiments::few::FewConfig { recordings, simulated_by: Variant::Ours });
+        ReproduceConfig { few_measured, seeds: 2, ..config() }
+    };
+    let plan = planned(&few(vec![1, 2]));
+    assert_eq!(plan.few.len(), 2 * Material::ALL.len());
+    let mut known: BTreeMap<(Material, usize), Vec<String>> = BTreeMap::new();
+    for (count, material, stages) in &plan.few {
+        assert_eq!(stages.len(), 2);
+        for (draw, &stage) in stages.iter().enumerate() {
+            let Task::Recognise { train, train_names, test, recognition, .. } = &plan.stages[stage].task else { unreachable!() };
+            let all = SUBJECTS.len() * ACTIONS.len() - ACTIONS.len();
+            let of_few = count * ACTIONS.len();
+            let learned = if *material == Material::Both { of_few + all } else { of_few };
+            assert_eq!((train.len(), train_names.len()), (learned, learned));
+            assert!(train_names.iter().all(|name| !name.starts_with("s2_")) && test.len() == ACTIONS.len());
+            assert_eq!(recognition.epochs, (config().recognition.epochs * all).div_ceil(learned));
+            let measured = train.iter().filter(|folder| folder.starts_with("/measured")).count();
+            assert_eq!(measured, if *material == Material::Simulated { 0 } else { of_few });
+            let fewer = known.insert((*material, draw), train_names.clone()).unwrap_or_default();
+            assert!(fewer.iter().all(|name| train_names.contains(name)), "{fewer:?} {train_names:?}");
+        }
+    }
+    let sorted = |material| {
+        let mut names = known[&(material, 0)].clone();
+        names.sort();
+        names
+    };
+    assert_eq!(sorted(Material::Measured), sorted(Material::Simulated));
+    let mut planner = Planner {
+        config: &few(vec![3]),
+        root: Path::new("/out"),
+        weights: None,
+        sequences: &site::sequences,
+        plan: Plan::default(),
+    };
+    let error = planner.all(&place("site"), None).unwrap_err().to_string();
+    assert!(error.contains("`few_measured.recordings` is 3") && error.contains("at most 2"), "{error}");
 }
 
 #[test]
@@ -114,7 +190,7 @@ fn a_changed_setting_remakes_what_depends_on_it_and_nothing_else() {
     let classifier = names(|config| config.comparison.metrics.span_db = 60.0);
     assert!(!classifier.is_empty() && classifier.iter().all(|name| name.starts_with("compare/")));
     let dense = names(|config| config.dense_surface.sampling = crate::body::Sampling::Subdivided);
-    assert!(!dense.is_empty() && dense.iter().all(|name| name.contains("dense_surface")));
+    assert!(!dense.is_empty() && dense.iter().all(|name| name.contains("dense_surface") || name.contains("physical")));
 }
 
 #[test]
@@ -190,7 +266,7 @@ fn planned_further(config: &ReproduceConfig) -> Result<Plan> {
         Planner { config, root: Path::new("/out"), weights: None, sequences: &site::sequences, plan: Plan::default() };
     let first = place("site");
     let trained = planner.all(&first, None)?;
-    planner.beyond(&first, Some(&scene()), &trained[&Variant::Ours])?;
+    planner.beyond(&first, Some(&scene()), &trained[&Variant::Ours][0])?;
     Ok(planner.plan)
 }
 

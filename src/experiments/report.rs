@@ -5,6 +5,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use super::config::ReproduceConfig;
+use super::few::Material;
 use super::plan::Method;
 use super::results::{MethodResults, Results};
 use super::tables::tables;
@@ -30,6 +31,10 @@ pub fn write(folder: &Path, config: &ReproduceConfig, results: &Results, command
         config.split.unseen,
     )
     .expect("text grows");
+    if config.seeds > 1 {
+        let said = "What learns was drawn (trained, scored, recognised) several times; intervals are over recordings and draws.";
+        writeln!(text, "{said} Draws: {}.\n", config.seeds).expect("text grows");
+    }
     if results.programs.len() > 1 {
         let builds: Vec<String> = results.programs.iter().map(|(build, stages)| format!("{build} ({stages})")).collect();
         writeln!(text, "The stages were done by several builds of the program: {}.\n", builds.join(", ")).expect("text grows");
@@ -48,6 +53,9 @@ pub fn write(folder: &Path, config: &ReproduceConfig, results: &Results, command
         let [loss, gradient] = stability(results);
         loss.save(&folder.join("stability_loss.png"))?;
         gradient.save(&folder.join("stability_gradient.png"))?;
+    }
+    if !results.few.is_empty() {
+        few(results).save(&folder.join("few_measured.png"))?;
     }
     if let Some(chart) = adaptation(results) {
         chart.save(&folder.join("adaptation.png"))?;
@@ -90,6 +98,25 @@ fn stability(results: &Results) -> [Chart; 2] {
             .collect(),
     };
     [chart("loss", " (dB²)", |epoch| epoch.largest_loss), chart("gradient", "", |epoch| epoch.largest_gradient)]
+}
+
+/// Accuracy against the number of recordings of each action.
+fn few(results: &Results) -> Chart {
+    let curve = |material: Material| Series {
+        name: material.title().into(),
+        points: results
+            .few
+            .iter()
+            .filter(|found| found.material == material)
+            .map(|found| [(found.recordings as f64).log2(), 100.0 * found.recognised.accuracy.value])
+            .collect(),
+    };
+    Chart {
+        title: "Recognition from few recordings".into(),
+        x_label: "log2(recordings of each action)".into(),
+        y_label: "accuracy (%)".into(),
+        series: Material::ALL.map(curve).to_vec(),
+    }
 }
 
 /// Quality in the second room against the number of its frames.

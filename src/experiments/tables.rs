@@ -11,6 +11,7 @@ use super::paper::{self, Paper};
 use super::plan::Method;
 use super::results::{MethodResults, Results};
 use super::variants::Variant;
+use crate::metrics::Spread;
 
 /// All tables that the results have rows for.
 pub fn tables(results: &Results) -> String {
@@ -20,6 +21,8 @@ pub fn tables(results: &Results) -> String {
     text += &behind(results);
     text += &further::pairs(results);
     text += &recognition(results);
+    text += &behind_measured(results);
+    text += &further::few(results);
     text += &further::additional(results);
     let variants = |list: &[Variant]| list.iter().map(|&variant| Method::Variant(variant)).collect::<Vec<_>>();
     text += &ablation(results, "Coupled Gaussian patches (paper, table 3)", "", &variants(&[Variant::Coupled, Variant::Ours]));
@@ -28,8 +31,8 @@ pub fn tables(results: &Results) -> String {
     text += &ablation(results, "Indirect path (paper, section 4.7)", "", &indirect);
     let noises = [Variant::WithoutNoise, Variant::FixedNoise, Variant::ThermalNoise, Variant::Ours];
     text += &ablation(results, "Noise (paper, table 4)", "", &variants(&noises));
-    let scales = variants(&[Variant::LinearLoss, Variant::Ours]);
-    text += &ablation(results, "Linear or dB loss (paper, supplement 8, which shows maps alone)", "", &scales);
+    let scales = variants(&[Variant::LinearLoss, Variant::Likelihood, Variant::Ours]);
+    text += &ablation(results, "Linear, likelihood or dB loss (paper, supplement 8, which shows maps alone)", "", &scales);
     text += &ablation(
         results,
         "Graph convolution (paper, table 5)",
@@ -40,7 +43,7 @@ pub fn tables(results: &Results) -> String {
     text += &further::stability(results);
     let parts = results.figures.iter().find(|figure| figure.name == "decomposition");
     text += &further::decomposition(parts.map(|figure| &figure.levels));
-    let mut surfaces = variants(&[Variant::DenseSurface, Variant::Ours]);
+    let mut surfaces = variants(&[Variant::Physical, Variant::DenseSurface, Variant::Ours]);
     surfaces.extend([BaselineName::MmgpeSurface, BaselineName::Mmgpe].map(Method::ReceiverNoise));
     text += &ablation(results, "Surface: vertices or all of it", "", &surfaces);
     let found = match &results.effects {
@@ -128,6 +131,33 @@ fn recognition(results: &Results) -> String {
         let same = recognised(found.recognition.get(&Protocol::SameMotions), paper::cross(found.method));
         let others = recognised(found.recognition.get(&Protocol::OtherSubjects), Paper::default());
         table.row(&cells(found.method.title(), same.into_iter().chain(others)));
+    }
+    table.end()
+}
+
+/// What learning from simulations costs.
+fn behind_measured(results: &Results) -> String {
+    let note = "Whole recordings of the unseen subject that are judged rightly after learning from measured recordings, less those after \
+                learning from the method's simulations of the same motions, recording by recording, points of a hundred; mean ± half \
+                the 95 % interval over recordings.";
+    let found: Vec<&MethodResults> = results.methods.iter().filter(|found| !found.behind_measured.is_empty()).collect();
+    if found.is_empty() {
+        return String::new();
+    }
+    let mut table =
+        Table::new("Recognition behind measured recordings, paired", note, &["learned from", "own motions", "others' motions"]);
+    for found in found {
+        let points = Protocol::ALL.map(|protocol| {
+            let share = found.behind_measured.get(&protocol);
+            let hundred = |share: &Spread| Spread {
+                mean: 100.0 * share.mean,
+                deviation: 100.0 * share.deviation,
+                interval: share.interval.map(|half| 100.0 * half),
+                ..*share
+            };
+            number(share.map(hundred), 1, None)
+        });
+        table.row(&cells(found.method.title(), points));
     }
     table.end()
 }

@@ -2,9 +2,10 @@ use std::collections::BTreeMap;
 
 use super::*;
 use crate::evaluation::{ScoreSummary, SequenceSummary};
+use crate::experiments::few::Material;
 use crate::experiments::figures::Levels;
 use crate::experiments::pairs::{On, Pair};
-use crate::experiments::results::{Figure, Recognised, Share, StabilityResults, Training};
+use crate::experiments::results::{Few, Figure, Recognised, Share, StabilityResults, Training};
 use crate::experiments::steps::train::Broke;
 use crate::experiments::steps::{Speed, Stability};
 use crate::metrics::Spread;
@@ -35,6 +36,7 @@ fn found(method: Method, psnr_db: f64, lpips: Option<f64>) -> MethodResults {
     MethodResults {
         id: method.id(),
         method,
+        draws: 1,
         intra: Some(summary(psnr_db + 1.0, lpips)),
         cross: Some(summary(psnr_db, lpips)),
         behind: None,
@@ -42,6 +44,10 @@ fn found(method: Method, psnr_db: f64, lpips: Option<f64>) -> MethodResults {
         additional_recognition: None,
         arm_swing: Some(summary(psnr_db, lpips)),
         recognition: BTreeMap::from([(Protocol::SameMotions, recognised)]),
+        behind_measured: BTreeMap::from([(
+            Protocol::SameMotions,
+            Spread { mean: 0.25, deviation: 0.4, interval: Some(0.125), count: 8 },
+        )]),
         training: Some(Training { folder: "stages/train/x-1".into(), seconds: 12.0, resumed: false }),
         speed: Some(Speed { frames: 10, geometry_s: 1.0, signal_s: 0.2 }),
     }
@@ -51,6 +57,7 @@ fn results(methods: Vec<MethodResults>) -> Results {
     Results {
         methods,
         pairs: vec![],
+        few: vec![],
         stability: vec![],
         figures: vec![],
         effects: None,
@@ -87,6 +94,7 @@ fn an_ablation_is_shown_where_both_sides_are_there() {
     let text = tables(&results(methods));
     assert!(text.contains("| HybridSim, coupled Gaussian patches | 21.00 ± 0.50 (19.12) |"), "{text}");
     assert!(text.contains("| HybridSim, adapted to 4 frames | 21.00 ± 0.50 |"), "{text}");
+    assert!(text.contains("| HybridSim, coupled Gaussian patches | 25.0 ± 12.5 | – |"), "{text}");
 }
 
 #[test]
@@ -115,6 +123,8 @@ fn what_goes_beyond_the_comparison_has_tables_with_the_papers_numbers() {
     let difference = Behind { global: spread(0.5), moving: spread(-0.25), person: None };
     let methods = (Method::Variant(Variant::DenseSurface), Method::OtherMesh);
     results.pairs = vec![Pair { first: "a".into(), second: "b".into(), methods, on: On::UnseenHuman, difference }];
+    let recognised = results.methods[0].recognition[&Protocol::SameMotions];
+    results.few = vec![Few { recordings: 4, material: Material::Measured, recognised }];
     let levels = Levels {
         columns: vec!["direct".into(), "indirect".into()],
         rows: vec!["lunge".into()],
@@ -130,6 +140,7 @@ fn what_goes_beyond_the_comparison_has_tables_with_the_papers_numbers() {
         "| without GCN | 120 | at step 120: direct path | 30.0, 28.0 | 40.0 | 5.000e0 | 7.000e3 |",
         "| HybridSim, dense surface | measured with another mesh error | unseen human | 0.50 ± 0.20 | -0.25 ± 0.20 | – |",
         "| lunge | -0.5; -1.2 | none; -20.0 |",
+        "| 4 | 80.0 [44.0, 97.0] | – | – |",
     ] {
         assert!(text.contains(row), "{row}\n{text}");
     }

@@ -112,6 +112,7 @@ pub enum Task {
     Recognise {
         #[serde(skip)]
         train: Vec<PathBuf>,
+        train_names: Vec<String>,
         #[serde(skip)]
         test: Vec<PathBuf>,
         names: Vec<String>,

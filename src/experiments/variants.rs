@@ -28,14 +28,18 @@ pub enum Variant {
     ThermalNoise,
     /// Trained on linear amplitudes (paper, supplement 8, which shows maps and no such training).
     LinearLoss,
+    /// Trained on how likely the measured power is, in place of decibels.
+    Likelihood,
     /// The surface as it is, in place of the mesh's vertices.
     DenseSurface,
+    /// All three that physics asks for: the surface as it is, the receiver's noise, the likelihood.
+    Physical,
     /// Ours, with what the diagnosis found in one training recording.
     WithEffects,
 }
 
 impl Variant {
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::Ours,
         Self::Coupled,
         Self::WithoutIndirect,
@@ -45,7 +49,9 @@ impl Variant {
         Self::FixedNoise,
         Self::ThermalNoise,
         Self::LinearLoss,
+        Self::Likelihood,
         Self::DenseSurface,
+        Self::Physical,
         Self::WithEffects,
     ];
 
@@ -61,7 +67,9 @@ impl Variant {
             Self::FixedNoise => "fixed_noise",
             Self::ThermalNoise => "thermal_noise",
             Self::LinearLoss => "linear_loss",
+            Self::Likelihood => "likelihood",
             Self::DenseSurface => "dense_surface",
+            Self::Physical => "physical",
             Self::WithEffects => "with_effects",
         }
     }
@@ -78,7 +86,9 @@ impl Variant {
             Self::FixedNoise => "HybridSim, fixed noise",
             Self::ThermalNoise => "HybridSim, thermal noise",
             Self::LinearLoss => "HybridSim, linear loss",
+            Self::Likelihood => "HybridSim, likelihood",
             Self::DenseSurface => "HybridSim, dense surface",
+            Self::Physical => "HybridSim, dense surface, thermal noise, likelihood",
             Self::WithEffects => "HybridSim with found effects",
         }
     }
@@ -100,12 +110,13 @@ impl Variant {
                 settings.noise.law = NoiseLaw::Fixed;
                 settings.noise.rate = 0.025;
             }
-            Self::ThermalNoise => {
-                settings.noise.law = NoiseLaw::Constant;
-                settings.noise.level = 0.0;
-            }
+            Self::ThermalNoise => thermal(&mut settings),
             Self::DenseSurface => settings.surface = dense.clone(),
-            Self::Ours | Self::GcnAtInference | Self::LinearLoss | Self::WithEffects => {}
+            Self::Physical => {
+                thermal(&mut settings);
+                settings.surface = dense.clone();
+            }
+            Self::Ours | Self::GcnAtInference | Self::LinearLoss | Self::Likelihood | Self::WithEffects => {}
         }
         settings
     }
@@ -113,11 +124,19 @@ impl Variant {
     /// How it is trained.
     pub fn training(self, base: &TrainingConfig) -> TrainingConfig {
         let mut training = base.clone();
-        if self == Self::LinearLoss {
-            training.loss.scale = Scale::Linear;
+        match self {
+            Self::LinearLoss => training.loss.scale = Scale::Linear,
+            Self::Likelihood | Self::Physical => training.loss.scale = Scale::Likelihood,
+            _ => {}
         }
         training
     }
+}
+
+/// What receivers have: one level, learned from where it starts.
+fn thermal(settings: &mut SimulatorConfig) {
+    settings.noise.law = NoiseLaw::Constant;
+    settings.noise.level = 0.0;
 }
 
 #[cfg(test)]
@@ -128,11 +147,12 @@ mod tests {
     fn every_ablation_changes_what_it_is_named_after() {
         let base = SimulatorConfig::default();
         let dense = SurfaceConfig { sampling: crate::body::Sampling::Facets, ..Default::default() };
-        let same = [Variant::Ours, Variant::GcnAtInference, Variant::LinearLoss, Variant::WithEffects];
+        let same = [Variant::Ours, Variant::GcnAtInference, Variant::LinearLoss, Variant::Likelihood, Variant::WithEffects];
+        let other_losses = [Variant::LinearLoss, Variant::Likelihood, Variant::Physical];
         let training = TrainingConfig::default();
         for variant in Variant::ALL {
             assert_eq!(variant.settings(&base, &dense) == base, same.contains(&variant), "{}", variant.id());
-            assert_eq!(variant.training(&training) == training, variant != Variant::LinearLoss, "{}", variant.id());
+            assert_eq!(variant.training(&training) != training, other_losses.contains(&variant), "{}", variant.id());
             assert_eq!(serde_json::to_value(variant).unwrap(), variant.id());
         }
         assert_eq!(Variant::Coupled.settings(&base, &dense).paths, PathModel::Coupled);

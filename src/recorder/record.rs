@@ -45,7 +45,8 @@ impl Recorder {
         world.check()?;
         let stages = Stages::new(world);
         let scatter = body_scatter(world, &stages, &stages.radar)?;
-        let previews = preview_frames(world, scatter.is_some());
+        // The receiver of another recording needs no scale of its own.
+        let previews = if world.receiver.level.is_some() { vec![] } else { preview_frames(world, scatter.is_some()) };
         let body = |frame: usize| -> Result<Signal> {
             let mut signal = Signal::zero(frame, &stages.wide, 1);
             if let Some(scatter) = &scatter {

@@ -8,6 +8,7 @@ pub mod align;
 pub mod challenge;
 pub mod diagnose;
 pub mod export;
+pub mod found;
 pub mod heatmaps;
 pub mod import;
 pub mod notes;

@@ -30,6 +30,8 @@ use crate::{
 pub struct RunReport<'a> {
     /// What was refined of the recordings' motions.
     pub refined: &'a [RefinedPose],
+    /// What the run's own diagnosis found; none without one.
+    pub found: Option<&'a str>,
     pub folder: &'a Path,
     pub config: &'a Config,
     pub recordings: &'a [LoadedRecording],
@@ -155,6 +157,9 @@ impl RunReport<'_> {
         );
         let which = if held_out { "held-out" } else { "training" };
         let mut text = format!("# Training run\n\n{lead}\n\n");
+        if let Some(found) = self.found {
+            writeln!(text, "{found} (`diagnosis/report.html`).\n").expect("text grows");
+        }
         for pose in self.refined {
             writeln!(text, "{} (`pose.toml`).\n", pose.line()).expect("text grows");
         }
@@ -176,6 +181,7 @@ impl RunReport<'_> {
         let content = html! {
             h1 { "Training run" }
             p.lead { (lead) }
+            @if let Some(found) = self.found { p { (page::shown(found)) " (" a href="diagnosis/report.html" { "why" } ")." } }
             @for pose in self.refined { p { (page::shown(&pose.line())) " (" code { "pose.toml" } ")." } }
             @for (folder, evaluation) in evaluations {
                 h2 { (page::shown(&folder.display().to_string())) ", " (which) " frames" }

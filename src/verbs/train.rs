@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use burn::tensor::Device;
 
-use super::{Notice, Notify, claimed, notes, plausible, record, report::RunReport};
+use super::{Notice, Notify, claimed, found, notes, plausible, record, report::RunReport};
 use crate::{
     config::Config,
     data::{atomic, files},
@@ -17,7 +17,8 @@ use crate::{
 pub enum Start<'a> {
     /// The experiment of a config file, changed by `--set key=value`. Without `out` the run is kept in `runs/<config>`, or the
     /// next `runs/<config>-N` that is free. `go_on`: a run of the same settings that is in `out` is continued.
-    Config { path: &'a Path, sets: &'a [String], out: Option<&'a Path>, go_on: bool },
+    /// `diagnose`: with the effects that the diagnosis finds in the first recording ([`found::add`]).
+    Config { path: &'a Path, sets: &'a [String], out: Option<&'a Path>, go_on: bool, diagnose: bool },
     /// A run folder that was interrupted; `sets` must be empty where it holds a checkpoint.
     Resume { run: &'a Path, sets: &'a [String] },
 }
@@ -38,7 +39,7 @@ pub struct Trained {
 pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, notify: &mut Notify<'_>) -> Result<Trained> {
     let (config_path, run_folder, sets, begun) = match *start {
         Start::Resume { run, sets } => (run.join("config.toml"), run.to_path_buf(), sets, true),
-        Start::Config { path, sets, out, go_on } => {
+        Start::Config { path, sets, out, go_on, .. } => {
             let folder = out.map_or_else(|| fresh_run_folder(path), Path::to_path_buf);
             (path.to_path_buf(), folder, sets, go_on)
         }
@@ -64,6 +65,9 @@ pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, notify: &mu
     }
     let _claim = resumed.map_or_else(|| claimed(&run_folder), Ok)?;
     has_recordings(&mut config, &config_path, as_stated, notify)?;
+    if matches!(start, Start::Config { diagnose: true, .. }) {
+        found::add(&mut config, &run_folder, resume.is_some(), &devices[0], as_stated, notify)?;
+    }
     let config_toml = config.to_toml();
     if resume.is_some() && by_config {
         is_the_same(&run_folder.join("config.toml"), &config_toml)?;
@@ -81,8 +85,10 @@ pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, notify: &mu
     let refined = refine::read(&run_folder)?;
     let recordings =
         recordings.into_iter().map(|recording| Ok(refine::refined(recording, &refined)?.0)).collect::<Result<Vec<_>>>()?;
+    let found = found::line(&run_folder)?;
     let report = RunReport {
         refined: &refined,
+        found: found.as_deref(),
         folder: &run_folder,
         config: &config,
         recordings: &recordings,

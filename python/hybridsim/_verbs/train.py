@@ -14,6 +14,7 @@ def train(
     out: StrPath | None = None,
     resume: StrPath | None = None,
     go_on: bool = False,
+    diagnose: bool = False,
     set: Settings = (),
     device: str = "auto",
     as_stated: bool = False,
@@ -26,6 +27,8 @@ def train(
         out: run folder; ``runs/<config>``, or the next free name, by default.
         resume: a run folder that was interrupted, in place of a config. Ctrl-C keeps the checkpoint of the last whole epoch.
         go_on: a run of the same settings that is in ``out`` already is continued; of others it is refused.
+        diagnose: the first recording is diagnosed, and the simulator is trained with the effects that were found; the diagnosis is in
+            ``diagnosis`` in the run folder.
         set: changes of settings, such as ``{"training.epochs": 10}``.
         device: ``flex``, ``wgpu``, ``cuda:0``, ``auto``, or several with commas between.
         as_stated: take what is stated, however implausible.
@@ -35,6 +38,6 @@ def train(
         hybridsim.Error: settings or recordings that cannot be used; a loss that became NaN.
     """
     with Notifier(progress) as notify:
-        about = _hybridsim.train(path(config), path(resume), path(out), sets(set), go_on, device, as_stated, notify)
+        about = _hybridsim.train(path(config), path(resume), path(out), sets(set), go_on, diagnose, device, as_stated, notify)
     found = json.loads(about)
     return Run(**{**found, "folder": Path(found["folder"])})

@@ -22,14 +22,15 @@ pub fn train(
     out: Option<PathBuf>,
     sets: Vec<String>,
     go_on: bool,
+    diagnose: bool,
     device: String,
     as_stated: bool,
     notify: &Bound<'_, PyAny>,
 ) -> PyResult<String> {
     run(py, notify, move |notify| {
         let start = match (&config, &resume) {
-            (Some(path), None) => Start::Config { path, sets: &sets, out: out.as_deref(), go_on },
-            (None, Some(run)) if out.is_none() && !go_on => Start::Resume { run, sets: &sets },
+            (Some(path), None) => Start::Config { path, sets: &sets, out: out.as_deref(), go_on, diagnose },
+            (None, Some(run)) if out.is_none() && !go_on && !diagnose => Start::Resume { run, sets: &sets },
             _ => {
                 return Err(Error::Usage {
                     message: "what is to be trained: expected a config, or a run to resume alone".into(),

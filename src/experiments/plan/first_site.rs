@@ -1,51 +1,57 @@
 //! The comparison: simulation, scores and recognition of every method, on the first site.
 
-use std::collections::BTreeMap;
-use std::path::PathBuf;
-
-use super::{Method, MethodStages, Place, Planner, Trained};
+use super::stages::Learned;
+use super::{Drawn, Method, MethodStages, Place, Planner, Trainings};
+use crate::error::Result;
 use crate::experiments::config::{BaselineName, Protocol};
 use crate::experiments::takes::Take;
 use crate::experiments::variants::Variant;
 
 /// Stages that simulate, and what they simulate.
-type Simulated<'a> = Vec<(usize, &'a Take)>;
+pub(super) type Simulated<'a> = Vec<(usize, &'a Take)>;
 
 impl Planner<'_> {
-    pub(super) fn methods(&mut self, place: &Place, trained: &BTreeMap<Variant, Trained>) {
+    pub(super) fn methods(&mut self, place: &Place, trained: &Trainings) -> Result<()> {
         let mut methods = self.compared();
         let [mut again, mut other_mesh] = [MethodStages::default(), MethodStages::default()];
         let simulations = self.simulations(place, trained, &mut methods, [&mut again, &mut other_mesh]);
-        for ((method, stages), simulated) in methods.iter_mut().zip(&simulations) {
-            self.recognitions(*method, stages, place, simulated);
+        for ((drawn, stages), simulated) in methods.iter_mut().zip(&simulations) {
+            self.recognitions(*drawn, stages, place, simulated);
         }
         self.recognitions_again(&mut again, place);
-        self.plan.methods.extend(methods);
+        let drawn: Vec<(Drawn, &Simulated)> = methods.iter().map(|(drawn, _)| *drawn).zip(&simulations).collect();
+        self.few(place, &drawn)?;
+        for (drawn, stages) in methods {
+            match self.plan.methods.iter_mut().find(|(method, _)| *method == drawn.method) {
+                Some((_, draws)) => draws.push(stages),
+                None => self.plan.methods.push((drawn.method, vec![stages])),
+            }
+        }
         if let Some(stage) = place.other_mesh {
             self.recognition_of_other_mesh(&mut other_mesh, stage, place);
-            self.plan.methods.push((Method::OtherMesh, other_mesh));
+            self.plan.methods.push((Method::OtherMesh, vec![other_mesh]));
         }
-        self.plan.methods.push((Method::Again, again));
+        self.plan.methods.push((Method::Again, vec![again]));
+        Ok(())
     }
 
-    /// Baselines, then variants.
-    fn compared(&self) -> Vec<(Method, MethodStages)> {
+    /// Baselines, then variants, then the variants' further draws.
+    fn compared(&self) -> Vec<(Drawn, MethodStages)> {
         let config = self.config;
         let rules: &[fn(BaselineName) -> Method] =
             if config.receiver_noise { &[Method::Baseline, Method::ReceiverNoise] } else { &[Method::Baseline] };
-        let baselines = config.baselines.iter().flat_map(|&name| rules.iter().map(move |rule| rule(name)));
-        baselines
-            .chain(config.variants.iter().map(|&variant| Method::Variant(variant)))
-            .map(|method| (method, MethodStages::default()))
-            .collect()
+        let baselines = config.baselines.iter().flat_map(|&name| rules.iter().map(move |rule| Drawn::first(rule(name))));
+        let of_draw = |draw| config.variants.iter().map(move |&variant| Drawn { method: Method::Variant(variant), draw });
+        let variants = (0..config.seeds).flat_map(of_draw);
+        baselines.chain(variants).map(|drawn| (drawn, MethodStages::default())).collect()
     }
 
     /// Simulations and scores of all methods, recording by recording; what was recorded again is scored beside them.
     fn simulations<'a>(
         &mut self,
         place: &'a Place,
-        trained: &BTreeMap<Variant, Trained>,
-        methods: &mut [(Method, MethodStages)],
+        trained: &Trainings,
+        methods: &mut [(Drawn, MethodStages)],
         [again, other_mesh]: [&mut MethodStages; 2],
     ) -> Vec<Simulated<'a>> {
         let config = self.config;
@@ -58,15 +64,15 @@ impl Planner<'_> {
             if !(everybody || compared(take) || additional) {
                 continue;
             }
-            for ((method, stages), simulations) in methods.iter_mut().zip(&mut simulations) {
-                if !everybody && additional && *method != Method::Variant(Variant::Ours) {
+            for ((drawn, stages), simulations) in methods.iter_mut().zip(&mut simulations) {
+                if !everybody && additional && *drawn != Drawn::first(Method::Variant(Variant::Ours)) {
                     continue;
                 }
-                let simulate = self.simulation(*method, stages, place, take, trained);
+                let simulate = self.simulation(*drawn, stages, place, take, trained);
                 stages.simulate.push(simulate);
                 simulations.push((simulate, take));
                 let simulated = self.folder(simulate).join("recording");
-                self.scores(stages, *method, place, take, simulate, simulated);
+                self.scores(stages, *drawn, place, take, simulate, simulated);
             }
             if place.again.subjects.contains(&take.subject) {
                 self.scores_again(again, Method::Again, place, take, place.again.folder.join(&take.name), None);
@@ -80,19 +86,13 @@ impl Planner<'_> {
         simulations
     }
 
-    fn simulation(
-        &mut self,
-        method: Method,
-        stages: &mut MethodStages,
-        place: &Place,
-        take: &Take,
-        trained: &BTreeMap<Variant, Trained>,
-    ) -> usize {
-        let ours = &trained[&Variant::Ours];
-        match method {
+    fn simulation(&mut self, drawn: Drawn, stages: &mut MethodStages, place: &Place, take: &Take, trained: &Trainings) -> usize {
+        let ours = &trained[&Variant::Ours][0];
+        match drawn.method {
             Method::Variant(variant) => {
-                stages.train = Some(trained[&variant].stage);
-                self.simulate(method, place, take, &trained[&variant])
+                let trained = &trained[&variant][drawn.draw];
+                stages.train = Some(trained.stage);
+                self.simulate(drawn, place, take, trained)
             }
             Method::Baseline(name) => self.baseline(name, None, place, take, ours),
             Method::ReceiverNoise(name) => {
@@ -114,25 +114,19 @@ impl Planner<'_> {
     }
 
     /// What classifiers learn from a method's simulations.
-    fn recognitions(&mut self, method: Method, stages: &mut MethodStages, place: &Place, simulated: &Simulated<'_>) {
+    fn recognitions(&mut self, drawn: Drawn, stages: &mut MethodStages, place: &Place, simulated: &Simulated<'_>) {
         let config = self.config;
         let unseen = &config.split.unseen;
         let (tested, second): (Vec<&Take>, _) = (place.of_subject(unseen).collect(), self.additional(place));
-        if method == Method::Variant(Variant::Ours) && self.recognises(&second) {
-            let learned: Vec<usize> =
-                simulated.iter().filter(|(_, take)| self.is_additional(take)).map(|&(stage, _)| stage).collect();
-            let folders = learned.iter().map(|&stage| self.folder(stage).join("recording")).collect();
-            let id = format!("{}_additional", method.id());
-            stages.additional_recognition = Some(self.recognition(id, Protocol::SameMotions, place, &second, learned, folders));
+        if drawn == Drawn::first(Method::Variant(Variant::Ours)) && self.recognises(&second) {
+            let learned = self.simulated_by(0, simulated.iter().copied().filter(|(_, take)| self.is_additional(take)));
+            let id = format!("{}_additional", drawn.id());
+            stages.additional_recognition = Some(self.recognition(id, Protocol::SameMotions, place, &second, learned));
         }
         for &protocol in &config.protocols {
-            let learned: Vec<usize> = simulated
-                .iter()
-                .filter(|(_, take)| (take.subject == *unseen) == (protocol == Protocol::SameMotions))
-                .map(|&(stage, _)| stage)
-                .collect();
-            let folders = learned.iter().map(|&stage| self.folder(stage).join("recording")).collect();
-            let stage = self.recognition(method.id(), protocol, place, &tested, learned, folders);
+            let counts = |take: &Take| (take.subject == *unseen) == (protocol == Protocol::SameMotions);
+            let learned = self.simulated_by(drawn.draw, simulated.iter().copied().filter(|(_, take)| counts(take)));
+            let stage = self.recognition(drawn.id(), protocol, place, &tested, learned);
             stages.recognition.insert(protocol, stage);
         }
     }
@@ -143,36 +137,36 @@ impl Planner<'_> {
         let unseen = &config.split.unseen;
         let (tested, second): (Vec<&Take>, _) = (place.of_subject(unseen).collect(), self.additional(place));
         for &protocol in &config.protocols {
-            let folders: Option<Vec<PathBuf>> = match protocol {
+            let learned = match protocol {
                 Protocol::SameMotions => {
-                    let recorded = place.again.subjects.contains(unseen);
-                    recorded.then(|| place.of_subject(unseen).map(|take| place.again.folder.join(&take.name)).collect())
+                    place.again.subjects.contains(unseen).then(|| Learned::recorded(&place.again.folder, &tested))
                 }
-                Protocol::OtherSubjects => {
-                    let others = place.takes.iter().filter(|take| take.subject != *unseen);
-                    Some(others.map(|take| place.recordings.join(&take.name)).collect())
-                }
+                Protocol::OtherSubjects => Some(Learned::recorded(&place.recordings, &self.others(place))),
             };
-            if let Some(folders) = folders {
-                let stage = self.recognition("again".into(), protocol, place, &tested, vec![], folders);
+            if let Some(learned) = learned {
+                let stage = self.recognition("again".into(), protocol, place, &tested, learned);
                 again.recognition.insert(protocol, stage);
             }
         }
         if self.recognises(&second) && second.iter().all(|take| place.again.subjects.contains(&take.subject)) {
-            let folders = second.iter().map(|take| place.again.folder.join(&take.name)).collect();
+            let learned = Learned::recorded(&place.again.folder, &second);
             let id = "again_additional".into();
-            again.additional_recognition = Some(self.recognition(id, Protocol::SameMotions, place, &second, vec![], folders));
+            again.additional_recognition = Some(self.recognition(id, Protocol::SameMotions, place, &second, learned));
         }
+    }
+
+    /// The recordings of everybody but the unseen subject.
+    pub(super) fn others<'a>(&self, place: &'a Place) -> Vec<&'a Take> {
+        place.takes.iter().filter(|take| take.subject != self.config.split.unseen).collect()
     }
 
     fn recognition_of_other_mesh(&mut self, other_mesh: &mut MethodStages, stage: usize, place: &Place) {
         if self.config.protocols.contains(&Protocol::SameMotions) {
             let tested: Vec<&Take> = place.of_subject(&self.config.split.unseen).collect();
-            let recorded = self.folder(stage).join("recordings");
-            let folders = tested.iter().map(|take| recorded.join(&take.name)).collect();
-            let id = Method::OtherMesh.id();
-            let learned = self.recognition(id, Protocol::SameMotions, place, &tested, vec![stage], folders);
-            other_mesh.recognition.insert(Protocol::SameMotions, learned);
+            let recorded = Learned::recorded(&self.folder(stage).join("recordings"), &tested);
+            let learned = Learned { stages: vec![stage], ..recorded };
+            let stage = self.recognition(Method::OtherMesh.id(), Protocol::SameMotions, place, &tested, learned);
+            other_mesh.recognition.insert(Protocol::SameMotions, stage);
         }
     }
 }

@@ -3,7 +3,8 @@
 
 use std::path::PathBuf;
 
-use super::{ARM_SWING, Method, MethodStages, Place, Planner, Trained};
+use super::stages::Learned;
+use super::{ARM_SWING, Drawn, Method, MethodStages, Place, Planner, Trained};
 use crate::error::{Error, Result};
 use crate::experiments::config::{Protocol, SecondSceneConfig, StabilityConfig};
 use crate::experiments::figures::{FigureColumn, FigureTask, Panel};
@@ -46,25 +47,24 @@ impl Planner<'_> {
         let there = Trained { stage, checkpoint: self.folder(stage).join("last") };
         for (method, trained) in [(Method::SceneOurs, &there), (Method::SceneUnadapted, ours)] {
             let mut stages = MethodStages { train: Some(trained.stage), ..Default::default() };
-            let mut folders = vec![];
             for take in &tested {
-                let simulate = self.simulate(method, place, take, trained);
+                let simulate = self.simulate(Drawn::first(method), place, take, trained);
                 stages.simulate.push(simulate);
-                folders.push(self.folder(simulate).join("recording"));
-                self.scene_scores(&mut stages, method, place, take, vec![simulate], folders[folders.len() - 1].clone());
+                let simulated = self.folder(simulate).join("recording");
+                self.scene_scores(&mut stages, method, place, take, vec![simulate], simulated);
             }
-            let parents = stages.simulate.clone();
-            self.scene_recognition(&mut stages, method, place, &tested, parents, folders);
-            self.plan.methods.push((method, stages));
+            let learned = self.simulated_by(0, stages.simulate.iter().copied().zip(tested.iter().copied()));
+            self.scene_recognition(&mut stages, method, place, &tested, learned);
+            self.plan.methods.push((method, vec![stages]));
         }
         if place.again.subjects.contains(subject) {
             let mut stages = MethodStages::default();
-            let folders: Vec<PathBuf> = tested.iter().map(|take| place.again.folder.join(&take.name)).collect();
-            for (take, folder) in tested.iter().zip(&folders) {
-                self.scene_scores(&mut stages, Method::SceneAgain, place, take, vec![], folder.clone());
+            for take in &tested {
+                self.scene_scores(&mut stages, Method::SceneAgain, place, take, vec![], place.again.folder.join(&take.name));
             }
-            self.scene_recognition(&mut stages, Method::SceneAgain, place, &tested, vec![], folders);
-            self.plan.methods.push((Method::SceneAgain, stages));
+            let learned = Learned::recorded(&place.again.folder, &tested);
+            self.scene_recognition(&mut stages, Method::SceneAgain, place, &tested, learned);
+            self.plan.methods.push((Method::SceneAgain, vec![stages]));
         }
         Ok(())
     }
@@ -89,11 +89,10 @@ impl Planner<'_> {
         method: Method,
         place: &Place,
         tested: &[&Take],
-        parents: Vec<usize>,
-        folders: Vec<PathBuf>,
+        learned: Learned,
     ) {
         if self.config.protocols.contains(&Protocol::SameMotions) {
-            let stage = self.recognition(method.id(), Protocol::SameMotions, place, tested, parents, folders);
+            let stage = self.recognition(method.id(), Protocol::SameMotions, place, tested, learned);
             stages.recognition.insert(Protocol::SameMotions, stage);
         }
     }

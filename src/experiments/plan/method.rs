@@ -30,6 +30,28 @@ pub enum Method {
     SceneAgain,
 }
 
+/// A method as it was trained once; what does not learn has the draw 0 alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Drawn {
+    pub method: Method,
+    pub draw: usize,
+}
+
+impl Drawn {
+    /// As in folders: the first draw has the method's.
+    pub fn id(self) -> String {
+        match self.draw {
+            0 => self.method.id(),
+            draw => format!("{}/draw_{}", self.method.id(), draw + 1),
+        }
+    }
+
+    /// The only one.
+    pub fn first(method: Method) -> Self {
+        Self { method, draw: 0 }
+    }
+}
+
 impl Method {
     /// As in folders.
     pub fn id(self) -> String {

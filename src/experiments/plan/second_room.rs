@@ -1,6 +1,6 @@
 //! A second room, to which trained simulators are brought.
 
-use super::{Method, MethodStages, Place, Planner, Trained, training_takes};
+use super::{Drawn, Method, MethodStages, Place, Planner, Trained, training_takes};
 use crate::experiments::task::Task;
 use crate::training::TrainingConfig;
 
@@ -48,12 +48,13 @@ impl Planner<'_> {
             .collect();
         for take in place.of_subject(&self.config.split.training) {
             for ((method, stages), (_, trained)) in methods.iter_mut().zip(trained) {
-                let simulate = self.simulate(*method, place, take, trained);
+                let drawn = Drawn::first(*method);
+                let simulate = self.simulate(drawn, place, take, trained);
                 stages.simulate.push(simulate);
                 let simulated = self.folder(simulate).join("recording");
-                self.scores(stages, *method, place, take, simulate, simulated);
+                self.scores(stages, drawn, place, take, simulate, simulated);
             }
         }
-        self.plan.methods.extend(methods);
+        self.plan.methods.extend(methods.into_iter().map(|(method, stages)| (method, vec![stages])));
     }
 }

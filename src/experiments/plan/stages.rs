@@ -1,23 +1,61 @@
 //! The stages that a method has of a recording: its simulation, its scores, what a classifier learns from it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::{Method, MethodStages, Place, Planner, Trained, training_takes};
+use super::{Drawn, Method, MethodStages, Place, Planner, Trained, training_takes};
 use crate::experiments::config::{BaselineName, Protocol};
 use crate::experiments::takes::Take;
 use crate::experiments::task::Task;
 use crate::experiments::variants::Variant;
+use crate::recognition::RecognitionConfig;
+
+/// What a classifier learns from.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Learned {
+    /// That made it.
+    pub stages: Vec<usize>,
+    pub folders: Vec<PathBuf>,
+    pub names: Vec<String>,
+    pub draw: usize,
+}
+
+impl Learned {
+    /// Recordings of these takes below a folder.
+    pub fn recorded(folder: &Path, takes: &[&Take]) -> Self {
+        let folders = takes.iter().map(|take| folder.join(&take.name)).collect();
+        Self { folders, names: takes.iter().map(|take| take.name.clone()).collect(), ..Self::default() }
+    }
+
+    /// More of it; the draw stays.
+    pub fn and(mut self, more: Self) -> Self {
+        self.stages.extend(more.stages);
+        self.folders.extend(more.folders);
+        self.names.extend(more.names);
+        self
+    }
+}
 
 impl Planner<'_> {
-    pub(super) fn simulate(&mut self, method: Method, place: &Place, take: &Take, trained: &Trained) -> usize {
+    /// What stages have simulated, by one draw.
+    pub(super) fn simulated_by<'a>(&self, draw: usize, simulated: impl Iterator<Item = (usize, &'a Take)>) -> Learned {
+        let mut learned = Learned { draw, ..Learned::default() };
+        for (stage, take) in simulated {
+            learned.stages.push(stage);
+            learned.folders.push(self.folder(stage).join("recording"));
+            learned.names.push(take.name.clone());
+        }
+        learned
+    }
+
+    pub(super) fn simulate(&mut self, drawn: Drawn, place: &Place, take: &Take, trained: &Trained) -> usize {
         let task = Task::Simulate {
             checkpoint: trained.checkpoint.clone(),
             recording: place.recordings.join(&take.name),
             name: take.name.clone(),
-            graph_at_inference: method == Method::Variant(Variant::GcnAtInference),
-            seed: self.config.seed,
+            graph_at_inference: drawn.method == Method::Variant(Variant::GcnAtInference),
+            seed: self.config.seed + drawn.draw as u64,
         };
-        self.add(format!("simulate/{}/{}", method.id(), take.name), vec![trained.stage], Some(place), task)
+        self.add(format!("simulate/{}/{}", drawn.id(), take.name), vec![trained.stage], Some(place), task)
     }
 
     /// A baseline's simulation of a recording: with our direct path, or at the level that the training recordings have.
@@ -57,7 +95,7 @@ impl Planner<'_> {
     pub(super) fn scores(
         &mut self,
         stages: &mut MethodStages,
-        method: Method,
+        drawn: Drawn,
         place: &Place,
         take: &Take,
         parent: usize,
@@ -65,13 +103,13 @@ impl Planner<'_> {
     ) {
         let held_out = take.subject == self.config.split.training;
         let additional = self.is_additional(take);
-        let full = method == Method::Variant(Variant::Ours);
+        let full = drawn == Drawn::first(Method::Variant(Variant::Ours));
         let scored = held_out || take.subject == self.config.split.unseen || (additional && full);
         if !scored {
             return;
         }
         let task = self.compare(place, take, simulated, held_out);
-        let stage = self.add(format!("compare/{}/{}", method.id(), take.name), vec![parent], Some(place), task);
+        let stage = self.add(format!("compare/{}/{}", drawn.id(), take.name), vec![parent], Some(place), task);
         if additional {
             stages.additional.push(stage);
         } else {
@@ -118,21 +156,29 @@ impl Planner<'_> {
         }
     }
 
+    /// A classifier under the protocol.
     pub(super) fn recognition(
         &mut self,
         id: String,
         protocol: Protocol,
         place: &Place,
         test: &[&Take],
-        parents: Vec<usize>,
-        train: Vec<PathBuf>,
+        learned: Learned,
     ) -> usize {
+        self.classifier(format!("recognise/{}/{id}", protocol.id()), place, test, learned, self.config.recognition.epochs)
+    }
+
+    /// A classifier that learns for so many epochs.
+    pub(super) fn classifier(&mut self, name: String, place: &Place, test: &[&Take], learned: Learned, epochs: usize) -> usize {
+        let settings = &self.config.recognition;
+        let seed = settings.seed + learned.draw as u64;
         let task = Task::Recognise {
-            train,
+            train: learned.folders,
+            train_names: learned.names,
             test: test.iter().map(|take| place.recordings.join(&take.name)).collect(),
             names: test.iter().map(|take| take.name.clone()).collect(),
-            recognition: Box::new(self.config.recognition.clone()),
+            recognition: Box::new(RecognitionConfig { seed, epochs, ..settings.clone() }),
         };
-        self.add(format!("recognise/{}/{id}", protocol.id()), parents, Some(place), task)
+        self.add(name, learned.stages, Some(place), task)
     }
 }
