@@ -2,23 +2,54 @@
 
 use num_complex::Complex64;
 
-/// Mean of exp(jφ) over a triangle on which φ is linear and takes the values `phases` (radians) at the corners.
+/// Phases that differ by less are summed as a series: there the quotient's numerator cancels.
+const SMALL: f64 = 1.0;
+/// Of the series: at |φ| ≤ 2/3, the most around the mean of phases that are [`SMALL`], the first one left out is below 1e-17.
+const TERMS: usize = 14;
+
+/// Mean of exp(jφ) over a triangle on which φ is linear and takes the values `phases` (radians) at the corners, to about 1e-15 for
+/// phases however far apart.
 ///
-/// With h_m the complete homogeneous polynomials of the corner phases, the mean of φ^m over the triangle is
-/// 2 m!/(m+2)! · h_m, hence Σ 2 j^m h_m/(m+2)!. Unlike the quotient form (Gordon 1975) the series has no singular
-/// direction: it holds for flat, tilted and degenerate phases alike. About e^|φ| · 1e-16 of accuracy is lost,
-/// so phases up to 20 radians around their mean are good to 1e-7.
+/// By Hermite and Genocchi the mean is −2 f[a, b, c], a divided difference of f(φ) = exp(jφ). With a ≤ b ≤ c it is
+/// (f[b, c] − f[a, b]) / (c − a), where f[x, y] = j exp(j (x + y)/2) sinc((y − x)/2): the only divisor is the largest difference, so no
+/// direction is singular (Gordon 1975 divides by all three).
 pub fn mean_phasor(phases: [f64; 3]) -> Complex64 {
+    let [mut a, mut b, mut c] = phases;
+    if a > b {
+        std::mem::swap(&mut a, &mut b);
+    }
+    if b > c {
+        std::mem::swap(&mut b, &mut c);
+    }
+    if a > b {
+        std::mem::swap(&mut a, &mut b);
+    }
+    if c - a < SMALL {
+        return series([a, b, c]);
+    }
+    // Around b: j exp(±jh) sinc(h) of either half.
+    let side = |half: f64| {
+        let (sin, cos) = half.sin_cos();
+        let sinc = if half > 1e-9 { sin / half } else { 1.0 };
+        [sin * sinc, cos * sinc]
+    };
+    let ([above_sin, above_cos], [below_sin, below_cos]) = (side(0.5 * (c - b)), side(0.5 * (b - a)));
+    // −2j ((above_cos + j above_sin) − (below_cos − j below_sin)) / (c − a)
+    let around = Complex64::new(above_sin + below_sin, below_cos - above_cos) * (2.0 / (c - a));
+    Complex64::cis(b) * around
+}
+
+/// With h_m the complete homogeneous polynomials of the corner phases, the mean of φ^m over the triangle is 2 m!/(m+2)! · h_m, hence
+/// Σ 2 j^m h_m/(m+2)!.
+fn series(phases: [f64; 3]) -> Complex64 {
     let mean = (phases[0] + phases[1] + phases[2]) / 3.0;
     let [a, b, c] = phases.map(|phase| phase - mean);
     // The first symmetric polynomial is zero now: h_m = −e2 h_{m−2} + e3 h_{m−3}.
     let (e2, e3) = (a * b + b * c + c * a, a * b * c);
-    let largest = a.abs().max(b.abs()).max(c.abs());
-    let terms = (8.0 + 2.9 * largest) as usize + 6;
     let [mut before_last, mut last, mut now] = [0.0, 0.0, 1.0];
     let [mut re, mut im] = [1.0, 0.0];
     let mut factor = 1.0;
-    for order in 1..terms {
+    for order in 1..TERMS {
         (before_last, last, now) = (last, now, -e2 * last + e3 * before_last);
         factor /= (order + 2) as f64;
         let term = now * factor;
@@ -55,6 +86,32 @@ mod tests {
         for phases in [[0.0; 3], [1.0, 1.0, 1.0], [0.1, -0.3, 0.2], [5.0, 5.0, -7.0], [12.0, -3.0, 4.0], [0.0, 0.0, 15.0]] {
             let difference = (mean_phasor(phases) - brute_force(phases, 1000)).norm();
             assert!(difference < 1e-5, "{phases:?}: {difference:e}");
+        }
+    }
+
+    /// A facet that a pose stretches is many wavelengths long: with phases this far apart a series in powers of them overflows.
+    #[test]
+    fn phases_far_apart_are_as_good_as_near_ones() {
+        for phases in [[0.0, 60.0, -45.0], [200.0, 200.0, 0.0], [-150.0, 100.0, 100.0], [3e3, 3e3 + 80.0, 3e3 - 7.0]] {
+            let difference = (mean_phasor(phases) - brute_force(phases, 3000)).norm();
+            assert!(difference < 1e-4, "{phases:?}: {difference:e}");
+        }
+        assert!(mean_phasor([0.0, 1e6, 3e6]).norm() < 1e-11);
+    }
+
+    /// On both sides of where one form ends and the other begins, in any order of the corners.
+    #[test]
+    fn the_two_forms_agree_where_they_meet() {
+        for shape in [[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 0.3, 1.0]] {
+            let [below, above] =
+                [0.999_999_999, 1.000_000_001].map(|scale| mean_phasor(shape.map(|phase| 40.0 + SMALL * scale * phase)));
+            assert!((below - above).norm() < 1e-8, "{shape:?}: {below} {above}");
+            let [a, b, c] = shape.map(|phase| 40.0 + 1.5 * phase);
+            let sorted = mean_phasor([a, b, c]);
+            for order in [[a, c, b], [b, a, c], [b, c, a], [c, a, b], [c, b, a]] {
+                assert!((mean_phasor(order) - sorted).norm() < 1e-14);
+            }
+            assert!((series([a, b, c]) - sorted).norm() < 1e-9, "{shape:?}");
         }
     }
 
