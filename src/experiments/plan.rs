@@ -61,6 +61,14 @@ pub struct MethodStages {
     pub additional_recognition: Option<usize>,
 }
 
+/// Classifiers that learned from so many recordings of each action, one stage for each draw.
+#[derive(Clone, Debug)]
+pub struct FewStages {
+    pub recordings: usize,
+    pub material: Material,
+    pub stages: Vec<usize>,
+}
+
 /// What is to be done, in an order in which it can be.
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
@@ -68,8 +76,7 @@ pub struct Plan {
     /// In the order of the tables, with one entry for each draw: those of trained simulators have [`ReproduceConfig::seeds`], all
     /// others one.
     pub methods: Vec<(Method, Vec<MethodStages>)>,
-    /// Classifiers that learned from a few recordings of each action, one stage for each draw.
-    pub few: Vec<(usize, Material, Vec<usize>)>,
+    pub few: Vec<FewStages>,
     pub diagnosis: Option<usize>,
     /// With the graph convolution, and without.
     pub stability: Vec<(Variant, usize)>,

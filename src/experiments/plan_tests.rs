@@ -121,7 +121,7 @@ fn few_recordings_are_others_and_more_of_them_hold_the_fewer() {
     let plan = planned(&few(vec![1, 2]));
     assert_eq!(plan.few.len(), 2 * Material::ALL.len());
     let mut known: BTreeMap<(Material, usize), Vec<String>> = BTreeMap::new();
-    for (count, material, stages) in &plan.few {
+    for FewStages { recordings: count, material, stages } in &plan.few {
         assert_eq!(stages.len(), 2);
         for (draw, &stage) in stages.iter().enumerate() {
             let Task::Recognise { train, train_names, test, recognition, .. } = &plan.stages[stage].task else { unreachable!() };

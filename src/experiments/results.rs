@@ -154,9 +154,9 @@ pub fn collect(plan: &Plan, store: &Store, records: &[Record]) -> Result<Results
     let results =
         |(method, draws): &(Method, Vec<MethodStages>)| method_results(&found, *method, draws, records, (&ours, our_takes));
     let methods = plan.methods.iter().map(results).collect::<Result<_>>()?;
-    let few = plan.few.iter().map(|(recordings, material, stages)| {
-        let recognised = found.recognised(stages)?.expect("a stage for every draw");
-        Ok::<_, Error>(Few { recordings: *recordings, material: *material, recognised })
+    let few = plan.few.iter().map(|few| {
+        let recognised = found.recognised(&few.stages)?.expect("a stage for every draw");
+        Ok::<_, Error>(Few { recordings: few.recordings, material: few.material, recognised })
     });
     let few = few.collect::<Result<_>>()?;
     let folder = |stage: usize| found.folder(stage);

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::first_site::Simulated;
 use super::stages::Learned;
-use super::{Drawn, Method, Place, Planner};
+use super::{Drawn, FewStages, Method, Place, Planner};
 use crate::error::{Error, Result};
 use crate::experiments::few::Material;
 use crate::experiments::takes::Take;
@@ -25,7 +25,7 @@ impl Planner<'_> {
         let (others, tested): (_, Vec<&Take>) = (self.others(place), place.of_subject(unseen).collect());
         for &count in &few.recordings {
             for material in Material::ALL {
-                self.plan.few.push((count, material, vec![]));
+                self.plan.few.push(FewStages { recordings: count, material, stages: vec![] });
             }
         }
         for draw in 0..self.config.seeds {
@@ -34,7 +34,7 @@ impl Planner<'_> {
             let of_others: Simulated = simulated.iter().copied().filter(|(_, take)| take.subject != *unseen).collect();
             let order = shuffled(&others, self.config.seed + draw as u64);
             for point in 0..self.plan.few.len() {
-                let (count, material, _) = self.plan.few[point];
+                let FewStages { recordings: count, material, .. } = self.plan.few[point];
                 let chosen = first_of_each(&order, count)?;
                 let measured = Learned { draw, ..Learned::recorded(&place.recordings, &chosen) };
                 let learned = match material {
@@ -46,11 +46,10 @@ impl Planner<'_> {
                     Material::Both => measured.and(self.simulated_by(draw, of_others.iter().copied())),
                 };
                 let epochs = (self.config.recognition.epochs * others.len()).div_ceil(learned.folders.len());
-                let id = Drawn { method: by.method, draw }.id();
-                let id = if material == Material::Measured { format!("draw_{}", draw + 1) } else { id };
+                let id = if material == Material::Measured { format!("draw_{}", draw + 1) } else { by.id() };
                 let name = format!("recognise/few/{count}_{}/{id}", material.id());
                 let stage = self.classifier(name, place, &tested, learned, epochs);
-                self.plan.few[point].2.push(stage);
+                self.plan.few[point].stages.push(stage);
             }
         }
         Ok(())
