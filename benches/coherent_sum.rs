@@ -1,7 +1,8 @@
 //! Times the direct and the indirect signal, from positions to samples, as JSON lines.
 //!
 //! `cargo bench --bench coherent_sum [-- unit | scaling | DEVICE]`; a device as of `--device`, such as `wgpu`, does the unit. Every case
-//! runs in a process of its own, so that its peak memory is its own. Several forms are timed in one run, because only numbers of one run can be compared.
+//! runs in a process of its own, so that its peak memory is its own. Several forms are timed in one run, because only numbers of one run
+//! can be compared.
 
 use std::time::Instant;
 

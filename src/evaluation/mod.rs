@@ -12,7 +12,7 @@ mod simulation;
 
 pub use compare::{ComparisonConfig, compare, compare_frames, refuse_different};
 pub use frames::{FrameMaps, measured_frame};
-pub use sequences::{SequenceSummary, by_sequence, over_draws, over_sequences};
+pub use sequences::{SequenceSummary, over_draws, over_sequences};
 pub use simulation::{Simulation, evaluate};
 
 use serde::{Deserialize, Serialize};

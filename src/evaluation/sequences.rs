@@ -53,7 +53,7 @@ pub fn over_draws(draws: &[&[Evaluation]]) -> Option<SequenceSummary> {
 ///
 /// # Panics
 /// When draws differ in their number of sequences.
-pub fn by_sequence<'a, T>(draws: &[&'a [Evaluation]], of: impl Fn(&'a Evaluation) -> Option<T>) -> Vec<Vec<T>> {
+fn by_sequence<'a, T>(draws: &[&'a [Evaluation]], of: impl Fn(&'a Evaluation) -> Option<T>) -> Vec<Vec<T>> {
     let sequences = draws.first().map_or(0, |draw| draw.len());
     assert!(draws.iter().all(|draw| draw.len() == sequences), "by_sequence: draws of different recordings");
     (0..sequences).filter_map(|sequence| draws.iter().map(|draw| of(&draw[sequence])).collect()).collect()

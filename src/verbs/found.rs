@@ -7,10 +7,11 @@ use burn::tensor::Device;
 use super::{Notice, Notify, diagnose};
 use crate::{
     config::Config,
-    data::{atomic, files},
+    data::atomic,
     diagnosis,
     effects::EffectSetting,
     error::{Error, Result},
+    experiments::steps::read_json,
 };
 
 /// In a run folder: the diagnosis' report, and `effects.json`, what the simulator was given.
@@ -61,8 +62,7 @@ pub fn read(run_folder: &Path) -> Result<Option<Vec<EffectSetting>>> {
     if !path.exists() {
         return Ok(None);
     }
-    let found = serde_json::from_str(&files::read_text(&path)?);
-    found.map(Some).map_err(|error| Error::Parse { path, message: error.to_string() })
+    read_json(path).map(Some)
 }
 
 /// The same for a report.
