@@ -38,6 +38,16 @@ impl PathModel {
     pub fn has_indirect(self) -> bool {
         self != Self::Direct
     }
+
+    /// Whether some scatterers are taken for microfacets.
+    pub fn has_microfacets(self) -> bool {
+        matches!(self, Self::Decoupled | Self::Direct)
+    }
+
+    /// Whether some scatterers are taken for Gaussian patches.
+    pub fn has_patches(self) -> bool {
+        self != Self::Direct
+    }
 }
 
 /// Everything that shapes the simulator's answer; saved with each checkpoint.

@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use burn::tensor::{DType, Device, Tensor};
 
-use super::{FrameView, Scene, Seen, Surface, point_tensors::column};
+use super::{FrameView, Scene, Seen, point_tensors::column};
 use crate::{
     body::{Displacement, PosedFrame},
     paths::Amplitude,
+    scatterers::{material::Material, patches::Patch},
 };
 
 /// Scatterers of body or room that a viewpoint sees.
@@ -24,9 +25,7 @@ pub(super) struct Visible<'a> {
 /// Scatterers that move together, with what they return.
 pub(super) struct Group<'a> {
     pub visible: Visible<'a>,
-    pub scattering: Scattering,
-    /// Decoded, of the visible points.
-    pub surface: Surface,
+    pub returns: Returns,
     /// What amplitudes are multiplied by, `[point, 1]`; none: nothing.
     pub weight: Option<Tensor<2>>,
 }
@@ -38,6 +37,12 @@ pub(super) enum Scattering {
     Microfacets,
     /// SH_{p,k}, from the patches' offset positions.
     Patches,
+}
+
+/// What the visible points were decoded to.
+pub(super) enum Returns {
+    Microfacets(Material),
+    Patches(Patch),
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -124,7 +129,10 @@ impl Group<'_> {
     pub fn displacement(&self, tx: usize, device: &Device) -> Displacement {
         let Visible { scene, view, kind, points, .. } = &self.visible;
         let loops = scene.radar.loops_per_frame;
-        let offset_m = (self.scattering == Scattering::Patches).then(|| self.surface.patch.offset_m.clone());
+        let offset_m = match &self.returns {
+            Returns::Microfacets(_) => None,
+            Returns::Patches(patch) => Some(patch.offset_m.clone()),
+        };
         if let Some(posed) = self.visible.posed {
             return posed.displacement(points, tx * loops..(tx + 1) * loops, offset_m);
         }

@@ -38,7 +38,7 @@ use crate::{
     features::{Extent, Gcn, TriPlane, draw},
     if_signal::{Noise, noise},
     radar::Radar,
-    scatterers::decoders::Decoders,
+    scatterers::{decoders::Decoders, material::Material, patches::Patch},
 };
 
 /// What learns.
@@ -112,21 +112,25 @@ impl Simulator {
     /// # Gradient
     /// Flows to the planes, the graph's layers and the decoders.
     pub fn surfaces(&self, constants: &SceneConstants, mode: Mode) -> Surfaces {
+        let paths = self.config.paths;
         let body = constants.body.as_ref().map(|body| {
             let features = self.triplane.forward(&body.sampler);
-            let regularised = self.regularise(features.clone(), body, mode);
             let at_points = |features: Tensor<2>| match &body.points {
                 Some(points) => points.apply(features),
                 None => features,
             };
+            let material = |features: &Tensor<2>| {
+                let regularised = self.regularise(features.clone(), body, mode);
+                self.decoders.body_material.forward(at_points(regularised))
+            };
             Surface {
-                material: self.decoders.body_material.forward(at_points(regularised)),
-                patch: self.decoders.body_patch.forward(at_points(features)),
+                material: paths.has_microfacets().then(|| material(&features)),
+                patch: paths.has_patches().then(|| self.decoders.body_patch.forward(at_points(features))),
             }
         });
         let room = constants.room.as_ref().map(|encoded| Surface {
-            material: self.decoders.room_material.forward(encoded.clone()),
-            patch: self.decoders.room_patch.forward(encoded.clone()),
+            material: paths.has_microfacets().then(|| self.decoders.room_material.forward(encoded.clone())),
+            patch: paths.has_patches().then(|| self.decoders.room_patch.forward(encoded.clone())),
         });
         Surfaces { body, room }
     }
@@ -243,10 +247,12 @@ impl Simulator {
         }
         let surfaces = self.surfaces(constants, mode);
         for surface in [&surfaces.body, &surfaces.room].into_iter().flatten() {
-            if !(is_finite(surface.material.refraction.clone()) && is_finite(surface.material.roughness.clone())) {
+            let finite = |material: &Material| is_finite(material.refraction.clone()) && is_finite(material.roughness.clone());
+            if !surface.material.as_ref().is_none_or(finite) {
                 return Some("material decoder");
             }
-            if !(is_finite(surface.patch.lobes.clone()) && is_finite(surface.patch.offset_m.clone())) {
+            let finite = |patch: &Patch| is_finite(patch.lobes.clone()) && is_finite(patch.offset_m.clone());
+            if !surface.patch.as_ref().is_none_or(finite) {
                 return Some("patch decoder");
             }
         }

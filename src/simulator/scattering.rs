@@ -3,8 +3,8 @@
 use burn::tensor::{Device, Tensor};
 
 use super::{
-    Amplitudes, FrameView, Gains, PathModel, Scene, Seen, Simulator, Surface, Surfaces, Weights,
-    groups::{Group, Kind, Scattering, Visible, WallPoints},
+    Amplitudes, FrameView, Gains, PathModel, Scene, Seen, Simulator, Surfaces, Weights,
+    groups::{Group, Kind, Returns, Scattering, Visible, WallPoints},
     point_tensors::rows,
     sight::{Attitude, Places, Sight},
 };
@@ -20,6 +20,9 @@ use crate::{
         tangent::Frame,
     },
 };
+
+/// Whoever asks for a kind of scattering has the paths that need it.
+const DECODED: &str = "decoded for these paths";
 
 impl Simulator {
     /// Eq. 2 for all transmitters: `[tx, rx, loop, sample]`.
@@ -173,9 +176,12 @@ impl Simulator {
             let posed = posed.filter(|_| kind == Kind::Body);
             let visible = Visible { scene, view, posed, kind, points, reference_m };
             let picked = rows(points, all.len(), &device);
-            let surface = Surface { material: surface.material.pick(&picked), patch: surface.patch.pick(&picked) };
+            let returns = match scattering {
+                Scattering::Microfacets => Returns::Microfacets(surface.material.as_ref().expect(DECODED).pick(&picked)),
+                Scattering::Patches => Returns::Patches(surface.patch.as_ref().expect(DECODED).pick(&picked)),
+            };
             let weight = self.weight(&visible);
-            groups.push(Group { visible, scattering, surface, weight });
+            groups.push(Group { visible, returns, weight });
         }
         groups
     }
@@ -207,18 +213,18 @@ impl Simulator {
     fn answer(&self, group: &Group<'_>, attitude: &Attitude, sight: Sight) -> Tensor<2> {
         let normal = attitude.normal.clone();
         let Sight { incident, outgoing } = sight;
-        let amplitude = match group.scattering {
-            Scattering::Microfacets => {
+        let amplitude = match &group.returns {
+            Returns::Microfacets(material) => {
                 let law = Law { response: self.config.response, grazing: self.config.equations.grazing };
-                microfacet::amplitude(&group.surface.material, normal, incident, outgoing, law)
+                microfacet::amplitude(material, normal, incident, outgoing, law)
             }
-            Scattering::Patches => {
+            Returns::Patches(patch) => {
                 let frame = match &attitude.tangent {
                     Some(tangent) => Frame::along(normal, tangent.clone()),
                     None => Frame::from_normal(normal),
                 };
                 let wavenumber = std::f64::consts::TAU / group.visible.scene.radar.wavelength_m();
-                patches::amplitude(&group.surface.patch, &frame, incident, outgoing, wavenumber)
+                patches::amplitude(patch, &frame, incident, outgoing, wavenumber)
             }
         };
         match &group.weight {

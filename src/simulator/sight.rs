@@ -3,7 +3,7 @@
 use burn::tensor::{DType, Device, Tensor};
 
 use super::{
-    groups::{Group, Kind, Scattering, Visible},
+    groups::{Group, Kind, Returns, Visible},
     point_tensors::{column, directions, towards, vectors, way},
 };
 use crate::body::Displacement;
@@ -83,7 +83,7 @@ impl Group<'_> {
         };
         Attitude {
             normal: on_device(body.normals_at(frame, points, chirps.clone())),
-            tangent: (self.scattering == Scattering::Patches).then(tangents),
+            tangent: matches!(self.returns, Returns::Patches(_)).then(tangents),
         }
     }
 

@@ -8,11 +8,12 @@ use crate::{
     scatterers::{material::Material, patches::Patch},
 };
 
-/// Materials of the direct path and patches of the indirect path, `[point]`.
+/// Materials of microfacets and Gaussian patches, `[point]`, as far as the paths take scatterers for these: what is decoded and never
+/// reaches the loss would stay in the autodiff graph for good.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    pub material: Material,
-    pub patch: Patch,
+    pub material: Option<Material>,
+    pub patch: Option<Patch>,
 }
 
 /// The decoded surfaces of a scene: the same for all of its frames until the parameters change.

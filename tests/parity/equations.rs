@@ -92,20 +92,20 @@ fn rows<const D: usize>(name: &str, from: usize, count: usize, column: Option<us
 fn surface(from: usize, count: usize, device: &Device) -> Surface {
     let material = |column| rows::<1>("in_material", from, count, Some(column), device);
     Surface {
-        material: Material {
+        material: Some(Material {
             roughness: material(0),
             metallic: material(1),
             refraction: material(2),
             extinction: material(3),
             polarisation: material(4),
-        },
-        patch: Patch {
+        }),
+        patch: Some(Patch {
             offset_m: rows("in_offset_m", from, count, None, device),
             rotation_rad: rows("in_rotation_rad", from, count, None, device),
             scale_m: rows("in_scale_m", from, count, None, device),
             reflectance: rows("in_reflectance", from, count, None, device),
             lobes: rows("in_lobes", from, count, None, device),
-        },
+        }),
     }
 }
 
@@ -197,21 +197,21 @@ fn gradients_of_the_papers_equations_agree_with_differences() {
     let plain = [surface(0, bodies, &device), surface(bodies, patches, &device)];
     // What is moved, and by how much along its direction.
     type Part = (&'static str, f64, fn(Surface, Tensor<1>) -> Surface);
-    fn roughness(mut surface: Surface, step: Tensor<1>) -> Surface {
-        surface.material.roughness = surface.material.roughness * (step + 1.0);
-        surface
+    fn roughness(Surface { material, patch }: Surface, step: Tensor<1>) -> Surface {
+        let rougher = |material: Material| Material { roughness: material.roughness * (step + 1.0), ..material };
+        Surface { material: material.map(rougher), patch }
     }
-    fn extinction(mut surface: Surface, step: Tensor<1>) -> Surface {
-        surface.material.extinction = surface.material.extinction * (step + 1.0);
-        surface
+    fn extinction(Surface { material, patch }: Surface, step: Tensor<1>) -> Surface {
+        let lossier = |material: Material| Material { extinction: material.extinction * (step + 1.0), ..material };
+        Surface { material: material.map(lossier), patch }
     }
-    fn offset(mut surface: Surface, step: Tensor<1>) -> Surface {
-        surface.patch.offset_m = surface.patch.offset_m + step.unsqueeze_dim::<2>(1);
-        surface
+    fn offset(Surface { material, patch }: Surface, step: Tensor<1>) -> Surface {
+        let moved = |patch: Patch| Patch { offset_m: patch.offset_m + step.unsqueeze_dim::<2>(1), ..patch };
+        Surface { material, patch: patch.map(moved) }
     }
-    fn rotation(mut surface: Surface, step: Tensor<1>) -> Surface {
-        surface.patch.rotation_rad = surface.patch.rotation_rad + step;
-        surface
+    fn rotation(Surface { material, patch }: Surface, step: Tensor<1>) -> Surface {
+        let turned = |patch: Patch| Patch { rotation_rad: patch.rotation_rad + step, ..patch };
+        Surface { material, patch: patch.map(turned) }
     }
     let parts: [Part; 4] = [
         ("roughness", 1e-2, roughness),
@@ -222,7 +222,7 @@ fn gradients_of_the_papers_equations_agree_with_differences() {
     for (name, step, change) in parts {
         let loss = |at: Tensor<1>| {
             let [body, room] = plain.clone().map(|plain| {
-                let [points] = plain.material.roughness.dims();
+                let [points] = plain.material.as_ref().unwrap().roughness.dims();
                 change(plain, at.clone().expand([points]))
             });
             let signal = simulator.clean_signal(&scene, &view, &Surfaces { body: Some(body), room: Some(room) });
