@@ -8,13 +8,14 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use hybridsim::challenge::answer::{self, Answers, RunConfig};
-use hybridsim::challenge::commitment::{Commitment, Sealed, read_json};
+use hybridsim::challenge::commitment::{Commitment, Sealed};
 use hybridsim::challenge::config::Stratum;
 use hybridsim::challenge::judge::Truth;
 use hybridsim::challenge::seal::seal;
 use hybridsim::challenge::{ChallengeConfig, score::score, twins};
 use hybridsim::data::Recording;
 use hybridsim::data::Shard;
+use hybridsim::data::files::read_json;
 use serde_json::{Value, json};
 
 fn config(cases: usize) -> ChallengeConfig {

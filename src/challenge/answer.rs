@@ -14,11 +14,12 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::commitment::{Commitment, canonical, hash_file, joint_root, read_json, sha256};
+use super::commitment::{Commitment, canonical, hash_file, joint_root, sha256};
 use super::report::Report;
 use super::worker::Worker;
 use crate::data::atomic::{AtomicFolder, write_text};
 use crate::data::entries::entries;
+use crate::data::files::read_json;
 use crate::data::unfinished::wait_if_ending;
 use crate::data::{Scratch, Shard, files};
 use crate::error::{Error, Result};

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::answer::{Failure, RunConfig, answered, diagnose};
-use super::commitment::{hash_file, read_json};
+use super::commitment::hash_file;
 use super::config::Scenes;
 use super::report::Report;
 use super::salt::ground::ground;
@@ -19,6 +19,7 @@ use super::uniformity;
 use crate::bounds;
 use crate::config::Config;
 use crate::data::atomic::write_text;
+use crate::data::files::read_json;
 use crate::data::{Recording, RecordingContents, Scratch, Shard, write_recording};
 use crate::diagnosis::DiagnosisConfig;
 use crate::diagnosis::calibration::{Calibration, FORMAT, FalseAlarms, Structure, program};

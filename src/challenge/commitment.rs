@@ -6,11 +6,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use crate::data::{entries::entries, files, hex};
+use crate::data::files::{self, read_json};
+use crate::data::{entries::entries, hex};
 use crate::error::{Error, Result};
 
 /// `commitment.json`, or one of several where the cases were sealed in shards.
@@ -41,11 +42,6 @@ pub struct Sealed {
 
 pub fn sha256(bytes: impl AsRef<[u8]>) -> String {
     hex(&Sha256::digest(bytes.as_ref()))
-}
-
-pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let text = files::read_text(path)?;
-    serde_json::from_str(&text).map_err(|error| Error::Parse { path: path.into(), message: error.to_string() })
 }
 
 pub fn hash_file(path: &Path) -> Result<String> {

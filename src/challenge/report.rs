@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
-use super::commitment::read_json;
+use crate::data::files::read_json;
 use crate::error::Result;
 
 #[derive(Clone, Debug, Deserialize)]

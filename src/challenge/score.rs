@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::answer::Answers;
 use super::baselines::{self, Statistics, quantile};
-use super::commitment::{Commitment, joint_root, read_json, sha256};
+use super::commitment::{Commitment, joint_root, sha256};
 use super::config::Stratum;
 use super::judge::{Judgement, Truth, judge};
 use super::plan::scalable;
@@ -21,6 +21,7 @@ use super::secret::Secret;
 use super::table::{Row, markdown};
 use crate::data::atomic::write_text;
 use crate::data::entries::entries;
+use crate::data::files::read_json;
 use crate::data::{Recording, read_toml};
 use crate::error::{Error, Result};
 use crate::text::shown;

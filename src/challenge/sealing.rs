@@ -7,10 +7,11 @@ use std::time::{Duration, SystemTime};
 
 use serde_json::Value;
 
-use super::commitment::{Commitment, Sealed, hash_file, hash_folder, leaf, merkle_root, read_json, sha256};
+use super::commitment::{Commitment, Sealed, hash_file, hash_folder, leaf, merkle_root, sha256};
 use super::secret::Secret;
 use crate::data::atomic::write_text;
 use crate::data::entries::entries;
+use crate::data::files::read_json;
 use crate::data::{Shard, files, program, read_toml};
 use crate::error::{Error, Result};
 

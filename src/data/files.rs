@@ -8,6 +8,8 @@ use std::fs::{self, File, FileType};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use serde::de::DeserializeOwned;
+
 use crate::error::{Error, Result};
 
 /// Longest text that is read as settings or a report, bytes: larger ones were not written by people, nor for this program.
@@ -102,6 +104,16 @@ pub fn read_text(path: impl AsRef<Path>) -> Result<String> {
     let mut text = String::new();
     file.read_to_string(&mut text).map_err(|source| Error::read(path, source))?;
     Ok(text)
+}
+
+/// Reads a JSON file.
+///
+/// # Errors
+/// As [`read_text`]; what is no JSON of this kind.
+pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
+    let path = path.as_ref();
+    let text = read_text(path)?;
+    serde_json::from_str(&text).map_err(|error| Error::Parse { path: path.into(), message: error.to_string() })
 }
 
 /// The whole path of something that exists, for settings that are written down: those are text.

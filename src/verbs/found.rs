@@ -7,11 +7,10 @@ use burn::tensor::Device;
 use super::{Notice, Notify, diagnose};
 use crate::{
     config::Config,
-    data::atomic,
+    data::{atomic, files::read_json},
     diagnosis,
     effects::EffectSetting,
     error::{Error, Result},
-    experiments::steps::read_json,
 };
 
 /// In a run folder: the diagnosis' report, and `effects.json`, what the simulator was given.

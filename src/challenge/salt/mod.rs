@@ -25,7 +25,7 @@ use serde_json::{Value, json};
 pub use plan::{Plan, Resolved, SaltConfig};
 
 use super::answer::{self, Answers, Failure, RunConfig};
-use super::commitment::{Commitment, read_json};
+use super::commitment::Commitment;
 use super::config::Stratum;
 use super::library;
 use super::report::Report;
@@ -33,6 +33,7 @@ use super::rules;
 use super::seal::effects;
 use super::sealing::{begin, commit, one_case, published, set_times};
 use super::secret::Secret;
+use crate::data::files::read_json;
 use crate::data::{IfLayout, Recording, Scratch, Shard};
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
