@@ -41,6 +41,7 @@ def reproduce(
     config: str,
     out: str,
     beginnings: list[str],
+    jobs: int,
     sets: list[str],
     command: str,
     device: str,

@@ -1,6 +1,9 @@
 //! `hybridsim reproduce`.
 
-use std::path::{Path, PathBuf};
+use std::{
+    num::NonZero,
+    path::{Path, PathBuf},
+};
 
 use clap::Args;
 
@@ -24,6 +27,9 @@ pub(crate) struct Arguments {
     /// tables are written when all stages are done
     #[arg(long, value_name = "BEGINNING", conflicts_with = "plan")]
     stages: Vec<String>,
+    /// Stages done side by side, each with its share of the cores; a small simulator's are done sooner so
+    #[arg(long, value_name = "N", default_value_t = NonZero::<usize>::MIN)]
+    jobs: NonZero<usize>,
     #[command(flatten)]
     lpips: LpipsArguments,
     #[command(flatten)]
@@ -40,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     if arguments.plan {
         return list(&planned);
     }
-    let devices = devices(&common.device)?;
+    let (devices, jobs) = (devices(&common.device)?, arguments.jobs.get());
     interrupt::kept(|| {
         let kept = "the stages that are done are kept, and of the one at work what it can go on from";
         format!("{kept}; go on with: {}", interrupt::typed())
@@ -52,12 +58,12 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     match arguments.stages.as_slice() {
         [] => {
-            planned.run(&command(arguments, common), &devices, common.as_stated, &mut notify)?;
+            planned.run(&command(arguments, common), &devices, jobs, common.as_stated, &mut notify)?;
             progress.finish();
             say!("results: {}", out.join("results.md").display());
         }
         beginnings => {
-            let [done, of] = planned.run_some(beginnings, &devices, common.as_stated, &mut notify)?;
+            let [done, of] = planned.run_some(beginnings, &devices, jobs, common.as_stated, &mut notify)?;
             progress.finish();
             say!("{done} of {of} stages are done: {}", out.display());
         }

@@ -37,7 +37,7 @@ pub struct FrameMaps {
 }
 
 /// A frame's samples, `[tx, rx, loop, sample]`.
-type FrameSource<'a> = &'a dyn Fn(usize) -> Result<Vec<Complex32>>;
+pub(super) type FrameSource<'a> = &'a dyn Fn(usize) -> Result<Vec<Complex32>>;
 
 /// What is measured and what is to equal it.
 pub(super) struct Pair<'a> {

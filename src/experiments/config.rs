@@ -341,10 +341,6 @@ impl ReproduceConfig {
         }
         if let Some(few) = &self.few_measured {
             few.check(&self.variants)?;
-            if !self.protocols.contains(&Protocol::OtherSubjects) {
-                return Err(Error::setting("protocols", format!("{:?}", self.protocols), "a list with `other_subjects`")
-                    .with_hint("`few_measured` learns from the other subjects' motions"));
-            }
         }
         if self.training.split != Split::Last || self.training.validation_fraction == 0.0 {
             return Err(Error::setting(

@@ -28,11 +28,6 @@ fn what_cannot_be_reproduced_is_refused_by_name() {
         config.variants = vec![Variant::Ours];
     });
     assert!(error.contains("`few_measured.simulated_by` is physical"), "{error}");
-    let error = refused(|config| {
-        config.few_measured = Some(few(vec![1]));
-        config.protocols = vec![Protocol::SameMotions];
-    });
-    assert!(error.contains("`protocols`") && error.contains("`other_subjects`"), "{error}");
     assert!(refused(|config| config.variants = vec![Variant::Coupled]).contains("`variants`"));
     assert!(refused(|config| config.training.split = Split::Random).contains("`training.split`"));
     assert!(refused(|config| config.training.frames = Some(3)).contains("`training.frames`"));

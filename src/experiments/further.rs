@@ -37,7 +37,7 @@ pub fn few(results: &Results) -> String {
     }
     let note = "Learned from so many recordings of each action by other subjects, tested on measured recordings of the unseen subject; \
                 accuracy of windows, %, its 95 % interval the exact one of whole recordings. Every classifier visits as many windows. \
-                What all of the others' recordings teach, measured and simulated, stands above. `few_measured.png` is this table.";
+                `few_measured.png` is this table.";
     let columns: Vec<&str> = std::iter::once("recordings of each action").chain(Material::ALL.map(Material::title)).collect();
     let mut table = Table::new("Few measured recordings", note, &columns);
     let counts: BTreeSet<usize> = results.few.iter().map(|found| found.recordings).collect();

@@ -6,7 +6,7 @@
 //! - [`takes`], [`variants`]: who does what in which recording; ours and its ablations
 //! - [`preflight`]: what cannot work is refused before anything is recorded
 //! - [`task`], [`mod@plan`]: every stage with what it depends on, before any of them runs
-//! - [`stage`], [`mod@run`], [`steps`]: each is done once, under the hash of all that it depends on
+//! - [`stage`], [`mod@run`], [`schedule`], [`steps`]: each is done once, under the hash of all that it depends on
 //! - [`results`], [`paper`], [`tables`], [`report`]: numbers, the paper's, and both side by side
 
 mod cells;
@@ -21,6 +21,7 @@ pub mod preflight;
 pub mod report;
 pub mod results;
 pub mod run;
+pub mod schedule;
 pub mod stage;
 pub mod steps;
 pub mod tables;
@@ -30,5 +31,6 @@ pub mod variants;
 
 pub use config::ReproduceConfig;
 pub use plan::{Plan, plan, plan_again};
-pub use run::{Event, run, run_one, run_some};
+pub use run::{Event, run_one};
+pub use schedule::with_jobs;
 pub use stage::Store;

@@ -270,7 +270,8 @@ impl Planner<'_> {
         let config = self.config;
         let (recordings, names) = training_takes(config, place);
         let mut trained: Trainings = BTreeMap::new();
-        let draws = (0..config.seeds).flat_map(|draw| config.variants.iter().map(move |&variant| (variant, draw)));
+        // Draws after one another: what of the geometry is known serves all of them.
+        let draws = config.variants.iter().flat_map(|&variant| (0..config.seeds).map(move |draw| (variant, draw)));
         for (variant, draw) in draws {
             let simulator = Box::new(variant.settings(&config.simulator, &config.dense_surface));
             let mut parents = vec![];

@@ -154,6 +154,34 @@ fn few_recordings_are_others_and_more_of_them_hold_the_fewer() {
     assert!(error.contains("`few_measured.recordings` is 3") && error.contains("at most 2"), "{error}");
 }
 
+/// Who teaches no classifier is simulated for scores alone, on the frames that are scored.
+#[test]
+fn simulations_that_nobody_learns_from_are_not_kept() {
+    let few = crate::experiments::few::FewConfig { recordings: vec![1], simulated_by: Variant::Physical };
+    let config = ReproduceConfig { protocols: vec![Protocol::SameMotions], few_measured: Some(few), seeds: 2, ..config() };
+    let plan = planned(&config);
+    let names = |beginning: &str| -> Vec<(&str, &Task)> {
+        let named = |stage: &&super::Stage| stage.key.name.starts_with(beginning);
+        plan.stages.iter().filter(named).map(|stage| (stage.key.name.as_str(), &stage.task)).collect()
+    };
+    for (method, kept) in [("ours", 2), ("physical", 6), ("mmgpe", 2), ("physical/draw_2", 6)] {
+        let of = |takes: &str| names(&format!("simulate/{method}/{takes}")).len();
+        assert_eq!(of("s1") + of("s2") + of("s3"), kept, "{method}");
+        let scored = names(&format!("compare/{method}/s1"));
+        assert_eq!(scored.len(), 2, "{method}");
+        for (name, task) in scored {
+            match task {
+                Task::HeldOut { simulation, fraction, .. } => {
+                    assert!(kept == 2 && *fraction == config.training.validation_fraction, "{name}");
+                    assert!(matches!(**simulation, Task::Simulate { .. } | Task::Baseline { .. }), "{name}");
+                }
+                Task::Compare { held_out_fraction, .. } => assert!(kept == 6 && held_out_fraction.is_some(), "{name}"),
+                _ => panic!("{name}"),
+            }
+        }
+    }
+}
+
 #[test]
 fn without_protocols_no_classifier_learns() {
     let config = ReproduceConfig { protocols: vec![], ..config() };
@@ -352,7 +380,7 @@ fn an_additional_subject_is_simulated_by_the_full_simulator_alone() {
 fn figures_show_what_was_simulated_before() {
     let plan = planned_further(&scene_config()).unwrap();
     let names: Vec<&str> = plan.figures.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, ["decomposition", "noise", "loss_scale", "graph"]);
+    assert_eq!(names, ["decomposition", "noise", "loss_scale", "graph", "found_effects"]);
     for (name, stage) in &plan.figures {
         let stage = &plan.stages[*stage];
         let Task::Figure(task) = &stage.task else { unreachable!() };

@@ -7,7 +7,8 @@ use burn::tensor::Device;
 
 use super::plan::{Plan, Stage};
 use super::stage::{Record, Store};
-use super::steps::{Bench, baseline, compare, diagnose, figure, recognise, simulate, site, train};
+use super::steps::simulate::{self, Source, Use};
+use super::steps::{Bench, Speed, baseline, compare, diagnose, figure, recognise, site, train, write_json};
 use super::task::Task;
 use crate::data::Shard;
 use crate::error::{Error, Result};
@@ -24,15 +25,8 @@ pub enum Event<'a> {
     Done { name: &'a str, seconds: f64 },
 }
 
-/// Does what is not done yet, below the store's folder; the records of all stages, in the plan's order.
-///
-/// # Errors
-/// Whatever a stage refuses; what was done before stays done.
-pub fn run(plan: &Plan, store: &Store, devices: &[Device], notify: &mut dyn FnMut(Event)) -> Result<Vec<Record>> {
-    run_some(plan, &(0..plan.stages.len()).collect(), store, devices, notify)
-}
-
-/// The same for some stages, which must hold all that they need ([`Plan::needed`]).
+/// Does what is not done yet of some stages, which must hold all that they need ([`Plan::needed`]), below the store's folder; their
+/// records, in the plan's order.
 ///
 /// # Errors
 /// Whatever a stage refuses; what was done before stays done.
@@ -84,7 +78,7 @@ pub fn run_one(
 }
 
 /// Does the stage, the so-manieth of so many, unless it is done.
-fn one(
+pub(super) fn one(
     plan: &Plan,
     stage: usize,
     [index, of]: [usize; 2],
@@ -120,21 +114,38 @@ fn work(stage: &Stage, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut(us
             train::stability(&task, folder, bench, step)
         }
         Task::Figure(task) => figure(task, folder, bench, step),
-        Task::Simulate { checkpoint, recording, name, graph_at_inference, seed } => {
-            let task = simulate::Task { checkpoint, recording, name, graph_at_inference: *graph_at_inference, seed: *seed };
-            simulate::simulate(&task, folder, bench, step)
+        Task::Simulate { .. } | Task::Baseline { .. } => {
+            let speed = simulated(&stage.task, bench, &mut |source| simulate::keep(source, folder, step))?;
+            write_json(&folder.join("speed.json"), &speed)
+        }
+        Task::HeldOut { simulation, fraction, comparison, .. } => {
+            let lpips = bench.lpips(comparison)?;
+            let mut score =
+                |source: &Source<'_>| simulate::score_held_out(source, *fraction, comparison, lpips.as_deref(), folder);
+            simulated(simulation, bench, &mut score).map(drop)
         }
         Task::Calibrate { method, recordings, .. } => baseline::calibrate(*method, recordings, folder, bench, step),
         Task::NoiseLevel { recordings, .. } => baseline::measure_noise(recordings, folder, step),
-        Task::Baseline { method, recording, name, gain, checkpoint, noise_level, seed } => {
-            let [gain, checkpoint, noise_level] = [gain, checkpoint, noise_level].map(Option::as_deref);
-            let task = baseline::Task { method: *method, recording, name, gain, checkpoint, noise_level, seed: *seed };
-            baseline::simulate(&task, folder, bench, step)
-        }
         Task::Compare { measured, simulated, held_out_fraction, comparison, .. } => {
             compare(measured, simulated, *held_out_fraction, comparison, folder, bench)
         }
         Task::Recognise { train, test, recognition, .. } => recognise(recognition, train, test, folder, bench, step),
+    }
+}
+
+/// Gives a method's frames to whoever uses them.
+fn simulated(task: &Task, bench: &mut Bench, then: Use<'_>) -> Result<Speed> {
+    match task {
+        Task::Simulate { checkpoint, recording, name, graph_at_inference, seed } => {
+            let task = simulate::Task { checkpoint, recording, name, graph_at_inference: *graph_at_inference, seed: *seed };
+            simulate::simulate(&task, bench, then)
+        }
+        Task::Baseline { method, recording, name, gain, checkpoint, noise_level, seed } => {
+            let [gain, checkpoint, noise_level] = [gain, checkpoint, noise_level].map(Option::as_deref);
+            let task = baseline::Task { method: *method, recording, name, gain, checkpoint, noise_level, seed: *seed };
+            baseline::simulate(&task, bench, then)
+        }
+        _ => unreachable!("planned as a simulation"),
     }
 }
 

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::*;
-use crate::experiments::{ReproduceConfig, plan::plan, report, results::collect};
+use crate::experiments::{ReproduceConfig, plan::plan, report, results::collect, with_jobs};
 use crate::person::actions::Action;
 use crate::recorder::{RecorderConfig, record_to};
 
@@ -17,6 +17,10 @@ fn site(folder: &Path) {
             record_to(&config, Path::new("."), &folder.join(name), &mut |_, _| {}).unwrap();
         }
     }
+}
+
+fn run(plan: &Plan, store: &Store, notify: &mut dyn FnMut(Event)) -> Result<Vec<Record>> {
+    run_some(plan, &(0..plan.stages.len()).collect(), store, &[Device::flex()], notify)
 }
 
 const CONFIG: &str = "
@@ -55,7 +59,7 @@ fn a_reproduction_is_done_once_and_what_is_lost_is_made_again_as_it_was() {
     let store = Store::open(&out, "flex").unwrap();
     let once = || {
         let mut worked = vec![];
-        let records = run(&plan, &store, &[Device::flex()], &mut |event| {
+        let records = run(&plan, &store, &mut |event| {
             if let Event::Done { name, .. } = event {
                 worked.push(name.to_string());
             }
@@ -84,6 +88,19 @@ fn a_reproduction_is_done_once_and_what_is_lost_is_made_again_as_it_was() {
     assert!(cross.global.as_ref().unwrap().psnr_db.mean.is_finite());
 
     assert!(once().0.is_empty());
+
+    // The held-out frames, scored without being kept, have the scores that they have in a recording.
+    let task = |name: &str| &plan.stages.iter().find(|stage| stage.key.name == name).unwrap().task;
+    for name in ["compare/ours/s1_lunge_1", "compare/mmgpe/s1_lunge_1"] {
+        let Task::HeldOut { simulation, fraction, comparison, .. } = task(name) else { panic!("{name}") };
+        let (kept, mut bench) = (folder.path().join(name), Bench::new(&[Device::flex()]));
+        std::fs::create_dir_all(&kept).unwrap();
+        simulated(simulation, &mut bench, &mut |source| simulate::keep(source, &kept, &mut |_, _| {})).unwrap();
+        compare(&recordings.join("s1_lunge_1"), &kept.join("recording"), Some(*fraction), comparison, &kept, &mut bench).unwrap();
+        let scored = plan.stages.iter().find(|stage| stage.key.name == name).unwrap();
+        let [scored, kept] = [&store.folder(&scored.key), &kept].map(|at| std::fs::read(at.join("scores.json")).unwrap());
+        assert!(scored == kept, "{name}");
+    }
 
     let lost = plan.stages.iter().find(|stage| stage.key.name == "simulate/ours/s4_lunge_1").unwrap();
     let sample = |()| std::fs::read(store.folder(&lost.key).join("recording/if.npy")).unwrap();
@@ -127,7 +144,7 @@ fn stages_come_out_the_same_in_any_order() {
     config.check().unwrap();
     let [together, apart] = ["together", "apart"].map(|name| folder.path().join(name));
     let whole = plan(&config, &together).unwrap();
-    run(&whole, &Store::open(&together, "flex").unwrap(), &[Device::flex()], &mut |_| {}).unwrap();
+    run(&whole, &Store::open(&together, "flex").unwrap(), &mut |_| {}).unwrap();
 
     let plan = crate::experiments::plan_again(&config, &apart).unwrap();
     let do_one = |stage: usize, pieces: Shard| {
@@ -148,10 +165,39 @@ fn stages_come_out_the_same_in_any_order() {
         do_one(open.remove(next), Shard::ALL).unwrap();
     }
     assert!(do_one(1, Shard { number: 1, of: 2 }).unwrap_err().to_string().contains("no pieces"));
-    let (one, other) = (files(&together), files(&apart));
-    assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>());
-    let different: Vec<_> = one.keys().filter(|name| one[*name] != other[*name]).collect();
-    assert!(different.is_empty(), "{different:?}");
+
+    // And by three workers of one process.
+    let beside = folder.path().join("beside");
+    let plan = crate::experiments::plan(&config, &beside).unwrap();
+    let (store, all) = (Store::open(&beside, "flex").unwrap(), (0..plan.stages.len()).collect());
+    let mut worked = vec![];
+    let mut notify = |event: Event| worked.extend(matches!(event, Event::Done { .. }).then_some(()));
+    let records = with_jobs(&plan, &all, &store, &[Device::flex()], 3, &mut notify).unwrap();
+    assert_eq!((records.len(), worked.len()), (plan.stages.len(), plan.stages.len()));
+    assert!(records.iter().zip(&plan.stages).all(|(record, stage)| record.name == stage.key.name));
+    drop(store);
+
+    let one = files(&together);
+    for other in [files(&apart), files(&beside)] {
+        assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>());
+        let different: Vec<_> = one.keys().filter(|name| one[*name] != other[*name]).collect();
+        assert!(different.is_empty(), "{different:?}");
+    }
+}
+
+/// A worker that fails ends all of them with its error.
+#[test]
+fn side_by_side_an_error_is_returned_and_nobody_waits_for_what_never_comes() {
+    let folder = tempfile::tempdir().unwrap();
+    let recordings = folder.path().join("measured");
+    site(&recordings);
+    let config: ReproduceConfig = crate::data::settings::read_text(&format!("site = {recordings:?}\n{CONFIG}")).unwrap();
+    let out = folder.path().join("out");
+    let (plan, store) = (plan(&config, &out).unwrap(), Store::open(&out, "flex").unwrap());
+    std::fs::remove_file(recordings.join("s1_lunge_1/if.npy")).unwrap();
+    let wanted = plan.needed(&["compare".into()]).unwrap();
+    let error = with_jobs(&plan, &wanted, &store, &[Device::flex()], 2, &mut |_| {}).unwrap_err().to_string();
+    assert!(error.contains("s1_lunge_1") && error.contains("if.npy"), "{error}");
 }
 
 /// That a training breaks is what the stability is asked for: its stage ends all the same, and says where.
@@ -171,7 +217,7 @@ fn a_training_that_breaks_is_a_result() {
     assert_eq!(run_some(&plan, &wanted, &store, &[Device::flex()], &mut |_| {}).unwrap().len(), 2);
     for &stage in &wanted {
         let path = store.folder(&plan.stages[stage].key).join("stability.json");
-        let found: crate::experiments::steps::Stability = crate::experiments::steps::read_json(path).unwrap();
+        let found: crate::experiments::steps::Stability = crate::data::files::read_json(path).unwrap();
         assert!(found.broke.is_some() && found.steps < 4, "{found:?}");
     }
 }

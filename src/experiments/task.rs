@@ -1,7 +1,7 @@
 //! What a stage does, with all that its result depends on. Paths are left out of a stage's hash: what is found there has
 //! stages of its own, or names that are in it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -94,6 +94,15 @@ pub enum Task {
         noise_level: Option<PathBuf>,
         seed: u64,
     },
+    /// Leaves `scores.json` of the frames that training held out, so large a part of the recording, by a [`Self::Simulate`] or a
+    /// [`Self::Baseline`], of which nothing is kept.
+    HeldOut {
+        simulation: Box<Self>,
+        fraction: f64,
+        comparison: Box<ComparisonConfig>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        weights: Option<String>,
+    },
     /// Leaves `scores.json`.
     Compare {
         #[serde(skip)]
@@ -118,4 +127,16 @@ pub enum Task {
         names: Vec<String>,
         recognition: Box<RecognitionConfig>,
     },
+}
+
+impl Task {
+    /// The recording whose simulation this is, or is about.
+    pub fn simulated_recording(&self) -> Option<&Path> {
+        match self {
+            Self::Simulate { recording, .. } | Self::Baseline { recording, .. } => Some(recording),
+            Self::HeldOut { simulation, .. } => simulation.simulated_recording(),
+            Self::Compare { measured, .. } => Some(measured),
+            _ => None,
+        }
+    }
 }

@@ -98,14 +98,16 @@ impl Planned {
         Ok(())
     }
 
-    /// Does what is not done yet, and writes the tables. `command`: what was typed, for them.
+    /// Does what is not done yet, so many stages at a time, and writes the tables. `command`: what was typed, for them.
     ///
     /// # Errors
     /// As [`Self::look`]; whatever a stage refuses; what was done before stays done.
-    pub fn run(&self, command: &str, devices: &[Device], as_stated: bool, notify: &mut Notify<'_>) -> Result<()> {
+    pub fn run(&self, command: &str, devices: &[Device], jobs: usize, as_stated: bool, notify: &mut Notify<'_>) -> Result<()> {
         self.look(devices, as_stated, notify)?;
         let store = self.store(devices)?;
-        let records = experiments::run(&self.plan, &store, devices, &mut |event| notify(Notice::Stage(&event)))?;
+        let all = (0..self.plan.stages.len()).collect();
+        let records =
+            experiments::with_jobs(&self.plan, &all, &store, devices, jobs, &mut |event| notify(Notice::Stage(&event)))?;
         let results = results::collect(&self.plan, &store, &records)?;
         report::write(&self.out, &self.config, &results, command)
     }
@@ -118,13 +120,14 @@ impl Planned {
         &self,
         beginnings: &[String],
         devices: &[Device],
+        jobs: usize,
         as_stated: bool,
         notify: &mut Notify<'_>,
     ) -> Result<[usize; 2]> {
         let wanted = self.plan.needed(beginnings)?;
         self.look(devices, as_stated, notify)?;
         let store = self.store(devices)?;
-        experiments::run_some(&self.plan, &wanted, &store, devices, &mut |event| notify(Notice::Stage(&event)))?;
+        experiments::with_jobs(&self.plan, &wanted, &store, devices, jobs, &mut |event| notify(Notice::Stage(&event)))?;
         let done = self.plan.stages.iter().filter(|stage| store.done(&stage.key).is_some()).count();
         Ok([done, self.plan.stages.len()])
     }

@@ -40,6 +40,7 @@ def reproduce(
     stages: Iterable[str] = (),
     stage: str | None = None,
     shard: Shard = WHOLE,
+    jobs: int = 1,
     set: Settings = (),
     device: str = "auto",
     as_stated: bool = False,
@@ -55,6 +56,7 @@ def reproduce(
             stages at the same time; the results are the same in any order and place.
         shard: of ``stage`` only part ``i`` of ``n``, as ``(i, n)`` with ``i`` from 1 and ``n`` at most its ``pieces``; doing the stage
             later finds them done.
+        jobs: stages done side by side, each with its share of the cores.
         set: changes of settings, such as ``{"training.epochs": 3}``.
         device: ``flex``, ``wgpu``, ``cuda:0``, ``auto``, or several with commas between.
         as_stated: take what is stated, however implausible.
@@ -64,9 +66,12 @@ def reproduce(
         ``results.json``; ``None`` of some stages.
 
     Raises:
+        ValueError: ``jobs`` below 1.
         hybridsim.Error: settings that cannot work, sites that cannot be, a stage whose parents are not done.
         hybridsim.BusyError: another process does the same stage, or all of it.
     """
+    if jobs < 1:
+        raise ValueError(f"jobs={jobs}: at least 1")
     asked = os.fspath(config), os.fspath(out)
     with Notifier(progress) as notify:
         if stage is not None:
@@ -74,5 +79,5 @@ def reproduce(
             return None
         some, more = list(stages), "".join(f", {one!r}" for one in sets(set))
         command = f"hybridsim.reproduce({asked[0]!r}, set=[{more[2:]}], device={device!r})"
-        _hybridsim.reproduce(*asked, some, sets(set), command, device, as_stated, notify)
+        _hybridsim.reproduce(*asked, some, jobs, sets(set), command, device, as_stated, notify)
     return None if some else dict(json.loads((Path(out) / "results.json").read_text()))

@@ -37,6 +37,7 @@ pub fn reproduce(
     config: PathBuf,
     out: PathBuf,
     beginnings: Vec<String>,
+    jobs: usize,
     sets: Vec<String>,
     command: String,
     device: String,
@@ -47,8 +48,8 @@ pub fn reproduce(
         let planned = Planned::new(&Reproduce { config: &config, sets: &sets, lpips: None, out: &out })?;
         let devices = devices(&device)?;
         match beginnings.is_empty() {
-            true => planned.run(&command, &devices, as_stated, notify),
-            false => planned.run_some(&beginnings, &devices, as_stated, notify).map(drop),
+            true => planned.run(&command, &devices, jobs, as_stated, notify),
+            false => planned.run_some(&beginnings, &devices, jobs, as_stated, notify).map(drop),
         }
     })
 }

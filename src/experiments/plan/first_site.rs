@@ -1,6 +1,6 @@
 //! The comparison: simulation, scores and recognition of every method, on the first site.
 
-use super::stages::Learned;
+use super::stages::{Learned, Simulation};
 use super::{Drawn, Method, MethodStages, Place, Planner, Trainings};
 use crate::error::Result;
 use crate::experiments::config::{BaselineName, Protocol};
@@ -54,21 +54,19 @@ impl Planner<'_> {
         methods: &mut [(Drawn, MethodStages)],
         [again, other_mesh]: [&mut MethodStages; 2],
     ) -> Vec<Simulated<'a>> {
-        let config = self.config;
-        // Everybody is needed where the classifier learns from others.
-        let everybody = config.protocols.contains(&Protocol::OtherSubjects);
-        let compared = |take: &Take| take.subject == config.split.training || take.subject == config.split.unseen;
         let mut simulations: Vec<Simulated> = vec![vec![]; methods.len()];
         for take in &place.takes {
             let additional = self.is_additional(take);
-            if !(everybody || compared(take) || additional) {
-                continue;
-            }
             for ((drawn, stages), simulations) in methods.iter_mut().zip(&mut simulations) {
-                if !everybody && additional && *drawn != Drawn::first(Method::Variant(Variant::Ours)) {
+                if !self.is_simulated(*drawn, take) {
                     continue;
                 }
-                let simulate = self.simulation(*drawn, stages, place, take, trained);
+                let simulation = self.simulation(*drawn, stages, place, take, trained);
+                if take.subject == self.config.split.training && !self.teaches(*drawn) {
+                    self.held_out(stages, *drawn, place, take, simulation);
+                    continue;
+                }
+                let simulate = self.kept(*drawn, place, take, simulation);
                 stages.simulate.push(simulate);
                 simulations.push((simulate, take));
                 let simulated = self.folder(simulate).join("recording");
@@ -86,13 +84,34 @@ impl Planner<'_> {
         simulations
     }
 
-    fn simulation(&mut self, drawn: Drawn, stages: &mut MethodStages, place: &Place, take: &Take, trained: &Trainings) -> usize {
+    /// Whether a classifier learns from the method's simulations of others than the unseen subject.
+    fn teaches(&self, drawn: Drawn) -> bool {
+        let config = self.config;
+        config.protocols.contains(&Protocol::OtherSubjects)
+            || config.few_measured.as_ref().is_some_and(|few| drawn.method == Method::Variant(few.simulated_by))
+    }
+
+    /// Whether the method is asked for this recording.
+    fn is_simulated(&self, drawn: Drawn, take: &Take) -> bool {
+        let compared = [&self.config.split.training, &self.config.split.unseen].contains(&&take.subject);
+        let second = self.is_additional(take) && drawn == Drawn::first(Method::Variant(Variant::Ours));
+        compared || second || self.teaches(drawn)
+    }
+
+    fn simulation(
+        &mut self,
+        drawn: Drawn,
+        stages: &mut MethodStages,
+        place: &Place,
+        take: &Take,
+        trained: &Trainings,
+    ) -> Simulation {
         let ours = &trained[&Variant::Ours][0];
         match drawn.method {
             Method::Variant(variant) => {
                 let trained = &trained[&variant][drawn.draw];
                 stages.train = Some(trained.stage);
-                self.simulate(drawn, place, take, trained)
+                self.simulation_by(drawn, place, take, trained)
             }
             Method::Baseline(name) => self.baseline(name, None, place, take, ours),
             Method::ReceiverNoise(name) => {

@@ -14,6 +14,52 @@ use crate::experiments::task::Task;
 use crate::experiments::variants::Variant;
 use crate::simulator::Part;
 
+/// A picture of one recording by several variants, beside the measured one.
+struct Compared {
+    name: &'static str,
+    title: &'static str,
+    static_removed: bool,
+    simulated: &'static [(&'static str, Variant)],
+    measured: &'static [(&'static str, Panel)],
+}
+
+const MEASURED: &[(&str, Panel)] = &[("measured", Panel::Measured)];
+
+const COMPARED: [Compared; 4] = [
+    Compared {
+        name: "noise",
+        title: "Noise, range-Doppler, middle frame",
+        static_removed: false,
+        simulated: &[("no noise", Variant::WithoutNoise), ("fixed noise", Variant::FixedNoise), ("learned noise", Variant::Ours)],
+        measured: MEASURED,
+    },
+    Compared {
+        name: "loss_scale",
+        title: "Linear or dB, range-Doppler, middle frame",
+        static_removed: false,
+        simulated: &[("learned by a linear loss", Variant::LinearLoss), ("learned by a dB loss", Variant::Ours)],
+        measured: &[("measured, linear", Panel::MeasuredLinear), ("measured, dB", Panel::Measured)],
+    },
+    Compared {
+        name: "graph",
+        title: "Graph convolution, range-Doppler, middle frame, static removed",
+        static_removed: true,
+        simulated: &[
+            ("no GCN in training", Variant::WithoutGcn),
+            ("GCN at inference", Variant::GcnAtInference),
+            ("HybridSim", Variant::Ours),
+        ],
+        measured: MEASURED,
+    },
+    Compared {
+        name: "found_effects",
+        title: "What the diagnosis found, range-Doppler, middle frame",
+        static_removed: false,
+        simulated: &[("without", Variant::Ours), ("with what was found", Variant::WithEffects)],
+        measured: MEASURED,
+    },
+];
+
 impl Planner<'_> {
     /// Trained on some actions of the second scene, scored and recognised on others (paper, section 4.8; that the classifier
     /// tells the evaluated actions apart, learned from simulations of the very motions it is tested on as in section 4.5, is our
@@ -141,35 +187,15 @@ impl Planner<'_> {
             );
         }
         let Some(&take) = unseen.iter().find(|take| take.action == ARM_SWING).or(unseen.first()) else { return };
-        let simulated = |planner: &Self, title: &str, variant: Variant| {
-            let stage = planner.simulated(Method::Variant(variant), take)?;
-            Some(column(title, Panel::Simulated(vec![planner.folder(stage).join("recording")])))
-        };
-        let of = |planner: &Self, list: &[(&str, Variant)]| -> Option<Vec<FigureColumn>> {
-            list.iter().map(|&(title, variant)| simulated(planner, title, variant)).collect()
-        };
-        let noises =
-            [("no noise", Variant::WithoutNoise), ("fixed noise", Variant::FixedNoise), ("learned noise", Variant::Ours)];
-        if let Some(mut columns) = of(self, &noises) {
-            columns.push(column("measured", Panel::Measured));
-            self.figure("noise", "Noise, range-Doppler, middle frame", false, columns, &[take], place, ours);
-        }
-        if let Some(learned) =
-            of(self, &[("learned by a linear loss", Variant::LinearLoss), ("learned by a dB loss", Variant::Ours)])
-        {
-            let measured = [column("measured, linear", Panel::MeasuredLinear), column("measured, dB", Panel::Measured)];
-            let columns = measured.into_iter().chain(learned).collect();
-            self.figure("loss_scale", "Linear or dB, range-Doppler, middle frame", false, columns, &[take], place, ours);
-        }
-        let graphs = [
-            ("no GCN in training", Variant::WithoutGcn),
-            ("GCN at inference", Variant::GcnAtInference),
-            ("HybridSim", Variant::Ours),
-        ];
-        if let Some(mut columns) = of(self, &graphs) {
-            columns.push(column("measured", Panel::Measured));
-            let title = "Graph convolution, range-Doppler, middle frame, static removed";
-            self.figure("graph", title, true, columns, &[take], place, ours);
+        for compared in &COMPARED {
+            let simulated = compared.simulated.iter().map(|&(title, variant)| {
+                let stage = self.simulated(Method::Variant(variant), take)?;
+                Some(column(title, Panel::Simulated(vec![self.folder(stage).join("recording")])))
+            });
+            let Some(simulated) = simulated.collect::<Option<Vec<_>>>() else { continue };
+            let measured = compared.measured.iter().map(|(title, panel)| column(title, panel.clone()));
+            let columns = simulated.into_iter().chain(measured).collect();
+            self.figure(compared.name, compared.title, compared.static_removed, columns, &[take], place, ours);
         }
     }
 

@@ -49,10 +49,8 @@ impl Planner<'_> {
         for take in place.of_subject(&self.config.split.training) {
             for ((method, stages), (_, trained)) in methods.iter_mut().zip(trained) {
                 let drawn = Drawn::first(*method);
-                let simulate = self.simulate(drawn, place, take, trained);
-                stages.simulate.push(simulate);
-                let simulated = self.folder(simulate).join("recording");
-                self.scores(stages, drawn, place, take, simulate, simulated);
+                let simulation = self.simulation_by(drawn, place, take, trained);
+                self.held_out(stages, drawn, place, take, simulation);
             }
         }
         self.plan.methods.extend(methods.into_iter().map(|(method, stages)| (method, vec![stages])));

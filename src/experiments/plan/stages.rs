@@ -9,6 +9,12 @@ use crate::experiments::task::Task;
 use crate::experiments::variants::Variant;
 use crate::recognition::RecognitionConfig;
 
+/// What simulates a recording, and the stages that it needs.
+pub(super) struct Simulation {
+    task: Task,
+    parents: Vec<usize>,
+}
+
 /// What a classifier learns from.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Learned {
@@ -48,6 +54,12 @@ impl Planner<'_> {
     }
 
     pub(super) fn simulate(&mut self, drawn: Drawn, place: &Place, take: &Take, trained: &Trained) -> usize {
+        let simulation = self.simulation_by(drawn, place, take, trained);
+        self.kept(drawn, place, take, simulation)
+    }
+
+    /// A trained simulator's.
+    pub(super) fn simulation_by(&self, drawn: Drawn, place: &Place, take: &Take, trained: &Trained) -> Simulation {
         let task = Task::Simulate {
             checkpoint: trained.checkpoint.clone(),
             recording: place.recordings.join(&take.name),
@@ -55,11 +67,36 @@ impl Planner<'_> {
             graph_at_inference: drawn.method == Method::Variant(Variant::GcnAtInference),
             seed: self.config.seed + drawn.draw as u64,
         };
-        self.add(format!("simulate/{}/{}", drawn.id(), take.name), vec![trained.stage], Some(place), task)
+        Simulation { task, parents: vec![trained.stage] }
     }
 
-    /// A baseline's simulation of a recording: with our direct path, or at the level that the training recordings have.
-    /// With the noise that a stage has measured, or the paper's.
+    /// A simulation that is kept, for scores and classifiers.
+    pub(super) fn kept(&mut self, drawn: Drawn, place: &Place, take: &Take, Simulation { task, parents }: Simulation) -> usize {
+        self.add(format!("simulate/{}/{}", drawn.id(), take.name), parents, Some(place), task)
+    }
+
+    /// Scores of the training subject's recording where nobody learns from its simulation: of the held-out frames, which alone are
+    /// simulated.
+    pub(super) fn held_out(
+        &mut self,
+        stages: &mut MethodStages,
+        drawn: Drawn,
+        place: &Place,
+        take: &Take,
+        Simulation { task, parents }: Simulation,
+    ) {
+        let task = Task::HeldOut {
+            simulation: Box::new(task),
+            fraction: self.config.training.validation_fraction,
+            comparison: Box::new(self.config.comparison.clone()),
+            weights: self.weights.clone(),
+        };
+        let stage = self.add(format!("compare/{}/{}", drawn.id(), take.name), parents, Some(place), task);
+        stages.note(stage, take, true);
+    }
+
+    /// A baseline's: with our direct path, or at the level that the training recordings have. With the noise that a stage has
+    /// measured, or the paper's.
     pub(super) fn baseline(
         &mut self,
         method: BaselineName,
@@ -67,7 +104,7 @@ impl Planner<'_> {
         place: &Place,
         take: &Take,
         ours: &Trained,
-    ) -> usize {
+    ) -> Simulation {
         let (parent, gain, checkpoint) = match method {
             BaselineName::TwoBounce => (ours.stage, None, Some(ours.checkpoint.clone())),
             _ => {
@@ -80,9 +117,7 @@ impl Planner<'_> {
         let (recording, name, seed) = (place.recordings.join(&take.name), take.name.clone(), self.config.seed);
         let noise_level = noise.map(|stage| self.folder(stage).join("noise.json"));
         let task = Task::Baseline { method, recording, name, gain, checkpoint, noise_level, seed };
-        let id = if noise.is_some() { Method::ReceiverNoise(method) } else { Method::Baseline(method) }.id();
-        let parents = std::iter::once(parent).chain(noise).collect();
-        self.add(format!("simulate/{id}/{}", take.name), parents, Some(place), task)
+        Simulation { task, parents: std::iter::once(parent).chain(noise).collect() }
     }
 
     /// Of the receiver, as the training recordings show it.

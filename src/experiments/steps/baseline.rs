@@ -6,13 +6,13 @@ use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 
 use super::bench::{Bench, seed_of};
-use super::measure::{read_json, write_json};
-use super::simulate::write_frames;
+use super::measure::{Speed, write_json};
+use super::simulate::{Source, Use};
 use crate::baselines::{
     Baseline, BaselineNoise, Calibration, MmGpe, MmGpeConfig, Rendering, RfGenesis, RfGenesisConfig, TwoBounce, TwoBounceConfig,
     noise_level,
 };
-use crate::data::Recording;
+use crate::data::{Recording, files::read_json};
 use crate::error::{Error, Result};
 use crate::experiments::config::BaselineName;
 use crate::person::Person;
@@ -68,7 +68,7 @@ pub struct Task<'a> {
     pub seed: u64,
 }
 
-pub fn simulate(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn FnMut(usize, usize)) -> Result<()> {
+pub fn simulate(task: &Task, bench: &mut Bench, then: Use<'_>) -> Result<Speed> {
     let recording = Recording::open(task.recording)?;
     let baseline = open(task.method, &recording, task.checkpoint, bench.device())?;
     let gain = task.gain.map(read_json::<Gain>).transpose()?.map_or(1.0, |found| found.gain);
@@ -78,8 +78,7 @@ pub fn simulate(task: &Task, folder: &Path, bench: &mut Bench, step: &mut dyn Fn
         None => BaselineNoise::Rate { seed },
     };
     let rendering = Rendering { baseline: &*baseline, gain, noise };
-    let speed = write_frames(folder, &recording, &|_| Ok(()), &mut |frame| rendering.frame(frame), step)?;
-    write_json(&folder.join("speed.json"), &speed)
+    then(&Source { recording: &recording, look: &|_| Ok(()), frame: &|frame| rendering.frame(frame) })
 }
 
 /// # Errors

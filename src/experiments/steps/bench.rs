@@ -87,11 +87,10 @@ impl Bench {
 }
 
 impl Bench {
-    /// The longest that the geometry of the simulated recording has taken; a simulator that needed `seconds` for it may have
-    /// found it done.
+    /// What the geometry of the simulated recording has taken so far, `seconds` more among it: every frame's is worked out once.
     pub fn charged_geometry_s(&mut self, config: &SimulatorConfig, seconds: f64) -> f64 {
         let known = self.geometry_s.entry(geometry(config)).or_default();
-        *known = known.max(seconds);
+        *known += seconds;
         *known
     }
 }

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize};
 
 use super::Bench;
-use crate::data::{Recording, atomic, files};
-use crate::error::{Error, Result};
+use crate::data::{Recording, atomic};
+use crate::error::Result;
 use crate::evaluation::{ComparisonConfig, compare_frames};
 use crate::recognition::{self, RecognitionConfig, Stage};
 use crate::training::{FrameSplit, Split};
@@ -25,12 +25,6 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     atomic::write_text(path, &serde_json::to_string_pretty(value).expect("plain data"))
 }
 
-pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
-    let path = path.as_ref();
-    let text = files::read_text(path)?;
-    serde_json::from_str(&text).map_err(|error| Error::Parse { path: path.into(), message: error.to_string() })
-}
-
 /// Scores of a simulated recording, on all frames or on those that training held out.
 pub fn compare(
     measured: &Path,
@@ -44,11 +38,16 @@ pub fn compare(
     let all = measured.frames();
     let frames: Vec<usize> = match held_out_fraction {
         None => (0..all).collect(),
-        Some(fraction) => FrameSplit::new(&[all], fraction, Split::Last, 0).validation.iter().map(|id| id.frame).collect(),
+        Some(fraction) => held_out(all, fraction),
     };
     let lpips = bench.lpips(config)?;
     let found = compare_frames(&measured, &simulated, &frames, &config.heatmap, &config.metrics, lpips.as_deref())?;
     write_json(&folder.join("scores.json"), &found)
+}
+
+/// The frames of a recording that no training learns from.
+pub fn held_out(frames: usize, fraction: f64) -> Vec<usize> {
+    FrameSplit::new(&[frames], fraction, Split::Last, 0).validation.iter().map(|id| id.frame).collect()
 }
 
 /// Trains a classifier on some recordings and tests it on others.

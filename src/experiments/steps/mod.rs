@@ -10,6 +10,6 @@ pub mod train;
 
 pub use bench::Bench;
 pub use figure::figure;
-pub use measure::{Speed, compare, read_json, recognise};
+pub use measure::{Speed, compare, recognise, write_json};
 pub use sources::{diagnose, site};
 pub use train::Stability;

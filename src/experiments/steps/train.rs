@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::Bench;
 use super::measure::write_json;
-use super::{Bench, read_json};
 use crate::config::{Config, DataConfig};
-use crate::data::atomic;
+use crate::data::{atomic, files::read_json};
 use crate::effects::EffectSetting;
 use crate::error::{Error, Result};
 use crate::simulator::SimulatorConfig;
