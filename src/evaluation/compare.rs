@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Evaluation,
-    frames::{FrameSource, Pair, measured_frame, score, whole},
+    frames::{compare_with, measured_frame},
 };
 use crate::{
     data::{Recording, recording::SETTINGS_FILE},
@@ -66,30 +66,7 @@ pub fn compare_frames(
     lpips: Option<&Lpips>,
 ) -> Result<Evaluation> {
     refuse_different(measured, simulated)?;
-    compare_with(measured, &|frame| measured_frame(simulated, frame), frames, heatmap, metrics, lpips)
-}
-
-/// The same with a source of the simulated frames' samples, `[tx, rx, loop, sample]`.
-///
-/// # Errors
-/// As [`compare`], less what two recordings can differ in; whatever the source refuses.
-pub fn compare_with(
-    measured: &Recording,
-    simulated: FrameSource<'_>,
-    frames: &[usize],
-    heatmap: &HeatmapConfig,
-    metrics: &MetricsConfig,
-    lpips: Option<&Lpips>,
-) -> Result<Evaluation> {
-    let frames = &whole(measured, frames)?[..];
-    measured.refuse_dead(frames.iter().copied())?;
-    let pair = Pair {
-        radar: &measured.radar,
-        tracked: measured.person().is_some(),
-        measured: &|frame| measured_frame(measured, frame),
-        simulated,
-    };
-    score(&pair, frames, heatmap, metrics, lpips, &mut |_, _, _| {})
+    compare_with(measured, &|frame| measured_frame(simulated, frame), frames, heatmap, metrics, lpips, &mut |_, _, _| {})
 }
 
 /// Whether two recordings can show the same: the same radar and number of frames, and no label that contradicts. How the

@@ -21,7 +21,7 @@ pub fn measured_frame(recording: &Recording, frame: usize) -> Result<Vec<Complex
 ///
 /// # Errors
 /// None of them is.
-pub(super) fn whole(recording: &Recording, frames: &[usize]) -> Result<Vec<usize>> {
+fn whole(recording: &Recording, frames: &[usize]) -> Result<Vec<usize>> {
     let whole: Vec<usize> = frames.iter().copied().filter(|frame| recording.is_whole(*frame)).collect();
     if whole.is_empty() && !frames.is_empty() {
         let found = format!("lost chirps in all of {} frames", frames.len());
@@ -37,19 +37,45 @@ pub struct FrameMaps {
 }
 
 /// A frame's samples, `[tx, rx, loop, sample]`.
-pub(super) type FrameSource<'a> = &'a dyn Fn(usize) -> Result<Vec<Complex32>>;
+type FrameSource<'a> = &'a dyn Fn(usize) -> Result<Vec<Complex32>>;
 
 /// What is measured and what is to equal it.
-pub(super) struct Pair<'a> {
-    pub radar: &'a Radar,
+struct Pair<'a> {
+    radar: &'a Radar,
     /// Whether the person's cells mean something.
-    pub tracked: bool,
-    pub measured: FrameSource<'a>,
-    pub simulated: FrameSource<'a>,
+    tracked: bool,
+    measured: FrameSource<'a>,
+    simulated: FrameSource<'a>,
+}
+
+/// Scores frames of a source, samples `[tx, rx, loop, sample]`, against a recording's, one by one.
+///
+/// `observe` sees the maps of every frame: all cells, then static-removed ones.
+///
+/// # Errors
+/// Frames without a signal; a frame that cannot be read; whatever the source refuses; maps too small for `lpips`.
+pub fn compare_with(
+    measured: &Recording,
+    simulated: FrameSource<'_>,
+    frames: &[usize],
+    heatmap: &HeatmapConfig,
+    metrics: &MetricsConfig,
+    lpips: Option<&Lpips>,
+    observe: &mut dyn FnMut(usize, FrameMaps, FrameMaps),
+) -> Result<Evaluation> {
+    let frames = &whole(measured, frames)?[..];
+    measured.refuse_dead(frames.iter().copied())?;
+    let pair = Pair {
+        radar: &measured.radar,
+        tracked: measured.person().is_some(),
+        measured: &|frame| measured_frame(measured, frame),
+        simulated,
+    };
+    score(&pair, frames, heatmap, metrics, lpips, observe)
 }
 
 /// Mean scores of these frames.
-pub(super) fn score(
+fn score(
     pair: &Pair<'_>,
     frames: &[usize],
     heatmap: &HeatmapConfig,

@@ -10,8 +10,8 @@ mod frames;
 mod sequences;
 mod simulation;
 
-pub use compare::{ComparisonConfig, compare, compare_frames, compare_with, refuse_different};
-pub use frames::{FrameMaps, measured_frame};
+pub use compare::{ComparisonConfig, compare, compare_frames, refuse_different};
+pub use frames::{FrameMaps, compare_with, measured_frame};
 pub use sequences::{SequenceSummary, over_draws, over_sequences};
 pub use simulation::{Simulation, evaluate};
 

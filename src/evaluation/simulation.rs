@@ -5,7 +5,7 @@ use rand::RngExt;
 
 use super::{
     Evaluation,
-    frames::{FrameMaps, Pair, measured_frame, score, whole},
+    frames::{FrameMaps, compare_with},
 };
 use crate::{
     error::Result,
@@ -76,13 +76,5 @@ pub fn evaluate(
     lpips: Option<&Lpips>,
     observe: &mut dyn FnMut(usize, FrameMaps, FrameMaps),
 ) -> Result<Evaluation> {
-    let frames = &whole(&recording.recording, frames)?[..];
-    recording.recording.refuse_dead(frames.iter().copied())?;
-    let pair = Pair {
-        radar: &recording.scene.radar,
-        tracked: recording.recording.person().is_some(),
-        measured: &|frame| measured_frame(&recording.recording, frame),
-        simulated: &|frame| simulation.frame(frame),
-    };
-    score(&pair, frames, heatmap, metrics, lpips, observe)
+    compare_with(&recording.recording, &|frame| simulation.frame(frame), frames, heatmap, metrics, lpips, observe)
 }

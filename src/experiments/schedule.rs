@@ -22,14 +22,11 @@ enum Told {
         stage: usize,
         known: bool,
     },
-    /// How long it took, unless it was done already.
-    Ended {
-        stage: usize,
-        seconds: f64,
-    },
-    Known {
+    /// `worked`: it was not done already.
+    Done {
         stage: usize,
         record: Record,
+        worked: bool,
     },
     Failed(Error),
 }
@@ -41,7 +38,8 @@ struct Queue {
     open: VecDeque<Group>,
     done: BTreeSet<usize>,
     /// Somebody trains a simulator. One does at a time: after every backward pass burn-autodiff 0.22.1 looks at all nodes of a graph
-    /// that another thread is building, once for each of them (`GraphCleaner::cleanup_orphaned_entries`).
+    /// that another thread is building, once for each of them (`GraphCleaner::cleanup_orphaned_entries`). What that costs was not
+    /// measured.
     trains: bool,
     stopped: bool,
 }
@@ -53,6 +51,18 @@ struct Work<'a> {
     store: &'a Store,
     queue: Mutex<Queue>,
     changed: Condvar,
+}
+
+/// A worker that panics stops the others, who would wait for what it was at; the panic goes on when all have ended.
+struct StopOnPanic<'a>(&'a Work<'a>);
+
+impl Drop for StopOnPanic<'_> {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            self.0.lock().stopped = true;
+            self.0.changed.notify_all();
+        }
+    }
 }
 
 /// As [`run_some`] by so many workers, each of which has its share of the cores. Sites are recorded first, by all cores; simulators
@@ -93,7 +103,10 @@ pub fn with_jobs(
         let (sender, received) = channel();
         for pool in &pools {
             let (work, sender) = (&work, sender.clone());
-            scope.spawn(move || pool.install(|| work.until_empty(devices, &sender)));
+            scope.spawn(move || {
+                let _stop = StopOnPanic(work);
+                pool.install(|| work.until_empty(devices, &sender));
+            });
         }
         drop(sender);
         for told in received {
@@ -101,8 +114,12 @@ pub fn with_jobs(
                 Told::Begun { place: [index, of], stage, known } => {
                     notify(Event::Stage { index, of, name: &plan.stages[stage].key.name, known });
                 }
-                Told::Ended { stage, seconds } => notify(Event::Done { name: &plan.stages[stage].key.name, seconds }),
-                Told::Known { stage, record } => drop(records.insert(stage, record)),
+                Told::Done { stage, record, worked } => {
+                    if worked {
+                        notify(Event::Done { name: &plan.stages[stage].key.name, seconds: record.seconds });
+                    }
+                    records.insert(stage, record);
+                }
                 Told::Failed(error) => failed = failed.take().or(Some(error)),
             }
         }
@@ -141,9 +158,9 @@ impl Work<'_> {
                 let done = self.done(stage, &mut bench, told);
                 let mut queue = self.lock();
                 match done {
-                    Ok(record) => {
+                    Ok((record, worked)) => {
                         queue.done.insert(stage);
-                        let _ = told.send(Told::Known { stage, record });
+                        let _ = told.send(Told::Done { stage, record, worked });
                     }
                     Err(error) => {
                         queue.stopped = true;
@@ -162,15 +179,17 @@ impl Work<'_> {
         }
     }
 
-    fn done(&self, stage: usize, bench: &mut Bench, told: &Sender<Told>) -> Result<Record> {
+    /// The stage's record, and whether there was something to do.
+    fn done(&self, stage: usize, bench: &mut Bench, told: &Sender<Told>) -> Result<(Record, bool)> {
         let place = [self.lock().done.len(), self.wanted.len()];
-        one(self.plan, stage, place, self.store, bench, &mut |event| {
-            let _ = match event {
-                Event::Stage { known, .. } => told.send(Told::Begun { place, stage, known }),
-                Event::Done { seconds, .. } => told.send(Told::Ended { stage, seconds }),
-                Event::Step { .. } => Ok(()),
-            };
-        })
+        let mut worked = true;
+        let record = one(self.plan, stage, place, self.store, bench, &mut |event| {
+            if let Event::Stage { known, .. } = event {
+                worked = !known;
+                let _ = told.send(Told::Begun { place, stage, known });
+            }
+        })?;
+        Ok((record, worked))
     }
 
     /// The first stages whose parents are done; waits for them. None: nothing is left, or somebody has failed.

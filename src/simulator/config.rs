@@ -35,6 +35,7 @@ impl PathModel {
         self != Self::Indirect
     }
 
+    /// By Gaussian patches, whatever the direct path is by.
     pub fn has_indirect(self) -> bool {
         self != Self::Direct
     }
@@ -42,11 +43,6 @@ impl PathModel {
     /// Whether some scatterers are taken for microfacets.
     pub fn has_microfacets(self) -> bool {
         matches!(self, Self::Decoupled | Self::Direct)
-    }
-
-    /// Whether some scatterers are taken for Gaussian patches.
-    pub fn has_patches(self) -> bool {
-        self != Self::Direct
     }
 }
 

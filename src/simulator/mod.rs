@@ -125,12 +125,12 @@ impl Simulator {
             };
             Surface {
                 material: paths.has_microfacets().then(|| material(&features)),
-                patch: paths.has_patches().then(|| self.decoders.body_patch.forward(at_points(features))),
+                patch: paths.has_indirect().then(|| self.decoders.body_patch.forward(at_points(features))),
             }
         });
         let room = constants.room.as_ref().map(|encoded| Surface {
             material: paths.has_microfacets().then(|| self.decoders.room_material.forward(encoded.clone())),
-            patch: paths.has_patches().then(|| self.decoders.room_patch.forward(encoded.clone())),
+            patch: paths.has_indirect().then(|| self.decoders.room_patch.forward(encoded.clone())),
         });
         Surfaces { body, room }
     }

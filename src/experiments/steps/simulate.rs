@@ -100,7 +100,7 @@ pub fn score_held_out(
     frames.iter().try_for_each(|&frame| (source.look)(frame))?;
     let seen = Instant::now();
     let simulated = |frame| Ok(sampled(&recording.radar, &(source.frame)(frame)?).complex().collect());
-    let found = compare_with(recording, &simulated, &frames, &config.heatmap, &config.metrics, lpips)?;
+    let found = compare_with(recording, &simulated, &frames, &config.heatmap, &config.metrics, lpips, &mut |_, _, _| {})?;
     write_json(&folder.join("scores.json"), &found)?;
     let (geometry_s, signal_s) = ((seen - started).as_secs_f64(), seen.elapsed().as_secs_f64());
     Ok(Speed { frames: frames.len(), geometry_s, signal_s })
