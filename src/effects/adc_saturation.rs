@@ -4,7 +4,9 @@ use burn::tensor::Tensor;
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -23,8 +25,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("level", "of the reference", 10.0, 0.01, 10.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
+    choice: Choice::None,
     look_alikes: &["interference"],
     separate_by: "a lower receiver gain; the samples' histogram shows a pile at the rail",
+    operator: Operator::Nonlinear(apply),
 };
 
 /// Both components are clamped.

@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Sampling starts later than declared; the sampled part of the ramp is another one and all phases are wrong in proportion to the delay.",
     equation: "t → t + offset_s, that is × exp(j2π τ_p S offset_s)",
     parameters: &[parameter("offset_s", "s", 0.0, -1e-05, 1e-05)],
+    choice: Choice::None,
     look_alikes: &["if_delay", "if_lowpass"],
     separate_by: "the same scene with another slope; never from one setting of the radar",
+    operator: Operator::Signal(apply),
 };
 
 /// A constant shift of the chirp's time. Good for shifts up to about one sample: nothing is known beyond the window's

@@ -3,7 +3,9 @@
 use burn::tensor::Tensor;
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::BodyPoints,
     values::Values,
 };
@@ -19,8 +21,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The antennas send and receive less towards the side, so that echoes fade as the person leaves the boresight.",
     equation: "A_p → A_p (cos θ_p)^exponent, both ways together",
     parameters: &[parameter("exponent", "1", 0.0, 0.0, 20.0)],
+    choice: Choice::None,
     look_alikes: &["part_reflectivity"],
     separate_by: "a walk sideways, and the same body part seen under several directions",
+    operator: Operator::Amplitude(weigh),
 };
 
 /// On the body alone: the room's own responses are learned where they stand. One exponent for both ways and both planes,

@@ -3,7 +3,9 @@
 use burn::tensor::Tensor;
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::{Values, repeated},
 };
 use crate::{
@@ -25,8 +27,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "An antenna's phase centre is a fraction of a wavelength off its place: a phase that changes with the direction.",
     equation: "τ_p → τ_p with tx_m + offset_m[tx], rx_m + offset_m[rx]",
     parameters: &[parameter("offset_m", "m", 0.0, -0.002, 0.002)],
+    choice: Choice::None,
     look_alikes: &["pose_offset", "mutual_coupling"],
     separate_by: "a target over ±40° of direction; a common rotation of the array cannot be told from a turned room",
+    operator: Operator::Direct(|points, values, of| direct_signal(points, values, of.radar, of.tx, of.dechirp, of.form)),
 };
 
 /// One transmitter's direct signal with its antennas moved, `[rx, chirp, sample]`.

@@ -1,7 +1,9 @@
 //! Echoes between parts of the body (card T9).
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::host_value,
     values::Values,
 };
@@ -25,8 +27,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("coefficient", "1", 0.0, -1.0, 1.0),
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
+    choice: Choice::None,
     look_alikes: &[],
     separate_by: "arms held away from the body, legs apart",
+    operator: Operator::Paths(|of, values| Some(echo(of.direct.clone(), values, of.chirps.radar))),
 };
 
 /// The late echo of the body's signal, `[rx, chirp, sample]` → the same.

@@ -1,7 +1,9 @@
 //! An object that the person carries.
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::{
@@ -26,8 +28,12 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("amplitude", "recording's unit·m²", 0.0, -1000000000.0, 1000000000.0),
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
+    choice: Choice::Part,
     look_alikes: &["part_reflectivity", "clothing_delay"],
     separate_by: "the same motion with empty hands and pockets",
+    operator: Operator::Carried(|values, place_m, moved, of| {
+        signal(values, place_m, moved, of.radar, of.tx, of.dechirp, of.form)
+    }),
 };
 
 /// One transmitter's signal of the object, `[rx, chirp, sample]`, from where the body's point is that carries it.

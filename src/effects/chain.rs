@@ -5,92 +5,15 @@ use burn::{
     tensor::{DType, Device, Tensor},
 };
 
-use super::*;
-use crate::{
-    body::Displacement,
-    complex::Complex,
-    if_signal::{SumForm, direct_signal},
-    paths::{Dechirp, Points},
-    radar::Radar,
-    room::Room,
+use super::{
+    context::Context,
+    effect::Effect,
+    library,
+    operator::{Chirps, DirectReturns, Operator},
+    points::BodyPoints,
+    setting::EffectSetting,
 };
-
-/// What acts on the summed signal.
-type SignalOperator = fn(Complex<4>, &Values, &Context<'_>) -> Complex<4>;
-/// What moves points of the body.
-type DisplacementOperator = fn(Displacement, &Values, &BodyPoints<'_>) -> Displacement;
-/// What weighs points of the body.
-type AmplitudeOperator = fn(Tensor<2>, &Values, &BodyPoints<'_>) -> Tensor<2>;
-/// What shapes noise.
-type NoiseOperator = fn(Complex<4>, &Values, &Radar, u64) -> Complex<4>;
-
-/// Where an effect enters the simulator.
-pub(super) enum Operator {
-    Signal(SignalOperator),
-    Displacement(DisplacementOperator),
-    Amplitude(AmplitudeOperator),
-    Noise(NoiseOperator),
-    /// Adds paths, or changes how they are found.
-    Paths,
-    /// Chooses the frame that is seen.
-    Frame,
-}
-
-pub(super) fn operator(id: &str) -> Operator {
-    use Operator::{Amplitude, Displacement, Frame, Noise, Paths, Signal};
-    match id {
-        frame_drop::ID => Frame,
-        clock_offset::ID => Displacement(clock_offset::displace),
-        clock_drift::ID => Displacement(clock_drift::displace),
-        tdm_phase::ID => Displacement(tdm_phase::displace),
-        pose_offset::ID => Displacement(pose_offset::displace),
-        breathing::ID => Displacement(breathing::displace),
-        heartbeat::ID => Displacement(heartbeat::displace),
-        clothing_delay::ID => Displacement(clothing_delay::displace),
-        part_reflectivity::ID => Amplitude(part_reflectivity::weigh),
-        soft_occlusion::ID => Amplitude(soft_occlusion::weigh),
-        antenna_pattern::ID => Amplitude(antenna_pattern::weigh),
-        static_reflector::ID
-        | moving_reflector::ID
-        | carried_reflector::ID
-        | wall_ghost::ID
-        | floor_bounce::ID
-        | body_multibounce::ID
-        | antenna_position::ID => Paths,
-        range_bias::ID => Signal(range_bias::apply),
-        radar_vibration::ID => Signal(radar_vibration::apply),
-        object_radar_object::ID => Signal(object_radar_object::apply),
-        range_alias::ID => Signal(range_alias::apply),
-        start_frequency_error::ID => Signal(start_frequency_error::apply),
-        adc_start_error::ID => Signal(adc_start_error::apply),
-        slope_error::ID => Signal(slope_error::apply),
-        chirp_nonlinearity::ID => Signal(chirp_nonlinearity::apply),
-        chirp_ripple::ID => Signal(chirp_ripple::apply),
-        phase_noise::ID => Signal(phase_noise::apply),
-        chirp_start_jitter::ID => Signal(chirp_start_jitter::apply),
-        channel_mismatch::ID => Signal(channel_mismatch::apply),
-        mutual_coupling::ID => Signal(mutual_coupling::apply),
-        tx_leakage::ID => Signal(tx_leakage::apply),
-        chirp_droop::ID => Signal(chirp_droop::apply),
-        chirp_settling::ID => Signal(chirp_settling::apply),
-        gain_drift::ID => Signal(gain_drift::apply),
-        interference::ID => Signal(interference::apply),
-        second_harmonic::ID => Signal(second_harmonic::apply),
-        compression::ID => Signal(compression::apply),
-        if_delay::ID => Signal(if_delay::apply),
-        if_highpass::ID => Signal(if_highpass::apply),
-        if_lowpass::ID => Signal(if_lowpass::apply),
-        spur::ID => Signal(spur::apply),
-        ramp_edge_transient::ID => Signal(ramp_edge_transient::apply),
-        iq_imbalance::ID => Signal(iq_imbalance::apply),
-        dc_offset::ID => Signal(dc_offset::apply),
-        adc_saturation::ID => Signal(adc_saturation::apply),
-        coloured_noise::ID => Noise(coloured_noise::shape),
-        impulsive_noise::ID => Noise(impulsive_noise::shape),
-        correlated_noise::ID => Noise(correlated_noise::shape),
-        _ => panic!("no effect {id}"),
-    }
-}
+use crate::{body::Displacement, complex::Complex, if_signal::direct_signal, paths::Points, radar::Radar};
 
 /// The effects that are part of a simulator; none by default.
 #[derive(Module, Debug)]
@@ -131,54 +54,49 @@ impl Effects {
 
     /// Switches off what is not linear in the signal.
     pub fn switch_off_nonlinear(&mut self) {
-        for id in [object_radar_object::ID, second_harmonic::ID, compression::ID, adc_saturation::ID] {
-            self.switch_off(Some(id));
-        }
+        self.switch_off_where(|operator| matches!(operator, Operator::Nonlinear(_)));
     }
 
     /// Switches off what adds to silence.
     pub fn switch_off_additive(&mut self) {
-        for id in [
-            static_reflector::ID,
-            moving_reflector::ID,
-            carried_reflector::ID,
-            range_alias::ID,
-            tx_leakage::ID,
-            interference::ID,
-            spur::ID,
-            ramp_edge_transient::ID,
-            dc_offset::ID,
-        ] {
-            self.switch_off(Some(id));
-        }
+        self.switch_off_where(Operator::adds_to_silence);
+    }
+
+    fn switch_off_where(&mut self, which: impl Fn(Operator) -> bool) {
+        self.list.iter_mut().filter(|effect| which(effect.operator())).for_each(|effect| effect.enable(false));
     }
 
     fn enabled(&self) -> impl Iterator<Item = &Effect> {
         self.list.iter().filter(|effect| effect.is_enabled())
     }
 
-    fn named(&self, id: &str) -> impl Iterator<Item = &Effect> {
-        self.enabled().filter(move |effect| effect.id() == id)
-    }
-
-    /// Whether an effect of this id is on.
-    pub fn has(&self, id: &str) -> bool {
-        self.named(id).next().is_some()
+    /// Whether anything of this kind is on.
+    fn any(&self, kind: impl Fn(Operator) -> bool) -> bool {
+        self.enabled().any(|effect| kind(effect.operator()))
     }
 
     /// How many frames later than its number a frame shows the scene.
     pub fn frame_shift(&self, frame: usize, device: &Device) -> usize {
-        self.named(frame_drop::ID).map(|effect| frame_drop::shift(&effect.values(device, DType::F32), frame)).sum()
+        let shifts = self.enabled().filter_map(|effect| match effect.operator() {
+            Operator::Frame(shift) => Some(shift(&effect.values(device, DType::F32), frame)),
+            _ => None,
+        });
+        shifts.sum()
     }
 
     /// Whether [`BodyPoints::velocity`] is needed.
     pub fn needs_velocity(&self) -> bool {
-        [clock_offset::ID, clock_drift::ID, tdm_phase::ID].into_iter().any(|id| self.has(id))
+        self.any(|operator| matches!(operator, Operator::Time(_)))
     }
 
     /// Whether anything acts on the body's points one by one.
     pub fn acts_on_points(&self) -> bool {
-        self.enabled().any(|effect| matches!(operator(effect.id()), Operator::Displacement(_) | Operator::Amplitude(_)))
+        self.any(|operator| operator.on_displacement().is_some() || matches!(operator, Operator::Amplitude(_)))
+    }
+
+    /// Whether there are objects that are not in the scene.
+    pub fn has_reflectors(&self) -> bool {
+        self.any(|operator| matches!(operator, Operator::Reflector(_) | Operator::Carried(_)))
     }
 
     /// Where the body's points are, `[point, chirp]`.
@@ -188,7 +106,7 @@ impl Effects {
     pub fn displace(&self, mut displacement: Displacement, points: &BodyPoints<'_>) -> Displacement {
         let (device, dtype) = (displacement.x.device(), displacement.x.dtype());
         for effect in self.enabled() {
-            if let Operator::Displacement(displace) = operator(effect.id()) {
+            if let Some(displace) = effect.operator().on_displacement() {
                 displacement = displace(displacement, &effect.values(&device, dtype), points);
             }
         }
@@ -202,7 +120,7 @@ impl Effects {
     pub fn weigh(&self, mut amplitude: Tensor<2>, points: &BodyPoints<'_>) -> Tensor<2> {
         let (device, dtype) = (amplitude.device(), amplitude.dtype());
         for effect in self.enabled() {
-            if let Operator::Amplitude(weigh) = operator(effect.id()) {
+            if let Operator::Amplitude(weigh) = effect.operator() {
                 amplitude = weigh(amplitude, &effect.values(&device, dtype), points);
             }
         }
@@ -210,39 +128,26 @@ impl Effects {
     }
 
     /// The direct signal of points, with the antennas where they are: `[rx, chirp, sample]`.
-    pub fn direct_signal(&self, points: Points, radar: &Radar, tx: usize, dechirp: Dechirp, form: SumForm) -> Complex<3> {
-        match self.named(antenna_position::ID).next() {
-            Some(effect) => {
+    pub fn direct_signal(&self, points: Points, chirps: &Chirps<'_>) -> Complex<3> {
+        let found = self.enabled().find_map(|effect| match effect.operator() {
+            Operator::Direct(signal) => {
                 let values = effect.values(&points.displacement.x.device(), points.displacement.x.dtype());
-                antenna_position::direct_signal(points, &values, radar, tx, dechirp, form)
+                Some(signal(points, &values, chirps))
             }
-            None => direct_signal(points, radar, tx, dechirp, form),
-        }
+            _ => None,
+        });
+        found.unwrap_or_else(|| direct_signal(points, chirps.radar, chirps.tx, chirps.dechirp, chirps.form))
     }
 
-    /// What else one transmitter receives of the body's points: by way of mirrors, and late. `direct` is their direct
-    /// signal, `[rx, chirp, sample]`.
+    /// What else one transmitter receives of the body's points: by way of mirrors, and late.
     ///
     /// # Gradient
-    /// Flows to the points and the values.
-    pub fn further_paths(
-        &self,
-        points: Points,
-        direct: &Complex<3>,
-        room: Option<&Room>,
-        radar: &Radar,
-        tx: usize,
-        (dechirp, form): (Dechirp, SumForm),
-    ) -> Option<Complex<3>> {
-        let (device, dtype) = (direct.device(), direct.re.dtype());
-        let parts = self.enabled().filter_map(|effect| {
-            let values = || effect.values(&device, dtype);
-            match effect.id() {
-                wall_ghost::ID => wall_ghost::signal(points, &values(), room?, radar, tx, dechirp, form),
-                floor_bounce::ID => floor_bounce::signal(points, &values(), room?, radar, tx, dechirp, form),
-                body_multibounce::ID => Some(body_multibounce::echo(direct.clone(), &values(), radar)),
-                _ => None,
-            }
+    /// Flows to the returns and the values.
+    pub fn further_paths(&self, returns: &DirectReturns<'_>) -> Option<Complex<3>> {
+        let (device, dtype) = (returns.direct.device(), returns.direct.re.dtype());
+        let parts = self.enabled().filter_map(|effect| match effect.operator() {
+            Operator::Paths(signal) => signal(returns, &effect.values(&device, dtype)),
+            _ => None,
         });
         parts.reduce(Complex::add)
     }
@@ -251,29 +156,33 @@ impl Effects {
     ///
     /// # Gradient
     /// Flows to the values.
-    pub fn reflectors(
-        &self,
-        times_s: &[f64],
-        radar: &Radar,
-        tx: usize,
-        dechirp: Dechirp,
-        form: SumForm,
-        options: (&Device, DType),
-    ) -> Option<Complex<3>> {
-        let parts = self.enabled().filter_map(|effect| {
-            let values = || effect.values(options.0, options.1);
-            match effect.id() {
-                static_reflector::ID => Some(static_reflector::signal(&values(), radar, tx, dechirp, form)),
-                moving_reflector::ID => Some(moving_reflector::signal(&values(), times_s, radar, tx, dechirp, form)),
-                _ => None,
-            }
+    pub fn reflectors(&self, chirps: &Chirps<'_>, (device, dtype): (&Device, DType)) -> Option<Complex<3>> {
+        let parts = self.enabled().filter_map(|effect| match effect.operator() {
+            Operator::Reflector(signal) => Some(signal(&effect.values(device, dtype), chirps)),
+            _ => None,
         });
         parts.reduce(Complex::add)
     }
 
-    /// Objects that the body carries, each with its part of the body.
-    pub fn carried(&self) -> impl Iterator<Item = (&Effect, Option<&str>)> {
-        self.named(carried_reflector::ID).map(|effect| (effect, effect.choice()))
+    /// One transmitter's echoes of objects that the body carries, `[rx, chirp, sample]`. `at`: from a part of the body to its place,
+    /// metres, and how that moves; none without a body.
+    ///
+    /// # Gradient
+    /// Flows to the displacement and the values.
+    pub fn carried(
+        &self,
+        chirps: &Chirps<'_>,
+        (device, dtype): (&Device, DType),
+        at: impl Fn(Option<&str>) -> Option<([f64; 3], Displacement)>,
+    ) -> Option<Complex<3>> {
+        let parts = self.enabled().filter_map(|effect| match effect.operator() {
+            Operator::Carried(signal) => {
+                let (place_m, moved) = at(effect.choice())?;
+                Some(signal(&effect.values(device, dtype), place_m, &moved, chirps))
+            }
+            _ => None,
+        });
+        parts.reduce(Complex::add)
     }
 
     /// All that happens to the sum of the paths, `[tx, rx, loop, sample]`.
@@ -283,7 +192,7 @@ impl Effects {
     pub fn apply(&self, mut signal: Complex<4>, context: &Context<'_>) -> Complex<4> {
         let (device, dtype) = (signal.device(), signal.re.dtype());
         for effect in self.enabled() {
-            if let Operator::Signal(apply) = operator(effect.id()) {
+            if let Some(apply) = effect.operator().on_signal() {
                 signal = apply(signal, &effect.values(&device, dtype), context);
             }
         }
@@ -297,7 +206,7 @@ impl Effects {
     pub fn shape_noise(&self, mut normals: Complex<4>, radar: &Radar, seed: u64) -> Complex<4> {
         let (device, dtype) = (normals.device(), normals.re.dtype());
         for effect in self.enabled() {
-            if let Operator::Noise(shape) = operator(effect.id()) {
+            if let Operator::Noise(shape) = effect.operator() {
                 normals = shape(normals, &effect.values(&device, dtype), radar, seed);
             }
         }

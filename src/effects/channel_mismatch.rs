@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The channels differ in gain and phase, the same for all echoes, which turns and blurs directions.",
     equation: "s_{t,r} → s_{t,r} 10^{gain_db/20} e^{j phase_deg}",
     parameters: &[parameter("gain_db", "dB", 0.0, -20.0, 20.0), parameter("phase_deg", "deg", 0.0, -180.0, 180.0)],
+    choice: Choice::None,
     look_alikes: &["antenna_position", "mutual_coupling"],
     separate_by: "a strong reflector at several directions: gains and phases stay, an antenna's misplacement changes with direction",
+    operator: Operator::Signal(apply),
 };
 
 /// `gain_db` and `phase_deg` are for each channel (tx by tx), for each receiver, or for all.

@@ -4,7 +4,9 @@ use std::f64::consts::LN_10;
 
 use super::{
     context::{Context, legendre},
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -20,8 +22,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Transmitted power or gain changes along the ramp, alike for all echoes: it shapes the sidelobes in range.",
     equation: "× 10^{g(x)/20}, g = −½ db[0] P_1(x) + Σ_k db[k] P_{k+1}(x), x = −1 … 1 over the window",
     parameters: &[parameter("db", "dB", 0.0, -20.0, 20.0)],
+    choice: Choice::None,
     look_alikes: &["if_highpass"],
     separate_by: "a strong reflector at two ranges: the same shape at both, where a bent chirp's grows with range",
+    operator: Operator::Signal(apply),
 };
 
 /// The first number of `db` is the fall from the first sample to the last, the others are Legendre polynomials of the

@@ -2,7 +2,9 @@
 
 use super::{
     context::{Context, legendre},
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The ramp is not straight: an echo is smeared over ranges, the more the farther it is.",
     equation: "× exp(j2π τ_p δf(t)), δf = Σ_k peak_hz[k] P_{k+2}(x), x = −1 … 1 over the window",
     parameters: &[parameter("peak_hz", "Hz", 0.0, -10000000.0, 10000000.0)],
+    choice: Choice::None,
     look_alikes: &["chirp_droop", "chirp_ripple"],
     separate_by: "a strong reflector at two ranges: this smear grows with the range, a receiver's does not",
+    operator: Operator::Signal(apply),
 };
 
 /// A warp of the chirp's time by Legendre polynomials from the second order on; those below are the start frequency and

@@ -4,7 +4,9 @@ use std::f64::consts::TAU;
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -17,15 +19,17 @@ pub static INFO: EffectInfo = EffectInfo {
     stage: Stage::Waveform,
     needs_person: false,
     title: "a ripple of the chirp's frequency",
-    explanation: "The ramp's frequency swings periodically: every echo gets a pair of fainter ones, before and behind, whose strength grows with range.",
+    explanation: "The ramp's frequency is modulated sinusoidally: every echo gets a pair of sidelobes, before and behind, whose level grows with range.",
     equation: "× exp(j2π τ_p deviation_hz sin(2π ripple_hz t + phase_rad))",
     parameters: &[
         parameter("deviation_hz", "Hz", 0.0, 0.0, 10000000.0),
         parameter("ripple_hz", "Hz", 200000.0, 10000.0, 5000000.0),
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
+    choice: Choice::None,
     look_alikes: &["wall_ghost", "spur"],
     separate_by: "move the target: the pair keeps its distance and grows with range; a spur stays where it is",
+    operator: Operator::Signal(apply),
 };
 
 /// A periodic warp of the chirp's time, t from the window's start.

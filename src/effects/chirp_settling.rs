@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The first chirps of each frame are weaker until the radar has settled.",
     equation: "× 1 − depth e^{−m/chirps}, m counts the chirps of the frame",
     parameters: &[parameter("depth", "1", 0.0, -1.0, 1.0), parameter("chirps", "chirps", 8.0, 0.5, 200.0)],
+    choice: Choice::None,
     look_alikes: &["gain_drift", "phase_noise"],
     separate_by: "longer frames: the first chirps change, the later ones do not",
+    operator: Operator::Signal(apply),
 };
 
 /// An exponential approach, from anew in every frame.

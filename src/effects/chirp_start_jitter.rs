@@ -4,7 +4,9 @@ use rand::RngExt;
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -20,8 +22,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Chirps start now and then one clock tick late, at random: a two-valued phase from chirp to chirp that grows with range.",
     equation: "× exp(j2π S τ_p δ_m), δ_m ∈ {0, jitter_s} at random",
     parameters: &[parameter("jitter_s", "s", 0.0, 0.0, 1e-07)],
+    choice: Choice::None,
     look_alikes: &[],
     separate_by: "a strong wall: the phases take two values here, and spread evenly with phase noise",
+    operator: Operator::Signal(apply),
 };
 
 /// Every chirp is late with probability ½; the draws of a frame are the same whenever it is simulated.

@@ -1,7 +1,9 @@
 //! A difference in rate between the radar's clock and the motion's (card G3).
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::BodyPoints,
     values::Values,
 };
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "One of the two clocks is faster, so that the body's displacement along its velocity grows with time.",
     equation: "τ_p(T) → τ_p(T (1 + relative))",
     parameters: &[parameter("relative", "1", 0.0, -0.1, 0.1)],
+    choice: Choice::None,
     look_alikes: &["clock_offset", "breathing"],
     separate_by: "a longer recording: the drift's error grows with time, an offset's does not",
+    operator: Operator::Time(displace),
 };
 
 /// As a clock's offset that grows with the radar's time from zero on.

@@ -1,7 +1,9 @@
 //! An offset between the radar's clock and the motion's (card G2).
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::BodyPoints,
     values::Values,
 };
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The motion was filmed by another clock: at each chirp the body is where it will be, or was, a moment later; every moving part is displaced along its velocity.",
     equation: "τ_p(T) → τ_p(T + offset_s)",
     parameters: &[parameter("offset_s", "s", 0.0, -0.5, 0.5)],
+    choice: Choice::None,
     look_alikes: &["pose_offset", "tdm_phase"],
     separate_by: "a motion that starts, stops and turns back: the offset's error changes sign with the velocity, a displaced pose's does not",
+    operator: Operator::Time(displace),
 };
 
 /// Along the velocity, to first order: an acceleration of 10 m/s² errs by 5 µm for 1 ms, by 0.5 mm for 10 ms. Normals and

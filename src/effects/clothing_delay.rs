@@ -1,7 +1,9 @@
 //! An extra delay on clothed parts of the body (card T3).
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::{BodyPoints, TORSO},
     values::Values,
 };
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Cloth and hair delay the wave on its way to the skin, so that the parts beneath seem farther away than the mesh.",
     equation: "τ_p → τ_p + 2 extra_m / c on the clothed part",
     parameters: &[parameter("extra_m", "m", 0.0, -0.01, 0.01)],
+    choice: Choice::Part,
     look_alikes: &["range_bias"],
     separate_by: "the same motion with and without the coat",
+    operator: Operator::Displacement(displace),
 };
 
 /// A displacement away from the radar of the body part that is chosen, or of the torso.

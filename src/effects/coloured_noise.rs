@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::{complex::Complex, radar::Radar};
@@ -19,8 +21,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The receiver's noise is not the same at all beat frequencies: the floor rises towards short ranges.",
     equation: "noise power × 1 + (knee_hz/f)^power",
     parameters: &[parameter("knee_hz", "Hz", 0.0, 0.0, 2000000.0), parameter("power", "1", 1.0, 0.2, 3.0)],
+    choice: Choice::None,
     look_alikes: &["tx_leakage", "if_highpass"],
     separate_by: "a recording without transmission",
+    operator: Operator::Noise(shape),
 };
 
 /// By the Fourier transform of the window; below half a range bin the spectrum stays as it is there.

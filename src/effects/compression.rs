@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -21,8 +23,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("level", "lost at the reference", 0.0, 0.0, 0.5),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
+    choice: Choice::None,
     look_alikes: &["adc_saturation"],
     separate_by: "lower the transmit power by 6 dB: products fall by 18 dB",
+    operator: Operator::Nonlinear(apply),
 };
 
 /// Third order: `level` is the share of a sample's amplitude that is lost where it equals the reference.

@@ -1,7 +1,9 @@
 //! Noise that the receivers have in common (card V4).
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::{complex::Complex, if_signal::noise, radar::Radar};
@@ -17,8 +19,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Supply or oscillator noise reaches all receivers at once: a faint echo from one direction in every cell.",
     equation: "n_r → n_r + coefficient n_common",
     parameters: &[parameter("coefficient", "1", 0.0, 0.0, 2.0)],
+    choice: Choice::None,
     look_alikes: &["mutual_coupling"],
     separate_by: "a recording without transmission",
+    operator: Operator::Noise(shape),
 };
 
 /// Standard normal noise `[tx, rx, loop, sample]` → noise with this effect.

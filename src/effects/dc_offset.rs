@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::{Values, repeated},
 };
 use crate::complex::Complex;
@@ -22,8 +24,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("q", "of the reference", 0.0, -1.0, 1.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
+    choice: Choice::None,
     look_alikes: &[],
     separate_by: "several transmitters: an offset is the same for all of them, leakage is not",
+    operator: Operator::Added(apply),
 };
 
 /// `i` and `q` for each receiver, or for all.

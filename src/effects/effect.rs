@@ -9,6 +9,7 @@ use burn::{
 
 use super::{
     EffectInfo, EffectSetting, info,
+    operator::Operator,
     values::{FIXED, Values},
 };
 
@@ -74,6 +75,14 @@ impl Effect {
         &self.setting.id
     }
 
+    fn info(&self) -> &'static EffectInfo {
+        info(&self.setting.id).expect("checked when it was made")
+    }
+
+    pub(super) fn operator(&self) -> Operator {
+        self.info().operator
+    }
+
     /// The boundary or the part of the body that it acts on.
     pub fn choice(&self) -> Option<&str> {
         self.setting.choice.as_deref()
@@ -92,8 +101,10 @@ impl Effect {
     /// # Gradient
     /// Flows to the parameters.
     pub fn values(&self, device: &Device, dtype: DType) -> Values {
+        let info = self.info();
         Values {
-            info: info(&self.setting.id).expect("checked when it was made"),
+            id: info.id,
+            known: info.parameters,
             tensors: self.parameters.iter().map(|parameter| (parameter.name.clone(), parameter.value(dtype))).collect(),
             fixed: self.fixed(),
             choice: self.setting.choice.clone(),

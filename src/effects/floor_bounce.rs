@@ -1,8 +1,10 @@
 //! The body's reflection in the floor (card P6).
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
     mirror::{mirrored_rx, mirrored_tx},
+    operator::{Chirps, Operator},
+    parameter::parameter,
     values::Values,
 };
 use crate::{
@@ -21,11 +23,16 @@ pub static INFO: EffectInfo = EffectInfo {
     stage: Stage::Propagation,
     needs_person: true,
     title: "the body's reflection in the floor",
-    explanation: "The wave also reaches the body by way of the floor, once or twice; the sum with the direct wave makes the echo fade and swell with range.",
+    explanation: "The wave also reaches the body by way of the floor, once or twice; the sum with the direct wave makes the echo interfere with itself, stronger and weaker with range.",
     equation: "+ Σ_p A_p [Γ (e^{j…τ_1} + e^{j…τ_2}) + Γ² e^{j…τ_12}], Γ = coefficient, the mirror being the floor",
     parameters: &[parameter("coefficient", "1", 0.0, -1.0, 1.0), parameter("phase_rad", "rad", 0.0, -6.3, 6.3)],
+    choice: Choice::None,
     look_alikes: &["part_reflectivity", "body_multibounce"],
     separate_by: "a carpet or absorber on the floor between radar and person",
+    operator: Operator::Paths(|of, values| {
+        let Chirps { radar, tx, dechirp, form, .. } = of.chirps;
+        signal(of.points, values, of.room?, radar, tx, dechirp, form)
+    }),
 };
 
 /// What one transmitter receives of these points by way of the floor, once or both ways, `[rx, chirp, sample]`; nothing

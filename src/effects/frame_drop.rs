@@ -1,7 +1,9 @@
 //! Frames that were lost (card G4).
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 
@@ -16,8 +18,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Frames are missing from the recording, so that from there on every frame shows the body later than its number says.",
     equation: "T_k → T_k + count·T_F for k ≥ at",
     parameters: &[parameter("at", "frame", 0.0, 0.0, 1000000.0), parameter("count", "frames", 0.0, 0.0, 1000.0)],
+    choice: Choice::None,
     look_alikes: &["clock_offset", "clock_drift"],
     separate_by: "the frames' own time stamps, or a motion with a sharp event on either side of the gap",
+    operator: Operator::Frame(shift),
 };
 
 /// How many frames later than its number a frame shows the scene. No gradient.

@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Temperature or a recalibration changes the gain of all echoes in the course of the recording.",
     equation: "× 10^{db(T)/20}, db piecewise linear over the frames",
     parameters: &[parameter("db", "dB", 0.0, -20.0, 20.0)],
+    choice: Choice::None,
     look_alikes: &["part_reflectivity", "compression"],
-    separate_by: "a wall in view: its echo changes along with the body's; a step has a date, a drift has none",
+    separate_by: "a wall in view: its echo changes along with the body's; a step occurs at one instant, a drift does not",
+    operator: Operator::Signal(apply),
 };
 
 /// One number is the change from the first frame to the last, about the middle; several are the gains at knots that are

@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::{BodyPoints, CHEST},
     values::Values,
 };
@@ -24,8 +26,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("amplitude_m", "m", 0.0, 0.0, 0.001),
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
+    choice: Choice::None,
     look_alikes: &["breathing", "radar_vibration"],
     separate_by: "a person who stands still with the breath held",
+    operator: Operator::Displacement(displace),
 };
 
 /// One sine along the surface's normals, the same phase everywhere on the upper torso.

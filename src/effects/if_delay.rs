@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The IF chain delays the signal, so that each beat is sampled late: a phase in proportion to range.",
     equation: "s(t) → s(t − delay_s), that is × exp(−j2π S τ_p delay_s)",
     parameters: &[parameter("delay_s", "s", 0.0, -1e-06, 1e-06)],
+    choice: Choice::None,
     look_alikes: &["if_lowpass"],
     separate_by: "the same scene with another slope; never from one setting of the radar",
+    operator: Operator::Signal(apply),
 };
 
 /// A constant shift of the chirp's time.

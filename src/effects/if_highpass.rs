@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "A filter that keeps leakage out also weakens near echoes and turns their phase, the more the nearer they are.",
     equation: "× [(j f_b/corner_hz) / (1 + j f_b/corner_hz)]^order, f_b = S τ",
     parameters: &[parameter("corner_hz", "Hz", 0.0, 0.0, 2000000.0), parameter("order", "1", 1.0, 1.0, 4.0)],
+    choice: Choice::None,
     look_alikes: &["if_lowpass", "start_frequency_error", "antenna_pattern"],
     separate_by: "a reflector at 0.3 to 1 m, or another filter setting of the chip; the noise floor has the filter's shape too",
+    operator: Operator::Signal(apply),
 };
 
 /// The filter's steady answer to every tone; its settling at the ramp's start is left out. `order` sections of first

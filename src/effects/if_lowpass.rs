@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The anti-alias filter delays all echoes a little and weakens far ones.",
     equation: "× 1 / (1 + j f_b/corner_hz), f_b = S τ; corner_hz = 0 stands for no filter",
     parameters: &[parameter("corner_hz", "Hz", 0.0, 0.0, 100000000.0)],
+    choice: Choice::None,
     look_alikes: &[],
     separate_by: "the shape of the noise floor over range in an empty room",
+    operator: Operator::Signal(apply),
 };
 
 /// The filter's steady answer to every tone.

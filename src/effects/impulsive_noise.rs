@@ -4,7 +4,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::host_value,
     values::Values,
 };
@@ -21,8 +23,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Now and then a single sample is far off: noise with heavier tails than a Gaussian's.",
     equation: "noise × (1 + excess) on a share `probability` of the samples",
     parameters: &[parameter("probability", "1", 0.0, 0.0, 0.2), parameter("excess", "1", 10.0, 0.0, 1000.0)],
+    choice: Choice::None,
     look_alikes: &[],
     separate_by: "a recording without transmission; bursts last several samples, impulses one",
+    operator: Operator::Noise(shape),
 };
 
 /// Samples are hit alike in both components. Broken: `probability` decides by lot and carries no gradient.

@@ -2,30 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A parameter of an effect: a single number, or a list with one for each channel, axis or order.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ParameterInfo {
-    pub name: &'static str,
-    pub unit: &'static str,
-    /// The value at which the effect does nothing. Parameters that only shape an effect have no such value; theirs is
-    /// where a search starts.
-    pub neutral: f64,
-    /// Prior: nothing below this is believed.
-    pub least: f64,
-    /// Prior: nothing above this is believed.
-    pub most: f64,
-}
-
-impl ParameterInfo {
-    /// Whether it is in a unit that only the recording knows, so that its prior says nothing about its size.
-    pub fn is_relative(&self) -> bool {
-        self.unit.contains("reference") || self.unit.contains("recording")
-    }
-}
-
-pub(super) const fn parameter(name: &'static str, unit: &'static str, neutral: f64, least: f64, most: f64) -> ParameterInfo {
-    ParameterInfo { name, unit, neutral, least, most }
-}
+use super::{operator::Operator, parameter::ParameterInfo};
 
 /// Where in the signal's way an effect acts, in the order of that way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -57,8 +34,18 @@ impl Stage {
     }
 }
 
+/// What an effect chooses beside its values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choice {
+    None,
+    /// A wall, the floor or the ceiling; it has to be named.
+    Boundary,
+    /// The part of the body that a joint moves; all of the body where none is named.
+    Part,
+}
+
 /// An effect as the library describes it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct EffectInfo {
     pub id: &'static str,
     /// Of the catalogue of effects; empty where there is none.
@@ -73,11 +60,14 @@ pub struct EffectInfo {
     /// The term as it enters the IF signal; p counts paths, m chirps, n samples, T is the chirp's time.
     pub equation: &'static str,
     pub parameters: &'static [ParameterInfo],
+    pub choice: Choice,
     /// Ids of effects that leave nearly the same trace. A pair stands once, with either of the two:
     /// [`look_alikes`](super::look_alikes) has both directions.
     pub(super) look_alikes: &'static [&'static str],
     /// The recording that would tell it from them.
     pub separate_by: &'static str,
+    /// Where it enters the simulator, and its function.
+    pub operator: Operator,
 }
 
 impl EffectInfo {

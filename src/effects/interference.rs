@@ -7,7 +7,9 @@ use rand::RngExt;
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::{Values, repeated},
 };
 use crate::complex::Complex;
@@ -33,8 +35,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("im", "of the reference", 0.0, -10.0, 10.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
+    choice: Choice::None,
     look_alikes: &["impulsive_noise", "spur"],
     separate_by: "switch the other radar off, or transmit nothing: the bursts stay without our own signal",
+    operator: Operator::Added(apply),
 };
 
 /// With the lists `frame`, `chirp`, `first` and `length`, the bursts that they name, `re` and `im` for each of them. With

@@ -4,7 +4,9 @@ use burn::tensor::Tensor;
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::{Values, repeated},
 };
 use crate::complex::Complex;
@@ -20,8 +22,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The two receiver branches differ in gain and angle: a faint mirror image of the scene at negative ranges and speeds.",
     equation: "s → s + μ s*, μ = (10^{gain_db/20} − 1 + j phase_deg π/180) / 2",
     parameters: &[parameter("gain_db", "dB", 0.0, -6.0, 6.0), parameter("phase_deg", "deg", 0.0, -30.0, 30.0)],
+    choice: Choice::None,
     look_alikes: &["second_harmonic", "range_alias"],
     separate_by: "a single strong moving reflector: the image moves against it",
+    operator: Operator::Signal(apply),
 };
 
 /// The widely linear form, to first order in the imbalance.

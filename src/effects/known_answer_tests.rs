@@ -4,8 +4,7 @@ use std::f64::consts::{LN_10, TAU};
 
 use burn::tensor::{Device, Tensor};
 
-use super::chain::{Operator, operator};
-use super::test_support::{context, flat, signal, values};
+use super::test_support::{context, flat, operator, signal, values};
 use super::*;
 use crate::{
     radar::{Radar, SPEED_OF_LIGHT},
@@ -35,7 +34,7 @@ fn echo(radar: &Radar, range_m: f64) -> Vec<f64> {
 
 /// What an effect makes of a signal.
 fn after(setting: &EffectSetting, radar: &Radar, parts: &[f64]) -> Vec<f64> {
-    let Operator::Signal(apply) = operator(&setting.id) else { panic!("{} does not act on the signal", setting.id) };
+    let apply = operator(&setting.id).on_signal().unwrap();
     let of: Tensor<1> = tensor(parts, [parts.len()], &Device::flex());
     host(&flat(apply(signal(of, radar), &values(setting), &context(radar))))
 }

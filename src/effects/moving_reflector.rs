@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::place,
     values::Values,
 };
@@ -34,8 +36,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("amplitude", "recording's unit·m²", 0.0, -1000000000.0, 1000000000.0),
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
+    choice: Choice::None,
     look_alikes: &["wall_ghost", "second_harmonic", "object_radar_object", "range_alias", "breathing", "heartbeat"],
     separate_by: "a recording of the room without the person: the object still moves, a ghost of the person does not",
+    operator: Operator::Reflector(|values, of| signal(values, of.times_s, of.radar, of.tx, of.dechirp, of.form)),
 };
 
 /// One transmitter's signal of the object, `[rx, chirp, sample]`; `times_s` are those of the transmitter's chirps.

@@ -4,7 +4,9 @@ use burn::tensor::Tensor;
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -24,8 +26,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("re", "1", 0.0, -1.0, 1.0),
         parameter("im", "1", 0.0, -1.0, 1.0),
     ],
+    choice: Choice::None,
     look_alikes: &[],
     separate_by: "a strong reflector at several directions",
+    operator: Operator::Signal(apply),
 };
 
 /// Receivers next to each other in the list couple, all alike; transmitters do not.

@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -22,8 +24,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
+    choice: Choice::None,
     look_alikes: &["second_harmonic", "wall_ghost"],
     separate_by: "step out of the boresight: a harmonic doubles the phases across the array, the second trip does not; or lower the transmit power by 6 dB",
+    operator: Operator::Nonlinear(apply),
 };
 
 /// A product of two beams: the way out ends at the radar's board, where the first receiver stands for it, and the second

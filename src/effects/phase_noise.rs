@@ -6,7 +6,9 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
@@ -25,8 +27,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The oscillator's frequency wanders from chirp to chirp: a pedestal in Doppler around strong echoes that grows with range.",
     equation: "× exp(j δ_m τ_p/τ_3m), δ_m normal of deviation per_chirp_rad",
     parameters: &[parameter("per_chirp_rad", "rad at 3 m", 0.0, 0.0, 1.0)],
+    choice: Choice::None,
     look_alikes: &["chirp_start_jitter", "gain_drift"],
     separate_by: "two walls at different ranges: this phase grows with range, a vibration's does not",
+    operator: Operator::Signal(apply),
 };
 
 /// Only the part that is slower than a chirp: a frequency error of its own for every chirp, drawn at random, the same

@@ -2,8 +2,7 @@
 
 use burn::tensor::{DType, Device, Tensor};
 
-use super::chain::{Operator, operator};
-use super::test_support::{flat, radar, values, values_of};
+use super::test_support::{flat, operator, radar, values, values_of};
 use super::*;
 use crate::{
     body::Displacement,
@@ -42,7 +41,7 @@ fn points<'a>(velocity: &'a Displacement) -> BodyPoints<'a> {
 fn displaced(values: &Values) -> Tensor<1> {
     let device = values.device.clone();
     let velocity = components(20, &device, 2.0);
-    let Operator::Displacement(displace) = operator(values.info.id) else { panic!("{}", values.info.id) };
+    let displace = operator(values.id).on_displacement().unwrap();
     let Displacement { x, y, z } = displace(components(10, &device, 0.02), values, &points(&velocity));
     Tensor::cat(vec![x.reshape([9]), y.reshape([9]), z.reshape([9])], 0)
 }
@@ -50,7 +49,7 @@ fn displaced(values: &Values) -> Tensor<1> {
 fn weighed(values: &Values) -> Tensor<1> {
     let device = values.device.clone();
     let velocity = components(20, &device, 2.0);
-    let Operator::Amplitude(weigh) = operator(values.info.id) else { panic!("{}", values.info.id) };
+    let Operator::Amplitude(weigh) = operator(values.id) else { panic!("{}", values.id) };
     weigh(tensor(&[1.0, 2.0, 3.0], [3, 1], &device), values, &points(&velocity)).reshape([3])
 }
 
@@ -75,27 +74,26 @@ fn point_cases() -> Vec<EffectSetting> {
 }
 
 fn on_points(values: &Values) -> Tensor<1> {
-    match operator(values.info.id) {
-        Operator::Displacement(_) => displaced(values),
-        _ => weighed(values),
+    match operator(values.id).on_displacement() {
+        Some(_) => displaced(values),
+        None => weighed(values),
     }
 }
 
 pub(crate) fn effects_on_points_are_neutral_and_differentiable() {
     let cases: Vec<String> = point_cases().into_iter().map(|case| case.id).collect();
-    let all: Vec<&str> = library().iter().map(|info| info.id).collect();
-    let wanted: Vec<&str> =
-        all.into_iter().filter(|id| matches!(operator(id), Operator::Displacement(_) | Operator::Amplitude(_))).collect();
+    let is_on_points = |of: Operator| of.on_displacement().is_some() || matches!(of, Operator::Amplitude(_));
+    let wanted: Vec<&str> = library().iter().filter(|info| is_on_points(info.operator)).map(|info| info.id).collect();
     assert!(wanted.iter().all(|id| cases.iter().any(|case| case == id)) && wanted.len() == cases.len(), "{wanted:?}");
     for case in point_cases() {
         let neutral = host(&on_points(&values(&of(&case.id))));
         let device = Device::flex();
-        let before = match operator(&case.id) {
-            Operator::Displacement(_) => {
+        let before = match operator(&case.id).on_displacement() {
+            Some(_) => {
                 let Displacement { x, y, z } = components(10, &device, 0.02);
                 [host(&x), host(&y), host(&z)].concat()
             }
-            _ => vec![1.0, 2.0, 3.0],
+            None => vec![1.0, 2.0, 3.0],
         };
         assert_eq!(neutral, before, "{}", case.id);
         assert_ne!(host(&on_points(&values(&case))), before, "{}", case.id);
@@ -169,18 +167,19 @@ fn room() -> Room {
 fn on_paths(values: &Values) -> Tensor<1> {
     let (radar, device) = (radar(), values.device.clone());
     let (dechirp, form) = (Dechirp::Exact, SumForm::Exact);
-    flat(match values.info.id {
-        "wall_ghost" => with_points(&device, |p| wall_ghost::signal(p, values, &room(), &radar, 1, dechirp, form)).unwrap(),
-        "floor_bounce" => with_points(&device, |p| floor_bounce::signal(p, values, &room(), &radar, 1, dechirp, form)).unwrap(),
-        "body_multibounce" => body_multibounce::echo(direct(&radar, &device), values, &radar),
-        "antenna_position" => with_points(&device, |p| antenna_position::direct_signal(p, values, &radar, 1, dechirp, form)),
-        "static_reflector" => static_reflector::signal(values, &radar, 1, dechirp, form),
-        "moving_reflector" => moving_reflector::signal(values, &TIMES, &radar, 1, dechirp, form),
-        "carried_reflector" => {
+    let chirps = Chirps { radar: &radar, tx: 1, times_s: &TIMES, dechirp, form };
+    let room = room();
+    flat(match operator(values.id) {
+        Operator::Paths(signal) => with_points(&device, |points| {
+            signal(&DirectReturns { points, direct: direct(&radar, &device), room: Some(&room), chirps }, values).unwrap()
+        }),
+        Operator::Direct(signal) => with_points(&device, |points| signal(points, values, &chirps)),
+        Operator::Reflector(signal) => signal(values, &chirps),
+        Operator::Carried(signal) => {
             let displacement = components(10, &device, 0.01).map(|part| part.narrow(0, 0, 1));
-            carried_reflector::signal(values, PLACES[0], &displacement, &radar, 1, dechirp, form)
+            signal(values, PLACES[0], &displacement, &chirps)
         }
-        id => panic!("{id}"),
+        other => panic!("{}: {other:?}", values.id),
     })
 }
 
@@ -201,8 +200,9 @@ pub(crate) fn effects_on_paths_are_differentiable() {
             .with("phase_rad", [0.4]),
         of("carried_reflector").with("amplitude", [1.5]).with("phase_rad", [0.4]),
     ];
-    let paths = library().iter().filter(|info| matches!(operator(info.id), Operator::Paths)).count();
-    assert_eq!(paths, cases.len());
+    let is_on_paths =
+        |of: Operator| matches!(of, Operator::Paths(_) | Operator::Direct(_) | Operator::Reflector(_) | Operator::Carried(_));
+    assert_eq!(library().iter().filter(|info| is_on_paths(info.operator)).count(), cases.len());
     for case in cases {
         for (name, start) in &case.parameters {
             let size = start.iter().fold(0.0f64, |size, value| size.max(value.abs()));
@@ -340,7 +340,7 @@ fn lost_frames_show_the_scene_later_from_there_on() {
 }
 
 fn shaped(values: &Values, dims: [usize; 4]) -> Complex<4> {
-    let Operator::Noise(shape) = operator(values.info.id) else { panic!("{}", values.info.id) };
+    let Operator::Noise(shape) = operator(values.id) else { panic!("{}", values.id) };
     shape(noise::normals(1, dims, &values.device, DType::F64), values, &radar(), 7)
 }
 

@@ -1,7 +1,9 @@
 //! An offset of the body's place (card G1).
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::BodyPoints,
     values::Values,
 };
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The body does not stand where the motion says: all of it is shifted, or turned about the vertical through its middle.",
     equation: "p → R_z(yaw_deg)(p − c) + c + offset_m",
     parameters: &[parameter("offset_m", "m", 0.0, -0.5, 0.5), parameter("yaw_deg", "deg", 0.0, -30.0, 30.0)],
+    choice: Choice::None,
     look_alikes: &["range_bias", "clothing_delay", "channel_mismatch"],
     separate_by: "a walk through many directions: a shift of the body changes range in front and direction at the side, a range bias changes range alone",
+    operator: Operator::Displacement(displace),
 };
 
 /// Normals and visibility stay those of the motion.

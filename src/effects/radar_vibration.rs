@@ -4,7 +4,9 @@ use std::f64::consts::TAU;
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -17,15 +19,17 @@ pub static INFO: EffectInfo = EffectInfo {
     stage: Stage::Scene,
     needs_person: false,
     title: "a vibration of the radar",
-    explanation: "The radar itself shakes along its boresight, so that all echoes, also those of the walls, swing in phase together.",
+    explanation: "The radar itself shakes along its boresight, so that the phases of all echoes, also those of the walls, oscillate together.",
     equation: "s(T) → s(T) exp(j 4π amplitude_m sin(2π frequency_hz T + phase_rad) / λ)",
     parameters: &[
         parameter("amplitude_m", "m", 0.0, 0.0, 0.001),
         parameter("frequency_hz", "Hz", 0.0, 0.0, 1000.0),
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
+    choice: Choice::None,
     look_alikes: &["phase_noise", "breathing"],
     separate_by: "a wall at another range: a vibration moves both alike, phase noise in proportion to the range; the radar on a soft mount",
+    operator: Operator::Signal(apply),
 };
 
 /// Along the boresight: one phase for all echoes of a chirp, the cosine of their direction left out.

@@ -4,7 +4,9 @@ use burn::tensor::Tensor;
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::{Values, repeated},
 };
 use crate::complex::Complex;
@@ -26,8 +28,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("im", "of the reference", 0.0, -10.0, 10.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
+    choice: Choice::None,
     look_alikes: &["spur", "interference", "chirp_droop"],
     separate_by: "a shorter sampling window inside the ramp: the transient disappears",
+    operator: Operator::Added(apply),
 };
 
 /// The same in all chirps and channels; `re` and `im` are for each of the edge's samples, or for all.

@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
@@ -24,8 +26,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("im", "of the reference", 0.0, -10.0, 10.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
+    choice: Choice::None,
     look_alikes: &["spur"],
     separate_by: "change the sample rate by 5 %: the alias moves, a near object does not",
+    operator: Operator::Added(apply),
 };
 
 /// A tone at the true range's beat frequency; that it is folded is the sampling's doing. An echo at rest: the simplest

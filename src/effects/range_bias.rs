@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::host_value,
     values::Values,
 };
@@ -19,8 +21,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Cables, boards and antennas delay every path alike, so that all is seen farther away by the same distance.",
     equation: "τ_p → τ_p + 2 offset_m / c",
     parameters: &[parameter("offset_m", "m", 0.0, -0.5, 0.5)],
+    choice: Choice::None,
     look_alikes: &["slope_error", "if_delay"],
     separate_by: "reflectors at known ranges of 1 m and 6 m: a bias shifts both alike, a slope error in proportion to the range",
+    operator: Operator::Signal(apply),
 };
 
 /// All paths times one tone, the carrier's phase included. Left out: the cross term of the residual video phase.

@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -23,8 +25,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("im", "of the reference", 0.0, -10.0, 10.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
+    choice: Choice::None,
     look_alikes: &["wall_ghost"],
     separate_by: "step out of the boresight: a harmonic doubles the phases across the array, a second trip does not; or lower the transmit power by 6 dB",
+    operator: Operator::Nonlinear(apply),
 };
 
 /// κ s² / reference: the level is that of the harmonic of a sample as strong as the reference.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{carried_reflector, clothing_delay, info, library, part_reflectivity, wall_ghost};
+use super::{info, info::Choice, library};
 use crate::{
     error::{Error, Result},
     person::JOINT_NAMES,
@@ -73,17 +73,18 @@ impl EffectSetting {
                 return Err(Error::setting(field, value, expected));
             }
         }
-        let boundaries = || Boundary::ALL.map(Boundary::name).join(", ");
-        let key = format!("{key}.choice");
-        match (self.id.as_str(), self.choice.as_deref()) {
-            (wall_ghost::ID, Some(choice)) if !Boundary::ALL.iter().any(|boundary| boundary.name() == choice) => {
-                Err(Error::setting(key, choice, format!("one of {}", boundaries())))
+        let field = format!("{key}.choice");
+        let known: Vec<&str> = match info.choice {
+            Choice::None => return Ok(()),
+            Choice::Boundary => Boundary::ALL.map(Boundary::name).to_vec(),
+            Choice::Part => JOINT_NAMES.to_vec(),
+        };
+        match self.choice.as_deref() {
+            Some(choice) if !known.contains(&choice) => {
+                Err(Error::setting(field, choice, format!("one of {}", known.join(", "))))
             }
-            (wall_ghost::ID, None) => Err(Error::setting(key, "missing", format!("one of {}", boundaries()))),
-            (clothing_delay::ID | part_reflectivity::ID | carried_reflector::ID, Some(choice))
-                if !JOINT_NAMES.contains(&choice) =>
-            {
-                Err(Error::setting(key, choice, format!("one of {}", JOINT_NAMES.join(", "))))
+            None if info.choice == Choice::Boundary => {
+                Err(Error::setting(field, "missing", format!("one of {}", known.join(", "))))
             }
             _ => Ok(()),
         }

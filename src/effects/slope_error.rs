@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::complex::Complex;
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The ramp is steeper or flatter than declared: all ranges are stretched in proportion.",
     equation: "× exp(j2π τ_p S relative t)",
     parameters: &[parameter("relative", "1", 0.0, -0.02, 0.02)],
+    choice: Choice::None,
     look_alikes: &["pose_offset"],
     separate_by: "two reflectors at known ranges of 1 m and 6 m",
+    operator: Operator::Signal(apply),
 };
 
 /// t → t (1 + relative), t from the ramp's start.

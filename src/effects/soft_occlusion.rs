@@ -3,7 +3,9 @@
 use burn::tensor::Tensor;
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::BodyPoints,
     values::Values,
 };
@@ -19,8 +21,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "A point is not suddenly hidden: its echo fades as its surface turns away, over the width that diffraction gives.",
     equation: "A_p → A_p (1 − exp(−cos²θ_p / width²)), θ_p between the normal and the line of sight",
     parameters: &[parameter("width", "cosine", 0.0, 0.0, 0.5)],
+    choice: Choice::None,
     look_alikes: &["part_reflectivity"],
     separate_by: "the same edge passed from either side",
+    operator: Operator::Amplitude(weigh),
 };
 
 /// Only the body's own horizon: points that turn away fade before hidden point removal drops them. What another part

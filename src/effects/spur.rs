@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::host_value,
     values::Values,
 };
@@ -25,8 +27,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("im", "of the reference", 0.0, -10.0, 10.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
+    choice: Choice::None,
     look_alikes: &["static_reflector"],
     separate_by: "transmit nothing: the spur stays",
+    operator: Operator::Added(apply),
 };
 
 /// A tone that runs on between chirps, T being the radar's time. `re` and `im` are for each channel, each receiver, or all.

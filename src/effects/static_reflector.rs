@@ -1,7 +1,9 @@
 //! An object at rest that the scene does not know (card P1).
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::place,
     values::Values,
 };
@@ -27,8 +29,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("amplitude", "recording's unit·m²", 0.0, -1000000000.0, 1000000000.0),
         parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
+    choice: Choice::None,
     look_alikes: &["tx_leakage", "range_alias", "wall_ghost"],
     separate_by: "turn the radar: leakage stays in place, the object turns with the room; or change the sample rate, which moves an alias",
+    operator: Operator::Reflector(|values, of| signal(values, of.radar, of.tx, of.dechirp, of.form)),
 };
 
 /// One transmitter's signal of the object, `[rx, 1, sample]`.

@@ -1,7 +1,9 @@
 //! An error in the time between the transmitters' slots (card G5).
 
 use super::{
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     points::BodyPoints,
     values::Values,
 };
@@ -18,8 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The transmitters fire one after the other, later than assumed; a moving part gains a phase from one transmitter to the next, which turns its direction.",
     equation: "τ_p → τ_p + τ̇_p · j · slot_s for transmitter j",
     parameters: &[parameter("slot_s", "s", 0.0, -0.001, 0.001)],
+    choice: Choice::None,
     look_alikes: &["channel_mismatch"],
     separate_by: "two directions of walking: the phase changes sign with the velocity, a transmitter's own phase does not",
+    operator: Operator::Time(displace),
 };
 
 /// A clock's offset that grows from transmitter to transmitter.

@@ -2,12 +2,16 @@
 
 use burn::tensor::{DType, Tensor};
 
-use super::{Context, EffectSetting, Values, effect::Effect, info};
+use super::{Context, EffectSetting, Operator, Values, effect::Effect, info};
 use crate::{
     complex::Complex,
     radar::{Radar, SPEED_OF_LIGHT},
     support::numbers,
 };
+
+pub(super) fn operator(id: &str) -> Operator {
+    info(id).unwrap().operator
+}
 
 pub(super) fn radar() -> Radar {
     Radar {

@@ -33,7 +33,6 @@ fn every_look_alike_exists_is_stated_once_and_is_mutual() {
 
 use burn::tensor::{Device, Tensor};
 
-use super::chain::{Operator, operator};
 use super::test_support::*;
 use crate::complex::Complex;
 use crate::support::{assert_close, check_gradient, input, tensor, values as host};
@@ -120,16 +119,37 @@ fn receiver_cases() -> Vec<(EffectSetting, &'static [&'static str])> {
 }
 
 fn apply(setting: &EffectSetting, values: &Values, of: Complex<4>, context: &Context<'_>) -> Complex<4> {
-    let Operator::Signal(apply) = operator(&setting.id) else { panic!("{} does not act on the signal", setting.id) };
+    let apply = operator(&setting.id).on_signal().unwrap();
     apply(of, values, context)
 }
 
 #[test]
-fn every_effect_has_an_operator_and_every_signal_operator_a_case() {
+fn every_operator_on_the_signal_has_a_case() {
     let cases: Vec<String> = signal_cases().into_iter().map(|(setting, _)| setting.id).collect();
-    let on_signal: Vec<&str> =
-        library().iter().map(|info| info.id).filter(|id| matches!(operator(id), Operator::Signal(_))).collect();
+    let on_signal: Vec<&str> = library().iter().filter(|info| info.operator.on_signal().is_some()).map(|info| info.id).collect();
     assert_eq!(cases, on_signal, "in the library's order");
+}
+
+#[test]
+fn operators_on_the_signal_are_of_the_kind_that_they_state() {
+    let radar = radar();
+    let echoes: Tensor<1> = tensor(&echoes(&radar, &[0.7, 2.1]), [2 * 192], &Device::flex());
+    for (case, _) in signal_cases() {
+        let after =
+            |scale: f64| host(&flat(apply(&case, &values(&case), signal(echoes.clone() * scale, &radar), &context(&radar))));
+        let size = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let (once, twice) = (after(1.0), after(2.0));
+        let beyond: Vec<f64> = twice.iter().zip(&once).map(|(twice, once)| twice - 2.0 * once).collect();
+        let (silence, beyond) = (size(&after(0.0)), size(&beyond) / size(&once));
+        let kind = info(&case.id).unwrap().operator;
+        let stated = match kind {
+            Operator::Signal(_) => silence == 0.0 && beyond < 1e-9,
+            Operator::Added(_) => silence > 0.0,
+            Operator::Nonlinear(_) => silence == 0.0 && beyond > 1e-6,
+            _ => false,
+        };
+        assert!(stated, "{} is {kind:?}: {silence} of silence, {beyond} beyond proportion", case.id);
+    }
 }
 
 #[test]
@@ -215,7 +235,7 @@ fn effects_that_are_switched_off_do_nothing_and_learned_values_are_read_back() {
     let radar = radar();
     let setting = EffectSetting::neutral("chirp_droop").with("db", [2.0, 0.3]);
     let mut effects = Effects::new(std::slice::from_ref(&setting), &Device::flex());
-    assert!(!effects.is_empty() && effects.has("chirp_droop"));
+    assert!(!effects.is_empty());
     let read = effects.settings()[0].parameters["db"].clone();
     assert_close("db", &read, &[2.0, 0.3], 1e-6);
     assert!(!effects.switch_off(Some("dc_offset")));

@@ -2,7 +2,9 @@
 
 use super::{
     context::Context,
-    info::{EffectInfo, Stage, parameter},
+    info::{Choice, EffectInfo, Stage},
+    operator::Operator,
+    parameter::parameter,
     values::Values,
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
@@ -24,8 +26,10 @@ pub static INFO: EffectInfo = EffectInfo {
         parameter("im", "of the reference", 0.0, -10.0, 10.0),
         parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
+    choice: Choice::None,
     look_alikes: &["dc_offset"],
     separate_by: "turn the radar: leakage stays, the room moves; a cover of absorber on the radar takes the room away",
+    operator: Operator::Added(apply),
 };
 
 /// The same in every chirp. `re` and `im` are for each channel, each receiver, or all; the carrier's phase is in them.

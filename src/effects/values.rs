@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use burn::tensor::{DType, Device, Int, Tensor, TensorData};
 
-use super::EffectInfo;
+use super::parameter::ParameterInfo;
 use crate::complex::Complex;
 
 /// Parameters that count or choose, and so do not learn.
@@ -14,7 +14,9 @@ pub(super) const FIXED: [&str; 10] =
 /// Values of one effect in the signal's number type.
 #[derive(Clone, Debug)]
 pub struct Values {
-    pub(super) info: &'static EffectInfo,
+    /// Of the effect.
+    pub(super) id: &'static str,
+    pub(super) known: &'static [ParameterInfo],
     /// Each `[value]`, in the parameter's unit.
     pub(super) tensors: BTreeMap<String, Tensor<1>>,
     pub(super) fixed: BTreeMap<String, Vec<f64>>,
@@ -25,7 +27,8 @@ pub struct Values {
 
 impl Values {
     fn neutral(&self, name: &str) -> f64 {
-        self.info.parameter(name).unwrap_or_else(|| panic!("{} has no parameter {name}", self.info.id)).neutral
+        let known = self.known.iter().find(|parameter| parameter.name == name);
+        known.unwrap_or_else(|| panic!("{} has no parameter {name}", self.id)).neutral
     }
 
     /// `[value]`; the neutral value where none is given.

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     body::{Displacement, PosedBody},
     complex::Complex,
-    effects::{self, BodyPoints, Effect, carried_reflector},
+    effects::{BodyPoints, Chirps},
 };
 
 impl Simulator {
@@ -54,34 +54,27 @@ impl Simulator {
     /// Echoes of objects that are not in the scene, `[tx, rx, loop, sample]`: those on their own as of this frame, those
     /// that the body carries as it is seen.
     pub(super) fn reflectors_signal(&self, scene: &Scene, frame: usize, seen: &FrameView) -> Option<Complex<4>> {
-        let ids = [effects::static_reflector::ID, effects::moving_reflector::ID, effects::carried_reflector::ID];
-        if !ids.into_iter().any(|id| self.effects.has(id)) {
+        if !self.effects.has_reflectors() {
             return None;
         }
         let times_s = scene.chirp_times_s(frame);
         let (dechirp, form) = (self.config.dechirp, self.config.sum);
         Some(self.transmitters(scene, |tx, device| {
-            let own = &times_s[chirps(scene, tx)];
-            let placed = self.effects.reflectors(own, &scene.radar, tx, dechirp, form, (device, DType::F32));
-            let carried = self.effects.carried().filter_map(|(effect, part)| self.carried(scene, seen, effect, part, tx));
+            let of = Chirps { radar: &scene.radar, tx, times_s: &times_s[chirps(scene, tx)], dechirp, form };
+            let placed = self.effects.reflectors(&of, (device, DType::F32));
+            let carried = self.effects.carried(&of, (device, DType::F32), |part| {
+                let (body, posed) = (scene.body.as_ref()?, seen.body.as_ref()?);
+                let point = middle_point(body, &scene.joints, part)?;
+                let displacement = body.displacement(posed, &[point], chirps(scene, tx), None, device);
+                Some((posed.position_m[point], displacement))
+            });
             placed.into_iter().chain(carried).reduce(Complex::add)
         }))
-    }
-
-    fn carried(&self, scene: &Scene, seen: &FrameView, effect: &Effect, part: Option<&str>, tx: usize) -> Option<Complex<3>> {
-        let (body, posed) = (scene.body.as_ref()?, seen.body.as_ref()?);
-        let point = middle_point(body, &scene.joints, part)?;
-        let device = self.device();
-        let displacement = body.displacement(posed, &[point], chirps(scene, tx), None, &device);
-        let values = effect.values(&device, DType::F32);
-        let place = posed.position_m[point];
-        let (dechirp, form) = (self.config.dechirp, self.config.sum);
-        Some(carried_reflector::signal(&values, place, &displacement, &scene.radar, tx, dechirp, form))
     }
 }
 
 /// The chirps of a transmitter among those of a frame.
-fn chirps(scene: &Scene, tx: usize) -> std::ops::Range<usize> {
+pub(super) fn chirps(scene: &Scene, tx: usize) -> std::ops::Range<usize> {
     let loops = scene.radar.loops_per_frame;
     tx * loops..(tx + 1) * loops
 }

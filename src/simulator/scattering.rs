@@ -6,11 +6,13 @@ use super::{
     Amplitudes, FrameView, Gains, PathModel, Scene, Seen, Simulator, Surfaces, Weights,
     groups::{Group, Kind, Returns, Scattering, Visible, WallPoints},
     point_tensors::rows,
+    points::chirps,
     sight::{Attitude, Places, Sight},
 };
 use crate::{
     body::{Displacement, PosedFrame},
     complex::Complex,
+    effects::{Chirps, DirectReturns},
     if_signal::{ToWalls, indirect_signal},
     paths::{Amplitude, Points},
     radar::Radar,
@@ -81,12 +83,16 @@ impl Simulator {
     fn direct_of(&self, group: &Group<'_>, seen: (Displacement, Tensor<2>), tx: usize, radar: &Radar) -> Complex<3> {
         let (displacement, weighed) = seen;
         let amplitude = group.amplitude(weighed, &displacement, tx);
-        let Visible { scene, kind, reference_m, .. } = &group.visible;
+        let Visible { scene, view, kind, reference_m, .. } = &group.visible;
         let points = Points { reference_m, displacement: &displacement, amplitude: &amplitude };
         let (dechirp, form) = (self.config.dechirp, self.config.sum);
-        let direct = self.effects.direct_signal(points, radar, tx, dechirp, form);
+        let times_s = &scene.chirp_times_s(view.frame)[chirps(scene, tx)];
+        let chirps = Chirps { radar, tx, times_s, dechirp, form };
+        let direct = self.effects.direct_signal(points, &chirps);
         let further = match kind {
-            Kind::Body => self.effects.further_paths(points, &direct, scene.room.as_ref(), radar, tx, (dechirp, form)),
+            Kind::Body => {
+                self.effects.further_paths(&DirectReturns { points, direct: direct.clone(), room: scene.room.as_ref(), chirps })
+            }
             Kind::Room => None,
         };
         match further {
