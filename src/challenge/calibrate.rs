@@ -353,8 +353,8 @@ impl Calibrated {
             let _ = writeln!(text, "- {note}");
         }
         let _ = write!(text, "\n{}\n![Share of nulls below a p-value](p_values.png)\n", markdown(&self.rows));
-        text.push_str("\n### Families of suspects\n\nSmallest p-values, corrected within a family alone.\n\n");
-        text.push_str("| family | nulls with something to say | smallest | below 0.01 | below 0.1 |\n|---|---|---|---|---|\n");
+        text.push_str("\n### Families of detectors\n\nSmallest p-values, corrected within a family alone.\n\n");
+        text.push_str("| family | nulls with a detection | smallest | below 0.01 | below 0.1 |\n|---|---|---|---|---|\n");
         for (name, values) in &self.table.suspects {
             let below = |level: f64| values.iter().filter(|value| **value < level).count();
             let smallest = values.first().map_or("–".into(), |value| format!("{value:.2e}"));

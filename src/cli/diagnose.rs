@@ -19,7 +19,7 @@ use crate::{
 pub(crate) struct Arguments {
     /// A recording folder
     recording: PathBuf,
-    /// A simulator trained on such recordings, to be held against them in place of one trained now
+    /// A simulator trained on such recordings, to compare them with in place of one trained now
     #[arg(long, value_name = "DIR")]
     checkpoint: Option<PathBuf>,
     /// Settings: [diagnosis], [simulator] and [training] of a config file

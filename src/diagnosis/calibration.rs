@@ -2,7 +2,7 @@
 //!
 //! The p-value of a report is uniform on the nulls that it was tried on; on a radar of another structure it may not be. A table holds
 //! the p-values of nulls of the user's own radar (`hybridsim challenge calibrate`), and a diagnosis that is given one ranks its own
-//! among them: with r of n nulls that look at least as odd, (r + 1)/(n + 1), which is exact where recording and nulls are alike (a
+//! among them: with r of n nulls that are at least as extreme, (r + 1)/(n + 1), which is exact where recording and nulls are alike (a
 //! Monte Carlo test: Davison and Hinkley, Bootstrap Methods and their Application, 1997, section 4.2; Phipson and Smyth, Statistical
 //! Applications in Genetics and Molecular Biology 9, 2010). It is never below 1/(n + 1): what no null has looked like is not known to
 //! be rarer, and no law is fitted beyond them. The p-value as it was before stands beside it.
@@ -75,7 +75,7 @@ pub struct Calibrated {
     pub format: u32,
     /// SHA-256 of the table.
     pub sha256: String,
-    /// Nulls with a p-value, and those that look at least as odd.
+    /// Nulls with a p-value, and those that are at least as extreme.
     pub nulls: usize,
     pub as_odd: usize,
     /// As it is without the table.

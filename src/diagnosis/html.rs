@@ -76,14 +76,14 @@ fn anything(report: &Report) -> Markup {
         ("beside body and room", null.beside),
         ("the body along the chirp", null.along_chirp),
         ("the body between receivers", null.between_receivers),
-        ("the strongest suspicion, at most", null.suspicion),
+        ("the most significant detector, at most", null.suspicion),
     ]
     .into_iter()
     .filter_map(|(what, chance)| Some((what, chance?)))
     .collect();
     html! {
         p {
-            "Is anything missing at all? A recording with nothing missing looks as odd as this one with a chance of "
+            "Is anything missing at all? Where nothing is, a statistic at least as extreme has a probability of "
             (probability(p_value)) " (p-value"
             @for (what, chance) in &parts {
                 "; "
@@ -93,9 +93,9 @@ fn anything(report: &Report) -> Markup {
         }
         @if let Some(calibrated) = &report.calibration {
             p {
-                "That chance is calibrated: of " (count(calibrated.nulls, "recording"))
+                "That probability is calibrated: of " (count(calibrated.nulls, "recording"))
                 " recorded with nothing missing by a radar of this structure, " (calibrated.as_odd)
-                " looked at least as odd. Without them it would be " (probability(calibrated.p_value_raw)) "."
+                " were at least as extreme. Without them it would be " (probability(calibrated.p_value_raw)) "."
             }
         }
     }
@@ -179,9 +179,9 @@ fn fit(report: &Report, pictures: &Pictures) -> Markup {
     html! {
         h2 { "Held-out data, before and after" }
         p {
-            (shown(&held_out(report))) " are held out: static clutter, noise and the body's powers come from the others, and a \
-             simulator is trained on those. They are not untouched: a finding stands only where it makes them more probable, and what \
-             changes from chirp to chirp or from frame to frame is read in every one of them."
+            (shown(&held_out(report))) ": static clutter, noise and the body's powers come from the others, and a \
+             simulator is trained on those. Held-out data are not untouched: a finding stands only where it makes them more probable, and what \
+             changes from chirp to chirp or from frame to frame is read in all frames."
         }
         (table(&["", "log-likelihood per sample", "error, dB²", "PSNR, dB"], &rows))
         @if !report.effects.is_empty() && after.loglik_per_sample <= before.loglik_per_sample {
@@ -206,15 +206,17 @@ fn fit(report: &Report, pictures: &Pictures) -> Markup {
     }
 }
 
+/// "Frames 2, 5 are held out", "Loop 3 is held out".
 fn held_out(report: &Report) -> String {
     let indices = &report.held_out.indices;
     let list: Vec<String> = indices.iter().take(12).map(usize::to_string).collect();
     let more = if indices.len() > 12 { format!(" and {} more", indices.len() - 12) } else { String::new() };
-    let mut axis = report.held_out.axis.clone();
+    let one = indices.len() == 1;
+    let mut axis = if one { report.held_out.axis.trim_end_matches('s').to_string() } else { report.held_out.axis.clone() };
     if let Some(first) = axis.get_mut(0..1) {
         first.make_ascii_uppercase();
     }
-    format!("{axis} {}{more}", list.join(", "))
+    format!("{axis} {}{more} {} held out", list.join(", "), if one { "is" } else { "are" })
 }
 
 /// Where the untouched recording differs.

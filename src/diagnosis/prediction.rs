@@ -11,7 +11,7 @@ use rayon::prelude::*;
 pub use echo::{Echo, SIDE_SPREAD, mirror_id, mirrored_return, range_and_velocity};
 pub use track::Track;
 
-use crate::body::{Interpolation, PosedBody, Sampling, SurfaceConfig};
+use crate::body::{Interpolation, PosedBody, SurfaceConfig};
 use crate::error::Result;
 use crate::person::{JOINT_NAMES, Person};
 use crate::radar::Radar;
@@ -69,11 +69,7 @@ impl BodyPrediction {
     pub fn new(person: &Person, radar: &Radar, starts_s: &[f64]) -> Result<Self> {
         // Smooth between poses: with straight lines, velocities are those of the middle between two poses, which at frames
         // and poses in step is a constant error of the clock.
-        let body = PosedBody::new(
-            person,
-            &SurfaceConfig { sampling: Sampling::Vertices, ..SurfaceConfig::default() },
-            Interpolation::Cubic,
-        )?;
+        let body = PosedBody::new(person, &SurfaceConfig::vertices(), Interpolation::Cubic)?;
         let (parts, of_vertex) = parts(person);
         let duration_s = radar.frame_duration_s();
         let period_s = period(starts_s).unwrap_or(duration_s);

@@ -158,7 +158,7 @@ pub struct Report {
     pub verdict: Verdict,
     pub reason: String,
     pub probability_nothing_missing: f64,
-    /// Chance that a recording with nothing missing looks as odd: uniform where nothing is missing. None where it was not asked.
+    /// Probability of a statistic at least as extreme where nothing is missing: uniform there. None where it was not asked.
     #[serde(default)]
     pub p_value: Option<f64>,
     /// What that is made of.

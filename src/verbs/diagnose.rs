@@ -20,7 +20,7 @@ use crate::{
 /// What is diagnosed, and how.
 pub struct Diagnose<'a> {
     pub recording: &'a Path,
-    /// A simulator trained on such recordings, to be held against them in place of one trained now.
+    /// A simulator trained on such recordings, to compare them with in place of one trained now.
     pub checkpoint: Option<&'a Path>,
     pub config: &'a Config,
     /// Folder for report.html, report.json and, where a simulator was trained, its checkpoint with the effects.

@@ -169,7 +169,7 @@ impl<'a> Groups<'a> {
         let undetectable = self.cases.iter().filter(|case| case.undetectable());
         [
             share(
-                "undetectable effects answered with silence",
+                "undetectable effects that nothing was claimed for",
                 undetectable.map(|case| case.judgement.failure.is_none() && !case.judgement.claims),
                 Aim::AtLeast(0.95),
             ),

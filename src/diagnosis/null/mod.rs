@@ -24,7 +24,7 @@ use super::suspects::{geometry, waveform};
 const SUSPECTED: f64 = 0.09;
 const FALLS: f64 = 0.2;
 
-/// Chances that recordings with nothing missing look as odd as this one; none where it cannot be asked.
+/// Probabilities of statistics at least as extreme where nothing is missing; none where it cannot be asked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Null {

@@ -88,7 +88,7 @@ fn candidate(evidence: &Evidence, fit: &Fit, found: &[(Complex64, f64)], excess:
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
-            "everything has a mirror image at the opposite beat frequency, which turns backwards when all static returns turn: {} dB \
+            "everything has a mirror image at the opposite beat frequency, whose phase is conjugate where all static returns share a phase: {} dB \
              in the {rx} receivers; on their average Q is {gain_db:.2} dB stronger than I and {phase_deg:.2} degrees off the right angle",
             levels.join(", ")
         ),

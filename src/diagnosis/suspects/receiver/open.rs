@@ -304,7 +304,7 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         .filter_map(|(holds, id)| holds.then_some(id))
         .collect(),
         statement: format!(
-            "a strong return {range:.2} m away that never changes, {:.0} dB above the valley behind it; it differs by \
+            "a strong return {range:.2} m away that never changes, {:.0} dB above the range sidelobes behind it; it differs by \
              {near_spread:.0} dB between the {channels} channels, while the strongest far return ({:.1} m) differs by \
              {far_spread:.0} dB: the transmitters leak into the receivers",
             near.depth_db(),
