@@ -14,7 +14,7 @@ use burn::{
     tensor::{Device, Tensor},
 };
 use hybridsim::{
-    body::{PoseCorrection, PoseTensors, Posing},
+    body::{PoseCorrection, PoseTensors, Posing, SurfaceConfig},
     features::Extent,
     heatmap::{HeatmapConfig, RangeDoppler, power_db},
     person::{
@@ -63,7 +63,7 @@ fn measure(paths: PathModel, transmitters: usize, pose: Pose, device: &Device) {
     let motion =
         actions::motion(Action::WalkBackForthArmswing, &StyleConfig::default(), &model, &[], 2.0, 60.0).expect("a motion");
     let person = Person::Skinned { model, motion, placement: actions::placement(1.0, 3.0) };
-    let mut config = SimulatorConfig { paths, ..Default::default() };
+    let mut config = SimulatorConfig { paths, surface: SurfaceConfig::vertices(), ..Default::default() };
     config.room.patches = Some(5000);
     config.graph.used = 1.0;
     config.surface.posing = if pose == Pose::Host { Posing::Host } else { Posing::Tensor };

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::place::{Pivot, Place};
-use crate::body::{Interpolation, PosedBody, Sampling, SurfaceConfig};
+use crate::body::{Interpolation, PosedBody, SurfaceConfig};
 use crate::diagnosis::prediction::parts;
 use crate::error::Result;
 use crate::person::Person;
@@ -43,7 +43,7 @@ impl Poses {
     /// # Errors
     /// A body that cannot be posed.
     pub fn new(person: &Person, from_s: f64, to_s: f64) -> Result<Option<Self>> {
-        let surface = SurfaceConfig { sampling: Sampling::Vertices, ..SurfaceConfig::default() };
+        let surface = SurfaceConfig::vertices();
         // Smooth between poses, as the diagnosis has it: straight lines have the velocities of the middle between two poses.
         let body = PosedBody::new(person, &surface, Interpolation::Cubic)?;
         let (first, last) = body.span_s();

@@ -46,7 +46,7 @@ pub struct MmGpeConfig {
 
 impl Default for MmGpeConfig {
     fn default() -> Self {
-        let (interpolation, surface) = (Interpolation::default(), SurfaceConfig::default());
+        let (interpolation, surface) = (Interpolation::default(), SurfaceConfig::vertices());
         Self { diffuse: 0.3, specular: 0.7, exponent: 10.0, interpolation, surface }
     }
 }
@@ -54,7 +54,7 @@ impl Default for MmGpeConfig {
 impl MmGpeConfig {
     /// Summed over all of the surface in place of its vertices.
     pub fn over_the_surface() -> Self {
-        Self { surface: SurfaceConfig { sampling: Sampling::Facets, ..SurfaceConfig::default() }, ..Self::default() }
+        Self { surface: SurfaceConfig { sampling: Sampling::Facets, ..SurfaceConfig::vertices() }, ..Self::default() }
     }
 
     /// Refuses what no reflector has.

@@ -130,7 +130,7 @@ impl RfGenesis {
                 hint: Some("give a body or meshes with faces".into()),
             });
         }
-        let body = PosedBody::new(person, &SurfaceConfig::default(), Interpolation::default())?;
+        let body = PosedBody::new(person, &SurfaceConfig::vertices(), Interpolation::default())?;
         let span_s = body.span_s();
         let camera = Camera::covering(radar.centre_m(), &body, person.pose_times_s().len(), config);
         let images = Mutex::new(Images::new(body, camera, config));

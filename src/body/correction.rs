@@ -169,7 +169,7 @@ mod tests {
     }
 
     fn at(person: &Person, time_s: f64) -> Vec<[f64; 3]> {
-        let body = PosedBody::new(person, &SurfaceConfig::default(), Interpolation::Cubic).unwrap();
+        let body = PosedBody::new(person, &SurfaceConfig::vertices(), Interpolation::Cubic).unwrap();
         body.frame(&[time_s]).unwrap().vertices_m
     }
 

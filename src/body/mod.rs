@@ -10,6 +10,7 @@ pub mod motion;
 pub mod posing;
 pub mod skinning;
 pub mod surface;
+mod surface_config;
 pub mod tensors;
 
 mod attitude;
@@ -28,7 +29,8 @@ pub use facets::{FacetEdges, facet_integral};
 pub use frame::BodyFrame;
 pub use motion::Interpolation;
 pub use posing::PosedFrame;
-pub use surface::{Posing, Sampling, Surface, SurfaceConfig};
+pub use surface::Surface;
+pub use surface_config::{Posing, Sampling, SurfaceConfig};
 
 use kinematics::{Matrix, Vector};
 use posing::DeviceBodies;

@@ -156,7 +156,7 @@ fn facet_edges_join_the_corners_at_every_chirp() {
     let edges = body.facet_edges(&frame, &[6], 0..128, (&Device::flex(), DType::F64));
     // The centre is a third of the way along both edges: corner + (second + third)/3 = point.
     let corner = body.surface().corners[6][0];
-    let vertices = PosedBody::new(&walker(), &SurfaceConfig::default(), Interpolation::Cubic).unwrap();
+    let vertices = PosedBody::new(&walker(), &SurfaceConfig::vertices(), Interpolation::Cubic).unwrap();
     for chirp in [0, 127] {
         let time = chirps()[chirp];
         let (point, corner) = (exact(&body, time)[6], exact(&vertices, time)[corner]);
@@ -170,7 +170,7 @@ fn bad_persons_get_the_reason() {
     let refused = |change: &dyn Fn(&mut BodyModel, &mut Motion)| {
         let Person::Skinned { mut model, mut motion, placement } = walker() else { unreachable!() };
         change(&mut model, &mut motion);
-        PosedBody::new(&Person::Skinned { model, motion, placement }, &SurfaceConfig::default(), Interpolation::Linear)
+        PosedBody::new(&Person::Skinned { model, motion, placement }, &SurfaceConfig::vertices(), Interpolation::Linear)
             .unwrap_err()
             .to_string()
     };
@@ -192,7 +192,7 @@ fn a_frame_of_a_full_body_takes_tens_of_milliseconds() {
     let poses = (0..10).map(|pose| (0..24).map(|joint| [0.02 * pose as f64, 0.1 * joint as f64, 0.0]).collect()).collect();
     let motion = Motion { poses, translations: vec![[0.0; 3]; 10], betas: vec![0.2; 10], rate_hz: 60.0 };
     let person = Person::Skinned { model, motion, placement: Placement::default() };
-    let body = PosedBody::new(&person, &SurfaceConfig::default(), Interpolation::Cubic).unwrap();
+    let body = PosedBody::new(&person, &SurfaceConfig::vertices(), Interpolation::Cubic).unwrap();
     let times: Vec<f64> = (0..128).map(|chirp| 0.06 + 72e-6 * chirp as f64).collect();
     let points: Vec<usize> = (0..6890).collect();
     let best = |run: &dyn Fn()| {

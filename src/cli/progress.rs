@@ -4,7 +4,7 @@ use std::{io::IsTerminal, time::Duration};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::{experiments::Event as StageEvent, text::shown, training::Event, verbs::Notice};
+use crate::{experiments::Event as StageEvent, loss::Scale, text::shown, training::Event, verbs::Notice};
 
 /// Shows how far a task is, with the time that remains.
 pub struct Progress {
@@ -55,13 +55,13 @@ impl Progress {
 pub struct TrainingProgress {
     progress: Option<Progress>,
     /// Of the loss.
-    unit: &'static str,
+    scale: Scale,
     quiet: bool,
 }
 
 impl TrainingProgress {
     pub fn new(quiet: bool) -> Self {
-        Self { progress: None, unit: "", quiet }
+        Self { progress: None, scale: Scale::default(), quiet }
     }
 
     pub fn show(&mut self, event: &Event) {
@@ -71,8 +71,8 @@ impl TrainingProgress {
                     remark!("{}", pose.line());
                 }
             }
-            Event::Started { steps, first_step, training_frames, validation_frames, unit } => {
-                self.unit = unit;
+            Event::Started { steps, first_step, training_frames, validation_frames, scale } => {
+                self.scale = *scale;
                 let progress = Progress::new("training", *steps, self.quiet);
                 progress.line(&format!("{training_frames} frames to train on, {validation_frames} held out"));
                 if *first_step > 0 {
@@ -84,19 +84,15 @@ impl TrainingProgress {
             Event::Step { step, loss, .. } => {
                 if let Some(progress) = &self.progress {
                     progress.set(*step);
-                    progress.message(format!("loss {loss:.2} {}", self.unit));
+                    progress.message(format!("loss {}", self.scale.shown(*loss)));
                 }
             }
             Event::Epoch(metrics) => {
                 if let Some(progress) = &self.progress {
+                    let with_unit = |loss: f64| self.scale.shown(loss);
                     let held_out =
-                        metrics.validation_loss.map_or(String::new(), |loss| format!(", held out {loss:.2} {}", self.unit));
-                    progress.line(&format!(
-                        "epoch {}: loss {:.2} {}{held_out}",
-                        metrics.epoch + 1,
-                        metrics.training_loss,
-                        self.unit
-                    ));
+                        metrics.validation_loss.map_or(String::new(), |loss| format!(", held out {}", with_unit(loss)));
+                    progress.line(&format!("epoch {}: loss {}{held_out}", metrics.epoch + 1, with_unit(metrics.training_loss)));
                 }
             }
             Event::Saved(_) => {}

@@ -251,7 +251,7 @@ fn once() -> usize {
 }
 
 fn all_variants() -> Vec<Variant> {
-    Variant::ALL.to_vec()
+    Variant::usual()
 }
 
 fn all_baselines() -> Vec<BaselineName> {
@@ -309,6 +309,18 @@ impl ReproduceConfig {
         Ok(config)
     }
 
+    /// Refuses a variant that would be trained as `ours` is.
+    fn check_differs(&self, variant: Variant) -> Result<()> {
+        let trained =
+            |variant: Variant| (variant.settings(&self.simulator, &self.dense_surface), variant.training(&self.training));
+        let alike = [Variant::Ours, Variant::WithEffects].contains(&variant.trained_as());
+        if alike || trained(variant) != trained(Variant::Ours) {
+            return Ok(());
+        }
+        Err(Error::setting("variants", variant.id(), "what the settings do not have already: it would be trained as `ours` is")
+            .with_hint("variants depart from the paper's surface, noise and loss: extend configs/paper_model.toml"))
+    }
+
     /// Refuses what cannot be reproduced, before anything is recorded.
     pub fn check(&self) -> Result<()> {
         self.simulator.check()?;
@@ -317,6 +329,7 @@ impl ReproduceConfig {
         self.recognition.check()?;
         for &variant in &self.variants {
             variant.settings(&self.simulator, &self.dense_surface).check()?;
+            self.check_differs(variant)?;
         }
         if !(1..=100).contains(&self.seeds) {
             return Err(Error::setting("seeds", self.seeds, "1 to 100"));
@@ -374,4 +387,4 @@ impl ReproduceConfig {
 
 #[cfg(test)]
 #[path = "config_tests.rs"]
-mod tests;
+pub(super) mod tests;

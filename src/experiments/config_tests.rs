@@ -1,7 +1,22 @@
 use super::*;
 
+/// Settings as reproductions have them, that extend `configs/paper_model.toml`.
+pub(in crate::experiments) fn on_the_papers_side(settings: &str) -> ReproduceConfig {
+    crate::data::settings::read_text(&format!("{settings}\n{}", include_str!("../../configs/paper_model.toml"))).unwrap()
+}
+
+#[test]
+fn a_variant_that_is_trained_as_ours_is_refused() {
+    let error = refused(|config| {
+        config.variants = vec![Variant::Ours, Variant::WithEffects, Variant::Likelihood];
+        config.check().unwrap();
+        config.training.loss.scale = crate::loss::Scale::Likelihood;
+    });
+    assert!(error.contains("`variants` is likelihood"), "{error}");
+}
+
 fn refused(change: impl FnOnce(&mut ReproduceConfig)) -> String {
-    let mut config: ReproduceConfig = crate::data::settings::read_text("site = \"site.toml\"").unwrap();
+    let mut config = on_the_papers_side("site = \"site.toml\"");
     config.check().unwrap();
     change(&mut config);
     config.check().unwrap_err().to_string()
@@ -51,7 +66,6 @@ fn nothing_tames_the_training_whose_stability_is_asked_for() {
 
 #[test]
 fn the_resolved_settings_are_read_again_as_they_are() {
-    let config: ReproduceConfig =
-        crate::data::settings::read_text("site = \"site.toml\"\nvariants = [\"ours\", \"coupled\"]").unwrap();
+    let config = on_the_papers_side("site = \"site.toml\"\nvariants = [\"ours\", \"coupled\"]");
     assert_eq!(crate::data::settings::read_text::<ReproduceConfig>(&config.to_toml()).unwrap(), config);
 }

@@ -76,12 +76,17 @@ pub fn asked_for(methods: &[Method]) -> Vec<(Method, Method, On)> {
     let noisy = Method::ReceiverNoise;
     let dense = Method::Variant(Variant::DenseSurface);
     let physical = Method::Variant(Variant::Physical);
+    let (direct, mirrored) = (Method::Variant(Variant::PhysicalDirect), Method::Variant(Variant::Mirrored));
     let (lobes, dense_lobes) = (noisy(BaselineName::Mmgpe), noisy(BaselineName::MmgpeSurface));
     let mut pairs = vec![
         (physical, dense_lobes, On::UnseenHuman),
         (physical, dense, On::UnseenHuman),
         (physical, Method::Variant(Variant::Likelihood), On::UnseenHuman),
         (physical, Method::OtherMesh, On::UnseenHuman),
+        (physical, direct, On::UnseenHuman),
+        (mirrored, direct, On::UnseenHuman),
+        (mirrored, physical, On::UnseenHuman),
+        (mirrored, noisy(BaselineName::TwoBounce), On::UnseenHuman),
         (Method::Variant(Variant::Likelihood), lobes, On::UnseenHuman),
         (dense, dense_lobes, On::UnseenHuman),
         (dense, lobes, On::UnseenHuman),

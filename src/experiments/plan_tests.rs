@@ -1,4 +1,5 @@
 use super::*;
+use crate::experiments::config::tests::on_the_papers_side;
 use crate::experiments::config::{SecondSceneConfig, StabilityConfig};
 use crate::experiments::figures::Panel;
 
@@ -20,8 +21,7 @@ fn place(name: &str) -> Place {
 }
 
 fn config() -> ReproduceConfig {
-    crate::data::settings::read_text("site = \"unused\"\nsplit.unseen = \"s2\"\n[adaptation]\nframes = [0, 2]\nsteps = 10")
-        .unwrap()
+    on_the_papers_side("site = \"unused\"\nsplit.unseen = \"s2\"\n[adaptation]\nframes = [0, 2]\nsteps = 10")
 }
 
 fn planned(config: &ReproduceConfig) -> Plan {

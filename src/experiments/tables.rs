@@ -27,7 +27,8 @@ pub fn tables(results: &Results) -> String {
     let variants = |list: &[Variant]| list.iter().map(|&variant| Method::Variant(variant)).collect::<Vec<_>>();
     text += &ablation(results, "Coupled Gaussian patches (paper, table 3)", "", &variants(&[Variant::Coupled, Variant::Ours]));
     let mut indirect = vec![Method::Baseline(BaselineName::TwoBounce), Method::ReceiverNoise(BaselineName::TwoBounce)];
-    indirect.extend(variants(&[Variant::WithoutIndirect, Variant::Ours]));
+    let paths = [Variant::WithoutIndirect, Variant::Ours, Variant::PhysicalDirect, Variant::Physical, Variant::Mirrored];
+    indirect.extend(variants(&paths));
     text += &ablation(results, "Indirect path (paper, section 4.7)", "", &indirect);
     let noises = [Variant::WithoutNoise, Variant::FixedNoise, Variant::ThermalNoise, Variant::Ours];
     text += &ablation(results, "Noise (paper, table 4)", "", &variants(&noises));

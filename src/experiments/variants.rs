@@ -3,8 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::body::SurfaceConfig;
+use crate::effects::{EffectSetting, floor_bounce, wall_ghost};
 use crate::if_signal::NoiseLaw;
 use crate::loss::Scale;
+use crate::room::Boundary;
 use crate::simulator::{PathModel, SimulatorConfig};
 use crate::training::TrainingConfig;
 
@@ -34,12 +36,16 @@ pub enum Variant {
     DenseSurface,
     /// All three that physics asks for: the surface as it is, the receiver's noise, the likelihood.
     Physical,
+    /// The same without the indirect path.
+    PhysicalDirect,
+    /// The same with every wall a mirror of the body (image theory), its coefficient learned, and patches for what is left.
+    Mirrored,
     /// Ours, with what the diagnosis found in one training recording.
     WithEffects,
 }
 
 impl Variant {
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::Ours,
         Self::Coupled,
         Self::WithoutIndirect,
@@ -52,8 +58,15 @@ impl Variant {
         Self::Likelihood,
         Self::DenseSurface,
         Self::Physical,
+        Self::PhysicalDirect,
+        Self::Mirrored,
         Self::WithEffects,
     ];
+
+    /// Those that say something at any site; the others need a truth with returns of the body by way of the walls.
+    pub fn usual() -> Vec<Self> {
+        Self::ALL.into_iter().filter(|variant| ![Self::PhysicalDirect, Self::Mirrored].contains(variant)).collect()
+    }
 
     /// As in settings and folders.
     pub fn id(self) -> &'static str {
@@ -70,6 +83,8 @@ impl Variant {
             Self::Likelihood => "likelihood",
             Self::DenseSurface => "dense_surface",
             Self::Physical => "physical",
+            Self::PhysicalDirect => "physical_direct",
+            Self::Mirrored => "mirrored",
             Self::WithEffects => "with_effects",
         }
     }
@@ -89,6 +104,8 @@ impl Variant {
             Self::Likelihood => "HybridSim, likelihood",
             Self::DenseSurface => "HybridSim, dense surface",
             Self::Physical => "HybridSim, dense surface, thermal noise, likelihood",
+            Self::PhysicalDirect => "HybridSim, dense surface, thermal noise, likelihood, no indirect path",
+            Self::Mirrored => "HybridSim, dense surface, thermal noise, likelihood, mirrors",
             Self::WithEffects => "HybridSim with found effects",
         }
     }
@@ -112,9 +129,14 @@ impl Variant {
             }
             Self::ThermalNoise => thermal(&mut settings),
             Self::DenseSurface => settings.surface = dense.clone(),
-            Self::Physical => {
-                thermal(&mut settings);
-                settings.surface = dense.clone();
+            Self::Physical => physical(&mut settings, dense),
+            Self::PhysicalDirect => {
+                physical(&mut settings, dense);
+                settings.paths = PathModel::Direct;
+            }
+            Self::Mirrored => {
+                physical(&mut settings, dense);
+                settings.effects.extend(Boundary::ALL.map(mirror));
             }
             Self::Ours | Self::GcnAtInference | Self::LinearLoss | Self::Likelihood | Self::WithEffects => {}
         }
@@ -126,11 +148,27 @@ impl Variant {
         let mut training = base.clone();
         match self {
             Self::LinearLoss => training.loss.scale = Scale::Linear,
-            Self::Likelihood | Self::Physical => training.loss.scale = Scale::Likelihood,
+            Self::Likelihood | Self::Physical | Self::PhysicalDirect | Self::Mirrored => {
+                training.loss.scale = Scale::Likelihood;
+            }
             _ => {}
         }
         training
     }
+}
+
+fn physical(settings: &mut SimulatorConfig, dense: &SurfaceConfig) {
+    thermal(settings);
+    settings.surface = dense.clone();
+}
+
+/// A wall as a mirror of the body; where learning starts is no claim about walls.
+fn mirror(boundary: Boundary) -> EffectSetting {
+    let mirror = match boundary {
+        Boundary::Floor => EffectSetting::neutral(floor_bounce::ID),
+        boundary => EffectSetting::neutral(wall_ghost::ID).choosing(boundary.name()),
+    };
+    mirror.with("coefficient", [0.1]).with("phase_rad", [0.0])
 }
 
 /// What receivers have: one level, learned from where it starts.
@@ -145,11 +183,14 @@ mod tests {
 
     #[test]
     fn every_ablation_changes_what_it_is_named_after() {
-        let base = SimulatorConfig::default();
+        let mut base = SimulatorConfig { surface: SurfaceConfig::vertices(), ..SimulatorConfig::default() };
+        base.noise.law = NoiseLaw::Learned;
         let dense = SurfaceConfig { sampling: crate::body::Sampling::Facets, ..Default::default() };
         let same = [Variant::Ours, Variant::GcnAtInference, Variant::LinearLoss, Variant::Likelihood, Variant::WithEffects];
-        let other_losses = [Variant::LinearLoss, Variant::Likelihood, Variant::Physical];
-        let training = TrainingConfig::default();
+        let physical = [Variant::Physical, Variant::PhysicalDirect, Variant::Mirrored];
+        let other_losses = [vec![Variant::LinearLoss, Variant::Likelihood], physical.to_vec()].concat();
+        let mut training = TrainingConfig::default();
+        training.loss.scale = Scale::Db;
         for variant in Variant::ALL {
             assert_eq!(variant.settings(&base, &dense) == base, same.contains(&variant), "{}", variant.id());
             assert_eq!(variant.training(&training) != training, other_losses.contains(&variant), "{}", variant.id());

@@ -113,22 +113,40 @@ impl RangeDoppler {
         let [loops, samples] = [dims[D - 2], dims[D - 1]];
         let expected = [self.doppler.dims()[1], self.range.dims()[0]];
         assert_eq!([loops, samples], expected, "range_doppler: signal {dims:?}, expected […, loop, sample] = {expected:?}");
+        let profiles = self.profiles(signal);
+        let dims = profiles.dims();
         let count: usize = dims[..D - 2].iter().product();
-        let flat = [count * loops, samples];
-        // one large product for range, whatever the number of antennas and frames
-        let profile = match self.sampling {
+        let stacked = profiles.reshape([count, loops, dims[D - 1]]);
+        self.doppler.clone().reshape([1, loops, loops]).matmul(stacked).reshape(dims)
+    }
+
+    /// Complex range profiles of every chirp.
+    ///
+    /// # Shapes
+    /// - `signal`: `[…, loop, sample]`, any number of loops; a real-sampled one is read from its real part alone
+    /// - result: `[…, loop, range]`
+    ///
+    /// # Gradient
+    /// Flows to `signal`; linear.
+    ///
+    /// # Panics
+    /// When the last axis is not that of the radar.
+    pub fn profiles<const D: usize>(&self, signal: Complex<D>) -> Complex<D> {
+        let mut dims = signal.dims();
+        let [samples, bins] = self.range.dims();
+        assert_eq!(dims[D - 1], samples, "range_doppler: signal {dims:?}, expected […, loop, sample] = […, {samples}]");
+        let count: usize = dims[..D - 1].iter().product();
+        let flat = [count, samples];
+        // one large product, whatever the number of antennas and frames
+        let profiles = match self.sampling {
             Sampling::Complex => signal.reshape(flat).matmul(self.range.clone()),
             Sampling::Real => {
                 let real = signal.re.reshape(flat);
                 Complex::new(real.clone().matmul(self.range.re.clone()), real.matmul(self.range.im.clone()))
             }
         };
-        let bins = self.range_bins();
-        let stacked = profile.reshape([count, loops, bins]);
-        let map = self.doppler.clone().reshape([1, loops, loops]).matmul(stacked);
-        let mut map_dims = dims;
-        map_dims[D - 1] = bins;
-        map.reshape(map_dims)
+        dims[D - 1] = bins;
+        profiles.reshape(dims)
     }
 
     /// Amplitude of the strongest cell: the scale to which [`HeatmapConfig::floor_db`] refers. No gradient.

@@ -15,11 +15,11 @@ use crate::error::{Error, Result};
 #[serde(rename_all = "lowercase")]
 pub enum NoiseLaw {
     /// The paper's: σ = rate · mean|Sim| for I and for Q, the rate learned.
-    #[default]
     Learned,
     /// The same with the rate as it is.
     Fixed,
     /// Thermal: the same σ whatever the signal.
+    #[default]
     Constant,
     None,
 }
@@ -36,7 +36,7 @@ pub struct NoiseConfig {
 
 impl Default for NoiseConfig {
     fn default() -> Self {
-        Self { law: NoiseLaw::Learned, rate: 0.025, level: 0.0 }
+        Self { law: NoiseLaw::default(), rate: 0.025, level: 0.0 }
     }
 }
 

@@ -1,11 +1,12 @@
 //! The loss: how far two range-Doppler maps are apart in decibels (ℒ of the paper, sec. 3.4 and supplement 8), or how unlikely the
 //! measured one is under the simulated one.
 
-use std::f64::consts::LN_10;
+mod likelihood;
 
 use burn::tensor::{Tensor, TensorCreationOptions};
 use serde::{Deserialize, Serialize};
 
+use self::likelihood::{Cells, NoiseGains};
 use crate::{
     complex::Complex,
     error::{Error, Result},
@@ -29,12 +30,13 @@ pub enum Combine {
 #[serde(rename_all = "lowercase")]
 pub enum Scale {
     /// Decibels (the paper).
-    #[default]
     Db,
     /// The amplitude over that of the recording's strongest cell: what the paper's supplement 8 argues against.
     Linear,
-    /// The law of the measured power P: exponential with mean |s|² + N, the simulated power and the noise's, as of a complex Gaussian
-    /// cell. Its deviance P/μ − ln(P/μ) − 1 (Itakura & Saito 1968) hardly weighs what is below the noise.
+    /// The law of the measured power P. Of what moves: exponential with mean |s|² + N, the simulated power and the noise's, as of a complex
+    /// Gaussian cell (deviance of Itakura & Saito 1968). Of static returns, a cell for each range: log-normal. It hardly weighs what is
+    /// below the noise.
+    #[default]
     Likelihood,
 }
 
@@ -47,13 +49,22 @@ impl Scale {
             Self::Likelihood => "nats a cell",
         }
     }
+
+    /// A loss with its unit, with as many digits as tell two epochs apart.
+    pub fn shown(self, loss: f64) -> String {
+        let unit = self.unit();
+        match self {
+            Self::Db => format!("{loss:.2} {unit}"),
+            Self::Linear => format!("{loss:.3e} {unit}"),
+            Self::Likelihood => format!("{loss:.4} {unit}"),
+        }
+    }
 }
 
 /// Which maps are compared, and down to which level.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LossConfig {
-    #[serde(skip_serializing_if = "is_db")]
     pub scale: Scale,
     pub combine: Combine,
     /// Antenna pairs that count, as `tx · receivers + rx`; empty for all.
@@ -63,10 +74,6 @@ pub struct LossConfig {
     pub clamp_db: Option<f64>,
     /// Compare what is left after the mean over the loops is removed.
     pub static_removed: bool,
-}
-
-fn is_db(scale: &Scale) -> bool {
-    *scale == Scale::Db
 }
 
 /// Mean squared difference of decibel maps, or of linear ones; built once for a recording.
@@ -80,8 +87,7 @@ pub struct DbLoss {
     static_removed: bool,
     floor_amplitude: f64,
     clamp_db: Option<f64>,
-    /// Power of a cell for noise of variance 1 in each component of a sample.
-    noise_gain: f64,
+    noise: NoiseGains,
 }
 
 impl DbLoss {
@@ -98,9 +104,8 @@ impl DbLoss {
         if let Some(channel) = config.channels.iter().find(|&&channel| channel >= count) {
             return Err(Error::setting("loss.channels", channel, format!("0 to {}: one for each antenna pair", count - 1)));
         }
-        let exact = config.scale == Scale::Likelihood;
-        if exact && (config.static_removed || config.clamp_db.is_some()) {
-            let expected = "neither `static_removed` nor `clamp_db`: the law is that of all cells, with their noise";
+        if config.scale == Scale::Likelihood && config.clamp_db.is_some() {
+            let expected = "no `clamp_db`: the law is that of all cells, with their noise";
             return Err(Error::setting("loss.scale", "likelihood", expected));
         }
         if !(peak_amplitude.is_finite() && peak_amplitude > 0.0) {
@@ -109,7 +114,9 @@ impl DbLoss {
                 hint: Some("check that the recording holds a signal".into()),
             });
         }
+        let options = options.into();
         Ok(Self {
+            noise: NoiseGains::new(radar, heatmap, options.clone()),
             transform: RangeDoppler::new(radar.loops_per_frame, radar.samples_per_chirp, radar.sampling, heatmap, options),
             scale: config.scale,
             peak_amplitude,
@@ -118,7 +125,6 @@ impl DbLoss {
             static_removed: config.static_removed,
             floor_amplitude: heatmap.floor_amplitude(peak_amplitude),
             clamp_db: config.clamp_db.map(|clamp| 20.0 * peak_amplitude.log10() + clamp),
-            noise_gain: heatmap.noise_gain(radar),
         })
     }
 
@@ -158,21 +164,30 @@ impl DbLoss {
 
     /// `[map, doppler, range]` of `[frame, tx, rx, loop, sample]`.
     fn power(&self, signal: Complex<5>) -> Tensor<3> {
-        let [frames, transmitters, receivers, loops, samples] = signal.dims();
-        let count = transmitters * receivers;
-        let mut signal = signal.reshape([frames, count, loops, samples]);
-        if self.channels.len() < count {
-            let chosen = self.channels.iter().map(|&channel| signal.clone().narrow(1, channel, 1)).collect();
-            signal = Complex::cat(chosen, 1);
-        }
+        let mut signal = self.chosen(signal);
         if self.static_removed {
             signal = remove_loop_mean(signal);
         }
-        let power = self.transform.map(signal).power();
-        let [_, chosen, doppler, range] = power.dims();
+        self.combined(self.transform.map(signal).power())
+    }
+
+    /// `[frame, channel, loop, sample]` of `[frame, tx, rx, loop, sample]`: the antenna pairs that count.
+    fn chosen(&self, signal: Complex<5>) -> Complex<4> {
+        let [frames, transmitters, receivers, loops, samples] = signal.dims();
+        let count = transmitters * receivers;
+        let signal = signal.reshape([frames, count, loops, samples]);
+        if self.channels.len() == count {
+            return signal;
+        }
+        Complex::cat(self.channels.iter().map(|&channel| signal.clone().narrow(1, channel, 1)).collect(), 1)
+    }
+
+    /// `[map, …]` of `[frame, channel, …]`.
+    fn combined(&self, power: Tensor<4>) -> Tensor<3> {
+        let [frames, channels, rows, range] = power.dims();
         match self.combine {
-            Combine::Each => power.reshape([frames * chosen, doppler, range]),
-            Combine::Mean => power.mean_dim(1).reshape([frames, doppler, range]),
+            Combine::Each => power.reshape([frames * channels, rows, range]),
+            Combine::Mean => power.mean_dim(1).reshape([frames, rows, range]),
         }
     }
 
@@ -188,23 +203,45 @@ impl DbLoss {
         mean_squared_db(self.maps_db(simulated), measured_db)
     }
 
-    /// Mean deviance of the measured power under an exponential law with mean |simulated|² + noise, nats a cell: its gradient is that of
-    /// the negative log-likelihood.
+    /// Mean deviance of the measured power, nats a cell, over the cells of maps without static returns and over those of the static
+    /// returns' range profile: its gradient is that of the negative log-likelihood.
     ///
     /// # Shapes
     /// - `clean`: `[frame, tx, rx, loop, sample]`, without noise
     /// - `variance`: `[1]`, of each component of the noise in a sample; `None` without noise
-    /// - `measured_db`: [`Self::maps_db`] of the recording's same frames, a constant of training
+    /// - `measured`: `[frame, tx, rx, loop, sample]`, the recording's same frames, a constant of training
     ///
     /// # Gradient
-    /// Flows to `clean` and to `variance`.
-    pub fn deviance(&self, clean: Complex<5>, variance: Option<Tensor<1>>, measured_db: Tensor<3>) -> Tensor<1> {
-        let mut power = self.power(clean);
-        if let Some(variance) = variance {
-            power = power + (variance * self.noise_gain).reshape([1, 1, 1]);
-        }
-        let ratio = (measured_db - power_db(power, self.floor_amplitude)) * (LN_10 / 10.0);
-        (ratio.clone().exp() - ratio - 1.0).mean()
+    /// Flows to `clean` and to `variance`; smooth.
+    pub fn deviance(&self, clean: Complex<5>, variance: Option<Tensor<1>>, measured: Complex<5>) -> Tensor<1> {
+        let variance = variance.map(|variance| variance.reshape([1, 1, 1]));
+        let moving_noise = variance.clone().map(|variance| variance * self.noise.moving.clone());
+        let static_noise = variance.map(|variance| variance * likelihood::mean_logarithm(self.noise.static_profile));
+        let measured = self.cells(measured, None, None);
+        let simulated = self.cells(clean, moving_noise, static_noise);
+        let moving = likelihood::moving_deviance(measured.moving_db - simulated.moving_db);
+        let Some((measured, simulated)) = measured.static_db.zip(simulated.static_db) else { return moving.mean() };
+        let cells = moving.dims().iter().product::<usize>() + measured.dims().iter().product::<usize>();
+        (moving.sum() + likelihood::static_deviance(measured - simulated).sum()) / cells as f64
+    }
+
+    /// The cells of a signal, and the noise's power added to them.
+    fn cells(&self, signal: Complex<5>, moving_noise: Option<Tensor<3>>, static_noise: Option<Tensor<3>>) -> Cells {
+        let db = |power: Tensor<3>, noise: Option<Tensor<3>>| {
+            let power = match noise {
+                Some(noise) => power + noise,
+                None => power,
+            };
+            power_db(power, self.floor_amplitude)
+        };
+        let signal = self.chosen(signal);
+        let mean = signal.clone().mean_dim(2);
+        let static_db = (!self.static_removed).then(|| {
+            let profile = self.transform.profiles(mean.clone()).power();
+            db(self.combined(profile), static_noise)
+        });
+        let map = self.transform.map(signal.sub(mean)).power();
+        Cells { moving_db: db(self.combined(map), moving_noise), static_db }
     }
 }
 

@@ -2,7 +2,7 @@ use burn::tensor::{DType, Device, TensorData};
 use rand::{RngExt, SeedableRng};
 
 use super::*;
-use crate::heatmap::synthetic;
+use crate::heatmap::{Window, synthetic};
 
 const DIMS: [usize; 5] = [1, 2, 2, 4, 6];
 
@@ -79,10 +79,9 @@ fn the_likelihood_finds_a_level_in_speckle_and_noise_where_decibels_do_not() {
         DbLoss::new(&radar, &HeatmapConfig::default(), &config, 100.0, (&device, DType::F64)).unwrap()
     };
     let exact = of(Scale::Likelihood);
-    let maps = exact.maps_db(measured.clone());
     let variance =
         |level_db: f64| Tensor::<1>::from_data(TensorData::from([2.0 * scale(level_db).powi(2)]), (&device, DType::F64));
-    let found = best(&|level| exact.deviance(silent(), Some(variance(level)), maps.clone()).into_scalar::<f64>());
+    let found = best(&|level| exact.deviance(silent(), Some(variance(level)), measured.clone()).into_scalar::<f64>());
     assert!(found.abs() < 0.2, "{found} dB");
     // The mean of the decibels of an exponential is 2.5 dB below those of its mean: Euler's constant in dB.
     let decibels = of(Scale::Db);
@@ -91,11 +90,96 @@ fn the_likelihood_finds_a_level_in_speckle_and_noise_where_decibels_do_not() {
     assert!((expected + 2.5).abs() < 0.2, "{expected} dB");
 }
 
+/// A radar of one antenna pair, and its likelihood.
+fn likelihood(loops: usize, samples: usize, heatmap: &HeatmapConfig, device: &Device) -> DbLoss {
+    let one = vec![[0.0; 3]];
+    let radar = Radar { loops_per_frame: loops, samples_per_chirp: samples, tx_m: one.clone(), rx_m: one, ..radar() };
+    let config = LossConfig { scale: Scale::Likelihood, ..Default::default() };
+    DbLoss::new(&radar, heatmap, &config, 1.0, (device, DType::F64)).unwrap()
+}
+
 #[test]
-fn the_likelihood_is_of_all_cells() {
-    let config = LossConfig { scale: Scale::Likelihood, static_removed: true, ..Default::default() };
+fn under_noise_alone_each_kind_of_cell_has_the_deviance_of_its_law() {
+    let device = Device::flex();
+    let (loops, samples) = (16, 4096);
+    for window in [Window::Hann, Window::Hamming, Window::Rectangular] {
+        let heatmap = HeatmapConfig { doppler_window: window, range_window: Window::Rectangular, ..Default::default() };
+        let loss = likelihood(loops, samples, &heatmap, &device);
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let mut draw = || {
+            let normal = (0..loops * samples).map(|_| rand_distr::Distribution::sample(&rand_distr::StandardNormal, &mut random));
+            let values: Vec<f64> = normal.collect();
+            Tensor::<5>::from_data(TensorData::new(values, [1, 1, 1, loops, samples]), (&device, DType::F64))
+        };
+        let measured = loss.cells(Complex::new(draw(), draw()), None, None);
+        let silence = draw() * 0.0;
+        let noise = Tensor::from_data(
+            TensorData::from([[[likelihood::mean_logarithm(loss.noise.static_profile)]]]),
+            (&device, DType::F64),
+        );
+        let silent = loss.cells(Complex::new(silence.clone(), silence), Some(loss.noise.moving.clone()), Some(noise));
+        // Row by row: the mean of x − ln x − 1 of an exponential is γ. A rectangular window leaves nothing at zero Doppler.
+        let rows = likelihood::moving_deviance(measured.moving_db - silent.moving_db).mean_dim(2);
+        for (row, deviance) in rows.into_data().iter::<f64>().enumerate() {
+            let expected = if window == Window::Rectangular && row == loops / 2 { 0.0 } else { 0.5772 };
+            assert!((deviance - expected).abs() < 0.05, "{window:?} {row}: {deviance}");
+        }
+        let ratio = measured.static_db.unwrap() - silent.static_db.unwrap();
+        assert!(ratio.clone().mean().into_scalar::<f64>().abs() < 0.3, "{window:?}: {ratio}");
+        let deviance = likelihood::static_deviance(ratio).mean().into_scalar::<f64>();
+        assert!((deviance - 0.5).abs() < 0.05, "{window:?}: {deviance}");
+    }
+}
+
+#[test]
+fn a_static_return_that_is_not_there_is_pulled_by_its_error_and_one_that_moves_is_not() {
+    let device = Device::flex().autodiff();
+    let (loops, samples) = (8, 16);
+    let loss = likelihood(loops, samples, &HeatmapConfig::default(), &device);
+    // A tone in one range cell, at zero Doppler or three cells beside it; 40 dB above what is measured, and 80.
+    let pull = |doppler: f64, level_db: f64| {
+        let tone = |scale: f64, part: fn(f64) -> f64| {
+            let angle = |index: usize, sample: usize| {
+                std::f64::consts::TAU * (5.0 * sample as f64 / samples as f64 + doppler * index as f64 / loops as f64)
+            };
+            let values: Vec<f64> = (0..loops * samples).map(|n| scale * part(angle(n / samples, n % samples))).collect();
+            Tensor::<5>::from_data(TensorData::new(values, [1, 1, 1, loops, samples]), (&device, DType::F64))
+        };
+        let signal = |scale: f64| Complex::new(tone(scale, f64::cos), tone(scale, f64::sin));
+        // In nepers, so that the gradient is a pull for each relative change.
+        let level = Tensor::<1>::from_data(TensorData::from([level_db * std::f64::consts::LN_10 / 20.0]), (&device, DType::F64));
+        let level = level.require_grad();
+        let amplitude = level.clone().exp().reshape([1, 1, 1, 1, 1]);
+        let clean = Complex::new(tone(1e-5, f64::cos) * amplitude.clone(), tone(1e-5, f64::sin) * amplitude);
+        let variance = Tensor::<1>::from_data(TensorData::from([1e-20]), (&device, DType::F64));
+        let gradients = loss.deviance(clean, Some(variance), signal(1e-5)).backward();
+        level.grad(&gradients).unwrap().into_scalar::<f64>()
+    };
+    let ratio = |doppler: f64| pull(doppler, 80.0) / pull(doppler, 40.0);
+    assert!((ratio(0.0) - 2.0).abs() < 0.01, "static: {}", ratio(0.0));
+    assert!((ratio(3.0) - 1.0).abs() < 0.01, "moving: {}", ratio(3.0));
+}
+
+#[test]
+fn static_returns_count_in_the_likelihood_where_they_are_not_removed() {
+    let device = Device::flex();
+    let deviance = |static_removed: bool, signal: Complex<5>| {
+        let loss = loss(&LossConfig { scale: Scale::Likelihood, static_removed, ..Default::default() }, &device);
+        loss.deviance(signal, None, self::signal(1, &device)).into_scalar::<f64>()
+    };
+    let shifted = || {
+        let signal = signal(1, &device);
+        Complex::new(signal.re + 0.5, signal.im)
+    };
+    assert!(deviance(false, shifted()) > deviance(false, signal(1, &device)) + 1e-3);
+    assert!((deviance(true, shifted()) - deviance(true, signal(1, &device))).abs() < 1e-9);
+}
+
+#[test]
+fn the_likelihood_has_no_clamp() {
+    let config = LossConfig { scale: Scale::Likelihood, clamp_db: Some(-40.0), ..Default::default() };
     let error = DbLoss::new(&radar(), &HeatmapConfig::default(), &config, 1.0, &Device::flex()).unwrap_err();
-    assert!(error.to_string().contains("static_removed"), "{error}");
+    assert!(error.to_string().contains("clamp_db"), "{error}");
 }
 
 #[test]
@@ -124,7 +208,7 @@ pub(crate) fn gradients_agree_with_central_differences_for_every_setting() {
     ];
     for config in settings {
         let loss = loss(&config, &device);
-        let measured = loss.maps_db(signal(2, &device)).detach();
+        let measured = signal(2, &device);
         let start = noise(1);
         let value = |re: Tensor<5>| {
             let simulated = Complex::new(re.clone(), tensor(noise(101), &device));
@@ -132,7 +216,7 @@ pub(crate) fn gradients_agree_with_central_differences_for_every_setting() {
             let variance = (re.clone() * re).mean() * 0.1;
             match loss.is_likelihood() {
                 true => loss.deviance(simulated, Some(variance), measured.clone()),
-                false => loss.loss(simulated, measured.clone()),
+                false => loss.loss(simulated, loss.maps_db(measured.clone())),
             }
         };
         let tracked = tensor(start.clone(), &device).require_grad();

@@ -106,7 +106,7 @@ mod tests {
 
     fn chart(points: Vec<[f64; 2]>) -> Chart {
         let series = vec![Series { name: "training".into(), points }];
-        Chart { title: "loss".into(), x_label: "step".into(), y_label: "loss (dB²)".into(), series }
+        Chart { title: "loss".into(), x_label: "step".into(), y_label: "loss".into(), series }
     }
 
     #[test]

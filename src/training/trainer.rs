@@ -19,6 +19,7 @@ use crate::{
     error::{Error, Result},
     heatmap::RangeDoppler,
     loss::DbLoss,
+    loss::Scale,
     simulator::{Mode, Simulator, SimulatorConfig},
 };
 
@@ -33,7 +34,8 @@ pub enum Event {
         training_frames: usize,
         validation_frames: usize,
         /// Of the loss.
-        unit: &'static str,
+        /// Of the loss.
+        scale: Scale,
     },
     /// `gradient`: the largest absolute derivative of the loss by any number that learns, before clipping.
     Step {
@@ -138,7 +140,7 @@ impl Trainer<'_> {
             first_step: learned.progress.steps_done,
             training_frames: split.training.len(),
             validation_frames: split.validation.len(),
-            unit: self.config.loss.scale.unit(),
+            scale: self.config.loss.scale,
         });
         for epoch in learned.progress.epochs_done..self.config.epochs {
             let best_epoch = learned.progress.best_epoch;

@@ -270,7 +270,7 @@ fn meshes_are_placed_by_tensors_too() {
     let skinned = body(Sampling::Vertices);
     let vertices = (0..20).map(|pose| skinned.vertices_at_pose(pose)).collect();
     let person = Person::Meshes { vertices, faces: walker().faces().to_vec(), pose_times_s: walker().pose_times_s() };
-    let meshes = PosedBody::new(&person, &SurfaceConfig::default(), Interpolation::Cubic).unwrap();
+    let meshes = PosedBody::new(&person, &SurfaceConfig::vertices(), Interpolation::Cubic).unwrap();
     let frame = meshes.frame(&chirps()).unwrap();
     let points: Vec<usize> = (0..VERTICES).collect();
     let own = correction();

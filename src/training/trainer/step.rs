@@ -114,13 +114,13 @@ impl Trainer<'_> {
             for (FrameId { frame, .. }, seed) in frames {
                 let view = recording.scene.view(*frame)?;
                 let clean = simulator.clean_signal(&recording.scene, &view, &surfaces);
-                let measured = loss.maps_db(one_frame(recording.target(*frame, device)?));
+                let measured = one_frame(recording.target(*frame, device)?);
                 let value = if loss.is_likelihood() {
                     let variance = simulator.noise_variance(&clean);
                     loss.deviance(one_frame(clean), variance, measured)
                 } else {
                     let signal = simulator.with_noise(&recording.scene.radar, clean, *seed);
-                    loss.loss(one_frame(signal), measured)
+                    loss.loss(one_frame(signal), loss.maps_db(measured))
                 };
                 sum = Some(match sum {
                     Some(sum) => sum + value,
