@@ -152,7 +152,7 @@ fn first_to_be_mended(
         return Some(reason);
     }
     observed_again(original, config, checks, progress);
-    let wrong = checks.iter().find(|check| !check.ok && audit::is_convention(check))?;
+    let wrong = audit::wrong_convention(checks)?;
     // Physics fitted under a wrong convention would only imitate it.
     Some(format!("a convention, or the scene as it is stated, is wrong, which comes before any physics: {}", wrong.found))
 }

@@ -25,6 +25,11 @@ fn signal(seed: u64, device: &Device) -> Complex<5> {
     Complex::new(tensor(noise(seed), device), tensor(noise(seed + 100), device))
 }
 
+/// The paper's loss.
+fn db() -> LossConfig {
+    LossConfig { scale: Scale::Db, ..Default::default() }
+}
+
 fn loss(config: &LossConfig, device: &Device) -> DbLoss {
     DbLoss::new(&radar(), &HeatmapConfig::default(), config, 0.2, (device, DType::F64)).unwrap()
 }
@@ -33,7 +38,7 @@ fn loss(config: &LossConfig, device: &Device) -> DbLoss {
 fn a_signal_has_no_distance_to_itself_and_ten_times_its_amplitude_is_twenty_decibels_away() {
     let device = Device::flex();
     for combine in [Combine::Each, Combine::Mean] {
-        let loss = loss(&LossConfig { combine, ..Default::default() }, &device);
+        let loss = loss(&LossConfig { combine, ..db() }, &device);
         let measured = loss.maps_db(signal(1, &device));
         assert_eq!(loss.loss(signal(1, &device), measured.clone()).into_scalar::<f64>(), 0.0);
         let louder = loss.loss(signal(1, &device).scale_by(10.0), measured).into_scalar::<f64>();
@@ -186,25 +191,25 @@ fn the_likelihood_has_no_clamp() {
 fn antennas_are_chosen_and_averaged_as_the_settings_say() {
     let device = Device::flex();
     let dims = |config: LossConfig| loss(&config, &device).maps_db(signal(1, &device)).dims();
-    assert_eq!(dims(LossConfig::default()), [4, 4, 6]);
-    assert_eq!(dims(LossConfig { channels: vec![3, 0], ..Default::default() }), [2, 4, 6]);
-    assert_eq!(dims(LossConfig { combine: Combine::Mean, ..Default::default() }), [1, 4, 6]);
-    let all = loss(&LossConfig::default(), &device).maps_db(signal(1, &device));
-    let last = loss(&LossConfig { channels: vec![3], ..Default::default() }, &device).maps_db(signal(1, &device));
+    assert_eq!(dims(db()), [4, 4, 6]);
+    assert_eq!(dims(LossConfig { channels: vec![3, 0], ..db() }), [2, 4, 6]);
+    assert_eq!(dims(LossConfig { combine: Combine::Mean, ..db() }), [1, 4, 6]);
+    let all = loss(&db(), &device).maps_db(signal(1, &device));
+    let last = loss(&LossConfig { channels: vec![3], ..db() }, &device).maps_db(signal(1, &device));
     assert_eq!((all.narrow(0, 3, 1) - last).abs().max().into_scalar::<f64>(), 0.0);
-    let error =
-        DbLoss::new(&radar(), &HeatmapConfig::default(), &LossConfig { channels: vec![4], ..Default::default() }, 1.0, &device);
+    let error = DbLoss::new(&radar(), &HeatmapConfig::default(), &LossConfig { channels: vec![4], ..db() }, 1.0, &device);
     assert_eq!(error.unwrap_err().to_string(), "`loss.channels` is 4, expected 0 to 3: one for each antenna pair");
 }
 
 pub(crate) fn gradients_agree_with_central_differences_for_every_setting() {
     let device = Device::flex().autodiff();
     let settings = [
-        LossConfig::default(),
-        LossConfig { combine: Combine::Mean, channels: vec![1, 2], ..Default::default() },
-        LossConfig { clamp_db: Some(-15.0), static_removed: true, ..Default::default() },
+        db(),
+        LossConfig { combine: Combine::Mean, channels: vec![1, 2], ..db() },
+        LossConfig { clamp_db: Some(-15.0), static_removed: true, ..db() },
         LossConfig { scale: Scale::Linear, ..Default::default() },
         LossConfig { scale: Scale::Likelihood, ..Default::default() },
+        LossConfig { scale: Scale::Likelihood, static_removed: true, combine: Combine::Mean, ..Default::default() },
     ];
     for config in settings {
         let loss = loss(&config, &device);
@@ -240,7 +245,7 @@ pub(crate) fn gradients_agree_with_central_differences_for_every_setting() {
 #[test]
 fn a_clamped_cell_does_not_pull_and_silence_gives_no_nan() {
     let device = Device::flex().autodiff();
-    let loss = loss(&LossConfig { clamp_db: Some(-40.0), ..Default::default() }, &device);
+    let loss = loss(&LossConfig { clamp_db: Some(-40.0), ..db() }, &device);
     let quiet = |scale: f64| tensor(noise(1), &device) * scale;
     let measured = loss.maps_db(Complex::new(quiet(1e-9), quiet(0.0))).detach();
     for scale in [0.0, 1e-8] {
@@ -255,7 +260,7 @@ fn a_clamped_cell_does_not_pull_and_silence_gives_no_nan() {
 
 #[test]
 fn a_silent_recording_is_refused() {
-    let error = DbLoss::new(&radar(), &HeatmapConfig::default(), &LossConfig::default(), 0.0, &Device::flex()).unwrap_err();
+    let error = DbLoss::new(&radar(), &HeatmapConfig::default(), &db(), 0.0, &Device::flex()).unwrap_err();
     assert!(error.to_string().contains("strongest cell has amplitude 0"), "{error}");
     assert!(error.hint().is_some());
 }

@@ -9,6 +9,7 @@ mod heatmap;
 mod overlay;
 pub mod page;
 mod panels;
+mod window;
 
 pub use chart::{Chart, Series};
 pub use confusion::confusion;
@@ -16,6 +17,7 @@ pub use grid::Grid;
 pub use heatmap::{comparison, heatmap};
 pub use overlay::{Line, overlay};
 pub use panels::{Panel, panels};
+pub use window::window;
 
 use std::{io, path::Path, sync::Once};
 

@@ -41,7 +41,8 @@ mod tests {
 
     #[test]
     fn the_largest_derivative_of_all_parameters_is_found_whatever_its_sign() {
-        let config: SimulatorConfig = toml::from_str("[triplane]\nresolution = 4\nfeatures = 2").unwrap();
+        let config: SimulatorConfig =
+            toml::from_str("[triplane]\nresolution = 4\nfeatures = 2\n[noise]\nlaw = \"learned\"").unwrap();
         let extent = Extent { low_m: [-1.0; 3], high_m: [1.0; 3] };
         let simulator = config.init(extent, 1, &Device::flex().autodiff());
         let rate = simulator.noise.raw_rate.as_ref().unwrap().val();

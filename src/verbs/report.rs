@@ -8,10 +8,7 @@ use std::{
 use burn::tensor::Device;
 use serde_json::json;
 
-use super::{
-    heatmaps::{Pictures, window},
-    scores,
-};
+use super::{heatmaps::Pictures, scores};
 use crate::{
     config::Config,
     data::atomic,
@@ -209,7 +206,7 @@ const PICTURES: [(&str, &str); 4] = [
 pub(crate) fn draw_frame(folder: &Path, which: &str, all: &FrameMaps, moving: &FrameMaps) -> Result<[PathBuf; 2]> {
     let draw = |name: &str, what: &str, maps: &FrameMaps| {
         let (file, title) = (folder.join(name), format!("Range-Doppler, {which}{what}"));
-        pictures::comparison(&file, &title, &maps.measured, &maps.simulated, window(&maps.measured))?;
+        pictures::comparison(&file, &title, &maps.measured, &maps.simulated, pictures::window(&maps.measured))?;
         Ok(file)
     };
     Ok([draw("range_doppler.png", "", all)?, draw("range_doppler_moving.png", ", static removed", moving)?])

@@ -10,7 +10,7 @@ use crate::{
     data::{atomic, files},
     error::{Error, Result},
     evaluation::Evaluation,
-    training::{checkpoint::Progress, load_recordings, load_recordings_as_stated, refine},
+    training::{LoadedRecording, checkpoint::Progress, load_recordings, load_recordings_as_stated, refine},
 };
 
 /// What to begin, or to go on with.
@@ -82,22 +82,25 @@ pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, notify: &mu
     let trainer = config.trainer(&recordings, &config_toml, &run_folder, devices)?;
     let outcome = trainer.run(resume.as_deref(), &mut |event| notify(Notice::Training(&event)))?;
 
-    let refined = refine::read(&run_folder)?;
+    let evaluations = reported(&run_folder, &config, recordings, &outcome.progress, (&devices[0], started))?;
+    Ok(Trained { folder: run_folder, progress: outcome.progress, evaluations })
+}
+
+/// Writes the report of a run that is over; what it scored.
+fn reported(
+    folder: &Path,
+    config: &Config,
+    recordings: Vec<LoadedRecording>,
+    progress: &Progress,
+    (device, started): (&Device, std::time::Instant),
+) -> Result<Vec<(PathBuf, Evaluation)>> {
+    let refined = refine::read(folder)?;
     let recordings =
         recordings.into_iter().map(|recording| Ok(refine::refined(recording, &refined)?.0)).collect::<Result<Vec<_>>>()?;
-    let found = found::line(&run_folder)?;
-    let report = RunReport {
-        refined: &refined,
-        found: found.as_deref(),
-        folder: &run_folder,
-        config: &config,
-        recordings: &recordings,
-        progress: &outcome.progress,
-        device: &devices[0],
-        seconds: started.elapsed().as_secs_f64(),
-    };
-    let evaluations = report.write()?;
-    Ok(Trained { folder: run_folder, progress: outcome.progress, evaluations })
+    let found = found::line(folder)?;
+    let seconds = started.elapsed().as_secs_f64();
+    let found = found.as_deref();
+    RunReport { refined: &refined, found, folder, config, recordings: &recordings, progress, device, seconds }.write()
 }
 
 fn holds_no_run(folder: &Path) -> Result<()> {

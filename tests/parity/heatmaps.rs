@@ -3,7 +3,7 @@
 use burn::tensor::{DType, Device};
 use hybridsim::complex::Complex;
 use hybridsim::heatmap::{Analysis, Gate, HeatmapConfig, RangeDoppler, Samples, Scan, StaticRemoval, remove_static};
-use hybridsim::loss::{Combine, DbLoss, LossConfig};
+use hybridsim::loss::{Combine, DbLoss, LossConfig, Scale};
 use hybridsim::radar::{Radar, Sampling};
 use num_complex::{Complex32, Complex64};
 
@@ -80,11 +80,12 @@ fn the_loss_is_that_of_numpy_for_every_setting() {
     let transform = RangeDoppler::new(15, 18, Sampling::Complex, &heatmap, (&device, DType::F64));
     let peak = transform.peak_amplitude(read_signal(&golden, "in_signal", &device));
     close("peak", &[peak], &golden.values("peak_amplitude"), 1e-13);
+    let db = || LossConfig { scale: Scale::Db, ..Default::default() };
     for (name, config) in [
-        ("loss_each", LossConfig::default()),
-        ("loss_mean", LossConfig { combine: Combine::Mean, ..Default::default() }),
-        ("loss_clamped", LossConfig { clamp_db: Some(-25.0), ..Default::default() }),
-        ("loss_without_static", LossConfig { static_removed: true, ..Default::default() }),
+        ("loss_each", db()),
+        ("loss_mean", LossConfig { combine: Combine::Mean, ..db() }),
+        ("loss_clamped", LossConfig { clamp_db: Some(-25.0), ..db() }),
+        ("loss_without_static", LossConfig { static_removed: true, ..db() }),
     ] {
         let loss = DbLoss::new(&radar(), &heatmap, &config, peak, (&device, DType::F64)).unwrap();
         let measured = loss.maps_db(read_signal(&golden, "in_signal", &device));

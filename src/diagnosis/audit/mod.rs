@@ -98,6 +98,16 @@ pub fn is_convention(check: &Check) -> bool {
     CONVENTIONS.contains(&check.check.as_str())
 }
 
+/// What a wrong convention of the motion or the radar breaks, too: a person who walks the other way may walk through a wall.
+const BROKEN_BY_OTHERS: [&str; 2] = ["body_in_room", "room"];
+
+/// The convention to be mended first, if one is wrong.
+pub fn wrong_convention(checks: &[Check]) -> Option<&Check> {
+    let mut wrong: Vec<&Check> = checks.iter().filter(|check| !check.ok && is_convention(check)).collect();
+    wrong.sort_by_key(|check| BROKEN_BY_OTHERS.contains(&check.check.as_str()));
+    wrong.first().copied()
+}
+
 /// Whether a body was expected and is observed nowhere.
 pub fn is_silent(check: &Check) -> bool {
     check.check == "body_place" && check.found.contains(placement::SILENT)
@@ -148,4 +158,19 @@ pub fn limits(loaded: &Loaded, body: bool, room: bool) -> Vec<String> {
         notes.push(format!("few frames: blocks of {loops} loops take their place, and some are held out"));
     }
     notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_wrong_convention_breaks_is_mended_with_it() {
+        let check = |name: &str, ok: bool| Check::new(name, "expected", format!("{name} found"), ok);
+        let mended = |checks: &[Check]| wrong_convention(checks).map(|check| check.check.clone());
+        let turned = [check("body_in_room", false), check("doppler_sign", true), check("heading", false)];
+        assert_eq!(mended(&turned).as_deref(), Some("heading"));
+        assert_eq!(mended(&[check("body_in_room", false), check("heading", true)]).as_deref(), Some("body_in_room"));
+        assert_eq!(mended(&[check("rail", false), check("room", true)]), None);
+    }
 }

@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::heatmap::{Axis, Map, range_axis, velocity_axis};
 use crate::metrics::DbWindow;
 use crate::pictures::page::{Markup, picture};
-use crate::pictures::{Chart, Series, comparison};
+use crate::pictures::{Chart, Series, comparison, window};
 use crate::radar::Radar;
 
 /// Titles or names, and what they are of.
@@ -27,6 +27,8 @@ impl Pictures {
         let mut pictures = Self { maps: vec![], curves: vec![], profiles: vec![] };
         let Some(explanation) = &diagnosis.explanation else { return Ok(pictures) };
         let path = folder.path().join("picture.png");
+        // One scale for both, from the noise (0 dB) up.
+        let mut shown: Option<DbWindow> = None;
         for (title, evidence) in [
             ("Before: the recording against the baseline", &diagnosis.original),
             (
@@ -38,12 +40,12 @@ impl Pictures {
                 continue;
             }
             let [measured, expected] = held_out_maps(evidence, &diagnosis.radar);
-            let window = DbWindow { low_db: -5.0, high_db: measured.max().max(20.0) };
+            let window = *shown.get_or_insert_with(|| DbWindow { low_db: 0.0, high_db: measured.max().max(20.0) });
             comparison(&path, "", &measured, &expected, window)?;
             pictures.maps.push((title.into(), picture(&path, title)?));
         }
         if let Some(Simulated { maps: [measured, before, after], .. }) = simulated {
-            let window = DbWindow::below(measured.max(), 60.0);
+            let window = window(measured);
             for (title, map) in [("The trained simulator", before), ("The trained simulator with the effects", after)] {
                 comparison(&path, "", measured, map, window)?;
                 pictures.maps.push((title.into(), picture(&path, title)?));
