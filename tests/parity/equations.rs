@@ -5,7 +5,7 @@
 
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use hybridsim::{
-    body::Interpolation,
+    body::{Interpolation, SurfaceConfig},
     complex::Complex,
     features::Extent,
     if_signal::SumForm,
@@ -41,6 +41,7 @@ fn paper() -> SimulatorConfig {
     let mut config = SimulatorConfig {
         dechirp: Dechirp::Paper,
         interpolation: Interpolation::Linear,
+        surface: SurfaceConfig::vertices(),
         equations: EquationsConfig::paper(),
         ..Default::default()
     };
