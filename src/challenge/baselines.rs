@@ -5,8 +5,8 @@
 //! mesh error is a turn of phase there), so their residual is what lies where nothing is expected: nearer than anything
 //! and farther than the room. Their thresholds are calibrated on the nulls of the very set, which flatters them.
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 use serde::Serialize;
 
 use crate::data::Recording;

@@ -1,8 +1,8 @@
 //! All samples of a recording in memory, and which of them are held out.
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 
 use crate::data::Recording;
 use crate::error::{Error, Result};

@@ -9,9 +9,9 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
+use hybridsim_fft::{Fft, FftDirection, FftPlanner};
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::{Fft, FftDirection, FftPlanner};
 
 use super::codes::{self, Component};
 use super::course::Course;

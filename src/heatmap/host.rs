@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use hybridsim_fft::{Fft, FftPlanner};
 use num_complex::{Complex32, Complex64};
-use rustfft::{Fft, FftPlanner};
 use serde::{Deserialize, Serialize};
 
 use super::{Axis, HeatmapConfig, Map, Window, range_axis, range_bins, velocity_axis};

@@ -1,9 +1,9 @@
 //! Velocity against time by the short-time Fourier transform over all chirps (the spectrogram of micro-Doppler pictures; Chen, The
 //! Micro-Doppler Effect in Radar, 2011, ch. 2), where [`Analysis::time_doppler`] has one column a frame.
 
+use hybridsim_fft::FftPlanner;
 use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 
 use super::{Analysis, Axis, Gate, Map, Samples, axes::doppler_turns_per_loop};
 use crate::radar::Radar;

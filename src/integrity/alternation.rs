@@ -7,9 +7,9 @@
 //! take turns. Loops of another gain or phase share one factor at all returns, as a receiver or a synthesiser that takes turns has; they
 //! must take turns beyond the best such factor, too.
 
+use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::stream::{Schedule, Stream};

@@ -7,8 +7,8 @@
 //! their Fisher transforms (artanh of the coherence, in the order of the channels), Bonferroni over the exchanges. Where no
 //! exchange makes them less coherent, nothing can be decided.
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use super::still::{Still, transformed};
 use super::stream::{Schedule, Stream};

@@ -6,8 +6,8 @@
 //! all of its samples show one scene. Lengths near whole numbers of chirps are not tried: the receivers of one chirp share its phase, and
 //! neighbouring chirps what moves.
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use super::stream::{Schedule, Stream};
 use super::{ALARM, Finding, Inspector, Kind};

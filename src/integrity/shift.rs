@@ -12,8 +12,8 @@
 
 use std::sync::Arc;
 
+use hybridsim_fft::{Fft, FftPlanner};
 use num_complex::Complex64;
-use rustfft::{Fft, FftPlanner};
 
 use super::stream::{Schedule, Stream};
 use super::{ALARM, Finding, Inspector, Kind};

@@ -1,7 +1,7 @@
 //! Static clutter in a stream: the sum of all its loops, and the noise that neighbouring loops differ by.
 
+use hybridsim_fft::{Fft, FftPlanner};
 use num_complex::{Complex32, Complex64};
-use rustfft::{Fft, FftPlanner};
 
 use super::stream::{Schedule, Stream};
 

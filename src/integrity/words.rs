@@ -13,8 +13,8 @@
 //! Bonferroni). Where neither the words as read nor the exchanged ones look exchanged, as where
 //! returns fill the whole band alike, nothing can be decided.
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use super::exchange::{Halves, bins};
 use super::still::{Sum, transformed};

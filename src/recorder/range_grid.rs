@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
+use hybridsim_fft::{Fft, FftPlanner32};
 use num_complex::{Complex32, Complex64};
-use rustfft::{Fft, FftPlanner};
 
 /// Width of the kernel in cells.
 const TAPS: usize = 8;
@@ -55,7 +55,7 @@ impl RangeGrid {
                 1.0 / spectrum
             })
             .collect();
-        Self { samples, size, table, correction, fft: FftPlanner::new().plan_fft_inverse(size) }
+        Self { samples, size, table, correction, fft: FftPlanner32::new().plan_fft_inverse(size) }
     }
 
     /// Cells of the grid; a tone of `turns_per_sample` sits at cell `turns_per_sample · size`, modulo size.

@@ -1,10 +1,10 @@
 //! The receiver: its unknown gain, its noise and its converter.
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use rustfft::FftPlanner;
 use serde::{Deserialize, Serialize};
 
 use crate::data::{IfFrame, IfLayout};

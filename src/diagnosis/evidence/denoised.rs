@@ -1,9 +1,9 @@
 //! The signal without most of its noise: a product of a signal with itself, as non-linear effects make it, would
 //! otherwise hold the noise times the strongest return wherever nothing else is.
 
+use hybridsim_fft::FftDirection;
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::FftDirection;
 
 use super::{Evidence, fft_2d};
 

@@ -7,12 +7,12 @@
 //! a parametric bootstrap with refit, in which noise of the same extent goes through the same levels, beams and boxes, the body's cells
 //! left out alike. A Gumbel law through the draws, to which maxima of exponential tails tend, gives chances between and beyond them.
 
+use hybridsim_fft::FftPlanner32;
 use num_complex::Complex32;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 
 use crate::diagnosis::Evidence;
 use crate::diagnosis::locate::{Table, intervals};
@@ -179,7 +179,7 @@ impl Cells {
         let [frames, loops, bins] = self.expected.shape();
         let channels = self.channels;
         let scales: Vec<f32> = levels.iter().map(|level| (level * channels as f64).sqrt().recip() as f32).collect();
-        let fft = FftPlanner::new().plan_fft_forward(channels);
+        let fft = FftPlanner32::new().plan_fft_forward(channels);
         let mut scratch = vec![Complex32::ZERO; fft.get_inplace_scratch_len()];
         let mut column = vec![Complex32::ZERO; channels];
         let mut beams = Grid::filled(["beam", "frame", "doppler", "range"], [channels + 1, frames, loops, bins], 0.0);

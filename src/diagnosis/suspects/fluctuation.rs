@@ -14,8 +14,8 @@ mod sinusoid;
 
 use std::sync::Arc;
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::Evidence;

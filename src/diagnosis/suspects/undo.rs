@@ -1,7 +1,7 @@
 //! Slow-time fields taken out of the samples again.
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use crate::diagnosis::cube::Cube;
 use crate::radar::Radar;

@@ -1,6 +1,6 @@
 //! Noise that is not white.
 
-use rustfft::FftPlanner;
+use hybridsim_fft::FftPlanner;
 
 use super::context::Context;
 use super::effect::Effect;

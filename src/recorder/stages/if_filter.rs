@@ -2,8 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use crate::radar::Radar;
 use crate::recorder::effects::{EffectsConfig, IfHighpass, IfLowpass, Section};

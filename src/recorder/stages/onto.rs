@@ -4,8 +4,8 @@
 //! effects in the recorder's order (leakage, oscillator, antennas, gains, nonlinearity, what is added, noise, converter), but what
 //! the samples hold has been through a converter before, and its noise goes through the effects too.
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use super::chain::{Chain, damage};
 use super::channels::Channels;

@@ -7,10 +7,10 @@
 
 use std::sync::Arc;
 
+use hybridsim_fft::{Fft, FftDirection, FftPlanner};
 use num_complex::Complex64;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use rustfft::{Fft, FftDirection, FftPlanner};
 
 use crate::diagnosis::evidence::fft_2d;
 

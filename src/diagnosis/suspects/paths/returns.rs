@@ -128,7 +128,7 @@ impl<'a> Returns<'a> {
                 left / total[range].powi(2)
             })
             .collect();
-        let mut planner = rustfft::FftPlanner::new();
+        let mut planner = hybridsim_fft::FftPlanner::new();
         let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
         let of_channel = |channel: usize| -> Vec<Complex64> {
             let mut sum = vec![Complex64::ZERO; samples];

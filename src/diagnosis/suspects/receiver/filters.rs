@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use crate::diagnosis::finding::Estimate;
 use crate::effects;
@@ -123,8 +123,8 @@ pub fn decay(turns_per_sample: f64, power: i32, samples: usize, amplitude: f64) 
 /// A multiplication of a chirp's DFT.
 pub struct Filter {
     response: Vec<Complex64>,
-    forward: Arc<dyn rustfft::Fft<f64>>,
-    inverse: Arc<dyn rustfft::Fft<f64>>,
+    forward: Arc<dyn hybridsim_fft::Fft<f64>>,
+    inverse: Arc<dyn hybridsim_fft::Fft<f64>>,
 }
 
 impl Filter {

@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
+use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use super::still_term::subtract;
 use super::support::{energy, range_m, ranges_m, tone};

@@ -6,10 +6,10 @@
 
 use std::sync::Arc;
 
+use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 
 use super::field::{Field, add, orthonormal};
 use super::filters::{Filter, SHAPES, Shape, decay};

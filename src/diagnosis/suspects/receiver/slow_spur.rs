@@ -6,9 +6,9 @@
 
 use std::f64::consts::TAU;
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::statistics::corrected;

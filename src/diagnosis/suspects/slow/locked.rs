@@ -7,9 +7,9 @@
 
 use std::sync::Arc;
 
+use hybridsim_fft::{FftDirection, FftPlanner};
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::{FftDirection, FftPlanner};
 
 use super::settling::{Decay, ENOUGH};
 use crate::diagnosis::behaviour::Behaviour;

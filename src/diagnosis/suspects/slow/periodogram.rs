@@ -1,8 +1,8 @@
 //! The coherent periodogram of a series that is sampled in frames that are apart, with a free constant.
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 
 use super::field::{Field, Series};
 

@@ -1,7 +1,7 @@
 //! What is random from chirp to chirp, yet common to all static returns.
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use super::field::{Field, Part, Series};
 use crate::diagnosis::statistics;

@@ -1,7 +1,7 @@
 //! Frames' means over range, in which a return that moves slowly is followed.
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::evidence::{Evidence, hann};

@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use hybridsim_fft::FftPlanner;
 use nalgebra::DVector;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::power::PowerModel;

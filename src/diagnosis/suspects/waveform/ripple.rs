@@ -7,9 +7,9 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::Cube;

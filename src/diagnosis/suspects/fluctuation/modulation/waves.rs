@@ -2,8 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 use super::chirps::{Chirps, reached};
 use super::line::Line;

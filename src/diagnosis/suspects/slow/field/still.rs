@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use hybridsim_fft::{Fft, FftPlanner};
 use num_complex::Complex64;
-use rustfft::{Fft, FftPlanner};
 
 use super::part::{Group, ahead};
 use crate::diagnosis::evidence::{Evidence, blackman_harris};

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 use std::iter::once;
 
+use hybridsim_fft::{FftDirection, FftPlanner};
 use num_complex::Complex64;
-use rustfft::{FftDirection, FftPlanner};
 
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::statistics;
