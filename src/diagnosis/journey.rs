@@ -152,9 +152,16 @@ fn first_to_be_mended(
         return Some(reason);
     }
     observed_again(original, config, checks, progress);
-    let wrong = audit::wrong_convention(checks)?;
+    let wrong = audit::wrong_conventions(checks);
+    let (first, others) = wrong.split_first()?;
     // Physics fitted under a wrong convention would only imitate it.
-    Some(format!("a convention, or the scene as it is stated, is wrong, which comes before any physics: {}", wrong.found))
+    let mut reason =
+        format!("a convention, or the scene as it is stated, is wrong, which comes before any physics: {}", first.found);
+    if !others.is_empty() {
+        let found: Vec<&str> = others.iter().map(|check| check.found.as_str()).collect();
+        reason += &format!(". What else is wrong, perhaps because of it: {}", found.join("; "));
+    }
+    Some(reason)
 }
 
 /// Verdict, effects, limits and probabilities, by what the rounds left.

@@ -101,11 +101,11 @@ pub fn is_convention(check: &Check) -> bool {
 /// What a wrong convention of the motion or the radar breaks, too: a person who walks the other way may walk through a wall.
 const BROKEN_BY_OTHERS: [&str; 2] = ["body_in_room", "room"];
 
-/// The convention to be mended first, if one is wrong.
-pub fn wrong_convention(checks: &[Check]) -> Option<&Check> {
+/// The conventions that are wrong, those first that may have broken the others.
+pub fn wrong_conventions(checks: &[Check]) -> Vec<&Check> {
     let mut wrong: Vec<&Check> = checks.iter().filter(|check| !check.ok && is_convention(check)).collect();
     wrong.sort_by_key(|check| BROKEN_BY_OTHERS.contains(&check.check.as_str()));
-    wrong.first().copied()
+    wrong
 }
 
 /// Whether a body was expected and is observed nowhere.
@@ -165,12 +165,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_wrong_convention_breaks_is_mended_with_it() {
+    fn what_a_wrong_convention_breaks_comes_after_it() {
         let check = |name: &str, ok: bool| Check::new(name, "expected", format!("{name} found"), ok);
-        let mended = |checks: &[Check]| wrong_convention(checks).map(|check| check.check.clone());
+        let wrong = |checks: &[Check]| wrong_conventions(checks).iter().map(|check| check.check.clone()).collect::<Vec<_>>();
         let turned = [check("body_in_room", false), check("doppler_sign", true), check("heading", false)];
-        assert_eq!(mended(&turned).as_deref(), Some("heading"));
-        assert_eq!(mended(&[check("body_in_room", false), check("heading", true)]).as_deref(), Some("body_in_room"));
-        assert_eq!(mended(&[check("rail", false), check("room", true)]), None);
+        assert_eq!(wrong(&turned), ["heading", "body_in_room"]);
+        assert_eq!(wrong(&[check("body_in_room", false), check("heading", true)]), ["body_in_room"]);
+        assert!(wrong(&[check("rail", false), check("room", true)]).is_empty());
     }
 }
