@@ -84,15 +84,14 @@ impl TrainingProgress {
             Event::Step { step, loss, .. } => {
                 if let Some(progress) = &self.progress {
                     progress.set(*step);
-                    progress.message(format!("loss {}", self.scale.shown(*loss)));
+                    progress.message(format!("loss {}", self.scale.with_unit(*loss)));
                 }
             }
             Event::Epoch(metrics) => {
                 if let Some(progress) = &self.progress {
-                    let with_unit = |loss: f64| self.scale.shown(loss);
-                    let held_out =
-                        metrics.validation_loss.map_or(String::new(), |loss| format!(", held out {}", with_unit(loss)));
-                    progress.line(&format!("epoch {}: loss {}{held_out}", metrics.epoch + 1, with_unit(metrics.training_loss)));
+                    let held_out = metrics.validation_loss.map(|loss| format!(", held out {}", self.scale.with_unit(loss)));
+                    let (trained, held_out) = (self.scale.with_unit(metrics.training_loss), held_out.unwrap_or_default());
+                    progress.line(&format!("epoch {}: loss {trained}{held_out}", metrics.epoch + 1));
                 }
             }
             Event::Saved(_) => {}

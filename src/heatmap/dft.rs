@@ -191,8 +191,17 @@ pub fn power_db<const D: usize>(power: Tensor<D>, floor_amplitude: f64) -> Tenso
 /// # Gradient
 /// Flows to `signal`; linear.
 pub fn remove_loop_mean<const D: usize>(signal: Complex<D>) -> Complex<D> {
+    let [_, moving] = split_loop_mean(signal);
+    moving
+}
+
+/// The mean over the loops (the second last axis, of which one place is left), and every sample less it.
+///
+/// # Gradient
+/// Flows to `signal`; linear.
+pub fn split_loop_mean<const D: usize>(signal: Complex<D>) -> [Complex<D>; 2] {
     let mean = signal.clone().mean_dim(D - 2);
-    signal.sub(mean)
+    [mean.clone(), signal.sub(mean)]
 }
 
 /// Doppler spectrum of every frame: power summed over range, averaged over the antennas.

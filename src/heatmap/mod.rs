@@ -20,7 +20,7 @@ mod windows;
 
 pub use angle::Scan;
 pub use axes::{doppler_turns_per_loop, range_axis, range_bins, velocity_axis};
-pub use dft::{RangeDoppler, power_db, remove_loop_mean, time_doppler};
+pub use dft::{RangeDoppler, power_db, remove_loop_mean, split_loop_mean, time_doppler};
 pub use gate::Gate;
 pub use host::{Analysis, Samples, StaticRemoval, mean_power, remove_static};
 pub use map::{Axis, Map};

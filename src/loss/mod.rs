@@ -10,7 +10,7 @@ use self::likelihood::{Cells, NoiseGains};
 use crate::{
     complex::Complex,
     error::{Error, Result},
-    heatmap::{HeatmapConfig, RangeDoppler, power_db, remove_loop_mean},
+    heatmap::{HeatmapConfig, RangeDoppler, power_db, remove_loop_mean, split_loop_mean},
     radar::Radar,
 };
 
@@ -33,9 +33,9 @@ pub enum Scale {
     Db,
     /// The amplitude over that of the recording's strongest cell: what the paper's supplement 8 argues against.
     Linear,
-    /// The law of the measured power P. Of what moves: exponential with mean |s|² + N, the simulated power and the noise's, as of a complex
-    /// Gaussian cell (deviance of Itakura & Saito 1968). Of static returns, a cell for each range: log-normal. It hardly weighs what is
-    /// below the noise.
+    /// The law of the measured power P. Of what moves: of a complex Gaussian cell, exponential where noise prevails and the ratio of two
+    /// draws where the simulated return does (F with 2 and 2 degrees of freedom). Of static returns, a cell for each range: log-normal.
+    /// It hardly weighs what is below the noise.
     #[default]
     Likelihood,
 }
@@ -51,7 +51,7 @@ impl Scale {
     }
 
     /// A loss with its unit, with as many digits as tell two epochs apart.
-    pub fn shown(self, loss: f64) -> String {
+    pub fn with_unit(self, loss: f64) -> String {
         let unit = self.unit();
         match self {
             Self::Db => format!("{loss:.2} {unit}"),
@@ -219,7 +219,7 @@ impl DbLoss {
         let static_noise = variance.map(|variance| variance * likelihood::mean_logarithm(self.noise.static_profile));
         let measured = self.cells(measured, None, None);
         let simulated = self.cells(clean, moving_noise, static_noise);
-        let moving = likelihood::moving_deviance(measured.moving_db - simulated.moving_db);
+        let moving = likelihood::moving_deviance(measured.moving_db - simulated.moving_db, simulated.share);
         let Some((measured, simulated)) = measured.static_db.zip(simulated.static_db) else { return moving.mean() };
         let cells = moving.dims().iter().product::<usize>() + measured.dims().iter().product::<usize>();
         (moving.sum() + likelihood::static_deviance(measured - simulated).sum()) / cells as f64
@@ -227,21 +227,19 @@ impl DbLoss {
 
     /// The cells of a signal, and the noise's power added to them.
     fn cells(&self, signal: Complex<5>, moving_noise: Option<Tensor<3>>, static_noise: Option<Tensor<3>>) -> Cells {
-        let db = |power: Tensor<3>, noise: Option<Tensor<3>>| {
-            let power = match noise {
-                Some(noise) => power + noise,
-                None => power,
-            };
-            power_db(power, self.floor_amplitude)
+        let with = |power: Tensor<3>, noise: Option<Tensor<3>>| match noise {
+            Some(noise) => power + noise,
+            None => power,
         };
-        let signal = self.chosen(signal);
-        let mean = signal.clone().mean_dim(2);
-        let static_db = (!self.static_removed).then(|| {
-            let profile = self.transform.profiles(mean.clone()).power();
-            db(self.combined(profile), static_noise)
-        });
-        let map = self.transform.map(signal.sub(mean)).power();
-        Cells { moving_db: db(self.combined(map), moving_noise), static_db }
+        let db = |power: Tensor<3>| power_db(power, self.floor_amplitude);
+        let [at_rest, moving] = split_loop_mean(self.chosen(signal));
+        let moving = self.combined(self.transform.map(moving).power());
+        let mean = with(moving.clone(), moving_noise);
+        // The floor decides where there is neither return nor noise.
+        let share = moving.clone() / (moving + mean.clone() + self.floor_amplitude.powi(2));
+        let static_db =
+            (!self.static_removed).then(|| db(with(self.combined(self.transform.profiles(at_rest).power()), static_noise)));
+        Cells { moving_db: db(mean), share, static_db }
     }
 }
 

@@ -95,6 +95,38 @@ fn the_likelihood_finds_a_level_in_speckle_and_noise_where_decibels_do_not() {
     assert!((expected + 2.5).abs() < 0.2, "{expected} dB");
 }
 
+#[test]
+fn a_level_is_found_from_one_draw_of_speckle_in_another() {
+    let device = Device::flex();
+    let count = 1 << 16;
+    let tensor = |values: Vec<f64>| Tensor::<3>::from_data(TensorData::new(values, [1, 1, count]), (&device, DType::F64));
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(11);
+    let mut draws = |mean: f64| -> Vec<f64> {
+        (0..count).map(|_| mean * rand_distr::Distribution::<f64>::sample(&rand_distr::Exp1, &mut random)).collect()
+    };
+    let mut worst = [0.0f64; 2];
+    for over_noise_db in [0.0, 10.0, 20.0, 30.0] {
+        let mean = 10f64.powf(over_noise_db / 10.0);
+        let (measured, simulated) = (tensor(draws(mean + 1.0)).log(), tensor(draws(mean)));
+        let deviance = |level_db: f64, as_a_draw: bool| {
+            let power = simulated.clone() * 10f64.powf(level_db / 10.0);
+            let expected = power.clone() + 1.0;
+            let ratio_db = (measured.clone() - expected.clone().log()) * (10.0 / std::f64::consts::LN_10);
+            let share = if as_a_draw { power.clone() / (power + expected) } else { power * 0.0 };
+            likelihood::moving_deviance(ratio_db, share).mean().into_scalar::<f64>()
+        };
+        for (worst, as_a_draw) in worst.iter_mut().zip([true, false]) {
+            let levels = (-20..=40).map(|step| f64::from(step) / 4.0);
+            let value = |level_db: f64| deviance(level_db, as_a_draw);
+            let found = levels.min_by(|a, b| value(*a).total_cmp(&value(*b))).unwrap();
+            *worst = worst.max(found.abs());
+        }
+    }
+    assert!(worst[0] <= 1.0, "{} dB", worst[0]);
+    // A draw that is taken for the mean makes what moves too strong.
+    assert!(worst[1] >= 6.0, "{} dB", worst[1]);
+}
+
 /// A radar of one antenna pair, and its likelihood.
 fn likelihood(loops: usize, samples: usize, heatmap: &HeatmapConfig, device: &Device) -> DbLoss {
     let one = vec![[0.0; 3]];
@@ -124,7 +156,7 @@ fn under_noise_alone_each_kind_of_cell_has_the_deviance_of_its_law() {
         );
         let silent = loss.cells(Complex::new(silence.clone(), silence), Some(loss.noise.moving.clone()), Some(noise));
         // Row by row: the mean of x − ln x − 1 of an exponential is γ. A rectangular window leaves nothing at zero Doppler.
-        let rows = likelihood::moving_deviance(measured.moving_db - silent.moving_db).mean_dim(2);
+        let rows = likelihood::moving_deviance(measured.moving_db - silent.moving_db, silent.share).mean_dim(2);
         for (row, deviance) in rows.into_data().iter::<f64>().enumerate() {
             let expected = if window == Window::Rectangular && row == loops / 2 { 0.0 } else { 0.5772 };
             assert!((deviance - expected).abs() < 0.05, "{window:?} {row}: {deviance}");

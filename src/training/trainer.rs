@@ -18,8 +18,7 @@ use crate::{
     bounds,
     error::{Error, Result},
     heatmap::RangeDoppler,
-    loss::DbLoss,
-    loss::Scale,
+    loss::{DbLoss, Scale},
     simulator::{Mode, Simulator, SimulatorConfig},
 };
 
@@ -33,7 +32,6 @@ pub enum Event {
         first_step: usize,
         training_frames: usize,
         validation_frames: usize,
-        /// Of the loss.
         /// Of the loss.
         scale: Scale,
     },

@@ -143,13 +143,13 @@ impl RunReport<'_> {
     fn write_report(&self, evaluations: &[(PathBuf, Evaluation)], held_out: bool) -> Result<()> {
         let history = &self.progress.history;
         let (first, best) = (&history[0], &history[self.progress.best_epoch]);
-        let with_unit = |loss: f64| self.config.training.loss.scale.shown(loss);
+        let scale = self.config.training.loss.scale;
         let lead = format!(
             "{} epochs; the best was epoch {}: loss {} after {} in the first{}.",
             self.progress.epochs_done,
             best.epoch + 1,
-            with_unit(best.score()),
-            with_unit(first.score()),
+            scale.with_unit(best.score()),
+            scale.with_unit(first.score()),
             if held_out { ", on held-out frames" } else { " (no frames were held out)" }
         );
         let which = if held_out { "held-out" } else { "training" };
