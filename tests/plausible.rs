@@ -162,6 +162,14 @@ fn check_says_what_a_body_or_a_motion_is() {
     for part in ["motion: recording/motion.npz", "mocap_framerate", " Hz, ", "speed ", "deg from y"] {
         assert!(out(&output).contains(part), "`{part}` is missing in:\n{}", out(&output));
     }
+    // The hint of a motion that seems to lie is one that `check` takes, and nothing else does.
+    let lying = hybridsim(&["check", "recording/motion.npz", "--up", "z"], made.path());
+    assert!(format!("{}{}", out(&lying), err(&lying)).contains("lies"), "{}{}", out(&lying), err(&lying));
+    for path in ["recording", "body.npz"] {
+        let path = if path == "recording" { made.path().join(path) } else { body.clone() };
+        let output = hybridsim(&["check", path.to_str().unwrap(), "--up", "z"], folder.path());
+        assert!(output.status.code() == Some(2) && err(&output).contains("--up: no motion's file is read"), "{}", err(&output));
+    }
     std::fs::write(folder.path().join("nothing.bvh"), "no hierarchy").unwrap();
     assert_eq!(hybridsim(&["check", "nothing.bvh"], folder.path()).status.code(), Some(2));
 }
@@ -181,6 +189,14 @@ fn check_says_what_a_mesh_is() {
     let text = out(&output);
     assert!(output.status.success() && text.contains("8 x 12, one pose") && text.contains("closed, volume 0.2550 m3"), "{text}");
     assert!(err(&output).contains("metres are assumed"), "{}", err(&output));
+    // With y up, as many tools write.
+    let y_up = |line: &str| match line.split(' ').collect::<Vec<_>>()[..] {
+        ["v", x, y, z] => format!("v {x} {z} -{y}\n"),
+        _ => format!("{line}\n"),
+    };
+    std::fs::write(&path, cuboid(1.7).lines().map(y_up).collect::<String>()).unwrap();
+    let output = hybridsim(&["check", "body.obj"], folder.path());
+    assert!(output.status.success() && err(&output).contains("90 deg from z"), "{}", err(&output));
     // In millimetres along one axis, and inside out.
     std::fs::write(&path, cuboid(1700.0)).unwrap();
     let text = err(&hybridsim(&["check", "body.obj"], folder.path()));

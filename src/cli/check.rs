@@ -5,7 +5,13 @@ use std::path::{Path, PathBuf};
 use burn::tensor::Device;
 use clap::Args;
 
-use super::{Common, Out, conventions, conventions::Against, describe, plausible};
+use super::{
+    Common, Out, conventions,
+    conventions::Against,
+    describe,
+    motion::{MotionReading, READING_HINT},
+    plausible,
+};
 use crate::{
     config::Config,
     data::{Recording, atomic::AtomicFolder},
@@ -26,11 +32,16 @@ pub(crate) struct Arguments {
     /// (vertices .npy, .obj)
     path: PathBuf,
     #[command(flatten)]
+    reading: MotionReading,
+    #[command(flatten)]
     out: Out,
 }
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let path = &arguments.path;
+    if !describe::knows(path) {
+        arguments.reading.refused(READING_HINT)?;
+    }
     if path.join("checkpoint.toml").is_file() {
         let (simulator, state) = checkpoint::open(path, &Device::flex())?;
         say!(
@@ -65,7 +76,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         return Ok(());
     }
     if describe::knows(path) {
-        return describe::run(path, common);
+        return describe::run(path, &arguments.reading, common);
     }
     let config = Config::read(path, &common.set)?;
     for recording in &config.data.recordings {

@@ -2,7 +2,11 @@
 
 use std::path::Path;
 
-use super::{Common, plausible};
+use super::{
+    Common,
+    motion::{MotionReading, READING_HINT},
+    plausible,
+};
 use crate::{
     data::{arrays::Npz, read_body, read_meshes},
     error::Result,
@@ -28,19 +32,23 @@ pub(super) fn knows(path: &Path) -> bool {
 ///
 /// # Errors
 /// A file that is none of them, or cannot be read, or cannot be meant.
-pub(super) fn run(path: &Path, common: &Common) -> Result<()> {
+pub(super) fn run(path: &Path, reading: &MotionReading, common: &Common) -> Result<()> {
     match ending(path).as_str() {
-        "bvh" => return describe_bvh(path, common),
-        "npy" | "obj" => return describe_meshes(path, common),
+        "bvh" => return describe_bvh(path, reading, common),
+        "npy" | "obj" => {
+            reading.refused(READING_HINT)?;
+            return describe_meshes(path, common);
+        }
         _ => {}
     }
     let archive = Npz::open(path)?;
     if archive.has("v_template") {
+        reading.refused(READING_HINT)?;
         return describe_body(path, common);
     }
     say!("motion: {}", path.display());
     say!("  arrays             {}", archive.names().join(", "));
-    describe_motion(path, common)
+    describe_motion(path, reading, common)
 }
 
 fn describe_body(path: &Path, common: &Common) -> Result<()> {
@@ -90,19 +98,19 @@ fn show_extent(what: &str, points: &[[f64; 3]]) {
     say!("  {what:<18} {:.3} x {:.3} x {:.3} m (x, y, z)", size[0], size[1], size[2]);
 }
 
-fn describe_bvh(path: &Path, common: &Common) -> Result<()> {
+fn describe_bvh(path: &Path, reading: &MotionReading, common: &Common) -> Result<()> {
     let bvh = Bvh::read(path)?;
     say!("motion: {}", path.display());
     let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
     say!("  joints             {}: {}", names.len(), names.join(", "));
     say!("  frame time         {} s ({:.3} Hz)", bvh.frame_time_s, 1.0 / bvh.frame_time_s);
-    describe_motion(path, common)
+    describe_motion(path, reading, common)
 }
 
 /// What becomes of the motion on the embedded person.
-fn describe_motion(path: &Path, common: &Common) -> Result<()> {
+fn describe_motion(path: &Path, reading: &MotionReading, common: &Common) -> Result<()> {
     let model = procedural::person(&PersonConfig::default())?;
-    let (motion, notes) = import::read_motion(path, &model, &BvhConfig::default())?;
+    let (motion, notes) = import::read_motion(path, &model, &BvhConfig::read(reading.motion_config.as_deref(), reading.up)?)?;
     for note in notes {
         remark!("note: {note}");
     }

@@ -4,11 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Common, Out, device, effects::WithoutEffects, progress::Shown};
+use super::{Common, Out, device, effects::WithoutEffects, motion::MotionReading, progress::Shown};
 use crate::{
     data::atomic::AtomicFolder,
     error::Result,
-    import::UpAxis,
     person::actions::Action,
     simulator::Part,
     verbs::simulate::{Ready, Simulate, What},
@@ -32,12 +31,8 @@ pub(crate) struct Arguments {
     /// The body that moves, npz in SMPL layout; the embedded person by default
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
-    /// How to read the motion: a TOML file with joint map, units, up axis and frame rate, as docs/motion.md has them
-    #[arg(long, value_name = "FILE", requires = "motion")]
-    motion_config: Option<PathBuf>,
-    /// Up axis of the motion's file: x, y, z, -x, -y or -z; recognised from how the person stands by default
-    #[arg(long, value_name = "AXIS", value_parser = parse_up, allow_hyphen_values = true, requires = "motion")]
-    up: Option<UpAxis>,
+    #[command(flatten)]
+    reading: MotionReading,
     /// Distance of the motion's origin in front of the radar; the training person's place by default
     #[arg(long, value_name = "METRES")]
     distance: Option<f64>,
@@ -54,11 +49,6 @@ pub(crate) struct Arguments {
     without: WithoutEffects,
     #[command(flatten)]
     out: Out,
-}
-
-fn parse_up(name: &str) -> std::result::Result<UpAxis, String> {
-    let names = UpAxis::ALL.map(UpAxis::name).join(", ");
-    UpAxis::ALL.into_iter().find(|axis| axis.name() == name).ok_or_else(|| format!("expected one of {names}"))
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -86,14 +76,19 @@ fn parse_action(name: &str) -> std::result::Result<Action, String> {
 }
 
 impl Arguments {
-    fn asked(&self) -> Simulate {
+    fn asked(&self) -> Result<Simulate> {
+        if self.motion.is_none() {
+            self.reading.refused("name it with --motion")?;
+        }
         let what = match (&self.motion, self.action, &self.recording) {
-            (Some(path), ..) => What::Motion { path: path.clone(), config: self.motion_config.clone(), up: self.up },
+            (Some(path), ..) => {
+                What::Motion { path: path.clone(), config: self.reading.motion_config.clone(), up: self.reading.up }
+            }
             (None, Some(action), _) => What::Action(action),
             (None, None, Some(recording)) => What::Recording(recording.clone()),
             (None, None, None) => unreachable!("clap asks for one of them"),
         };
-        Simulate {
+        Ok(Simulate {
             checkpoint: self.checkpoint.clone(),
             what,
             body: self.body.clone(),
@@ -102,16 +97,17 @@ impl Arguments {
             clean: self.clean,
             only: self.only.map(Part::from),
             without: self.without.without(),
-        }
+        })
     }
 }
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let device = device(&common.device)?;
+    let asked = arguments.asked()?;
     let out = arguments.out.out.clone().unwrap_or_else(|| "runs/inferred".into());
     let folder = AtomicFolder::create(&out)?;
     let mut shown = Shown::new(common.quiet);
-    let ready = Ready::new(&arguments.asked(), &device, common.as_stated, &mut |notice| shown.show(notice))?;
+    let ready = Ready::new(&asked, &device, common.as_stated, &mut |notice| shown.show(notice))?;
     ready.write(folder.path(), &mut |notice| shown.show(notice))?;
     shown.finish();
     folder.finish()?;

@@ -31,6 +31,7 @@ mod export;
 mod import;
 mod infer;
 mod interrupt;
+mod motion;
 mod plausible;
 mod progress;
 mod recognize;

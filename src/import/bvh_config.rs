@@ -1,10 +1,11 @@
 //! The settings of a motion file.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
 use serde::{Deserialize, Serialize};
 
-use crate::data::{MotionOptions, RotationUnit, UpAxis};
+use crate::data::{MotionOptions, RotationUnit, UpAxis, settings};
+use crate::error::Result;
 
 /// What a motion file does not say about itself: the TOML file that `--motion-config` names.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,6 +52,15 @@ impl Default for BvhConfig {
 }
 
 impl BvhConfig {
+    /// Of a file, if one is given; `up` goes before what it says.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or holds another key.
+    pub fn read(file: Option<&Path>, up: Option<UpAxis>) -> Result<Self> {
+        let config: Self = file.map_or_else(|| Ok(Self::default()), |file| settings::read_settings(file, &[]))?;
+        Ok(Self { up: up.or(config.up), ..config })
+    }
+
     /// The settings that npz files have in common with BVH.
     pub fn options(&self) -> MotionOptions {
         MotionOptions {

@@ -1,5 +1,7 @@
 //! The body by itself: how long it is, and which way its faces look.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use super::units::{LENGTHS, likely};
 use super::{Facts, Finding, Kind, Part};
 
@@ -64,6 +66,16 @@ pub fn faces_outwards(facts: &Facts) -> Vec<Finding> {
     }]
 }
 
+/// Meshes are in the radar's frame, whose z is up; files of many tools have y up.
+pub fn longest_upwards(facts: &Facts) -> Vec<Finding> {
+    let along_z = facts.body.as_ref().and_then(|body| body.longest_along_z);
+    let Some(cosine) = along_z.filter(|cosine| *cosine < FRAC_1_SQRT_2) else { return vec![] };
+    let angle = cosine.acos().to_degrees();
+    let found = format!("a surface whose longest axis is {angle:.0} deg from z");
+    let hint = "meshes are in the radar's frame, z up: where y is up, write (x, -z, y) in place of (x, y, z)";
+    vec![Finding::new(Kind::Note, Part::Body, "vertices", found, "somebody upright").with_hint(hint)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -91,12 +103,29 @@ mod tests {
     #[test]
     fn a_raised_arm_makes_no_giant_of_a_mesh() {
         let body = |length_m| Facts {
-            body: Some(BodyFacts { length_m, volume_m3: 0.07, open: None, meshes: true }),
+            body: Some(BodyFacts { length_m, volume_m3: 0.07, open: None, meshes: true, longest_along_z: None }),
             ..Facts::default()
         };
         assert!(length(&body([0.9, 3.1])).is_empty());
         assert_eq!(length(&body([90.0, 310.0]))[0].field, "vertices");
         assert_eq!(length(&body([0.1, 0.2])).len(), 1);
+    }
+
+    #[test]
+    fn meshes_that_lie_are_noted_and_those_that_stand_or_bend_a_little_are_not() {
+        let of = |size: [f64; 3]| {
+            let (vertices, faces) = cuboid([3.0, 2.0, 1.0], size);
+            longest_upwards(&Facts { body: Some(BodyFacts::of_meshes(&[vertices], &faces)), ..Facts::default() })
+        };
+        assert!(of([0.5, 0.3, 1.75]).is_empty());
+        let y_up = &of([0.5, 1.75, 0.3])[0];
+        assert!(y_up.kind == Kind::Note && y_up.found.contains("90 deg from z"), "{y_up:?}");
+        // Leaning by 30 degrees, and without any surface.
+        let (mut vertices, faces) = cuboid([0.0; 3], [0.5, 0.3, 1.75]);
+        vertices.iter_mut().for_each(|vertex| vertex[0] += vertex[2] * 30f64.to_radians().tan());
+        let leaning = BodyFacts::of_meshes(&[vertices.clone()], &faces);
+        assert!(longest_upwards(&Facts { body: Some(leaning), ..Facts::default() }).is_empty());
+        assert_eq!(BodyFacts::of_meshes(&[vertices], &[]).longest_along_z, None);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! What the checks look at: the settings, the body, and the course of its motion seen at moments close enough together.
 
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::CodeFacts;
@@ -44,6 +45,9 @@ pub struct BodyFacts {
     pub open: Option<String>,
     /// Whether it is a sequence of meshes, not a skinned body.
     pub meshes: bool,
+    /// Of a sequence of meshes: cosine between z and the axis along which the surface is longest, in the median pose. Which end is
+    /// the head is not known: 0 to 1.
+    pub longest_along_z: Option<f64>,
 }
 
 /// The way of the root, pose by pose.
@@ -131,6 +135,7 @@ impl BodyFacts {
             volume_m3: mesh::volume(&about, faces),
             open: mesh::check_closed(vertices.len(), faces).err(),
             meshes: false,
+            longest_along_z: None,
         }
     }
 
@@ -140,7 +145,10 @@ impl BodyFacts {
         let [least, most] =
             lengths.fold([f64::INFINITY, 0.0], |[least, most], length| [least.min(length), f64::max(most, length)]);
         let first = vertices.first().map_or(&[][..], Vec::as_slice);
-        Self { length_m: [least, most], meshes: true, ..Self::of_mesh(first, faces) }
+        let mut along_z: Vec<f64> = vertices.iter().filter_map(|mesh| longest_along_z(mesh, faces)).collect();
+        along_z.sort_by(f64::total_cmp);
+        let longest_along_z = along_z.get(along_z.len() / 2).copied();
+        Self { length_m: [least, most], meshes: true, longest_along_z, ..Self::of_mesh(first, faces) }
     }
 }
 
@@ -208,6 +216,27 @@ impl Look {
     }
 }
 
+/// Cosine between z and the first principal axis of a surface.
+fn longest_along_z(vertices: &[Point], faces: &[[usize; 3]]) -> Option<f64> {
+    let corners = || faces.iter().map(|face| face.map(|vertex| Vector3::from(vertices[vertex])));
+    let area = |[a, b, c]: [Vector3<f64>; 3]| (b - a).cross(&(c - a)).norm() / 2.0;
+    let whole: f64 = corners().map(area).sum();
+    let middle = corners().map(|face| face.iter().sum::<Vector3<f64>>() * (area(face) / 3.0)).sum::<Vector3<f64>>() / whole;
+    // Second moment of a triangle: A/12 · (Σ vvᵀ + (Σ v)(Σ v)ᵀ).
+    let moment = |face: [Vector3<f64>; 3]| {
+        let about = face.map(|corner| corner - middle);
+        let sum: Vector3<f64> = about.iter().sum();
+        (about.iter().map(|corner| corner * corner.transpose()).sum::<Matrix3<f64>>() + sum * sum.transpose())
+            * (area(face) / 12.0)
+    };
+    let spread: Matrix3<f64> = corners().map(moment).sum();
+    if !(whole > 0.0 && spread.iter().all(|value| value.is_finite())) {
+        return None;
+    }
+    let axes = spread.symmetric_eigen();
+    Some(axes.eigenvectors[(2, axes.eigenvalues.imax())].abs())
+}
+
 /// Cosine between pelvis to head and up, of a body with SMPL's joints.
 fn upright(person: &Person, vertices: &[Point]) -> Option<f64> {
     let Person::Skinned { model, .. } = person else { return None };
@@ -235,7 +264,7 @@ fn fastest(now: &[Point], later: &[Point], after_s: f64, radar_m: Point) -> [f64
 /// inside-outside segmentation using generalized winding numbers"; solid angle by Van Oosterom and Strackee 1983).
 fn winding_number(vertices: &[Point], faces: &[[usize; 3]], point: Point) -> f64 {
     let solid_angle = |face: &[usize; 3]| {
-        let [a, b, c] = face.map(|vertex| nalgebra::Vector3::from(minus(vertices[vertex], point)));
+        let [a, b, c] = face.map(|vertex| Vector3::from(minus(vertices[vertex], point)));
         let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
         2.0 * a.dot(&b.cross(&c)).atan2(la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb)
     };

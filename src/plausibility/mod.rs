@@ -101,7 +101,7 @@ type Check = fn(&Facts) -> Vec<Finding>;
 /// All checks, in stages: what follows from a wrong unit is not reported beside it.
 const STAGES: [&[Check]; 6] = [
     &[codes::unsigned, radar::frequencies, radar::times, radar::sweep, antennas::spacing],
-    &[body::length, body::faces_outwards],
+    &[body::length, body::faces_outwards, body::longest_upwards],
     &[motion::angles],
     &[motion::speed_of_the_root],
     &[motion::speed_of_limbs, motion::upright],

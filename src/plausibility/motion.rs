@@ -183,7 +183,7 @@ mod tests {
             speed_mps: None,
         };
         Facts {
-            body: Some(BodyFacts { length_m: [1.7; 2], volume_m3: 0.07, open: None, meshes: false }),
+            body: Some(BodyFacts { length_m: [1.7; 2], volume_m3: 0.07, open: None, meshes: false, longest_along_z: None }),
             root: Some(RootPath { times_s: vec![0.0, 1.0], positions_m: vec![[0.0; 3], [0.0, 0.0, climb_m]] }),
             course: Some(Course { looks: vec![look; 3] }),
             ..Facts::default()

@@ -13,7 +13,7 @@ use super::{
     simulated::{self, Sequence},
 };
 use crate::{
-    data::{read_body, settings::read_settings},
+    data::read_body,
     error::{Error, Result},
     evaluation::Simulation,
     import::{self, BvhConfig, UpAxis},
@@ -228,11 +228,7 @@ fn new_person(asked: &Simulate, state: &CheckpointState, notify: &mut Notify<'_>
     let mut labels = BTreeMap::new();
     let motion = match &asked.what {
         What::Motion { path, config, up } => {
-            let mut config: BvhConfig = match config {
-                Some(config) => read_settings(config, &[])?,
-                None => BvhConfig::default(),
-            };
-            config.up = up.or(config.up);
+            let config = BvhConfig::read(config.as_deref(), *up)?;
             let (motion, notes) = import::read_motion(path, &model, &config)?;
             notes.iter().for_each(|note| notify(Notice::Note(note)));
             // A captured motion starts wherever its recorder's floor had its origin: its path is centred instead, with the
