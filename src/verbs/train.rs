@@ -69,7 +69,7 @@ pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, notify: &mu
         found::add(&mut config, &run_folder, resume.is_some(), &devices[0], as_stated, notify)?;
     }
     let config_toml = config.to_toml();
-    if resume.is_some() && by_config {
+    if resume.is_some() {
         is_the_same(&run_folder.join("config.toml"), &config_toml)?;
     }
     atomic::write_text(run_folder.join("config.toml"), &config_toml)?;
@@ -127,16 +127,29 @@ fn has_recordings(config: &mut Config, config_path: &Path, as_stated: bool, noti
     Ok(())
 }
 
-/// Refuses to go on with a run of other settings.
-fn is_the_same(file: &Path, settings: &str) -> Result<()> {
-    let found = files::read_text(file)?;
-    let mut pairs = found.lines().zip(settings.lines());
-    let (was, is) = pairs.find(|(was, is)| was != is).unwrap_or(("of another length", "those given now"));
-    match found == settings {
-        true => Ok(()),
-        false => Err(Error::field(file, "the settings", format!("`{was}`"), format!("`{is}`"))
-            .with_hint("train in another folder, or remove this run")),
-    }
+/// Refuses to go on with a run of other settings: those asked for now, or those that a newer version adds with a value of its own.
+fn is_the_same(file: &Path, resolved: &str) -> Result<()> {
+    let table = |text: &str| toml::from_str::<toml::Table>(text).map(toml::Value::Table);
+    // Both have been read as configs.
+    let (Ok(was), Ok(is)) = (table(&files::read_text(file)?), table(resolved)) else { return Ok(()) };
+    let Some((key, was, is)) = first_difference("", Some(&was), Some(&is)) else { return Ok(()) };
+    let shown = |value: Option<&toml::Value>| value.map_or("not set".into(), toml::Value::to_string);
+    Err(Error::field(file, key, shown(was), format!("{}, which this run would go on with", shown(is)))
+        .with_hint("train in another folder, or state in the file what the run was started with"))
+}
+
+type Differing<'a> = (String, Option<&'a toml::Value>, Option<&'a toml::Value>);
+
+/// The first key, with its sections, whose value is not the same in both.
+fn first_difference<'a>(key: &str, a: Option<&'a toml::Value>, b: Option<&'a toml::Value>) -> Option<Differing<'a>> {
+    let (Some(toml::Value::Table(left)), Some(toml::Value::Table(right))) = (a, b) else {
+        return (a != b).then(|| (key.to_string(), a, b));
+    };
+    let keys: std::collections::BTreeSet<&String> = left.keys().chain(right.keys()).collect();
+    keys.into_iter().find_map(|name| {
+        let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+        first_difference(&key, left.get(name), right.get(name))
+    })
 }
 
 /// `runs/<config>`, or the next `runs/<config>-N` that is free.
@@ -155,4 +168,28 @@ fn absolute(paths: &mut [PathBuf]) -> Result<()> {
         *path = files::absolute(&*path)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_goes_on_with_its_own_settings_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("config.toml");
+        let refused = |was: &str, is: &str| {
+            std::fs::write(&file, was).unwrap();
+            is_the_same(&file, is).err().map(|error| error.to_string())
+        };
+        let is = "seed = 1\n[training]\nepochs = 3\n[training.loss]\nscale = \"likelihood\"\n";
+        assert_eq!(refused(is, is), None);
+        let otherwise_written = "# mine\nseed = 1\ntraining = { epochs = 3, loss = { scale = \"likelihood\" } }";
+        assert_eq!(refused(otherwise_written, is), None);
+        let error = refused(&is.replace("epochs = 3", "epochs = 4"), is).unwrap();
+        assert!(error.contains("`training.epochs`") && error.contains("is 4") && error.contains("expected 3"), "{error}");
+        // Of a version that had no such setting.
+        let error = refused("seed = 1\n[training]\nepochs = 3\n[training.loss]\n", is).unwrap();
+        assert!(error.contains("`training.loss.scale`") && error.contains("not set"), "{error}");
+    }
 }
