@@ -136,7 +136,7 @@ impl Signature {
         let radar = &self.world.radar;
         let analysis = Analysis::new(radar, &HeatmapConfig::default());
         let frame = |samples: &Vec<Complex32>| analysis.range_doppler(without.shaped(samples).frame(radar.frames / 2));
-        let over_time = |samples: &Vec<Complex32>| analysis.time_doppler(without.shaped(samples), &Gate::default());
+        let over_time = |samples: &Vec<Complex32>| analysis.spectrogram(without.shaped(samples), &Gate::default());
         let maps = [samples.iter().map(frame).collect(), samples.iter().map(over_time).collect()].map(relative);
         let columns = ["without", "with", "difference"].map(String::from);
         let rows = ["one frame", "all frames"].map(String::from);

@@ -4,18 +4,22 @@ use std::path::Path;
 
 use plotters::prelude::*;
 
-use super::heatmap::{Colours, draw_bar, paint, under};
+use super::heatmap::{Colours, draw_bar, edges, label, paint, under};
 use super::{Area, DrawResult, INK, letters, save, tick};
 use crate::error::Result;
-use crate::heatmap::{Axis, Map};
+use crate::heatmap::Map;
 
 const CELL: (u32, u32) = (260, 190);
-const GAP: u32 = 8;
-const NAMES: u32 = 250;
+const GAP: u32 = 14;
+/// Of the rows' names.
+const NAMES: u32 = 215;
+/// Of the ordinate, left of the first column.
+const LEFT: u32 = 64;
+/// Of an abscissa, below a row.
+const BELOW: u32 = 50;
 const BAR: u32 = 116;
 const TITLE: u32 = 44;
 const HEADS: u32 = 30;
-const FOOT: u32 = 34;
 
 /// What all maps of a grid share.
 pub struct Grid<'a> {
@@ -37,60 +41,83 @@ impl Grid<'_> {
     pub fn save(&self, path: &Path, maps: &[Vec<Map>]) -> Result<()> {
         assert!(!maps.is_empty() && maps.len() == self.rows.len(), "grid: {} rows for {} names", maps.len(), self.rows.len());
         assert!(maps.iter().all(|row| row.len() == self.columns.len()), "grid: rows of {} columns", self.columns.len());
-        let (columns, rows) = (self.columns.len() as u32, self.rows.len() as u32);
-        let size = (NAMES + columns * (CELL.0 + GAP) + BAR, TITLE + HEADS + rows * (CELL.1 + GAP) + FOOT);
+        // An abscissa that all rows share stands below the last.
+        let alike = maps.iter().all(|row| row[0].columns == maps[0][0].columns);
+        let layout = Layout { alike, rows: self.rows.len() as u32, columns: self.columns.len() as u32 };
         let colours = Colours::between(self.low, self.high);
-        // Axes that all rows share are said once.
-        let alike = maps.iter().all(|row| axes(&row[0]) == axes(&maps[0][0]));
-        save(path, size, |area| {
+        save(path, layout.size(), |area| {
             let area = under(area, self.title, 26, TITLE)?;
-            for (column, name) in self.columns.iter().enumerate() {
-                let x = NAMES + column as u32 * (CELL.0 + GAP);
-                let head = area.clone().shrink((x, 0), (CELL.0, HEADS));
-                under(&head, name, 19, HEADS)?;
+            for (column, name) in (0..).zip(self.columns) {
+                let (x, _) = layout.corner(0, column);
+                under(&area.clone().shrink((x, 0), (CELL.0, HEADS)), name, 19, HEADS)?;
             }
-            for (row, (name, maps)) in self.rows.iter().zip(maps).enumerate() {
-                let y = HEADS + row as u32 * (CELL.1 + GAP);
-                let middle = (y + CELL.1 / 2) as i32;
-                area.draw_text(name, &letters(18), (8, middle - 9))?;
-                if !alike {
-                    let [right, up] = axes(&maps[0]);
-                    area.draw_text(&format!("right: {right}"), &letters(15), (8, middle + 16))?;
-                    area.draw_text(&format!("up: {up}"), &letters(15), (8, middle + 34))?;
-                }
-                for (column, map) in maps.iter().enumerate() {
-                    let x = NAMES + column as u32 * (CELL.0 + GAP);
-                    draw_cell(&area.clone().shrink((x, y), CELL), map, &colours)?;
+            for (row, (name, maps)) in (0..).zip(self.rows.iter().zip(maps)) {
+                let (_, y) = layout.corner(row, 0);
+                area.draw_text(name, &letters(18), (8, (y + CELL.1 / 2) as i32 - 9))?;
+                for (column, map) in (0..).zip(maps) {
+                    draw_cell(&area, &layout, (row, column), map, &colours)?;
                 }
             }
             if let Some(unit) = self.unit {
-                let height = (rows * (CELL.1 + GAP)).min(2 * (CELL.1 + GAP));
-                draw_bar(&area.clone().shrink((size.0 - BAR, HEADS), (BAR, height)), unit, &colours)?;
-            }
-            if alike {
-                let [right, up] = axes(&maps[0][0]);
-                let y = (HEADS + rows * (CELL.1 + GAP)) as i32 + 6;
-                area.draw_text(&format!("to the right: {right}; upwards: {up}"), &letters(17), (NAMES as i32, y))?;
+                let (x, y) = (layout.size().0 - BAR, HEADS);
+                let height = (layout.size().1 - TITLE - HEADS).min(2 * (CELL.1 + BELOW));
+                draw_bar(&area.clone().shrink((x, y), (BAR, height)), unit, &colours)?;
             }
             Ok(())
         })
     }
 }
 
-/// To the right, and upwards.
-fn axes(map: &Map) -> [String; 2] {
-    [span(&map.columns), span(&map.rows)]
+/// Where the cells are, pixels below the title.
+struct Layout {
+    /// Whether all rows have one abscissa.
+    alike: bool,
+    rows: u32,
+    columns: u32,
 }
 
-fn span(axis: &Axis) -> String {
-    format!("{} {} to {} {}", axis.name, tick(&axis.values[0]), tick(&axis.values[axis.len() - 1]), axis.unit)
+impl Layout {
+    fn size(&self) -> (u32, u32) {
+        let (_, last) = self.corner(self.rows - 1, 0);
+        (NAMES + LEFT + self.columns * (CELL.0 + GAP) + BAR, TITLE + last + CELL.1 + BELOW)
+    }
+
+    /// Of a cell's map, left and above.
+    fn corner(&self, row: u32, column: u32) -> (u32, u32) {
+        let below = if self.alike { 0 } else { BELOW };
+        (NAMES + LEFT + column * (CELL.0 + GAP), HEADS + row * (CELL.1 + GAP + below))
+    }
+
+    fn has_abscissa(&self, row: u32) -> bool {
+        !self.alike || row + 1 == self.rows
+    }
 }
 
-fn draw_cell(area: &Area<'_>, map: &Map, colours: &Colours) -> DrawResult {
-    paint(area, map, colours)?;
-    let (width, height) = area.dim_in_pixel();
-    area.draw(&Rectangle::new([(0, 0), (width as i32 - 1, height as i32 - 1)], INK))?;
-    Ok(())
+/// A map with its frame; the ordinate in the first column, the abscissa where the row has one.
+fn draw_cell(area: &Area<'_>, layout: &Layout, (row, column): (u32, u32), map: &Map, colours: &Colours) -> DrawResult {
+    let (x, y) = layout.corner(row, column);
+    let left = if column == 0 { LEFT } else { 0 };
+    let below = if layout.has_abscissa(row) { BELOW } else { 0 };
+    let mut chart = ChartBuilder::on(&area.clone().shrink((x - left, y), (CELL.0 + left, CELL.1 + below)))
+        .x_label_area_size(below)
+        .y_label_area_size(left)
+        .build_cartesian_2d(edges(&map.columns), edges(&map.rows))?;
+    chart
+        .configure_mesh()
+        .disable_mesh()
+        .x_desc(label(&map.columns))
+        .y_desc(label(&map.rows))
+        .axis_desc_style(letters(17))
+        .label_style(letters(15))
+        .axis_style(INK)
+        .x_labels(6)
+        .y_labels(5)
+        .x_label_formatter(&tick)
+        .y_label_formatter(&tick)
+        .draw()?;
+    paint(&chart.plotting_area().strip_coord_spec(), map, colours)?;
+    let (right, bottom) = ((x + CELL.0) as i32 - 1, (y + CELL.1) as i32 - 1);
+    Ok(area.draw(&Rectangle::new([(x as i32, y as i32), (right, bottom)], INK))?)
 }
 
 #[cfg(test)]
@@ -119,9 +146,8 @@ mod tests {
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         let width = reader.next_frame(&mut pixels).unwrap().width;
         let at = |row: u32, column: u32| {
-            let x = NAMES + column * (CELL.0 + GAP) + CELL.0 / 2;
-            let y = TITLE + HEADS + row * (CELL.1 + GAP) + CELL.1 / 2;
-            let start = ((y * width + x) * 3) as usize;
+            let (x, y) = Layout { alike: true, rows: 2, columns: 2 }.corner(row, column);
+            let start = (((TITLE + y + CELL.1 / 2) * width + x + CELL.0 / 2) * 3) as usize;
             [pixels[start], pixels[start + 1], pixels[start + 2]]
         };
         let colour = |t: f64| colorous::VIRIDIS.eval_continuous(t).as_array();

@@ -94,13 +94,14 @@ pub(super) fn under<'a>(
 }
 
 /// From the outer edge of the first cell to that of the last.
-fn edges(axis: &Axis) -> std::ops::Range<f64> {
+pub(super) fn edges(axis: &Axis) -> std::ops::Range<f64> {
     let (first, last) = (axis.values[0], axis.values[axis.len() - 1]);
     let half = if axis.len() > 1 { 0.5 * (last - first) / (axis.len() - 1) as f64 } else { 0.5 };
     first - half..last + half
 }
 
-fn label(axis: &Axis) -> String {
+/// Name and unit.
+pub(super) fn label(axis: &Axis) -> String {
     format!("{} ({})", axis.name, axis.unit)
 }
 
