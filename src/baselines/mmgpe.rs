@@ -54,7 +54,7 @@ impl Default for MmGpeConfig {
 impl MmGpeConfig {
     /// Summed over all of the surface in place of its vertices.
     pub fn over_the_surface() -> Self {
-        Self { surface: SurfaceConfig { sampling: Sampling::Facets, ..SurfaceConfig::vertices() }, ..Self::default() }
+        Self { surface: SurfaceConfig { sampling: Sampling::Facets, ..SurfaceConfig::default() }, ..Self::default() }
     }
 
     /// Refuses what no reflector has.

@@ -152,13 +152,14 @@ impl Effects {
         parts.reduce(Complex::add)
     }
 
-    /// One transmitter's echoes of objects that are not in the scene, `[rx, chirp, sample]` or `[rx, 1, sample]`.
+    /// One transmitter's echoes of objects that are not in the scene, `[rx, chirp, sample]` or `[rx, 1, sample]`. `times_s`: of its
+    /// chirps, radar time.
     ///
     /// # Gradient
     /// Flows to the values.
-    pub fn reflectors(&self, chirps: &Chirps<'_>, (device, dtype): (&Device, DType)) -> Option<Complex<3>> {
+    pub fn reflectors(&self, times_s: &[f64], chirps: &Chirps<'_>, (device, dtype): (&Device, DType)) -> Option<Complex<3>> {
         let parts = self.enabled().filter_map(|effect| match effect.operator() {
-            Operator::Reflector(signal) => Some(signal(&effect.values(device, dtype), chirps)),
+            Operator::Reflector(signal) => Some(signal(&effect.values(device, dtype), times_s, chirps)),
             _ => None,
         });
         parts.reduce(Complex::add)

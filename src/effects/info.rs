@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{operator::Operator, parameter::ParameterInfo};
+use super::{
+    operator::Operator,
+    parameter::{ParameterInfo, named},
+};
 
 /// Where in the signal's way an effect acts, in the order of that way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -72,6 +75,6 @@ pub struct EffectInfo {
 
 impl EffectInfo {
     pub fn parameter(&self, name: &str) -> Option<&'static ParameterInfo> {
-        self.parameters.iter().find(|parameter| parameter.name == name)
+        named(self.parameters, name)
     }
 }

@@ -39,7 +39,7 @@ pub static INFO: EffectInfo = EffectInfo {
     choice: Choice::None,
     look_alikes: &["wall_ghost", "second_harmonic", "object_radar_object", "range_alias", "breathing", "heartbeat"],
     separate_by: "a recording of the room without the person: the object still moves, a ghost of the person does not",
-    operator: Operator::Reflector(|values, of| signal(values, of.times_s, of.radar, of.tx, of.dechirp, of.form)),
+    operator: Operator::Reflector(|values, times_s, of| signal(values, times_s, of.radar, of.tx, of.dechirp, of.form)),
 };
 
 /// One transmitter's signal of the object, `[rx, chirp, sample]`; `times_s` are those of the transmitter's chirps.

@@ -32,8 +32,8 @@ pub enum Operator {
     Direct(fn(Points<'_>, &Values, &Chirps<'_>) -> Complex<3>),
     /// Adds paths of the body's points, `[rx, chirp, sample]`; none where the room has no wall for them.
     Paths(fn(&DirectReturns<'_>, &Values) -> Option<Complex<3>>),
-    /// An object that is not in the scene, `[rx, chirp, sample]` or `[rx, 1, sample]`.
-    Reflector(fn(&Values, &Chirps<'_>) -> Complex<3>),
+    /// An object that is not in the scene, at these radar times of the chirps, seconds: `[rx, chirp, sample]` or `[rx, 1, sample]`.
+    Reflector(fn(&Values, &[f64], &Chirps<'_>) -> Complex<3>),
     /// An object that a part of the body carries, at this place, moved by this much: `[rx, chirp, sample]`.
     Carried(fn(&Values, [f64; 3], &Displacement, &Chirps<'_>) -> Complex<3>),
     /// Changes the sum of the paths, in proportion to it.
@@ -51,18 +51,16 @@ pub enum Operator {
 pub struct Chirps<'a> {
     pub radar: &'a Radar,
     pub tx: usize,
-    /// Radar times of the chirps.
-    pub times_s: &'a [f64],
     pub dechirp: Dechirp,
     pub form: SumForm,
 }
 
 /// What one transmitter receives of the body's points on the direct path.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct DirectReturns<'a> {
     pub points: Points<'a>,
     /// `[rx, chirp, sample]`.
-    pub direct: Complex<3>,
+    pub direct: &'a Complex<3>,
     pub room: Option<&'a Room>,
     pub chirps: Chirps<'a>,
 }

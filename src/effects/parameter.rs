@@ -21,6 +21,11 @@ impl ParameterInfo {
     }
 }
 
+/// The parameter of this name.
+pub(super) fn named(all: &'static [ParameterInfo], name: &str) -> Option<&'static ParameterInfo> {
+    all.iter().find(|parameter| parameter.name == name)
+}
+
 pub(super) const fn parameter(name: &'static str, unit: &'static str, neutral: f64, least: f64, most: f64) -> ParameterInfo {
     ParameterInfo { name, unit, neutral, least, most }
 }

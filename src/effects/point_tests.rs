@@ -167,14 +167,14 @@ fn room() -> Room {
 fn on_paths(values: &Values) -> Tensor<1> {
     let (radar, device) = (radar(), values.device.clone());
     let (dechirp, form) = (Dechirp::Exact, SumForm::Exact);
-    let chirps = Chirps { radar: &radar, tx: 1, times_s: &TIMES, dechirp, form };
+    let chirps = Chirps { radar: &radar, tx: 1, dechirp, form };
     let room = room();
     flat(match operator(values.id) {
         Operator::Paths(signal) => with_points(&device, |points| {
-            signal(&DirectReturns { points, direct: direct(&radar, &device), room: Some(&room), chirps }, values).unwrap()
+            signal(&DirectReturns { points, direct: &direct(&radar, &device), room: Some(&room), chirps }, values).unwrap()
         }),
         Operator::Direct(signal) => with_points(&device, |points| signal(points, values, &chirps)),
-        Operator::Reflector(signal) => signal(values, &chirps),
+        Operator::Reflector(signal) => signal(values, &TIMES, &chirps),
         Operator::Carried(signal) => {
             let displacement = components(10, &device, 0.01).map(|part| part.narrow(0, 0, 1));
             signal(values, PLACES[0], &displacement, &chirps)

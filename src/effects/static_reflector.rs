@@ -32,7 +32,7 @@ pub static INFO: EffectInfo = EffectInfo {
     choice: Choice::None,
     look_alikes: &["tx_leakage", "range_alias", "wall_ghost"],
     separate_by: "turn the radar: leakage stays in place, the object turns with the room; or change the sample rate, which moves an alias",
-    operator: Operator::Reflector(|values, of| signal(values, of.radar, of.tx, of.dechirp, of.form)),
+    operator: Operator::Reflector(|values, _, of| signal(values, of.radar, of.tx, of.dechirp, of.form)),
 };
 
 /// One transmitter's signal of the object, `[rx, 1, sample]`.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use burn::tensor::{DType, Device, Int, Tensor, TensorData};
 
-use super::parameter::ParameterInfo;
+use super::parameter::{ParameterInfo, named};
 use crate::complex::Complex;
 
 /// Parameters that count or choose, and so do not learn.
@@ -27,8 +27,7 @@ pub struct Values {
 
 impl Values {
     fn neutral(&self, name: &str) -> f64 {
-        let known = self.known.iter().find(|parameter| parameter.name == name);
-        known.unwrap_or_else(|| panic!("{} has no parameter {name}", self.id)).neutral
+        named(self.known, name).unwrap_or_else(|| panic!("{} has no parameter {name}", self.id)).neutral
     }
 
     /// `[value]`; the neutral value where none is given.

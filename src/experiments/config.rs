@@ -213,7 +213,7 @@ pub struct ReproduceConfig {
     pub few_measured: Option<FewConfig>,
     #[serde(default)]
     pub split: SubjectSplit,
-    #[serde(default = "all_variants")]
+    #[serde(default = "Variant::usual")]
     pub variants: Vec<Variant>,
     #[serde(default = "all_baselines")]
     pub baselines: Vec<BaselineName>,
@@ -248,10 +248,6 @@ pub struct ReproduceConfig {
 
 fn once() -> usize {
     1
-}
-
-fn all_variants() -> Vec<Variant> {
-    Variant::usual()
 }
 
 fn all_baselines() -> Vec<BaselineName> {

@@ -60,8 +60,8 @@ impl Simulator {
         let times_s = scene.chirp_times_s(frame);
         let (dechirp, form) = (self.config.dechirp, self.config.sum);
         Some(self.transmitters(scene, |tx, device| {
-            let of = Chirps { radar: &scene.radar, tx, times_s: &times_s[chirps(scene, tx)], dechirp, form };
-            let placed = self.effects.reflectors(&of, (device, DType::F32));
+            let of = Chirps { radar: &scene.radar, tx, dechirp, form };
+            let placed = self.effects.reflectors(&times_s[chirps(scene, tx)], &of, (device, DType::F32));
             let carried = self.effects.carried(&of, (device, DType::F32), |part| {
                 let (body, posed) = (scene.body.as_ref()?, seen.body.as_ref()?);
                 let point = middle_point(body, &scene.joints, part)?;
@@ -74,7 +74,7 @@ impl Simulator {
 }
 
 /// The chirps of a transmitter among those of a frame.
-pub(super) fn chirps(scene: &Scene, tx: usize) -> std::ops::Range<usize> {
+fn chirps(scene: &Scene, tx: usize) -> std::ops::Range<usize> {
     let loops = scene.radar.loops_per_frame;
     tx * loops..(tx + 1) * loops
 }

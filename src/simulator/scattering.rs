@@ -6,7 +6,6 @@ use super::{
     Amplitudes, FrameView, Gains, PathModel, Scene, Seen, Simulator, Surfaces, Weights,
     groups::{Group, Kind, Returns, Scattering, Visible, WallPoints},
     point_tensors::rows,
-    points::chirps,
     sight::{Attitude, Places, Sight},
 };
 use crate::{
@@ -83,15 +82,14 @@ impl Simulator {
     fn direct_of(&self, group: &Group<'_>, seen: (Displacement, Tensor<2>), tx: usize, radar: &Radar) -> Complex<3> {
         let (displacement, weighed) = seen;
         let amplitude = group.amplitude(weighed, &displacement, tx);
-        let Visible { scene, view, kind, reference_m, .. } = &group.visible;
+        let Visible { scene, kind, reference_m, .. } = &group.visible;
         let points = Points { reference_m, displacement: &displacement, amplitude: &amplitude };
         let (dechirp, form) = (self.config.dechirp, self.config.sum);
-        let times_s = &scene.chirp_times_s(view.frame)[chirps(scene, tx)];
-        let chirps = Chirps { radar, tx, times_s, dechirp, form };
+        let chirps = Chirps { radar, tx, dechirp, form };
         let direct = self.effects.direct_signal(points, &chirps);
         let further = match kind {
             Kind::Body => {
-                self.effects.further_paths(&DirectReturns { points, direct: direct.clone(), room: scene.room.as_ref(), chirps })
+                self.effects.further_paths(&DirectReturns { points, direct: &direct, room: scene.room.as_ref(), chirps })
             }
             Kind::Room => None,
         };

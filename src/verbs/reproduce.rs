@@ -6,7 +6,7 @@ use burn::tensor::Device;
 
 use super::{Notice, Notify, plausible};
 use crate::{
-    data::{Shard, atomic, files, unfinished::Undo},
+    data::{Shard, atomic, files},
     error::{Error, Result},
     experiments::{self, Event, Plan, ReproduceConfig, Store, report, results, stage::read_record, stage::stage_folder},
     lpips::{Lpips, LpipsConfig},
@@ -40,8 +40,6 @@ pub struct Planned {
     /// Absolute: stages name each other's files.
     out: PathBuf,
     plan: Plan,
-    /// Of an empty folder that was made for it.
-    _made: Option<Undo>,
 }
 
 impl Planned {
@@ -66,18 +64,10 @@ impl Planned {
         if let Some(lpips) = &what.lpips {
             config.comparison.lpips = Some(lpips.clone());
         }
-        let made = (!what.out.exists()).then(|| what.out.to_path_buf());
-        std::fs::create_dir_all(what.out).map_err(|error| Error::write(what.out, error))?;
-        let out = files::absolute(what.out)?;
-        let remove = |folder: &Path| drop(std::fs::remove_dir(folder));
-        let undo = made.clone().map(|folder| Undo::by(move || remove(&folder)));
-        match plan(&config, &out) {
-            Ok(plan) => Ok(Self { plan, config, out, _made: undo }),
-            Err(error) => {
-                made.as_deref().into_iter().for_each(remove);
-                Err(error)
-            }
-        }
+        // The folder is made by whoever works in it, and removed again where it stays empty ([`crate::data::Claim`]).
+        let out = std::path::absolute(what.out).map_err(|error| Error::write(what.out, error))?;
+        files::utf8(&out)?;
+        Ok(Self { plan: plan(&config, &out)?, config, out })
     }
 
     /// All stages, in an order in which they can be done.
