@@ -123,6 +123,7 @@ fn draw_cell(area: &Area<'_>, layout: &Layout, (row, column): (u32, u32), map: &
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::heatmap::Axis;
 
     #[test]
     fn every_map_stands_in_its_row_and_column() {
