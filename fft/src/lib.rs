@@ -1,7 +1,7 @@
 //! Discrete Fourier transforms of any length (rustfft), in a crate of their own.
 //!
 //! A `rustfft::FftPlanner<T>` brings all kernels of `T`, for every instruction set, into the crate that makes one: 780,000 lines of
-//! LLVM's intermediate language, an eighth of what `hybridsim` had, compiled for the library and again for its tests. Here they are
+//! LLVM's intermediate language, a ninth of what `hybridsim` had, compiled for the library and again for its tests. Here they are
 //! compiled once, beside the other dependencies.
 
 use std::sync::Arc;
@@ -14,6 +14,7 @@ macro_rules! planner {
         pub struct $name(rustfft::FftPlanner<$real>);
 
         impl $name {
+            // Never in the caller, or its crate would compile the kernels after all.
             #[inline(never)]
             pub fn new() -> Self {
                 Self(rustfft::FftPlanner::new())

@@ -39,9 +39,10 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let path = &arguments.path;
-    if !describe::knows(path) {
-        arguments.reading.refused(READING_HINT)?;
+    if !path.is_dir() && describe::knows(path) {
+        return describe::run(path, &arguments.reading, common);
     }
+    arguments.reading.refused(READING_HINT)?;
     if path.join("checkpoint.toml").is_file() {
         let (simulator, state) = checkpoint::open(path, &Device::flex())?;
         say!(
@@ -74,9 +75,6 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
             say!("  heatmaps           {}", out.display());
         }
         return Ok(());
-    }
-    if describe::knows(path) {
-        return describe::run(path, &arguments.reading, common);
     }
     let config = Config::read(path, &common.set)?;
     for recording in &config.data.recordings {

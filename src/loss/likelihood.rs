@@ -29,10 +29,18 @@ const EULER_GAMMA: f64 = 0.577_215_664_901_532_9;
 pub(super) struct Cells {
     /// Of what is left without the mean over the loops, `[map, doppler, range]`, dB.
     pub moving_db: Tensor<3>,
-    /// The return's power over its own and all of the cell's, `[map, doppler, range]`.
-    pub share: Tensor<3>,
+    /// The return's power of the same cells, and with the noise's, `[map, doppler, range]`.
+    pub moving: [Tensor<3>; 2],
     /// Of the mean over the loops, `[map, 1, range]`, dB; none where static returns do not count.
     pub static_db: Option<Tensor<3>>,
+}
+
+impl Cells {
+    /// The return's power over its own and all of the cell's; `floor` decides where there is neither return nor noise.
+    pub fn share(&self, floor: f64) -> Tensor<3> {
+        let [power, mean] = self.moving.clone();
+        power.clone() / (power + mean + floor)
+    }
 }
 
 /// Power of cells for noise of variance 1 in each component of a sample.

@@ -219,7 +219,8 @@ impl DbLoss {
         let static_noise = variance.map(|variance| variance * likelihood::mean_logarithm(self.noise.static_profile));
         let measured = self.cells(measured, None, None);
         let simulated = self.cells(clean, moving_noise, static_noise);
-        let moving = likelihood::moving_deviance(measured.moving_db - simulated.moving_db, simulated.share);
+        let share = simulated.share(self.floor_amplitude.powi(2));
+        let moving = likelihood::moving_deviance(measured.moving_db - simulated.moving_db, share);
         let Some((measured, simulated)) = measured.static_db.zip(simulated.static_db) else { return moving.mean() };
         let cells = moving.dims().iter().product::<usize>() + measured.dims().iter().product::<usize>();
         (moving.sum() + likelihood::static_deviance(measured - simulated).sum()) / cells as f64
@@ -235,11 +236,9 @@ impl DbLoss {
         let [at_rest, moving] = split_loop_mean(self.chosen(signal));
         let moving = self.combined(self.transform.map(moving).power());
         let mean = with(moving.clone(), moving_noise);
-        // The floor decides where there is neither return nor noise.
-        let share = moving.clone() / (moving + mean.clone() + self.floor_amplitude.powi(2));
         let static_db =
             (!self.static_removed).then(|| db(with(self.combined(self.transform.profiles(at_rest).power()), static_noise)));
-        Cells { moving_db: db(mean), share, static_db }
+        Cells { moving_db: db(mean.clone()), moving: [moving, mean], static_db }
     }
 }
 

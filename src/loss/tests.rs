@@ -156,7 +156,8 @@ fn under_noise_alone_each_kind_of_cell_has_the_deviance_of_its_law() {
         );
         let silent = loss.cells(Complex::new(silence.clone(), silence), Some(loss.noise.moving.clone()), Some(noise));
         // Row by row: the mean of x − ln x − 1 of an exponential is γ. A rectangular window leaves nothing at zero Doppler.
-        let rows = likelihood::moving_deviance(measured.moving_db - silent.moving_db, silent.share).mean_dim(2);
+        let share = silent.share(loss.floor_amplitude.powi(2));
+        let rows = likelihood::moving_deviance(measured.moving_db - silent.moving_db, share).mean_dim(2);
         for (row, deviance) in rows.into_data().iter::<f64>().enumerate() {
             let expected = if window == Window::Rectangular && row == loops / 2 { 0.0 } else { 0.5772 };
             assert!((deviance - expected).abs() < 0.05, "{window:?} {row}: {deviance}");

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use plotters::prelude::*;
 
-use super::heatmap::{Colours, draw_bar, edges, label, paint, under};
-use super::{Area, DrawResult, INK, letters, save, tick};
+use super::heatmap::{Axes, Colours, draw_bar, under, with_axes};
+use super::{Area, DrawResult, INK, letters, save};
 use crate::error::Result;
 use crate::heatmap::Map;
 
@@ -98,24 +98,8 @@ fn draw_cell(area: &Area<'_>, layout: &Layout, (row, column): (u32, u32), map: &
     let (x, y) = layout.corner(row, column);
     let left = if column == 0 { LEFT } else { 0 };
     let below = if layout.has_abscissa(row) { BELOW } else { 0 };
-    let mut chart = ChartBuilder::on(&area.clone().shrink((x - left, y), (CELL.0 + left, CELL.1 + below)))
-        .x_label_area_size(below)
-        .y_label_area_size(left)
-        .build_cartesian_2d(edges(&map.columns), edges(&map.rows))?;
-    chart
-        .configure_mesh()
-        .disable_mesh()
-        .x_desc(label(&map.columns))
-        .y_desc(label(&map.rows))
-        .axis_desc_style(letters(17))
-        .label_style(letters(15))
-        .axis_style(INK)
-        .x_labels(6)
-        .y_labels(5)
-        .x_label_formatter(&tick)
-        .y_label_formatter(&tick)
-        .draw()?;
-    paint(&chart.plotting_area().strip_coord_spec(), map, colours)?;
+    let axes = Axes { below, left, ticks: [6, 5], names: 17, numbers: 15 };
+    with_axes(&area.clone().shrink((x - left, y), (CELL.0 + left, CELL.1 + below)), map, colours, &axes)?;
     let (right, bottom) = ((x + CELL.0) as i32 - 1, (y + CELL.1) as i32 - 1);
     Ok(area.draw(&Rectangle::new([(x as i32, y as i32), (right, bottom)], INK))?)
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
 use super::{Area, DrawResult, INK, letters, save, tick};
@@ -94,14 +95,13 @@ pub(super) fn under<'a>(
 }
 
 /// From the outer edge of the first cell to that of the last.
-pub(super) fn edges(axis: &Axis) -> std::ops::Range<f64> {
+fn edges(axis: &Axis) -> std::ops::Range<f64> {
     let (first, last) = (axis.values[0], axis.values[axis.len() - 1]);
     let half = if axis.len() > 1 { 0.5 * (last - first) / (axis.len() - 1) as f64 } else { 0.5 };
     first - half..last + half
 }
 
-/// Name and unit.
-pub(super) fn label(axis: &Axis) -> String {
+fn label(axis: &Axis) -> String {
     format!("{} ({})", axis.name, axis.unit)
 }
 
@@ -111,26 +111,8 @@ fn draw_map(area: &Area<'_>, map: &Map, colours: &Colours) -> DrawResult {
 
 /// A map with lines over it, each of points in the axes' units.
 pub(super) fn draw_map_under(area: &Area<'_>, map: &Map, colours: &Colours, lines: &[Vec<(f64, f64)>]) -> DrawResult {
-    let mut chart = ChartBuilder::on(area)
-        .margin(10)
-        .margin_right(16)
-        .x_label_area_size(52)
-        .y_label_area_size(66)
-        .build_cartesian_2d(edges(&map.columns), edges(&map.rows))?;
-    chart
-        .configure_mesh()
-        .disable_mesh()
-        .x_desc(label(&map.columns))
-        .y_desc(label(&map.rows))
-        .axis_desc_style(letters(19))
-        .label_style(letters(17))
-        .axis_style(INK)
-        .x_labels(8)
-        .y_labels(9)
-        .x_label_formatter(&tick)
-        .y_label_formatter(&tick)
-        .draw()?;
-    paint(&chart.plotting_area().strip_coord_spec(), map, colours)?;
+    let axes = Axes { below: 52, left: 66, ticks: [8, 9], names: 19, numbers: 17 };
+    let mut chart = with_axes(&area.margin(10, 10, 10, 16), map, colours, &axes)?;
     for (edge, width) in [(BLACK, 4), (WHITE, 2)] {
         for line in lines {
             chart.draw_series(LineSeries::new(line.iter().copied(), edge.stroke_width(width)))?;
@@ -139,8 +121,50 @@ pub(super) fn draw_map_under(area: &Area<'_>, map: &Map, colours: &Colours, line
     Ok(())
 }
 
+/// How a map's axes are drawn.
+pub(super) struct Axes {
+    /// Pixels of the abscissa and of the ordinate; none where they are 0.
+    pub below: u32,
+    pub left: u32,
+    /// To the right and upwards, about so many.
+    pub ticks: [usize; 2],
+    /// Sizes of letters.
+    pub names: u32,
+    pub numbers: u32,
+}
+
+type Chart<'a> = ChartContext<'a, BitMapBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+/// A map and its axes, over all of an area.
+pub(super) fn with_axes<'a>(
+    area: &Area<'a>,
+    map: &Map,
+    colours: &Colours,
+    axes: &Axes,
+) -> std::result::Result<Chart<'a>, Box<dyn std::error::Error>> {
+    let mut chart = ChartBuilder::on(area)
+        .x_label_area_size(axes.below)
+        .y_label_area_size(axes.left)
+        .build_cartesian_2d(edges(&map.columns), edges(&map.rows))?;
+    chart
+        .configure_mesh()
+        .disable_mesh()
+        .x_desc(label(&map.columns))
+        .y_desc(label(&map.rows))
+        .axis_desc_style(letters(axes.names))
+        .label_style(letters(axes.numbers))
+        .axis_style(INK)
+        .x_labels(axes.ticks[0])
+        .y_labels(axes.ticks[1])
+        .x_label_formatter(&tick)
+        .y_label_formatter(&tick)
+        .draw()?;
+    paint(&chart.plotting_area().strip_coord_spec(), map, colours)?;
+    Ok(chart)
+}
+
 /// The map alone, over all of an area.
-pub(super) fn paint(plot: &Area<'_>, map: &Map, colours: &Colours) -> DrawResult {
+fn paint(plot: &Area<'_>, map: &Map, colours: &Colours) -> DrawResult {
     // pixel by pixel, so that neighbouring cells leave no seams
     let (width, height) = plot.dim_in_pixel();
     let [rows, columns] = map.dims();

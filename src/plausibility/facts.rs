@@ -145,7 +145,7 @@ impl BodyFacts {
         let [least, most] =
             lengths.fold([f64::INFINITY, 0.0], |[least, most], length| [least.min(length), f64::max(most, length)]);
         let first = vertices.first().map_or(&[][..], Vec::as_slice);
-        let mut along_z: Vec<f64> = vertices.iter().filter_map(|mesh| longest_along_z(mesh, faces)).collect();
+        let mut along_z: Vec<f64> = vertices.par_iter().filter_map(|mesh| longest_along_z(mesh, faces)).collect();
         along_z.sort_by(f64::total_cmp);
         let longest_along_z = along_z.get(along_z.len() / 2).copied();
         Self { length_m: [least, most], meshes: true, longest_along_z, ..Self::of_mesh(first, faces) }
@@ -218,18 +218,18 @@ impl Look {
 
 /// Cosine between z and the first principal axis of a surface.
 fn longest_along_z(vertices: &[Point], faces: &[[usize; 3]]) -> Option<f64> {
-    let corners = || faces.iter().map(|face| face.map(|vertex| Vector3::from(vertices[vertex])));
-    let area = |[a, b, c]: [Vector3<f64>; 3]| (b - a).cross(&(c - a)).norm() / 2.0;
-    let whole: f64 = corners().map(area).sum();
-    let middle = corners().map(|face| face.iter().sum::<Vector3<f64>>() * (area(face) / 3.0)).sum::<Vector3<f64>>() / whole;
-    // Second moment of a triangle: A/12 · (Σ vvᵀ + (Σ v)(Σ v)ᵀ).
-    let moment = |face: [Vector3<f64>; 3]| {
-        let about = face.map(|corner| corner - middle);
-        let sum: Vector3<f64> = about.iter().sum();
-        (about.iter().map(|corner| corner * corner.transpose()).sum::<Matrix3<f64>>() + sum * sum.transpose())
-            * (area(face) / 12.0)
-    };
-    let spread: Matrix3<f64> = corners().map(moment).sum();
+    let origin = Vector3::from(vertices[faces.first()?[0]]);
+    let (mut whole, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
+    for face in faces {
+        let [a, b, c] = face.map(|vertex| Vector3::from(vertices[vertex]) - origin);
+        let area = (b - a).cross(&(c - a)).norm() / 2.0;
+        let sum = a + b + c;
+        whole += area;
+        first += sum * (area / 3.0);
+        // Of a triangle: A/12 · (Σ vvᵀ + (Σ v)(Σ v)ᵀ).
+        second += [a, b, c, sum].iter().map(|v| v * v.transpose()).sum::<Matrix3<f64>>() * (area / 12.0);
+    }
+    let spread = second - first * first.transpose() / whole;
     if !(whole > 0.0 && spread.iter().all(|value| value.is_finite())) {
         return None;
     }

@@ -7,7 +7,7 @@ use burn::tensor::Device;
 use super::{Notice, Notify, claimed, found, notes, plausible, record, report::RunReport};
 use crate::{
     config::Config,
-    data::{atomic, files},
+    data::{atomic, files, settings},
     error::{Error, Result},
     evaluation::Evaluation,
     training::{LoadedRecording, checkpoint::Progress, load_recordings, load_recordings_as_stated, refine},
@@ -121,6 +121,10 @@ fn has_recordings(config: &mut Config, config_path: &Path, as_stated: bool, noti
     }
     absolute(&mut config.data.recordings)?;
     absolute(config.training.start_from.as_mut_slice())?;
+    if let Some(table) = &mut config.diagnosis.calibration {
+        // A training may never read it: it need not be there.
+        *table = std::path::absolute(&*table).map_err(|error| Error::read(&*table, error))?;
+    }
     for recording in &config.data.recordings {
         plausible::folder(recording, as_stated, notify)?;
     }
@@ -129,9 +133,8 @@ fn has_recordings(config: &mut Config, config_path: &Path, as_stated: bool, noti
 
 /// Refuses to go on with a run of other settings: those asked for now, or those that a newer version adds with a value of its own.
 fn is_the_same(file: &Path, resolved: &str) -> Result<()> {
-    let table = |text: &str| toml::from_str::<toml::Table>(text).map(toml::Value::Table);
-    // Both have been read as configs.
-    let (Ok(was), Ok(is)) = (table(&files::read_text(file)?), table(resolved)) else { return Ok(()) };
+    let was = toml::Value::Table(settings::resolve(file, &[])?);
+    let is = toml::Value::Table(resolved.parse().expect("written by a config"));
     let Some((key, was, is)) = first_difference("", Some(&was), Some(&is)) else { return Ok(()) };
     let shown = |value: Option<&toml::Value>| value.map_or("not set".into(), toml::Value::to_string);
     Err(Error::field(file, key, shown(was), format!("{}, which this run would go on with", shown(is)))
@@ -188,6 +191,7 @@ mod tests {
         assert_eq!(refused(otherwise_written, is), None);
         let error = refused(&is.replace("epochs = 3", "epochs = 4"), is).unwrap();
         assert!(error.contains("`training.epochs`") && error.contains("is 4") && error.contains("expected 3"), "{error}");
+        assert!(refused("seed = ", is).is_some_and(|error| error.contains("config.toml")));
         // Of a version that had no such setting.
         let error = refused("seed = 1\n[training]\nepochs = 3\n[training.loss]\n", is).unwrap();
         assert!(error.contains("`training.loss.scale`") && error.contains("not set"), "{error}");
