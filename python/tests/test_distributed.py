@@ -237,5 +237,5 @@ def test_a_sweep_survives_a_worker(config: Path, recording: hybridsim.Recording,
     same(again.last, runs[str(folder)].last)
     assert tree(one.last) != tree(again.last)
     # Of other settings it is another run.
-    with pytest.raises(hybridsim.Error, match="config.toml: `the settings`"):
+    with pytest.raises(hybridsim.Error, match="config.toml: `training.learning_rate` is 0.02, expected 0.01"):
         hybridsim.train(config, out=folder, go_on=True, set=shared, device="flex", progress=False)
