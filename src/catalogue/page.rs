@@ -24,7 +24,7 @@ pub(super) fn markdown(info: &EffectInfo, signature: Option<&Signature>) -> Stri
     );
     text.push_str("\n| parameter | unit | neutral or start | prior |\n|---|---|---|---|\n");
     for parameter in info.parameters {
-        let ParameterInfo { name, unit, neutral, least, most } = parameter;
+        let ParameterInfo { name, unit, neutral, least, most, .. } = parameter;
         let _ = writeln!(text, "| `{name}` | {unit} | {neutral} | {least} to {most} |");
     }
     if let Some(signature) = signature {

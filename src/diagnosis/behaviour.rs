@@ -38,6 +38,7 @@ behaviours! {
     ChangingAtOneRange "static returns that change at one range";
     Modulated "a static return that is modulated";
     NonLinear "non-linear";
+    LinearInTheSignal "linear in the signal";
     Quadratic "quadratic in the signal";
     ConjugateImage "conjugate image";
     Amplitude "amplitude";

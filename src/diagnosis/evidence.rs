@@ -22,6 +22,7 @@ use super::finding::{Undo, Volume};
 use super::prediction::BodyPrediction;
 use super::statistics;
 use crate::diagnosis::behaviour::Behaviour;
+use crate::effects::{self, EffectInfo};
 use crate::grid::Grid;
 use crate::radar::{Radar, Sampling};
 use crate::room::Room;
@@ -47,6 +48,8 @@ pub struct Evidence {
     /// Radar time at which each frame begins.
     pub starts_s: Vec<f64>,
     pub body: Option<BodyPrediction>,
+    /// Effects that may be named.
+    pub library: &'static [&'static EffectInfo],
     /// Ids that were accepted, oldest first.
     pub accepted: Vec<&'static str>,
     /// What was accepted without a name, oldest first.
@@ -77,6 +80,7 @@ impl Evidence {
             split,
             starts_s,
             body,
+            library: effects::library(),
             accepted: vec![],
             accepted_unnamed: vec![],
             inverses: vec![],
@@ -103,6 +107,11 @@ impl Evidence {
             peak: OnceLock::new(),
             ..self
         }
+    }
+
+    /// The effect of this id, of those that may be named.
+    pub fn info(&self, id: &str) -> Option<&'static EffectInfo> {
+        self.library.iter().find(|info| info.id == id).copied()
     }
 
     pub fn is_real(&self) -> bool {

@@ -11,9 +11,10 @@ use super::finding::Place;
 use super::limits::Limit;
 use super::locate;
 use super::misfit::Misfit;
+use super::never;
 use super::null::Null;
 use super::select::{Accepted, Explanation};
-use crate::effects;
+use crate::effects::EffectInfo;
 
 /// Version of the report's format.
 pub const FORMAT: u32 = 1;
@@ -248,9 +249,8 @@ impl Effect {
         std::iter::once(self.id.as_str()).chain(self.indistinguishable_from.iter().map(String::as_str))
     }
 
-    fn of(accepted: &Accepted, id: &str) -> Self {
+    fn of(accepted: &Accepted, id: &str, info: Option<&EffectInfo>) -> Self {
         let candidate = &accepted.candidate;
-        let info = effects::info(id);
         let parameters = candidate.estimates.iter().map(|estimate| {
             let single = estimate.values.len() == 1;
             let value = if single { estimate.values[0].into() } else { estimate.values.clone().into() };
@@ -304,7 +304,7 @@ impl Findings {
         for effect in accepted {
             let candidate = &effect.candidate;
             match candidate.id {
-                Some(id) => effects.push(Effect::of(effect, id)),
+                Some(id) => effects.push(Effect::of(effect, id, explanation.evidence.info(id))),
                 None => unexplained.push(Unexplained {
                     place: candidate.place.clone(),
                     p_value: candidate.p_value,
@@ -327,49 +327,7 @@ impl Findings {
     }
 }
 
-/// What no recording of this kind can show, whatever its size, and why.
-struct Never {
-    ids: &'static [&'static str],
-    /// Only where somebody was tracked.
-    of_the_tracked: bool,
-    reason: &'static str,
-}
-
-const NEVER: [Never; 5] = [
-    Never {
-        ids: &[effects::part_reflectivity::ID],
-        of_the_tracked: false,
-        reason: "a wrong reflectivity is only another amplitude, and amplitudes are free: no recording can show it without a prior",
-    },
-    Never {
-        ids: &[effects::start_frequency_error::ID, effects::adc_start_error::ID, effects::if_delay::ID],
-        of_the_tracked: false,
-        reason: "all three only turn every return by a phase in proportion to its delay, and phases of returns are free: millimetres of the \
-         mesh and of the room do the same; they would show only if known ranges were good to a fiftieth of a millimetre",
-    },
-    Never {
-        ids: &[effects::antenna_pattern::ID],
-        of_the_tracked: false,
-        reason: "a factor that depends on direction alone is part of the amplitudes of whatever stands in that direction, and those are \
-         free; the same body would have to be seen from the same side in several directions",
-    },
-    Never {
-        ids: &[effects::tdm_phase::ID],
-        of_the_tracked: false,
-        reason: "within the body's few velocities it is a phase of channels, which is reported as such (channel_mismatch); a faster target \
-         would tell them apart",
-    },
-    Never {
-        ids: &[effects::breathing::ID, effects::heartbeat::ID, effects::clothing_delay::ID],
-        of_the_tracked: true,
-        reason: "of a body whose motion is known to millimetres: the mesh's own error moves by as much, and as slowly; breath and heart \
-         are looked for only where nobody was tracked",
-    },
-];
-
 /// Effects that no recording of this kind can show; `body`: somebody was tracked.
 pub fn never_detectable(body: bool) -> Vec<NotDetectable> {
-    let entry = |id: &&str, reason: &str| NotDetectable { id: (*id).into(), at_most_db: None, reason: reason.into() };
-    let applying = NEVER.iter().filter(|never| body || !never.of_the_tracked);
-    applying.flat_map(|never| never.ids.iter().map(|id| entry(id, never.reason))).collect()
+    never::all(body).map(|(id, reason)| NotDetectable { id: id.into(), at_most_db: None, reason: reason.into() }).collect()
 }

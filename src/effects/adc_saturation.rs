@@ -6,7 +6,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{fixed, shaping},
     values::Values,
 };
 use crate::complex::Complex;
@@ -22,8 +22,8 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Samples beyond the converter's rail are cut off: products of the strong echoes fill the map in the affected chirps.",
     equation: "Re s, Im s → clamped to ± level · reference",
     parameters: &[
-        parameter("level", "of the reference", 10.0, 0.01, 10.0),
-        parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
+        shaping("level", "of the reference", 10.0, 0.01, 10.0),
+        fixed("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
     choice: Choice::None,
     look_alikes: &["interference"],

@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     values::Values,
 };
 use crate::complex::Complex;
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "an error of the sampling window's start",
     explanation: "Sampling starts later than declared; the sampled part of the ramp is another one and all phases are wrong in proportion to the delay.",
     equation: "t → t + offset_s, that is × exp(j2π τ_p S offset_s)",
-    parameters: &[parameter("offset_s", "s", 0.0, -1e-05, 1e-05)],
+    parameters: &[amplitude("offset_s", "s", 0.0, -1e-05, 1e-05)],
     choice: Choice::None,
     look_alikes: &["if_delay", "if_lowpass"],
     separate_by: "the same scene with another slope; never from one setting of the radar",

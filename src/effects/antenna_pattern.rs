@@ -5,7 +5,7 @@ use burn::tensor::Tensor;
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     points::BodyPoints,
     values::Values,
 };
@@ -20,7 +20,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "the antennas' directivity",
     explanation: "The antennas send and receive less towards the side, so that echoes fade as the person leaves the boresight.",
     equation: "A_p → A_p (cos θ_p)^exponent, both ways together",
-    parameters: &[parameter("exponent", "1", 0.0, 0.0, 20.0)],
+    parameters: &[amplitude("exponent", "1", 0.0, 0.0, 20.0)],
     choice: Choice::None,
     look_alikes: &["part_reflectivity"],
     separate_by: "a walk sideways, and the same body part seen under several directions",

@@ -5,7 +5,7 @@ use burn::tensor::Tensor;
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     values::{Values, repeated},
 };
 use crate::{
@@ -26,7 +26,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "antennas that are not where they are declared",
     explanation: "An antenna's phase centre is a fraction of a wavelength off its place: a phase that changes with the direction.",
     equation: "τ_p → τ_p with tx_m + offset_m[tx], rx_m + offset_m[rx]",
-    parameters: &[parameter("offset_m", "m", 0.0, -0.002, 0.002)],
+    parameters: &[amplitude("offset_m", "m", 0.0, -0.002, 0.002)],
     choice: Choice::None,
     look_alikes: &["pose_offset", "mutual_coupling"],
     separate_by: "a target over ±40° of direction; a common rotation of the array cannot be told from a turned room",

@@ -3,7 +3,7 @@
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, angle, shaping},
     points::host_value,
     values::Values,
 };
@@ -23,9 +23,9 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The wave goes from one part of the body to another before it returns: a faint second body, a little behind the first.",
     equation: "+ coefficient s_body(τ + 2 extra_m / c)",
     parameters: &[
-        parameter("extra_m", "m", 0.3, 0.0, 1.5),
-        parameter("coefficient", "1", 0.0, -1.0, 1.0),
-        parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
+        shaping("extra_m", "m", 0.3, 0.0, 1.5),
+        amplitude("coefficient", "1", 0.0, -1.0, 1.0),
+        angle("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
     choice: Choice::None,
     look_alikes: &[],

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, angle, shaping},
     points::{BodyPoints, TORSO},
     values::Values,
 };
@@ -22,9 +22,9 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The torso's surface moves in and out by a few millimetres as the person breathes, which the motion does not hold.",
     equation: "p → p + n_p amplitude_m sin(2π rate_hz T + phase_rad) on the torso",
     parameters: &[
-        parameter("rate_hz", "Hz", 0.25, 0.1, 0.7),
-        parameter("amplitude_m", "m", 0.0, 0.0, 0.012),
-        parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
+        shaping("rate_hz", "Hz", 0.25, 0.1, 0.7),
+        amplitude("amplitude_m", "m", 0.0, 0.0, 0.012),
+        angle("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
     choice: Choice::None,
     look_alikes: &["pose_offset"],

@@ -3,7 +3,7 @@
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, angle},
     values::Values,
 };
 use crate::{
@@ -25,8 +25,8 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The person carries something that reflects, such as a telephone or keys: an echo that moves with one part of the body.",
     equation: "+ amplitude e^{jφ} exp j2π(f_c τ + S t τ) / (d_tx d_rx), τ from the point in the middle of the body part",
     parameters: &[
-        parameter("amplitude", "recording's unit·m²", 0.0, -1000000000.0, 1000000000.0),
-        parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
+        amplitude("amplitude", "recording's unit·m²", 0.0, -1000000000.0, 1000000000.0),
+        angle("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
     choice: Choice::Part,
     look_alikes: &["part_reflectivity", "clothing_delay"],

@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     values::Values,
 };
 use crate::complex::Complex;
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "different gains and phases of the channels",
     explanation: "The channels differ in gain and phase, the same for all echoes, which turns and blurs directions.",
     equation: "s_{t,r} → s_{t,r} 10^{gain_db/20} e^{j phase_deg}",
-    parameters: &[parameter("gain_db", "dB", 0.0, -20.0, 20.0), parameter("phase_deg", "deg", 0.0, -180.0, 180.0)],
+    parameters: &[amplitude("gain_db", "dB", 0.0, -20.0, 20.0), amplitude("phase_deg", "deg", 0.0, -180.0, 180.0)],
     choice: Choice::None,
     look_alikes: &["antenna_position", "mutual_coupling"],
     separate_by: "a strong reflector at several directions: gains and phases stay, an antenna's misplacement changes with direction",

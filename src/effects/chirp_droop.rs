@@ -6,7 +6,7 @@ use super::{
     context::{Context, legendre},
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     values::Values,
 };
 use crate::complex::Complex;
@@ -21,7 +21,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "a change of gain along the chirp",
     explanation: "Transmitted power or gain changes along the ramp, alike for all echoes: it shapes the sidelobes in range.",
     equation: "× 10^{g(x)/20}, g = −½ db[0] P_1(x) + Σ_k db[k] P_{k+1}(x), x = −1 … 1 over the window",
-    parameters: &[parameter("db", "dB", 0.0, -20.0, 20.0)],
+    parameters: &[amplitude("db", "dB", 0.0, -20.0, 20.0)],
     choice: Choice::None,
     look_alikes: &["if_highpass"],
     separate_by: "a strong reflector at two ranges: the same shape at both, where a bent chirp's grows with range",

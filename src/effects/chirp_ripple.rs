@@ -6,7 +6,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, angle, shaping},
     values::Values,
 };
 use crate::complex::Complex;
@@ -22,9 +22,9 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The ramp's frequency is modulated sinusoidally: every echo gets a pair of sidelobes, before and behind, whose level grows with range.",
     equation: "× exp(j2π τ_p deviation_hz sin(2π ripple_hz t + phase_rad))",
     parameters: &[
-        parameter("deviation_hz", "Hz", 0.0, 0.0, 10000000.0),
-        parameter("ripple_hz", "Hz", 200000.0, 10000.0, 5000000.0),
-        parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
+        amplitude("deviation_hz", "Hz", 0.0, 0.0, 10000000.0),
+        shaping("ripple_hz", "Hz", 200000.0, 10000.0, 5000000.0),
+        angle("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
     choice: Choice::None,
     look_alikes: &["wall_ghost", "spur"],

@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, shaping},
     values::Values,
 };
 use crate::complex::Complex;
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "chirps that settle at the start of a frame",
     explanation: "The first chirps of each frame are weaker until the radar has settled.",
     equation: "× 1 − depth e^{−m/chirps}, m counts the chirps of the frame",
-    parameters: &[parameter("depth", "1", 0.0, -1.0, 1.0), parameter("chirps", "chirps", 8.0, 0.5, 200.0)],
+    parameters: &[amplitude("depth", "1", 0.0, -1.0, 1.0), shaping("chirps", "chirps", 8.0, 0.5, 200.0)],
     choice: Choice::None,
     look_alikes: &["gain_drift", "phase_noise"],
     separate_by: "longer frames: the first chirps change, the later ones do not",

@@ -6,7 +6,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::spread,
     values::Values,
 };
 use crate::complex::Complex;
@@ -21,7 +21,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "a jitter of the chirps' starts",
     explanation: "Chirps start now and then one clock tick late, at random: a two-valued phase from chirp to chirp that grows with range.",
     equation: "× exp(j2π S τ_p δ_m), δ_m ∈ {0, jitter_s} at random",
-    parameters: &[parameter("jitter_s", "s", 0.0, 0.0, 1e-07)],
+    parameters: &[spread("jitter_s", "s", 0.0, 0.0, 1e-07)],
     choice: Choice::None,
     look_alikes: &[],
     separate_by: "a strong wall: the phases take two values here, and spread evenly with phase noise",

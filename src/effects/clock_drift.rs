@@ -3,7 +3,7 @@
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     points::BodyPoints,
     values::Values,
 };
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "a difference in rate between the radar's clock and the motion's",
     explanation: "One of the two clocks is faster, so that the body's displacement along its velocity grows with time.",
     equation: "τ_p(T) → τ_p(T (1 + relative))",
-    parameters: &[parameter("relative", "1", 0.0, -0.1, 0.1)],
+    parameters: &[amplitude("relative", "1", 0.0, -0.1, 0.1)],
     choice: Choice::None,
     look_alikes: &["clock_offset", "breathing"],
     separate_by: "a longer recording: the drift's error grows with time, an offset's does not",

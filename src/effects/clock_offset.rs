@@ -3,7 +3,7 @@
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     points::BodyPoints,
     values::Values,
 };
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "an offset between the radar's clock and the motion's",
     explanation: "The motion was filmed by another clock: at each chirp the body is where it will be, or was, a moment later; every moving part is displaced along its velocity.",
     equation: "τ_p(T) → τ_p(T + offset_s)",
-    parameters: &[parameter("offset_s", "s", 0.0, -0.5, 0.5)],
+    parameters: &[amplitude("offset_s", "s", 0.0, -0.5, 0.5)],
     choice: Choice::None,
     look_alikes: &["pose_offset", "tdm_phase"],
     separate_by: "a motion that starts, stops and turns back: the offset's error changes sign with the velocity, a displaced pose's does not",

@@ -3,7 +3,7 @@
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     points::{BodyPoints, TORSO},
     values::Values,
 };
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "an extra delay on clothed parts of the body",
     explanation: "Cloth and hair delay the wave on its way to the skin, so that the parts beneath seem farther away than the mesh.",
     equation: "τ_p → τ_p + 2 extra_m / c on the clothed part",
-    parameters: &[parameter("extra_m", "m", 0.0, -0.01, 0.01)],
+    parameters: &[amplitude("extra_m", "m", 0.0, -0.01, 0.01)],
     choice: Choice::Part,
     look_alikes: &["range_bias"],
     separate_by: "the same motion with and without the coat",

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::shaping,
     values::Values,
 };
 use crate::{complex::Complex, radar::Radar};
@@ -20,7 +20,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "noise that is stronger at low frequencies",
     explanation: "The receiver's noise is not the same at all beat frequencies: the floor rises towards short ranges.",
     equation: "noise power × 1 + (knee_hz/f)^power",
-    parameters: &[parameter("knee_hz", "Hz", 0.0, 0.0, 2000000.0), parameter("power", "1", 1.0, 0.2, 3.0)],
+    parameters: &[shaping("knee_hz", "Hz", 0.0, 0.0, 2000000.0), shaping("power", "1", 1.0, 0.2, 3.0)],
     choice: Choice::None,
     look_alikes: &["tx_leakage", "if_highpass"],
     separate_by: "a recording without transmission",

@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, fixed},
     values::Values,
 };
 use crate::complex::Complex;
@@ -20,8 +20,8 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Strong sums of echoes are amplified less: products of three echoes appear, and weak echoes fade when strong ones are present.",
     equation: "s → s − level |s|² s / reference²",
     parameters: &[
-        parameter("level", "lost at the reference", 0.0, 0.0, 0.5),
-        parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
+        amplitude("level", "lost at the reference", 0.0, 0.0, 0.5),
+        fixed("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
     choice: Choice::None,
     look_alikes: &["adc_saturation"],

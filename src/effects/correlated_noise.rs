@@ -3,7 +3,7 @@
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::spread,
     values::Values,
 };
 use crate::{complex::Complex, if_signal::noise, radar::Radar};
@@ -18,7 +18,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "noise that the receivers have in common",
     explanation: "Supply or oscillator noise reaches all receivers at once: a faint echo from one direction in every cell.",
     equation: "n_r → n_r + coefficient n_common",
-    parameters: &[parameter("coefficient", "1", 0.0, 0.0, 2.0)],
+    parameters: &[spread("coefficient", "1", 0.0, 0.0, 2.0)],
     choice: Choice::None,
     look_alikes: &["mutual_coupling"],
     separate_by: "a recording without transmission",

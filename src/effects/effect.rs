@@ -7,11 +7,7 @@ use burn::{
     tensor::{DType, Device, Tensor, TensorData},
 };
 
-use super::{
-    EffectInfo, EffectSetting, info,
-    operator::Operator,
-    values::{FIXED, Values},
-};
+use super::{EffectInfo, EffectSetting, info, operator::Operator, parameter::Role, values::Values};
 
 /// Decibels of a factor of e.
 const NEPER_DB: f64 = 20.0 * std::f64::consts::LOG10_E;
@@ -53,6 +49,10 @@ impl Parameter {
     }
 }
 
+fn is_fixed(info: &EffectInfo, name: &str) -> bool {
+    info.parameter(name).is_some_and(|parameter| parameter.role == Role::Fixed)
+}
+
 /// An effect with its values.
 #[derive(Module, Debug)]
 pub struct Effect {
@@ -66,7 +66,7 @@ impl Effect {
     /// For a setting that [`EffectSetting::check`] refuses.
     pub(super) fn new(setting: &EffectSetting, device: &Device) -> Self {
         let info = info(&setting.id).unwrap_or_else(|| panic!("no effect {}", setting.id));
-        let learning = setting.parameters.iter().filter(|(name, _)| !FIXED.contains(&name.as_str()));
+        let learning = setting.parameters.iter().filter(|(name, _)| !is_fixed(info, name));
         let parameters = learning.map(|(name, values)| Parameter::new(name, values, info, device)).collect();
         Self { parameters, setting: setting.clone() }
     }
@@ -114,7 +114,7 @@ impl Effect {
     }
 
     fn fixed(&self) -> BTreeMap<String, Vec<f64>> {
-        let fixed = self.setting.parameters.iter().filter(|(name, _)| FIXED.contains(&name.as_str()));
+        let fixed = self.setting.parameters.iter().filter(|(name, _)| is_fixed(self.info(), name));
         fixed.map(|(name, values)| (name.clone(), values.clone())).collect()
     }
 

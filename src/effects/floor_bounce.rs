@@ -4,7 +4,7 @@ use super::{
     info::{Choice, EffectInfo, Stage},
     mirror::{mirrored_rx, mirrored_tx},
     operator::{Chirps, Operator},
-    parameter::parameter,
+    parameter::{amplitude, angle},
     values::Values,
 };
 use crate::{
@@ -25,7 +25,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "the body's reflection in the floor",
     explanation: "The wave also reaches the body by way of the floor, once or twice; the sum with the direct wave makes the echo interfere with itself, stronger and weaker with range.",
     equation: "+ Σ_p A_p [Γ (e^{j…τ_1} + e^{j…τ_2}) + Γ² e^{j…τ_12}], Γ = coefficient, the mirror being the floor",
-    parameters: &[parameter("coefficient", "1", 0.0, -1.0, 1.0), parameter("phase_rad", "rad", 0.0, -6.3, 6.3)],
+    parameters: &[amplitude("coefficient", "1", 0.0, -1.0, 1.0), angle("phase_rad", "rad", 0.0, -6.3, 6.3)],
     choice: Choice::None,
     look_alikes: &["part_reflectivity", "body_multibounce"],
     separate_by: "a carpet or absorber on the floor between radar and person",

@@ -3,7 +3,7 @@
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::fixed,
     values::Values,
 };
 
@@ -17,7 +17,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "frames that were lost",
     explanation: "Frames are missing from the recording, so that from there on every frame shows the body later than its number says.",
     equation: "T_k → T_k + count·T_F for k ≥ at",
-    parameters: &[parameter("at", "frame", 0.0, 0.0, 1000000.0), parameter("count", "frames", 0.0, 0.0, 1000.0)],
+    parameters: &[fixed("at", "frame", 0.0, 0.0, 1000000.0), fixed("count", "frames", 0.0, 0.0, 1000.0)],
     choice: Choice::None,
     look_alikes: &["clock_offset", "clock_drift"],
     separate_by: "the frames' own time stamps, or a motion with a sharp event on either side of the gap",

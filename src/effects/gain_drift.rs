@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     values::Values,
 };
 use crate::complex::Complex;
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "a gain that changes with time",
     explanation: "Temperature or a recalibration changes the gain of all echoes in the course of the recording.",
     equation: "× 10^{db(T)/20}, db piecewise linear over the frames",
-    parameters: &[parameter("db", "dB", 0.0, -20.0, 20.0)],
+    parameters: &[amplitude("db", "dB", 0.0, -20.0, 20.0)],
     choice: Choice::None,
     look_alikes: &["part_reflectivity", "compression"],
     separate_by: "a wall in view: its echo changes along with the body's; a step occurs at one instant, a drift does not",

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, angle, shaping},
     points::{BodyPoints, CHEST},
     values::Values,
 };
@@ -22,9 +22,9 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The chest moves by a fraction of a millimetre with every beat of the heart.",
     equation: "p → p + n_p amplitude_m sin(2π rate_hz T + phase_rad) on the upper torso",
     parameters: &[
-        parameter("rate_hz", "Hz", 1.2, 0.7, 3.0),
-        parameter("amplitude_m", "m", 0.0, 0.0, 0.001),
-        parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
+        shaping("rate_hz", "Hz", 1.2, 0.7, 3.0),
+        amplitude("amplitude_m", "m", 0.0, 0.0, 0.001),
+        angle("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
     choice: Choice::None,
     look_alikes: &["breathing", "radar_vibration"],

@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     values::Values,
 };
 use crate::complex::Complex;
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "a delay in the IF chain",
     explanation: "The IF chain delays the signal, so that each beat is sampled late: a phase in proportion to range.",
     equation: "s(t) → s(t − delay_s), that is × exp(−j2π S τ_p delay_s)",
-    parameters: &[parameter("delay_s", "s", 0.0, -1e-06, 1e-06)],
+    parameters: &[amplitude("delay_s", "s", 0.0, -1e-06, 1e-06)],
     choice: Choice::None,
     look_alikes: &["if_lowpass"],
     separate_by: "the same scene with another slope; never from one setting of the radar",

@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{fixed, shaping},
     values::Values,
 };
 use crate::complex::Complex;
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "the receiver's IF high-pass filter",
     explanation: "A filter that keeps leakage out also weakens near echoes and turns their phase, the more the nearer they are.",
     equation: "× [(j f_b/corner_hz) / (1 + j f_b/corner_hz)]^order, f_b = S τ",
-    parameters: &[parameter("corner_hz", "Hz", 0.0, 0.0, 2000000.0), parameter("order", "1", 1.0, 1.0, 4.0)],
+    parameters: &[shaping("corner_hz", "Hz", 0.0, 0.0, 2000000.0), fixed("order", "1", 1.0, 1.0, 4.0)],
     choice: Choice::None,
     look_alikes: &["if_lowpass", "start_frequency_error", "antenna_pattern"],
     separate_by: "a reflector at 0.3 to 1 m, or another filter setting of the chip; the noise floor has the filter's shape too",

@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::shaping,
     values::Values,
 };
 use crate::complex::Complex;
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "the receiver's IF low-pass filter",
     explanation: "The anti-alias filter delays all echoes a little and weakens far ones.",
     equation: "× 1 / (1 + j f_b/corner_hz), f_b = S τ; corner_hz = 0 stands for no filter",
-    parameters: &[parameter("corner_hz", "Hz", 0.0, 0.0, 100000000.0)],
+    parameters: &[shaping("corner_hz", "Hz", 0.0, 0.0, 100000000.0)],
     choice: Choice::None,
     look_alikes: &[],
     separate_by: "the shape of the noise floor over range in an empty room",

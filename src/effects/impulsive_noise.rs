@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{shaping, spread},
     points::host_value,
     values::Values,
 };
@@ -22,7 +22,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "noise with rare strong samples",
     explanation: "Now and then a single sample is far off: noise with heavier tails than a Gaussian's.",
     equation: "noise × (1 + excess) on a share `probability` of the samples",
-    parameters: &[parameter("probability", "1", 0.0, 0.0, 0.2), parameter("excess", "1", 10.0, 0.0, 1000.0)],
+    parameters: &[spread("probability", "1", 0.0, 0.0, 0.2), shaping("excess", "1", 10.0, 0.0, 1000.0)],
     choice: Choice::None,
     look_alikes: &[],
     separate_by: "a recording without transmission; bursts last several samples, impulses one",

@@ -66,7 +66,7 @@ pub struct EffectInfo {
     pub choice: Choice,
     /// Ids of effects that leave nearly the same trace. A pair stands once, with either of the two:
     /// [`look_alikes`](super::look_alikes) has both directions.
-    pub(super) look_alikes: &'static [&'static str],
+    pub(crate) look_alikes: &'static [&'static str],
     /// The recording that would tell it from them.
     pub separate_by: &'static str,
     /// Where it enters the simulator, and its function.

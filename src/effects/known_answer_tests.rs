@@ -193,9 +193,11 @@ fn nonlinear_effects_make_the_products_that_they_should() {
     let (level, turns) = against(&radar, &rest, 2.0 * hz);
     assert!((level - 0.02).abs() < 1e-9 && (turns - 0.2).abs() < 1e-9, "{level}, {turns}");
     let image = after(&setting("iq_imbalance").with("gain_db", [0.5]).with("phase_deg", [2.0]), &radar, &before);
-    let rest: Vec<f64> = image.iter().zip(&before).map(|(a, b)| a - b).collect();
-    let wanted = 0.5 * ((0.5 * LN_10 / 20.0).exp() - 1.0).hypot(2.0 * TAU / 360.0);
-    assert!((against(&radar, &rest, -hz).0 - wanted).abs() < 1e-9);
+    // What the branches are by themselves: Q is stronger than I, and not at a right angle to it.
+    let (gain, angle) = ((0.5 * LN_10 / 20.0).exp(), 2.0 * TAU / 360.0);
+    let half = before.len() / 2;
+    let turned = |n: usize| gain * (before[half + n] * angle.cos() + before[n] * angle.sin());
+    assert!((0..half).all(|n| (image[n] - before[n]).abs() < 1e-9 && (image[half + n] - turned(n)).abs() < 1e-9));
     let less = after(&setting("compression").with("level", [0.1]).with("reference", [2.0]), &radar, &before);
     assert!((against(&radar, &less, hz).0 - (1.0 - 0.1 / 4.0)).abs() < 1e-9);
     let clipped = after(&setting("adc_saturation").with("level", [0.35]).with("reference", [2.0]), &radar, &before);

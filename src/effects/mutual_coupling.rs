@@ -6,7 +6,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, level},
     values::Values,
 };
 use crate::complex::Complex;
@@ -22,9 +22,9 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Each receiver also picks up what its neighbours receive.",
     equation: "s_r → s_r + (z + re + j im)(s_{r−1} + s_{r+1}), |z| = 10^{level_db/20}",
     parameters: &[
-        parameter("level_db", "dB of the neighbour", -200.0, -120.0, 0.0),
-        parameter("re", "1", 0.0, -1.0, 1.0),
-        parameter("im", "1", 0.0, -1.0, 1.0),
+        level("level_db", "dB of the neighbour", -200.0, -120.0, 0.0),
+        amplitude("re", "1", 0.0, -1.0, 1.0),
+        amplitude("im", "1", 0.0, -1.0, 1.0),
     ],
     choice: Choice::None,
     look_alikes: &[],

@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, angle, fixed},
     values::Values,
 };
 use crate::complex::Complex;
@@ -20,9 +20,9 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Part of the echo is reflected by the radar itself and goes to the scene once more: everything appears again at twice the range and twice the speed, in every pair.",
     equation: "s_{t,r} → s_{t,r} + coefficient s_{t,0} s_{0,r} / reference",
     parameters: &[
-        parameter("coefficient", "1", 0.0, -1.0, 1.0),
-        parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
-        parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
+        amplitude("coefficient", "1", 0.0, -1.0, 1.0),
+        angle("phase_rad", "rad", 0.0, -6.3, 6.3),
+        fixed("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
     choice: Choice::None,
     look_alikes: &["second_harmonic", "wall_ghost"],

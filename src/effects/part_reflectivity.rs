@@ -5,7 +5,7 @@ use burn::tensor::Tensor;
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     points::{BodyPoints, TORSO},
     values::Values,
 };
@@ -20,7 +20,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "another reflectivity of one part of the body",
     explanation: "One part of the body reflects more or less. The learned reflectivity takes this up exactly: a change of description that no recording can prove, never missing physics.",
     equation: "A_p → A_p 10^{db/20} on the body part",
-    parameters: &[parameter("db", "dB", 0.0, -20.0, 20.0)],
+    parameters: &[amplitude("db", "dB", 0.0, -20.0, 20.0)],
     choice: Choice::Part,
     look_alikes: &[],
     separate_by: "none with one person: it cannot be told from the learned reflectivity; the same garment on several persons hints at it",

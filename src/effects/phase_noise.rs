@@ -8,7 +8,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::spread,
     values::Values,
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
@@ -26,7 +26,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "the oscillator's phase noise",
     explanation: "The oscillator's frequency wanders from chirp to chirp: a pedestal in Doppler around strong echoes that grows with range.",
     equation: "× exp(j δ_m τ_p/τ_3m), δ_m normal of deviation per_chirp_rad",
-    parameters: &[parameter("per_chirp_rad", "rad at 3 m", 0.0, 0.0, 1.0)],
+    parameters: &[spread("per_chirp_rad", "rad at 3 m", 0.0, 0.0, 1.0)],
     choice: Choice::None,
     look_alikes: &["chirp_start_jitter", "gain_drift"],
     separate_by: "two walls at different ranges: this phase grows with range, a vibration's does not",

@@ -3,7 +3,7 @@
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     points::BodyPoints,
     values::Values,
 };
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "an offset of the body's place",
     explanation: "The body does not stand where the motion says: all of it is shifted, or turned about the vertical through its middle.",
     equation: "p → R_z(yaw_deg)(p − c) + c + offset_m",
-    parameters: &[parameter("offset_m", "m", 0.0, -0.5, 0.5), parameter("yaw_deg", "deg", 0.0, -30.0, 30.0)],
+    parameters: &[amplitude("offset_m", "m", 0.0, -0.5, 0.5), amplitude("yaw_deg", "deg", 0.0, -30.0, 30.0)],
     choice: Choice::None,
     look_alikes: &["range_bias", "clothing_delay", "channel_mismatch"],
     separate_by: "a walk through many directions: a shift of the body changes range in front and direction at the side, a range bias changes range alone",

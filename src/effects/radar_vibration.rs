@@ -6,7 +6,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, angle, shaping},
     values::Values,
 };
 use crate::complex::Complex;
@@ -22,9 +22,9 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The radar itself shakes along its boresight, so that the phases of all echoes, also those of the walls, oscillate together.",
     equation: "s(T) → s(T) exp(j 4π amplitude_m sin(2π frequency_hz T + phase_rad) / λ)",
     parameters: &[
-        parameter("amplitude_m", "m", 0.0, 0.0, 0.001),
-        parameter("frequency_hz", "Hz", 0.0, 0.0, 1000.0),
-        parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
+        amplitude("amplitude_m", "m", 0.0, 0.0, 0.001),
+        shaping("frequency_hz", "Hz", 0.0, 0.0, 1000.0),
+        angle("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
     choice: Choice::None,
     look_alikes: &["phase_noise", "breathing"],

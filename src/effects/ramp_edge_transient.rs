@@ -6,7 +6,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, fixed, level},
     values::{Values, repeated},
 };
 use crate::complex::Complex;
@@ -22,11 +22,11 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "At the start or the end of each ramp the receiver has not settled: the same additive jump in the first or last samples of every chirp.",
     equation: "+ (10^{level_db/20} + re + j im) reference on the last `samples` samples (the first ones where negative)",
     parameters: &[
-        parameter("samples", "samples", 1.0, -64.0, 64.0),
-        parameter("level_db", "dB of the reference", -200.0, -120.0, 20.0),
-        parameter("re", "of the reference", 0.0, -10.0, 10.0),
-        parameter("im", "of the reference", 0.0, -10.0, 10.0),
-        parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
+        fixed("samples", "samples", 1.0, -64.0, 64.0),
+        level("level_db", "dB of the reference", -200.0, -120.0, 20.0),
+        amplitude("re", "of the reference", 0.0, -10.0, 10.0),
+        amplitude("im", "of the reference", 0.0, -10.0, 10.0),
+        fixed("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
     choice: Choice::None,
     look_alikes: &["spur", "interference", "chirp_droop"],

@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, fixed, level, shaping},
     values::Values,
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
@@ -20,11 +20,11 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Something farther away than the radar can measure appears folded back to a near range.",
     equation: "+ (re + j im) exp j2π(f_c τ + S t τ), τ = 2 range_m / c, S τ beyond the sample rate",
     parameters: &[
-        parameter("range_m", "m", 0.0, 0.0, 200.0),
-        parameter("level_db", "dB of the reference", -200.0, -120.0, 20.0),
-        parameter("re", "of the reference", 0.0, -10.0, 10.0),
-        parameter("im", "of the reference", 0.0, -10.0, 10.0),
-        parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
+        shaping("range_m", "m", 0.0, 0.0, 200.0),
+        level("level_db", "dB of the reference", -200.0, -120.0, 20.0),
+        amplitude("re", "of the reference", 0.0, -10.0, 10.0),
+        amplitude("im", "of the reference", 0.0, -10.0, 10.0),
+        fixed("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
     choice: Choice::None,
     look_alikes: &["spur"],

@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     points::host_value,
     values::Values,
 };
@@ -20,7 +20,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "a constant delay of all paths",
     explanation: "Cables, boards and antennas delay every path alike, so that all is seen farther away by the same distance.",
     equation: "τ_p → τ_p + 2 offset_m / c",
-    parameters: &[parameter("offset_m", "m", 0.0, -0.5, 0.5)],
+    parameters: &[amplitude("offset_m", "m", 0.0, -0.5, 0.5)],
     choice: Choice::None,
     look_alikes: &["slope_error", "if_delay"],
     separate_by: "reflectors at known ranges of 1 m and 6 m: a bias shifts both alike, a slope error in proportion to the range",

@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, fixed, level},
     values::Values,
 };
 use crate::complex::Complex;
@@ -20,10 +20,10 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "The mixer or amplifier squares a little of the signal: strong echoes appear again at twice the range, speed and array phase.",
     equation: "s → s + κ s² / reference, κ = 10^{level_db/20} + re + j im",
     parameters: &[
-        parameter("level_db", "dB of the reference", -200.0, -120.0, 20.0),
-        parameter("re", "of the reference", 0.0, -10.0, 10.0),
-        parameter("im", "of the reference", 0.0, -10.0, 10.0),
-        parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
+        level("level_db", "dB of the reference", -200.0, -120.0, 20.0),
+        amplitude("re", "of the reference", 0.0, -10.0, 10.0),
+        amplitude("im", "of the reference", 0.0, -10.0, 10.0),
+        fixed("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
     choice: Choice::None,
     look_alikes: &["wall_ghost"],

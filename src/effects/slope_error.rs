@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     values::Values,
 };
 use crate::complex::Complex;
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "an error of the chirp's slope",
     explanation: "The ramp is steeper or flatter than declared: all ranges are stretched in proportion.",
     equation: "× exp(j2π τ_p S relative t)",
-    parameters: &[parameter("relative", "1", 0.0, -0.02, 0.02)],
+    parameters: &[amplitude("relative", "1", 0.0, -0.02, 0.02)],
     choice: Choice::None,
     look_alikes: &["pose_offset"],
     separate_by: "two reflectors at known ranges of 1 m and 6 m",

@@ -5,7 +5,7 @@ use burn::tensor::Tensor;
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::shaping,
     points::BodyPoints,
     values::Values,
 };
@@ -20,7 +20,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "waves that bend around the body's edges",
     explanation: "A point is not suddenly hidden: its echo fades as its surface turns away, over the width that diffraction gives.",
     equation: "A_p → A_p (1 − exp(−cos²θ_p / width²)), θ_p between the normal and the line of sight",
-    parameters: &[parameter("width", "cosine", 0.0, 0.0, 0.5)],
+    parameters: &[shaping("width", "cosine", 0.0, 0.0, 0.5)],
     choice: Choice::None,
     look_alikes: &["part_reflectivity"],
     separate_by: "the same edge passed from either side",

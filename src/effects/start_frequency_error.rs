@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     values::Values,
 };
 use crate::complex::Complex;
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "an error of the chirp's start frequency",
     explanation: "The ramp starts at another frequency than declared, so that every path's phase is wrong in proportion to its delay.",
     equation: "× exp(j2π τ_p f_0 relative) on path p",
-    parameters: &[parameter("relative", "1", 0.0, -0.01, 0.01)],
+    parameters: &[amplitude("relative", "1", 0.0, -0.01, 0.01)],
     choice: Choice::None,
     look_alikes: &["adc_start_error", "if_delay", "if_lowpass"],
     separate_by: "the same scene with another slope: a delay in the receiver counts in proportion to the slope, the start frequency does not; never from one setting of the radar",

@@ -3,7 +3,7 @@
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, angle, shaping},
     points::place,
     values::Values,
 };
@@ -25,9 +25,9 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Something at rest, such as furniture, sends an echo that no wall or body explains.",
     equation: "+ amplitude e^{jφ} exp j2π(f_c τ + S t τ) / (d_tx d_rx), τ from position_m",
     parameters: &[
-        parameter("position_m", "m", 0.0, -20.0, 20.0),
-        parameter("amplitude", "recording's unit·m²", 0.0, -1000000000.0, 1000000000.0),
-        parameter("phase_rad", "rad", 0.0, -6.3, 6.3),
+        shaping("position_m", "m", 0.0, -20.0, 20.0),
+        amplitude("amplitude", "recording's unit·m²", 0.0, -1000000000.0, 1000000000.0),
+        angle("phase_rad", "rad", 0.0, -6.3, 6.3),
     ],
     choice: Choice::None,
     look_alikes: &["tx_leakage", "range_alias", "wall_ghost"],

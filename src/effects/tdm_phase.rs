@@ -3,7 +3,7 @@
 use super::{
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::amplitude,
     points::BodyPoints,
     values::Values,
 };
@@ -19,7 +19,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "an error in the time between the transmitters' slots",
     explanation: "The transmitters fire one after the other, later than assumed; a moving part gains a phase from one transmitter to the next, which turns its direction.",
     equation: "τ_p → τ_p + τ̇_p · j · slot_s for transmitter j",
-    parameters: &[parameter("slot_s", "s", 0.0, -0.001, 0.001)],
+    parameters: &[amplitude("slot_s", "s", 0.0, -0.001, 0.001)],
     choice: Choice::None,
     look_alikes: &["channel_mismatch"],
     separate_by: "two directions of walking: the phase changes sign with the velocity, a transmitter's own phase does not",

@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::parameter,
+    parameter::{amplitude, fixed, level, shaping},
     values::Values,
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
@@ -20,11 +20,11 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Part of the transmitted wave goes straight to the receivers: a strong echo at rest in the first range bins, different in every channel.",
     equation: "+ L_{t,r} exp(j2π S τ_L t), τ_L = 2 range_m / c, L = reference (10^{level_db/20} + re + j im)",
     parameters: &[
-        parameter("range_m", "m", 0.08, 0.0, 0.5),
-        parameter("level_db", "dB of the reference", -200.0, -120.0, 20.0),
-        parameter("re", "of the reference", 0.0, -10.0, 10.0),
-        parameter("im", "of the reference", 0.0, -10.0, 10.0),
-        parameter("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
+        shaping("range_m", "m", 0.08, 0.0, 0.5),
+        level("level_db", "dB of the reference", -200.0, -120.0, 20.0),
+        amplitude("re", "of the reference", 0.0, -10.0, 10.0),
+        amplitude("im", "of the reference", 0.0, -10.0, 10.0),
+        fixed("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
     choice: Choice::None,
     look_alikes: &["dc_offset"],

@@ -4,7 +4,7 @@ use super::{
     info::{Choice, EffectInfo, Stage},
     mirror::{mirrored_rx, mirrored_tx},
     operator::{Chirps, Operator},
-    parameter::parameter,
+    parameter::{amplitude, angle},
     values::Values,
 };
 use crate::{
@@ -25,7 +25,7 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "the body's reflection in a wall",
     explanation: "A wall mirrors the body: the wave goes out directly and comes back by way of the wall, and the other way round, which shows a ghost behind the person.",
     equation: "+ coefficient Σ_p A_p [exp j2π(f_c τ_1 + S t τ_1) + exp j2π(f_c τ_2 + S t τ_2)], τ_1 by way of the mirrored receiver, τ_2 of the mirrored transmitter",
-    parameters: &[parameter("coefficient", "1", 0.0, -1.0, 1.0), parameter("phase_rad", "rad", 0.0, -6.3, 6.3)],
+    parameters: &[amplitude("coefficient", "1", 0.0, -1.0, 1.0), angle("phase_rad", "rad", 0.0, -6.3, 6.3)],
     choice: Choice::Boundary,
     look_alikes: &["body_multibounce", "floor_bounce"],
     separate_by: "stand at another distance from the wall: the ghost's delay follows the mirror law, a second person's does not",

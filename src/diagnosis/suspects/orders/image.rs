@@ -10,7 +10,6 @@ use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, HANN_LOBE, spectrum};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
 use crate::diagnosis::statistics::DECIBEL;
-use crate::diagnosis::suspects::receiver::image::{balanced, imbalance};
 use crate::effects::{self, Stage};
 
 /// Orders of the fit: static returns and what turns backwards.
@@ -106,4 +105,17 @@ fn undo(cube: &mut Cube, turned: &[Complex64], coefficients: &[Complex64]) {
         let mu = coefficients[channel % rx] * back * back;
         chirp.iter_mut().for_each(|value| *value = balanced(*value, mu));
     });
+}
+
+/// Gain of Q over I in decibels and error of their right angle in degrees.
+pub(super) fn imbalance(mu: Complex64) -> (f64, f64) {
+    // I + jQ' with Q' = g (Q cos φ + I sin φ) is (1 + x*) / 2 s + (1 − x) / 2 s* with x = g e^{−jφ}, so that the image over
+    // its parent's conjugate is μ = (1 − x) / (1 + x).
+    let x = (Complex64::ONE - mu) / (Complex64::ONE + mu);
+    (20.0 * x.norm().log10(), -x.arg().to_degrees())
+}
+
+/// s = (y − μ y*) / (1 − |μ|²).
+fn balanced(value: Complex64, mu: Complex64) -> Complex64 {
+    (value - mu * value.conj()) * (1.0 - mu.norm_sqr()).recip()
 }

@@ -65,7 +65,7 @@ fn what_does_not_turn_with_the_room_is_an_offset_and_what_turns_backwards_its_im
             assert!(low < truth && truth < high && high - low < 2.0, "{name}: {truth} in {low} to {high}");
         }
     }
-    let (gain_db, phase_deg) = crate::diagnosis::suspects::receiver::image::imbalance(image);
+    let (gain_db, phase_deg) = super::image::imbalance(image);
     assert!((of(&found[1], "gain_db").values[0] - gain_db).abs() < 0.05);
     assert!((of(&found[1], "phase_deg").values[0] - phase_deg).abs() < 0.5);
     let mut left = found.iter().fold(evidence.clone(), |evidence, found| evidence.with(found));

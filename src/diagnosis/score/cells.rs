@@ -1,0 +1,178 @@
+//! Cells of range and Doppler in which what an operator puts there stands out of the signal that it acts on.
+//!
+//! A cell's own returns have free amplitudes: a small change of them is no evidence. So a cell counts where what the effect can put there
+//! exceeds, by far, all that the clean signal has around it in any channel. What is left there is noise, weak strangers, and the effect.
+
+use num_complex::Complex64;
+
+use super::directions::{Direction, Drive};
+use crate::diagnosis::cube::mean_chirp;
+use crate::diagnosis::evidence::{Evidence, blackman_harris, denoised, transform_under};
+use crate::grid::Grid;
+
+/// Cells to each side that the windows' main lobes fill (Blackman-Harris, four terms: Harris 1978, table 1).
+pub const LOBE: usize = 4;
+/// The signal around a cell is at most this share of the power that the effect can put there: 10 dB below.
+const APART: f64 = 0.1;
+/// Power that the effect can put there over the noise, below which a cell cannot add to the evidence.
+const LEAST: f64 = 0.03;
+
+/// One cell of a channel.
+#[derive(Clone, Debug)]
+pub struct Cell {
+    pub doppler: usize,
+    pub range: usize,
+    pub found: Complex64,
+    /// Its variance.
+    pub noise: f64,
+    /// Derivative of what is expected by every amplitude.
+    pub tangents: Vec<Complex64>,
+}
+
+impl Cell {
+    pub fn expected(&self, amplitudes: &[f64]) -> Complex64 {
+        self.tangents.iter().zip(amplitudes).map(|(tangent, amplitude)| tangent * *amplitude).sum()
+    }
+}
+
+/// Of one frame: what changes within it, and what does not.
+pub struct Frame {
+    pub moving: Vec<Cell>,
+    pub still: Vec<Cell>,
+    /// Sum over all samples of |tangent|², by amplitude.
+    pub energies: Vec<f64>,
+}
+
+/// What changes within a frame, `[doppler, range]`, and what does not, `[0, range]`.
+struct Maps {
+    moving: Grid<Complex64, 2>,
+    still: Grid<Complex64, 2>,
+}
+
+/// Of the windows over loops and samples.
+struct Windows {
+    slow: Vec<f64>,
+    fast: Vec<f64>,
+}
+
+impl Windows {
+    fn new(loops: usize, samples: usize) -> Self {
+        Self { slow: blackman_harris(loops), fast: blackman_harris(samples) }
+    }
+
+    /// Of one channel, `[loop · sample]`.
+    fn maps(&self, channel: &[Complex64]) -> Maps {
+        let (loops, samples) = (self.slow.len(), self.fast.len());
+        let mean = mean_chirp(channel.chunks_exact(samples), samples);
+        let moving: Vec<Complex64> =
+            channel.chunks_exact(samples).flat_map(|chirp| chirp.iter().zip(&mean).map(|(value, mean)| value - mean)).collect();
+        let grid = |loops: usize, values: Vec<Complex64>| Grid::new(["doppler", "range"], [loops, samples], values);
+        Maps {
+            moving: grid(loops, transform_under(&moving, &self.slow, &self.fast)),
+            still: grid(1, transform_under(&mean, &[1.0], &self.fast)),
+        }
+    }
+}
+
+/// Largest power of any channel within the lobes around every cell.
+fn around<'a>(maps: impl Iterator<Item = &'a Grid<Complex64, 2>>) -> Option<Grid<f64, 2>> {
+    let largest = |mut most: Grid<f64, 2>, map: &Grid<Complex64, 2>| {
+        most.values_mut().iter_mut().zip(map.values()).for_each(|(most, value)| *most = most.max(value.norm_sqr()));
+        most
+    };
+    let mut maps = maps.peekable();
+    let [loops, samples] = maps.peek()?.shape();
+    let most = maps.fold(Grid::filled(["doppler", "range"], [loops, samples], 0.0), largest);
+    let over = |count: usize, index: usize, value: &dyn Fn(usize) -> f64| {
+        let reach = LOBE.min(count / 2);
+        (0..=2 * reach).map(|offset| value((index + count + offset - reach) % count)).fold(0.0, f64::max)
+    };
+    let axes = ["doppler", "range"];
+    let by_range = Grid::from_fn(axes, [loops, samples], |[d, r]| over(samples, r, &|r| most[[d, r]]));
+    Some(Grid::from_fn(axes, [loops, samples], |[d, r]| over(loops, d, &|d| by_range[[d, r]])))
+}
+
+/// What effects share of one frame.
+struct Shared<'a> {
+    evidence: &'a Evidence,
+    frame: usize,
+    windows: Windows,
+    clean: Vec<Complex64>,
+    /// Largest power of the clean signal around a cell: what moves, and what does not.
+    around: [Option<Grid<f64, 2>>; 2],
+    /// By channel.
+    found: Vec<Maps>,
+}
+
+/// Cells of a frame, by effect.
+pub fn of_frame(evidence: &Evidence, effects: &[(Drive<'_>, Vec<Direction>)], frame: usize) -> Vec<Frame> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let windows = Windows::new(loops, samples);
+    let clean = denoised::frame(evidence, frame).concat();
+    let of_clean: Vec<Maps> = clean.chunks_exact(loops * samples).map(|channel| windows.maps(channel)).collect();
+    let shared = Shared {
+        around: [around(of_clean.iter().map(|maps| &maps.moving)), around(of_clean.iter().map(|maps| &maps.still))],
+        found: (0..evidence.cube.channels()).map(|channel| windows.maps(evidence.cube.channel(frame, channel))).collect(),
+        evidence,
+        frame,
+        windows,
+        clean,
+    };
+    effects.iter().map(|(drive, directions)| shared.cells(drive, directions)).collect()
+}
+
+impl Shared<'_> {
+    fn cells(&self, drive: &Drive<'_>, directions: &[Direction]) -> Frame {
+        let energy = |values: &[Complex64]| values.iter().map(Complex64::norm_sqr).sum::<f64>();
+        let size = self.windows.slow.len() * self.windows.fast.len();
+        let (mut tangents, mut energies, mut most) = (vec![], vec![], vec![]);
+        for &direction in directions {
+            let tangent = drive.tangent(&self.clean, self.frame, direction);
+            let of_tangent = energy(&tangent);
+            // As far as it is believed, or until it is as strong as the signal.
+            let believed = direction.parameter.most - direction.parameter.neutral;
+            most.push(believed.min((energy(&self.clean) / of_tangent.max(f64::MIN_POSITIVE)).sqrt()));
+            energies.push(of_tangent);
+            tangents.push(tangent.chunks_exact(size).map(|channel| self.windows.maps(channel)).collect::<Vec<Maps>>());
+        }
+        let [moving, still] = &self.around;
+        let select = |around: &Option<Grid<f64, 2>>, of: fn(&Maps) -> &Grid<Complex64, 2>| -> Vec<Cell> {
+            around.as_ref().map_or_else(Vec::new, |around| self.select(around, of, &tangents, &most))
+        };
+        Frame { moving: select(moving, |maps| &maps.moving), still: select(still, |maps| &maps.still), energies }
+    }
+
+    /// `tangents`: by amplitude and channel; `most`: of every amplitude.
+    fn select(
+        &self,
+        around: &Grid<f64, 2>,
+        of: fn(&Maps) -> &Grid<Complex64, 2>,
+        tangents: &[Vec<Maps>],
+        most: &[f64],
+    ) -> Vec<Cell> {
+        let mut cells = vec![];
+        let [rows, _] = around.shape();
+        // The mean over a frame's chirps has as much less noise.
+        let averaged = self.windows.slow.len() / rows;
+        for (channel, found) in self.found.iter().enumerate() {
+            let noise = (self.evidence.noise()[channel] / averaged as f64).max(f64::MIN_POSITIVE);
+            for doppler in dopplers(rows) {
+                for range in self.evidence.noise_bins() {
+                    let at = [doppler, range];
+                    let tangents = || tangents.iter().map(|channels| of(&channels[channel])[at]);
+                    let reach: f64 = tangents().zip(most).map(|(tangent, most)| tangent.norm_sqr() * most * most).sum();
+                    if reach > LEAST * noise && around[at] < APART * reach {
+                        cells.push(Cell { doppler, range, found: of(found)[at], noise, tangents: tangents().collect() });
+                    }
+                }
+            }
+        }
+        cells
+    }
+}
+
+/// Doppler cells beyond what the mean over a frame's chirps leaves near zero; the one of a mean itself.
+fn dopplers(loops: usize) -> impl Iterator<Item = usize> {
+    let lobe = LOBE.min(loops / 4);
+    (0..loops).filter(move |&doppler| loops == 1 || doppler.min(loops - doppler) > lobe)
+}

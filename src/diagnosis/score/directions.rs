@@ -1,0 +1,133 @@
+//! How an effect's operator changes a signal: at some values, and to first order in its amplitudes.
+
+use burn::tensor::{DType, Device, Tensor, TensorData};
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use crate::complex::Complex;
+use crate::diagnosis::cube::{Cube, analytic};
+use crate::diagnosis::evidence::Evidence;
+use crate::effects::{Context, EffectInfo, ParameterInfo, Role, SignalOperator, Values};
+
+/// Range of the farthest echo where no room is known.
+const FARTHEST_M: f64 = 10.0;
+/// Step of the central difference, of a parameter's prior width: its own error is of second order in it.
+const STEP: f64 = 1e-4;
+/// An inversion by fixed-point steps ends at a change of this share, or after so many steps.
+const INVERTED: f64 = 1e-9;
+const MOST_STEPS: usize = 40;
+
+/// One real amplitude of an effect: a parameter that its operator is linear in, at one of the two phases of a complex one.
+#[derive(Clone, Copy, Debug)]
+pub struct Direction {
+    pub parameter: &'static ParameterInfo,
+    /// Where the amplitude has an angle: a quarter turn.
+    pub is_quadrature: bool,
+}
+
+/// An effect as an operator on the samples of a radar, with levels relative to a reference.
+#[derive(Clone, Copy)]
+pub struct Drive<'a> {
+    pub info: &'static EffectInfo,
+    operator: SignalOperator,
+    evidence: &'a Evidence,
+    reference: f64,
+}
+
+impl Direction {
+    /// All of an effect. None where it does not act on the summed signal, or where more than amplitudes are free: shapes need a search,
+    /// and what is drawn at random changes the covariance instead of the mean.
+    pub fn all(info: &'static EffectInfo) -> Vec<Self> {
+        let is = |role: Role| info.parameters.iter().filter(move |parameter| parameter.role == role);
+        let counts = is(Role::Fixed).any(|parameter| parameter.name != "reference");
+        let more = counts || is(Role::Shape).chain(is(Role::Spread)).next().is_some();
+        if more || info.operator.on_signal().is_none() {
+            return vec![];
+        }
+        let phases: &[bool] = if is(Role::Angle).next().is_some() { &[false, true] } else { &[false] };
+        is(Role::Amplitude)
+            .flat_map(|parameter| phases.iter().map(move |&is_quadrature| Self { parameter, is_quadrature }))
+            .collect()
+    }
+}
+
+impl<'a> Drive<'a> {
+    /// `reference`: amplitude that levels are relative to. None for what does not act on the summed signal.
+    pub fn new(info: &'static EffectInfo, evidence: &'a Evidence, reference: f64) -> Option<Self> {
+        Some(Self { info, operator: info.operator.on_signal()?, evidence, reference })
+    }
+
+    fn values(&self, amplitudes: &[(Direction, f64)], device: &Device) -> Values {
+        let mut given: Vec<(&'static str, Vec<f64>)> = vec![];
+        for parameter in self.info.parameters {
+            let of: Vec<&(Direction, f64)> =
+                amplitudes.iter().filter(|(direction, _)| direction.parameter.name == parameter.name).collect();
+            let along = |is_quadrature: bool| -> f64 {
+                of.iter().filter(|(direction, _)| direction.is_quadrature == is_quadrature).map(|(_, value)| value).sum()
+            };
+            match (parameter.role, self.info.parameters.iter().find(|other| other.role == Role::Angle)) {
+                (Role::Amplitude, Some(angle)) if !of.is_empty() => {
+                    let amplitude = Complex64::new(along(false), along(true));
+                    given.push((parameter.name, vec![amplitude.norm()]));
+                    given.push((angle.name, vec![amplitude.arg()]));
+                }
+                (Role::Amplitude, None) if !of.is_empty() => given.push((parameter.name, vec![along(false)])),
+                (Role::Fixed, _) if parameter.name == "reference" => given.push((parameter.name, vec![self.reference])),
+                _ => {}
+            }
+        }
+        Values::of(self.info, &given, device, DType::F64)
+    }
+
+    /// What the operator makes of a frame's samples, `[tx, rx, loop, sample]`. Receivers without quadrature keep the real part.
+    pub fn applied(&self, signal: &[Complex64], frame: usize, amplitudes: &[(Direction, f64)]) -> Vec<Complex64> {
+        let device = Device::flex();
+        let [_, tx, rx, loops, samples] = self.evidence.cube.dims;
+        let part = |of: fn(&Complex64) -> f64| -> Tensor<4> {
+            let data = TensorData::new(signal.iter().map(of).collect::<Vec<f64>>(), [tx, rx, loops, samples]);
+            Tensor::from_data(data, (&device, DType::F64))
+        };
+        let farthest_m = self.evidence.room.as_ref().and_then(|room| room.farthest_m()).unwrap_or(FARTHEST_M);
+        let context = Context { radar: &self.evidence.radar, frame, farthest_m };
+        let before = Complex::new(part(|value| value.re), part(|value| value.im));
+        let after = (self.operator)(before, &self.values(amplitudes, &device), &context);
+        let host = |part: Tensor<4>| part.into_data().convert::<f64>().try_into_vec::<f64>().expect("converted");
+        let re = host(after.re);
+        if self.evidence.is_real() {
+            return analytic(&re.iter().map(|&value| value as f32).collect::<Vec<f32>>(), samples);
+        }
+        re.into_iter().zip(host(after.im)).map(|(re, im)| Complex64::new(re, im)).collect()
+    }
+
+    /// Derivative of [`Self::applied`] by one amplitude at zero: a central difference of the operator in double precision.
+    pub fn tangent(&self, signal: &[Complex64], frame: usize, direction: Direction) -> Vec<Complex64> {
+        let ParameterInfo { neutral, least, most, .. } = *direction.parameter;
+        let step = STEP * (most - least);
+        let [above, below] = [neutral + step, neutral - step].map(|value| self.applied(signal, frame, &[(direction, value)]));
+        above.iter().zip(below).map(|(above, below)| (above - below) / (2.0 * step)).collect()
+    }
+
+    /// All samples as they were before the effect: v = y − (E(v) − v), step by step.
+    pub fn undone(&self, cube: &Cube, amplitudes: &[(Direction, f64)]) -> Cube {
+        let mut cube = cube.clone();
+        let size: usize = cube.dims[1..].iter().product();
+        cube.samples.par_chunks_exact_mut(size).enumerate().for_each(|(frame, found)| {
+            let mut before = found.to_vec();
+            for _ in 0..MOST_STEPS {
+                let after = self.applied(&before, frame, amplitudes);
+                let (mut change, mut all) = (0.0, 0.0);
+                for ((before, after), found) in before.iter_mut().zip(after).zip(found.iter()) {
+                    let next = found - (after - *before);
+                    change += (next - *before).norm_sqr();
+                    all += next.norm_sqr();
+                    *before = next;
+                }
+                if change <= INVERTED * INVERTED * all {
+                    break;
+                }
+            }
+            found.copy_from_slice(&before);
+        });
+        cube
+    }
+}

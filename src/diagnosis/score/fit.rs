@@ -1,0 +1,175 @@
+//! An effect's amplitudes by the score test, and by Gauss-Newton steps through its operator.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::cells::{self, Cell, Frame};
+use super::directions::{Direction, Drive};
+use crate::diagnosis::estimated::Estimated;
+use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::speckle::Look;
+use crate::effects::EffectInfo;
+
+/// Neighbouring range bins whose returns err together: the windows' lobes to both sides.
+const PLACE: usize = 2 * cells::LOBE;
+/// Cells along range and Doppler whose power is taken together: half a lobe.
+const BLOCK: usize = 2;
+/// Samples whose cells are held at a time, at most, and frames that are looked at whatever their size.
+const MOST_SAMPLES: usize = 4_000_000;
+const FEWEST_FRAMES: usize = 12;
+/// Gauss-Newton steps, at most, and the share of the errors below which a step is none.
+const STEPS: usize = 8;
+const CONVERGED: f64 = 0.1;
+
+/// What a recording says of an effect's amplitudes.
+pub struct Fit {
+    pub directions: Vec<Direction>,
+    pub amplitudes: Vec<f64>,
+    /// Of their errors, by how groups of cells disagree.
+    pub deviations: Vec<f64>,
+    pub p_value: f64,
+    /// Of each part of the frames, predicted by the others, nats.
+    pub gain: f64,
+    /// Of the power above the noise where the effect is above it: the share that the effect does not explain.
+    pub left: f64,
+    /// Energy that an amplitude of one adds to a frame, by amplitude.
+    pub frame_energies: Vec<f64>,
+}
+
+impl Fit {
+    /// The score tests of amplitudes of zero, by effect. None where too few cells say anything.
+    pub fn at_zero(evidence: &Evidence, effects: &[&'static EffectInfo], reference: f64) -> Vec<Option<Self>> {
+        let all = |info: &&'static EffectInfo| Some((Drive::new(info, evidence, reference)?, Direction::all(info)));
+        let asked: Vec<(Drive<'_>, Vec<Direction>)> = effects.iter().filter_map(all).collect();
+        assert_eq!(asked.len(), effects.len(), "effects that act on the summed signal");
+        let by_frame: Vec<Vec<Frame>> =
+            some_frames(evidence).into_par_iter().map(|frame| cells::of_frame(evidence, &asked, frame)).collect();
+        let mut by_effect: Vec<Vec<Frame>> = asked.iter().map(|_| vec![]).collect();
+        for frame in by_frame {
+            by_effect.iter_mut().zip(frame).for_each(|(frames, cells)| frames.push(cells));
+        }
+        asked.into_par_iter().zip(by_effect).map(|((_, directions), frames)| Self::of(&frames, directions, &[])).collect()
+    }
+
+    /// `undone`: amplitudes of what was taken out already, for the share that is left; none where nothing was.
+    fn of(frames: &[Frame], directions: Vec<Direction>, undone: &[f64]) -> Option<Self> {
+        let count = directions.len();
+        let first = looks(frames, &DVector::zeros(count));
+        let of = |at: &DVector<f64>| Some(looks(frames, at));
+        let found = Estimated::converged(&first, &DMatrix::identity(count, count), &vec![0.0; count], of)?;
+        let deviation = |index: usize| {
+            let mut weights = DVector::zeros(count);
+            weights[index] = 1.0;
+            found.deviation(&weights)
+        };
+        let amplitudes: Vec<f64> = found.values.iter().copied().collect();
+        // Of all frames alike.
+        let energy = |index: usize| frames.iter().map(|frame| frame.energies[index]).sum::<f64>() / frames.len() as f64;
+        Some(Self {
+            deviations: (0..count).map(deviation).collect(),
+            p_value: found.p_value,
+            gain: found.gain,
+            left: left(frames, &amplitudes, undone),
+            frame_energies: (0..count).map(energy).collect(),
+            directions,
+            amplitudes,
+        })
+    }
+
+    /// The same amplitudes by Gauss-Newton steps: the effect is undone by its operator, and tested for again. None where that leads
+    /// beyond what is believed.
+    pub fn refined(self, evidence: &Evidence, info: &'static EffectInfo, reference: f64) -> Option<Self> {
+        let drive = Drive::new(info, evidence, reference)?;
+        let mut fit = self;
+        for _ in 0..STEPS {
+            if !fit.is_believed() {
+                return None;
+            }
+            let mut undone = evidence.clone();
+            undone.cube = drive.undone(&evidence.cube, &fit.by_direction());
+            let undone = undone.changed();
+            let asked = [(Drive::new(info, &undone, reference)?, fit.directions.clone())];
+            let of_frame = |frame| cells::of_frame(&undone, &asked, frame).remove(0);
+            let frames: Vec<Frame> = some_frames(&undone).into_par_iter().map(of_frame).collect();
+            let step = Self::of(&frames, fit.directions.clone(), &fit.amplitudes)?;
+            let is_last =
+                step.amplitudes.iter().zip(&step.deviations).all(|(step, deviation)| step.abs() < CONVERGED * deviation);
+            fit.amplitudes.iter_mut().zip(&step.amplitudes).for_each(|(amplitude, step)| *amplitude += step);
+            (fit.deviations, fit.left) = (step.deviations, step.left);
+            if is_last {
+                break;
+            }
+        }
+        fit.is_believed().then_some(fit)
+    }
+
+    pub fn by_direction(&self) -> Vec<(Direction, f64)> {
+        self.directions.iter().copied().zip(self.amplitudes.iter().copied()).collect()
+    }
+
+    /// Whether every amplitude lies within its prior.
+    fn is_believed(&self) -> bool {
+        let is_complex = self.directions.iter().any(|direction| direction.is_quadrature);
+        self.directions.iter().zip(&self.amplitudes).all(|(direction, value)| {
+            let parameter = direction.parameter;
+            let value = if is_complex { value.abs() } else { *value };
+            (parameter.least..=parameter.most).contains(&value)
+        })
+    }
+}
+
+/// All frames, or as many as bound what is held of their cells, evenly spread.
+fn some_frames(evidence: &Evidence) -> Vec<usize> {
+    let [frames, rest @ ..] = evidence.cube.dims;
+    let count = (MOST_SAMPLES / rest.iter().product::<usize>().max(1)).max(FEWEST_FRAMES).min(frames);
+    (0..count).map(|index| index * frames / count).collect()
+}
+
+/// By frame: what changes within it, by ranges; and what does not, which errs together in all frames.
+fn looks(frames: &[Frame], at: &DVector<f64>) -> Vec<Vec<Look>> {
+    let of = |frame: &Frame| [of_cells(&frame.moving, at, false), of_cells(&frame.still, at, true)].concat();
+    frames.par_iter().map(of).collect()
+}
+
+/// Scores and information of the amplitudes, by ranges. What is in the cells besides has the power that is left in them: cells that
+/// strangers fill say as much less.
+fn of_cells(cells: &[Cell], at: &DVector<f64>, is_still: bool) -> Vec<Look> {
+    let left: Vec<Complex64> = cells.iter().map(|cell| cell.found - cell.expected(at.as_slice())).collect();
+    let block = |cell: &Cell| (cell.range / BLOCK, cell.doppler / BLOCK);
+    let mut powers: BTreeMap<(usize, usize), [f64; 2]> = BTreeMap::new();
+    for (cell, left) in cells.iter().zip(&left) {
+        let [sum, count] = powers.entry(block(cell)).or_default();
+        (*sum, *count) = (*sum + left.norm_sqr() / cell.noise, *count + 1.0);
+    }
+    let mut looks: BTreeMap<usize, Look> = BTreeMap::new();
+    for (cell, left) in cells.iter().zip(&left) {
+        let [sum, count] = powers[&block(cell)];
+        let weight = 2.0 / (cell.noise * (sum / count).max(1.0));
+        let place = cell.range / PLACE;
+        let look = looks.entry(place).or_insert_with(|| Look::new(at.len(), is_still.then_some(place)));
+        for (a, tangent) in cell.tangents.iter().enumerate() {
+            look.score[a] += weight * (tangent.conj() * left).re;
+            for (b, other) in cell.tangents.iter().enumerate() {
+                look.information[(a, b)] += weight * (tangent.conj() * other).re;
+            }
+        }
+    }
+    looks.into_values().collect()
+}
+
+/// Share of the power above the noise that amplitudes leave, in cells where what they make is above it. `undone`: amplitudes of what was
+/// taken out of the cells already.
+fn left(frames: &[Frame], amplitudes: &[f64], undone: &[f64]) -> f64 {
+    let (mut before, mut after) = (0.0, 0.0);
+    for cell in frames.iter().flat_map(|frame| frame.moving.iter().chain(&frame.still)) {
+        let (out, rest) = (cell.expected(undone), cell.expected(amplitudes));
+        if (out + rest).norm_sqr() > cell.noise {
+            before += (cell.found + out).norm_sqr() / cell.noise - 1.0;
+            after += (cell.found - rest).norm_sqr() / cell.noise - 1.0;
+        }
+    }
+    if before > 0.0 { (after / before).max(0.0) } else { 0.0 }
+}

@@ -1,0 +1,177 @@
+//! One score test for every effect of the library whose operator acts on the summed signal: a new effect is one file in `effects`.
+//!
+//! With the clean signal ŝ, the operator E of the library and its amplitudes θ, zero where the effect is absent, a recording is
+//! y = ŝ + Σ θ_j J_j + n, J_j = ∂E_θ(ŝ)/∂θ_j at θ = 0. In cells of range and Doppler the score and the information of θ are
+//!
+//!   U_j = Σ 2 Re(J_j* y) / C,   I_jk = Σ 2 Re(J_j* J_k) / C
+//!
+//! (Rao 1948), over the cells in which ŝ itself says nothing ([`cells`]), with C the power that is left there. θ̂ = I⁻¹ U; its errors are
+//! by how groups of cells disagree (the sandwich of Huber 1967), its chance is Hotelling's, its gain is that of frames which others
+//! predict ([`Estimated`](super::estimated::Estimated)). What passes is refined by Gauss-Newton steps through the operator ([`fit`]).
+//! An effect that changes each return where it is alone (a filter, a phase) has no such cells, and is not judged here.
+
+mod cells;
+mod directions;
+mod fit;
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+
+use self::directions::{Direction, Drive};
+use self::fit::Fit;
+use super::behaviour::Behaviour;
+use super::cube::Cube;
+use super::evidence::{Evidence, denoised};
+use super::finding::{Candidate, Correction, Estimate, NINETY, Place, Volume};
+use super::never;
+use super::statistics::{DECIBEL, corrected};
+use crate::effects::{self, EffectInfo, Operator, Role};
+
+/// Chance and gain beyond which a fit is refined by steps through the operator: those beyond cannot be accepted.
+const WORTH_REFINING: f64 = 1e-3;
+/// Share of the power above the noise that may be left where the effect is above it: what else lies there makes more of it than the
+/// effect does.
+const MOST_LEFT: f64 = 0.5;
+/// Standard deviations of a one-sided limit of 95 %.
+const NINETY_FIVE: f64 = 1.645;
+
+/// Effects of the evidence's library that the test is asked of.
+fn asked(evidence: &Evidence) -> Vec<&'static EffectInfo> {
+    // A signal that the converter cut has products of all kinds, and so has one whose products were undone roughly.
+    let is_bent =
+        evidence.accepted.contains(&effects::adc_saturation::ID) || evidence.accepted_unnamed.contains(&Behaviour::Quadratic);
+    let never: Vec<&str> = never::all(evidence.body.is_some()).map(|(id, _)| id).collect();
+    let is_asked = |info: &&'static EffectInfo| {
+        !is_bent && !evidence.accepted.contains(&info.id) && !never.contains(&info.id) && !Direction::all(info).is_empty()
+    };
+    evidence.library.iter().copied().filter(is_asked).collect()
+}
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let (asked, reference) = (asked(evidence), evidence.peak());
+    if reference <= 0.0 {
+        return vec![];
+    }
+    let fits = Fit::at_zero(evidence, &asked, reference);
+    let of = |(info, fit): (&&'static EffectInfo, Option<Fit>)| {
+        let fit = fit?;
+        let p_value = corrected(fit.p_value, asked.len() as f64);
+        if p_value > WORTH_REFINING || fit.gain <= 0.0 {
+            return None;
+        }
+        let fit = fit.refined(evidence, info, reference)?;
+        (fit.left < MOST_LEFT).then(|| candidate(evidence, info, &fit, p_value))
+    };
+    asked.iter().zip(fits).filter_map(of).collect()
+}
+
+/// Energy over all samples that an effect can have at most, with a confidence of 95 %, where it was not found; by effect.
+pub fn limits(evidence: &Evidence) -> Vec<(&'static str, f64)> {
+    let (asked, reference) = (asked(evidence), evidence.peak());
+    if reference <= 0.0 {
+        return vec![];
+    }
+    let frames = evidence.cube.dims[0] as f64;
+    let of = |(info, fit): (&&'static EffectInfo, Option<Fit>)| {
+        let fit = fit?;
+        let errors = fit.amplitudes.iter().zip(&fit.deviations).zip(&fit.frame_energies);
+        let most = |value: f64, deviation: f64| value.abs() + NINETY_FIVE * deviation;
+        let energy: f64 = errors.map(|((value, deviation), energy)| most(*value, *deviation).powi(2) * energy).sum();
+        Some((info.id, frames * energy))
+    };
+    asked.iter().zip(Fit::at_zero(evidence, &asked, reference)).filter_map(of).collect()
+}
+
+fn candidate(evidence: &Evidence, info: &'static EffectInfo, fit: &Fit, p_value: f64) -> Candidate {
+    let estimates = estimates(info, fit);
+    let numbers: Vec<String> = estimates.iter().filter_map(|estimate| said(info, estimate)).collect();
+    let reference = evidence.peak();
+    let amplitudes = fit.by_direction();
+    let undone = |evidence: &Evidence| {
+        Drive::new(info, evidence, reference)
+            .map_or_else(|| evidence.cube.clone(), |drive| drive.undone(&evidence.cube, &amplitudes))
+    };
+    let before = undone(evidence);
+    let energy = evidence.cube.samples.iter().zip(&before.samples).map(|(after, before)| (after - before).norm_sqr()).sum();
+    Candidate {
+        id: Some(info.id),
+        behaves_like: behaviour(info),
+        estimates,
+        choice: None,
+        place: Place::at(info.stage),
+        p_value,
+        gain: fit.gain,
+        errs_alike: false,
+        look_alikes: vec![],
+        statement: format!("{} ({}): {}", info.title, numbers.join(", "), uncapitalised(info.explanation.trim_end_matches('.'))),
+        curve: None,
+        energy,
+        correction: correction(evidence, info, reference, fit),
+    }
+}
+
+fn correction(evidence: &Evidence, info: &'static EffectInfo, reference: f64, fit: &Fit) -> Correction {
+    let (amplitudes, of) = (fit.by_direction(), Arc::new(evidence.clone()));
+    let undo = move |cube: &mut Cube| {
+        if let Some(drive) = Drive::new(info, &of, reference) {
+            *cube = drive.undone(cube, &amplitudes);
+        }
+    };
+    // Energy goes to other cells than its own: to first order volumes stay.
+    Correction::Inverse(Arc::new(undo), Volume::KEPT)
+}
+
+fn behaviour(info: &EffectInfo) -> Behaviour {
+    match info.operator {
+        Operator::Nonlinear(_) => Behaviour::NonLinear,
+        Operator::Added(_) => Behaviour::AdditiveFastTime,
+        _ => Behaviour::LinearInTheSignal,
+    }
+}
+
+/// Amplitudes with their angle, or their level, as the effect's parameters have them.
+fn estimates(info: &EffectInfo, fit: &Fit) -> Vec<Estimate> {
+    let named = |role: Role| info.parameters.iter().find(|parameter| parameter.role == role);
+    let size = fit.amplitudes.iter().map(|value| value * value).sum::<f64>().sqrt();
+    let deviation = (fit.deviations.iter().map(|value| value * value).sum::<f64>() / fit.deviations.len() as f64).sqrt();
+    let share = deviation / size.max(f64::MIN_POSITIVE);
+    // What levels are relative to is known so well; squares of it twice as well.
+    let is_relative = info.parameters.iter().any(|parameter| parameter.name == "reference");
+    let reference = if is_relative { denoised::PEAK_DB / DECIBEL } else { 0.0 };
+    if let Some(level) = named(Role::Level) {
+        return vec![Estimate::normal(level.name, DECIBEL * size.ln(), DECIBEL * share.hypot(reference))];
+    }
+    if let (Some(angle), [of, _]) = (named(Role::Angle), fit.directions.as_slice()) {
+        let phase = Complex64::new(fit.amplitudes[0], fit.amplitudes[1]).arg();
+        let amplitude = Estimate::normal(of.parameter.name, size, size * share.hypot(reference));
+        return vec![amplitude, Estimate::normal(angle.name, phase, share)];
+    }
+    let one = |index: usize| {
+        let (value, deviation) = (fit.amplitudes[index], fit.deviations[index]);
+        Estimate::normal(fit.directions[index].parameter.name, value, deviation.hypot(2.0 * reference * value))
+    };
+    (0..fit.directions.len()).map(one).collect()
+}
+
+/// A sentence as what follows a colon; a symbol stays as it is.
+fn uncapitalised(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    match (letters.next(), letters.clone().next()) {
+        (Some(first), Some(second)) if second.is_lowercase() => first.to_lowercase().chain(letters).collect(),
+        _ => sentence.into(),
+    }
+}
+
+/// "gain_db 0.5 ± 0.1 dB".
+fn said(info: &EffectInfo, estimate: &Estimate) -> Option<String> {
+    let (parameter, value) = (info.parameter(estimate.name)?, *estimate.values.first()?);
+    let half = 0.5 * (estimate.ci90[0][1] - estimate.ci90[0][0]);
+    let unit = if parameter.unit == "1" { String::new() } else { format!(" {}", parameter.unit) };
+    // Digits down to the tenth part of the error.
+    let digits = (1.0 - (half / NINETY).max(1e-12).log10().floor()).clamp(0.0, 9.0) as usize;
+    Some(format!("{} {value:.digits$} ± {half:.digits$}{unit}", estimate.name))
+}
+
+#[cfg(test)]
+mod tests;

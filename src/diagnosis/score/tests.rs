@@ -1,0 +1,146 @@
+use std::f64::consts::TAU;
+
+use burn::tensor::Tensor;
+
+use super::*;
+use crate::complex::Complex;
+use crate::diagnosis::DiagnosisConfig;
+use crate::diagnosis::report::Findings;
+use crate::diagnosis::select::explain;
+use crate::effects::{Choice, Context, ParameterInfo, Stage, Values};
+use crate::radar::Radar;
+
+const fn part(name: &'static str) -> ParameterInfo {
+    ParameterInfo { name, role: Role::Amplitude, unit: "1", neutral: 0.0, least: -0.5, most: 0.5 }
+}
+
+/// Two converters that take turns and differ: an effect that this module alone knows of.
+static INTERLEAVED: EffectInfo = EffectInfo {
+    id: "interleaved_converter",
+    card: "",
+    stage: Stage::Receiver,
+    needs_person: false,
+    title: "two interleaved converters that differ",
+    explanation: "Even and odd samples have another gain and phase: everything appears again half a sample rate away.",
+    equation: "s_n → s_n + (re + j im) (−1)^n s_n",
+    parameters: &[part("re"), part("im")],
+    choice: Choice::None,
+    look_alikes: &[],
+    separate_by: "a tone on the test input",
+    operator: Operator::Signal(interleaved),
+};
+
+fn interleaved(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Complex<4> {
+    let samples = context.radar.samples_per_chirp;
+    let turns: Tensor<4> = values.tensor((0..samples).map(|n| 1.0 - 2.0 * (n % 2) as f64).collect(), [1, 1, 1, samples]);
+    let factor = Complex::new(turns.clone() * values.scalar::<4>("re"), turns * values.scalar::<4>("im"));
+    signal.clone().add(signal.mul(factor))
+}
+
+/// Things that move and things that stand still, seen by a receiver that does something to every sample.
+fn evidence(seed: u64, receiver: impl Fn(Complex64, usize) -> Complex64) -> Evidence {
+    let mut radar = Radar::small(12);
+    (radar.loops_per_frame, radar.samples_per_chirp) = (32, 64);
+    // Beat frequency and Doppler in cells, amplitude.
+    let things = [(9.0, 6.3, 60.0), (11.5, -8.2, 50.0), (14.2, 10.4, 40.0), (7.3, 0.0, 90.0), (12.8, 0.0, 70.0)];
+    Evidence::in_noise(radar, seed, |[frame, channel, index, sample]| {
+        let of = |(range, doppler, amplitude): &(f64, f64, f64)| {
+            // What moves is speckle: another phase in every frame and channel.
+            let free =
+                if *doppler == 0.0 { channel as f64 * range } else { (frame * frame) as f64 * 0.37 * range + channel as f64 };
+            amplitude * Complex64::cis(TAU * (range * sample as f64 / 64.0 + doppler * index as f64 / 32.0) + free)
+        };
+        receiver(things.iter().map(of).sum(), sample)
+    })
+}
+
+fn by_interleaving(factor: Complex64) -> impl Fn(Complex64, usize) -> Complex64 {
+    move |value, sample| value * (1.0 + factor * if sample % 2 == 0 { 1.0 } else { -1.0 })
+}
+
+fn library_with_it() -> &'static [&'static EffectInfo] {
+    Box::leak([effects::library(), &[&INTERLEAVED]].concat().into_boxed_slice())
+}
+
+fn named<'a>(found: &'a [Candidate], id: &str) -> Option<&'a Candidate> {
+    found.iter().find(|candidate| candidate.id == Some(id))
+}
+
+fn value(candidate: &Candidate, name: &str) -> (f64, [f64; 2]) {
+    let estimate = candidate.estimates.iter().find(|estimate| estimate.name == name).unwrap();
+    (estimate.values[0], estimate.ci90[0])
+}
+
+#[test]
+fn an_effect_that_is_one_file_is_detected_fitted_undone_and_reported() {
+    let truth = Complex64::new(0.03, -0.02);
+    let mut evidence = evidence(5, by_interleaving(truth));
+    assert!(named(&find(&evidence), INTERLEAVED.id).is_none());
+    evidence.library = library_with_it();
+    let found = find(&evidence);
+    let candidate = named(&found, INTERLEAVED.id).unwrap_or_else(|| panic!("{found:?}"));
+    for (name, wanted) in [("re", truth.re), ("im", truth.im)] {
+        let (found, [low, high]) = value(candidate, name);
+        assert!((found - wanted).abs() < 2e-3 && (low..high).contains(&wanted), "{name}: {found} in {low} to {high}");
+    }
+    let undone = evidence.with(candidate);
+    assert!(named(&find(&undone), INTERLEAVED.id).is_none());
+    let explanation = explain(evidence.clone(), &DiagnosisConfig::default(), &mut |_| {});
+    let findings = Findings::of(&explanation, 1.0);
+    let effect =
+        findings.effects.iter().find(|effect| effect.id == INTERLEAVED.id).unwrap_or_else(|| panic!("{:?}", findings.effects));
+    assert_eq!(effect.equation, INTERLEAVED.equation);
+    assert!(effect.statement.contains("half a sample rate away") && effect.probability > 0.99, "{effect:?}");
+    assert!(effect.evidence.held_out_loglik_gain > 100.0);
+}
+
+#[test]
+fn an_effect_that_is_not_there_is_bounded() {
+    let mut evidence = evidence(6, |value, _| value);
+    evidence.library = library_with_it();
+    assert!(find(&evidence).is_empty());
+    let limits = limits(&evidence);
+    let energy_of = |id: &str| limits.iter().find(|(known, _)| *known == id).unwrap().1;
+    let all: f64 = evidence.cube.samples.iter().map(Complex64::norm_sqr).sum();
+    // Some 1500 times below the signal, as the noise of so many samples lets tell: and not better than that.
+    let level_db = 10.0 * (energy_of(INTERLEAVED.id) / all).log10();
+    assert!((-75.0..-45.0).contains(&level_db), "{level_db}");
+    assert!(energy_of(effects::iq_imbalance::ID) > 0.0);
+}
+
+#[test]
+fn receivers_of_the_library_are_found_with_what_they_do() {
+    // Q' = g (Q cos φ + I sin φ).
+    let (gain, angle) = (10f64.powf(0.4 / 20.0), 2.0f64.to_radians());
+    let branches =
+        find(&evidence(7, |value, _| Complex64::new(value.re, gain * (value.im * angle.cos() + value.re * angle.sin()))));
+    let image = named(&branches, effects::iq_imbalance::ID).unwrap();
+    for (name, wanted, error) in [("gain_db", 0.4, 0.02), ("phase_deg", 2.0, 0.1)] {
+        let (found, [low, high]) = value(image, name);
+        assert!((found - wanted).abs() < error && (low..high).contains(&wanted), "{name}: {found} in {low} to {high}");
+    }
+    // Levels are relative to the strongest sample, which is some 300.
+    let square = find(&evidence(8, |value, _| value + value * value * 1e-4));
+    let harmonic = named(&square, effects::second_harmonic::ID).unwrap();
+    let (level_db, _) = value(harmonic, "level_db");
+    assert!((level_db - 20.0 * (1e-4 * 300f64).log10()).abs() < 1.0, "{level_db}");
+    let cube = find(&evidence(9, |value, _| value * (1.0 - 1e-6 * value.norm_sqr())));
+    let compression = named(&cube, effects::compression::ID).unwrap();
+    let (level, _) = value(compression, "level");
+    assert!((level / (1e-6 * 300f64.powi(2)) - 1.0).abs() < 0.2, "{level}");
+}
+
+#[test]
+fn chances_are_uniform_where_nothing_is_there() {
+    let chances: Vec<f64> = (0..40)
+        .flat_map(|seed| {
+            let evidence = evidence(100 + seed, |value, _| value);
+            let reference = evidence.peak();
+            let asked = [&effects::iq_imbalance::INFO, &effects::second_harmonic::INFO];
+            Fit::at_zero(&evidence, &asked, reference).into_iter().flatten().map(|fit| fit.p_value).collect::<Vec<_>>()
+        })
+        .collect();
+    assert!(chances.len() >= 60, "{}", chances.len());
+    let chance = crate::diagnosis::statistics::uniform_chance(&chances);
+    assert!(chance > 1e-3, "{chance}: {chances:?}");
+}
