@@ -4,7 +4,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::{amplitude, fixed},
+    parameter::{amplitude_of_receivers, fixed},
     values::{Values, repeated},
 };
 use crate::complex::Complex;
@@ -20,8 +20,8 @@ pub static INFO: EffectInfo = EffectInfo {
     explanation: "Each receiver's output has a constant offset: a line at range zero and speed zero.",
     equation: "s_r → s_r + reference (i_r + j q_r)",
     parameters: &[
-        amplitude("i", "of the reference", 0.0, -1.0, 1.0),
-        amplitude("q", "of the reference", 0.0, -1.0, 1.0),
+        amplitude_of_receivers("i", "of the reference", 0.0, -1.0, 1.0),
+        amplitude_of_receivers("q", "of the reference", 0.0, -1.0, 1.0),
         fixed("reference", "recording's unit", 0.0, 0.0, 1000000000.0),
     ],
     choice: Choice::None,

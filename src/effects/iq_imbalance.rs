@@ -6,7 +6,7 @@ use super::{
     context::Context,
     info::{Choice, EffectInfo, Stage},
     operator::Operator,
-    parameter::amplitude,
+    parameter::amplitude_of_receivers,
     values::{Values, repeated},
 };
 use crate::complex::Complex;
@@ -21,7 +21,10 @@ pub static INFO: EffectInfo = EffectInfo {
     title: "an imbalance of the I and Q channels",
     explanation: "The two receiver branches differ in gain and angle: a faint mirror image of the scene at negative ranges and speeds.",
     equation: "s → (1 + x*) s / 2 + (1 − x) s* / 2, x = 10^{gain_db/20} e^{−j phase_deg π/180}",
-    parameters: &[amplitude("gain_db", "dB", 0.0, -6.0, 6.0), amplitude("phase_deg", "deg", 0.0, -30.0, 30.0)],
+    parameters: &[
+        amplitude_of_receivers("gain_db", "dB", 0.0, -6.0, 6.0),
+        amplitude_of_receivers("phase_deg", "deg", 0.0, -30.0, 30.0),
+    ],
     choice: Choice::None,
     look_alikes: &["second_harmonic", "range_alias"],
     separate_by: "a single strong moving reflector: the image moves against it",

@@ -5,6 +5,8 @@
 pub enum Role {
     /// The effect is linear in it near its neutral value.
     Amplitude,
+    /// The same, one for each receiver or one for all.
+    AmplitudeOfReceivers,
     /// Phase of the amplitude beside it, radians.
     Angle,
     /// Amplitude beside it in decibels; an amplitude of zero has no derivative by it.
@@ -54,6 +56,7 @@ macro_rules! roles {
 
 roles! {
     amplitude Amplitude;
+    amplitude_of_receivers AmplitudeOfReceivers;
     angle Angle;
     level Level;
     shaping Shape;

@@ -5,7 +5,7 @@
 
 use num_complex::Complex64;
 
-use super::directions::{Direction, Drive};
+use super::directions::{Amplitudes, Direction, Drive};
 use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::evidence::{Evidence, blackman_harris, denoised, transform_under};
 use crate::grid::Grid;
@@ -20,6 +20,7 @@ const LEAST: f64 = 0.03;
 /// One cell of a channel.
 #[derive(Clone, Debug)]
 pub struct Cell {
+    pub receiver: usize,
     pub doppler: usize,
     pub range: usize,
     pub found: Complex64,
@@ -30,8 +31,8 @@ pub struct Cell {
 }
 
 impl Cell {
-    pub fn expected(&self, amplitudes: &[f64]) -> Complex64 {
-        self.tangents.iter().zip(amplitudes).map(|(tangent, amplitude)| tangent * *amplitude).sum()
+    pub fn expected(&self, amplitudes: &Amplitudes) -> Complex64 {
+        self.tangents.iter().zip(amplitudes.of(self.receiver)).map(|(tangent, amplitude)| tangent * *amplitude).sum()
     }
 }
 
@@ -154,6 +155,7 @@ impl Shared<'_> {
         let [rows, _] = around.shape();
         // The mean over a frame's chirps has as much less noise.
         let averaged = self.windows.slow.len() / rows;
+        let receivers = self.evidence.cube.dims[2];
         for (channel, found) in self.found.iter().enumerate() {
             let noise = (self.evidence.noise()[channel] / averaged as f64).max(f64::MIN_POSITIVE);
             for doppler in dopplers(rows) {
@@ -162,7 +164,8 @@ impl Shared<'_> {
                     let tangents = || tangents.iter().map(|channels| of(&channels[channel])[at]);
                     let reach: f64 = tangents().zip(most).map(|(tangent, most)| tangent.norm_sqr() * most * most).sum();
                     if reach > LEAST * noise && around[at] < APART * reach {
-                        cells.push(Cell { doppler, range, found: of(found)[at], noise, tangents: tangents().collect() });
+                        let (receiver, found) = (channel % receivers, of(found)[at]);
+                        cells.push(Cell { receiver, doppler, range, found, noise, tangents: tangents().collect() });
                     }
                 }
             }

@@ -25,6 +25,28 @@ pub struct Direction {
     pub is_quadrature: bool,
 }
 
+/// Values along the directions of an effect: the same for all receivers, or one after the other for each.
+#[derive(Clone, Debug)]
+pub struct Amplitudes {
+    pub directions: Vec<Direction>,
+    /// `[direction]` or `[receiver · direction]`.
+    pub values: Vec<f64>,
+}
+
+impl Amplitudes {
+    /// Of one receiver.
+    pub fn of(&self, receiver: usize) -> &[f64] {
+        let count = self.directions.len();
+        let first = if self.values.len() > count { receiver * count } else { 0 };
+        &self.values[first..first + count]
+    }
+
+    /// How many receivers have values of their own; one where all have the same.
+    pub fn receivers(&self) -> usize {
+        self.values.len() / self.directions.len()
+    }
+}
+
 /// An effect as an operator on the samples of a radar, with levels relative to a reference.
 #[derive(Clone, Copy)]
 pub struct Drive<'a> {
@@ -46,6 +68,7 @@ impl Direction {
         }
         let phases: &[bool] = if is(Role::Angle).next().is_some() { &[false, true] } else { &[false] };
         is(Role::Amplitude)
+            .chain(is(Role::AmplitudeOfReceivers))
             .flat_map(|parameter| phases.iter().map(move |&is_quadrature| Self { parameter, is_quadrature }))
             .collect()
     }
@@ -57,30 +80,35 @@ impl<'a> Drive<'a> {
         Some(Self { info, operator: info.operator.on_signal()?, evidence, reference })
     }
 
-    fn values(&self, amplitudes: &[(Direction, f64)], device: &Device) -> Values {
+    fn values(&self, amplitudes: &Amplitudes, device: &Device) -> Values {
         let mut given: Vec<(&'static str, Vec<f64>)> = vec![];
+        let angle = self.info.parameters.iter().find(|other| other.role == Role::Angle);
         for parameter in self.info.parameters {
-            let of: Vec<&(Direction, f64)> =
-                amplitudes.iter().filter(|(direction, _)| direction.parameter.name == parameter.name).collect();
-            let along = |is_quadrature: bool| -> f64 {
-                of.iter().filter(|(direction, _)| direction.is_quadrature == is_quadrature).map(|(_, value)| value).sum()
+            if parameter.name == "reference" {
+                given.push((parameter.name, vec![self.reference]));
+            }
+            let along = |is_quadrature: bool| {
+                let place = |direction: &Direction| {
+                    direction.parameter.name == parameter.name && direction.is_quadrature == is_quadrature
+                };
+                let index = amplitudes.directions.iter().position(place)?;
+                Some((0..amplitudes.receivers()).map(|receiver| amplitudes.of(receiver)[index]).collect::<Vec<f64>>())
             };
-            match (parameter.role, self.info.parameters.iter().find(|other| other.role == Role::Angle)) {
-                (Role::Amplitude, Some(angle)) if !of.is_empty() => {
-                    let amplitude = Complex64::new(along(false), along(true));
-                    given.push((parameter.name, vec![amplitude.norm()]));
-                    given.push((angle.name, vec![amplitude.arg()]));
+            match (along(false), along(true), angle) {
+                (None, None, _) => {}
+                (re, im, Some(angle)) => {
+                    let first = |values: Option<Vec<f64>>| values.map_or(0.0, |values| values[0]);
+                    let amplitude = Complex64::new(first(re), first(im));
+                    given.extend([(parameter.name, vec![amplitude.norm()]), (angle.name, vec![amplitude.arg()])]);
                 }
-                (Role::Amplitude, None) if !of.is_empty() => given.push((parameter.name, vec![along(false)])),
-                (Role::Fixed, _) if parameter.name == "reference" => given.push((parameter.name, vec![self.reference])),
-                _ => {}
+                (values, _, None) => given.push((parameter.name, values.unwrap_or_default())),
             }
         }
         Values::of(self.info, &given, device, DType::F64)
     }
 
     /// What the operator makes of a frame's samples, `[tx, rx, loop, sample]`. Receivers without quadrature keep the real part.
-    pub fn applied(&self, signal: &[Complex64], frame: usize, amplitudes: &[(Direction, f64)]) -> Vec<Complex64> {
+    pub fn applied(&self, signal: &[Complex64], frame: usize, amplitudes: &Amplitudes) -> Vec<Complex64> {
         let device = Device::flex();
         let [_, tx, rx, loops, samples] = self.evidence.cube.dims;
         let part = |of: fn(&Complex64) -> f64| -> Tensor<4> {
@@ -103,12 +131,13 @@ impl<'a> Drive<'a> {
     pub fn tangent(&self, signal: &[Complex64], frame: usize, direction: Direction) -> Vec<Complex64> {
         let ParameterInfo { neutral, least, most, .. } = *direction.parameter;
         let step = STEP * (most - least);
-        let [above, below] = [neutral + step, neutral - step].map(|value| self.applied(signal, frame, &[(direction, value)]));
+        let at = |value: f64| Amplitudes { directions: vec![direction], values: vec![value] };
+        let [above, below] = [neutral + step, neutral - step].map(|value| self.applied(signal, frame, &at(value)));
         above.iter().zip(below).map(|(above, below)| (above - below) / (2.0 * step)).collect()
     }
 
     /// All samples as they were before the effect: v = y − (E(v) − v), step by step.
-    pub fn undone(&self, cube: &Cube, amplitudes: &[(Direction, f64)]) -> Cube {
+    pub fn undone(&self, cube: &Cube, amplitudes: &Amplitudes) -> Cube {
         let mut cube = cube.clone();
         let size: usize = cube.dims[1..].iter().product();
         cube.samples.par_chunks_exact_mut(size).enumerate().for_each(|(frame, found)| {

@@ -7,11 +7,12 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::cells::{self, Cell, Frame};
-use super::directions::{Direction, Drive};
+use super::directions::{Amplitudes, Direction, Drive};
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::speckle::Look;
-use crate::effects::EffectInfo;
+use crate::diagnosis::statistics::corrected;
+use crate::effects::{EffectInfo, Role};
 
 /// Neighbouring range bins whose returns err together: the windows' lobes to both sides.
 const PLACE: usize = 2 * cells::LOBE;
@@ -20,14 +21,15 @@ const BLOCK: usize = 2;
 /// Samples whose cells are held at a time, at most, and frames that are looked at whatever their size.
 const MOST_SAMPLES: usize = 4_000_000;
 const FEWEST_FRAMES: usize = 12;
+/// Chance of receivers that have the same values, below which each has its own.
+const DIFFER: f64 = 1e-3;
 /// Gauss-Newton steps, at most, and the share of the errors below which a step is none.
 const STEPS: usize = 8;
 const CONVERGED: f64 = 0.1;
 
 /// What a recording says of an effect's amplitudes.
 pub struct Fit {
-    pub directions: Vec<Direction>,
-    pub amplitudes: Vec<f64>,
+    pub amplitudes: Amplitudes,
     /// Of their errors, by how groups of cells disagree.
     pub deviations: Vec<f64>,
     pub p_value: f64,
@@ -35,7 +37,7 @@ pub struct Fit {
     pub gain: f64,
     /// Of the power above the noise where the effect is above it: the share that the effect does not explain.
     pub left: f64,
-    /// Energy that an amplitude of one adds to a frame, by amplitude.
+    /// Energy that an amplitude of one adds to a frame, by direction.
     pub frame_energies: Vec<f64>,
 }
 
@@ -51,32 +53,56 @@ impl Fit {
         for frame in by_frame {
             by_effect.iter_mut().zip(frame).for_each(|(frames, cells)| frames.push(cells));
         }
-        asked.into_par_iter().zip(by_effect).map(|((_, directions), frames)| Self::of(&frames, directions, &[])).collect()
+        let receivers = evidence.cube.dims[2];
+        let of =
+            |((_, directions), frames): ((Drive<'_>, Vec<Direction>), Vec<Frame>)| Self::best(&frames, &directions, receivers);
+        asked.into_par_iter().zip(by_effect).map(of).collect()
     }
 
-    /// `undone`: amplitudes of what was taken out already, for the share that is left; none where nothing was.
-    fn of(frames: &[Frame], directions: Vec<Direction>, undone: &[f64]) -> Option<Self> {
-        let count = directions.len();
-        let first = looks(frames, &DVector::zeros(count));
-        let of = |at: &DVector<f64>| Some(looks(frames, at));
+    /// One value for all receivers; or one for each, where they may have their own and do not agree.
+    fn best(frames: &[Frame], directions: &[Direction], receivers: usize) -> Option<Self> {
+        let common = Self::of(frames, directions, 1, None);
+        let may_differ = directions.iter().all(|direction| direction.parameter.role == Role::AmplitudeOfReceivers);
+        if !may_differ || receivers < 2 {
+            return common.map(|(fit, _)| fit);
+        }
+        let each = Self::of(frames, directions, receivers, None);
+        let (fit, _) = each.filter(|(_, alike)| *alike < DIFFER).or(common)?;
+        Some(Self { p_value: corrected(fit.p_value, 2.0), ..fit })
+    }
+
+    /// With the chance that all receivers have the same values. `undone`: what was taken out already, for the share that is left.
+    fn of(frames: &[Frame], directions: &[Direction], receivers: usize, undone: Option<&Amplitudes>) -> Option<(Self, f64)> {
+        let count = directions.len() * receivers;
+        let amplitudes = |values: &[f64]| Amplitudes { directions: directions.to_vec(), values: values.to_vec() };
+        let first = looks(frames, &amplitudes(&vec![0.0; count]));
+        let of = |at: &DVector<f64>| Some(looks(frames, &amplitudes(at.as_slice())));
         let found = Estimated::converged(&first, &DMatrix::identity(count, count), &vec![0.0; count], of)?;
         let deviation = |index: usize| {
             let mut weights = DVector::zeros(count);
             weights[index] = 1.0;
             found.deviation(&weights)
         };
-        let amplitudes: Vec<f64> = found.values.iter().copied().collect();
+        // Differences from the first receiver.
+        let own = count - directions.len();
+        let contrasts = DMatrix::from_fn(count, own, |row, column| match row {
+            row if row == column + directions.len() => 1.0,
+            row if row == column % directions.len() => -1.0,
+            _ => 0.0,
+        });
+        let alike = if own > 0 { found.chance(&contrasts) } else { 1.0 };
+        let amplitudes = amplitudes(found.values.as_slice());
         // Of all frames alike.
         let energy = |index: usize| frames.iter().map(|frame| frame.energies[index]).sum::<f64>() / frames.len() as f64;
-        Some(Self {
+        let fit = Self {
             deviations: (0..count).map(deviation).collect(),
             p_value: found.p_value,
             gain: found.gain,
             left: left(frames, &amplitudes, undone),
-            frame_energies: (0..count).map(energy).collect(),
-            directions,
+            frame_energies: (0..directions.len()).map(energy).collect(),
             amplitudes,
-        })
+        };
+        Some((fit, alike))
     }
 
     /// The same amplitudes by Gauss-Newton steps: the effect is undone by its operator, and tested for again. None where that leads
@@ -89,15 +115,16 @@ impl Fit {
                 return None;
             }
             let mut undone = evidence.clone();
-            undone.cube = drive.undone(&evidence.cube, &fit.by_direction());
+            undone.cube = drive.undone(&evidence.cube, &fit.amplitudes);
             let undone = undone.changed();
-            let asked = [(Drive::new(info, &undone, reference)?, fit.directions.clone())];
+            let directions = fit.amplitudes.directions.clone();
+            let asked = [(Drive::new(info, &undone, reference)?, directions.clone())];
             let of_frame = |frame| cells::of_frame(&undone, &asked, frame).remove(0);
             let frames: Vec<Frame> = some_frames(&undone).into_par_iter().map(of_frame).collect();
-            let step = Self::of(&frames, fit.directions.clone(), &fit.amplitudes)?;
-            let is_last =
-                step.amplitudes.iter().zip(&step.deviations).all(|(step, deviation)| step.abs() < CONVERGED * deviation);
-            fit.amplitudes.iter_mut().zip(&step.amplitudes).for_each(|(amplitude, step)| *amplitude += step);
+            let (step, _) = Self::of(&frames, &directions, fit.amplitudes.receivers(), Some(&fit.amplitudes))?;
+            let steps = &step.amplitudes.values;
+            let is_last = steps.iter().zip(&step.deviations).all(|(step, deviation)| step.abs() < CONVERGED * deviation);
+            fit.amplitudes.values.iter_mut().zip(steps).for_each(|(amplitude, step)| *amplitude += step);
             (fit.deviations, fit.left) = (step.deviations, step.left);
             if is_last {
                 break;
@@ -106,14 +133,11 @@ impl Fit {
         fit.is_believed().then_some(fit)
     }
 
-    pub fn by_direction(&self) -> Vec<(Direction, f64)> {
-        self.directions.iter().copied().zip(self.amplitudes.iter().copied()).collect()
-    }
-
     /// Whether every amplitude lies within its prior.
     fn is_believed(&self) -> bool {
-        let is_complex = self.directions.iter().any(|direction| direction.is_quadrature);
-        self.directions.iter().zip(&self.amplitudes).all(|(direction, value)| {
+        let Amplitudes { directions, values } = &self.amplitudes;
+        let is_complex = directions.iter().any(|direction| direction.is_quadrature);
+        directions.iter().cycle().zip(values).all(|(direction, value)| {
             let parameter = direction.parameter;
             let value = if is_complex { value.abs() } else { *value };
             (parameter.least..=parameter.most).contains(&value)
@@ -129,15 +153,15 @@ fn some_frames(evidence: &Evidence) -> Vec<usize> {
 }
 
 /// By frame: what changes within it, by ranges; and what does not, which errs together in all frames.
-fn looks(frames: &[Frame], at: &DVector<f64>) -> Vec<Vec<Look>> {
+fn looks(frames: &[Frame], at: &Amplitudes) -> Vec<Vec<Look>> {
     let of = |frame: &Frame| [of_cells(&frame.moving, at, false), of_cells(&frame.still, at, true)].concat();
     frames.par_iter().map(of).collect()
 }
 
 /// Scores and information of the amplitudes, by ranges. What is in the cells besides has the power that is left in them: cells that
 /// strangers fill say as much less.
-fn of_cells(cells: &[Cell], at: &DVector<f64>, is_still: bool) -> Vec<Look> {
-    let left: Vec<Complex64> = cells.iter().map(|cell| cell.found - cell.expected(at.as_slice())).collect();
+fn of_cells(cells: &[Cell], at: &Amplitudes, is_still: bool) -> Vec<Look> {
+    let left: Vec<Complex64> = cells.iter().map(|cell| cell.found - cell.expected(at)).collect();
     let block = |cell: &Cell| (cell.range / BLOCK, cell.doppler / BLOCK);
     let mut powers: BTreeMap<(usize, usize), [f64; 2]> = BTreeMap::new();
     for (cell, left) in cells.iter().zip(&left) {
@@ -149,11 +173,13 @@ fn of_cells(cells: &[Cell], at: &DVector<f64>, is_still: bool) -> Vec<Look> {
         let [sum, count] = powers[&block(cell)];
         let weight = 2.0 / (cell.noise * (sum / count).max(1.0));
         let place = cell.range / PLACE;
-        let look = looks.entry(place).or_insert_with(|| Look::new(at.len(), is_still.then_some(place)));
+        let look = looks.entry(place).or_insert_with(|| Look::new(at.values.len(), is_still.then_some(place)));
+        // Where each receiver has its own, those of the others are no matter of this cell.
+        let first = if at.receivers() > 1 { cell.receiver * at.directions.len() } else { 0 };
         for (a, tangent) in cell.tangents.iter().enumerate() {
-            look.score[a] += weight * (tangent.conj() * left).re;
+            look.score[first + a] += weight * (tangent.conj() * left).re;
             for (b, other) in cell.tangents.iter().enumerate() {
-                look.information[(a, b)] += weight * (tangent.conj() * other).re;
+                look.information[(first + a, first + b)] += weight * (tangent.conj() * other).re;
             }
         }
     }
@@ -162,10 +188,10 @@ fn of_cells(cells: &[Cell], at: &DVector<f64>, is_still: bool) -> Vec<Look> {
 
 /// Share of the power above the noise that amplitudes leave, in cells where what they make is above it. `undone`: amplitudes of what was
 /// taken out of the cells already.
-fn left(frames: &[Frame], amplitudes: &[f64], undone: &[f64]) -> f64 {
+fn left(frames: &[Frame], amplitudes: &Amplitudes, undone: Option<&Amplitudes>) -> f64 {
     let (mut before, mut after) = (0.0, 0.0);
     for cell in frames.iter().flat_map(|frame| frame.moving.iter().chain(&frame.still)) {
-        let (out, rest) = (cell.expected(undone), cell.expected(amplitudes));
+        let (out, rest) = (undone.map_or(Complex64::ZERO, |undone| cell.expected(undone)), cell.expected(amplitudes));
         if (out + rest).norm_sqr() > cell.noise {
             before += (cell.found + out).norm_sqr() / cell.noise - 1.0;
             after += (cell.found - rest).norm_sqr() / cell.noise - 1.0;

@@ -8,17 +8,20 @@
 //! (Rao 1948), over the cells in which ŝ itself says nothing ([`cells`]), with C the power that is left there. θ̂ = I⁻¹ U; its errors are
 //! by how groups of cells disagree (the sandwich of Huber 1967), its chance is Hotelling's, its gain is that of frames which others
 //! predict ([`Estimated`](super::estimated::Estimated)). What passes is refined by Gauss-Newton steps through the operator ([`fit`]).
-//! An effect that changes each return where it is alone (a filter, a phase) has no such cells, and is not judged here.
+//! An effect that changes each return where it is alone (a filter, a phase) has no such cells, and is not judged here. What follows the
+//! signal and is no effect of the library is a field without a name ([`fields`]).
 
 mod cells;
 mod directions;
+mod fields;
 mod fit;
 
 use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use self::directions::{Direction, Drive};
+use self::directions::{Amplitudes, Direction, Drive};
+use self::fields::Field;
 use self::fit::Fit;
 use super::behaviour::Behaviour;
 use super::cube::Cube;
@@ -33,6 +36,8 @@ const WORTH_REFINING: f64 = 1e-3;
 /// Share of the power above the noise that may be left where the effect is above it: what else lies there makes more of it than the
 /// effect does.
 const MOST_LEFT: f64 = 0.5;
+/// Share of a field's gain from which on an effect of the library explains what the field does.
+const BY_A_LAW: f64 = 0.8;
 /// Standard deviations of a one-sided limit of 95 %.
 const NINETY_FIVE: f64 = 1.645;
 
@@ -49,7 +54,11 @@ fn asked(evidence: &Evidence) -> Vec<&'static EffectInfo> {
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let (asked, reference) = (asked(evidence), evidence.peak());
+    let reference = evidence.peak();
+    let named = asked(evidence);
+    let is_open = |field: &&Field| !named.is_empty() && !evidence.accepted_unnamed.contains(&field.behaves_like);
+    let fields: Vec<&Field> = fields::ALL.iter().filter(is_open).collect();
+    let asked: Vec<&'static EffectInfo> = named.iter().copied().chain(fields.iter().map(|field| field.info)).collect();
     if reference <= 0.0 {
         return vec![];
     }
@@ -63,7 +72,16 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         let fit = fit.refined(evidence, info, reference)?;
         (fit.left < MOST_LEFT).then(|| candidate(evidence, info, &fit, p_value))
     };
-    asked.iter().zip(fits).filter_map(of).collect()
+    let mut found: Vec<Option<Candidate>> = asked.iter().zip(fits).map(of).collect();
+    let of_fields = found.split_off(named.len());
+    let mut found: Vec<Candidate> = found.into_iter().flatten().collect();
+    let explained = found.iter().map(|candidate| candidate.gain).fold(0.0, f64::max);
+    let nameless = fields.iter().zip(of_fields).filter_map(|(field, candidate)| {
+        let candidate = candidate.filter(|candidate| explained < BY_A_LAW * candidate.gain)?;
+        Some(Candidate { id: None, behaves_like: field.behaves_like, estimates: vec![], ..candidate })
+    });
+    found.extend(nameless.collect::<Vec<_>>());
+    found
 }
 
 /// Energy over all samples that an effect can have at most, with a confidence of 95 %, where it was not found; by effect.
@@ -75,10 +93,12 @@ pub fn limits(evidence: &Evidence) -> Vec<(&'static str, f64)> {
     let frames = evidence.cube.dims[0] as f64;
     let of = |(info, fit): (&&'static EffectInfo, Option<Fit>)| {
         let fit = fit?;
-        let errors = fit.amplitudes.iter().zip(&fit.deviations).zip(&fit.frame_energies);
+        // Where each receiver has its own, each has its share of the energy.
+        let share = frames / fit.amplitudes.receivers() as f64;
+        let errors = fit.amplitudes.values.iter().zip(&fit.deviations).zip(fit.frame_energies.iter().cycle());
         let most = |value: f64, deviation: f64| value.abs() + NINETY_FIVE * deviation;
         let energy: f64 = errors.map(|((value, deviation), energy)| most(*value, *deviation).powi(2) * energy).sum();
-        Some((info.id, frames * energy))
+        Some((info.id, share * energy))
     };
     asked.iter().zip(Fit::at_zero(evidence, &asked, reference)).filter_map(of).collect()
 }
@@ -87,12 +107,8 @@ fn candidate(evidence: &Evidence, info: &'static EffectInfo, fit: &Fit, p_value:
     let estimates = estimates(info, fit);
     let numbers: Vec<String> = estimates.iter().filter_map(|estimate| said(info, estimate)).collect();
     let reference = evidence.peak();
-    let amplitudes = fit.by_direction();
-    let undone = |evidence: &Evidence| {
-        Drive::new(info, evidence, reference)
-            .map_or_else(|| evidence.cube.clone(), |drive| drive.undone(&evidence.cube, &amplitudes))
-    };
-    let before = undone(evidence);
+    let drive = Drive::new(info, evidence, reference);
+    let before = drive.map_or_else(|| evidence.cube.clone(), |drive| drive.undone(&evidence.cube, &fit.amplitudes));
     let energy = evidence.cube.samples.iter().zip(&before.samples).map(|(after, before)| (after - before).norm_sqr()).sum();
     Candidate {
         id: Some(info.id),
@@ -112,7 +128,7 @@ fn candidate(evidence: &Evidence, info: &'static EffectInfo, fit: &Fit, p_value:
 }
 
 fn correction(evidence: &Evidence, info: &'static EffectInfo, reference: f64, fit: &Fit) -> Correction {
-    let (amplitudes, of) = (fit.by_direction(), Arc::new(evidence.clone()));
+    let (amplitudes, of) = (fit.amplitudes.clone(), Arc::new(evidence.clone()));
     let undo = move |cube: &mut Cube| {
         if let Some(drive) = Drive::new(info, &of, reference) {
             *cube = drive.undone(cube, &amplitudes);
@@ -133,7 +149,8 @@ fn behaviour(info: &EffectInfo) -> Behaviour {
 /// Amplitudes with their angle, or their level, as the effect's parameters have them.
 fn estimates(info: &EffectInfo, fit: &Fit) -> Vec<Estimate> {
     let named = |role: Role| info.parameters.iter().find(|parameter| parameter.role == role);
-    let size = fit.amplitudes.iter().map(|value| value * value).sum::<f64>().sqrt();
+    let Amplitudes { directions, values } = &fit.amplitudes;
+    let size = values.iter().map(|value| value * value).sum::<f64>().sqrt();
     let deviation = (fit.deviations.iter().map(|value| value * value).sum::<f64>() / fit.deviations.len() as f64).sqrt();
     let share = deviation / size.max(f64::MIN_POSITIVE);
     // What levels are relative to is known so well; squares of it twice as well.
@@ -142,16 +159,19 @@ fn estimates(info: &EffectInfo, fit: &Fit) -> Vec<Estimate> {
     if let Some(level) = named(Role::Level) {
         return vec![Estimate::normal(level.name, DECIBEL * size.ln(), DECIBEL * share.hypot(reference))];
     }
-    if let (Some(angle), [of, _]) = (named(Role::Angle), fit.directions.as_slice()) {
-        let phase = Complex64::new(fit.amplitudes[0], fit.amplitudes[1]).arg();
+    if let (Some(angle), [of, _]) = (named(Role::Angle), directions.as_slice()) {
+        let phase = Complex64::new(values[0], values[1]).arg();
         let amplitude = Estimate::normal(of.parameter.name, size, size * share.hypot(reference));
         return vec![amplitude, Estimate::normal(angle.name, phase, share)];
     }
     let one = |index: usize| {
-        let (value, deviation) = (fit.amplitudes[index], fit.deviations[index]);
-        Estimate::normal(fit.directions[index].parameter.name, value, deviation.hypot(2.0 * reference * value))
+        let of_receivers = |all: &[f64]| -> Vec<f64> { all.iter().skip(index).step_by(directions.len()).copied().collect() };
+        let (values, deviations) = (of_receivers(values), of_receivers(&fit.deviations));
+        let deviations: Vec<f64> =
+            values.iter().zip(deviations).map(|(value, deviation)| deviation.hypot(2.0 * reference * value)).collect();
+        Estimate::list(directions[index].parameter.name, &values, &deviations)
     };
-    (0..fit.directions.len()).map(one).collect()
+    (0..directions.len()).map(one).collect()
 }
 
 /// A sentence as what follows a colon; a symbol stays as it is.
@@ -163,14 +183,19 @@ fn uncapitalised(sentence: &str) -> String {
     }
 }
 
-/// "gain_db 0.5 ± 0.1 dB".
+/// "gain_db 0.5 ± 0.1 dB"; of receivers one after the other.
 fn said(info: &EffectInfo, estimate: &Estimate) -> Option<String> {
-    let (parameter, value) = (info.parameter(estimate.name)?, *estimate.values.first()?);
-    let half = 0.5 * (estimate.ci90[0][1] - estimate.ci90[0][0]);
+    let parameter = info.parameter(estimate.name)?;
+    let number = |(value, [low, high]): (&f64, &[f64; 2])| {
+        let half = 0.5 * (high - low);
+        // Digits down to the tenth part of the error.
+        let digits = (1.0 - (half / NINETY).max(1e-12).log10().floor()).clamp(0.0, 9.0) as usize;
+        format!("{value:.digits$} ± {half:.digits$}")
+    };
+    let numbers: Vec<String> = estimate.values.iter().zip(&estimate.ci90).map(number).collect();
     let unit = if parameter.unit == "1" { String::new() } else { format!(" {}", parameter.unit) };
-    // Digits down to the tenth part of the error.
-    let digits = (1.0 - (half / NINETY).max(1e-12).log10().floor()).clamp(0.0, 9.0) as usize;
-    Some(format!("{} {value:.digits$} ± {half:.digits$}{unit}", estimate.name))
+    let of = if numbers.len() > 1 { " by receiver" } else { "" };
+    Some(format!("{}{of} {}{unit}", estimate.name, numbers.join(", ")))
 }
 
 #[cfg(test)]

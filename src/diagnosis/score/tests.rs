@@ -39,6 +39,11 @@ fn interleaved(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Co
 
 /// Things that move and things that stand still, seen by a receiver that does something to every sample.
 fn evidence(seed: u64, receiver: impl Fn(Complex64, usize) -> Complex64) -> Evidence {
+    of_receivers(seed, |_, value, sample| receiver(value, sample))
+}
+
+/// The same with receivers that differ.
+fn of_receivers(seed: u64, receiver: impl Fn(usize, Complex64, usize) -> Complex64) -> Evidence {
     let mut radar = Radar::small(12);
     (radar.loops_per_frame, radar.samples_per_chirp) = (32, 64);
     // Beat frequency and Doppler in cells, amplitude.
@@ -50,7 +55,7 @@ fn evidence(seed: u64, receiver: impl Fn(Complex64, usize) -> Complex64) -> Evid
                 if *doppler == 0.0 { channel as f64 * range } else { (frame * frame) as f64 * 0.37 * range + channel as f64 };
             amplitude * Complex64::cis(TAU * (range * sample as f64 / 64.0 + doppler * index as f64 / 32.0) + free)
         };
-        receiver(things.iter().map(of).sum(), sample)
+        receiver(channel, things.iter().map(of).sum(), sample)
     })
 }
 
@@ -108,12 +113,43 @@ fn an_effect_that_is_not_there_is_bounded() {
     assert!(energy_of(effects::iq_imbalance::ID) > 0.0);
 }
 
+/// Q' = g (Q cos φ + I sin φ).
+fn unbalanced(value: Complex64, gain_db: f64, phase_deg: f64) -> Complex64 {
+    let (gain, angle) = (10f64.powf(gain_db / 20.0), phase_deg.to_radians());
+    Complex64::new(value.re, gain * (value.im * angle.cos() + value.re * angle.sin()))
+}
+
+#[test]
+fn receivers_that_differ_have_values_of_their_own() {
+    let gains_db = [0.5, -0.3];
+    let evidence = of_receivers(10, |receiver, value, _| unbalanced(value, gains_db[receiver], 1.0));
+    let found = find(&evidence);
+    let image = named(&found, effects::iq_imbalance::ID).unwrap_or_else(|| panic!("{found:?}"));
+    let gains = image.estimates.iter().find(|estimate| estimate.name == "gain_db").unwrap();
+    assert!(gains.values.iter().zip(gains_db).all(|(found, wanted)| (found - wanted).abs() < 0.03), "{gains:?}");
+    assert!(named(&find(&evidence.with(image)), effects::iq_imbalance::ID).is_none());
+}
+
+#[test]
+fn without_its_effect_an_image_is_an_unknown_of_its_family() {
+    let mut evidence = evidence(11, |value, _| unbalanced(value, 0.4, 2.0));
+    let without = effects::library().iter().copied().filter(|info| info.id != effects::iq_imbalance::ID);
+    evidence.library = Box::leak(without.collect::<Vec<_>>().into_boxed_slice());
+    let found = find(&evidence);
+    assert!(matches!(found.as_slice(), [Candidate { id: None, behaves_like: Behaviour::ConjugateImage, .. }]), "{found:?}");
+    assert!(found[0].gain > 100.0 && find(&evidence.with(&found[0])).is_empty());
+    // With it, the field has nothing to add.
+    evidence.library = effects::library();
+    let found = find(&evidence);
+    assert!(
+        found.iter().all(|candidate| candidate.id.is_some()) && named(&found, effects::iq_imbalance::ID).is_some(),
+        "{found:?}"
+    );
+}
+
 #[test]
 fn receivers_of_the_library_are_found_with_what_they_do() {
-    // Q' = g (Q cos φ + I sin φ).
-    let (gain, angle) = (10f64.powf(0.4 / 20.0), 2.0f64.to_radians());
-    let branches =
-        find(&evidence(7, |value, _| Complex64::new(value.re, gain * (value.im * angle.cos() + value.re * angle.sin()))));
+    let branches = find(&evidence(7, |value, _| unbalanced(value, 0.4, 2.0)));
     let image = named(&branches, effects::iq_imbalance::ID).unwrap();
     for (name, wanted, error) in [("gain_db", 0.4, 0.02), ("phase_deg", 2.0, 0.1)] {
         let (found, [low, high]) = value(image, name);
