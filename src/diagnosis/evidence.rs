@@ -37,6 +37,9 @@ const SHAPED: f32 = 1.3;
 /// Share of the strongest cell below which there is not even noise.
 const EMPTIED: f64 = 1e-20;
 
+/// Range of the farthest echo where no room is known.
+const FARTHEST_M: f64 = 10.0;
+
 /// What the suspects look at. Cheap products are computed once and shared.
 #[derive(Clone)]
 pub struct Evidence {
@@ -116,6 +119,11 @@ impl Evidence {
 
     pub fn is_real(&self) -> bool {
         self.radar.sampling == Sampling::Real
+    }
+
+    /// Range of the farthest echo.
+    pub fn farthest_m(&self) -> f64 {
+        self.room.as_ref().and_then(|room| room.farthest_m()).unwrap_or(FARTHEST_M)
     }
 
     /// Beat frequencies that mean something: all, or the positive half.

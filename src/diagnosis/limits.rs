@@ -21,8 +21,6 @@ use crate::effects::{self, Context, EffectSetting, Effects};
 const STEPS: usize = 12;
 /// Added to the level that is found: phases, frequencies and places that hide better, dB.
 const MARGIN_DB: f64 = 10.0;
-/// Range of the farthest echo where no room is known.
-const FARTHEST_M: f64 = 10.0;
 
 /// An effect that can be put into recorded samples.
 struct Salt {
@@ -199,7 +197,7 @@ fn put_in(evidence: &Evidence, setting: &EffectSetting) -> (Cube, f64) {
     let effects = Effects::new(std::slice::from_ref(setting), &device);
     let [frames, tx, rx, loops, samples] = evidence.cube.dims;
     let size = tx * rx * loops * samples;
-    let farthest_m = evidence.room.as_ref().and_then(|room| room.farthest_m()).unwrap_or(FARTHEST_M);
+    let farthest_m = evidence.farthest_m();
     let mut cube = evidence.cube.clone();
     let mut added = 0.0;
     for (frame, values) in cube.samples.chunks_exact_mut(size).enumerate().take(frames) {

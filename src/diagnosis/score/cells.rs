@@ -106,7 +106,7 @@ struct Shared<'a> {
 }
 
 /// Cells of a frame, by effect.
-pub fn of_frame(evidence: &Evidence, effects: &[(Drive<'_>, Vec<Direction>)], frame: usize) -> Vec<Frame> {
+pub fn of_frame(evidence: &Evidence, effects: &[(Drive, Vec<Direction>)], frame: usize) -> Vec<Frame> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let windows = Windows::new(loops, samples);
     let clean = denoised::frame(evidence, frame).concat();
@@ -123,7 +123,7 @@ pub fn of_frame(evidence: &Evidence, effects: &[(Drive<'_>, Vec<Direction>)], fr
 }
 
 impl Shared<'_> {
-    fn cells(&self, drive: &Drive<'_>, directions: &[Direction]) -> Frame {
+    fn cells(&self, drive: &Drive, directions: &[Direction]) -> Frame {
         let energy = |values: &[Complex64]| values.iter().map(Complex64::norm_sqr).sum::<f64>();
         let size = self.windows.slow.len() * self.windows.fast.len();
         let (mut tangents, mut energies, mut most) = (vec![], vec![], vec![]);
@@ -162,7 +162,8 @@ impl Shared<'_> {
                 for range in self.evidence.noise_bins() {
                     let at = [doppler, range];
                     let tangents = || tangents.iter().map(|channels| of(&channels[channel])[at]);
-                    let reach: f64 = tangents().zip(most).map(|(tangent, most)| tangent.norm_sqr() * most * most).sum();
+                    let reaches = tangents().zip(most).map(|(tangent, most)| tangent.norm_sqr() * most * most);
+                    let reach = reaches.fold(0.0, f64::max);
                     if reach > LEAST * noise && around[at] < APART * reach {
                         let (receiver, found) = (channel % receivers, of(found)[at]);
                         cells.push(Cell { receiver, doppler, range, found, noise, tangents: tangents().collect() });

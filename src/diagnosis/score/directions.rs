@@ -8,9 +8,8 @@ use crate::complex::Complex;
 use crate::diagnosis::cube::{Cube, analytic};
 use crate::diagnosis::evidence::Evidence;
 use crate::effects::{Context, EffectInfo, ParameterInfo, Role, SignalOperator, Values};
+use crate::radar::{Radar, Sampling};
 
-/// Range of the farthest echo where no room is known.
-const FARTHEST_M: f64 = 10.0;
 /// Step of the central difference, of a parameter's prior width: its own error is of second order in it.
 const STEP: f64 = 1e-4;
 /// An inversion by fixed-point steps ends at a change of this share, or after so many steps.
@@ -48,11 +47,14 @@ impl Amplitudes {
 }
 
 /// An effect as an operator on the samples of a radar, with levels relative to a reference.
-#[derive(Clone, Copy)]
-pub struct Drive<'a> {
-    pub info: &'static EffectInfo,
+#[derive(Clone)]
+pub struct Drive {
+    info: &'static EffectInfo,
     operator: SignalOperator,
-    evidence: &'a Evidence,
+    radar: Radar,
+    /// `[tx, rx, loop, sample]`.
+    dims: [usize; 4],
+    farthest_m: f64,
     reference: f64,
 }
 
@@ -74,10 +76,12 @@ impl Direction {
     }
 }
 
-impl<'a> Drive<'a> {
+impl Drive {
     /// `reference`: amplitude that levels are relative to. None for what does not act on the summed signal.
-    pub fn new(info: &'static EffectInfo, evidence: &'a Evidence, reference: f64) -> Option<Self> {
-        Some(Self { info, operator: info.operator.on_signal()?, evidence, reference })
+    pub fn new(info: &'static EffectInfo, evidence: &Evidence, reference: f64) -> Option<Self> {
+        let [_, dims @ ..] = evidence.cube.dims;
+        let farthest_m = evidence.farthest_m();
+        Some(Self { info, operator: info.operator.on_signal()?, radar: evidence.radar.clone(), dims, farthest_m, reference })
     }
 
     fn values(&self, amplitudes: &Amplitudes, device: &Device) -> Values {
@@ -110,19 +114,17 @@ impl<'a> Drive<'a> {
     /// What the operator makes of a frame's samples, `[tx, rx, loop, sample]`. Receivers without quadrature keep the real part.
     pub fn applied(&self, signal: &[Complex64], frame: usize, amplitudes: &Amplitudes) -> Vec<Complex64> {
         let device = Device::flex();
-        let [_, tx, rx, loops, samples] = self.evidence.cube.dims;
         let part = |of: fn(&Complex64) -> f64| -> Tensor<4> {
-            let data = TensorData::new(signal.iter().map(of).collect::<Vec<f64>>(), [tx, rx, loops, samples]);
+            let data = TensorData::new(signal.iter().map(of).collect::<Vec<f64>>(), self.dims);
             Tensor::from_data(data, (&device, DType::F64))
         };
-        let farthest_m = self.evidence.room.as_ref().and_then(|room| room.farthest_m()).unwrap_or(FARTHEST_M);
-        let context = Context { radar: &self.evidence.radar, frame, farthest_m };
+        let context = Context { radar: &self.radar, frame, farthest_m: self.farthest_m };
         let before = Complex::new(part(|value| value.re), part(|value| value.im));
         let after = (self.operator)(before, &self.values(amplitudes, &device), &context);
         let host = |part: Tensor<4>| part.into_data().convert::<f64>().try_into_vec::<f64>().expect("converted");
         let re = host(after.re);
-        if self.evidence.is_real() {
-            return analytic(&re.iter().map(|&value| value as f32).collect::<Vec<f32>>(), samples);
+        if self.radar.sampling == Sampling::Real {
+            return analytic(&re.iter().map(|&value| value as f32).collect::<Vec<f32>>(), self.radar.samples_per_chirp);
         }
         re.into_iter().zip(host(after.im)).map(|(re, im)| Complex64::new(re, im)).collect()
     }
@@ -134,6 +136,16 @@ impl<'a> Drive<'a> {
         let at = |value: f64| Amplitudes { directions: vec![direction], values: vec![value] };
         let [above, below] = [neutral + step, neutral - step].map(|value| self.applied(signal, frame, &at(value)));
         above.iter().zip(below).map(|(above, below)| (above - below) / (2.0 * step)).collect()
+    }
+
+    /// Whether every sample is changed for itself, whatever the others are.
+    pub fn is_by_sample(&self, signal: &[Complex64], amplitudes: &Amplitudes) -> bool {
+        // Of any two samples that share an index, one changes: a fixed draw of half of them.
+        let changes = |index: usize| (index.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) % 2 == 0;
+        let changed: Vec<Complex64> =
+            signal.iter().enumerate().map(|(index, value)| if changes(index) { value * 2.0 + 1.0 } else { *value }).collect();
+        let [before, after] = [signal, &changed].map(|signal| self.applied(signal, 0, amplitudes));
+        before.iter().zip(after).enumerate().all(|(index, (before, after))| changes(index) || *before == after)
     }
 
     /// All samples as they were before the effect: v = y − (E(v) − v), step by step.

@@ -24,7 +24,7 @@ static CONJUGATE: EffectInfo = field(
     "conjugate",
     "everything appears again at the opposite beat frequency and velocity, with the conjugate phase",
     "s → s + (re + j im) s*",
-    &[part("re", Role::AmplitudeOfReceivers), part("im", Role::AmplitudeOfReceivers)],
+    &[part("re", Role::AmplitudeOfReceivers, IMAGE), part("im", Role::AmplitudeOfReceivers, IMAGE)],
     conjugate,
 );
 
@@ -32,16 +32,20 @@ static CUBE: EffectInfo = field(
     "cube",
     "products of three returns lie where none of them is, as those of a receiver that is not linear",
     "s → s + (re + j im) |s|² s / reference²",
-    &[part("re", Role::Amplitude), part("im", Role::Amplitude), REFERENCE],
+    &[part("re", Role::Amplitude, THIRD_ORDER), part("im", Role::Amplitude, THIRD_ORDER), REFERENCE],
     cube,
 );
 
 const REFERENCE: ParameterInfo =
     ParameterInfo { name: "reference", role: Role::Fixed, unit: "recording's unit", neutral: 0.0, least: 0.0, most: 1e9 };
 
-/// Beyond the amplitude of what it follows, nothing is a product of it.
-const fn part(name: &'static str, role: Role) -> ParameterInfo {
-    ParameterInfo { name, role, unit: "1", neutral: 0.0, least: -1.0, most: 1.0 }
+/// The strongest that the library's law of the same family can make of it, so that both are held against the same cells: branches that
+/// differ by 6 dB, (6 dB · ln 10 / 20) / 2; and half of the strongest sample.
+const IMAGE: f64 = 0.345;
+const THIRD_ORDER: f64 = 0.5;
+
+const fn part(name: &'static str, role: Role, most: f64) -> ParameterInfo {
+    ParameterInfo { name, role, unit: "1", neutral: 0.0, least: -most, most }
 }
 
 const fn field(

@@ -11,11 +11,11 @@ use super::directions::{Amplitudes, Direction, Drive};
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::speckle::Look;
-use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::effects::{EffectInfo, Role};
 
-/// Neighbouring range bins whose returns err together: the windows' lobes to both sides.
-const PLACE: usize = 2 * cells::LOBE;
+/// Neighbouring range bins whose returns err together: the main lobe of the windows, to one side.
+const PLACE: usize = cells::LOBE;
 /// Cells along range and Doppler whose power is taken together: half a lobe.
 const BLOCK: usize = 2;
 /// Samples whose cells are held at a time, at most, and frames that are looked at whatever their size.
@@ -45,7 +45,7 @@ impl Fit {
     /// The score tests of amplitudes of zero, by effect. None where too few cells say anything.
     pub fn at_zero(evidence: &Evidence, effects: &[&'static EffectInfo], reference: f64) -> Vec<Option<Self>> {
         let all = |info: &&'static EffectInfo| Some((Drive::new(info, evidence, reference)?, Direction::all(info)));
-        let asked: Vec<(Drive<'_>, Vec<Direction>)> = effects.iter().filter_map(all).collect();
+        let asked: Vec<(Drive, Vec<Direction>)> = effects.iter().filter_map(all).collect();
         assert_eq!(asked.len(), effects.len(), "effects that act on the summed signal");
         let by_frame: Vec<Vec<Frame>> =
             some_frames(evidence).into_par_iter().map(|frame| cells::of_frame(evidence, &asked, frame)).collect();
@@ -54,8 +54,7 @@ impl Fit {
             by_effect.iter_mut().zip(frame).for_each(|(frames, cells)| frames.push(cells));
         }
         let receivers = evidence.cube.dims[2];
-        let of =
-            |((_, directions), frames): ((Drive<'_>, Vec<Direction>), Vec<Frame>)| Self::best(&frames, &directions, receivers);
+        let of = |((_, directions), frames): ((Drive, Vec<Direction>), Vec<Frame>)| Self::best(&frames, &directions, receivers);
         asked.into_par_iter().zip(by_effect).map(of).collect()
     }
 
@@ -127,10 +126,31 @@ impl Fit {
             fit.amplitudes.values.iter_mut().zip(steps).for_each(|(amplitude, step)| *amplitude += step);
             (fit.deviations, fit.left) = (step.deviations, step.left);
             if is_last {
-                break;
+                match fit.in_common() {
+                    // What seemed to differ between receivers was the first step's error.
+                    Some(amplitudes) => fit.amplitudes = amplitudes,
+                    None => break,
+                }
             }
         }
         fit.is_believed().then_some(fit)
+    }
+
+    /// The mean over receivers, where each has values of its own and these agree within their errors.
+    fn in_common(&self) -> Option<Amplitudes> {
+        let Amplitudes { directions, values } = &self.amplitudes;
+        let (count, receivers) = (directions.len(), self.amplitudes.receivers());
+        let weights: Vec<f64> = self.deviations.iter().map(|deviation| deviation.powi(-2)).collect();
+        let mean = |direction: usize| {
+            let of = || (0..receivers).map(|receiver| receiver * count + direction);
+            of().map(|i| values[i] * weights[i]).sum::<f64>() / of().map(|i| weights[i]).sum::<f64>()
+        };
+        let means: Vec<f64> = (0..count).map(mean).collect();
+        let squares =
+            values.iter().zip(&weights).enumerate().map(|(i, (value, weight))| (value - means[i % count]).powi(2) * weight);
+        let freedom = (count * (receivers - 1)) as f64;
+        let agree = receivers > 1 && chi2_tail(squares.sum(), freedom) > DIFFER;
+        agree.then(|| Amplitudes { directions: directions.clone(), values: means })
     }
 
     /// Whether every amplitude lies within its prior.
@@ -172,10 +192,10 @@ fn of_cells(cells: &[Cell], at: &Amplitudes, is_still: bool) -> Vec<Look> {
     for (cell, left) in cells.iter().zip(&left) {
         let [sum, count] = powers[&block(cell)];
         let weight = 2.0 / (cell.noise * (sum / count).max(1.0));
-        let place = cell.range / PLACE;
-        let look = looks.entry(place).or_insert_with(|| Look::new(at.values.len(), is_still.then_some(place)));
         // Where each receiver has its own, those of the others are no matter of this cell.
-        let first = if at.receivers() > 1 { cell.receiver * at.directions.len() } else { 0 };
+        let (receiver, receivers) = if at.receivers() > 1 { (cell.receiver, at.receivers()) } else { (0, 1) };
+        let (place, first) = (cell.range / PLACE * receivers + receiver, receiver * at.directions.len());
+        let look = looks.entry(place).or_insert_with(|| Look::new(at.values.len(), is_still.then_some(place)));
         for (a, tangent) in cell.tangents.iter().enumerate() {
             look.score[first + a] += weight * (tangent.conj() * left).re;
             for (b, other) in cell.tangents.iter().enumerate() {

@@ -36,8 +36,8 @@ const WORTH_REFINING: f64 = 1e-3;
 /// Share of the power above the noise that may be left where the effect is above it: what else lies there makes more of it than the
 /// effect does.
 const MOST_LEFT: f64 = 0.5;
-/// Share of a field's gain from which on an effect of the library explains what the field does.
-const BY_A_LAW: f64 = 0.8;
+/// The same below which an effect of the library explains what a field does.
+const LEFT_BY_A_LAW: f64 = 0.2;
 /// Standard deviations of a one-sided limit of 95 %.
 const NINETY_FIVE: f64 = 1.645;
 
@@ -70,18 +70,17 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             return None;
         }
         let fit = fit.refined(evidence, info, reference)?;
-        (fit.left < MOST_LEFT).then(|| candidate(evidence, info, &fit, p_value))
+        Some(Fit { p_value, ..fit }).filter(|fit| fit.left < MOST_LEFT)
     };
-    let mut found: Vec<Option<Candidate>> = asked.iter().zip(fits).map(of).collect();
-    let of_fields = found.split_off(named.len());
-    let mut found: Vec<Candidate> = found.into_iter().flatten().collect();
-    let explained = found.iter().map(|candidate| candidate.gain).fold(0.0, f64::max);
-    let nameless = fields.iter().zip(of_fields).filter_map(|(field, candidate)| {
-        let candidate = candidate.filter(|candidate| explained < BY_A_LAW * candidate.gain)?;
+    let mut fits: Vec<Option<Fit>> = asked.iter().zip(fits).map(of).collect();
+    let of_fields = fits.split_off(named.len());
+    let explained = fits.iter().flatten().any(|fit| fit.left < LEFT_BY_A_LAW);
+    let candidates = named.iter().zip(fits).filter_map(|(info, fit)| candidate(evidence, info, &fit?));
+    let nameless = fields.iter().zip(of_fields).filter(|_| !explained).filter_map(|(field, fit)| {
+        let candidate = candidate(evidence, field.info, &fit?)?;
         Some(Candidate { id: None, behaves_like: field.behaves_like, estimates: vec![], ..candidate })
     });
-    found.extend(nameless.collect::<Vec<_>>());
-    found
+    candidates.chain(nameless).collect()
 }
 
 /// Energy over all samples that an effect can have at most, with a confidence of 95 %, where it was not found; by effect.
@@ -103,39 +102,37 @@ pub fn limits(evidence: &Evidence) -> Vec<(&'static str, f64)> {
     asked.iter().zip(Fit::at_zero(evidence, &asked, reference)).filter_map(of).collect()
 }
 
-fn candidate(evidence: &Evidence, info: &'static EffectInfo, fit: &Fit, p_value: f64) -> Candidate {
+fn candidate(evidence: &Evidence, info: &'static EffectInfo, fit: &Fit) -> Option<Candidate> {
     let estimates = estimates(info, fit);
     let numbers: Vec<String> = estimates.iter().filter_map(|estimate| said(info, estimate)).collect();
     let reference = evidence.peak();
-    let drive = Drive::new(info, evidence, reference);
-    let before = drive.map_or_else(|| evidence.cube.clone(), |drive| drive.undone(&evidence.cube, &fit.amplitudes));
+    let drive = Drive::new(info, evidence, reference)?;
+    let before = drive.undone(&evidence.cube, &fit.amplitudes);
     let energy = evidence.cube.samples.iter().zip(&before.samples).map(|(after, before)| (after - before).norm_sqr()).sum();
-    Candidate {
+    Some(Candidate {
         id: Some(info.id),
         behaves_like: behaviour(info),
         estimates,
         choice: None,
         place: Place::at(info.stage),
-        p_value,
+        p_value: fit.p_value,
         gain: fit.gain,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!("{} ({}): {}", info.title, numbers.join(", "), uncapitalised(info.explanation.trim_end_matches('.'))),
         curve: None,
         energy,
-        correction: correction(evidence, info, reference, fit),
-    }
+        correction: correction(evidence, drive, fit),
+    })
 }
 
-fn correction(evidence: &Evidence, info: &'static EffectInfo, reference: f64, fit: &Fit) -> Correction {
-    let (amplitudes, of) = (fit.amplitudes.clone(), Arc::new(evidence.clone()));
-    let undo = move |cube: &mut Cube| {
-        if let Some(drive) = Drive::new(info, &of, reference) {
-            *cube = drive.undone(cube, &amplitudes);
-        }
-    };
-    // Energy goes to other cells than its own: to first order volumes stay.
-    Correction::Inverse(Arc::new(undo), Volume::KEPT)
+fn correction(evidence: &Evidence, drive: Drive, fit: &Fit) -> Correction {
+    let amplitudes = fit.amplitudes.clone();
+    let size: usize = evidence.cube.dims[1..].iter().product();
+    // What depends on other samples goes to other cells than its own: to first order volumes stay.
+    let by_sample = drive.is_by_sample(&evidence.cube.samples[..size], &amplitudes);
+    let volume = if by_sample { Volume::BY_SAMPLE } else { Volume::KEPT };
+    Correction::Inverse(Arc::new(move |cube: &mut Cube| *cube = drive.undone(cube, &amplitudes)), volume)
 }
 
 fn behaviour(info: &EffectInfo) -> Behaviour {

@@ -120,6 +120,36 @@ fn unbalanced(value: Complex64, gain_db: f64, phase_deg: f64) -> Complex64 {
 }
 
 #[test]
+fn limits_hold() {
+    let all = |evidence: &Evidence| evidence.cube.samples.clone();
+    let held = (0..20).filter(|seed| {
+        // Below what is found.
+        let truth = Complex64::from_polar(3e-4, *seed as f64);
+        let [mut with, without] = [truth, Complex64::ZERO].map(|factor| evidence(200 + seed, by_interleaving(factor)));
+        with.library = library_with_it();
+        let energy: f64 = all(&with).iter().zip(all(&without)).map(|(a, b)| (a - b).norm_sqr()).sum();
+        limits(&with).iter().any(|(id, limit)| *id == INTERLEAVED.id && *limit > energy)
+    });
+    // Nine of ten at least: fewer than 15 of 20 would be by chance once in a hundred.
+    let held = held.count();
+    assert!(held >= 15, "{held} of 20");
+}
+
+#[test]
+fn what_changes_each_sample_for_itself_is_told_from_what_does_not() {
+    let evidence = evidence(12, |value, _| value);
+    let size: usize = evidence.cube.dims[1..].iter().product();
+    let is = |info: &'static EffectInfo, value: f64| {
+        let directions = Direction::all(info);
+        let values = vec![value; directions.len()];
+        let drive = Drive::new(info, &evidence, evidence.peak()).unwrap();
+        drive.is_by_sample(&evidence.cube.samples[..size], &Amplitudes { directions, values })
+    };
+    assert!(is(&effects::iq_imbalance::INFO, 0.3) && is(&effects::compression::INFO, 0.1));
+    assert!(!is(&effects::object_radar_object::INFO, 0.1) && !is(&effects::chirp_nonlinearity::INFO, 1e6));
+}
+
+#[test]
 fn receivers_that_differ_have_values_of_their_own() {
     let gains_db = [0.5, -0.3];
     let evidence = of_receivers(10, |receiver, value, _| unbalanced(value, gains_db[receiver], 1.0));
@@ -161,6 +191,7 @@ fn receivers_of_the_library_are_found_with_what_they_do() {
     let (level_db, _) = value(harmonic, "level_db");
     assert!((level_db - 20.0 * (1e-4 * 300f64).log10()).abs() < 1.0, "{level_db}");
     let cube = find(&evidence(9, |value, _| value * (1.0 - 1e-6 * value.norm_sqr())));
+    assert!(cube.iter().all(|candidate| candidate.id.is_some()), "{cube:?}");
     let compression = named(&cube, effects::compression::ID).unwrap();
     let (level, _) = value(compression, "level");
     assert!((level / (1e-6 * 300f64.powi(2)) - 1.0).abs() < 0.2, "{level}");
