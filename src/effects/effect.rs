@@ -49,6 +49,33 @@ impl Parameter {
     }
 }
 
+impl EffectInfo {
+    /// Values of its parameters; one that is not given keeps its neutral value.
+    ///
+    /// # Panics
+    /// For a parameter that it does not have.
+    pub fn values(&self, given: &[(&str, Vec<f64>)], device: &Device, dtype: DType) -> Values {
+        let mut values = Values {
+            id: self.id,
+            known: self.parameters,
+            tensors: BTreeMap::new(),
+            fixed: BTreeMap::new(),
+            choice: None,
+            device: device.clone(),
+            dtype,
+        };
+        for (name, list) in given {
+            assert!(self.parameter(name).is_some(), "{} has no parameter {name}", self.id);
+            if is_fixed(self, name) {
+                values.fixed.insert((*name).into(), list.clone());
+            } else {
+                values.tensors.insert((*name).into(), values.constant(list));
+            }
+        }
+        values
+    }
+}
+
 fn is_fixed(info: &EffectInfo, name: &str) -> bool {
     info.parameter(name).is_some_and(|parameter| parameter.role == Role::Fixed)
 }

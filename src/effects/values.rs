@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use burn::tensor::{DType, Device, Int, Tensor, TensorData};
 
-use super::info::EffectInfo;
-use super::parameter::{ParameterInfo, Role, named};
+use super::parameter::{ParameterInfo, named};
 use crate::complex::Complex;
 
 /// Values of one effect in the signal's number type.
@@ -23,31 +22,6 @@ pub struct Values {
 }
 
 impl Values {
-    /// Of an effect; a parameter that is not given keeps its neutral value.
-    ///
-    /// # Panics
-    /// For a parameter that it does not have.
-    pub fn of(info: &'static EffectInfo, given: &[(&'static str, Vec<f64>)], device: &Device, dtype: DType) -> Self {
-        let mut values = Self {
-            id: info.id,
-            known: info.parameters,
-            tensors: BTreeMap::new(),
-            fixed: BTreeMap::new(),
-            choice: None,
-            device: device.clone(),
-            dtype,
-        };
-        for (name, list) in given {
-            let parameter = info.parameter(name).unwrap_or_else(|| panic!("{} has no parameter {name}", info.id));
-            if parameter.role == Role::Fixed {
-                values.fixed.insert((*name).into(), list.clone());
-            } else {
-                values.tensors.insert((*name).into(), values.constant(list));
-            }
-        }
-        values
-    }
-
     fn neutral(&self, name: &str) -> f64 {
         named(self.known, name).unwrap_or_else(|| panic!("{} has no parameter {name}", self.id)).neutral
     }

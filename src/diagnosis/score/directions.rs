@@ -108,7 +108,7 @@ impl Drive {
                 (values, _, None) => given.push((parameter.name, values.unwrap_or_default())),
             }
         }
-        Values::of(self.info, &given, device, DType::F64)
+        self.info.values(&given, device, DType::F64)
     }
 
     /// What the operator makes of a frame's samples, `[tx, rx, loop, sample]`. Receivers without quadrature keep the real part.
