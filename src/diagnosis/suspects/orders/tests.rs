@@ -51,19 +51,24 @@ fn sure(evidence: &Evidence) -> Vec<Candidate> {
 #[test]
 fn what_does_not_turn_with_the_room_is_an_offset() {
     let offset = Complex64::new(4.0, -2.0);
-    let evidence = turned(1, offset);
-    let found = sure(&evidence);
-    assert_eq!(found.iter().filter_map(|found| found.id).collect::<Vec<_>>(), [effects::dc_offset::ID], "{found:?}");
     let of = |found: &Candidate, name: &str| found.estimates.iter().find(|e| e.name == name).unwrap().clone();
-    for (name, truth) in [("i", offset.re), ("q", offset.im)] {
-        for [low, high] in of(&found[0], name).ci90 {
-            assert!(low < truth && truth < high && high - low < 2.0, "{name}: {truth} in {low} to {high}");
+    let mut held = 0;
+    for seed in 1..7 {
+        let evidence = turned(seed, offset);
+        let found = sure(&evidence);
+        assert_eq!(found.iter().filter_map(|found| found.id).collect::<Vec<_>>(), [effects::dc_offset::ID], "{found:?}");
+        for (name, truth) in [("i", offset.re), ("q", offset.im)] {
+            let intervals = of(&found[0], name).ci90;
+            assert!(intervals.iter().all(|[low, high]| high - low < 0.2), "{name}: {intervals:?}");
+            held += intervals.iter().filter(|[low, high]| (*low..*high).contains(&truth)).count();
         }
+        let mut left = found.iter().fold(evidence.clone(), |evidence, found| evidence.with(found));
+        left.accepted.clear();
+        left.accepted_unnamed.clear();
+        assert!(sure(&left).is_empty(), "{:?}", sure(&left));
     }
-    let mut left = found.iter().fold(evidence.clone(), |evidence, found| evidence.with(found));
-    left.accepted.clear();
-    left.accepted_unnamed.clear();
-    assert!(sure(&left).is_empty(), "{:?}", sure(&left));
+    // Of 24 intervals of 90 % fewer hold once in a hundred times.
+    assert!(held >= 18, "{held}");
 }
 
 #[test]
