@@ -141,7 +141,7 @@ impl Drive {
     /// Whether every sample is changed for itself, whatever the others are.
     pub fn is_by_sample(&self, signal: &[Complex64], amplitudes: &Amplitudes) -> bool {
         // Of any two samples that share an index, one changes: a fixed draw of half of them.
-        let changes = |index: usize| (index.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) % 2 == 0;
+        let changes = |index: usize| (index.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40).is_multiple_of(2);
         let changed: Vec<Complex64> =
             signal.iter().enumerate().map(|(index, value)| if changes(index) { value * 2.0 + 1.0 } else { *value }).collect();
         let [before, after] = [signal, &changed].map(|signal| self.applied(signal, 0, amplitudes));
