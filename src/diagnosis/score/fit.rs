@@ -11,7 +11,7 @@ use super::directions::{Amplitudes, Direction, Drive};
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::speckle::Look;
-use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::statistics::{chi2_tail, corrected, fisher_tail};
 use crate::effects::{EffectInfo, Role};
 
 /// Neighbouring range bins whose returns err together: the main lobe of the windows, to one side.
@@ -21,15 +21,35 @@ const BLOCK: usize = 2;
 /// Samples whose cells are held at a time, at most, and frames that are looked at whatever their size.
 const MOST_SAMPLES: usize = 4_000_000;
 const FEWEST_FRAMES: usize = 12;
+/// Groups beyond the number of amplitudes, at least: with fewer, a scatter has no law to speak of.
+const FEWEST_BESIDE: f64 = 6.0;
 /// Chance of receivers that have the same values, below which each has its own.
 const DIFFER: f64 = 1e-3;
 /// Gauss-Newton steps, at most, and the share of the errors below which a step is none.
 const STEPS: usize = 8;
 const CONVERGED: f64 = 0.1;
 
+/// What changes within a frame, and what does not.
+#[derive(Clone, Copy)]
+pub enum Part {
+    Moving,
+    Still,
+}
+
+impl Part {
+    fn cells(self, frame: &Frame) -> &[Cell] {
+        match self {
+            Self::Moving => &frame.moving,
+            Self::Still => &frame.still,
+        }
+    }
+}
+
 /// What a recording says of an effect's amplitudes.
 pub struct Fit {
     pub amplitudes: Amplitudes,
+    /// Whose cells it rests on.
+    pub part: Part,
     /// Of their errors, by how groups of cells disagree.
     pub deviations: Vec<f64>,
     pub p_value: f64,
@@ -58,24 +78,37 @@ impl Fit {
         asked.into_par_iter().zip(by_effect).map(of).collect()
     }
 
-    /// One value for all receivers; or one for each, where they may have their own and do not agree.
+    /// By what moves or by what stands still, whichever says more: chance makes the same of a return that stands still in all frames, so
+    /// that the few ranges which hold most of what it says would stand for all frames.
     fn best(frames: &[Frame], directions: &[Direction], receivers: usize) -> Option<Self> {
-        let common = Self::of(frames, directions, 1, None);
         let may_differ = directions.iter().all(|direction| direction.parameter.role == Role::AmplitudeOfReceivers);
-        if !may_differ || receivers < 2 {
-            return common.map(|(fit, _)| fit);
-        }
-        let each = Self::of(frames, directions, receivers, None);
-        let (fit, _) = each.filter(|(_, alike)| *alike < DIFFER).or(common)?;
-        Some(Self { p_value: corrected(fit.p_value, 2.0), ..fit })
+        let of_part = |part: Part| {
+            let common = Self::of(frames, directions, 1, part, None);
+            if !may_differ || receivers < 2 {
+                return common.map(|(fit, _)| fit);
+            }
+            // One value for all receivers; or one for each, where they do not agree.
+            let each = Self::of(frames, directions, receivers, part, None);
+            each.filter(|(_, alike)| *alike < DIFFER).or(common).map(|(fit, _)| fit)
+        };
+        let fits = [Part::Moving, Part::Still].into_iter().filter_map(of_part);
+        let fit = fits.min_by(|a, b| a.p_value.total_cmp(&b.p_value))?;
+        let tried = if may_differ { 4.0 } else { 2.0 };
+        Some(Self { p_value: corrected(fit.p_value, tried), ..fit })
     }
 
     /// With the chance that all receivers have the same values. `undone`: what was taken out already, for the share that is left.
-    fn of(frames: &[Frame], directions: &[Direction], receivers: usize, undone: Option<&Amplitudes>) -> Option<(Self, f64)> {
+    fn of(
+        frames: &[Frame],
+        directions: &[Direction],
+        receivers: usize,
+        part: Part,
+        undone: Option<&Amplitudes>,
+    ) -> Option<(Self, f64)> {
         let count = directions.len() * receivers;
         let amplitudes = |values: &[f64]| Amplitudes { directions: directions.to_vec(), values: values.to_vec() };
-        let first = looks(frames, &amplitudes(&vec![0.0; count]));
-        let of = |at: &DVector<f64>| Some(looks(frames, &amplitudes(at.as_slice())));
+        let first = looks(frames, &amplitudes(&vec![0.0; count]), part);
+        let of = |at: &DVector<f64>| Some(looks(frames, &amplitudes(at.as_slice()), part));
         let found = Estimated::converged(&first, &DMatrix::identity(count, count), &vec![0.0; count], of)?;
         let deviation = |index: usize| {
             let mut weights = DVector::zeros(count);
@@ -91,15 +124,17 @@ impl Fit {
         });
         let alike = if own > 0 { found.chance(&contrasts) } else { 1.0 };
         let amplitudes = amplitudes(found.values.as_slice());
+        let p_value = chance(&looks(frames, &amplitudes, part), &found)?;
         // Of all frames alike.
         let energy = |index: usize| frames.iter().map(|frame| frame.energies[index]).sum::<f64>() / frames.len() as f64;
         let fit = Self {
             deviations: (0..count).map(deviation).collect(),
-            p_value: found.p_value,
+            p_value,
             gain: found.gain,
-            left: left(frames, &amplitudes, undone),
+            left: left(frames, &amplitudes, part, undone),
             frame_energies: (0..directions.len()).map(energy).collect(),
             amplitudes,
+            part,
         };
         Some((fit, alike))
     }
@@ -120,7 +155,7 @@ impl Fit {
             let asked = [(Drive::new(info, &undone, reference)?, directions.clone())];
             let of_frame = |frame| cells::of_frame(&undone, &asked, frame).remove(0);
             let frames: Vec<Frame> = some_frames(&undone).into_par_iter().map(of_frame).collect();
-            let (step, _) = Self::of(&frames, &directions, fit.amplitudes.receivers(), Some(&fit.amplitudes))?;
+            let (step, _) = Self::of(&frames, &directions, fit.amplitudes.receivers(), fit.part, Some(&fit.amplitudes))?;
             let steps = &step.amplitudes.values;
             let is_last = steps.iter().zip(&step.deviations).all(|(step, deviation)| step.abs() < CONVERGED * deviation);
             fit.amplitudes.values.iter_mut().zip(steps).for_each(|(amplitude, step)| *amplitude += step);
@@ -172,10 +207,37 @@ fn some_frames(evidence: &Evidence) -> Vec<usize> {
     (0..count).map(|index| index * frames / count).collect()
 }
 
-/// By frame: what changes within it, by ranges; and what does not, which errs together in all frames.
-fn looks(frames: &[Frame], at: &Amplitudes) -> Vec<Vec<Look>> {
-    let of = |frame: &Frame| [of_cells(&frame.moving, at, false), of_cells(&frame.still, at, true)].concat();
-    frames.par_iter().map(of).collect()
+/// By frame and ranges; of what stands still, a range errs in all frames alike.
+fn looks(frames: &[Frame], at: &Amplitudes, part: Part) -> Vec<Vec<Look>> {
+    frames.par_iter().map(|frame| of_cells(part.cells(frame), at, matches!(part, Part::Still))).collect()
+}
+
+/// Chance of amplitudes of zero by Hotelling's law, with as many groups as count: where a few hold most of the information, the scatter
+/// between groups is that of those few (Satterthwaite 1946; for sandwiches Bell and McCaffrey 2002). None of too few.
+fn chance(frames: &[Vec<Look>], found: &Estimated) -> Option<f64> {
+    let freedom = found.values.len() as f64;
+    let mut groups: BTreeMap<(bool, usize, usize), f64> = BTreeMap::new();
+    for (frame, looks) in frames.iter().enumerate() {
+        for (index, look) in looks.iter().enumerate() {
+            let group = look.place.map_or((false, frame, index), |place| (true, place, 0));
+            *groups.entry(group).or_default() += relative(&look.information, found);
+        }
+    }
+    let (sum, squares) = groups.values().fold((0.0, 0.0), |(sum, squares), share| (sum + share, squares + share * share));
+    let count = sum * sum / f64::max(squares, f64::MIN_POSITIVE);
+    let below = count - freedom;
+    let p_value = fisher_tail(found.square * below / (freedom * (count - 1.0)), freedom, below);
+    (below > FEWEST_BESIDE).then_some(p_value)
+}
+
+/// Of a group's information: what it says of all amplitudes, each in units of its own.
+fn relative(information: &DMatrix<f64>, found: &Estimated) -> f64 {
+    let unit = |index: usize| {
+        let mut weights = DVector::zeros(found.values.len());
+        weights[index] = 1.0;
+        found.deviation(&weights).powi(2)
+    };
+    (0..found.values.len()).map(|index| information[(index, index)] * unit(index)).sum()
 }
 
 /// Scores and information of the amplitudes, by ranges. What is in the cells besides has the power that is left in them: cells that
@@ -208,9 +270,9 @@ fn of_cells(cells: &[Cell], at: &Amplitudes, is_still: bool) -> Vec<Look> {
 
 /// Share of the power above the noise that amplitudes leave, in cells where what they make is above it. `undone`: amplitudes of what was
 /// taken out of the cells already.
-fn left(frames: &[Frame], amplitudes: &Amplitudes, undone: Option<&Amplitudes>) -> f64 {
+fn left(frames: &[Frame], amplitudes: &Amplitudes, part: Part, undone: Option<&Amplitudes>) -> f64 {
     let (mut before, mut after) = (0.0, 0.0);
-    for cell in frames.iter().flat_map(|frame| frame.moving.iter().chain(&frame.still)) {
+    for cell in frames.iter().flat_map(|frame| part.cells(frame)) {
         let (out, rest) = (undone.map_or(Complex64::ZERO, |undone| cell.expected(undone)), cell.expected(amplitudes));
         if (out + rest).norm_sqr() > cell.noise {
             before += (cell.found + out).norm_sqr() / cell.noise - 1.0;

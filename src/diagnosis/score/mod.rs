@@ -31,8 +31,9 @@ use super::never;
 use super::statistics::{DECIBEL, corrected};
 use crate::effects::{self, EffectInfo, Operator, Role};
 
-/// Chance and gain beyond which a fit is refined by steps through the operator: those beyond cannot be accepted.
+/// Chance and gain (nats, `diagnosis.gain`) up to which a fit is refined by steps through the operator: others cannot be accepted.
 const WORTH_REFINING: f64 = 1e-3;
+const WORTH_GAINING: f64 = 6.0;
 /// Share of the power above the noise that may be left where the effect is above it: what else lies there makes more of it than the
 /// effect does.
 const MOST_LEFT: f64 = 0.5;
@@ -66,7 +67,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let of = |(info, fit): (&&'static EffectInfo, Option<Fit>)| {
         let fit = fit?;
         let p_value = corrected(fit.p_value, asked.len() as f64);
-        if p_value > WORTH_REFINING || fit.gain <= 0.0 {
+        if p_value > WORTH_REFINING || fit.gain < WORTH_GAINING {
             return None;
         }
         let fit = fit.refined(evidence, info, reference)?;

@@ -85,8 +85,8 @@ fn an_effect_that_is_one_file_is_detected_fitted_undone_and_reported() {
     let found = find(&evidence);
     let candidate = named(&found, INTERLEAVED.id).unwrap_or_else(|| panic!("{found:?}"));
     for (name, wanted) in [("re", truth.re), ("im", truth.im)] {
-        let (found, [low, high]) = value(candidate, name);
-        assert!((found - wanted).abs() < 2e-3 && (low..high).contains(&wanted), "{name}: {found} in {low} to {high}");
+        let (found, _) = value(candidate, name);
+        assert!((found - wanted).abs() < 1e-3, "{name}: {found}");
     }
     let undone = evidence.with(candidate);
     assert!(named(&find(&undone), INTERLEAVED.id).is_none());
@@ -198,7 +198,25 @@ fn receivers_of_the_library_are_found_with_what_they_do() {
 }
 
 #[test]
-fn chances_are_uniform_where_nothing_is_there() {
+fn intervals_hold() {
+    let truth = Complex64::new(0.03, -0.02);
+    let held = (20..30).flat_map(|seed| {
+        let mut evidence = evidence(seed, by_interleaving(truth));
+        evidence.library = library_with_it();
+        let found = find(&evidence);
+        let candidate = named(&found, INTERLEAVED.id).unwrap_or_else(|| panic!("{found:?}"));
+        [("re", truth.re), ("im", truth.im)].map(|(name, wanted)| {
+            let (_, [low, high]) = value(candidate, name);
+            (low..high).contains(&wanted)
+        })
+    });
+    // Of 20 intervals of 90 % fewer hold once in a hundred times.
+    let held = held.filter(|held| *held).count();
+    assert!(held >= 15, "{held} of 20");
+}
+
+#[test]
+fn chances_are_bounds_where_nothing_is_there() {
     let chances: Vec<f64> = (0..40)
         .flat_map(|seed| {
             let evidence = evidence(100 + seed, |value, _| value);
@@ -208,6 +226,10 @@ fn chances_are_uniform_where_nothing_is_there() {
         })
         .collect();
     assert!(chances.len() >= 60, "{}", chances.len());
-    let chance = crate::diagnosis::statistics::uniform_chance(&chances);
-    assert!(chance > 1e-3, "{chance}: {chances:?}");
+    // Corrected for what moves and what stands still, and for receivers together and apart, of which some say the same.
+    for level in [0.01, 0.05, 0.2, 0.5] {
+        let below = chances.iter().filter(|chance| **chance < level).count();
+        let chance = crate::diagnosis::statistics::poisson_tail(below, level * chances.len() as f64);
+        assert!(chance > 1e-3, "{below} of {} below {level}: {chance}", chances.len());
+    }
 }
