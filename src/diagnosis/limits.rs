@@ -12,7 +12,6 @@ use rayon::prelude::*;
 use super::config::DiagnosisConfig;
 use super::cube::Cube;
 use super::evidence::Evidence;
-use super::score;
 use super::suspects::SUSPECTS;
 use crate::complex::Complex;
 use crate::effects::{self, Context, EffectSetting, Effects};
@@ -21,6 +20,8 @@ use crate::effects::{self, Context, EffectSetting, Effects};
 const STEPS: usize = 12;
 /// Added to the level that is found: phases, frequencies and places that hide better, dB.
 const MARGIN_DB: f64 = 10.0;
+/// Range of the farthest echo where no room is known.
+const FARTHEST_M: f64 = 10.0;
 
 /// An effect that can be put into recorded samples.
 struct Salt {
@@ -36,8 +37,16 @@ struct Salt {
 const STILL: &[&str] = &["still field", "still field, room unknown"];
 const SLOW: &[&str] = &["slow time"];
 const ALONG: &[&str] = &["along the chirp"];
+const PRODUCTS: &[&str] = &["non-linear receiver", "extra paths"];
 
-const SALTS: [Salt; 15] = [
+const SALTS: [Salt; 19] = [
+    Salt {
+        id: effects::object_radar_object::ID,
+        suspects: PRODUCTS,
+        least: 1e-4,
+        most: 1.0,
+        setting: |s, x, _| s.with("coefficient", [x]),
+    },
     Salt {
         id: effects::chirp_ripple::ID,
         suspects: &["chirp"],
@@ -117,6 +126,14 @@ const SALTS: [Salt; 15] = [
     Salt { id: effects::dc_offset::ID, suspects: STILL, least: 1e-6, most: 1.0, setting: |s, x, _| s.with("i", [x]) },
     Salt { id: effects::if_highpass::ID, suspects: STILL, least: 1e3, most: 1e6, setting: |s, x, _| s.with("corner_hz", [x]) },
     Salt {
+        id: effects::second_harmonic::ID,
+        suspects: PRODUCTS,
+        least: 1e-5,
+        most: 0.5,
+        setting: |s, x, _| s.with("level_db", [db(x)]),
+    },
+    Salt { id: effects::compression::ID, suspects: PRODUCTS, least: 1e-4, most: 0.4, setting: |s, x, _| s.with("level", [x]) },
+    Salt {
         id: effects::spur::ID,
         suspects: &["spur"],
         least: 1e-6,
@@ -126,6 +143,13 @@ const SALTS: [Salt; 15] = [
             let rate = evidence.radar.sample_rate_hz;
             s.with("level_db", [db(x)]).with("frequency_hz", [(0.23 + 0.37 / evidence.cube.dims[4] as f64) * rate])
         },
+    },
+    Salt {
+        id: effects::iq_imbalance::ID,
+        suspects: &["quadrature image"],
+        least: 1e-4,
+        most: 3.0,
+        setting: |s, x, _| s.with("gain_db", [x]),
     },
 ];
 
@@ -161,14 +185,7 @@ pub fn limits(evidence: &Evidence, found: &[&str], moving_energy: f64, threshold
         let at_most_db = 10.0 * (energy? / moving_energy).log10() + MARGIN_DB;
         at_most_db.is_finite().then_some(Limit { id: salt.id, at_most_db })
     };
-    let scored = score::limits(evidence).into_iter().filter(|(id, _)| !found.contains(id));
-    let scored = scored.map(|(id, energy)| Limit { id, at_most_db: 10.0 * (energy / moving_energy).log10() });
-    let salted: Vec<Limit> = SALTS.par_iter().filter(|salt| !found.contains(&salt.id)).filter_map(of).collect();
-    // What both bound has the tighter of the two.
-    let mut limits: Vec<Limit> = scored.filter(|limit| limit.at_most_db.is_finite()).chain(salted).collect();
-    limits.sort_by(|a, b| (a.id, a.at_most_db).partial_cmp(&(b.id, b.at_most_db)).expect("finite"));
-    limits.dedup_by_key(|limit| limit.id);
-    limits
+    SALTS.par_iter().filter(|salt| !found.contains(&salt.id)).filter_map(of).collect()
 }
 
 /// Puts an effect in; its energy if it is found.
@@ -197,7 +214,7 @@ fn put_in(evidence: &Evidence, setting: &EffectSetting) -> (Cube, f64) {
     let effects = Effects::new(std::slice::from_ref(setting), &device);
     let [frames, tx, rx, loops, samples] = evidence.cube.dims;
     let size = tx * rx * loops * samples;
-    let farthest_m = evidence.farthest_m();
+    let farthest_m = evidence.room.as_ref().and_then(|room| room.farthest_m()).unwrap_or(FARTHEST_M);
     let mut cube = evidence.cube.clone();
     let mut added = 0.0;
     for (frame, values) in cube.samples.chunks_exact_mut(size).enumerate().take(frames) {

@@ -242,7 +242,7 @@ fn strongest<'a>(passing: &[&'a (usize, Candidate)]) -> Option<&'a (usize, Candi
     let order = |(suspect, candidate): &(usize, Candidate)| {
         let suspect = &SUSPECTS[*suspect];
         let worth = if is_rough(candidate) { ROUGHLY * candidate.gain } else { candidate.gain };
-        (suspect.last_in_chain, suspect.undone_first, !suspect.last_resort, worth)
+        (suspect.last_in_chain, !suspect.last_resort, worth)
     };
     passing.iter().copied().max_by(|a, b| order(a).partial_cmp(&order(b)).expect("gains are finite"))
 }

@@ -34,8 +34,6 @@ pub struct Suspect {
     pub find: fn(&Evidence) -> Vec<Candidate>,
     /// Looks at the codes as they were recorded: what is corrected happened before and takes nothing back.
     pub last_in_chain: bool,
-    /// Follows the signal as it arrived behind all that the others look at: undone before it, and asked again in the end.
-    pub undone_first: bool,
     /// Counts only where no other suspect finds anything.
     pub last_resort: bool,
     /// Trusts that the body is where it was predicted: it waits until that is so.
@@ -51,7 +49,6 @@ impl Suspect {
             share: 1.0,
             find,
             last_in_chain: false,
-            undone_first: false,
             last_resort: false,
             trusts_the_place: false,
             predicts_all_frames: false,
@@ -63,7 +60,7 @@ impl Suspect {
 pub const SUSPECTS: &[Suspect] = &[
     Suspect::new("still field", receiver::still::find),
     Suspect::new("still field, room unknown", receiver::open::find),
-    Suspect { predicts_all_frames: true, undone_first: true, ..Suspect::new("operators of the library", score::find) },
+    Suspect::new("quadrature image", receiver::image::find),
     Suspect { predicts_all_frames: true, ..Suspect::new("non-linear receiver", receiver::harmonic::find) },
     Suspect { last_in_chain: true, ..Suspect::new("converter's rail", receiver::rail::find) },
     Suspect::new("spur", receiver::spur::find),
@@ -86,6 +83,8 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect { share: 8.0, ..Suspect::new("geometry", geometry::find) },
     Suspect::new("changing static returns", fluctuation::find),
     carried::SUSPECT,
+    // Effects that none of the above seeks.
+    Suspect { share: 0.1, predicts_all_frames: true, ..Suspect::new("operators of the library", score::find) },
     Suspect { last_resort: true, ..Suspect::new("excess power", excess::find) },
 ];
 
