@@ -5,11 +5,11 @@
 //!
 //!   U_j = Σ 2 Re(J_j* y) / C,   I_jk = Σ 2 Re(J_j* J_k) / C
 //!
-//! (Rao 1948), over the cells in which ŝ itself says nothing ([`cells`]), with C the power that is left there. θ̂ = I⁻¹ U; its errors are
+//! (Rao 1948), over the cells in which ŝ itself says nothing (`cells.rs`), with C the power that is left there. θ̂ = I⁻¹ U; its errors are
 //! by how groups of cells disagree (the sandwich of Huber 1967), its chance is Hotelling's, its gain is that of frames which others
-//! predict ([`Estimated`](super::estimated::Estimated)). What passes is refined by Gauss-Newton steps through the operator ([`fit`]).
+//! predict (`estimated.rs`). What passes is refined by Gauss-Newton steps through the operator (`fit.rs`).
 //! An effect that changes each return where it is alone (a filter, a phase) has no such cells, and is not judged here. What follows the
-//! signal and is no effect of the library is a field without a name ([`fields`]).
+//! signal and is no effect of the library is a field without a name (`fields.rs`).
 
 mod cells;
 mod directions;
