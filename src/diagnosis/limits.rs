@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::config::DiagnosisConfig;
 use super::cube::Cube;
 use super::evidence::Evidence;
+use super::score;
 use super::suspects::SUSPECTS;
 use crate::complex::Complex;
 use crate::effects::{self, Context, EffectSetting, Effects};
@@ -20,8 +21,6 @@ use crate::effects::{self, Context, EffectSetting, Effects};
 const STEPS: usize = 12;
 /// Added to the level that is found: phases, frequencies and places that hide better, dB.
 const MARGIN_DB: f64 = 10.0;
-/// Range of the farthest echo where no room is known.
-const FARTHEST_M: f64 = 10.0;
 
 /// An effect that can be put into recorded samples.
 struct Salt {
@@ -185,7 +184,11 @@ pub fn limits(evidence: &Evidence, found: &[&str], moving_energy: f64, threshold
         let at_most_db = 10.0 * (energy? / moving_energy).log10() + MARGIN_DB;
         at_most_db.is_finite().then_some(Limit { id: salt.id, at_most_db })
     };
-    SALTS.par_iter().filter(|salt| !found.contains(&salt.id)).filter_map(of).collect()
+    let salted: Vec<Limit> = SALTS.par_iter().filter(|salt| !found.contains(&salt.id)).filter_map(of).collect();
+    // What no salt is of has the limit of its score.
+    let scored = score::limits(evidence).into_iter().filter(|(id, energy)| !found.contains(id) && *energy > 0.0);
+    let scored = scored.map(|(id, energy)| Limit { id, at_most_db: 10.0 * (energy / moving_energy).log10() });
+    salted.into_iter().chain(scored).collect()
 }
 
 /// Puts an effect in; its energy if it is found.
@@ -214,7 +217,7 @@ fn put_in(evidence: &Evidence, setting: &EffectSetting) -> (Cube, f64) {
     let effects = Effects::new(std::slice::from_ref(setting), &device);
     let [frames, tx, rx, loops, samples] = evidence.cube.dims;
     let size = tx * rx * loops * samples;
-    let farthest_m = evidence.room.as_ref().and_then(|room| room.farthest_m()).unwrap_or(FARTHEST_M);
+    let farthest_m = evidence.farthest_m();
     let mut cube = evidence.cube.clone();
     let mut added = 0.0;
     for (frame, values) in cube.samples.chunks_exact_mut(size).enumerate().take(frames) {

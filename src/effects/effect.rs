@@ -128,15 +128,11 @@ impl Effect {
     /// # Gradient
     /// Flows to the parameters.
     pub fn values(&self, device: &Device, dtype: DType) -> Values {
-        let info = self.info();
         Values {
-            id: info.id,
-            known: info.parameters,
             tensors: self.parameters.iter().map(|parameter| (parameter.name.clone(), parameter.value(dtype))).collect(),
             fixed: self.fixed(),
             choice: self.setting.choice.clone(),
-            device: device.clone(),
-            dtype,
+            ..self.info().values(&[], device, dtype)
         }
     }
 

@@ -140,7 +140,7 @@ impl Drive {
 
     /// Whether every sample is changed for itself, whatever the others are.
     pub fn is_by_sample(&self, signal: &[Complex64], amplitudes: &Amplitudes) -> bool {
-        // Of any two samples that share an index, one changes: a fixed draw of half of them.
+        // A fixed draw of half of the samples changes: what depends on others shows in the half that does not.
         let changes = |index: usize| (index.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40).is_multiple_of(2);
         let changed: Vec<Complex64> =
             signal.iter().enumerate().map(|(index, value)| if changes(index) { value * 2.0 + 1.0 } else { *value }).collect();

@@ -110,11 +110,8 @@ impl Fit {
         let first = looks(frames, &amplitudes(&vec![0.0; count]), part);
         let of = |at: &DVector<f64>| Some(looks(frames, &amplitudes(at.as_slice()), part));
         let found = Estimated::converged(&first, &DMatrix::identity(count, count), &vec![0.0; count], of)?;
-        let deviation = |index: usize| {
-            let mut weights = DVector::zeros(count);
-            weights[index] = 1.0;
-            found.deviation(&weights)
-        };
+        let unit = |index: usize| DVector::from_fn(count, |row, _| if row == index { 1.0 } else { 0.0 });
+        let deviations: Vec<f64> = (0..count).map(|index| found.deviation(&unit(index))).collect();
         // Differences from the first receiver.
         let own = count - directions.len();
         let contrasts = DMatrix::from_fn(count, own, |row, column| match row {
@@ -124,11 +121,11 @@ impl Fit {
         });
         let alike = if own > 0 { found.chance(&contrasts) } else { 1.0 };
         let amplitudes = amplitudes(found.values.as_slice());
-        let p_value = chance(&looks(frames, &amplitudes, part), &found)?;
+        let p_value = chance(&looks(frames, &amplitudes, part), found.square, &deviations)?;
         // Of all frames alike.
         let energy = |index: usize| frames.iter().map(|frame| frame.energies[index]).sum::<f64>() / frames.len() as f64;
         let fit = Self {
-            deviations: (0..count).map(deviation).collect(),
+            deviations,
             p_value,
             gain: found.gain,
             left: left(frames, &amplitudes, part, undone),
@@ -214,30 +211,26 @@ fn looks(frames: &[Frame], at: &Amplitudes, part: Part) -> Vec<Vec<Look>> {
 
 /// Chance of amplitudes of zero by Hotelling's law, with as many groups as count: where a few hold most of the information, the scatter
 /// between groups is that of those few (Satterthwaite 1946; for sandwiches Bell and McCaffrey 2002). None of too few.
-fn chance(frames: &[Vec<Look>], found: &Estimated) -> Option<f64> {
-    let freedom = found.values.len() as f64;
+///
+/// `square`: of the amplitudes, in units of their covariance; `deviations`: of theirs.
+fn chance(frames: &[Vec<Look>], square: f64, deviations: &[f64]) -> Option<f64> {
+    let freedom = deviations.len() as f64;
+    // What a group says of all amplitudes, each in units of its own.
+    let share = |look: &Look| -> f64 {
+        deviations.iter().enumerate().map(|(index, deviation)| look.information[(index, index)] * deviation.powi(2)).sum()
+    };
     let mut groups: BTreeMap<(bool, usize, usize), f64> = BTreeMap::new();
     for (frame, looks) in frames.iter().enumerate() {
         for (index, look) in looks.iter().enumerate() {
             let group = look.place.map_or((false, frame, index), |place| (true, place, 0));
-            *groups.entry(group).or_default() += relative(&look.information, found);
+            *groups.entry(group).or_default() += share(look);
         }
     }
     let (sum, squares) = groups.values().fold((0.0, 0.0), |(sum, squares), share| (sum + share, squares + share * share));
     let count = sum * sum / f64::max(squares, f64::MIN_POSITIVE);
     let below = count - freedom;
-    let p_value = fisher_tail(found.square * below / (freedom * (count - 1.0)), freedom, below);
+    let p_value = fisher_tail(square * below / (freedom * (count - 1.0)), freedom, below);
     (below > FEWEST_BESIDE).then_some(p_value)
-}
-
-/// Of a group's information: what it says of all amplitudes, each in units of its own.
-fn relative(information: &DMatrix<f64>, found: &Estimated) -> f64 {
-    let unit = |index: usize| {
-        let mut weights = DVector::zeros(found.values.len());
-        weights[index] = 1.0;
-        found.deviation(&weights).powi(2)
-    };
-    (0..found.values.len()).map(|index| information[(index, index)] * unit(index)).sum()
 }
 
 /// Scores and information of the amplitudes, by ranges. What is in the cells besides has the power that is left in them: cells that

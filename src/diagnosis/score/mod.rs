@@ -8,12 +8,10 @@
 //! (Rao 1948), over the cells in which ŝ itself says nothing (`cells.rs`), with C the power that is left there. θ̂ = I⁻¹ U; its errors are
 //! by how groups of cells disagree (the sandwich of Huber 1967), its chance is Hotelling's, its gain is that of frames which others
 //! predict (`estimated.rs`). What passes is refined by Gauss-Newton steps through the operator (`fit.rs`).
-//! An effect that changes each return where it is alone (a filter, a phase) has no such cells, and is not judged here. What follows the
-//! signal and is no effect of the library is a field without a name (`fields.rs`).
+//! An effect that changes each return where it is alone (a filter, a phase) has no such cells, and is not judged here.
 
 mod cells;
 mod directions;
-mod fields;
 mod fit;
 
 use std::sync::Arc;
@@ -21,7 +19,6 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use self::directions::{Amplitudes, Direction, Drive};
-use self::fields::Field;
 use self::fit::Fit;
 use super::behaviour::Behaviour;
 use super::cube::Cube;
@@ -37,8 +34,6 @@ const WORTH_GAINING: f64 = 6.0;
 /// Share of the power above the noise that may be left where the effect is above it: what else lies there makes more of it than the
 /// effect does.
 const MOST_LEFT: f64 = 0.5;
-/// The same below which an effect of the library explains what a field does.
-const LEFT_BY_A_LAW: f64 = 0.2;
 /// Standard deviations of a one-sided limit of 95 %.
 const NINETY_FIVE: f64 = 1.645;
 
@@ -74,41 +69,22 @@ fn asked(evidence: &Evidence) -> Vec<&'static EffectInfo> {
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let reference = evidence.peak();
-    let named = asked(evidence);
-    let is_open = |field: &&Field| !named.is_empty() && !evidence.accepted_unnamed.contains(&field.behaves_like);
-    let fields: Vec<&Field> = fields::ALL.iter().filter(is_open).collect();
-    let asked: Vec<&'static EffectInfo> = named.iter().copied().chain(fields.iter().map(|field| field.info)).collect();
-    if reference <= 0.0 {
-        return vec![];
-    }
-    let fits = Fit::at_zero(evidence, &asked, reference);
+    let asked = asked(evidence);
     let of = |(info, fit): (&&'static EffectInfo, Option<Fit>)| {
         let fit = fit?;
         let p_value = corrected(fit.p_value, asked.len() as f64);
         if p_value > WORTH_REFINING || fit.gain < WORTH_GAINING {
             return None;
         }
-        let fit = fit.refined(evidence, info, reference)?;
-        Some(Fit { p_value, ..fit }).filter(|fit| fit.left < MOST_LEFT)
+        let fit = fit.refined(evidence, info, evidence.peak()).filter(|fit| fit.left < MOST_LEFT)?;
+        candidate(evidence, info, &Fit { p_value, ..fit })
     };
-    let mut fits: Vec<Option<Fit>> = asked.iter().zip(fits).map(of).collect();
-    let of_fields = fits.split_off(named.len());
-    let explained = fits.iter().flatten().any(|fit| fit.left < LEFT_BY_A_LAW);
-    let candidates = named.iter().zip(fits).filter_map(|(info, fit)| candidate(evidence, info, &fit?));
-    let nameless = fields.iter().zip(of_fields).filter(|_| !explained).filter_map(|(field, fit)| {
-        let candidate = candidate(evidence, field.info, &fit?)?;
-        Some(Candidate { id: None, behaves_like: field.behaves_like, estimates: vec![], ..candidate })
-    });
-    candidates.chain(nameless).collect()
+    asked.iter().zip(at_zero(evidence, &asked)).filter_map(of).collect()
 }
 
 /// Energy over all samples that an effect can have at most, with a confidence of 95 %, where it was not found; by effect.
 pub fn limits(evidence: &Evidence) -> Vec<(&'static str, f64)> {
-    let (asked, reference) = (asked(evidence), evidence.peak());
-    if reference <= 0.0 {
-        return vec![];
-    }
+    let asked = asked(evidence);
     let frames = evidence.cube.dims[0] as f64;
     let of = |(info, fit): (&&'static EffectInfo, Option<Fit>)| {
         let fit = fit?;
@@ -119,7 +95,15 @@ pub fn limits(evidence: &Evidence) -> Vec<(&'static str, f64)> {
         let energy: f64 = errors.map(|((value, deviation), energy)| most(*value, *deviation).powi(2) * energy).sum();
         Some((info.id, share * energy))
     };
-    asked.iter().zip(Fit::at_zero(evidence, &asked, reference)).filter_map(of).collect()
+    asked.iter().zip(at_zero(evidence, &asked)).filter_map(of).collect()
+}
+
+/// No work, and no peak looked for, where nothing is asked.
+fn at_zero(evidence: &Evidence, asked: &[&'static EffectInfo]) -> Vec<Option<Fit>> {
+    if asked.is_empty() || evidence.peak() <= 0.0 {
+        return vec![];
+    }
+    Fit::at_zero(evidence, asked, evidence.peak())
 }
 
 fn candidate(evidence: &Evidence, info: &'static EffectInfo, fit: &Fit) -> Option<Candidate> {
@@ -139,7 +123,7 @@ fn candidate(evidence: &Evidence, info: &'static EffectInfo, fit: &Fit) -> Optio
         gain: fit.gain,
         errs_alike: false,
         look_alikes: vec![],
-        statement: format!("{} ({}): {}", info.title, numbers.join(", "), uncapitalised(info.explanation.trim_end_matches('.'))),
+        statement: format!("{} ({}). {}", info.title, numbers.join(", "), info.explanation),
         curve: None,
         energy,
         correction: correction(evidence, drive, fit),
@@ -189,15 +173,6 @@ fn estimates(info: &EffectInfo, fit: &Fit) -> Vec<Estimate> {
         Estimate::list(directions[index].parameter.name, &values, &deviations)
     };
     (0..directions.len()).map(one).collect()
-}
-
-/// A sentence as what follows a colon; a symbol stays as it is.
-fn uncapitalised(sentence: &str) -> String {
-    let mut letters = sentence.chars();
-    match (letters.next(), letters.clone().next()) {
-        (Some(first), Some(second)) if second.is_lowercase() => first.to_lowercase().chain(letters).collect(),
-        _ => sentence.into(),
-    }
 }
 
 /// "gain_db 0.5 ± 0.1 dB"; of receivers one after the other.

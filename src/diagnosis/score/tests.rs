@@ -142,6 +142,52 @@ fn what_changes_each_sample_for_itself_is_told_from_what_does_not() {
     assert!(!is(&effects::object_radar_object::INFO, 0.1) && !is(&effects::chirp_nonlinearity::INFO, 1e6));
 }
 
+/// Q' = g (Q cos φ + I sin φ).
+fn unbalanced(value: Complex64, gain_db: f64, phase_deg: f64) -> Complex64 {
+    let (gain, angle) = (10f64.powf(gain_db / 20.0), phase_deg.to_radians());
+    Complex64::new(value.re, gain * (value.im * angle.cos() + value.re * angle.sin()))
+}
+
+/// A library of one effect of the real one, under a name that no detector seeks.
+fn only(info: &EffectInfo) -> &'static [&'static EffectInfo] {
+    vec![&*Box::leak(Box::new(EffectInfo { id: RENAMED, ..*info }))].leak()
+}
+
+const RENAMED: &str = "renamed";
+
+#[test]
+fn receivers_that_differ_have_values_of_their_own() {
+    let gains_db = [0.5, -0.3];
+    let mut evidence = of_receivers(10, |receiver, value, _| unbalanced(value, gains_db[receiver], 1.0));
+    evidence.library = only(&effects::iq_imbalance::INFO);
+    let found = find(&evidence);
+    let image = named(&found, RENAMED).unwrap_or_else(|| panic!("{found:?}"));
+    let gains = image.estimates.iter().find(|estimate| estimate.name == "gain_db").unwrap();
+    assert!(gains.values.iter().zip(gains_db).all(|(found, wanted)| (found - wanted).abs() < 0.03), "{gains:?}");
+    assert!(named(&find(&evidence.with(image)), RENAMED).is_none());
+}
+
+#[test]
+fn receivers_of_the_library_are_found_with_what_they_do() {
+    let found_by = |info: &EffectInfo, seed: u64, receiver: &dyn Fn(Complex64) -> Complex64| {
+        let mut evidence = evidence(seed, |value, _| receiver(value));
+        evidence.library = only(info);
+        named(&find(&evidence), RENAMED).cloned().unwrap()
+    };
+    let image = found_by(&effects::iq_imbalance::INFO, 7, &|value| unbalanced(value, 0.4, 2.0));
+    for (name, wanted, error) in [("gain_db", 0.4, 0.02), ("phase_deg", 2.0, 0.1)] {
+        let (found, [low, high]) = value(&image, name);
+        assert!((found - wanted).abs() < error && (low..high).contains(&wanted), "{name}: {found} in {low} to {high}");
+    }
+    // Levels are relative to the strongest sample, which is some 300.
+    let harmonic = found_by(&effects::second_harmonic::INFO, 8, &|value| value + value * value * 1e-4);
+    let (level_db, _) = value(&harmonic, "level_db");
+    assert!((level_db - 20.0 * (1e-4 * 300f64).log10()).abs() < 1.0, "{level_db}");
+    let compression = found_by(&effects::compression::INFO, 9, &|value| value * (1.0 - 1e-6 * value.norm_sqr()));
+    let (level, _) = value(&compression, "level");
+    assert!((level / (1e-6 * 300f64.powi(2)) - 1.0).abs() < 0.2, "{level}");
+}
+
 #[test]
 fn intervals_hold() {
     let truth = Complex64::new(0.03, -0.02);
