@@ -75,7 +75,7 @@ impl Estimated {
         if count == 0 || groups < FEWEST[0] + FEWEST[1] * count {
             return None;
         }
-        let all = together(frames.iter().flatten(), count);
+        let all = Look::sum(frames.iter().flatten(), count);
         let inverse = all.information.clone().cholesky()?.inverse();
         let step = &inverse * &all.score;
         let values = at + &step;
@@ -105,7 +105,7 @@ impl Estimated {
         let p_value = fisher_tail(square * below / (freedom * (groups - 1.0)), freedom, below);
         // The likelihood near the estimate, scaled to what the groups really scatter, by the others' estimate and by zeros.
         let gain = |[rest, held]: [Vec<usize>; 2]| {
-            let of = |part: &[usize]| together(part.iter().flat_map(|&frame| &frames[frame]), count);
+            let of = |part: &[usize]| Look::sum(part.iter().flat_map(|&frame| &frames[frame]), count);
             let [rest, held] = [of(&rest), of(&held)];
             let predicted = rest.information.cholesky()?.solve(&rest.score);
             let likelihood = |from: &DVector<f64>| held.score.dot(from) - 0.5 * from.dot(&(&held.information * from));
@@ -140,14 +140,5 @@ fn summed<K: Ord>(frames: &[Vec<Look>], key: impl Fn(usize, usize, &Look) -> K) 
             sums.entry(key(frame, index, look)).or_default().push(look);
         }
     }
-    sums.into_values().map(|looks| together(looks.iter().copied(), looks[0].score.len())).collect()
-}
-
-fn together<'a>(looks: impl Iterator<Item = &'a Look>, count: usize) -> Look {
-    let mut sum = Look::new(count, None);
-    for look in looks {
-        sum.score += &look.score;
-        sum.information += &look.information;
-    }
-    sum
+    sums.into_values().map(|looks| Look::sum(looks.iter().copied(), looks[0].score.len())).collect()
 }

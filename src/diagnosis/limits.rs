@@ -36,16 +36,8 @@ struct Salt {
 const STILL: &[&str] = &["still field", "still field, room unknown"];
 const SLOW: &[&str] = &["slow time"];
 const ALONG: &[&str] = &["along the chirp"];
-const PRODUCTS: &[&str] = &["non-linear receiver", "extra paths"];
 
-const SALTS: [Salt; 19] = [
-    Salt {
-        id: effects::object_radar_object::ID,
-        suspects: PRODUCTS,
-        least: 1e-4,
-        most: 1.0,
-        setting: |s, x, _| s.with("coefficient", [x]),
-    },
+const SALTS: [Salt; 15] = [
     Salt {
         id: effects::chirp_ripple::ID,
         suspects: &["chirp"],
@@ -125,14 +117,6 @@ const SALTS: [Salt; 19] = [
     Salt { id: effects::dc_offset::ID, suspects: STILL, least: 1e-6, most: 1.0, setting: |s, x, _| s.with("i", [x]) },
     Salt { id: effects::if_highpass::ID, suspects: STILL, least: 1e3, most: 1e6, setting: |s, x, _| s.with("corner_hz", [x]) },
     Salt {
-        id: effects::second_harmonic::ID,
-        suspects: PRODUCTS,
-        least: 1e-5,
-        most: 0.5,
-        setting: |s, x, _| s.with("level_db", [db(x)]),
-    },
-    Salt { id: effects::compression::ID, suspects: PRODUCTS, least: 1e-4, most: 0.4, setting: |s, x, _| s.with("level", [x]) },
-    Salt {
         id: effects::spur::ID,
         suspects: &["spur"],
         least: 1e-6,
@@ -142,13 +126,6 @@ const SALTS: [Salt; 19] = [
             let rate = evidence.radar.sample_rate_hz;
             s.with("level_db", [db(x)]).with("frequency_hz", [(0.23 + 0.37 / evidence.cube.dims[4] as f64) * rate])
         },
-    },
-    Salt {
-        id: effects::iq_imbalance::ID,
-        suspects: &["quadrature image"],
-        least: 1e-4,
-        most: 3.0,
-        setting: |s, x, _| s.with("gain_db", [x]),
     },
 ];
 
@@ -184,11 +161,14 @@ pub fn limits(evidence: &Evidence, found: &[&str], moving_energy: f64, threshold
         let at_most_db = 10.0 * (energy? / moving_energy).log10() + MARGIN_DB;
         at_most_db.is_finite().then_some(Limit { id: salt.id, at_most_db })
     };
-    let salted: Vec<Limit> = SALTS.par_iter().filter(|salt| !found.contains(&salt.id)).filter_map(of).collect();
-    // What no salt is of has the limit of its score.
     let scored = score::limits(evidence).into_iter().filter(|(id, energy)| !found.contains(id) && *energy > 0.0);
     let scored = scored.map(|(id, energy)| Limit { id, at_most_db: 10.0 * (energy / moving_energy).log10() });
-    salted.into_iter().chain(scored).collect()
+    let salted: Vec<Limit> = SALTS.par_iter().filter(|salt| !found.contains(&salt.id)).filter_map(of).collect();
+    // What both bound has the tighter of the two.
+    let mut limits: Vec<Limit> = scored.filter(|limit| limit.at_most_db.is_finite()).chain(salted).collect();
+    limits.sort_by(|a, b| (a.id, a.at_most_db).partial_cmp(&(b.id, b.at_most_db)).expect("finite"));
+    limits.dedup_by_key(|limit| limit.id);
+    limits
 }
 
 /// Puts an effect in; its energy if it is found.

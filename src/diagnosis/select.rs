@@ -244,7 +244,15 @@ fn strongest<'a>(passing: &[&'a (usize, Candidate)]) -> Option<&'a (usize, Candi
         let worth = if is_rough(candidate) { ROUGHLY * candidate.gain } else { candidate.gain };
         (suspect.last_in_chain, !suspect.last_resort, worth)
     };
-    passing.iter().copied().max_by(|a, b| order(a).partial_cmp(&order(b)).expect("gains are finite"))
+    let of = |candidates: &mut dyn Iterator<Item = &'a (usize, Candidate)>| {
+        candidates.max_by(|a, b| order(a).partial_cmp(&order(b)).expect("gains are finite"))
+    };
+    let strongest = of(&mut passing.iter().copied())?;
+    if SUSPECTS[strongest.0].last_in_chain || matches!(strongest.1.place.stage, Some(Stage::Receiver | Stage::Noise)) {
+        return Some(strongest);
+    }
+    // What the receiver does to everything that it receives lies behind what was done to it before.
+    of(&mut passing.iter().copied().filter(|(suspect, _)| SUSPECTS[*suspect].of_all_received)).or(Some(strongest))
 }
 
 /// What every suspect has to say.

@@ -26,6 +26,16 @@ impl Look {
         Self { score: DVector::zeros(numbers), information: DMatrix::zeros(numbers, numbers), place }
     }
 
+    /// Of all of them, which have so many numbers.
+    pub fn sum<'a>(looks: impl Iterator<Item = &'a Self>, numbers: usize) -> Self {
+        let mut sum = Self::new(numbers, None);
+        for look in looks {
+            sum.score += &look.score;
+            sum.information += &look.information;
+        }
+        sum
+    }
+
     /// Adds a cell.
     ///
     /// `shape`: covariance that the body is expected to have, in units of the noise; `observed`: independent draws; `changes`: how

@@ -59,14 +59,6 @@ pub struct Law {
     pub peak: f64,
 }
 
-impl Law {
-    /// Of the peak sample before the law acted on it.
-    pub fn share(&self) -> Complex64 {
-        let before = without(&[*self], self.peak.into()).norm();
-        self.kappa * self.product.scale(self.peak) / self.product.scale(before)
-    }
-}
-
 /// A sample as it was before some laws acted on it.
 pub fn without(laws: &[Law], found: Complex64) -> Complex64 {
     let distortion = |value: Complex64| -> Complex64 {
@@ -82,9 +74,6 @@ const BESIDE: f64 = 0.3;
 const LEAST_GAIN: f64 = 20.0;
 /// Steps by which a distortion is undone: each leaves a part of the last in proportion to how strong the distortion is.
 const STEPS: usize = 6;
-/// Times that a law is found anew from the signal without what was found, or until it is the same but for so much.
-const DRIVEN: usize = 5;
-const ALIKE: f64 = 0.02;
 /// Chance below which it is there.
 const SURELY: f64 = 1e-6;
 
@@ -105,10 +94,7 @@ impl Products {
         if evidence.is_real() || !empty.contains(&true) || evidence.peak() <= 0.0 {
             return Self::default();
         }
-        let [square, magnitude, mut cube] = found(evidence, &empty, PRODUCTS, None);
-        if let Some(law) = cube.filter(|cube| cube.p_value < SURELY) {
-            cube = driven(law, |law| found(evidence, &empty, [Product::Cube], Some(law))[0]);
-        }
+        let [square, magnitude, cube] = found(evidence, &empty);
         Self { square, magnitude, cube }
     }
 
@@ -127,32 +113,15 @@ impl Products {
     }
 }
 
-/// How much of some products of the signal, without a law's part, is in the recording.
-fn found<const N: usize>(evidence: &Evidence, empty: &[bool], products: [Product; N], undone: Option<Law>) -> [Option<Law>; N] {
+/// How much of the products of the signal is in the recording.
+fn found(evidence: &Evidence, empty: &[bool]) -> [Option<Law>; 3] {
     let peak = evidence.peak();
-    let of_frame = |frame| of_frame(evidence, frame, empty, products, undone);
-    let sums: Vec<[Sums; N]> = (0..evidence.cube.dims[0]).into_par_iter().map(of_frame).collect();
+    let of_frame = |frame| of_frame(evidence, frame, empty);
+    let sums: Vec<[Sums; 3]> = (0..evidence.cube.dims[0]).into_par_iter().map(of_frame).collect();
     std::array::from_fn(|index| {
         let of_product: Vec<Sums> = sums.iter().map(|sums| sums[index]).collect();
-        judged(products[index], &of_product, peak)
+        judged(PRODUCTS[index], &of_product, peak)
     })
-}
-
-/// What is compressed makes another product than what drives it: the share of a first law without which the signal shows just that
-/// much of it, by secants.
-fn driven(first: Law, found: impl Fn(Law) -> Option<Law>) -> Option<Law> {
-    let along = |law: &Law| (law.kappa * first.kappa.conj()).re / first.kappa.norm_sqr();
-    let (mut last, mut share, mut law) = ([0.0, 1.0], 1.0f64, first);
-    for _ in 0..DRIVEN {
-        law = found(Law { kappa: share * first.kappa, ..first })?;
-        let beyond = along(&law) - share;
-        let slope = (beyond - last[1]) / (share - last[0]);
-        if beyond.abs() < ALIKE || slope >= 0.0 {
-            break;
-        }
-        (last, share) = ([share, beyond], (share - beyond / slope).clamp(0.0, 1.0));
-    }
-    Some(law)
 }
 
 /// None where it is not to be expected, or frames that it was not fitted to are worse with it. `sums`: by frame.
@@ -182,23 +151,14 @@ fn judged(product: Product, sums: &[Sums], peak: f64) -> Option<Law> {
 }
 
 /// Templates are scaled by the peak sample, so that κ is a share of it.
-fn of_frame<const N: usize>(
-    evidence: &Evidence,
-    frame: usize,
-    empty: &[bool],
-    products: [Product; N],
-    undone: Option<Law>,
-) -> [Sums; N] {
+fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool]) -> [Sums; 3] {
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let mut sums = [Sums::default(); N];
+    let mut sums = [Sums::default(); 3];
     for channel in 0..evidence.cube.channels() {
         let noise = evidence.noise()[channel].max(1e-300);
-        let mut clean = denoised::channel(evidence, frame, channel);
-        if let Some(law) = undone {
-            clean.iter_mut().for_each(|value| *value = without(&[law], *value));
-        }
+        let clean = denoised::channel(evidence, frame, channel);
         let [found, still] = moving_and_still(evidence.cube.channel(frame, channel).to_vec(), samples);
-        for (product, sums) in products.into_iter().zip(&mut sums) {
+        for (product, sums) in PRODUCTS.into_iter().zip(&mut sums) {
             let scale = product.scale(evidence.peak());
             let template = clean.iter().map(|value| product.of(*value) * scale).collect();
             let [expected, mean] = moving_and_still(template, samples);
@@ -255,23 +215,4 @@ fn jackknife(sums: &[Sums], whole: &Sums) -> f64 {
         .sum();
     let count = sums.len() as f64;
     (spread * (count - 1.0) / count).sqrt()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_drives_a_strong_compression_is_found_by_secants() {
-        let first = Law { product: Product::Cube, kappa: (-0.2).into(), scatter: 0.01, p_value: 0.0, gain: 1.0, peak: 1.0 };
-        // Undone by too much, the signal shows far less of it: steps without secants would oscillate.
-        let found = |law: Law| Some(Law { kappa: -0.2 - 1.2 * (law.kappa + 0.3 * law.kappa * law.kappa), ..first });
-        let law = driven(first, found).unwrap();
-        let same = found(law).unwrap();
-        assert!((law.kappa - same.kappa).norm() < 0.01 && (-0.12..-0.08).contains(&law.kappa.re), "{}", law.kappa);
-        // Of the peak before it: y (1 + share) is what was measured of y = 1.
-        let share = law.share();
-        let before = without(&[law], Complex64::ONE);
-        assert!((before * (1.0 + share) - 1.0).norm() < 1e-3, "{before} {share}");
-    }
 }

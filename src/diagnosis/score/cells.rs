@@ -3,6 +3,9 @@
 //! A cell's own returns have free amplitudes: a small change of them is no evidence. So a cell counts where what the effect can put there
 //! exceeds, by far, all that the clean signal has around it in any channel. What is left there is noise, weak strangers, and the effect.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use num_complex::Complex64;
 
 use super::directions::{Amplitudes, Direction, Drive};
@@ -36,13 +39,15 @@ impl Cell {
     }
 }
 
-/// Of one frame: what changes within it, and what does not.
-pub struct Frame {
-    pub moving: Vec<Cell>,
-    pub still: Vec<Cell>,
-    /// Sum over all samples of |tangent|², by amplitude.
-    pub energies: Vec<f64>,
+/// What changes within a frame, and what does not.
+#[derive(Clone, Copy, Debug)]
+pub enum Part {
+    Moving,
+    Still,
 }
+
+/// Cells by which an effect's pattern is shifted, `[doppler, range]`: none is where the effect puts it.
+pub type Shift = [usize; 2];
 
 /// What changes within a frame, `[doppler, range]`, and what does not, `[0, range]`.
 struct Maps {
@@ -94,75 +99,79 @@ fn around<'a>(maps: impl Iterator<Item = &'a Grid<Complex64, 2>>) -> Option<Grid
 }
 
 /// What effects share of one frame.
-struct Shared<'a> {
-    evidence: &'a Evidence,
-    frame: usize,
-    windows: Windows,
-    clean: Vec<Complex64>,
+struct Shared {
+    /// By channel: noise of a cell, and what was found.
+    noise: Vec<f64>,
+    found: Vec<Maps>,
     /// Largest power of the clean signal around a cell: what moves, and what does not.
     around: [Option<Grid<f64, 2>>; 2],
-    /// By channel.
-    found: Vec<Maps>,
+    receivers: usize,
+    /// Where noise can be told from the receiver's filters.
+    ranges: Range<usize>,
 }
 
-/// Cells of a frame, by effect.
-pub fn of_frame(evidence: &Evidence, effects: &[(Drive, Vec<Direction>)], frame: usize) -> Vec<Frame> {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
+/// What an effect can put into the cells of one frame.
+pub struct Pattern {
+    shared: Arc<Shared>,
+    /// By amplitude and channel.
+    tangents: Vec<Vec<Maps>>,
+    /// What each amplitude can be at most.
+    most: Vec<f64>,
+    /// Sum over all samples of |tangent|², by amplitude.
+    pub energies: Vec<f64>,
+}
+
+/// Patterns of a frame, by effect.
+pub fn of_frame(evidence: &Evidence, effects: &[(Drive, Vec<Direction>)], frame: usize) -> Vec<Pattern> {
+    let [_, _, receivers, loops, samples] = evidence.cube.dims;
     let windows = Windows::new(loops, samples);
     let clean = denoised::frame(evidence, frame).concat();
     let of_clean: Vec<Maps> = clean.chunks_exact(loops * samples).map(|channel| windows.maps(channel)).collect();
-    let shared = Shared {
-        around: [around(of_clean.iter().map(|maps| &maps.moving)), around(of_clean.iter().map(|maps| &maps.still))],
+    let shared = Arc::new(Shared {
+        noise: evidence.noise().iter().map(|noise| noise.max(f64::MIN_POSITIVE)).collect(),
         found: (0..evidence.cube.channels()).map(|channel| windows.maps(evidence.cube.channel(frame, channel))).collect(),
-        evidence,
-        frame,
-        windows,
-        clean,
-    };
-    effects.iter().map(|(drive, directions)| shared.cells(drive, directions)).collect()
-}
-
-impl Shared<'_> {
-    fn cells(&self, drive: &Drive, directions: &[Direction]) -> Frame {
-        let energy = |values: &[Complex64]| values.iter().map(Complex64::norm_sqr).sum::<f64>();
-        let size = self.windows.slow.len() * self.windows.fast.len();
-        let (mut tangents, mut energies, mut most) = (vec![], vec![], vec![]);
+        around: [around(of_clean.iter().map(|maps| &maps.moving)), around(of_clean.iter().map(|maps| &maps.still))],
+        receivers,
+        ranges: evidence.noise_bins(),
+    });
+    let energy = |values: &[Complex64]| values.iter().map(Complex64::norm_sqr).sum::<f64>();
+    let of_effect = |(drive, directions): &(Drive, Vec<Direction>)| {
+        let mut pattern = Pattern { shared: shared.clone(), tangents: vec![], most: vec![], energies: vec![] };
         for &direction in directions {
-            let tangent = drive.tangent(&self.clean, self.frame, direction);
+            let tangent = drive.tangent(&clean, frame, direction);
             let of_tangent = energy(&tangent);
             // As far as it is believed, or until it is as strong as the signal.
             let believed = direction.parameter.most - direction.parameter.neutral;
-            most.push(believed.min((energy(&self.clean) / of_tangent.max(f64::MIN_POSITIVE)).sqrt()));
-            energies.push(of_tangent);
-            tangents.push(tangent.chunks_exact(size).map(|channel| self.windows.maps(channel)).collect::<Vec<Maps>>());
+            pattern.most.push(believed.min((energy(&clean) / of_tangent.max(f64::MIN_POSITIVE)).sqrt()));
+            pattern.energies.push(of_tangent);
+            pattern.tangents.push(tangent.chunks_exact(loops * samples).map(|channel| windows.maps(channel)).collect());
         }
-        let [moving, still] = &self.around;
-        let select = |around: &Option<Grid<f64, 2>>, of: fn(&Maps) -> &Grid<Complex64, 2>| -> Vec<Cell> {
-            around.as_ref().map_or_else(Vec::new, |around| self.select(around, of, &tangents, &most))
-        };
-        Frame { moving: select(moving, |maps| &maps.moving), still: select(still, |maps| &maps.still), energies }
-    }
+        pattern
+    };
+    effects.iter().map(of_effect).collect()
+}
 
-    /// `tangents`: by amplitude and channel; `most`: of every amplitude.
-    fn select(
-        &self,
-        around: &Grid<f64, 2>,
-        of: fn(&Maps) -> &Grid<Complex64, 2>,
-        tangents: &[Vec<Maps>],
-        most: &[f64],
-    ) -> Vec<Cell> {
+impl Pattern {
+    /// Cells where the pattern, shifted, stands out of the signal.
+    pub fn cells(&self, part: Part, [by_doppler, by_range]: Shift) -> Vec<Cell> {
+        let Shared { noise, found, around, receivers, ranges } = &*self.shared;
+        let (of, around): (fn(&Maps) -> &Grid<Complex64, 2>, _) = match part {
+            Part::Moving => (|maps| &maps.moving, &around[0]),
+            Part::Still => (|maps| &maps.still, &around[1]),
+        };
+        let Some(around) = around else { return vec![] };
         let mut cells = vec![];
-        let [rows, _] = around.shape();
-        // The mean over a frame's chirps has as much less noise.
-        let averaged = self.windows.slow.len() / rows;
-        let receivers = self.evidence.cube.dims[2];
-        for (channel, found) in self.found.iter().enumerate() {
-            let noise = (self.evidence.noise()[channel] / averaged as f64).max(f64::MIN_POSITIVE);
+        let [rows, samples] = around.shape();
+        let [loops, _] = found[0].moving.shape();
+        for (channel, found) in found.iter().enumerate() {
+            // The mean over a frame's chirps has as much less noise.
+            let noise = noise[channel] * rows as f64 / loops as f64;
             for doppler in dopplers(rows) {
-                for range in self.evidence.noise_bins() {
+                for range in ranges.clone() {
                     let at = [doppler, range];
-                    let tangents = || tangents.iter().map(|channels| of(&channels[channel])[at]);
-                    let reaches = tangents().zip(most).map(|(tangent, most)| tangent.norm_sqr() * most * most);
+                    let from = [(doppler + rows - by_doppler) % rows, (range + samples - by_range) % samples];
+                    let tangents = || self.tangents.iter().map(|channels| of(&channels[channel])[from]);
+                    let reaches = tangents().zip(&self.most).map(|(tangent, most)| tangent.norm_sqr() * most * most);
                     let reach = reaches.fold(0.0, f64::max);
                     if reach > LEAST * noise && around[at] < APART * reach {
                         let (receiver, found) = (channel % receivers, of(found)[at]);
@@ -172,6 +181,28 @@ impl Shared<'_> {
             }
         }
         cells
+    }
+
+    /// Cells where the pattern is, with what was undone there before put back to first order.
+    pub fn found(&self, part: Part, undone: Option<&Amplitudes>) -> Vec<Cell> {
+        let mut cells = self.cells(part, Shift::default());
+        if let Some(undone) = undone {
+            cells.iter_mut().for_each(|cell| cell.found += cell.expected(undone));
+        }
+        cells
+    }
+
+    /// Shifts that share no main lobe, at most so many, evenly spread: along range, and along Doppler of what moves.
+    pub fn shifts(&self, part: Part, most: usize) -> Vec<Shift> {
+        let [loops, samples] = self.shared.found[0].moving.shape();
+        let along = |count: usize| (0..count).step_by(LOBE + 1).filter(move |shift| *shift == 0 || count - shift > LOBE);
+        let rows = match part {
+            Part::Moving => loops,
+            Part::Still => 1,
+        };
+        let all: Vec<Shift> = along(rows).flat_map(|doppler| along(samples).map(move |range| [doppler, range])).skip(1).collect();
+        let count = all.len().min(most);
+        (0..count).map(|index| all[index * all.len() / count]).collect()
     }
 }
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::complex::Complex;
 use crate::diagnosis::cube::{Cube, analytic};
 use crate::diagnosis::evidence::Evidence;
-use crate::effects::{Context, EffectInfo, ParameterInfo, Role, SignalOperator, Values};
+use crate::effects::{Context, EffectInfo, Operator, ParameterInfo, Role, SignalOperator, Values};
 use crate::radar::{Radar, Sampling};
 
 /// Step of the central difference, of a parameter's prior width: its own error is of second order in it.
@@ -59,13 +59,14 @@ pub struct Drive {
 }
 
 impl Direction {
-    /// All of an effect. None where it does not act on the summed signal, or where more than amplitudes are free: shapes need a search,
-    /// and what is drawn at random changes the covariance instead of the mean.
+    /// All of an effect. None where it does not act on the summed signal, or adds whatever that is: one line more is no pattern. None
+    /// where more than amplitudes are free: shapes need a search, and what is drawn at random changes the covariance instead of the mean.
     pub fn all(info: &'static EffectInfo) -> Vec<Self> {
         let is = |role: Role| info.parameters.iter().filter(move |parameter| parameter.role == role);
         let counts = is(Role::Fixed).any(|parameter| parameter.name != "reference");
         let more = counts || is(Role::Shape).chain(is(Role::Spread)).next().is_some();
-        if more || info.operator.on_signal().is_none() {
+        let follows_the_signal = matches!(info.operator, Operator::Signal(_) | Operator::Nonlinear(_));
+        if more || !follows_the_signal {
             return vec![];
         }
         let phases: &[bool] = if is(Role::Angle).next().is_some() { &[false, true] } else { &[false] };

@@ -5,20 +5,26 @@
 //!
 //!   U_j = Σ 2 Re(J_j* y) / C,   I_jk = Σ 2 Re(J_j* J_k) / C
 //!
-//! (Rao 1948), over the cells in which ŝ itself says nothing (`cells.rs`), with C the power that is left there. θ̂ = I⁻¹ U; its errors are
-//! by how groups of cells disagree (the sandwich of Huber 1967), its chance is Hotelling's, its gain is that of frames which others
-//! predict (`estimated.rs`). What passes is refined by Gauss-Newton steps through the operator (`fit.rs`).
-//! An effect that changes each return where it is alone (a filter, a phase) has no such cells, and is not judged here.
+//! (Rao 1948), over the cells in which ŝ itself says nothing (`cells.rs`), with C the power that is left there. θ̂ = I⁻¹ U; what is
+//! significant is refined by Gauss-Newton steps through the operator (`fit.rs`) and held against the same pattern elsewhere (`shifted.rs`).
+//! Errors are by how groups of cells disagree (the sandwich of Huber 1967), the gain is that of frames which others predict
+//! (`estimated.rs`).
+//! An effect that changes each return where it is alone (a filter, a phase) has no such cells, and is not judged here. What follows the
+//! signal and is no effect of the library is a field without a name (`fields.rs`).
 
 mod cells;
 mod directions;
+mod fields;
 mod fit;
+mod looks;
+mod shifted;
 
 use std::sync::Arc;
 
 use num_complex::Complex64;
 
 use self::directions::{Amplitudes, Direction, Drive};
+use self::fields::Field;
 use self::fit::Fit;
 use super::behaviour::Behaviour;
 use super::cube::Cube;
@@ -28,32 +34,15 @@ use super::never;
 use super::statistics::{DECIBEL, corrected};
 use crate::effects::{self, EffectInfo, Operator, Role};
 
-/// Chance and gain (nats, `diagnosis.gain`) up to which a fit is refined by steps through the operator: others cannot be accepted.
-const WORTH_REFINING: f64 = 1e-3;
-const WORTH_GAINING: f64 = 6.0;
+/// Chance above which nothing can be accepted.
+const MOST_LIKELY: f64 = 1e-3;
 /// Share of the power above the noise that may be left where the effect is above it: what else lies there makes more of it than the
 /// effect does.
 const MOST_LEFT: f64 = 0.5;
+/// The same below which an effect of the library explains what a field does; and the share of the field's gain that it may lack.
+const LEFT_BY_A_LAW: f64 = 0.2;
 /// Standard deviations of a one-sided limit of 95 %.
 const NINETY_FIVE: f64 = 1.645;
-
-/// Effects with a detector of their own, which have not yet given way to this test.
-const OF_OTHERS: [&str; 14] = [
-    effects::range_bias::ID,
-    effects::object_radar_object::ID,
-    effects::slope_error::ID,
-    effects::chirp_nonlinearity::ID,
-    effects::channel_mismatch::ID,
-    effects::mutual_coupling::ID,
-    effects::chirp_droop::ID,
-    effects::gain_drift::ID,
-    effects::second_harmonic::ID,
-    effects::compression::ID,
-    effects::iq_imbalance::ID,
-    effects::dc_offset::ID,
-    effects::interference::ID,
-    effects::ramp_edge_transient::ID,
-];
 
 /// Effects of the evidence's library that the test is asked of.
 fn asked(evidence: &Evidence) -> Vec<&'static EffectInfo> {
@@ -62,24 +51,37 @@ fn asked(evidence: &Evidence) -> Vec<&'static EffectInfo> {
         evidence.accepted.contains(&effects::adc_saturation::ID) || evidence.accepted_unnamed.contains(&Behaviour::Quadratic);
     let never: Vec<&str> = never::all(evidence.body.is_some()).map(|(id, _)| id).collect();
     let is_asked = |info: &&'static EffectInfo| {
-        let known = [&evidence.accepted[..], &never, &OF_OTHERS].iter().any(|ids| ids.contains(&info.id));
-        !is_bent && !known && !Direction::all(info).is_empty()
+        !is_bent && !evidence.accepted.contains(&info.id) && !never.contains(&info.id) && !Direction::all(info).is_empty()
     };
     evidence.library.iter().copied().filter(is_asked).collect()
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let asked = asked(evidence);
-    let of = |(info, fit): (&&'static EffectInfo, Option<Fit>)| {
+    let named = asked(evidence);
+    let is_open = |field: &&Field| !named.is_empty() && !evidence.accepted_unnamed.contains(&field.behaves_like);
+    let fields: Vec<&Field> = fields::ALL.iter().filter(is_open).collect();
+    let asked: Vec<&'static EffectInfo> = named.iter().copied().chain(fields.iter().map(|field| field.info)).collect();
+    let of = |fit: Option<Fit>| {
         let fit = fit?;
         let p_value = corrected(fit.p_value, asked.len() as f64);
-        if p_value > WORTH_REFINING || fit.gain < WORTH_GAINING {
-            return None;
-        }
-        let fit = fit.refined(evidence, info, evidence.peak()).filter(|fit| fit.left < MOST_LEFT)?;
-        candidate(evidence, info, &Fit { p_value, ..fit })
+        (p_value < MOST_LIKELY && fit.left < MOST_LEFT).then_some(Fit { p_value, ..fit })
     };
-    asked.iter().zip(at_zero(evidence, &asked)).filter_map(of).collect()
+    let mut fits: Vec<Option<Fit>> = at_zero(evidence, &asked).into_iter().map(of).collect();
+    let of_fields = fits.split_off(named.len().min(fits.len()));
+    let laws: Vec<[f64; 2]> = fits.iter().flatten().map(|fit| [fit.left, fit.gain]).collect();
+    let is_explained =
+        |field: &Fit| laws.iter().any(|[left, gain]| *left < LEFT_BY_A_LAW || *gain > (1.0 - LEFT_BY_A_LAW) * field.gain);
+    let candidates = named.iter().zip(fits).filter_map(|(info, fit)| candidate(evidence, info, &fit?));
+    let nameless = fields.iter().zip(of_fields).filter_map(|(field, fit)| {
+        let fit = fit.filter(|fit| !is_explained(fit))?;
+        Some(Candidate {
+            id: None,
+            behaves_like: field.behaves_like,
+            estimates: vec![],
+            ..candidate(evidence, field.info, &fit)?
+        })
+    });
+    candidates.chain(nameless).collect()
 }
 
 /// Energy over all samples that an effect can have at most, with a confidence of 95 %, where it was not found; by effect.
@@ -142,7 +144,6 @@ fn correction(evidence: &Evidence, drive: Drive, fit: &Fit) -> Correction {
 fn behaviour(info: &EffectInfo) -> Behaviour {
     match info.operator {
         Operator::Nonlinear(_) => Behaviour::NonLinear,
-        Operator::Added(_) => Behaviour::AdditiveFastTime,
         _ => Behaviour::LinearInTheSignal,
     }
 }

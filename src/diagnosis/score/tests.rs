@@ -110,6 +110,13 @@ fn an_effect_that_is_not_there_is_bounded() {
     // Some 1500 times below the signal, as the noise of so many samples lets tell: and not better than that.
     let level_db = 10.0 * (energy_of(INTERLEAVED.id) / all).log10();
     assert!((-75.0..-45.0).contains(&level_db), "{level_db}");
+    assert!(energy_of(effects::iq_imbalance::ID) > 0.0);
+}
+
+/// Q' = g (Q cos φ + I sin φ).
+fn unbalanced(value: Complex64, gain_db: f64, phase_deg: f64) -> Complex64 {
+    let (gain, angle) = (10f64.powf(gain_db / 20.0), phase_deg.to_radians());
+    Complex64::new(value.re, gain * (value.im * angle.cos() + value.re * angle.sin()))
 }
 
 #[test]
@@ -142,49 +149,66 @@ fn what_changes_each_sample_for_itself_is_told_from_what_does_not() {
     assert!(!is(&effects::object_radar_object::INFO, 0.1) && !is(&effects::chirp_nonlinearity::INFO, 1e6));
 }
 
-/// Q' = g (Q cos φ + I sin φ).
-fn unbalanced(value: Complex64, gain_db: f64, phase_deg: f64) -> Complex64 {
-    let (gain, angle) = (10f64.powf(gain_db / 20.0), phase_deg.to_radians());
-    Complex64::new(value.re, gain * (value.im * angle.cos() + value.re * angle.sin()))
-}
-
-/// A library of one effect of the real one, under a name that no detector seeks.
-fn only(info: &EffectInfo) -> &'static [&'static EffectInfo] {
-    vec![&*Box::leak(Box::new(EffectInfo { id: RENAMED, ..*info }))].leak()
-}
-
-const RENAMED: &str = "renamed";
-
 #[test]
 fn receivers_that_differ_have_values_of_their_own() {
     let gains_db = [0.5, -0.3];
-    let mut evidence = of_receivers(10, |receiver, value, _| unbalanced(value, gains_db[receiver], 1.0));
-    evidence.library = only(&effects::iq_imbalance::INFO);
+    let evidence = of_receivers(10, |receiver, value, _| unbalanced(value, gains_db[receiver], 1.0));
     let found = find(&evidence);
-    let image = named(&found, RENAMED).unwrap_or_else(|| panic!("{found:?}"));
+    let image = named(&found, effects::iq_imbalance::ID).unwrap_or_else(|| panic!("{found:?}"));
     let gains = image.estimates.iter().find(|estimate| estimate.name == "gain_db").unwrap();
     assert!(gains.values.iter().zip(gains_db).all(|(found, wanted)| (found - wanted).abs() < 0.03), "{gains:?}");
-    assert!(named(&find(&evidence.with(image)), RENAMED).is_none());
+    assert!(named(&find(&evidence.with(image)), effects::iq_imbalance::ID).is_none());
+}
+
+#[test]
+fn something_else_at_the_mirrored_place_of_one_return_is_no_image() {
+    let radar = Radar { loops_per_frame: 32, samples_per_chirp: 64, ..Radar::small(12) };
+    for seed in 0..8 {
+        // The same in all frames, of any phase in each channel.
+        let evidence = Evidence::in_noise(radar.clone(), seed, |[_, channel, _, sample]| {
+            let tone =
+                |range: f64, amplitude: f64, turns: f64| amplitude * Complex64::cis(TAU * (range * sample as f64 / 64.0 + turns));
+            tone(9.0, 90.0, 0.1 * channel as f64) + tone(-9.0, 4.0, 0.37 * (seed as f64 + 1.0) * (channel as f64 + 1.0))
+        });
+        let found = find(&evidence);
+        assert!(found.is_empty(), "{seed}: {found:?}");
+    }
+}
+
+#[test]
+fn without_its_effect_an_image_is_an_unknown_of_its_family() {
+    let mut evidence = evidence(11, |value, _| unbalanced(value, 0.4, 2.0));
+    let without = effects::library().iter().copied().filter(|info| info.id != effects::iq_imbalance::ID);
+    evidence.library = Box::leak(without.collect::<Vec<_>>().into_boxed_slice());
+    let found = find(&evidence);
+    assert!(matches!(found.as_slice(), [Candidate { id: None, behaves_like: Behaviour::ConjugateImage, .. }]), "{found:?}");
+    assert!(found[0].gain > 100.0 && find(&evidence.with(&found[0])).is_empty());
+    // With it, the field has nothing to add.
+    evidence.library = effects::library();
+    let found = find(&evidence);
+    assert!(
+        found.iter().all(|candidate| candidate.id.is_some()) && named(&found, effects::iq_imbalance::ID).is_some(),
+        "{found:?}"
+    );
 }
 
 #[test]
 fn receivers_of_the_library_are_found_with_what_they_do() {
-    let found_by = |info: &EffectInfo, seed: u64, receiver: &dyn Fn(Complex64) -> Complex64| {
-        let mut evidence = evidence(seed, |value, _| receiver(value));
-        evidence.library = only(info);
-        named(&find(&evidence), RENAMED).cloned().unwrap()
-    };
-    let image = found_by(&effects::iq_imbalance::INFO, 7, &|value| unbalanced(value, 0.4, 2.0));
+    let branches = find(&evidence(7, |value, _| unbalanced(value, 0.4, 2.0)));
+    let image = named(&branches, effects::iq_imbalance::ID).unwrap();
     for (name, wanted, error) in [("gain_db", 0.4, 0.02), ("phase_deg", 2.0, 0.1)] {
-        let (found, [low, high]) = value(&image, name);
+        let (found, [low, high]) = value(image, name);
         assert!((found - wanted).abs() < error && (low..high).contains(&wanted), "{name}: {found} in {low} to {high}");
     }
     // Levels are relative to the strongest sample, which is some 300.
-    let harmonic = found_by(&effects::second_harmonic::INFO, 8, &|value| value + value * value * 1e-4);
-    let (level_db, _) = value(&harmonic, "level_db");
+    let square = find(&evidence(8, |value, _| value + value * value * 1e-4));
+    let harmonic = named(&square, effects::second_harmonic::ID).unwrap();
+    let (level_db, _) = value(harmonic, "level_db");
     assert!((level_db - 20.0 * (1e-4 * 300f64).log10()).abs() < 1.0, "{level_db}");
-    let compression = found_by(&effects::compression::INFO, 9, &|value| value * (1.0 - 1e-6 * value.norm_sqr()));
-    let (level, _) = value(&compression, "level");
+    let cube = find(&evidence(9, |value, _| value * (1.0 - 1e-6 * value.norm_sqr())));
+    assert!(cube.iter().all(|candidate| candidate.id.is_some()), "{cube:?}");
+    let compression = named(&cube, effects::compression::ID).unwrap();
+    let (level, _) = value(compression, "level");
     assert!((level / (1e-6 * 300f64.powi(2)) - 1.0).abs() < 0.2, "{level}");
 }
 

@@ -34,6 +34,8 @@ pub struct Suspect {
     pub find: fn(&Evidence) -> Vec<Candidate>,
     /// Looks at the codes as they were recorded: what is corrected happened before and takes nothing back.
     pub last_in_chain: bool,
+    /// Acts in the receiver on all that arrives: undone before what happened to it in front of the receiver.
+    pub of_all_received: bool,
     /// Counts only where no other suspect finds anything.
     pub last_resort: bool,
     /// Trusts that the body is where it was predicted: it waits until that is so.
@@ -49,6 +51,7 @@ impl Suspect {
             share: 1.0,
             find,
             last_in_chain: false,
+            of_all_received: false,
             last_resort: false,
             trusts_the_place: false,
             predicts_all_frames: false,
@@ -60,7 +63,7 @@ impl Suspect {
 pub const SUSPECTS: &[Suspect] = &[
     Suspect::new("still field", receiver::still::find),
     Suspect::new("still field, room unknown", receiver::open::find),
-    Suspect::new("quadrature image", receiver::image::find),
+    Suspect { predicts_all_frames: true, of_all_received: true, ..Suspect::new("operators of the library", score::find) },
     Suspect { predicts_all_frames: true, ..Suspect::new("non-linear receiver", receiver::harmonic::find) },
     Suspect { last_in_chain: true, ..Suspect::new("converter's rail", receiver::rail::find) },
     Suspect::new("spur", receiver::spur::find),
@@ -83,8 +86,6 @@ pub const SUSPECTS: &[Suspect] = &[
     Suspect { share: 8.0, ..Suspect::new("geometry", geometry::find) },
     Suspect::new("changing static returns", fluctuation::find),
     carried::SUSPECT,
-    // Effects that none of the above seeks.
-    Suspect { share: 0.1, predicts_all_frames: true, ..Suspect::new("operators of the library", score::find) },
     Suspect { last_resort: true, ..Suspect::new("excess power", excess::find) },
 ];
 

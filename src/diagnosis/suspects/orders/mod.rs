@@ -1,12 +1,10 @@
 //! What carries another multiple of a phase than the returns do whose phase it is, where nobody is tracked.
 //!
 //! Once it is known how a phase φ goes over time ([`Course`]), its multiples identify the path of a signal:
-//! a return has order 1; what is added behind the mixer does not turn, order 0; its image in a quadrature receiver turns backwards,
-//! order −1; what went to the thing and back twice turns twice, order 2. Static returns that share a phase
-//! so identify the part of them that is none.
+//! a return has order 1; what is added behind the mixer does not turn, order 0; what went to the thing and back twice turns twice,
+//! order 2. Static returns that share a phase so identify the part of them that is none.
 
 mod fit;
-mod image;
 mod offset;
 mod twice;
 
@@ -25,7 +23,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let of_course = |course: &Arc<Course>| match &course.of {
         Of::All => {
             let Some(fit) = Fit::new(evidence, course) else { return vec![] };
-            [offset::find(evidence, &fit), image::find(evidence, &fit)].into_iter().flatten().collect()
+            offset::find(evidence, &fit).into_iter().collect()
         }
         Of::Mover { bin, amplitude } => twice::find(evidence, course, *bin, amplitude).into_iter().collect::<Vec<_>>(),
     };

@@ -15,26 +15,23 @@ use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::suspects::receiver::zero_beat::ZeroBeat;
 use crate::effects::{self, Stage};
 
-/// Order of the fit that it has.
-const ADDED: usize = 1;
-
 pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     let [frames, tx, rx, loops, samples] = evidence.cube.dims;
     if evidence.is_real() || samples < 8 * HANN_LOBE || evidence.accepted.contains(&effects::dc_offset::ID) {
         return None;
     }
-    let spectra: Vec<Vec<Complex64>> = fit.parts[ADDED].iter().map(|part| spectrum(part)).collect();
-    let error = |channel: usize| evidence.noise()[channel].max(f64::MIN_POSITIVE) / fit.own[channel / rx][ADDED];
+    let spectra: Vec<Vec<Complex64>> = fit.added.iter().map(|part| spectrum(part)).collect();
+    let error = |channel: usize| evidence.noise()[channel].max(f64::MIN_POSITIVE) / fit.own[channel / rx];
     let power = |bin: usize| (0..tx * rx).map(|c| spectra[c][bin].norm_sqr() / error(c)).sum::<f64>();
     let others: Vec<f64> = (2 * HANN_LOBE..samples - 2 * HANN_LOBE).step_by(HANN_LOBE + 1).map(power).collect();
     let (p_value, excess) = against(power(0), &others, tx * rx);
-    let means = |channel: usize| fit.parts[ADDED][channel].iter().sum::<Complex64>() / samples as f64;
+    let means = |channel: usize| fit.added[channel].iter().sum::<Complex64>() / samples as f64;
     let offsets: Vec<Complex64> = (0..rx).map(|r| (0..tx).map(|t| means(t * rx + r)).sum::<Complex64>() / tx as f64).collect();
     // Errors as what is left says, which is more than the noise.
     let deviation = |r: usize| (0.5 * excess * error(r) / (samples * tx) as f64).sqrt();
     let term: Vec<Vec<Complex64>> = (0..tx * rx).map(|channel| vec![offsets[channel % rx]; samples]).collect();
-    let gain = fit.held_out_gain(evidence, ADDED, &term) / excess;
-    let beat = ZeroBeat::new(evidence, &fit.parts[ADDED], |channel| excess * error(channel));
+    let gain = fit.held_out_gain(evidence, &term) / excess;
+    let beat = ZeroBeat::new(evidence, &fit.added, |channel| excess * error(channel));
     // Neither by its frequency: something else that does not turn.
     if gain <= 0.0 || !beat.may_be_constant() {
         return None;

@@ -19,14 +19,13 @@ fn tone(bin: f64, n: usize) -> Complex64 {
     Complex64::cis(TAU * bin * n as f64 / SAMPLES as f64)
 }
 
-/// A static room that turns by a course of about a radian to either side, an offset that does not, and its image; the course is
-/// undone and known.
-fn turned(seed: u64, offset: Complex64, image: Complex64) -> Evidence {
+/// A static room that turns by a course of about a radian to either side, and an offset that does not; the course is undone and known.
+fn turned(seed: u64, offset: Complex64) -> Evidence {
     let course = |frame: usize| 0.9 * (TAU * 0.7 * frame as f64 / FRAMES as f64).sin();
     let evidence = Evidence::in_noise(radar(), seed, |[frame, channel, _, n]| {
         let room = |bin: f64| tone(bin, n) * Complex64::from_polar(30.0, channel as f64 + bin);
         let still = [14.0, 23.4, 37.0].into_iter().map(room).sum::<Complex64>() * Complex64::cis(course(frame));
-        still + image * still.conj() + offset
+        still + offset
     });
     let [_, tx, _, loops, _] = evidence.cube.dims;
     let turned: Vec<Complex64> = (0..FRAMES * tx * loops).map(|i| Complex64::cis(course(i / (tx * loops)))).collect();
@@ -50,34 +49,32 @@ fn sure(evidence: &Evidence) -> Vec<Candidate> {
 }
 
 #[test]
-fn what_does_not_turn_with_the_room_is_an_offset_and_what_turns_backwards_its_image() {
-    let (offset, image) = (Complex64::new(4.0, -2.0), Complex64::from_polar(0.05, 1.0));
-    let evidence = turned(1, offset, image);
-    let found = sure(&evidence);
-    assert_eq!(
-        found.iter().filter_map(|found| found.id).collect::<Vec<_>>(),
-        [effects::dc_offset::ID, effects::iq_imbalance::ID],
-        "{found:?}"
-    );
+fn what_does_not_turn_with_the_room_is_an_offset() {
+    let offset = Complex64::new(4.0, -2.0);
     let of = |found: &Candidate, name: &str| found.estimates.iter().find(|e| e.name == name).unwrap().clone();
-    for (name, truth) in [("i", offset.re), ("q", offset.im)] {
-        for [low, high] in of(&found[0], name).ci90 {
-            assert!(low < truth && truth < high && high - low < 2.0, "{name}: {truth} in {low} to {high}");
+    let mut held = 0;
+    for seed in 1..7 {
+        let evidence = turned(seed, offset);
+        let found = sure(&evidence);
+        assert_eq!(found.iter().filter_map(|found| found.id).collect::<Vec<_>>(), [effects::dc_offset::ID], "{found:?}");
+        for (name, truth) in [("i", offset.re), ("q", offset.im)] {
+            let intervals = of(&found[0], name).ci90;
+            assert!(intervals.iter().all(|[low, high]| high - low < 0.2), "{name}: {intervals:?}");
+            held += intervals.iter().filter(|[low, high]| (*low..*high).contains(&truth)).count();
         }
+        let mut left = found.iter().fold(evidence.clone(), |evidence, found| evidence.with(found));
+        left.accepted.clear();
+        left.accepted_unnamed.clear();
+        assert!(sure(&left).is_empty(), "{:?}", sure(&left));
     }
-    let (gain_db, phase_deg) = crate::diagnosis::suspects::receiver::image::imbalance(image);
-    assert!((of(&found[1], "gain_db").values[0] - gain_db).abs() < 0.05);
-    assert!((of(&found[1], "phase_deg").values[0] - phase_deg).abs() < 0.5);
-    let mut left = found.iter().fold(evidence.clone(), |evidence, found| evidence.with(found));
-    left.accepted.clear();
-    left.accepted_unnamed.clear();
-    assert!(sure(&left).is_empty(), "{:?}", sure(&left));
+    // Of 24 intervals of 90 % fewer hold once in a hundred times.
+    assert!(held >= 18, "{held}");
 }
 
 #[test]
 fn a_room_that_only_turns_has_neither() {
     for seed in 2..10 {
-        let found = find(&turned(seed, Complex64::ZERO, Complex64::ZERO));
+        let found = find(&turned(seed, Complex64::ZERO));
         assert!(found.iter().all(|found| found.p_value > 1e-3), "{found:?}");
     }
 }

@@ -1,56 +1,22 @@
-//! Non-linear receivers: the second harmonic s + κ s² and compression s − κ |s|² s.
+//! Products of the signal with itself that no effect of the library makes: |s|² beside s².
 //!
 //! What was measured is the best prediction of what drives them: see [`Products`](crate::diagnosis::products::Products).
 
 use std::sync::Arc;
 
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place, Volume};
+use crate::diagnosis::finding::{Candidate, Correction, Place, Volume};
 use crate::diagnosis::products::{Law, Product, without};
-use crate::diagnosis::{Cube, Evidence, denoised};
+use crate::diagnosis::{Cube, Evidence};
 use crate::effects::{self, Stage};
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    if evidence.is_real() || evidence.accepted.contains(&effects::adc_saturation::ID) {
+    let is_bent =
+        evidence.accepted.contains(&effects::adc_saturation::ID) || evidence.accepted_unnamed.contains(&Behaviour::Quadratic);
+    if evidence.is_real() || is_bent {
         return vec![];
     }
-    let known = |id: &str| evidence.accepted.contains(&id);
-    let bent = evidence.accepted_unnamed.contains(&Behaviour::Quadratic);
-    let products = evidence.products();
-    if let Some(laws) = products.mixed() {
-        return if bent { vec![] } else { vec![nameless(evidence, laws)] };
-    }
-    let square = products.square.filter(|_| !known(effects::second_harmonic::ID) && !bent);
-    let cube = products.cube.filter(|_| !known(effects::compression::ID));
-    square.into_iter().chain(cube).map(|law| candidate(evidence, law)).collect()
-}
-
-fn candidate(evidence: &Evidence, law: Law) -> Candidate {
-    let Law { product, scatter, .. } = law;
-    let share = law.share();
-    let level = share.norm();
-    let level_db = 20.0 * level.log10();
-    let (id, estimate, statement) = if product == Product::Cube {
-        (
-            effects::compression::ID,
-            Estimate::normal("level", -share.re, (0.71 * scatter).hypot(2.0 * denoised::PEAK_DB / 8.7 * level)),
-            format!(
-                "strong samples come out too small: the receiver compresses, the strongest sample by {:.2} %; its third-order \
-                 products lie where neither the room nor the body can be",
-                -100.0 * share.re
-            ),
-        )
-    } else {
-        (
-            effects::second_harmonic::ID,
-            Estimate::normal("level_db", level_db, denoised::PEAK_DB.hypot(8.7 * 0.71 * scatter / level)),
-            format!(
-                "everything has a second harmonic, at twice its beat frequency and velocity: {level_db:.1} dB at the strongest \
-                 sample; it follows the square of the measured signal in phase"
-            ),
-        )
-    };
-    Candidate { id: Some(id), estimates: vec![estimate], ..nonlinear(evidence, Behaviour::NonLinear, vec![law], statement) }
+    evidence.products().mixed().map(|laws| nameless(evidence, laws)).into_iter().collect()
 }
 
 fn nameless(evidence: &Evidence, laws: Vec<Law>) -> Candidate {
@@ -65,16 +31,11 @@ fn nameless(evidence: &Evidence, laws: Vec<Law>) -> Candidate {
         level(Product::Magnitude),
         level(Product::Square)
     );
-    nonlinear(evidence, Behaviour::Quadratic, laws, statement)
-}
-
-/// Without a name.
-fn nonlinear(evidence: &Evidence, behaves_like: Behaviour, laws: Vec<Law>, statement: String) -> Candidate {
     let (p_value, gain) = (laws.iter().map(|law| law.p_value).fold(1.0, f64::min), laws.iter().map(|law| law.gain).sum());
     let energy = evidence.cube.samples.iter().map(|&value| (value - without(&laws, value)).norm_sqr()).sum();
     Candidate {
         id: None,
-        behaves_like,
+        behaves_like: Behaviour::Quadratic,
         estimates: vec![],
         choice: None,
         place: Place::at(Stage::Receiver),

@@ -9,7 +9,6 @@ mod elements;
 pub mod field;
 mod filters;
 pub mod harmonic;
-pub mod image;
 mod line;
 pub mod noise;
 pub mod open;
