@@ -244,15 +244,16 @@ fn strongest<'a>(passing: &[&'a (usize, Candidate)]) -> Option<&'a (usize, Candi
         let worth = if is_rough(candidate) { ROUGHLY * candidate.gain } else { candidate.gain };
         (suspect.last_in_chain, !suspect.last_resort, worth)
     };
-    let of = |candidates: &mut dyn Iterator<Item = &'a (usize, Candidate)>| {
+    let strongest_of = |may: fn(&Suspect) -> bool| {
+        let candidates = passing.iter().copied().filter(|(suspect, _)| may(&SUSPECTS[*suspect]));
         candidates.max_by(|a, b| order(a).partial_cmp(&order(b)).expect("gains are finite"))
     };
-    let strongest = of(&mut passing.iter().copied())?;
+    let strongest = strongest_of(|_| true)?;
     if SUSPECTS[strongest.0].last_in_chain || matches!(strongest.1.place.stage, Some(Stage::Receiver | Stage::Noise)) {
         return Some(strongest);
     }
     // What the receiver does to everything that it receives lies behind what was done to it before.
-    of(&mut passing.iter().copied().filter(|(suspect, _)| SUSPECTS[*suspect].of_all_received)).or(Some(strongest))
+    strongest_of(|suspect| suspect.of_all_received).or(Some(strongest))
 }
 
 /// What every suspect has to say.

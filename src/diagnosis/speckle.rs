@@ -4,6 +4,8 @@
 //! comes from the points in that cell, which are predicted, and from a power that is not. So every cell counts with the
 //! information that its own covariance has: scores and Fisher's information of a complex Gaussian law.
 
+use std::ops::AddAssign;
+
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
@@ -29,10 +31,7 @@ impl Look {
     /// Of all of them, which have so many numbers.
     pub fn sum<'a>(looks: impl Iterator<Item = &'a Self>, numbers: usize) -> Self {
         let mut sum = Self::new(numbers, None);
-        for look in looks {
-            sum.score += &look.score;
-            sum.information += &look.information;
-        }
+        looks.for_each(|look| sum += look);
         sum
     }
 
@@ -99,6 +98,13 @@ pub fn groups<T>(mut all: Vec<T>, count: usize) -> Vec<Vec<T>> {
     let mut groups: Vec<Vec<T>> = (0..count).rev().map(|group| all.split_off(group * length / count)).collect();
     groups.reverse();
     groups
+}
+
+impl AddAssign<&Self> for Look {
+    fn add_assign(&mut self, other: &Self) {
+        self.score += &other.score;
+        self.information += &other.information;
+    }
 }
 
 /// The power that a cell has, over the expected one.

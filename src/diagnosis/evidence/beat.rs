@@ -9,7 +9,7 @@ const CLEARANCE_M: f64 = 0.3;
 /// The same behind the farthest, for a slope that is not quite as stated.
 const CLEARANCE_SHARE: f64 = 0.05;
 /// The window's main lobe, cells to each side.
-pub const LOBE: usize = 3;
+const LOBE: usize = 3;
 
 /// Round-trip beat frequency of a range.
 pub fn beat_hz(evidence: &Evidence, range_m: f64) -> f64 {

@@ -51,8 +51,6 @@ impl Product {
 pub struct Law {
     pub product: Product,
     pub kappa: Complex64,
-    /// Of κ, complex.
-    pub scatter: f64,
     pub p_value: f64,
     /// Of frames that the others predict, all in turn.
     pub gain: f64,
@@ -82,9 +80,9 @@ const PRODUCTS: [Product; 3] = [Product::Square, Product::Magnitude, Product::Cu
 /// What was found of each.
 #[derive(Clone, Default)]
 pub struct Products {
-    pub square: Option<Law>,
-    pub magnitude: Option<Law>,
-    pub cube: Option<Law>,
+    square: Option<Law>,
+    magnitude: Option<Law>,
+    cube: Option<Law>,
 }
 
 impl Products {
@@ -147,7 +145,7 @@ fn judged(product: Product, sums: &[Sums], peak: f64) -> Option<Law> {
     let gain: f64 = folds(sums.len()).map(of_fold).sum();
     // A receiver that expands instead of compressing, or turns phases more than amplitudes, is none.
     let possible = gain > 0.0 && !(product == Product::Cube && kappa.re > 0.0);
-    possible.then_some(Law { product, kappa, scatter, p_value, gain, peak })
+    possible.then_some(Law { product, kappa, p_value, gain, peak })
 }
 
 /// Templates are scaled by the peak sample, so that κ is a share of it.

@@ -106,7 +106,7 @@ struct Shared {
     /// Largest power of the clean signal around a cell: what moves, and what does not.
     around: [Option<Grid<f64, 2>>; 2],
     receivers: usize,
-    /// Where noise can be told from the receiver's filters.
+    /// Range bins in which noise is observed.
     ranges: Range<usize>,
 }
 
@@ -183,12 +183,10 @@ impl Pattern {
         cells
     }
 
-    /// Cells where the pattern is, with what was undone there before put back to first order.
-    pub fn found(&self, part: Part, undone: Option<&Amplitudes>) -> Vec<Cell> {
+    /// Cells where the pattern is, with what was undone there put back to first order.
+    pub fn put_back(&self, part: Part, undone: &Amplitudes) -> Vec<Cell> {
         let mut cells = self.cells(part, Shift::default());
-        if let Some(undone) = undone {
-            cells.iter_mut().for_each(|cell| cell.found += cell.expected(undone));
-        }
+        cells.iter_mut().for_each(|cell| cell.found += cell.expected(undone));
         cells
     }
 

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::cells::{self, Cell, Part, Pattern};
+use super::cells::{self, Cell, Part, Pattern, Shift};
 use super::directions::{Amplitudes, Direction, Drive};
 use super::looks::{left, of_cells};
 use super::shifted::{self, Law};
@@ -19,7 +19,7 @@ const FEWEST_FRAMES: usize = 12;
 /// Chance of receivers that have the same values, below which each has its own.
 const DIFFER: f64 = 1e-3;
 /// Chance and gain (nats, `diagnosis.gain`) up to which a fit is refined by steps through the operator: others cannot be accepted.
-const WORTH_REFINING: f64 = 1e-3;
+pub const WORTH_REFINING: f64 = 1e-3;
 const WORTH_GAINING: f64 = 6.0;
 /// Gauss-Newton steps, at most, and the share of the errors below which a step is none.
 const STEPS: usize = 8;
@@ -34,9 +34,9 @@ struct Frame {
 }
 
 impl Frame {
-    fn new(pattern: &Pattern, undone: Option<&Amplitudes>) -> Self {
-        let [moving, still] = [Part::Moving, Part::Still].map(|part| pattern.found(part, undone));
-        Self { moving, still, energies: pattern.energies.clone() }
+    fn new(pattern: Pattern) -> Self {
+        let [moving, still] = [Part::Moving, Part::Still].map(|part| pattern.cells(part, Shift::default()));
+        Self { moving, still, energies: pattern.energies }
     }
 
     fn cells(&self, part: Part) -> &[Cell] {
@@ -69,7 +69,7 @@ impl Fit {
         let all = |info: &&'static EffectInfo| Some((Drive::new(info, evidence, reference)?, Direction::all(info)));
         let asked: Vec<(Drive, Vec<Direction>)> = effects.iter().filter_map(all).collect();
         assert_eq!(asked.len(), effects.len(), "effects that act on the summed signal");
-        let of_frame = |frame| cells::of_frame(evidence, &asked, frame).iter().map(|pattern| Frame::new(pattern, None)).collect();
+        let of_frame = |frame| cells::of_frame(evidence, &asked, frame).into_iter().map(Frame::new).collect();
         let by_frame: Vec<Vec<Frame>> = some_frames(evidence).into_par_iter().map(of_frame).collect();
         let mut by_effect: Vec<Vec<Frame>> = asked.iter().map(|_| vec![]).collect();
         for frame in by_frame {
@@ -84,8 +84,10 @@ impl Fit {
         let may_differ = asked.1.iter().all(|direction| direction.parameter.role == Role::AmplitudeOfReceivers);
         let receivers = evidence.cube.dims[2];
         let numbers = if may_differ && receivers > 1 { vec![1, receivers] } else { vec![1] };
+        let energies = mean_energies(frames.iter().map(|frame| &frame.energies));
         let of = |(part, receivers)| {
-            let fit = Self::of(frames, &asked.1, receivers, part)?;
+            let cells: Vec<&[Cell]> = frames.iter().map(|frame| frame.cells(part)).collect();
+            let fit = Self::of(&cells, &energies, &asked.1, receivers, part)?;
             if fit.p_value > WORTH_REFINING || fit.gain < WORTH_GAINING {
                 return Some(Self { p_value: fit.p_value.max(WORTH_REFINING), ..fit });
             }
@@ -97,22 +99,27 @@ impl Fit {
         Some(Self { p_value: corrected(fit.p_value, 2.0 * numbers.len() as f64), ..fit })
     }
 
-    fn of(frames: &[Frame], directions: &[Direction], receivers: usize, part: Part) -> Option<Self> {
+    /// `cells`: of the part, by frame; `energies`: of a frame, by direction.
+    fn of(
+        cells: &[impl AsRef<[Cell]> + Sync],
+        energies: &[f64],
+        directions: &[Direction],
+        receivers: usize,
+        part: Part,
+    ) -> Option<Self> {
         let count = directions.len() * receivers;
         let amplitudes = |values: &[f64]| Amplitudes { directions: directions.to_vec(), values: values.to_vec() };
-        let first = looks(frames, &amplitudes(&vec![0.0; count]), part);
-        let of = |at: &DVector<f64>| Some(looks(frames, &amplitudes(at.as_slice()), part));
+        let first = looks(cells, &amplitudes(&vec![0.0; count]));
+        let of = |at: &DVector<f64>| Some(looks(cells, &amplitudes(at.as_slice())));
         let found = Estimated::converged(&first, &DMatrix::identity(count, count), &vec![0.0; count], of)?;
         let unit = |index: usize| DVector::from_fn(count, |row, _| if row == index { 1.0 } else { 0.0 });
         let amplitudes = amplitudes(found.values.as_slice());
-        // Of all frames alike.
-        let energy = |index: usize| frames.iter().map(|frame| frame.energies[index]).sum::<f64>() / frames.len() as f64;
         Some(Self {
             deviations: (0..count).map(|index| found.deviation(&unit(index))).collect(),
             p_value: found.p_value,
             gain: found.gain,
-            left: left(frames.iter().flat_map(|frame| frame.cells(part)), &amplitudes),
-            frame_energies: (0..directions.len()).map(energy).collect(),
+            left: left(cells.iter().flat_map(AsRef::as_ref), &amplitudes),
+            frame_energies: energies.to_vec(),
             amplitudes,
             part,
         })
@@ -130,11 +137,12 @@ impl Fit {
             let mut undone = evidence.clone();
             undone.cube = asked.0.undone(&evidence.cube, &fit.amplitudes);
             let patterns = patterns(&undone.changed(), asked);
-            let frames: Vec<Frame> = patterns.iter().map(|pattern| Frame::new(pattern, Some(&fit.amplitudes))).collect();
-            let next = Self::of(&frames, &asked.1, fit.amplitudes.receivers(), fit.part)?;
+            let cells: Vec<Vec<Cell>> = patterns.iter().map(|pattern| pattern.put_back(fit.part, &fit.amplitudes)).collect();
+            let energies = mean_energies(patterns.iter().map(|pattern| &pattern.energies));
+            let next = Self::of(&cells, &energies, &asked.1, fit.amplitudes.receivers(), fit.part)?;
             let mut changes = next.amplitudes.values.iter().zip(&fit.amplitudes.values).zip(&next.deviations);
             if step == STEPS || changes.all(|((next, last), deviation)| (next - last).abs() < CONVERGED * deviation) {
-                let law = shifted::against(&patterns, &fit.amplitudes, fit.part)?;
+                let law = shifted::against(&patterns, &cells, &fit.amplitudes, fit.part)?;
                 return Some(next.against(&law)).filter(Self::is_believed);
             }
             fit = next;
@@ -191,6 +199,12 @@ fn patterns(evidence: &Evidence, asked: &(Drive, Vec<Direction>)) -> Vec<Pattern
 }
 
 /// By frame and ranges.
-fn looks(frames: &[Frame], at: &Amplitudes, part: Part) -> Vec<Vec<Look>> {
-    frames.par_iter().map(|frame| of_cells(frame.cells(part), at).into_values().collect()).collect()
+fn looks(cells: &[impl AsRef<[Cell]> + Sync], at: &Amplitudes) -> Vec<Vec<Look>> {
+    cells.par_iter().map(|cells| of_cells(cells.as_ref(), at).into_values().collect()).collect()
+}
+
+/// By direction, of frames that are at least one.
+fn mean_energies<'a>(frames: impl Iterator<Item = &'a Vec<f64>>) -> Vec<f64> {
+    let frames: Vec<&Vec<f64>> = frames.collect();
+    (0..frames[0].len()).map(|index| frames.iter().map(|frame| frame[index]).sum::<f64>() / frames.len() as f64).collect()
 }

@@ -25,7 +25,7 @@ use num_complex::Complex64;
 
 use self::directions::{Amplitudes, Direction, Drive};
 use self::fields::Field;
-use self::fit::Fit;
+use self::fit::{Fit, WORTH_REFINING};
 use super::behaviour::Behaviour;
 use super::cube::Cube;
 use super::evidence::{Evidence, denoised};
@@ -34,8 +34,6 @@ use super::never;
 use super::statistics::{DECIBEL, corrected};
 use crate::effects::{self, EffectInfo, Operator, Role};
 
-/// Chance above which nothing can be accepted.
-const MOST_LIKELY: f64 = 1e-3;
 /// Share of the power above the noise that may be left where the effect is above it: what else lies there makes more of it than the
 /// effect does.
 const MOST_LEFT: f64 = 0.5;
@@ -64,7 +62,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let of = |fit: Option<Fit>| {
         let fit = fit?;
         let p_value = corrected(fit.p_value, asked.len() as f64);
-        (p_value < MOST_LIKELY && fit.left < MOST_LEFT).then_some(Fit { p_value, ..fit })
+        (p_value < WORTH_REFINING && fit.left < MOST_LEFT).then_some(Fit { p_value, ..fit })
     };
     let mut fits: Vec<Option<Fit>> = at_zero(evidence, &asked).into_iter().map(of).collect();
     let of_fields = fits.split_off(named.len().min(fits.len()));

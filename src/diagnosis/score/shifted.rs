@@ -29,19 +29,19 @@ pub struct Law {
     pub deviations: Vec<f64>,
 }
 
-/// None of too few shifts. `patterns`: by frame, with these amplitudes undone.
-pub fn against(patterns: &[Pattern], undone: &Amplitudes, part: Part) -> Option<Law> {
-    let count = undone.values.len() as f64;
+/// None of too few shifts. `patterns`: by frame, of what is left when the effect is undone; `cells`: by frame, where they are, with what
+/// was undone; `of`: directions and receivers of the amplitudes.
+pub fn against(patterns: &[Pattern], cells: &[Vec<Cell>], of: &Amplitudes, part: Part) -> Option<Law> {
+    let count = of.values.len() as f64;
     let of_shift = |shift: Shift| {
         let cells: Vec<Vec<Cell>> = patterns.iter().map(|pattern| pattern.cells(part, shift)).collect();
-        Some(Fitted::new(&cells, undone, part)?.square)
+        Some(Fitted::new(&cells, of, part)?.square)
     };
     let others: Vec<f64> = patterns.first()?.shifts(part, MOST).into_par_iter().filter_map(of_shift).collect();
     if others.len() < FEWEST {
         return None;
     }
-    let cells: Vec<Vec<Cell>> = patterns.iter().map(|pattern| pattern.found(part, Some(undone))).collect();
-    let found = Fitted::new(&cells, undone, part)?;
+    let found = Fitted::new(cells, of, part)?;
     let (level, p_value) = level_and_chance(found.square, &others, count);
     let inverse = found.information.cholesky()?.inverse();
     Some(Law { p_value, deviations: inverse.diagonal().iter().map(|variance| (variance * level / count).sqrt()).collect() })
@@ -103,9 +103,7 @@ impl Fitted {
 fn by_place(looks: impl Iterator<Item = (usize, Look)>) -> BTreeMap<usize, Look> {
     let mut places: BTreeMap<usize, Look> = BTreeMap::new();
     for (place, look) in looks {
-        let sum = places.entry(place).or_insert_with(|| Look::new(look.score.len(), None));
-        sum.score += look.score;
-        sum.information += look.information;
+        *places.entry(place).or_insert_with(|| Look::new(look.score.len(), None)) += &look;
     }
     places
 }
