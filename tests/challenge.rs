@@ -10,8 +10,8 @@ use std::time::Duration;
 use hybridsim::challenge::answer::{self, Answers, RunConfig};
 use hybridsim::challenge::commitment::{Commitment, Sealed};
 use hybridsim::challenge::config::Stratum;
-use hybridsim::challenge::judge::Truth;
 use hybridsim::challenge::seal::seal;
+use hybridsim::challenge::truth::Truth;
 use hybridsim::challenge::{ChallengeConfig, score::score, twins};
 use hybridsim::data::Recording;
 use hybridsim::data::Shard;
@@ -179,6 +179,72 @@ fn a_run_goes_on_where_it_stopped_and_failures_stand() {
             none => assert_eq!(none, [None, None]),
         }
     }
+}
+
+/// A challenge whose cases have two structures and are diagnosed without an effect here and there.
+fn structured() -> ChallengeConfig {
+    let mut config = config(20);
+    let structure = |text: &str| toml::from_str(text).unwrap();
+    config.structures = vec![
+        structure("name = \"usual\""),
+        structure("name = \"empty\"\nperson = \"nobody\"\nroom = false\nradar = { loops_per_frame = 1, frames = 40 }"),
+        structure("name = \"untracked\"\nperson = \"untracked\""),
+    ];
+    (config.leave_one_out, config.shares.outside) = (true, 0.2);
+    config
+}
+
+#[test]
+fn structures_differ_in_what_is_recorded_and_told_and_an_effect_left_out_is_published_and_obeyed() {
+    let parent = tempfile::tempdir().unwrap();
+    let challenge = parent.path().join("c");
+    seal(&structured(), Some("structures"), &challenge, Shard::ALL, &|_| {}).unwrap();
+    let commitment = Commitment::read_all(&challenge).unwrap().remove(0);
+    let mut of_structure = std::collections::BTreeMap::<String, usize>::new();
+    let mut left_out = [0; 2];
+    for name in names(&challenge) {
+        let (truth, recording) = (truth(&challenge, &name), Recording::open(challenge.join("cases").join(&name)).unwrap());
+        *of_structure.entry(truth.structure.clone()).or_default() += 1;
+        let loops = recording.radar.loops_per_frame;
+        let found = (loops, recording.person().is_some(), recording.room.is_some(), truth.untracked);
+        let expected = match truth.structure.as_str() {
+            "usual" => (16, true, true, false),
+            "empty" => (1, false, false, false),
+            _ => (16, false, true, true),
+        };
+        assert_eq!(found, expected, "{}", truth.structure);
+        assert_eq!(truth.left_out.as_ref(), commitment.left_out.get(&name));
+        if let Some(id) = &truth.left_out {
+            let planted = truth.stratum == Stratum::Outside;
+            left_out[usize::from(planted)] += 1;
+            assert_eq!(truth.effects.first().map(|effect| effect["name"] == **id), planted.then_some(true));
+            assert_eq!(truth.ids(), vec![None; truth.effects.len()]);
+        }
+    }
+    assert!(of_structure.values().all(|count| (6..=7).contains(count)) && of_structure.len() == 3, "{of_structure:?}");
+    assert!(left_out[0] == left_out[1] && left_out[1] >= 3, "{left_out:?}");
+    // Whoever diagnoses is told what to leave out, and of which case.
+    let told = parent.path().join("told");
+    let config = program(
+        parent.path(),
+        &format!("echo \"$@\" >> {}; printf '%s' '{}' > \"$4/report.json\"", told.display(), silent_report()),
+    );
+    answer::run(&challenge, &parent.path().join("answers"), &config, &mut |_| {}).unwrap();
+    let told = fs::read_to_string(&told).unwrap();
+    let lines: Vec<&str> = told.lines().filter(|line| line.contains("diagnosis.left_out=")).collect();
+    assert_eq!((lines.len(), told.lines().count()), (commitment.left_out.len(), 20));
+    assert!(commitment.left_out.values().all(|id| lines.iter().any(|line| line.contains(&format!("left_out=[\"{id}\"]")))));
+    let text = score(&challenge, &parent.path().join("answers"), None, false, &|_| {}).unwrap().markdown();
+    assert!(text.contains("### By structure") && text.contains("| untracked | "), "{text}");
+    // What was published is what is in the truths.
+    let path = challenge.join("commitment.json");
+    let (name, id) = commitment.left_out.first_key_value().unwrap();
+    let other = if id == "spur" { "compression" } else { "spur" };
+    let swapped =
+        fs::read_to_string(&path).unwrap().replace(&format!("\"{name}\": \"{id}\""), &format!("\"{name}\": \"{other}\""));
+    fs::write(&path, swapped).unwrap();
+    let refused = score(&challenge, &parent.path().join("answers"), None, false, &|_| {}).unwrap_err().to_string();
+    assert!(refused.contains(name) && refused.contains("left_out"), "{refused}");
 }
 
 #[test]

@@ -234,6 +234,22 @@ fn a_simulator_is_trained_with_what_the_diagnosis_finds() {
     assert!(String::from_utf8_lossy(&shown.stdout).contains("effect if_highpass: corner_hz"), "{shown:?}");
     let resumed = hybridsim(&["train", "--resume", "with", "--diagnose"], folder.path());
     assert_refused(&resumed, 2, &["--diagnose", "--resume"]);
+    // Left out of the library it has no name.
+    let without = |id: &str| {
+        let left_out = format!("diagnosis.left_out=[{id:?}]");
+        let sets = ["--set", "diagnosis.limits=false", "--set", "diagnosis.epochs=0", "--set", &left_out];
+        hybridsim(&[&["diagnose", "recorded", "-q", "--out", "unnamed"][..], &sets].concat(), folder.path())
+    };
+    assert!(without("if_highpass").status.success());
+    let report = std::fs::read_to_string(folder.path().join("unnamed/report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let named = |list: &str| report[list].as_array().unwrap().iter().any(|entry| entry["id"] == "if_highpass");
+    assert!(!named("effects") && !named("not_detectable"), "{report:#}");
+    // What is left of it is said all the same.
+    let lead = std::fs::read_to_string(folder.path().join("unnamed/report.html")).unwrap();
+    assert!(report["verdict"] != "no_mismatch" || lead.contains("Nothing was located, and yet"), "{report:#}");
+    assert!(report["settings"].as_str().unwrap().contains("left_out"), "{report:#}");
+    assert_refused(&without("if_hipass"), 2, &["`diagnosis.left_out`", "if_hipass", "hybridsim effects"]);
 }
 
 #[test]

@@ -413,6 +413,7 @@ fn challenge(folder: &Path, script: &str) {
         secret_sha256: hash(),
         root: merkle_root(&leaves),
         leaves,
+        left_out: BTreeMap::new(),
     };
     fs::write(folder.join("challenge/commitment.json"), serde_json::to_string(&commitment).unwrap()).unwrap();
     fs::write(folder.join("program"), format!("#!/bin/sh\n{script}\n")).unwrap();

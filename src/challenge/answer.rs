@@ -44,6 +44,15 @@ pub struct RunConfig {
     pub limit: Duration,
 }
 
+impl RunConfig {
+    /// The same without an effect of the library.
+    fn without(&self, id: &str) -> Self {
+        let mut config = self.clone();
+        config.arguments.extend(["--set".into(), format!("diagnosis.left_out=[\"{id}\"]")]);
+        config
+    }
+}
+
 /// `answers.json`: to be published before the truths are opened.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answers {
@@ -100,7 +109,7 @@ pub fn run(challenge: &Path, out: &Path, config: &RunConfig, progress: &mut dyn 
     let commitments = Commitment::read_all(challenge)?;
     let names: Vec<&String> = commitments.iter().flat_map(|commitment| commitment.leaves.keys()).collect();
     let mine = names.iter().enumerate().filter(|(index, _)| config.shard.holds(*index)).map(|(_, name)| *name);
-    each(mine, challenge, out, config, progress)?;
+    each(mine, challenge, &commitments, out, config, progress)?;
     gather(&names, out, &commitments, &config.program)
 }
 
@@ -108,6 +117,7 @@ pub fn run(challenge: &Path, out: &Path, config: &RunConfig, progress: &mut dyn 
 pub(super) fn each<'a>(
     names: impl Iterator<Item = &'a String>,
     challenge: &Path,
+    commitments: &[Commitment],
     out: &Path,
     config: &RunConfig,
     progress: &mut dyn FnMut(usize),
@@ -115,7 +125,10 @@ pub(super) fn each<'a>(
     fs::create_dir_all(out).map_err(|source| Error::write(out, source))?;
     let open = names.filter(|name| !answered(&out.join(name)));
     for (index, name) in open.take(config.most.unwrap_or(usize::MAX)).enumerate() {
-        diagnose(&challenge.join("cases").join(name), &out.join(name), config, &mut || progress(index))?;
+        let left_out = commitments.iter().find_map(|commitment| commitment.left_out.get(name));
+        let of_case = left_out.map(|id| config.without(id));
+        let case = challenge.join("cases").join(name);
+        diagnose(&case, &out.join(name), of_case.as_ref().unwrap_or(config), &mut || progress(index))?;
         progress(index + 1);
     }
     Ok(())

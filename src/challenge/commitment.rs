@@ -31,6 +31,9 @@ pub struct Commitment {
     pub root: String,
     /// Name of the case → leaf.
     pub leaves: BTreeMap<String, String>,
+    /// Name of a case → effect of the library that it is to be diagnosed without; its truth has the same.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub left_out: BTreeMap<String, String>,
 }
 
 /// `sealed/NAME.json`.

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::library;
+use super::structures::Structure;
 use crate::bounds;
 use crate::data::read_settings;
 use crate::error::{Error, Result};
@@ -28,7 +29,7 @@ pub enum Stratum {
     LookAlike,
     /// Two effects.
     Pair,
-    /// One effect that no id names.
+    /// One effect that no id names, or that the diagnosis is run without.
     Outside,
     /// One effect that nobody could detect.
     Undetectable,
@@ -153,11 +154,18 @@ pub struct ChallengeConfig {
     /// nulls up to the number of cases. To learn from, not to count: how strong the effects came out is not measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub every: Option<f64>,
+    /// Cases outside the library: instead of effects that no id names, effects of the library, each of which its diagnosis is run without
+    /// (leave-one-effect-out). As many nulls are diagnosed with an effect less, so that which cases these are says nothing.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub leave_one_out: bool,
     #[serde(default)]
     pub shares: Shares,
     #[serde(default)]
     pub scenes: Scenes,
     pub radar: Radar,
+    /// Structures that cases are dealt, all equally often; none: all cases are as `radar` has them, with a person who is tracked.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub structures: Vec<Structure>,
 }
 
 /// Fewest nulls, as a part of all cases: false alarms are what claims stand on.
@@ -172,9 +180,13 @@ impl ChallengeConfig {
 
     pub fn check(&self) -> Result<()> {
         self.radar.check("radar")?;
+        self.kinds()?;
         // Each is planned before the first is recorded.
         bounds::count("cases", self.cases, 1_000_000)?;
         if let Some(level) = self.every {
+            if self.leave_one_out {
+                return Err(Error::setting("leave_one_out", true, "false where every effect is dealt once"));
+            }
             if !(0.0..=1.0).contains(&level) {
                 return Err(Error::setting("every", level, "between 0 (weakest) and 1 (strongest)"));
             }
@@ -225,6 +237,22 @@ impl ChallengeConfig {
         Ok(())
     }
 
+    /// Structures with their radars, one at least.
+    ///
+    /// # Errors
+    /// As [`Structure::radar`], and two of one name.
+    pub fn kinds(&self) -> Result<Vec<(Structure, Radar)>> {
+        if self.structures.is_empty() {
+            return Ok(vec![(Structure::default(), self.radar.clone())]);
+        }
+        for (index, structure) in self.structures.iter().enumerate() {
+            if self.structures[..index].iter().any(|other| other.name == structure.name) {
+                return Err(Error::setting("structures.name", &structure.name, "a name of its own for each"));
+            }
+        }
+        self.structures.iter().map(|structure| Ok((structure.clone(), structure.radar(&self.radar)?))).collect()
+    }
+
     /// How many cases of each kind, summing to `cases`: the largest remainders are rounded up.
     pub fn counts(&self) -> [usize; 8] {
         let total: f64 = Stratum::ALL.iter().map(|&stratum| self.shares.of(stratum)).sum();
@@ -255,7 +283,15 @@ mod tests {
     use super::*;
 
     fn config(cases: usize) -> ChallengeConfig {
-        ChallengeConfig { cases, every: None, shares: Shares::default(), scenes: Scenes::default(), radar: Radar::small(12) }
+        ChallengeConfig {
+            cases,
+            every: None,
+            leave_one_out: false,
+            shares: Shares::default(),
+            scenes: Scenes::default(),
+            radar: Radar::small(12),
+            structures: vec![],
+        }
     }
 
     #[test]

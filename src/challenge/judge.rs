@@ -1,49 +1,14 @@
 //! One report held against one truth.
 
-use std::path::Path;
-
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 
-use super::commitment::{Sealed, open};
 use super::config::Stratum;
 use super::measure::Strength;
 use super::report::{Effect, Place, Report};
 use super::rules::{CONFIDENT, PLACE_M, RANGE_SLACK_M, look_alike, stage};
+use super::truth::Truth;
 use crate::effects;
-use crate::error::{Error, Result};
-
-/// What a case holds.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Truth {
-    pub stratum: Stratum,
-    pub tier: String,
-    pub effects: Vec<Value>,
-    pub strength: Option<Strength>,
-    /// The recorder's, as TOML: from them anybody records the case again.
-    pub settings: String,
-}
-
-impl Truth {
-    /// Of a case, verified against its published leaf.
-    pub fn open(challenge: &Path, name: &str, leaf: &str) -> Result<Self> {
-        let sealed = open(challenge, name, leaf)?;
-        Self::of(&sealed).map_err(|found| Error::field(name, "truth", found, "a truth of this version"))
-    }
-
-    pub fn of(sealed: &Sealed) -> std::result::Result<Self, String> {
-        serde_json::from_value(sealed.truth.clone()).map_err(|error| error.to_string())
-    }
-
-    /// Ids of docs/report.md; none for what is outside the library.
-    pub fn ids(&self) -> Vec<Option<&str>> {
-        self.effects.iter().map(|effect| effect["name"].as_str()).collect()
-    }
-
-    pub fn d_prime(&self) -> f64 {
-        self.strength.map_or(0.0, |strength| strength.d_prime)
-    }
-}
 
 /// A parameter and whether its 90 % interval holds the truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -58,6 +23,7 @@ pub struct Covered {
 pub struct Judgement {
     pub case: String,
     pub stratum: Stratum,
+    pub structure: String,
     pub tier: String,
     /// Id, or the recorder's word for what is outside the library.
     pub truth: Vec<String>,
@@ -96,6 +62,7 @@ impl Judgement {
         Self {
             case: case.into(),
             stratum: truth.stratum,
+            structure: truth.structure.clone(),
             tier: truth.tier.clone(),
             truth: truth.effects.iter().map(word).collect(),
             strength: truth.strength,
@@ -139,6 +106,7 @@ pub(super) fn stands_for(reported: &Effect, id: &str) -> bool {
 pub fn judge(case: &str, truth: &Truth, report: &std::result::Result<Report, String>) -> Judgement {
     let mut judgement = Judgement::unanswered(case, truth, report.as_ref().err().cloned());
     let Ok(report) = report else { return judgement };
+    let report = &truth.beside_somebody(report.clone());
     let ids: Vec<&str> = truth.ids().into_iter().flatten().collect();
     judgement.verdict = report.verdict.clone();
     judgement.claims = report.claims();
@@ -155,12 +123,13 @@ pub fn judge(case: &str, truth: &Truth, report: &std::result::Result<Report, Str
     for reported in &report.effects {
         let alone = reported.probability >= CONFIDENT && reported.indistinguishable_from.is_empty();
         if alone && !ids.contains(&reported.id.as_str()) {
-            let twin = ids.iter().any(|id| look_alike(&reported.id, id));
+            // Also of one that is left out: nothing that is left is nearer to it.
+            let twin = truth.effects.iter().filter_map(|effect| effect["name"].as_str()).any(|id| look_alike(&reported.id, id));
             if twin { &mut judgement.twins_overclaimed } else { &mut judgement.overclaims }.push(reported.id.clone());
         }
     }
-    for effect in &truth.effects {
-        match effect["name"].as_str() {
+    for (effect, id) in truth.effects.iter().zip(truth.ids()) {
+        match id {
             Some(id) => {
                 if let Some(reported) = report.effects.iter().find(|reported| stands_for(reported, id)) {
                     let right = reported.place.stage.as_deref().is_some_and(|found| stage_fits(found, id, &reported.id))
@@ -342,6 +311,32 @@ mod tests {
         assert_eq!(at(json!({"stage": "receiver", "range_m": [2.9, 3.2]})), Some(false));
         assert_eq!(at(json!({"stage": "scene"})), Some(false));
         assert_eq!(at(Value::Null), Some(false));
+    }
+
+    #[test]
+    fn what_is_left_out_must_be_left_unnamed_and_its_twin_is_no_other_effect() {
+        let mut truth = truth("outside", json!([{"name": "if_delay", "delay_s": 1e-8}]), 20.0);
+        truth.left_out = Some("if_delay".into());
+        let named = |id: &str| judge("a", &truth, &answer(json!([{"id": id, "probability": 0.9}]), json!([])));
+        let unnamed = judge("a", &truth, &answer(json!([]), json!([{"where": {}, "behaves_like": "delay-proportional phase"}])));
+        assert!(unnamed.left_unnamed == Some(true) && unnamed.overclaims.is_empty() && unnamed.found == [false]);
+        let twin = named("adc_start_error");
+        assert!(twin.left_unnamed == Some(false) && twin.overclaims.is_empty() && twin.twins_overclaimed == ["adc_start_error"]);
+        assert_eq!(named("spur").overclaims, ["spur"]);
+    }
+
+    #[test]
+    fn somebody_whom_nobody_tracked_is_no_false_alarm_and_anything_else_is() {
+        let claims = |untracked: bool, effects: Value, unexplained: Value| {
+            let truth = Truth { untracked, ..truth("null", json!([]), 0.0) };
+            let judged = judge("a", &truth, &answer(effects, unexplained));
+            (judged.claims, judged.overclaims)
+        };
+        let named = |id: &str| json!([{"id": id, "probability": 0.9}]);
+        assert_eq!(claims(true, named("moving_reflector"), json!([{"behaves_like": "path-like"}])), (false, vec![]));
+        assert_eq!(claims(false, named("moving_reflector"), json!([])), (true, vec!["moving_reflector".to_string()]));
+        assert_eq!(claims(true, named("spur"), json!([])), (true, vec!["spur".to_string()]));
+        assert!(claims(true, json!([]), json!([{"behaves_like": "quadratic in the signal"}])).0);
     }
 
     #[test]

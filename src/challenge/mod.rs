@@ -2,14 +2,14 @@
 //! separate processes that cannot see the truth, and scored by rules that were fixed beforehand.
 //!
 //! The way of a case, in the order of the files:
-//! - [`config`], [`secret`]: what may be drawn, and by which random numbers
+//! - [`config`], [`structures`], [`secret`]: what may be drawn, and by which random numbers
 //! - [`library`], [`rules`]: graded effects; look-alike sets and thresholds, fixed before any sealed run
 //! - [`plan`], [`measure`], [`surviving`], [`seal`]: a case is drawn, recorded, its effect measured, and everything committed to
 //! - [`commitment`]: leaves, their Merkle root, and their verification
 //! - [`answer`]: one process per case, and what it answered
 //! - [`twins`]: the same scenes without their effects, for what a perfect diagnosis would be left with
 //! - [`salt`]: the same with effects put into somebody's recording; [`calibrate`]: what nulls of somebody's radar say
-//! - [`report`], [`judge`], [`psychometric`], [`baselines`], [`table`], [`score`]: reports held against truths
+//! - [`report`], [`truth`], [`judge`], [`psychometric`], [`baselines`], [`table`], [`score`]: reports held against truths
 
 pub mod answer;
 pub mod baselines;
@@ -28,8 +28,10 @@ pub mod score;
 pub mod seal;
 mod sealing;
 pub mod secret;
+pub mod structures;
 pub mod surviving;
 pub mod table;
+pub mod truth;
 pub mod twins;
 mod uniformity;
 mod worker;

@@ -8,9 +8,12 @@ use super::config::{ChallengeConfig, Scenes, Stratum};
 use super::library::{self, Graded, Surroundings};
 use super::rules::DECOYS;
 use super::secret::Secret;
+use super::structures::{Structure, Who};
 use crate::effects;
+use crate::error::{Error, Result};
 use crate::person::Placement;
 use crate::person::actions::{StyleConfig, placement};
+use crate::radar::Radar;
 use crate::recorder::{ActorConfig, EffectsConfig, RadarChoice, RecorderConfig, SurfaceConfig, WallsConfig};
 use crate::room::Room;
 
@@ -24,6 +27,10 @@ pub struct Plan {
     pub stratum: Stratum,
     /// Effects, each with its place between its weakest (0) and its strongest (1).
     pub effects: Vec<(&'static Graded, f64)>,
+    /// Effect that the diagnosis is run without.
+    pub left_out: Option<&'static str>,
+    pub structure: Structure,
+    radar: Radar,
     /// The scene without effects.
     pub scene: RecorderConfig,
     distance_m: f64,
@@ -33,29 +40,78 @@ pub struct Plan {
 }
 
 /// All cases of a challenge, in the order of their numbers.
-pub fn plans(config: &ChallengeConfig, secret: &Secret) -> Vec<Plan> {
+///
+/// # Errors
+/// As [`ChallengeConfig::kinds`].
+pub fn plans(config: &ChallengeConfig, secret: &Secret) -> Result<Vec<Plan>> {
+    let kinds = config.kinds()?;
+    let mut order: Vec<usize> = (0..config.cases).map(|index| index % kinds.len()).collect();
+    order.shuffle(&mut secret.random("structure", 0));
     let mut random = secret.random("order", 0);
     let dealt = match config.every {
         Some(level) => every(config.cases, level, &mut random),
-        None => by_shares(config, random),
+        None => by_shares(config, random, &|index| &kinds[order[index]]),
     };
-    let plan = |(index, (stratum, effects))| {
+    for (of_case, (_, effects)) in order.iter_mut().zip(&dealt) {
+        let can_have =
+            |(structure, radar): &(Structure, Radar)| effects.iter().all(|(graded, _)| structure.can_have(radar, graded.id));
+        if !can_have(&kinds[*of_case]) {
+            let ids: Vec<&str> = effects.iter().map(|(graded, _)| graded.id).collect();
+            let refuse = || Error::setting("structures", "none can have it", format!("one that can have {}", ids.join(" and ")));
+            *of_case = kinds.iter().position(can_have).ok_or_else(refuse)?;
+        }
+    }
+    let left_out = left_out(config, secret, &dealt);
+    let plan = |(index, ((stratum, effects), left_out))| {
         let mut random = secret.random("scene", index);
-        let (scene, distance_m) = scene(config, secret.world_seed(index), &mut random);
-        Plan { index, stratum, effects, scene, distance_m, details: secret.random("effect", index), redrawn: 0 }
+        let (structure, radar) = kinds[order[index]].clone();
+        let (mut scene, distance_m) = scene(config, &radar, secret.world_seed(index), &mut random);
+        scene.empty = structure.person == Who::Nobody;
+        Plan {
+            index,
+            stratum,
+            effects,
+            left_out,
+            structure,
+            radar,
+            scene,
+            distance_m,
+            details: secret.random("effect", index),
+            redrawn: 0,
+        }
     };
-    dealt.into_iter().enumerate().map(plan).collect()
+    Ok(dealt.into_iter().zip(left_out).enumerate().map(plan).collect())
 }
 
 /// What a case holds.
 type Dealt = (Stratum, Vec<(&'static Graded, f64)>);
 
-fn by_shares(config: &ChallengeConfig, mut random: ChaCha8Rng) -> Vec<Dealt> {
+fn by_shares<'a>(config: &ChallengeConfig, mut random: ChaCha8Rng, kind: &dyn Fn(usize) -> &'a (Structure, Radar)) -> Vec<Dealt> {
     let mut strata: Vec<Stratum> =
         Stratum::ALL.into_iter().zip(config.counts()).flat_map(|(stratum, count)| vec![stratum; count]).collect();
     strata.shuffle(&mut random);
-    let mut decks = Decks::new(random);
-    strata.into_iter().map(|stratum| (stratum, decks.draw(stratum))).collect()
+    let mut decks = Decks::new(random, config.leave_one_out);
+    let deal = |(index, stratum)| {
+        let (structure, radar) = kind(index);
+        (stratum, decks.draw(stratum, &|id| structure.can_have(radar, id)))
+    };
+    strata.into_iter().enumerate().map(deal).collect()
+}
+
+/// By case: what is planted in those outside the library, and anything in as many nulls.
+fn left_out(config: &ChallengeConfig, secret: &Secret, dealt: &[Dealt]) -> Vec<Option<&'static str>> {
+    let outside = dealt.iter().filter(|(stratum, _)| *stratum == Stratum::Outside).count();
+    let (mut random, all) = (secret.random("left out", 0), library::library().collect::<Vec<_>>());
+    let mut decoys = outside;
+    let of = |(stratum, effects): &Dealt| match stratum {
+        Stratum::Outside => effects.first().map(|(graded, _)| graded.id),
+        Stratum::Null if decoys > 0 => {
+            decoys -= 1;
+            Some(all[random.random_range(0..all.len())].id)
+        }
+        _ => None,
+    };
+    if config.leave_one_out { dealt.iter().map(of).collect() } else { vec![None; dealt.len()] }
 }
 
 /// Every effect once, at one level, and nulls.
@@ -70,6 +126,7 @@ fn every(cases: usize, level: f64, random: &mut ChaCha8Rng) -> Vec<Dealt> {
 /// Effects are dealt like cards, so that none is forgotten and none comes too often.
 struct Decks {
     random: ChaCha8Rng,
+    leave_one_out: bool,
     library: Vec<&'static Graded>,
     masked: Vec<&'static Graded>,
     absorbed: Vec<&'static Graded>,
@@ -78,11 +135,12 @@ struct Decks {
 }
 
 impl Decks {
-    fn new(random: ChaCha8Rng) -> Self {
-        Self { random, library: vec![], masked: vec![], absorbed: vec![], look_alikes: vec![], outside: vec![] }
+    fn new(random: ChaCha8Rng, leave_one_out: bool) -> Self {
+        Self { random, leave_one_out, library: vec![], masked: vec![], absorbed: vec![], look_alikes: vec![], outside: vec![] }
     }
 
-    fn draw(&mut self, stratum: Stratum) -> Vec<(&'static Graded, f64)> {
+    /// `can_have`: whether an effect can be in the case.
+    fn draw(&mut self, stratum: Stratum, can_have: &dyn Fn(&str) -> bool) -> Vec<(&'static Graded, f64)> {
         let (deck, levels) = match stratum {
             Stratum::Null => return vec![],
             Stratum::Single => (&mut self.library, [0.0, 1.0]),
@@ -96,17 +154,24 @@ impl Decks {
         let mut drawn: Vec<(&'static Graded, f64)> = vec![];
         let count = if stratum == Stratum::Pair { 2 } else { 1 };
         while drawn.len() < count {
-            if deck.is_empty() {
-                *deck = match stratum {
+            let Some(place) = deck.iter().rposition(|graded| can_have(graded.id)) else {
+                let mut fresh: Vec<&'static Graded> = match stratum {
                     Stratum::Masked => library::MASKED.iter().collect(),
                     Stratum::Absorbed => library::ABSORBED.iter().filter_map(|id| library::graded(id)).collect(),
                     Stratum::LookAlike => DECOYS.into_iter().filter_map(library::graded).collect(),
-                    Stratum::Outside => library::OUTSIDE.iter().collect(),
+                    Stratum::Outside if !self.leave_one_out => library::OUTSIDE.iter().collect(),
                     _ => library::library().collect(),
                 };
-                deck.shuffle(&mut self.random);
-            }
-            let graded = deck.pop().expect("just filled");
+                assert!(
+                    fresh.iter().any(|graded| can_have(graded.id)),
+                    "every stratum has effects that every structure can have"
+                );
+                fresh.shuffle(&mut self.random);
+                // What other structures can have is dealt later.
+                deck.splice(0..0, fresh);
+                continue;
+            };
+            let graded = deck.remove(place);
             // d′ means nothing for what only changes the noise.
             let unfit = stratum == Stratum::Undetectable && !scalable(graded.id);
             if !unfit && drawn.iter().all(|(other, _)| other.id != graded.id) {
@@ -140,7 +205,7 @@ fn one<'a, T>(of: &'a [T], random: &mut ChaCha8Rng) -> &'a T {
 }
 
 /// A scene that holds nothing but the baseline, and how far away the person is.
-fn scene(config: &ChallengeConfig, seed: u64, random: &mut ChaCha8Rng) -> (RecorderConfig, f64) {
+fn scene(config: &ChallengeConfig, radar: &Radar, seed: u64, random: &mut ChaCha8Rng) -> (RecorderConfig, f64) {
     let scenes: &Scenes = &config.scenes;
     let room = Room {
         left_m: Some(between(scenes.side_m, random)),
@@ -177,7 +242,7 @@ fn scene(config: &ChallengeConfig, seed: u64, random: &mut ChaCha8Rng) -> (Recor
     let mut scene = RecorderConfig {
         seed,
         mesh_error_m: between(scenes.mesh_error_m, random),
-        radar: RadarChoice::Full(Box::new(config.radar.clone())),
+        radar: RadarChoice::Full(Box::new(radar.clone())),
         room,
         person,
         surface,
@@ -190,8 +255,8 @@ fn scene(config: &ChallengeConfig, seed: u64, random: &mut ChaCha8Rng) -> (Recor
 
 impl Plan {
     /// The scene's effects at their strengths.
-    pub fn planted(&self, config: &ChallengeConfig) -> EffectsConfig {
-        let at = Surroundings::new(&config.radar, self.scene.room.clone(), self.distance_m);
+    pub fn planted(&self) -> EffectsConfig {
+        let at = Surroundings::new(&self.radar, self.scene.room.clone(), self.distance_m);
         let mut effects = EffectsConfig::default();
         for (place, &(graded, level)) in self.effects.iter().enumerate() {
             let mut random = self.details.clone();
@@ -217,17 +282,24 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::radar::Radar;
 
     fn config(cases: usize) -> ChallengeConfig {
-        ChallengeConfig { cases, every: None, shares: Default::default(), scenes: Scenes::default(), radar: Radar::small(12) }
+        ChallengeConfig {
+            cases,
+            every: None,
+            leave_one_out: false,
+            shares: Default::default(),
+            scenes: Scenes::default(),
+            radar: Radar::small(12),
+            structures: vec![],
+        }
     }
 
     #[test]
     fn equal_secrets_give_equal_plans_and_every_effect_is_dealt() {
         let (config, secret) = (config(400), Secret::new(Some("x")));
-        let (a, b) = (plans(&config, &secret), plans(&config, &secret));
-        assert!(a.iter().zip(&b).all(|(a, b)| a.scene == b.scene && a.planted(&config) == b.planted(&config)));
+        let (a, b) = (plans(&config, &secret).unwrap(), plans(&config, &secret).unwrap());
+        assert!(a.iter().zip(&b).all(|(a, b)| a.scene == b.scene && a.planted() == b.planted()));
         let singles: std::collections::BTreeSet<_> =
             a.iter().filter(|plan| plan.stratum == Stratum::Single).flat_map(|plan| &plan.effects).map(|(e, _)| e.id).collect();
         assert!(singles.len() > 40, "{}", singles.len());
@@ -245,7 +317,7 @@ mod tests {
     fn no_scene_is_implausible() {
         use crate::plausibility::{Facts, Kind, findings};
         use crate::recorder::body::MovingBody;
-        for plan in plans(&config(24), &Secret::new(Some("p"))) {
+        for plan in plans(&config(24), &Secret::new(Some("p"))).unwrap() {
             let world = plan.scene.world(std::path::Path::new("")).unwrap();
             let body = MovingBody::new(world.person.as_ref().unwrap(), world.interpolation).unwrap();
             let facts = Facts::new(Some(&world.radar), Some(&world.room), world.person.as_ref(), &|pose| body.pose(pose));
@@ -257,7 +329,7 @@ mod tests {
     #[test]
     fn every_effect_comes_once_beside_nulls() {
         let config = ChallengeConfig { every: Some(0.7), ..config(120) };
-        let plans = plans(&config, &Secret::new(Some("z")));
+        let plans = plans(&config, &Secret::new(Some("z"))).unwrap();
         let mut ids: Vec<&str> = plans.iter().flat_map(|plan| &plan.effects).map(|(effect, _)| effect.id).collect();
         ids.sort_unstable();
         let mut wanted: Vec<&str> = library::every().map(|effect| effect.id).collect();
@@ -271,12 +343,12 @@ mod tests {
     #[test]
     fn a_weakened_effect_keeps_everything_but_its_strength() {
         let config = config(200);
-        let plan = plans(&config, &Secret::new(Some("y")));
+        let plan = plans(&config, &Secret::new(Some("y"))).unwrap();
         let mut plan =
             plan.into_iter().find(|plan| plan.effects.first().is_some_and(|(e, _)| e.id == "static_reflector")).unwrap();
-        let before = plan.planted(&config).static_reflector[0].clone();
+        let before = plan.planted().static_reflector[0].clone();
         plan.weaken(10.0);
-        let after = plan.planted(&config).static_reflector[0].clone();
+        let after = plan.planted().static_reflector[0].clone();
         assert_eq!(after.position_m, before.position_m);
         assert!((before.amplitude / after.amplitude - 10.0).abs() < 1e-9);
     }

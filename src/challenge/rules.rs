@@ -1,5 +1,6 @@
 //! What counts as what: fixed before any sealed run, and changed only with a new sealed set.
 
+use crate::diagnosis::behaviour::Behaviour;
 use crate::effects;
 
 /// A name is confident from this probability on.
@@ -28,6 +29,12 @@ pub const LOOK_ALIKES: &[&[&str]] = &[
     &[effects::clock_offset::ID, effects::pose_offset::ID],
     &[effects::phase_noise::ID, effects::chirp_start_jitter::ID],
 ];
+
+/// What a person is of whom nothing is told, and what a report without a name says of one: where such a person is, these are no false
+/// alarms and no wrong names, and they are not planted.
+pub const SOMEBODY: [&str; 3] = [effects::moving_reflector::ID, effects::breathing::ID, effects::heartbeat::ID];
+pub const LIKE_SOMEBODY: [Behaviour; 4] =
+    [Behaviour::PathLike, Behaviour::ChangingAtOneRange, Behaviour::SlowTimePatternOfOneReturn, Behaviour::ExcessPower];
 
 /// Effects that are easily taken for a look-alike although a recording can distinguish the two. What stands here twice is drawn
 /// twice as often.

@@ -1,6 +1,6 @@
 //! All cases together: verified, judged, counted.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use super::answer::Answers;
 use super::baselines::{self, Statistics, quantile};
 use super::commitment::{Commitment, joint_root, sha256};
 use super::config::Stratum;
-use super::judge::{Judgement, Truth, judge};
+use super::judge::{Judgement, judge};
 use super::plan::scalable;
 use super::psychometric::{Logistic, chart};
 use super::report::{Measures, Report};
@@ -19,6 +19,7 @@ use super::rules::*;
 use super::seal::measured;
 use super::secret::Secret;
 use super::table::{Row, markdown};
+use super::truth::Truth;
 use crate::data::atomic::write_text;
 use crate::data::entries::entries;
 use crate::data::files::read_json;
@@ -88,6 +89,15 @@ pub fn score(
         .par_iter()
         .map(|(name, leaf)| {
             let mut truth = Truth::open(challenge, name, leaf)?;
+            let published = commitments.iter().find_map(|commitment| commitment.left_out.get(*name));
+            if published != truth.left_out.as_ref() {
+                return Err(Error::field(
+                    name.as_str(),
+                    "left_out",
+                    format!("{published:?}"),
+                    format!("{:?}, as the truth has it", truth.left_out),
+                ));
+            }
             if again && truth.strength.is_some() {
                 truth.strength = Some(measured(&truth.settings, Path::new(name))?);
             }
@@ -271,9 +281,10 @@ fn failure(judgement: &Judgement) -> Option<String> {
         None => "not measured".into(),
     };
     Some(format!(
-        "`{}` ({}, tier {}, {}, {strength}): {reason}",
+        "`{}` ({}{}, tier {}, {}, {strength}): {reason}",
         judgement.case,
         judgement.stratum.name(),
+        if judgement.structure.is_empty() { String::new() } else { format!(", {}", judgement.structure) },
         judgement.tier,
         judgement.truth.join(" + ")
     ))
@@ -298,9 +309,43 @@ impl Score {
             markdown(&self.rows)
         );
         let _ = write!(text, "\n![Detection against strength](psychometric.png)\n\n### By effect\n\n{}", self.by_effect());
+        let structures: BTreeSet<&str> = self.judgements.iter().map(|judgement| judgement.structure.as_str()).collect();
+        if structures.len() > 1 {
+            let _ = write!(text, "\n### By structure\n\n{}", self.by_structure(&structures));
+        }
         let _ = write!(text, "\n### Every failure ({})\n\n", self.failures.len());
         for failure in &self.failures {
             let _ = writeln!(text, "- {failure}");
+        }
+        text
+    }
+
+    /// How the cases of each structure fared.
+    fn by_structure(&self, structures: &BTreeSet<&str>) -> String {
+        let mut text = format!(
+            "Planted: with d′ ≥ {OBVIOUS_D_PRIME}. Right: each effect named, look-alikes allowed, or left without a name where no name is known.\n\n\
+             | structure | nulls | with a claim | planted | detected | right | confident wrong name |\n|---|---|---|---|---|---|---|\n"
+        );
+        for structure in structures {
+            let of = |planted: bool| {
+                let within = move |judgement: &&Judgement| {
+                    judgement.structure == *structure && (judgement.stratum != Stratum::Null) == planted
+                };
+                self.judgements.iter().filter(within)
+            };
+            let strong = || of(true).filter(|judgement| judgement.d_primes()[0] >= OBVIOUS_D_PRIME);
+            let is_right =
+                |judgement: &&Judgement| judgement.left_unnamed.unwrap_or_else(|| judgement.found.iter().all(|&found| found));
+            let _ = writeln!(
+                text,
+                "| {structure} | {} | {} | {} | {} | {} | {} |",
+                of(false).count(),
+                of(false).filter(|judgement| judgement.claims).count(),
+                strong().count(),
+                strong().filter(|judgement| judgement.claims).count(),
+                strong().filter(is_right).count(),
+                of(true).filter(|judgement| !judgement.overclaims.is_empty()).count(),
+            );
         }
         text
     }

@@ -19,6 +19,7 @@ use super::plan::{Plan, plans};
 use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
 use super::sealing::{self, commit, one_case, published, set_times};
 use super::secret::Secret;
+use super::structures::{Structure, Told, Who};
 use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, settings, write_recording};
 use crate::effects;
 use crate::error::{Error, Result};
@@ -56,7 +57,9 @@ pub fn seal(
         });
     }
     let (secret, leaves) = cases(config, seed, out, shard, progress)?;
-    commit(out, &config.to_toml(), &secret, shard, leaves)
+    let of_shard = plans(config, &secret)?.into_iter().filter(|plan| shard.holds(plan.index));
+    let left_out = of_shard.filter_map(|plan| Some((secret.name(plan.index), plan.left_out?.to_string()))).collect();
+    commit(out, &config.to_toml(), &secret, shard, leaves, left_out)
 }
 
 /// Makes the folders of a challenge and settles its secret, so that shards of it need no seed.
@@ -80,7 +83,7 @@ pub fn cases(
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<(Secret, BTreeMap<String, String>)> {
     let secret = begin(config, seed, out, shard)?;
-    let chosen: Vec<Plan> = plans(config, &secret).into_iter().filter(|plan| shard.holds(plan.index)).collect();
+    let chosen: Vec<Plan> = plans(config, &secret)?.into_iter().filter(|plan| shard.holds(plan.index)).collect();
     let (done, leaves) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     chosen.into_par_iter().try_for_each(|plan| -> Result<()> {
         let name = secret.name(plan.index);
@@ -97,8 +100,9 @@ fn seal_case(config: &ChallengeConfig, mut plan: Plan, secret: &Secret, out: &Pa
     let index = plan.index;
     one_case(out, secret, index, |case| {
         let recorded = record(config, &mut plan)?;
-        write_case(&recorded, case)?;
-        Ok(truth(&plan, &recorded))
+        let told = plan.structure.told();
+        write_frames(&recorded.world, &recorded.frames, told, case)?;
+        Ok(truth(&plan, &recorded, told))
     })
 }
 
@@ -119,7 +123,7 @@ fn record(config: &ChallengeConfig, plan: &mut Plan) -> Result<Recorded> {
         plan.effects.iter().any(|(graded, _)| matches!(graded.id, effects::adc_saturation::ID | Outside::LSB_STUCK));
     let world = scene.world(Path::new("."))?;
     if plan.stratum == Stratum::Null || config.every.is_some() {
-        let settings = RecorderConfig { effects: plan.planted(config), ..scene };
+        let settings = RecorderConfig { effects: plan.planted(), ..scene };
         let frames = match plan.stratum {
             Stratum::Null => frames_of(&world)?,
             _ => frames_of(&settings.world(Path::new("."))?)?,
@@ -129,7 +133,7 @@ fn record(config: &ChallengeConfig, plan: &mut Plan) -> Result<Recorded> {
     let clean = draws(&scene)?;
     let mut attempts = 1;
     loop {
-        let settings = RecorderConfig { effects: plan.planted(config), ..scene.clone() };
+        let settings = RecorderConfig { effects: plan.planted(), ..scene.clone() };
         let mut planted = draws(&settings)?;
         let strength = strength(&clean, &planted);
         if attempts == MOST_ATTEMPTS || as_meant(plan, &strength) {
@@ -183,11 +187,6 @@ fn draws(settings: &RecorderConfig) -> Result<Draws> {
     Ok(Draws { frames, empty, gain: level.gain })
 }
 
-/// The recording without a truth and without labels.
-fn write_case(recorded: &Recorded, case: &Path) -> Result<()> {
-    write_frames(&recorded.world, &recorded.frames, case)
-}
-
 /// How strong the effects of a sealed case are by the measure of this program: records it again with and without them.
 pub fn measured(settings: &str, case: &Path) -> Result<Strength> {
     let planted = settings_of(settings, case)?;
@@ -200,20 +199,21 @@ fn settings_of(settings: &str, case: &Path) -> Result<RecorderConfig> {
 }
 
 /// Records the same scene, noise included, without its effects: what a perfect diagnosis would be left with.
-pub fn record_twin(settings: &str, case: &Path) -> Result<()> {
+pub fn record_twin(settings: &str, told: Told, case: &Path) -> Result<()> {
     let world = RecorderConfig { effects: EffectsConfig::default(), ..settings_of(settings, case)? }.world(Path::new("."))?;
-    write_frames(&world, &frames_of(&world)?, case)
+    write_frames(&world, &frames_of(&world)?, told, case)
 }
 
-fn write_frames(world: &World, frames: &[IfFrame], case: &Path) -> Result<()> {
+/// The recording without a truth and without labels.
+fn write_frames(world: &World, frames: &[IfFrame], told: Told, case: &Path) -> Result<()> {
     let layout = match world.radar.sampling {
         Sampling::Complex => IfLayout::Codes,
         Sampling::Real => IfLayout::RealCodes,
     };
     let contents = RecordingContents {
         radar: &world.radar,
-        room: Some(&world.room),
-        person: world.person.as_ref(),
+        room: told.room.then_some(&world.room),
+        person: world.person.as_ref().filter(|_| told.person),
         body_file: None,
         labels: BTreeMap::new(),
         layout,
@@ -223,9 +223,9 @@ fn write_frames(world: &World, frames: &[IfFrame], case: &Path) -> Result<()> {
     set_times(case)
 }
 
-fn truth(plan: &Plan, recorded: &Recorded) -> Value {
+fn truth(plan: &Plan, recorded: &Recorded, told: Told) -> Value {
     let settings = &recorded.settings;
-    json!({
+    let mut truth = json!({
         "format": 1,
         "index": plan.index,
         "stratum": plan.stratum,
@@ -233,7 +233,17 @@ fn truth(plan: &Plan, recorded: &Recorded) -> Value {
         "effects": effects(&settings.effects),
         "strength": recorded.strength,
         "settings": toml::to_string(settings).expect("settings are plain data"),
-    })
+    });
+    let mut add = |key: &str, value: Value| truth.as_object_mut().expect("a table").insert(key.into(), value);
+    if plan.structure != Structure::default() {
+        add("structure", plan.structure.name.as_str().into());
+        add("told", json!(told));
+        add("untracked", (plan.structure.person == Who::Untracked).into());
+    }
+    if let Some(id) = plan.left_out {
+        add("left_out", id.into());
+    }
+    truth
 }
 
 /// Every effect with its id (none: outside the library) and the recorder's numbers.

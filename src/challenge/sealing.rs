@@ -35,8 +35,15 @@ pub fn begin(out: &Path, settings: &str, seed: Option<&str>, shard: Shard) -> Re
     settle_secret(&sealed, settings, seed, shard)
 }
 
-/// Publishes what commits to the cases of a part.
-pub fn commit(out: &Path, settings: &str, secret: &Secret, shard: Shard, leaves: BTreeMap<String, String>) -> Result<Commitment> {
+/// Publishes what commits to the cases of a part. `left_out`: effects that cases are to be diagnosed without, by their names.
+pub fn commit(
+    out: &Path,
+    settings: &str,
+    secret: &Secret,
+    shard: Shard,
+    leaves: BTreeMap<String, String>,
+    left_out: BTreeMap<String, String>,
+) -> Result<Commitment> {
     let commitment = Commitment {
         format: 1,
         shard: [shard.number, shard.of],
@@ -46,6 +53,7 @@ pub fn commit(out: &Path, settings: &str, secret: &Secret, shard: Shard, leaves:
         secret_sha256: sha256(&secret.seed),
         root: merkle_root(&leaves),
         leaves,
+        left_out,
     };
     set_time(&out.join("cases"))?;
     let text = format!("{:#}\n", serde_json::to_value(&commitment).expect("plain data"));

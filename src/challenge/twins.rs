@@ -8,8 +8,8 @@ use std::path::Path;
 use super::answer::{Answers, RunConfig, diagnose};
 use super::commitment::Commitment;
 use super::config::Stratum;
-use super::judge::Truth;
 use super::seal::record_twin;
+use super::truth::Truth;
 use crate::data::Scratch;
 use crate::error::{Error, Result};
 
@@ -39,7 +39,7 @@ pub fn run(challenge: &Path, answers: &Path, out: &Path, config: &RunConfig, pro
         }
         let workplace = Scratch::new()?;
         let case = workplace.path().join(name);
-        record_twin(&truth.settings, &case)?;
+        record_twin(&truth.settings, truth.told, &case)?;
         diagnose(&case, &folder, config, &mut || progress(done))?;
         done += 1;
         progress(done);

@@ -1,11 +1,13 @@
 //! Settings of a diagnosis.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::data::hex;
+use crate::effects::{self, EffectInfo};
 use crate::error::{Error, Result};
 
 /// When something is claimed, and what is done to show it. Every report names these settings and their hash.
@@ -28,6 +30,10 @@ pub struct DiagnosisConfig {
     pub limits: bool,
     /// Of the simulator's training.
     pub seed: u64,
+    /// Effects of the library that are taken for unknown: nothing is named so, as if nobody had written them down. What they do is left
+    /// without a name, if it is found.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
     /// A table of `hybridsim challenge calibrate`, by which p-values are calibrated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<PathBuf>,
@@ -48,6 +54,7 @@ impl Default for DiagnosisConfig {
             epochs: 8,
             limits: true,
             seed: 1,
+            left_out: vec![],
             calibration: None,
         }
     }
@@ -64,7 +71,15 @@ impl DiagnosisConfig {
                 return Err(Error::setting(format!("diagnosis.{key}"), value, "nats, 0 or more"));
             }
         }
+        if let Some(id) = self.left_out.iter().find(|id| effects::info(id).is_none()) {
+            return Err(Error::setting("diagnosis.left_out", id, "ids of effects, as `hybridsim effects` lists them"));
+        }
         Ok(())
+    }
+
+    /// Effects that may be named.
+    pub(super) fn library(&self) -> Arc<[&'static EffectInfo]> {
+        effects::library().iter().copied().filter(|info| self.left_out.iter().all(|id| id != info.id)).collect()
     }
 
     /// All that decides the answer beside the recording: these settings as text, the program's version and its sources (which hold

@@ -52,7 +52,7 @@ pub struct Evidence {
     pub starts_s: Vec<f64>,
     pub body: Option<BodyPrediction>,
     /// Effects that may be named.
-    pub library: &'static [&'static EffectInfo],
+    pub library: Arc<[&'static EffectInfo]>,
     /// Ids that were accepted, oldest first.
     pub accepted: Vec<&'static str>,
     /// What was accepted without a name, oldest first.
@@ -83,7 +83,7 @@ impl Evidence {
             split,
             starts_s,
             body,
-            library: effects::library(),
+            library: effects::library().into(),
             accepted: vec![],
             accepted_unnamed: vec![],
             inverses: vec![],

@@ -4,7 +4,7 @@ mod pictures;
 
 use super::finding::Place;
 use super::journey::Diagnosis;
-use super::report::{Effect, Report, Unexplained, Verdict};
+use super::report::{Effect, NOTHING, Report, Unexplained, Verdict};
 use super::simulate::Simulated;
 use crate::error::Result;
 use crate::pictures::page::{Markup, html, page, shown, table};
@@ -43,6 +43,7 @@ pub fn lead(report: &Report) -> String {
     match report.verdict {
         Verdict::Undecided => format!("Nothing can be said about this recording: {}.", report.reason),
         Verdict::Damaged => format!("The recording is damaged: {}.", report.reason),
+        Verdict::NoMismatch if report.reason != NOTHING => format!("Nothing was located, and yet {}.", report.reason),
         Verdict::NoMismatch => {
             "Nothing was left out that this recording could show: body, static clutter and noise explain it.".into()
         }

@@ -70,7 +70,8 @@ pub fn diagnose(recording: &Recording, config: &DiagnosisConfig, progress: &mut 
     }
     let radar = loaded.radar.clone();
     let held_out = HeldOut::of(&loaded.split);
-    let original = Evidence::new(loaded, recording.room.clone(), body);
+    let mut original = Evidence::new(loaded, recording.room.clone(), body);
+    original.library = config.library();
     let mut report = Report {
         audit: integrity.into_iter().map(Check::from).collect(),
         notes,
@@ -185,6 +186,7 @@ fn conclude(
         let limits = limits(&explanation.evidence, &taken, moving_energy(original), config);
         report.not_detectable.extend(limits.into_iter().map(NotDetectable::at_most));
     }
+    report.not_detectable.retain(|limit| original.info(&limit.id).is_some());
     report.not_detectable.retain(|limit| report.effects.iter().all(|effect| effect.id != limit.id));
     report.null.suspicion = Some(explanation.suspicion);
     report.suspects = explanation.suspects.clone();
@@ -193,6 +195,11 @@ fn conclude(
         let calibrated = table.calibrated(raw, &report.suspects);
         report.p_value = Some(calibrated.p_value());
         report.calibration = Some(calibrated);
+    }
+    if let (Verdict::NoMismatch, Some(p_value)) = (report.verdict, report.p_value.filter(|p_value| *p_value < config.alarm)) {
+        report.reason = format!(
+            "a recording like this is improbable where nothing is missing (p = {p_value:.1e}): something may be that no detector locates"
+        );
     }
     let nothing = probability_of_nothing(report.p_value.unwrap_or(1.0));
     report.probability_nothing_missing = match report.verdict {

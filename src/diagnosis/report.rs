@@ -294,6 +294,9 @@ pub struct Findings {
     pub reason: String,
 }
 
+/// Reason of a verdict of no mismatch where the recording as a whole is not improbable either.
+pub const NOTHING: &str = "nothing is significant beyond body, static clutter and noise";
+
 impl Findings {
     /// `moving_energy`: of the untouched recording.
     pub fn of(explanation: &Explanation, moving_energy: f64) -> Self {
@@ -316,7 +319,7 @@ impl Findings {
             }
         }
         let (verdict, reason) = match (effects.is_empty(), unexplained.is_empty()) {
-            (true, true) => (Verdict::NoMismatch, "nothing is significant beyond body, static clutter and noise".to_string()),
+            (true, true) => (Verdict::NoMismatch, NOTHING.to_string()),
             (false, true) => (Verdict::Explained, "every significant mismatch has a name".to_string()),
             (false, false) => (Verdict::PartlyExplained, "some of the mismatch has no name in the library".to_string()),
             (true, false) => {

@@ -5,12 +5,11 @@
 //! all others taken into account.
 
 mod precedence;
+mod said;
 
 use crate::diagnosis::behaviour::Behaviour;
 use crate::effects::{self, Stage};
 use std::collections::BTreeMap;
-
-use rayon::prelude::*;
 
 use super::config::DiagnosisConfig;
 use super::evidence::Evidence;
@@ -19,6 +18,7 @@ use super::misfit::Misfit;
 use super::remains::{ROUGHLY, is_by_chirp, is_left_by, is_of_receivers, is_of_remains, is_product, is_rough, is_same};
 use super::suspects::{SUSPECTS, Suspect, by_suspect, strongest_suspicion};
 use precedence::{is_displaced, is_echo, upstream};
+use said::{said_by, suspicions};
 
 impl DiagnosisConfig {
     /// Limit of one suspect's p-value.
@@ -256,16 +256,6 @@ fn strongest<'a>(passing: &[&'a (usize, Candidate)]) -> Option<&'a (usize, Candi
     strongest_of(|suspect| suspect.of_all_received).or(Some(strongest))
 }
 
-/// What every suspect has to say.
-fn suspicions(evidence: &Evidence) -> Vec<(usize, Candidate)> {
-    // The shared products first, so that suspects do not wait for one another.
-    evidence.maps();
-    let ask = |(index, suspect): (usize, &Suspect)| -> Vec<(usize, Candidate)> {
-        (suspect.find)(evidence).into_iter().map(|candidate| (index, candidate)).collect()
-    };
-    SUSPECTS.par_iter().enumerate().flat_map_iter(ask).collect()
-}
-
 /// How likely a look-alike is beforehand, against the effect that was accepted.
 fn prior(id: &str) -> f64 {
     match id {
@@ -353,7 +343,7 @@ fn again(
             && candidate.choice == effect.candidate.choice
             && thresholds.passes(effect.suspect, candidate, true)
     };
-    let found = (SUSPECTS[effect.suspect].find)(&evidence).into_iter().filter(same);
+    let found = said_by(effect.suspect, &evidence).into_iter().filter(same);
     found.max_by(|a, b| a.gain.total_cmp(&b.gain))
 }
 

@@ -109,7 +109,7 @@ pub fn seal(
         progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         Ok(())
     })?;
-    commit(out, &settings, &secret, shard, leaves.into_inner().expect("all threads are done"))
+    commit(out, &settings, &secret, shard, leaves.into_inner().expect("all threads are done"), BTreeMap::new())
 }
 
 /// A copy with an effect; returns its truth.
@@ -145,7 +145,7 @@ fn truth(plan: &Plan, planted: &EffectsConfig, seed: u64) -> Value {
 pub fn answer(out: &Path, how: &RunConfig, progress: &mut dyn FnMut(usize)) -> Result<Answers> {
     let answers = out.join(ANSWERS);
     let commitments = Commitment::read_all(out)?;
-    answer::each(mine(&commitments, how.shard), out, &answers, how, progress)?;
+    answer::each(mine(&commitments, how.shard), out, &commitments, &answers, how, progress)?;
     let all: Vec<&String> = commitments.iter().flat_map(|commitment| commitment.leaves.keys()).collect();
     answer::gather(&all, &answers, &commitments, &how.program)
 }

@@ -81,7 +81,7 @@ fn an_effect_that_is_one_file_is_detected_fitted_undone_and_reported() {
     let truth = Complex64::new(0.03, -0.02);
     let mut evidence = evidence(5, by_interleaving(truth));
     assert!(named(&find(&evidence), INTERLEAVED.id).is_none());
-    evidence.library = library_with_it();
+    evidence.library = library_with_it().into();
     let found = find(&evidence);
     let candidate = named(&found, INTERLEAVED.id).unwrap_or_else(|| panic!("{found:?}"));
     for (name, wanted) in [("re", truth.re), ("im", truth.im)] {
@@ -102,7 +102,7 @@ fn an_effect_that_is_one_file_is_detected_fitted_undone_and_reported() {
 #[test]
 fn an_effect_that_is_not_there_is_bounded() {
     let mut evidence = evidence(6, |value, _| value);
-    evidence.library = library_with_it();
+    evidence.library = library_with_it().into();
     assert!(find(&evidence).is_empty());
     let limits = limits(&evidence);
     let energy_of = |id: &str| limits.iter().find(|(known, _)| *known == id).unwrap().1;
@@ -126,7 +126,7 @@ fn limits_hold() {
         // Below what is found.
         let truth = Complex64::from_polar(3e-4, *seed as f64);
         let [mut with, without] = [truth, Complex64::ZERO].map(|factor| evidence(200 + seed, by_interleaving(factor)));
-        with.library = library_with_it();
+        with.library = library_with_it().into();
         let energy: f64 = all(&with).iter().zip(all(&without)).map(|(a, b)| (a - b).norm_sqr()).sum();
         limits(&with).iter().any(|(id, limit)| *id == INTERLEAVED.id && *limit > energy)
     });
@@ -179,12 +179,12 @@ fn something_else_at_the_mirrored_place_of_one_return_is_no_image() {
 fn without_its_effect_an_image_is_an_unknown_of_its_family() {
     let mut evidence = evidence(11, |value, _| unbalanced(value, 0.4, 2.0));
     let without = effects::library().iter().copied().filter(|info| info.id != effects::iq_imbalance::ID);
-    evidence.library = Box::leak(without.collect::<Vec<_>>().into_boxed_slice());
+    evidence.library = without.collect();
     let found = find(&evidence);
     assert!(matches!(found.as_slice(), [Candidate { id: None, behaves_like: Behaviour::ConjugateImage, .. }]), "{found:?}");
     assert!(found[0].gain > 100.0 && find(&evidence.with(&found[0])).is_empty());
     // With it, the field has nothing to add.
-    evidence.library = effects::library();
+    evidence.library = effects::library().into();
     let found = find(&evidence);
     assert!(
         found.iter().all(|candidate| candidate.id.is_some()) && named(&found, effects::iq_imbalance::ID).is_some(),
@@ -217,7 +217,7 @@ fn intervals_hold() {
     let truth = Complex64::new(0.03, -0.02);
     let held = (20..30).flat_map(|seed| {
         let mut evidence = evidence(seed, by_interleaving(truth));
-        evidence.library = library_with_it();
+        evidence.library = library_with_it().into();
         let found = find(&evidence);
         let candidate = named(&found, INTERLEAVED.id).unwrap_or_else(|| panic!("{found:?}"));
         [("re", truth.re), ("im", truth.im)].map(|(name, wanted)| {

@@ -1,12 +1,12 @@
 //! Which of two suspects comes first, where one of them makes what the other one sees.
 
 use super::NEARLY;
+use super::said::said_by;
 use crate::diagnosis::course::Of;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction};
 use crate::diagnosis::misfit::Misfit;
 use crate::diagnosis::remains::{is_rough, is_same};
-use crate::diagnosis::suspects::SUSPECTS;
 use crate::effects::{self, Stage};
 
 /// What never changes and may be a return or added behind the mixer: what turns all returns distinguishes the two, and goes first.
@@ -51,7 +51,7 @@ pub(super) fn upstream<'a>(
     if best.1.id == Some(effects::tx_leakage::ID) {
         // What the chirp makes of the room's returns never changes either, nor does an offset, and a leakage is free in every channel: it
         // is none where nothing is left of it.
-        let left = |evidence: &Evidence| (SUSPECTS[best.0].find)(evidence).iter().any(|candidate| candidate.id == best.1.id);
+        let left = |evidence: &Evidence| said_by(best.0, evidence).iter().any(|candidate| candidate.id == best.1.id);
         let simpler = |candidate: &Candidate| {
             candidate.place.stage == Some(Stage::Waveform) || candidate.id == Some(effects::dc_offset::ID)
         };
@@ -65,7 +65,7 @@ pub(super) fn upstream<'a>(
     // Seen from a wrong place, an echo of the body has no name: where the body is elsewhere with and without the echo, it is put right
     // first.
     let stands = |(suspect, other): &(usize, Candidate)| {
-        let again = (SUSPECTS[*suspect].find)(&evidence.with(&best.1));
+        let again = said_by(*suspect, &evidence.with(&best.1));
         again.iter().any(|found| found.id == other.id && found.gain > NEARLY * other.gain)
     };
     if best.1.id.is_none() && is_displaced(&other.1) && stands(other) {
@@ -73,7 +73,7 @@ pub(super) fn upstream<'a>(
     }
     if evidence.body.is_none() {
         // Nobody predicts where something moves: it does where it still seems to once what all returns share is undone.
-        let again = (SUSPECTS[best.0].find)(&evidence.with(&other.1));
+        let again = said_by(best.0, &evidence.with(&other.1));
         let stands = again.iter().any(|found| is_same(&best.1, found) && found.gain > NEARLY * best.1.gain);
         return if stands { best } else { other };
     }

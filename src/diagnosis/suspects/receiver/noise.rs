@@ -42,7 +42,7 @@ struct Cells {
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let empty = empty_bins(evidence);
     let samples = evidence.cube.dims[4];
-    let bins: Vec<usize> = (2..samples - 1).filter(|&bin| empty[bin]).collect();
+    let bins: Vec<usize> = evidence.noise_bins().filter(|&bin| (2..samples - 1).contains(&bin) && empty[bin]).collect();
     if bins.len() < 8 || evidence.cube.dims[3] < 16 {
         return vec![];
     }
@@ -233,8 +233,9 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::diagnosis::cube::Loaded;
-    use crate::radar::Radar;
+    use crate::diagnosis::cube::{Loaded, analytic};
+    use crate::radar::{Radar, Sampling};
+    use crate::room::Room;
 
     /// Noise of four receivers; `shared`: amplitude of what is common to all of them, by frame and chirp.
     fn noise(shared: impl Fn(usize, usize) -> f64) -> Evidence {
@@ -253,6 +254,33 @@ mod tests {
             }
         }
         Evidence::new(Loaded::of_samples(radar, samples, [-1e3, 1e3]), None, None)
+    }
+
+    /// White noise of a receiver without quadrature, in a room that is told.
+    fn real_noise(seed: u64) -> Evidence {
+        let mut radar = Radar::small(12);
+        (radar.loops_per_frame, radar.samples_per_chirp, radar.sampling) = (32, 128, Sampling::Real);
+        (radar.tx_m, radar.rx_m) = (vec![[0.0; 3]], vec![[0.0; 3], [0.0019, 0.0, 0.0]]);
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let parts: Vec<f32> = (0..12 * 2 * 32 * 128).map(|_| StandardNormal.sample(&mut random)).collect();
+        let room = Room { left_m: Some(1.2), right_m: Some(1.2), front_m: Some(3.0), ..Room::default() };
+        Evidence::new(Loaded::of_samples(radar, analytic(&parts, 128), [-1e3, 1e3]), Some(room), None)
+    }
+
+    #[test]
+    fn beat_frequencies_that_a_receiver_without_quadrature_has_twice_are_no_colour() {
+        let all = |evidence: &Evidence| {
+            let empty = empty_bins(evidence);
+            coloured(evidence, &(2..127).filter(|&bin| empty[bin]).collect::<Vec<_>>())
+        };
+        let (mut found, mut found_in_all) = (0, 0);
+        for seed in 0..6 {
+            let evidence = real_noise(seed);
+            found += find(&evidence).len();
+            found_in_all += usize::from(all(&evidence).is_some());
+        }
+        // Where an analytic signal holds nothing, what is beside it has a colour.
+        assert_eq!((found, found_in_all), (0, 6));
     }
 
     #[test]

@@ -1,0 +1,137 @@
+//! Structures of recordings: frames, chirps, channels and sampling, and what is told of the scene.
+
+use serde::{Deserialize, Serialize};
+
+use super::rules::SOMEBODY;
+use crate::effects;
+use crate::error::{Error, Result};
+use crate::radar::{Radar, Sampling};
+use crate::recorder::effects::Outside;
+
+/// Who is before the radar.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Who {
+    /// A person whose motion is told.
+    #[default]
+    Tracked,
+    /// A person of whom nothing is told.
+    Untracked,
+    Nobody,
+}
+
+/// One structure; cases are dealt all of them equally often.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Structure {
+    pub name: String,
+    #[serde(default)]
+    pub person: Who,
+    /// Whether the walls are told.
+    #[serde(default = "told")]
+    pub room: bool,
+    /// Keys of `[radar]` that differ.
+    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    pub radar: toml::Table,
+}
+
+/// What a case's recording says of its scene.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Told {
+    pub person: bool,
+    pub room: bool,
+}
+
+impl Default for Told {
+    fn default() -> Self {
+        Self { person: true, room: true }
+    }
+}
+
+fn told() -> bool {
+    true
+}
+
+impl Default for Structure {
+    /// The radar as it is, a tracked person, and a room that is told.
+    fn default() -> Self {
+        Self { name: "as configured".into(), person: Who::Tracked, room: true, radar: toml::Table::new() }
+    }
+}
+
+impl Structure {
+    /// The radar with what differs.
+    ///
+    /// # Errors
+    /// A key that no radar has, or a radar that cannot be.
+    pub fn radar(&self, of: &Radar) -> Result<Radar> {
+        let key = || format!("structures.{}.radar", self.name);
+        let mut table = toml::Table::try_from(of).expect("plain data");
+        table.extend(self.radar.clone());
+        let radar: Radar = table.try_into().map_err(|error: toml::de::Error| {
+            Error::setting(key(), error.message(), "keys of [radar] with values of their kinds")
+        })?;
+        radar.check(&key())?;
+        Ok(radar)
+    }
+
+    pub fn told(&self) -> Told {
+        Told { person: self.person == Who::Tracked, room: self.room }
+    }
+
+    /// Whether an effect can be in such a recording. What needs a person needs one that is tracked: of anybody else it is unknown what
+    /// would be there without it.
+    pub fn can_have(&self, radar: &Radar, id: &str) -> bool {
+        let needs_person = effects::info(id).is_some_and(|info| info.needs_person);
+        let between_receivers = [
+            effects::channel_mismatch::ID,
+            effects::antenna_position::ID,
+            effects::mutual_coupling::ID,
+            effects::correlated_noise::ID,
+            Outside::MUX_CROSSTALK,
+            Outside::RX_MUX_SKEW,
+        ];
+        let within_a_frame = [effects::chirp_settling::ID];
+        (self.person == Who::Tracked || !needs_person)
+            && (self.person != Who::Untracked || !SOMEBODY.contains(&id))
+            && (radar.sampling == Sampling::Complex || id != effects::iq_imbalance::ID)
+            && (radar.rx_m.len() > 1 || !between_receivers.contains(&id))
+            && (radar.loops_per_frame > 1 || !within_a_frame.contains(&id))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn structure(text: &str) -> Structure {
+        toml::from_str(text).unwrap()
+    }
+
+    #[test]
+    fn a_structure_changes_what_it_names_and_refuses_what_no_radar_has() {
+        let radar = Radar::small(12);
+        let one = structure("name = \"one\"\nroom = false\nradar = { loops_per_frame = 1, frames = 90 }");
+        assert_eq!(one.radar(&radar).unwrap(), Radar { loops_per_frame: 1, frames: 90, ..radar.clone() });
+        assert!(!one.room && one.person == Who::Tracked);
+        let unknown = structure("name = \"odd\"\nradar = { chirps = 3 }").radar(&radar).unwrap_err().to_string();
+        assert!(unknown.contains("structures.odd.radar") && unknown.contains("chirps"), "{unknown}");
+        assert!(structure("name = \"none\"\nradar = { frames = 0 }").radar(&radar).is_err());
+    }
+
+    #[test]
+    fn effects_are_dealt_where_they_can_be() {
+        let radar = Radar::small(12);
+        let nobody = structure("name = \"n\"\nperson = \"nobody\"");
+        assert!(!nobody.can_have(&radar, effects::pose_offset::ID) && nobody.can_have(&radar, effects::iq_imbalance::ID));
+        assert!(nobody.can_have(&radar, effects::moving_reflector::ID));
+        let untracked = structure("name = \"u\"\nperson = \"untracked\"");
+        assert!(!untracked.can_have(&radar, effects::moving_reflector::ID));
+        let real = Radar { sampling: Sampling::Real, ..radar.clone() };
+        assert!(!Structure::default().can_have(&real, effects::iq_imbalance::ID));
+        let single = Radar { rx_m: vec![[0.0; 3]], loops_per_frame: 1, ..radar };
+        for id in [effects::channel_mismatch::ID, effects::chirp_settling::ID] {
+            assert!(!Structure::default().can_have(&single, id), "{id}");
+        }
+    }
+}
