@@ -23,6 +23,8 @@ const ONE: &str =
     "tx_m = [[-0.0153, 0.0, 0.0]]\nrx_m = [[0.0, 0.0, 0.0], [0.0019, 0.0, 0.0], [0.0038, 0.0, 0.0], [0.0057, 0.0, 0.0]]";
 /// Two transmitters that make eight receivers of four.
 const TWO: &str = "tx_m = [[-0.0153, 0.0, 0.0], [-0.0077, 0.0, 0.0]]\nrx_m = [[0.0, 0.0, 0.0], [0.0019, 0.0, 0.0], [0.0038, 0.0, 0.0], [0.0057, 0.0, 0.0]]";
+/// Three transmitters in turn, one of them higher.
+const THREE: &str = "tx_m = [[-0.0153, 0.0, 0.0], [-0.0115, 0.0, 0.0019], [-0.0077, 0.0, 0.0]]\nrx_m = [[0.0, 0.0, 0.0], [0.0019, 0.0, 0.0], [0.0038, 0.0, 0.0], [0.0057, 0.0, 0.0]]";
 /// A square of receivers.
 const SQUARE: &str =
     "tx_m = [[-0.0153, 0.0, 0.0]]\nrx_m = [[0.0, 0.0, 0.0], [0.0019, 0.0, 0.0], [0.0, 0.0, 0.0019], [0.0019, 0.0, 0.0019]]";
@@ -37,7 +39,8 @@ fn recorded_as(timing: &str, folder: &Path, text: &str, antennas: &str) -> PathB
         "[radar]\nstart_frequency_hz = 77.0e9\nslope_hz_per_s = 60.012e12\nsample_rate_hz = 4.4e6\nsamples_per_chirp = 128\n\
          adc_start_s = 6.0e-6\n{timing}\nframes = 12\n{antennas}"
     );
-    let config: RecorderConfig = read_text(&format!("{text}\n[surface]\nedge_m = 0.012\n{radar}")).unwrap();
+    let surface = if text.contains("[surface]") { "" } else { "[surface]\nedge_m = 0.012" };
+    let config: RecorderConfig = read_text(&format!("{text}\n{surface}\n{radar}")).unwrap();
     let out = folder.join("recording");
     recorder::record_to(&config, Path::new("."), &out, &mut |_, _| {}).unwrap();
     out
@@ -244,6 +247,22 @@ fn two_transmitters_in_the_wrong_order_are_found() {
     );
     let differ = audited(&recorded(folder.path(), &uneven, TWO), &|text| text);
     assert!(check(&differ, "tx_order").ok && check(&differ, "sides").ok, "{differ:?}");
+}
+
+/// Straight ahead a direction and its mirror image hardly differ, and which part of the body returns most decides between them.
+#[test]
+fn antennas_are_not_doubted_because_of_a_person_straight_ahead() {
+    for seed in 0..6 {
+        let folder = tempfile::tempdir().unwrap();
+        let text = format!(
+            "seed = {seed}\nmesh_error_m = 2e-3\n[person]\nsubject = \"s6\"\naction = \"lunge\"\ndistance_m = 4.4\n[person.placement]\n\
+             start_s = {}\n[surface]\nreturns = \"random\"\nedge_m = 0.012",
+            -0.5 - 0.3 * f64::from(seed)
+        );
+        let timing = "loops_per_frame = 16\nchirp_period_s = 72.0e-6\nframe_period_s = 0.1";
+        let stated = audited(&recorded_as(timing, folder.path(), &text, THREE), &|text| text);
+        assert!(check(&stated, "sides").ok && check(&stated, "tx_order").ok, "{seed}: {stated:?}");
+    }
 }
 
 #[test]

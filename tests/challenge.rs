@@ -11,6 +11,7 @@ use hybridsim::challenge::answer::{self, Answers, RunConfig};
 use hybridsim::challenge::commitment::{Commitment, Sealed};
 use hybridsim::challenge::config::Stratum;
 use hybridsim::challenge::seal::seal;
+use hybridsim::challenge::structures::Who;
 use hybridsim::challenge::truth::Truth;
 use hybridsim::challenge::{ChallengeConfig, score::score, twins};
 use hybridsim::data::Recording;
@@ -204,15 +205,15 @@ fn structures_differ_in_what_is_recorded_and_told_and_an_effect_left_out_is_publ
     let mut left_out = [0; 2];
     for name in names(&challenge) {
         let (truth, recording) = (truth(&challenge, &name), Recording::open(challenge.join("cases").join(&name)).unwrap());
-        *of_structure.entry(truth.structure.clone()).or_default() += 1;
+        *of_structure.entry(truth.structure.name.clone()).or_default() += 1;
         let loops = recording.radar.loops_per_frame;
-        let found = (loops, recording.person().is_some(), recording.room.is_some(), truth.untracked);
-        let expected = match truth.structure.as_str() {
+        let found = (loops, recording.person().is_some(), recording.room.is_some(), truth.structure.person == Who::Untracked);
+        let expected = match truth.structure.name.as_str() {
             "usual" => (16, true, true, false),
             "empty" => (1, false, false, false),
             _ => (16, false, true, true),
         };
-        assert_eq!(found, expected, "{}", truth.structure);
+        assert_eq!(found, expected, "{}", truth.structure.name);
         assert_eq!(truth.left_out.as_ref(), commitment.left_out.get(&name));
         if let Some(id) = &truth.left_out {
             let planted = truth.stratum == Stratum::Outside;

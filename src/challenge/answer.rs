@@ -14,7 +14,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::commitment::{Commitment, canonical, hash_file, joint_root, sha256};
+use super::commitment::{Commitment, canonical, hash_file, joint_root, left_out, sha256};
 use super::report::Report;
 use super::worker::Worker;
 use crate::data::atomic::{AtomicFolder, write_text};
@@ -125,8 +125,7 @@ pub(super) fn each<'a>(
     fs::create_dir_all(out).map_err(|source| Error::write(out, source))?;
     let open = names.filter(|name| !answered(&out.join(name)));
     for (index, name) in open.take(config.most.unwrap_or(usize::MAX)).enumerate() {
-        let left_out = commitments.iter().find_map(|commitment| commitment.left_out.get(name));
-        let of_case = left_out.map(|id| config.without(id));
+        let of_case = left_out(commitments, name).map(|id| config.without(id));
         let case = challenge.join("cases").join(name);
         diagnose(&case, &out.join(name), of_case.as_ref().unwrap_or(config), &mut || progress(index))?;
         progress(index + 1);

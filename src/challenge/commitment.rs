@@ -113,6 +113,11 @@ impl Commitment {
     }
 }
 
+/// Effect of the library that a case is to be diagnosed without.
+pub fn left_out<'a>(commitments: &'a [Commitment], case: &str) -> Option<&'a String> {
+    commitments.iter().find_map(|commitment| commitment.left_out.get(case))
+}
+
 /// One hash over all shards.
 pub fn joint_root(commitments: &[Commitment]) -> String {
     match commitments {

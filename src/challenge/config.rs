@@ -279,10 +279,10 @@ impl ChallengeConfig {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn config(cases: usize) -> ChallengeConfig {
+    pub fn config(cases: usize) -> ChallengeConfig {
         ChallengeConfig {
             cases,
             every: None,

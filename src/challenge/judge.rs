@@ -62,7 +62,7 @@ impl Judgement {
         Self {
             case: case.into(),
             stratum: truth.stratum,
-            structure: truth.structure.clone(),
+            structure: truth.structure.name.clone(),
             tier: truth.tier.clone(),
             truth: truth.effects.iter().map(word).collect(),
             strength: truth.strength,
@@ -237,6 +237,7 @@ mod tests {
     use serde_json::json;
 
     use super::super::report::tests::report;
+    use super::super::structures::{Structure, Who};
     use super::*;
 
     fn truth(stratum: &str, effects: Value, d_prime: f64) -> Truth {
@@ -328,7 +329,9 @@ mod tests {
     #[test]
     fn somebody_whom_nobody_tracked_is_no_false_alarm_and_anything_else_is() {
         let claims = |untracked: bool, effects: Value, unexplained: Value| {
-            let truth = Truth { untracked, ..truth("null", json!([]), 0.0) };
+            let person = if untracked { Who::Untracked } else { Who::Tracked };
+            let structure = Structure { person, ..Structure::default() };
+            let truth = Truth { structure, ..truth("null", json!([]), 0.0) };
             let judged = judge("a", &truth, &answer(effects, unexplained));
             (judged.claims, judged.overclaims)
         };

@@ -3,7 +3,8 @@
 //!
 //! The way of a case, in the order of the files:
 //! - [`config`], [`structures`], [`secret`]: what may be drawn, and by which random numbers
-//! - [`library`], [`rules`]: graded effects; look-alike sets and thresholds, fixed before any sealed run
+//! - [`library`], `possible`, [`rules`]: graded effects; which of them a radar cannot have; look-alike sets and thresholds, fixed before any
+//!   sealed run
 //! - [`plan`], [`measure`], [`surviving`], [`seal`]: a case is drawn, recorded, its effect measured, and everything committed to
 //! - [`commitment`]: leaves, their Merkle root, and their verification
 //! - [`answer`]: one process per case, and what it answered
@@ -20,6 +21,7 @@ pub mod judge;
 pub mod library;
 pub mod measure;
 pub mod plan;
+mod possible;
 pub mod psychometric;
 pub mod report;
 pub mod rules;

@@ -42,7 +42,7 @@ pub struct Plan {
 /// All cases of a challenge, in the order of their numbers.
 ///
 /// # Errors
-/// As [`ChallengeConfig::kinds`].
+/// As [`ChallengeConfig::kinds`], and where every effect is dealt once, one that none of the structures can have.
 pub fn plans(config: &ChallengeConfig, secret: &Secret) -> Result<Vec<Plan>> {
     let kinds = config.kinds()?;
     let mut order: Vec<usize> = (0..config.cases).map(|index| index % kinds.len()).collect();
@@ -281,19 +281,8 @@ impl Plan {
 
 #[cfg(test)]
 mod tests {
+    use super::super::config::tests::config;
     use super::*;
-
-    fn config(cases: usize) -> ChallengeConfig {
-        ChallengeConfig {
-            cases,
-            every: None,
-            leave_one_out: false,
-            shares: Default::default(),
-            scenes: Scenes::default(),
-            radar: Radar::small(12),
-            structures: vec![],
-        }
-    }
 
     #[test]
     fn equal_secrets_give_equal_plans_and_every_effect_is_dealt() {

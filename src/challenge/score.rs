@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::answer::Answers;
 use super::baselines::{self, Statistics, quantile};
-use super::commitment::{Commitment, joint_root, sha256};
+use super::commitment::{Commitment, joint_root, left_out, sha256};
 use super::config::Stratum;
 use super::judge::{Judgement, judge};
 use super::plan::scalable;
@@ -89,7 +89,7 @@ pub fn score(
         .par_iter()
         .map(|(name, leaf)| {
             let mut truth = Truth::open(challenge, name, leaf)?;
-            let published = commitments.iter().find_map(|commitment| commitment.left_out.get(*name));
+            let published = left_out(&commitments, name);
             if published != truth.left_out.as_ref() {
                 return Err(Error::field(
                     name.as_str(),

@@ -19,7 +19,7 @@ use super::plan::{Plan, plans};
 use super::rules::{MASKED_DB, OBVIOUS_D_PRIME, UNDETECTABLE_D_PRIME};
 use super::sealing::{self, commit, one_case, published, set_times};
 use super::secret::Secret;
-use super::structures::{Structure, Told, Who};
+use super::structures::Structure;
 use crate::data::{IfFrame, IfLayout, RecordingContents, Shard, settings, write_recording};
 use crate::effects;
 use crate::error::{Error, Result};
@@ -56,9 +56,10 @@ pub fn seal(
             hint: Some("seal into another folder".into()),
         });
     }
-    let (secret, leaves) = cases(config, seed, out, shard, progress)?;
-    let of_shard = plans(config, &secret)?.into_iter().filter(|plan| shard.holds(plan.index));
-    let left_out = of_shard.filter_map(|plan| Some((secret.name(plan.index), plan.left_out?.to_string()))).collect();
+    let secret = begin(config, seed, out, shard)?;
+    let plans = of_shard(config, &secret, shard)?;
+    let left_out = plans.iter().filter_map(|plan| Some((secret.name(plan.index), plan.left_out?.to_string()))).collect();
+    let leaves = seal_cases(config, plans, &secret, out, progress)?;
     commit(out, &config.to_toml(), &secret, shard, leaves, left_out)
 }
 
@@ -83,16 +84,31 @@ pub fn cases(
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<(Secret, BTreeMap<String, String>)> {
     let secret = begin(config, seed, out, shard)?;
-    let chosen: Vec<Plan> = plans(config, &secret)?.into_iter().filter(|plan| shard.holds(plan.index)).collect();
+    let leaves = seal_cases(config, of_shard(config, &secret, shard)?, &secret, out, progress)?;
+    Ok((secret, leaves))
+}
+
+fn of_shard(config: &ChallengeConfig, secret: &Secret, shard: Shard) -> Result<Vec<Plan>> {
+    Ok(plans(config, secret)?.into_iter().filter(|plan| shard.holds(plan.index)).collect())
+}
+
+/// The leaves by the cases' names.
+fn seal_cases(
+    config: &ChallengeConfig,
+    plans: Vec<Plan>,
+    secret: &Secret,
+    out: &Path,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<BTreeMap<String, String>> {
     let (done, leaves) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
-    chosen.into_par_iter().try_for_each(|plan| -> Result<()> {
+    plans.into_par_iter().try_for_each(|plan| -> Result<()> {
         let name = secret.name(plan.index);
-        let leaf = seal_case(config, plan, &secret, out)?;
+        let leaf = seal_case(config, plan, secret, out)?;
         leaves.lock().expect("nobody panics while holding it").insert(name, leaf);
         progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         Ok(())
     })?;
-    Ok((secret, leaves.into_inner().expect("all threads are done")))
+    Ok(leaves.into_inner().expect("all threads are done"))
 }
 
 /// Records one case, unless it is there already, and returns its leaf.
@@ -100,9 +116,8 @@ fn seal_case(config: &ChallengeConfig, mut plan: Plan, secret: &Secret, out: &Pa
     let index = plan.index;
     one_case(out, secret, index, |case| {
         let recorded = record(config, &mut plan)?;
-        let told = plan.structure.told();
-        write_frames(&recorded.world, &recorded.frames, told, case)?;
-        Ok(truth(&plan, &recorded, told))
+        write_frames(&recorded.world, &recorded.frames, &plan.structure, case)?;
+        Ok(truth(&plan, &recorded))
     })
 }
 
@@ -199,21 +214,21 @@ fn settings_of(settings: &str, case: &Path) -> Result<RecorderConfig> {
 }
 
 /// Records the same scene, noise included, without its effects: what a perfect diagnosis would be left with.
-pub fn record_twin(settings: &str, told: Told, case: &Path) -> Result<()> {
+pub fn record_twin(settings: &str, structure: &Structure, case: &Path) -> Result<()> {
     let world = RecorderConfig { effects: EffectsConfig::default(), ..settings_of(settings, case)? }.world(Path::new("."))?;
-    write_frames(&world, &frames_of(&world)?, told, case)
+    write_frames(&world, &frames_of(&world)?, structure, case)
 }
 
 /// The recording without a truth and without labels.
-fn write_frames(world: &World, frames: &[IfFrame], told: Told, case: &Path) -> Result<()> {
+fn write_frames(world: &World, frames: &[IfFrame], structure: &Structure, case: &Path) -> Result<()> {
     let layout = match world.radar.sampling {
         Sampling::Complex => IfLayout::Codes,
         Sampling::Real => IfLayout::RealCodes,
     };
     let contents = RecordingContents {
         radar: &world.radar,
-        room: told.room.then_some(&world.room),
-        person: world.person.as_ref().filter(|_| told.person),
+        room: structure.room.then_some(&world.room),
+        person: world.person.as_ref().filter(|_| structure.is_tracked()),
         body_file: None,
         labels: BTreeMap::new(),
         layout,
@@ -223,7 +238,7 @@ fn write_frames(world: &World, frames: &[IfFrame], told: Told, case: &Path) -> R
     set_times(case)
 }
 
-fn truth(plan: &Plan, recorded: &Recorded, told: Told) -> Value {
+fn truth(plan: &Plan, recorded: &Recorded) -> Value {
     let settings = &recorded.settings;
     let mut truth = json!({
         "format": 1,
@@ -236,9 +251,7 @@ fn truth(plan: &Plan, recorded: &Recorded, told: Told) -> Value {
     });
     let mut add = |key: &str, value: Value| truth.as_object_mut().expect("a table").insert(key.into(), value);
     if plan.structure != Structure::default() {
-        add("structure", plan.structure.name.as_str().into());
-        add("told", json!(told));
-        add("untracked", (plan.structure.person == Who::Untracked).into());
+        add("structure", json!(plan.structure));
     }
     if let Some(id) = plan.left_out {
         add("left_out", id.into());

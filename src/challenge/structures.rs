@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::possible::impossible;
 use super::rules::SOMEBODY;
 use crate::effects;
 use crate::error::{Error, Result};
-use crate::radar::{Radar, Sampling};
-use crate::recorder::effects::Outside;
+use crate::radar::Radar;
 
 /// Who is before the radar.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,27 +35,14 @@ pub struct Structure {
     pub radar: toml::Table,
 }
 
-/// What a case's recording says of its scene.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Told {
-    pub person: bool,
-    pub room: bool,
-}
-
-impl Default for Told {
-    fn default() -> Self {
-        Self { person: true, room: true }
-    }
-}
-
 fn told() -> bool {
     true
 }
 
 impl Default for Structure {
-    /// The radar as it is, a tracked person, and a room that is told.
+    /// The radar as it is, a tracked person, and a room that is told: the one structure that needs no name.
     fn default() -> Self {
-        Self { name: "as configured".into(), person: Who::Tracked, room: true, radar: toml::Table::new() }
+        Self { name: String::new(), person: Who::Tracked, room: true, radar: toml::Table::new() }
     }
 }
 
@@ -75,34 +62,25 @@ impl Structure {
         Ok(radar)
     }
 
-    pub fn told(&self) -> Told {
-        Told { person: self.person == Who::Tracked, room: self.room }
+    /// Whether the person's motion is told.
+    pub fn is_tracked(&self) -> bool {
+        self.person == Who::Tracked
     }
 
     /// Whether an effect can be in such a recording. What needs a person needs one that is tracked: of anybody else it is unknown what
     /// would be there without it.
     pub fn can_have(&self, radar: &Radar, id: &str) -> bool {
         let needs_person = effects::info(id).is_some_and(|info| info.needs_person);
-        let between_receivers = [
-            effects::channel_mismatch::ID,
-            effects::antenna_position::ID,
-            effects::mutual_coupling::ID,
-            effects::correlated_noise::ID,
-            Outside::MUX_CROSSTALK,
-            Outside::RX_MUX_SKEW,
-        ];
-        let within_a_frame = [effects::chirp_settling::ID];
-        (self.person == Who::Tracked || !needs_person)
+        (self.is_tracked() || !needs_person)
             && (self.person != Who::Untracked || !SOMEBODY.contains(&id))
-            && (radar.sampling == Sampling::Complex || id != effects::iq_imbalance::ID)
-            && (radar.rx_m.len() > 1 || !between_receivers.contains(&id))
-            && (radar.loops_per_frame > 1 || !within_a_frame.contains(&id))
+            && impossible(id, radar).is_none()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::radar::Sampling;
 
     fn structure(text: &str) -> Structure {
         toml::from_str(text).unwrap()

@@ -10,7 +10,7 @@ use super::config::Stratum;
 use super::measure::Strength;
 use super::report::Report;
 use super::rules::{LIKE_SOMEBODY, SOMEBODY};
-use super::structures::Told;
+use super::structures::{Structure, Who};
 use crate::error::{Error, Result};
 
 /// What a case holds.
@@ -22,14 +22,8 @@ pub struct Truth {
     pub strength: Option<Strength>,
     /// The recorder's, as TOML: from them anybody records the case again.
     pub settings: String,
-    /// Name of the case's structure.
     #[serde(default)]
-    pub structure: String,
-    #[serde(default)]
-    pub told: Told,
-    /// Whether somebody is there of whom nothing is told.
-    #[serde(default)]
-    pub untracked: bool,
+    pub structure: Structure,
     /// Effect of the library that the case was diagnosed without.
     #[serde(default)]
     pub left_out: Option<String>,
@@ -54,7 +48,7 @@ impl Truth {
 
     /// What a report says beside what is known of somebody whom nobody tracked.
     pub(super) fn beside_somebody(&self, mut report: Report) -> Report {
-        if self.untracked {
+        if self.structure.person == Who::Untracked {
             report.effects.retain(|effect| !SOMEBODY.contains(&effect.id.as_str()));
             let is_somebody = |words: &str| LIKE_SOMEBODY.iter().any(|behaviour| behaviour.words() == words);
             report.unexplained.retain(|rest| !is_somebody(&rest.behaves_like));

@@ -39,7 +39,7 @@ pub fn run(challenge: &Path, answers: &Path, out: &Path, config: &RunConfig, pro
         }
         let workplace = Scratch::new()?;
         let case = workplace.path().join(name);
-        record_twin(&truth.settings, truth.told, &case)?;
+        record_twin(&truth.settings, &truth.structure, &case)?;
         diagnose(&case, &folder, config, &mut || progress(done))?;
         done += 1;
         progress(done);

@@ -117,6 +117,11 @@ impl Evidence {
         self.library.iter().find(|info| info.id == id).copied()
     }
 
+    /// Whether an effect may be named that is not yet: the library has it, and nothing before was named so.
+    pub fn may_name(&self, id: &str) -> bool {
+        self.info(id).is_some() && !self.accepted.contains(&id)
+    }
+
     pub fn is_real(&self) -> bool {
         self.radar.sampling == Sampling::Real
     }

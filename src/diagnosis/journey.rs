@@ -186,8 +186,8 @@ fn conclude(
         let limits = limits(&explanation.evidence, &taken, moving_energy(original), config);
         report.not_detectable.extend(limits.into_iter().map(NotDetectable::at_most));
     }
-    report.not_detectable.retain(|limit| original.info(&limit.id).is_some());
-    report.not_detectable.retain(|limit| report.effects.iter().all(|effect| effect.id != limit.id));
+    let is_found = |id: &str| report.effects.iter().any(|effect| effect.id == id);
+    report.not_detectable.retain(|limit| original.info(&limit.id).is_some() && !is_found(&limit.id));
     report.null.suspicion = Some(explanation.suspicion);
     report.suspects = explanation.suspects.clone();
     report.p_value = report.null.p_value();

@@ -1,10 +1,11 @@
 //! Which effects can be put onto samples alone, in which unit their strength is, and why the others cannot.
 
 use crate::challenge::library::{Graded, every};
+use crate::challenge::possible::impossible;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::effects::{self, Stage};
 use crate::error::{Error, Result};
-use crate::radar::{Radar, Sampling};
+use crate::radar::Radar;
 use crate::recorder::effects::Outside;
 
 /// An effect that is offered.
@@ -189,20 +190,10 @@ pub fn refusal(id: &str, radar: &Radar, codes: bool) -> Option<&'static str> {
     if offered(id).is_none() {
         return refused(id).or(Some("no such effect is known"));
     }
-    let chirps = radar.loops_per_frame * radar.tx_m.len();
     match id {
-        effects::iq_imbalance::ID if radar.sampling == Sampling::Real => Some("this receiver has no quadrature"),
-        effects::channel_mismatch::ID | effects::mutual_coupling::ID | Outside::MUX_CROSSTALK | effects::correlated_noise::ID
-            if radar.rx_m.len() < 2 =>
-        {
-            Some("this radar has a single receiver")
-        }
-        effects::chirp_settling::ID if chirps < 2 => Some("a frame has a single chirp"),
-        Outside::CHIRP_AFTERGLOW if radar.loops_per_frame < 2 => Some("a frame has a single chirp of each transmitter"),
-        Outside::GAIN_HOP if radar.frames < 2 => Some("there is a single frame"),
         effects::frame_drop::ID if radar.frames < FEWEST_FRAMES => Some("there are fewer than 14 frames"),
         Outside::LSB_STUCK if !codes => Some("the samples are no whole codes"),
-        _ => None,
+        _ => impossible(id, radar),
     }
 }
 
@@ -227,6 +218,7 @@ pub fn chosen(asked: &[String], radar: &Radar, codes: bool) -> Result<Vec<&'stat
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::radar::Sampling;
 
     #[test]
     fn every_effect_is_offered_or_refused_with_a_reason_and_none_both() {

@@ -1,29 +1,31 @@
 //! Which antenna is which, and on which side: left and right, up and down, receivers in reverse, transmitters in another order.
 //!
 //! Where the body moves, the phases of the channels follow from its direction. Every reading of the antennas predicts them; the one
-//! that is stated is held against the others. The measure of a channel is its coherence with the first channel after that phase is
-//! taken out: a constant phase of its own (receivers that differ) does not lower it, but directions that change do where the
-//! reading is wrong. With a coherence γ, a share 1 − γ² of a channel's power is left (Carter, Knapp and Nuttall 1973), so Σ ln((1 −
-//! γ²) / (1 − γ'²)) over channels and frames is the log of a likelihood ratio; a frame counts once, however many cells the body
-//! fills in it. Where the body stays in one direction, only the constant phases themselves decide, which receivers that differ
-//! make by chance: they must then agree with the other reading nearly as a whole, over three channels at least.
+//! that is stated is held against the others. The measure of a cell of range and Doppler is its alignment, the sum over channels of the
+//! cosine between what a channel has in common with the first one and its constant phase, after the predicted phase is taken out: a
+//! constant phase of its own (receivers that differ) does not lower it, but directions that change do where the reading is wrong. Of two
+//! readings the right one gains Σ (1 − cos Δ) over the other in a cell, in the mean and times the coherence, where Δ is by how much more
+//! they differ there than elsewhere; the parts of a body interfere, so each cell deviates from that. The test is the ratio estimator of
+//! the one over the other, with Student's law over cells (a main lobe is one, however many channels show the same return). Where the
+//! body stays in one direction, only the constant phases themselves decide, which receivers that differ make by chance: they must then
+//! agree with the other reading nearly as a whole, over three channels at least.
+
+use std::collections::BTreeMap;
 
 use num_complex::Complex64;
 
 use super::Check;
 use super::cells::{aligned, moving_cells};
-use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::prediction::Point;
+use crate::diagnosis::evidence::{Evidence, HANN_LOBE};
+use crate::diagnosis::prediction::{BodyPrediction, Point};
+use crate::diagnosis::statistics::ratio_tail;
+use crate::integrity::ALARM;
 use crate::paths::distance;
 
-/// Chance that one of the readings beats the stated one where that is right, at most (each check).
-const ALARM: f64 = 1e-3;
 /// Mean phasor of the channels from which on their phases agree: receivers that differ by chance do not.
 const ALIGNED: f64 = 0.93;
 /// Share of that mean phasor that the stated reading must fall short of.
 const LESS: f64 = 0.75;
-/// Coherence that is taken for complete: a tenth of a percent of the power is always left.
-const COMPLETE: f64 = 0.999;
 /// Most transmitters whose orders are all tried.
 const MOST_TRANSMITTERS: usize = 4;
 
@@ -37,11 +39,23 @@ struct Reading {
     mirrored: Option<usize>,
 }
 
-/// What the channels have in common with the first one under a reading.
+/// What each channel of a cell has in common with the first one, as a share of their amplitudes, by reading: the phase that it predicts is
+/// taken out.
+struct Cell {
+    observed: Vec<Vec<Complex64>>,
+    /// What the stated reading would leave of it, were this one right.
+    otherwise: Vec<Vec<Complex64>>,
+}
+
+/// What the cells say of a reading.
 struct Agreement {
-    coherence: Vec<f64>,
+    /// Each channel's constant phase.
     phasors: Vec<Complex64>,
-    frames: usize,
+    coherence: f64,
+    /// Of each cell, the alignment beyond that of the stated reading, and what that is in the mean and without losses where this one is
+    /// right.
+    gains: Vec<f64>,
+    apart: Vec<f64>,
 }
 
 /// Left and right, up and down.
@@ -91,76 +105,114 @@ fn compared(evidence: &Evidence, stated: &Reading, others: &[Reading], by_phases
     let all: Vec<&Reading> = std::iter::once(stated).chain(others).collect();
     let agreements = agreements(evidence, &all)?;
     let (as_is, rest) = agreements.split_first()?;
-    let least = (others.len() as f64 / ALARM).ln();
+    let alarm = ALARM / others.len() as f64;
     let better = |other: &Agreement| -> bool {
-        let changes = ratio(as_is, other);
+        let losses: Vec<f64> = other.gains.iter().map(|gain| -gain).collect();
+        let [for_it, against_it] = [&other.gains, &losses].map(|gains| ratio_tail(gains, &other.apart).1);
         let mean = |agreement: &Agreement| agreement.phasors.iter().sum::<Complex64>().norm() / agreement.phasors.len() as f64;
         let turned = by_phases && other.phasors.len() >= 3 && mean(other) >= ALIGNED && mean(as_is) < LESS * mean(other);
-        changes > least || turned && changes > -least
+        for_it < alarm || turned && against_it >= alarm
     };
     let wrong: Vec<(&Reading, &Agreement)> = others.iter().zip(rest).filter(|(_, other)| better(other)).collect();
-    let Some(best) = wrong.iter().map(|(_, agreement)| strength(agreement)).reduce(f64::max) else {
+    let Some(best) = wrong.iter().map(|(_, agreement)| agreement.coherence).reduce(f64::max) else {
         return Some(("array phases do not contradict it".into(), true));
     };
     // Readings that predict the same phases are reported together.
     let names: Vec<String> = wrong
         .iter()
-        .filter(|(_, agreement)| strength(agreement) > best - 1e-3)
+        .filter(|(_, agreement)| agreement.coherence > best - 1e-3)
         .map(|(reading, _)| match reading.description {
             "" => format!("the order {:?}", reading.tx),
             description => description.into(),
         })
         .collect();
-    Some((format!("array phases fit {} (coherence {best:.2}, as stated {:.2})", names.join(", or "), strength(as_is)), false))
+    Some((format!("array phases fit {} (coherence {best:.2}, as stated {:.2})", names.join(", or "), as_is.coherence), false))
 }
 
-/// Mean coherence.
-fn strength(agreement: &Agreement) -> f64 {
-    agreement.coherence.iter().sum::<f64>() / agreement.coherence.len().max(1) as f64
-}
-
-/// Log of the likelihood ratio of another reading against the stated one, constant phases free.
-fn ratio(stated: &Agreement, other: &Agreement) -> f64 {
-    let left = |coherence: &f64| 1.0 - coherence.min(COMPLETE).powi(2);
-    let channels = stated.coherence.iter().zip(&other.coherence);
-    stated.frames as f64 * channels.map(|(stated, other)| (left(stated) / left(other)).ln()).sum::<f64>()
-}
-
+/// The stated reading comes first. None where nothing of the body is observed.
 fn agreements(evidence: &Evidence, readings: &[&Reading]) -> Option<Vec<Agreement>> {
-    let [_, transmitters, receivers, ..] = evidence.cube.dims;
-    let channels = transmitters * receivers;
-    let (body, radar) = (evidence.body.as_ref().filter(|_| channels > 1)?, &evidence.radar);
-    let mut sums = vec![vec![Complex64::ZERO; channels]; readings.len()];
-    let mut scales = vec![0.0; channels];
-    let mut frames = std::collections::BTreeSet::new();
-    let all: Vec<usize> = (0..channels).collect();
-    moving_cells(evidence, body, &all, |frame, point, velocity, seen| {
-        frames.insert(frame);
-        for (scale, own) in scales.iter_mut().zip(seen) {
-            *scale += (own * seen[0].conj()).norm();
+    let channels = evidence.cube.channels();
+    let body = evidence.body.as_ref().filter(|_| channels > 1)?;
+    let mut count = 0;
+    let zero = || vec![vec![Complex64::ZERO; channels]; readings.len()];
+    let (mut observed, mut otherwise) = (zero(), zero());
+    each_cell(evidence, body, readings, &mut |cell| {
+        count += 1;
+        for (sums, of_cell) in [(&mut observed, &cell.observed), (&mut otherwise, &cell.otherwise)] {
+            let values = of_cell.iter().flatten();
+            sums.iter_mut().flatten().zip(values).for_each(|(sum, value)| *sum += value);
         }
-        for (reading, sums) in readings.iter().zip(&mut sums) {
-            let path = |channel: usize| {
-                let (slot, lane) = (channel / receivers, channel % receivers);
-                let at = mirrored(point, reading.mirrored, radar.position_m);
-                let moved = 2.0 * velocity * slot as f64 * radar.chirp_period_s;
-                distance(at, radar.tx_position_m(reading.tx[slot])) + distance(at, radar.rx_position_m(reading.rx[lane])) + moved
-            };
-            let first = path(0);
-            for (channel, sum) in sums.iter_mut().enumerate() {
-                *sum += aligned(seen[channel], seen[0], path(channel) - first, radar);
+    });
+    if observed[0].iter().any(|sum| *sum == Complex64::ZERO) {
+        return None;
+    }
+    let phasors = |sums: &[Complex64]| sums.iter().map(|sum| sum / sum.norm().max(f64::MIN_POSITIVE)).collect::<Vec<_>>();
+    let mut agreements: Vec<Agreement> = (observed.iter())
+        .map(|sums| Agreement {
+            phasors: phasors(sums),
+            coherence: sums[1..].iter().map(|sum| sum.norm()).sum::<f64>() / (count * (channels - 1)) as f64,
+            gains: vec![],
+            apart: vec![],
+        })
+        .collect();
+    let expected: Vec<Vec<Complex64>> = otherwise.iter().map(|sums| phasors(sums)).collect();
+    let alignment = |of_cell: &[Complex64], phasors: &[Complex64]| -> f64 {
+        of_cell.iter().zip(phasors).map(|(own, phasor)| (own * phasor.conj()).re).sum()
+    };
+    each_cell(evidence, body, readings, &mut |cell| {
+        let as_stated = alignment(&cell.observed[0], &agreements[0].phasors);
+        for (index, agreement) in agreements.iter_mut().enumerate() {
+            let apart = channels as f64 - alignment(&cell.otherwise[index], &expected[index]);
+            agreement.gains.push(alignment(&cell.observed[index], &agreement.phasors) - as_stated);
+            // Readings that predict the same differ by rounding.
+            agreement.apart.push(if apart > 1e-9 { apart } else { 0.0 });
+        }
+    });
+    Some(agreements)
+}
+
+/// Visits the body's cells, a main lobe each.
+fn each_cell(evidence: &Evidence, body: &BodyPrediction, readings: &[&Reading], see: &mut dyn FnMut(&Cell)) {
+    let ([_, _, receivers, ..], channels, radar) = (evidence.cube.dims, evidence.cube.channels(), &evidence.radar);
+    let all: Vec<usize> = (0..channels).collect();
+    let path = |reading: &Reading, point: &Point, velocity: f64, channel: usize| {
+        let (slot, lane) = (channel / receivers, channel % receivers);
+        let at = mirrored(point, reading.mirrored, radar.position_m);
+        let moved = 2.0 * velocity * slot as f64 * radar.chirp_period_s;
+        distance(at, radar.tx_position_m(reading.tx[slot])) + distance(at, radar.rx_position_m(reading.rx[lane])) + moved
+    };
+    let mut now = 0;
+    let mut cells: BTreeMap<[usize; 2], (Cell, Vec<f64>)> = BTreeMap::new();
+    let mut finished = |cells: &mut BTreeMap<[usize; 2], (Cell, Vec<f64>)>| {
+        for (mut cell, scales) in std::mem::take(cells).into_values() {
+            for of_reading in cell.observed.iter_mut().chain(&mut cell.otherwise) {
+                of_reading.iter_mut().zip(&scales).for_each(|(value, scale)| *value /= scale.max(f64::MIN_POSITIVE));
+            }
+            see(&cell);
+        }
+    };
+    moving_cells(evidence, body, &all, |[frame, row, bin], point, velocity, seen| {
+        if frame != now {
+            finished(&mut cells);
+            now = frame;
+        }
+        let zero = || vec![vec![Complex64::ZERO; channels]; readings.len()];
+        let new = || (Cell { observed: zero(), otherwise: zero() }, vec![0.0; channels]);
+        let (cell, scales) = cells.entry([row, bin].map(|index| index / (2 * HANN_LOBE))).or_insert_with(new);
+        for channel in 0..channels {
+            let longer = |reading: &Reading| path(reading, point, velocity, channel) - path(reading, point, velocity, 0);
+            let as_stated = longer(readings[0]);
+            scales[channel] += (seen[channel] * seen[0].conj()).norm();
+            for (index, reading) in readings.iter().enumerate() {
+                let longer = longer(reading);
+                let observed = aligned(seen[channel], seen[0], longer, radar);
+                let phase = std::f64::consts::TAU * (longer - as_stated) / radar.wavelength_m();
+                cell.observed[index][channel] += observed;
+                cell.otherwise[index][channel] += Complex64::from_polar(observed.norm(), phase);
             }
         }
     });
-    if frames.is_empty() || scales.iter().any(|scale| *scale <= 0.0) {
-        return None;
-    }
-    let agreement = |sums: Vec<Complex64>| Agreement {
-        coherence: sums.iter().zip(&scales).skip(1).map(|(sum, scale)| sum.norm() / scale).collect(),
-        phasors: sums.iter().map(|sum| sum / sum.norm().max(f64::MIN_POSITIVE)).collect(),
-        frames: frames.len(),
-    };
-    Some(sums.into_iter().map(agreement).collect())
+    finished(&mut cells);
 }
 
 fn mirrored(point: &Point, axis: Option<usize>, at: [f64; 3]) -> [f64; 3] {

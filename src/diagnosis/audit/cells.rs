@@ -10,12 +10,13 @@ use crate::diagnosis::statistics::median;
 use crate::radar::Radar;
 
 /// Visits the cells of the body's points that move, in the training frames, where they hold a return that the same range has
-/// not at all velocities (a spur does): `see` gets the frame, the point, its radial velocity, and what the channels hold there.
+/// not at all velocities (a spur does): `see` gets the cell (frame, Doppler row, range bin), the point, its radial velocity, and what the
+/// channels hold there.
 pub(super) fn moving_cells(
     evidence: &Evidence,
     body: &BodyPrediction,
     channels: &[usize],
-    mut see: impl FnMut(usize, &Point, f64, &[Complex64]),
+    mut see: impl FnMut([usize; 3], &Point, f64, &[Complex64]),
 ) {
     let ([_, _, _, loops, samples], radar) = (evidence.cube.dims, &evidence.radar);
     for &frame in &evidence.split.training {
@@ -31,11 +32,12 @@ pub(super) fn moving_cells(
             if bin >= samples || doppler.abs() < 3 {
                 continue;
             }
-            let cell = doppler.rem_euclid(loops as i64) as usize * samples + bin;
+            let row = doppler.rem_euclid(loops as i64) as usize;
+            let cell = row * samples + bin;
             if maps[0][cell].norm_sqr() < RETURN * usual[bin] {
                 continue;
             }
-            see(frame, point, velocity, &maps.iter().map(|map| map[cell]).collect::<Vec<_>>());
+            see([frame, row, bin], point, velocity, &maps.iter().map(|map| map[cell]).collect::<Vec<_>>());
         }
     }
 }

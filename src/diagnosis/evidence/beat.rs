@@ -29,18 +29,18 @@ pub fn ranges_m(evidence: &Evidence) -> Option<[f64; 2]> {
     Some([(nearest - CLEARANCE_M).max(0.5 * nearest), farthest * (1.0 + CLEARANCE_SHARE) + CLEARANCE_M])
 }
 
-/// Beat frequencies, as bins, that hold neither room nor body.
+/// Beat frequencies, as bins, that hold neither room nor body, of those in which the noise is as it is elsewhere.
 pub fn empty_bins(evidence: &Evidence) -> Vec<bool> {
-    let samples = evidence.cube.dims[4];
+    let (samples, noise_bins) = (evidence.cube.dims[4], evidence.noise_bins());
     match ranges_m(evidence) {
         Some([low, high]) => {
             let bin = |range: f64| beat_hz(evidence, range) / evidence.radar.sample_rate_hz * samples as f64;
             let (low, high) = (bin(low) - LOBE as f64, bin(high) + LOBE as f64);
             (0..samples)
                 .map(|bin| {
-                    let bin = bin as f64;
                     let inside = |bin: f64| (low..=high).contains(&bin);
-                    !inside(bin) && !inside(bin + samples as f64) && !inside(bin - samples as f64)
+                    let wrapped = [0.0, samples as f64, -(samples as f64)];
+                    noise_bins.contains(&bin) && !wrapped.into_iter().any(|by| inside(bin as f64 + by))
                 })
                 .collect()
         }

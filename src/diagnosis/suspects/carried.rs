@@ -47,11 +47,7 @@ fn find(evidence: &Evidence) -> Vec<Candidate> {
     let parts = body.parts.len();
     // Remains of paths that were taken out are near the body, too, and in a copied frame the body is not where it is said to be.
     let remains = paths::LEAVE_REMAINS.iter().any(|id| evidence.accepted.contains(id));
-    if parts < 2
-        || remains
-        || body.centres.len() != body.frames.len()
-        || evidence.accepted.contains(&effects::carried_reflector::ID)
-    {
+    if parts < 2 || remains || body.centres.len() != body.frames.len() || !evidence.may_name(effects::carried_reflector::ID) {
         return vec![];
     }
     let skin: Vec<Vec<Template>> = (0..body.frames.len()).into_par_iter().map(|frame| skin(model, frame)).collect();

@@ -52,7 +52,7 @@ pub fn best(trial: &Trial, coarse: &[usize]) -> Vec<Fitted> {
     let none = trial.score(Change::Range(0.0), coarse, true);
     let tried: Vec<(Echo, f64, f64)> = mirrors
         .chain(delayed)
-        .filter(|echo| !evidence.accepted.contains(&id(*echo)))
+        .filter(|echo| evidence.may_name(id(*echo)))
         .filter_map(|echo| {
             let gain = |power: f64| trial.score(Change::Again(of_power(echo, power)), coarse, true).gain_over(&none, coarse);
             let least = gain(POWERS[0]);

@@ -84,7 +84,7 @@ fn alternatives(trial: &Trial, null: &Score) -> Vec<Fitted> {
     }
     // A ramp's slope is wrong by no more than the library allows it.
     let most_slope = slope_error::INFO.parameters[0].most;
-    fitted.retain(|fit| !accepted.contains(&fit.id) && (fit.id != slope_error::ID || fit.value.abs() <= most_slope));
+    fitted.retain(|fit| trial.evidence.may_name(fit.id) && (fit.id != slope_error::ID || fit.value.abs() <= most_slope));
     fitted
 }
 

@@ -101,8 +101,12 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
             error * evidence.cube.channel(frame, channel).iter().map(|value| value.norm_sqr()).sum::<f64>()
         })
         .sum();
+    // Gains and phases that are free: receivers differ so whatever the cause.
+    let id = evidence.info(effects::channel_mismatch::ID).map(|info| info.id);
+    let estimates =
+        vec![Estimate::list("gain_db", &gains_db, &gain_deviations), Estimate::list("phase_deg", &phases_deg, &phase_deviations)];
     Candidate {
-        id: Some(effects::channel_mismatch::ID),
+        id,
         behaves_like: Behaviour::ChannelGain,
         statement: format!(
             "The receivers differ: against the first, {} {} dB of gain and {}° of phase, which no direction of the body explains.",
@@ -110,10 +114,7 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
             text(&gains_db, 2),
             text(&phases_deg, 1),
         ),
-        estimates: vec![
-            Estimate::list("gain_db", &gains_db, &gain_deviations),
-            Estimate::list("phase_deg", &phases_deg, &phase_deviations),
-        ],
+        estimates: if id.is_some() { estimates } else { vec![] },
         choice: None,
         place: Place { rx: Some((1..receivers).collect()), ..Place::at(Stage::Antenna) },
         p_value,

@@ -17,7 +17,7 @@ use crate::effects::{self, Stage};
 
 pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     let [frames, tx, rx, loops, samples] = evidence.cube.dims;
-    if evidence.is_real() || samples < 8 * HANN_LOBE || evidence.accepted.contains(&effects::dc_offset::ID) {
+    if evidence.is_real() || samples < 8 * HANN_LOBE || !evidence.may_name(effects::dc_offset::ID) {
         return None;
     }
     let spectra: Vec<Vec<Complex64>> = fit.added.iter().map(|part| spectrum(part)).collect();

@@ -5,6 +5,7 @@ use num_complex::Complex64;
 use super::field::{Field, Fitted, Templates, orthonormal, remove};
 use super::support::{beat_hz, dot, tone};
 use crate::diagnosis::Evidence;
+use crate::effects;
 
 /// Leakage over the board is nearer than this.
 const NEAR_M: f64 = 0.5;
@@ -21,6 +22,18 @@ pub enum Element {
     End(usize),
     Image,
     Square,
+}
+
+impl Element {
+    fn id(&self) -> &'static str {
+        match self {
+            Self::Offset => effects::dc_offset::ID,
+            Self::Leakage(_) => effects::tx_leakage::ID,
+            Self::Start(_) | Self::End(_) => effects::ramp_edge_transient::ID,
+            Self::Image => effects::iq_imbalance::ID,
+            Self::Square => effects::second_harmonic::ID,
+        }
+    }
 }
 
 /// Price in nats of another complex number.
@@ -93,7 +106,8 @@ pub fn choose(evidence: &Evidence, field: &Field, images: &Images) -> Vec<Elemen
     let near = leakages(evidence);
     let mut chosen: Vec<Element> = vec![];
     while chosen.len() < MOST_ELEMENTS {
-        let options = Next::new(field, images, &chosen).options(&near);
+        let mut options = Next::new(field, images, &chosen).options(&near);
+        options.retain(|(_, element)| evidence.info(element.id()).is_some());
         let best = options.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
         match best {
             Some((score, element)) if score > 0.0 => chosen.push(element),

@@ -17,11 +17,18 @@ const LEAVES_BINS: f64 = 6.0;
 /// Where lines are looked for, in cells of both axes: one between two cells shows only half of its power in either.
 const BETWEEN: [[usize; 2]; 4] = [[0, 0], [0, 1], [1, 0], [1, 1]];
 
+/// Doppler bins around zero where a Hann window leaves static clutter.
+const STILL_BINS: usize = 2;
+/// Fewest others of which a median is taken.
+const FEWEST_ROWS: usize = 8;
+
 /// Where a line of a fixed range and Doppler frequency cannot be anything that moves, and the powers there.
 pub struct Line<'a> {
     evidence: &'a Evidence,
     /// Beat frequencies without room and body.
     empty: Vec<bool>,
+    /// Noise of each beat frequency, over that of the recording: a response that was undone leaves more of it where little came through.
+    levels: Vec<f64>,
     /// Over what room and body have elsewhere.
     residual: Option<Residual>,
     /// Doppler bins from which on a mover leaves its range bins during the recording.
@@ -34,7 +41,7 @@ impl<'a> Line<'a> {
         let duration_s = evidence.starts_s.last().map_or(0.0, |last| last - evidence.starts_s[0]);
         let fast = LEAVES_BINS / (cells.bins_per_m * duration_s.max(1e-9)) * cells.doppler_per_mps;
         let residual = evidence.power().and_then(|_| Residual::new(evidence));
-        Self { evidence, empty: empty_bins(evidence), residual, fast }
+        Self { evidence, empty: empty_bins(evidence), levels: levels(evidence), residual, fast }
     }
 
     fn is_usable(&self, doppler: usize, range: usize) -> bool {
@@ -108,9 +115,26 @@ impl<'a> Line<'a> {
         let at = [frame, doppler, range];
         match &self.residual {
             Some(residual) if !self.empty[range] => f64::from(if residual.count[at] > 0.0 { residual.ratio[at] } else { 0.0 }),
-            _ => f64::from(self.evidence.maps()[at]),
+            _ => f64::from(self.evidence.maps()[at]) / self.levels[range],
         }
     }
+}
+
+/// The median over the other velocities (order-statistic CFAR, Rohling 1983), by the median of a mean of exponential variables (Choi
+/// 1994), and never less than the noise.
+fn levels(evidence: &Evidence) -> Vec<f64> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let rows: Vec<usize> = (0..loops).filter(|&row| row.min(loops - row) > STILL_BINS).collect();
+    if rows.len() < FEWEST_ROWS {
+        return vec![1.0; samples];
+    }
+    let (maps, channels) = (evidence.maps(), evidence.cube.channels() as f64);
+    let of_bin = |bin: usize| {
+        let frames = evidence.split.training.iter();
+        let powers = frames.flat_map(|&frame| rows.iter().map(move |&row| f64::from(maps[[frame, row, bin]])));
+        (median(&mut powers.collect::<Vec<f64>>()) * channels / (channels - 1.0 / 3.0)).max(1.0)
+    };
+    (0..samples).into_par_iter().map(of_bin).collect()
 }
 
 /// A line, with its median power and its turns per chirp and per sample.
@@ -139,7 +163,7 @@ mod tests {
         let radar = Radar { samples_per_chirp: 64, loops_per_frame: 32, ..Radar::small(6) };
         let (slow, fast) = (10.5 / 32.0, 40.5 / 64.0);
         let evidence = Evidence::in_noise(radar, 5, |[_, _, chirp, n]| 0.5 * tone(slow, fast, chirp, n));
-        let line = Line { evidence: &evidence, empty: vec![true; 64], residual: None, fast: 0.0 };
+        let line = Line { evidence: &evidence, empty: vec![true; 64], levels: vec![1.0; 64], residual: None, fast: 0.0 };
         let [on, _, _, half] = line.strongest().map(|(found, _)| found.expect("empty ranges"));
         assert_eq!(half.at, (slow, fast));
         // Scalloping of a Hann window (Harris 1978, table 1): 1.42 dB along each axis.

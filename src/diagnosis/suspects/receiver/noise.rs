@@ -42,7 +42,7 @@ struct Cells {
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let empty = empty_bins(evidence);
     let samples = evidence.cube.dims[4];
-    let bins: Vec<usize> = evidence.noise_bins().filter(|&bin| (2..samples - 1).contains(&bin) && empty[bin]).collect();
+    let bins: Vec<usize> = (2..samples - 1).filter(|&bin| empty[bin]).collect();
     if bins.len() < 8 || evidence.cube.dims[3] < 16 {
         return vec![];
     }
@@ -270,7 +270,9 @@ mod tests {
     #[test]
     fn beat_frequencies_that_a_receiver_without_quadrature_has_twice_are_no_colour() {
         let all = |evidence: &Evidence| {
-            let empty = empty_bins(evidence);
+            let mut taken_for_complex = evidence.clone();
+            taken_for_complex.radar.sampling = Sampling::Complex;
+            let empty = empty_bins(&taken_for_complex);
             coloured(evidence, &(2..127).filter(|&bin| empty[bin]).collect::<Vec<_>>())
         };
         let (mut found, mut found_in_all) = (0, 0);

@@ -39,20 +39,20 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let samples = evidence.cube.dims[4];
     let still: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
-    if !evidence.accepted.contains(&effects::ramp_edge_transient::ID) {
+    if evidence.may_name(effects::ramp_edge_transient::ID) {
         let edge: Vec<Candidate> = [false, true].into_iter().filter_map(|at_end| edge(evidence, &still, at_end)).collect();
         let edge: Vec<Candidate> = edge.into_iter().filter(|edge| edge.p_value < 1e-6).collect();
         if !edge.is_empty() {
             return edge;
         }
     }
-    if evidence.is_real() && !evidence.accepted.contains(&effects::dc_offset::ID) {
+    if evidence.is_real() && evidence.may_name(effects::dc_offset::ID) {
         let offset = offset(evidence, &still);
         if offset.is_some() {
             return offset.into_iter().collect();
         }
     }
-    if evidence.accepted.contains(&effects::tx_leakage::ID) { vec![] } else { leakage(evidence, &still).into_iter().collect() }
+    if evidence.may_name(effects::tx_leakage::ID) { leakage(evidence, &still).into_iter().collect() } else { vec![] }
 }
 
 /// Held-out log-likelihood gained by taking a still term away, samples outside `range` untouched.

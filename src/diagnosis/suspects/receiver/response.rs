@@ -32,6 +32,8 @@ pub struct Found {
     pub likelihood: f64,
     /// The same of an additive term instead.
     pub additive: f64,
+    /// Chance that what it leaves of the static scene is as large, where it is the response: whitened, that is white noise.
+    pub chance: f64,
 }
 
 /// The best of the library's responses.
@@ -54,7 +56,8 @@ pub fn find(evidence: &Evidence, field: &Field, without: &[Vec<Complex64>]) -> O
         .collect();
     look_alikes.dedup();
     let candidate = search.candidate(best[0], p_value, look_alikes);
-    Some(Found { candidate, likelihood: top, additive })
+    let chance = search.process.chance(&field.still, &search.of_mean, (shape, best[0].2), search.rate);
+    Some(Found { candidate, likelihood: top, additive, chance })
 }
 
 /// A shape with its value, after the log-likelihood that it gains.
@@ -92,7 +95,7 @@ impl<'a> Search<'a> {
         let (samples, rate) = (self.evidence.cube.dims[4], self.rate);
         let tried: Vec<Tried> = SHAPES
             .iter()
-            .filter(|shape| !self.evidence.accepted.contains(&shape.id()))
+            .filter(|shape| self.evidence.may_name(shape.id()))
             .flat_map(|&shape| shape.grid(samples, rate).into_iter().map(move |value| (shape, value)))
             .collect::<Vec<_>>()
             .into_par_iter()
@@ -214,6 +217,24 @@ impl Process {
 
     /// Log-likelihood of chirps, of a variance of the noise each, behind a response.
     fn likelihood(&self, chirps: &[Vec<Complex64>], variance: &[f64], shape: Option<(Shape, f64)>, rate: f64) -> f64 {
+        self.whitened(chirps, variance, shape, rate)
+            .map_or(f64::NEG_INFINITY, |(energy, log_determinant)| -energy - chirps.len() as f64 * log_determinant)
+    }
+
+    /// Chance that whitened chirps have as much energy or more: half of a χ² of two degrees of freedom for each sample.
+    fn chance(&self, chirps: &[Vec<Complex64>], variance: &[f64], shape: (Shape, f64), rate: f64) -> f64 {
+        let freedom = (2 * chirps.len() * self.samples) as f64;
+        self.whitened(chirps, variance, Some(shape), rate).map_or(0.0, |(energy, _)| chi2_tail(2.0 * energy, freedom))
+    }
+
+    /// Energy of the chirps once they are white behind a response, and the log-determinant of a chirp's covariance.
+    fn whitened(
+        &self,
+        chirps: &[Vec<Complex64>],
+        variance: &[f64],
+        shape: Option<(Shape, f64)>,
+        rate: f64,
+    ) -> Option<(f64, f64)> {
         let samples = self.samples;
         let noise = variance.iter().sum::<f64>() / variance.len() as f64;
         let mut columns: Vec<Vec<Complex64>> = self
@@ -252,17 +273,15 @@ impl Process {
             }
             covariance[(row, row)] += Complex64::from(noise);
         }
-        let Some(factor) = covariance.cholesky() else { return f64::NEG_INFINITY };
+        let factor = covariance.cholesky()?;
         let lower = factor.l_dirty();
         let log_determinant: f64 = (0..samples).map(|n| 2.0 * lower[(n, n)].re.max(1e-300).ln()).sum();
-        chirps
-            .iter()
-            .map(|chirp| {
-                let chirp = DVector::from_column_slice(chirp);
-                let whitened = factor.l().solve_lower_triangular(&chirp).unwrap_or_else(|| DVector::zeros(samples));
-                -whitened.norm_squared() - log_determinant
-            })
-            .sum()
+        let lower = factor.l();
+        let energy = |chirp: &Vec<Complex64>| {
+            let whitened = lower.solve_lower_triangular(&DVector::from_column_slice(chirp));
+            whitened.unwrap_or_else(|| DVector::zeros(samples)).norm_squared()
+        };
+        Some((chirps.iter().map(energy).sum(), log_determinant))
     }
 }
 

@@ -20,6 +20,10 @@ use crate::effects::Stage;
 
 /// Share of what a free field explains that named elements must reach.
 const ENOUGH: f64 = 0.8;
+/// Held-out log-likelihood that a free field must gain, nats.
+const LEAST_GAIN: f64 = 20.0;
+/// Chance of what a filter leaves below which it is another filter, or more than one.
+const UNLIKELY: f64 = 1e-3;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(field) = Field::new(evidence) else { return vec![] };
@@ -45,7 +49,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         && found.likelihood >= ENOUGH * (free - 0.5 * field.freedom())
         && (!named || found.likelihood > found.additive)
     {
-        return vec![found.candidate.clone()];
+        let no_law = || if free_gain < LEAST_GAIN { None } else { unexplained(evidence, &field, p_free, free_gain) };
+        let found = if found.chance < UNLIKELY { no_law() } else { Some(found.candidate.clone()) };
+        return found.into_iter().collect();
     }
     if explained >= ENOUGH * free_gain {
         // The field is sure; what an element's numbers are is another question.
@@ -53,7 +59,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         let found = (0..elements.len()).filter_map(|index| chosen.candidate(index));
         return found.map(Candidate::named_if_sure).collect();
     }
-    if free_gain < 20.0 || bent {
+    if free_gain < LEAST_GAIN || bent {
         return vec![];
     }
     unexplained(evidence, &field, p_free, free_gain).into_iter().collect()

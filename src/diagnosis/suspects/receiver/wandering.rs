@@ -23,7 +23,8 @@ const FEWEST_FRAMES: usize = 4;
 const OPPOSITE: f64 = 1e-3;
 /// Share of the power at its range that a tone may leave: as in `spur`.
 const LEFT_OVER: f64 = 0.2;
-/// Standard deviations within which a tone stays at its beat frequency: 0.3 % of normal errors lie beyond.
+/// Standard deviations within which a tone stays at its beat frequency, between the halves of a recording and in its median frame:
+/// 0.3 % of normal errors lie beyond.
 const STAYS: f64 = 3.0;
 
 /// One Doppler frequency for each frame, at one beat frequency.
@@ -49,7 +50,11 @@ pub fn find(evidence: &Evidence) -> Option<Wandering> {
     let way = Way::of(evidence, &slow, fast);
     let amplitudes = amplitudes(&evidence.cube, &slow, fast);
     let stays = way.measured.abs() < STAYS * way.deviation;
-    if !stays || leaves_much(evidence, &slow, fast, &amplitudes) || has_opposite(evidence, &slow, fast, &amplitudes) {
+    if !stays
+        || !is_in_each(evidence, &slow, fast, &amplitudes)
+        || leaves_much(evidence, &slow, fast, &amplitudes)
+        || has_opposite(evidence, &slow, fast, &amplitudes)
+    {
         return None;
     }
     let count = (loops * samples) as f64;
@@ -200,6 +205,19 @@ pub fn deviation_bins(energy: f64) -> f64 {
     0.02f64.hypot(1.3 * (6.0 / energy.max(1.0)).sqrt() / TAU)
 }
 
+/// Whether half of the frames or more have the tone at its beat frequency. Limbs that swing about a range are found at one Doppler
+/// frequency or another in every frame, and anywhere in the cell.
+fn is_in_each(evidence: &Evidence, slow: &[f64], fast: f64, tone: &Grid<Complex64, 2>) -> bool {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let of_frame = |&frame: &usize| {
+        let off = (beat(evidence, &[frame], slow, fast) - fast) * samples as f64;
+        let own = tone.below([frame]).iter().zip(evidence.noise());
+        let energy = own.map(|(a, noise)| a.norm_sqr() / noise.max(1e-300)).sum::<f64>() * (loops * samples) as f64;
+        off.abs() / deviation_bins(energy)
+    };
+    median(&mut evidence.split.training.iter().map(of_frame).collect::<Vec<f64>>()) < STAYS
+}
+
 /// Whether the range has much of other velocities, as what turns or walks has.
 fn leaves_much(evidence: &Evidence, slow: &[f64], fast: f64, tone: &Grid<Complex64, 2>) -> bool {
     let [_, _, _, loops, samples] = evidence.cube.dims;
@@ -303,5 +321,12 @@ mod tests {
         }
         assert!(sure(find(&evidence(wanders, 0.0, true))).is_none());
         assert!(sure(find(&evidence(|_| 0.0, 0.0, false))).is_none());
+        // Elsewhere within the cell in each frame, and on average where it was.
+        let swings = Evidence::in_noise(radar.clone(), 4, |[frame, rx, index, n]| {
+            let turns = wanders(frame) * radar.chirp_time_s(0, 0, index) + 0.37 * frame as f64;
+            let bin = 12.0 + [0.3, -0.2, -0.3, 0.2][frame % 4];
+            Complex64::cis(TAU * (bin * n as f64 / 64.0 + turns) + rx as f64) * 2.0
+        });
+        assert!(sure(find(&swings)).is_none());
     }
 }

@@ -70,14 +70,14 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(chirps) = Chirps::new(evidence, model, body) else { return vec![] };
     let first = chirps.looks(0.0, [0.0; 2]);
     let mut found = vec![];
-    if !evidence.accepted.contains(&effects::chirp_droop::ID) {
+    if evidence.may_name(effects::chirp_droop::ID) {
         // What transmits tires; nothing gains power along a chirp.
         let falls = |found: &Estimated| found.values[0] < 0.0;
         found.extend(
             chirps.converged(&first, &[TILT]).filter(falls).map(|found| (found.likelihood, chirps.droop(evidence, &found))),
         );
     }
-    if !evidence.accepted.contains(&effects::chirp_nonlinearity::ID) {
+    if evidence.may_name(effects::chirp_nonlinearity::ID) {
         let once = chirps.converged(&first, &[BEND]);
         let changing = chirps
             .converged(&first, &[BEND, TREND])

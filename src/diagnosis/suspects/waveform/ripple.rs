@@ -109,7 +109,7 @@ fn support(evidence: &Evidence, frame: usize) -> [Option<[usize; 2]>; 2] {
 
 pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let radar = &evidence.radar;
-    if evidence.accepted.contains(&effects::chirp_ripple::ID) || evidence.is_real() || evidence.split.held_out.is_empty() {
+    if !evidence.may_name(effects::chirp_ripple::ID) || evidence.is_real() || evidence.split.held_out.is_empty() {
         return None;
     }
     let [frames, _, _, _, samples] = evidence.cube.dims;

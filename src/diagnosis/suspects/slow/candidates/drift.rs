@@ -13,7 +13,7 @@ use crate::effects;
 pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -> Candidate {
     let shape = drift.clone();
     let deviation: Deviation = Arc::new(move |[frame, _, _]| shape.value(frame));
-    let Description { id, estimates, statement } = describe(field, part, drift);
+    let Description { id, estimates, statement } = describe(evidence, field, part, drift);
     Candidate {
         id,
         behaves_like: behaves_like(part),
@@ -37,7 +37,7 @@ pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -
     }
 }
 
-fn describe(field: &Field, part: Part, drift: &Drift) -> Description {
+fn describe(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -> Description {
     let change = match drift.shape {
         Shape::Smooth(_) => drift.change(),
         Shape::Step([before, after], _) => after - before,
@@ -50,13 +50,9 @@ fn describe(field: &Field, part: Part, drift: &Drift) -> Description {
     match part {
         Part::Gain => {
             let db = gain_db(field, drift);
-            Description {
-                id: Some(effects::gain_drift::ID),
-                estimates: vec![Estimate::normal("db", db, 8.686 * drift.deviation)],
-                statement: format!(
-                    "The gain of the radar {how}, by {db:+.3} dB, the same at all ranges: all static returns share it."
-                ),
-            }
+            let estimates = vec![Estimate::normal("db", db, 8.686 * drift.deviation)];
+            let observed = format!("The gain of the radar {how}, by {db:+.3} dB, the same at all ranges");
+            Description::named(evidence, effects::gain_drift::ID, estimates, [observed, "all static returns share it".into()])
         }
         Part::Phase | Part::Boresight => {
             Description::unnamed(format!("The phase of all static returns {how}, by {change:+.4} rad, the same at all ranges."))

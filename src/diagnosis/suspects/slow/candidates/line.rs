@@ -79,20 +79,16 @@ impl Wave<'_> {
         let metres = evidence.radar.wavelength_m() / (4.0 * PI * along);
         let deviation = self.line.amplitude_deviation.hypot(PATTERN * self.amplitude);
         let where_ = if part == Part::Phase { "the same at all ranges" } else { "the more the farther ahead they are" };
-        Description {
-            id: Some(effects::radar_vibration::ID),
-            estimates: vec![
-                Estimate::normal("amplitude_m", self.amplitude * metres, deviation * metres),
-                Estimate::normal("frequency_hz", self.line.frequency_hz, self.line.frequency_deviation_hz),
-            ],
-            statement: format!(
-                "The phases of all static returns oscillate together, by {:.3} rad at {}, {where_}: the radar \
-                 itself vibrates by {:.1} µm along its boresight.",
-                self.amplitude,
-                self.hertz,
-                1e6 * self.amplitude * metres
-            ),
-        }
+        let estimates = vec![
+            Estimate::normal("amplitude_m", self.amplitude * metres, deviation * metres),
+            Estimate::normal("frequency_hz", self.line.frequency_hz, self.line.frequency_deviation_hz),
+        ];
+        let observed = format!(
+            "The phases of all static returns oscillate together, by {:.3} rad at {}, {where_}",
+            self.amplitude, self.hertz
+        );
+        let cause = format!("the radar itself vibrates by {:.1} µm along its boresight", 1e6 * self.amplitude * metres);
+        Description::named(evidence, effects::radar_vibration::ID, estimates, [observed, cause])
     }
 
     /// Of the local oscillator's frequency.

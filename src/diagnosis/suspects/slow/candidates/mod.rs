@@ -46,6 +46,15 @@ impl Description {
     pub fn unnamed(statement: String) -> Self {
         Self { id: None, estimates: vec![], statement }
     }
+
+    /// `observed`: what the deviation does, and `cause`: what that is. A deviation that any cause may have is observed without it, where the
+    /// library has no such effect.
+    pub fn named(evidence: &Evidence, id: &'static str, estimates: Vec<Estimate>, [observed, cause]: [String; 2]) -> Self {
+        match evidence.info(id) {
+            Some(_) => Self { id: Some(id), estimates, statement: format!("{observed}: {cause}.") },
+            None => Self::unnamed(format!("{observed}.")),
+        }
+    }
 }
 
 /// `spent`: nats per chirp on deviations that no law predicts.

@@ -22,7 +22,7 @@ pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random
         }
         (Part::Delay, two) => {
             let close = two.as_ref().is_some_and(|two| two.held_out_gain > one - UNDECIDED);
-            (phase_noise(random), if close { vec![effects::chirp_start_jitter::ID] } else { vec![] }, one)
+            (phase_noise(evidence, random), if close { vec![effects::chirp_start_jitter::ID] } else { vec![] }, one)
         }
         (part, _) => (common(part, random), vec![], one),
     };
@@ -57,30 +57,25 @@ fn most_probable(field: &Field, part: Part, random: &Random) -> (Deviation, f64)
 fn start_jitter(evidence: &Evidence, two: &Two) -> Description {
     let per_second = 1.0 / (2.0 * PI * evidence.radar.slope_hz_per_s);
     let jitter_s = two.distance * per_second;
-    Description {
-        id: Some(effects::chirp_start_jitter::ID),
-        estimates: vec![Estimate::normal("jitter_s", jitter_s, two.distance_error * per_second)],
-        statement: format!(
-            "Chirps start at one of two times, {:.2} ns apart ({:.0} % of them late), at random: the phase of every return \
-             jumps in proportion to its delay, by {:.4} rad at {STATED_AT_M} m.",
-            1e9 * jitter_s,
-            100.0 * two.share,
-            two.distance * stated_delay_s()
-        ),
-    }
+    let estimates = vec![Estimate::normal("jitter_s", jitter_s, two.distance_error * per_second)];
+    let observed = format!(
+        "The phase of every return jumps at random between two values in proportion to its delay, by {:.4} rad at {STATED_AT_M} m",
+        two.distance * stated_delay_s()
+    );
+    let cause =
+        format!("chirps start at one of two times, {:.2} ns apart ({:.0} % of them late)", 1e9 * jitter_s, 100.0 * two.share);
+    Description::named(evidence, effects::chirp_start_jitter::ID, estimates, [observed, cause])
 }
 
-fn phase_noise(random: &Random) -> Description {
+fn phase_noise(evidence: &Evidence, random: &Random) -> Description {
     let at_stated = random.deviation * stated_delay_s();
     let error = random.deviation_error * stated_delay_s();
-    Description {
-        id: Some(effects::phase_noise::ID),
-        estimates: vec![Estimate::normal("per_chirp_rad", at_stated, error)],
-        statement: format!(
-            "The phase of every return jitters at random from chirp to chirp in proportion to its delay, {at_stated:.4} rad \
-             (standard deviation) at {STATED_AT_M} m: phase noise of the local oscillator."
-        ),
-    }
+    let estimates = vec![Estimate::normal("per_chirp_rad", at_stated, error)];
+    let observed = format!(
+        "The phase of every return jitters at random from chirp to chirp in proportion to its delay, {at_stated:.4} rad (standard \
+         deviation) at {STATED_AT_M} m"
+    );
+    Description::named(evidence, effects::phase_noise::ID, estimates, [observed, "phase noise of the local oscillator".into()])
 }
 
 /// The same at all ranges.

@@ -18,8 +18,8 @@ type OfLoop = Arc<dyn Fn(usize) -> Complex64 + Send + Sync>;
 
 pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> Candidate {
     let transmitters = evidence.radar.tx_m.len();
-    let (named, free) = (settling.is_named(), &settling.free);
-    let deviation = deviation(settling);
+    let (named, free) = (is_named(evidence, settling), &settling.free);
+    let deviation = deviation(settling, named);
     let square: f64 = (0..field.loops).map(|i| deviation(i).norm_sqr()).sum::<f64>() * field.frames as f64;
     let energy = square * evidence.still().iter().map(|v| v.norm_sqr()).sum::<f64>();
     let Description { id, estimates, statement } = if named { decay(settling, transmitters as f64) } else { pattern(settling) };
@@ -48,10 +48,15 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
     }
 }
 
+/// A decay is a law of its own: without that effect only the free pattern is left.
+fn is_named(evidence: &Evidence, settling: &Settling) -> bool {
+    settling.is_named() && evidence.info(effects::chirp_settling::ID).is_some()
+}
+
 /// Of a decay from where the gain settles, of anything else from its mean over the frame.
-fn deviation(settling: &Settling) -> OfLoop {
+fn deviation(settling: &Settling, named: bool) -> OfLoop {
     let shape = settling.clone();
-    if settling.is_named() {
+    if named {
         Arc::new(move |index| shape.value(index) / (1.0 + shape.constant))
     } else {
         Arc::new(move |index| shape.free.values[index])
