@@ -6,7 +6,7 @@
 //! constant phase of its own (receivers that differ) does not lower it, but directions that change do where the reading is wrong. Of two
 //! readings the right one gains Σ (1 − cos Δ) over the other in a cell, in the mean and times the coherence, where Δ is by how much more
 //! they differ there than elsewhere; the parts of a body interfere, so each cell deviates from that. The test is the ratio estimator of
-//! the one over the other, with Student's law over cells (a main lobe is one, however many channels show the same return). Where the
+//! the one over the other, with Student's law over cells (two bins of either axis are one, as cells two bins apart correlate by 1/6 under a Hann window: Harris 1978). Where the
 //! body stays in one direction, only the constant phases themselves decide, which receivers that differ make by chance: they must then
 //! agree with the other reading nearly as a whole, over three channels at least.
 
@@ -171,7 +171,7 @@ fn agreements(evidence: &Evidence, readings: &[&Reading]) -> Option<Vec<Agreemen
     Some(agreements)
 }
 
-/// Visits the body's cells, a main lobe each.
+/// Visits the body's cells, two bins wide along either axis.
 fn each_cell(evidence: &Evidence, body: &BodyPrediction, readings: &[&Reading], see: &mut dyn FnMut(&Cell)) {
     let ([_, _, receivers, ..], channels, radar) = (evidence.cube.dims, evidence.cube.channels(), &evidence.radar);
     let all: Vec<usize> = (0..channels).collect();
@@ -198,7 +198,7 @@ fn each_cell(evidence: &Evidence, body: &BodyPrediction, readings: &[&Reading], 
         }
         let zero = || vec![vec![Complex64::ZERO; channels]; readings.len()];
         let new = || (Cell { observed: zero(), otherwise: zero() }, vec![0.0; channels]);
-        let (cell, scales) = cells.entry([row, bin].map(|index| index / (2 * HANN_LOBE))).or_insert_with(new);
+        let (cell, scales) = cells.entry([row, bin].map(|index| index / HANN_LOBE)).or_insert_with(new);
         for channel in 0..channels {
             let longer = |reading: &Reading| path(reading, point, velocity, channel) - path(reading, point, velocity, 0);
             let as_stated = longer(readings[0]);
