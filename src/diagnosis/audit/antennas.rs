@@ -6,9 +6,9 @@
 //! constant phase of its own (receivers that differ) does not lower it, but directions that change do where the reading is wrong. Of two
 //! readings the right one gains Σ (1 − cos Δ) over the other in a cell, in the mean and times the coherence, where Δ is by how much more
 //! they differ there than elsewhere; the parts of a body interfere, so each cell deviates from that. The test is the ratio estimator of
-//! the one over the other, with Student's law over cells (two bins of either axis are one, as cells two bins apart correlate by 1/6 under a Hann window: Harris 1978). Where the
-//! body stays in one direction, only the constant phases themselves decide, which receivers that differ make by chance: they must then
-//! agree with the other reading nearly as a whole, over three channels at least.
+//! the one over the other, with Student's law over cells, two bins wide along either axis (such cells correlate by 1/6 under a Hann
+//! window: Harris 1978). Where the body stays in one direction, only the constant phases themselves decide, which receivers that differ
+//! make by chance: they must then agree with the other reading nearly as a whole, over three channels at least.
 
 use std::collections::BTreeMap;
 
@@ -143,7 +143,7 @@ fn agreements(evidence: &Evidence, readings: &[&Reading]) -> Option<Vec<Agreemen
             sums.iter_mut().flatten().zip(values).for_each(|(sum, value)| *sum += value);
         }
     });
-    if observed[0].iter().any(|sum| *sum == Complex64::ZERO) {
+    if observed[0].contains(&Complex64::ZERO) {
         return None;
     }
     let phasors = |sums: &[Complex64]| sums.iter().map(|sum| sum / sum.norm().max(f64::MIN_POSITIVE)).collect::<Vec<_>>();
