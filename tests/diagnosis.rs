@@ -104,6 +104,16 @@ fn an_ignored_high_pass_is_named() {
     close(value(&report, "if_highpass", "corner_hz"), 350e3, 50e3);
 }
 
+/// Neither another filter nor what is added to all chirps leaves white noise where a high-pass filter was.
+#[test]
+fn a_filter_that_the_library_lacks_is_left_without_a_name() {
+    let Some(folder) = support::shared("recordings/planted/p5") else { return };
+    let config = DiagnosisConfig { left_out: vec!["if_highpass".into()], ..config() };
+    let report = diagnose(&Recording::open(&folder).unwrap(), &config, &mut |_| {}).unwrap().report;
+    assert!(report.effects.is_empty(), "{:?}", ids(&report));
+    assert!(report.unexplained[0].behaves_like == "additive fast-time", "{:?}", report.unexplained);
+}
+
 #[test]
 fn a_wrong_slope_is_named_or_among_what_looks_the_same() {
     let Some(report) = planted("p6") else { return };

@@ -129,7 +129,8 @@ fn compared(evidence: &Evidence, stated: &Reading, others: &[Reading], by_phases
     Some((format!("array phases fit {} (coherence {best:.2}, as stated {:.2})", names.join(", or "), as_is.coherence), false))
 }
 
-/// The stated reading comes first. None where nothing of the body is observed.
+/// The stated reading comes first. None where nothing of the body is observed. Cells are visited twice, for the constant phases and for the
+/// alignment to them: all of them by reading and channel would not be bounded.
 fn agreements(evidence: &Evidence, readings: &[&Reading]) -> Option<Vec<Agreement>> {
     let channels = evidence.cube.channels();
     let body = evidence.body.as_ref().filter(|_| channels > 1)?;
@@ -175,11 +176,16 @@ fn agreements(evidence: &Evidence, readings: &[&Reading]) -> Option<Vec<Agreemen
 fn each_cell(evidence: &Evidence, body: &BodyPrediction, readings: &[&Reading], see: &mut dyn FnMut(&Cell)) {
     let ([_, _, receivers, ..], channels, radar) = (evidence.cube.dims, evidence.cube.channels(), &evidence.radar);
     let all: Vec<usize> = (0..channels).collect();
-    let path = |reading: &Reading, point: &Point, velocity: f64, channel: usize| {
-        let (slot, lane) = (channel / receivers, channel % receivers);
+    // By how much the path of each channel is longer than the first one's.
+    let longer = |reading: &Reading, point: &Point, velocity: f64| -> Vec<f64> {
         let at = mirrored(point, reading.mirrored, radar.position_m);
-        let moved = 2.0 * velocity * slot as f64 * radar.chirp_period_s;
-        distance(at, radar.tx_position_m(reading.tx[slot])) + distance(at, radar.rx_position_m(reading.rx[lane])) + moved
+        let path = |channel: usize| {
+            let (slot, lane) = (channel / receivers, channel % receivers);
+            let moved = 2.0 * velocity * slot as f64 * radar.chirp_period_s;
+            distance(at, radar.tx_position_m(reading.tx[slot])) + distance(at, radar.rx_position_m(reading.rx[lane])) + moved
+        };
+        let first = path(0);
+        (0..channels).map(|channel| path(channel) - first).collect()
     };
     let mut now = 0;
     let mut cells: BTreeMap<[usize; 2], (Cell, Vec<f64>)> = BTreeMap::new();
@@ -199,14 +205,12 @@ fn each_cell(evidence: &Evidence, body: &BodyPrediction, readings: &[&Reading], 
         let zero = || vec![vec![Complex64::ZERO; channels]; readings.len()];
         let new = || (Cell { observed: zero(), otherwise: zero() }, vec![0.0; channels]);
         let (cell, scales) = cells.entry([row, bin].map(|index| index / HANN_LOBE)).or_insert_with(new);
-        for channel in 0..channels {
-            let longer = |reading: &Reading| path(reading, point, velocity, channel) - path(reading, point, velocity, 0);
-            let as_stated = longer(readings[0]);
-            scales[channel] += (seen[channel] * seen[0].conj()).norm();
-            for (index, reading) in readings.iter().enumerate() {
-                let longer = longer(reading);
+        scales.iter_mut().zip(seen).for_each(|(scale, own)| *scale += (own * seen[0].conj()).norm());
+        let as_stated = longer(readings[0], point, velocity);
+        for (index, reading) in readings.iter().enumerate() {
+            for (channel, longer) in longer(reading, point, velocity).into_iter().enumerate() {
                 let observed = aligned(seen[channel], seen[0], longer, radar);
-                let phase = std::f64::consts::TAU * (longer - as_stated) / radar.wavelength_m();
+                let phase = std::f64::consts::TAU * (longer - as_stated[channel]) / radar.wavelength_m();
                 cell.observed[index][channel] += observed;
                 cell.otherwise[index][channel] += Complex64::from_polar(observed.norm(), phase);
             }

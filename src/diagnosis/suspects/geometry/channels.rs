@@ -85,15 +85,14 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
 /// The way in which the receivers differ, if they do.
 fn differ(evidence: &Evidence, array: &Array, displaced: bool) -> Option<Candidate> {
     let accepted = |id: &str| evidence.accepted.contains(&id);
-    let may_name = |id: &str| evidence.may_name(id);
     // What is common to the receivers says nothing of them where it is not the body's; and those that differed were
     // brought to the first one's, a neighbour's part included.
     let alike = !displaced && !accepted(effects::channel_mismatch::ID);
-    let may_couple = alike && may_name(effects::mutual_coupling::ID);
+    let may_couple = alike && evidence.may_name(effects::mutual_coupling::ID);
     let coupled = if may_couple { coupling::find(evidence, array) } else { None };
     let differ = [
         if alike { mismatch::find(evidence, array) } else { None },
-        if displaced || !may_name(effects::antenna_position::ID) { None } else { places::find(evidence, array) },
+        if displaced || !evidence.may_name(effects::antenna_position::ID) { None } else { places::find(evidence, array) },
         if may_couple { coupling::one_way(evidence, array, coupled.as_ref()) } else { None },
         coupled,
     ];

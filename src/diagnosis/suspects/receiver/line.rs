@@ -9,7 +9,7 @@ use crate::diagnosis::Evidence;
 use crate::diagnosis::evidence::beat::empty_bins;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::locate::Residual;
-use crate::diagnosis::power::Cells;
+use crate::diagnosis::power::{Cells, STILL_BINS};
 use crate::diagnosis::statistics::median;
 
 /// Range bins that a mover must have passed during the recording.
@@ -17,8 +17,6 @@ const LEAVES_BINS: f64 = 6.0;
 /// Where lines are looked for, in cells of both axes: one between two cells shows only half of its power in either.
 const BETWEEN: [[usize; 2]; 4] = [[0, 0], [0, 1], [1, 0], [1, 1]];
 
-/// Doppler bins around zero where a Hann window leaves static clutter.
-const STILL_BINS: usize = 2;
 /// Fewest others of which a median is taken.
 const FEWEST_ROWS: usize = 8;
 

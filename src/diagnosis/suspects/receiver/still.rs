@@ -44,25 +44,22 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let bent = is_bent(evidence);
     let filter = if plain || bent { None } else { response::find(evidence, &field, &without) };
     // What is added explains itself as well as any filter does; a filter's traces it does not.
-    if let Some(found) = &filter
-        && found.likelihood > 12.0
-        && found.likelihood >= ENOUGH * (free - 0.5 * field.freedom())
-        && (!named || found.likelihood > found.additive)
-    {
-        let no_law = || if free_gain < LEAST_GAIN { None } else { unexplained(evidence, &field, p_free, free_gain) };
-        let found = if found.chance < UNLIKELY { no_law() } else { Some(found.candidate.clone()) };
-        return found.into_iter().collect();
+    let filter = filter.filter(|found| {
+        found.likelihood > 12.0
+            && found.likelihood >= ENOUGH * (free - 0.5 * field.freedom())
+            && (!named || found.likelihood > found.additive)
+    });
+    match filter {
+        Some(found) if found.chance >= UNLIKELY => vec![found.candidate],
+        None if explained >= ENOUGH * free_gain => {
+            // The field is sure; what an element's numbers are is another question.
+            let chosen = Chosen { evidence, field: &field, images: &images, elements: &elements, fitted: &fitted };
+            let found = (0..elements.len()).filter_map(|index| chosen.candidate(index));
+            found.map(Candidate::named_if_sure).collect()
+        }
+        _ if free_gain < LEAST_GAIN || bent => vec![],
+        _ => unexplained(evidence, &field, p_free, free_gain).into_iter().collect(),
     }
-    if explained >= ENOUGH * free_gain {
-        // The field is sure; what an element's numbers are is another question.
-        let chosen = Chosen { evidence, field: &field, images: &images, elements: &elements, fitted: &fitted };
-        let found = (0..elements.len()).filter_map(|index| chosen.candidate(index));
-        return found.map(Candidate::named_if_sure).collect();
-    }
-    if free_gain < LEAST_GAIN || bent {
-        return vec![];
-    }
-    unexplained(evidence, &field, p_free, free_gain).into_iter().collect()
 }
 
 /// Still chirps less what the elements make of them.

@@ -10,12 +10,11 @@ use rayon::prelude::*;
 
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::{Evidence, hann};
+use crate::diagnosis::power::STILL_BINS;
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median, normal_tails};
 use crate::diagnosis::suspects::climb::climb;
 use crate::grid::Grid;
 
-/// Doppler bins around zero where a Hann window leaves static clutter.
-const STILL_BINS: usize = 2;
 /// Fewest loops and training frames that show a Doppler frequency and a way.
 const FEWEST_LOOPS: usize = 8;
 const FEWEST_FRAMES: usize = 4;
@@ -47,8 +46,8 @@ pub fn find(evidence: &Evidence) -> Option<Wandering> {
     let (bin, p_line) = most_steady(evidence)?;
     let slow: Vec<f64> = (0..frames).map(|frame| strongest_doppler(evidence, frame, bin) as f64 / loops as f64).collect();
     let (slow, fast) = refined(evidence, slow, bin as f64 / samples as f64);
-    let way = Way::of(evidence, &slow, fast);
     let amplitudes = amplitudes(&evidence.cube, &slow, fast);
+    let way = Way::of(evidence, &slow, fast, &amplitudes);
     let stays = way.measured.abs() < STAYS * way.deviation;
     if !stays
         || !is_in_each(evidence, &slow, fast, &amplitudes)
@@ -158,19 +157,12 @@ struct Way {
 }
 
 impl Way {
-    fn of(evidence: &Evidence, slow: &[f64], fast: f64) -> Self {
-        let [_, _, _, loops, samples] = evidence.cube.dims;
+    fn of(evidence: &Evidence, slow: &[f64], fast: f64, tone: &Grid<Complex64, 2>) -> Self {
+        let samples = evidence.cube.dims[4];
         let training = &evidence.split.training;
         let halves = training.split_at(training.len() / 2);
         let [early, late] = [halves.0, halves.1].map(|frames| beat(evidence, frames, slow, fast) * samples as f64);
-        let amplitudes = amplitudes(&evidence.cube, slow, fast);
-        let energy = |frames: &[usize]| -> f64 {
-            let of_frame = |&frame: &usize| -> f64 {
-                let own = amplitudes.below([frame]);
-                own.iter().zip(evidence.noise()).map(|(a, noise)| a.norm_sqr() / noise.max(1e-300)).sum()
-            };
-            frames.iter().map(of_frame).sum::<f64>() * (loops * samples) as f64
-        };
+        let energy = |frames: &[usize]| frames.iter().map(|&frame| energy(evidence, tone, frame)).sum::<f64>();
         let radar = &evidence.radar;
         let bins_per_turn = 0.5 * radar.wavelength_m() / radar.range_resolution_m() / radar.loop_period_s();
         let wrapped = |turns: f64| turns - turns.round();
@@ -199,6 +191,13 @@ impl Way {
     }
 }
 
+/// Of the tone in a frame, over the noise.
+fn energy(evidence: &Evidence, tone: &Grid<Complex64, 2>, frame: usize) -> f64 {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let own = tone.below([frame]).iter().zip(evidence.noise());
+    own.map(|(a, noise)| a.norm_sqr() / noise.max(1e-300)).sum::<f64>() * (loops * samples) as f64
+}
+
 /// Of a frequency, in bins, from a tone's energy over the noise: Cramér and Rao's bound with a Hann window's loss, and a fiftieth of a bin
 /// for all else.
 pub fn deviation_bins(energy: f64) -> f64 {
@@ -208,12 +207,9 @@ pub fn deviation_bins(energy: f64) -> f64 {
 /// Whether half of the frames or more have the tone at its beat frequency. Limbs that swing about a range are found at one Doppler
 /// frequency or another in every frame, and anywhere in the cell.
 fn is_in_each(evidence: &Evidence, slow: &[f64], fast: f64, tone: &Grid<Complex64, 2>) -> bool {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
     let of_frame = |&frame: &usize| {
-        let off = (beat(evidence, &[frame], slow, fast) - fast) * samples as f64;
-        let own = tone.below([frame]).iter().zip(evidence.noise());
-        let energy = own.map(|(a, noise)| a.norm_sqr() / noise.max(1e-300)).sum::<f64>() * (loops * samples) as f64;
-        off.abs() / deviation_bins(energy)
+        let off = (beat(evidence, &[frame], slow, fast) - fast) * evidence.cube.dims[4] as f64;
+        off.abs() / deviation_bins(energy(evidence, tone, frame))
     };
     median(&mut evidence.split.training.iter().map(of_frame).collect::<Vec<f64>>()) < STAYS
 }
