@@ -21,17 +21,10 @@ const TURNS: [Behaviour; 3] = [Behaviour::SlowTimePhase, Behaviour::DelayProport
 const SHAKEN: f64 = 0.5;
 const FADING: Behaviour = Behaviour::SlowTimeGain;
 
-/// What is cut out where it is plain, and goes on below the noise.
-const BURSTS: [&str; 2] = [effects::interference::ID, effects::impulsive_noise::ID];
-
-/// And what a path that was taken out roughly leaves below the noise looks like the faintest of these, or like a faint path anywhere.
-const FAINT: [&str; 5] = [
-    effects::interference::ID,
-    effects::chirp_start_jitter::ID,
-    effects::phase_noise::ID,
-    effects::correlated_noise::ID,
-    effects::spur::ID,
-];
+/// What a path that was taken out roughly leaves below the noise looks like the faintest of these, like noise that receivers share, or
+/// like a faint path anywhere.
+const FAINT: [&str; 4] =
+    [effects::interference::ID, effects::chirp_start_jitter::ID, effects::phase_noise::ID, effects::spur::ID];
 
 /// Products of the signal with itself, of which either is hardly taken out in full: one that was never there makes the other.
 const PRODUCTS: [&str; 2] = [effects::object_radar_object::ID, effects::second_harmonic::ID];
@@ -76,6 +69,11 @@ pub fn is_by_chirp(candidate: &Candidate) -> bool {
 /// Whether it differs between receivers: what others leave, or leaves what others are, unless those were there before.
 pub fn is_of_receivers(candidate: &Candidate) -> bool {
     candidate.place.stage == Some(OF_RECEIVERS)
+}
+
+/// Whether it is a law of the noise where nothing returns, which whatever is left of anything bends.
+pub fn is_of_noise(candidate: &Candidate) -> bool {
+    matches!(candidate.behaves_like, Behaviour::NoiseOverBeatFrequency | Behaviour::NoiseSharedByReceivers)
 }
 
 /// Whether it explains a little of whatever is near the body.
@@ -129,10 +127,13 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let image = timed && is_one_of(candidate, &IMAGES);
     let hardly = timed && candidate.id == Some(effects::carried_reflector::ID);
     let products = is_product(accepted) && is_product(candidate);
-    // What bursts leave below the noise of single samples is in all receivers at once.
-    let bursts = is_one_of(accepted, &BURSTS) && candidate.id == Some(effects::correlated_noise::ID);
+    // Bursts are cut out where they are plain: what they leave below the noise of single samples is in all receivers at once.
+    let shared = candidate.behaves_like == Behaviour::NoiseSharedByReceivers;
+    let bursts = accepted.behaves_like == Behaviour::SparseAdditive && shared;
     let path_like = accepted.behaves_like.is_path();
-    let faint = path_like && (is_one_of(candidate, &FAINT) || is_path(candidate));
+    let faint = path_like && (is_one_of(candidate, &FAINT) || shared || is_path(candidate));
+    // What has no name is modelled roughly.
+    let bent = accepted.id.is_none() && !is_of_noise(accepted) && is_of_noise(candidate);
     // What moves as no single reflector does was taken out along one track: what else of it moves with the body is left, and a line
     // where it stays longest.
     let no_single = is_path(accepted) && accepted.id.is_none();
@@ -141,12 +142,12 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let smeared = vibrates || timed || is_by_chirp(accepted) || path_like;
     let uneven = (smeared || is_one_of(accepted, &OF_REMAINS)) && is_of_receivers(candidate);
     // Chirps that start at random differ from their neighbours, and go on doing so a little.
-    let unlike = is_by_chirp(accepted) && is_one_of(candidate, &BURSTS);
+    let unlike = is_by_chirp(accepted) && candidate.behaves_like == Behaviour::SparseAdditive;
     // Up to which share of what was gained.
     [
         (roughly || fades || image || unlike, ROUGHLY),
         (bursts || behind || line, 1.0),
-        (hardly || uneven || is_mixed_or_cut(accepted, candidate) || products || alone, f64::INFINITY),
+        (hardly || uneven || bent || is_mixed_or_cut(accepted, candidate) || products || alone, f64::INFINITY),
         (shaken || rest, SHAKEN),
         (by_chirp || faint, SLIGHTLY),
     ]
@@ -157,8 +158,8 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
 /// Whether it is in the noise as an accepted correction mixes it, or in the products of a signal that is cut.
 fn is_mixed_or_cut(accepted: &Candidate, candidate: &Candidate) -> bool {
     // To undo a coupling of receivers mixes their noise, and chirps read between their samples have less of it.
-    let mixed = is_of_receivers(accepted) && candidate.id == Some(effects::correlated_noise::ID)
-        || accepted.id == Some(effects::chirp_nonlinearity::ID) && candidate.id == Some(effects::coloured_noise::ID);
+    let mixed = is_of_receivers(accepted) && candidate.behaves_like == Behaviour::NoiseSharedByReceivers
+        || accepted.id == Some(effects::chirp_nonlinearity::ID) && candidate.behaves_like == Behaviour::NoiseOverBeatFrequency;
     // A signal that is cut and cannot be restored has products of all returns along every chirp, and other ones in every receiver.
     let cut = accepted.id == Some(effects::adc_saturation::ID)
         && matches!(accepted.correction, Correction::None)

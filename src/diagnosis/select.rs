@@ -15,7 +15,9 @@ use super::config::DiagnosisConfig;
 use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
-use super::remains::{ROUGHLY, is_by_chirp, is_left_by, is_of_receivers, is_of_remains, is_product, is_rough, is_same};
+use super::remains::{
+    ROUGHLY, is_by_chirp, is_left_by, is_of_noise, is_of_receivers, is_of_remains, is_product, is_rough, is_same,
+};
 use super::suspects::{SUSPECTS, Suspect, by_suspect, strongest_suspicion};
 use precedence::{is_displaced, is_echo, upstream};
 use said::{said_by, suspicions};
@@ -227,12 +229,13 @@ impl Rounds<'_> {
     }
 
     /// What a radar that vibrates leaves, or paths of what differs between receivers, or that of their noise, is less than there
-    /// was before; and a tone or a product that was there before is no remains.
+    /// was before; and a tone, a product or a law of the noise that was there before is no remains. What has no name was there before,
+    /// too, and bent what differs between receivers as much as what is left of it does.
     fn was_there(&self, effect: &Accepted, candidate: &Candidate) -> bool {
         let as_much = |&(id, gain): &(&str, f64)| candidate.id == Some(id) && candidate.gain > NEARLY * gain;
         let vibrates = effect.candidate.id == Some(effects::radar_vibration::ID);
-        let of_receivers = is_of_receivers(candidate) || is_of_receivers(&effect.candidate);
-        (vibrates || of_receivers || candidate.id == Some(effects::spur::ID) || is_product(candidate))
+        let of_receivers = is_of_receivers(candidate) && effect.candidate.id.is_some() || is_of_receivers(&effect.candidate);
+        (vibrates || of_receivers || candidate.id == Some(effects::spur::ID) || is_product(candidate) || is_of_noise(candidate))
             && self.at_first.iter().flatten().any(as_much)
     }
 }

@@ -1,6 +1,8 @@
 //! Where in beat frequency the room and the body can be.
 
-use super::Evidence;
+use num_complex::Complex64;
+
+use super::{Evidence, spectrum};
 use crate::radar::SPEED_OF_LIGHT;
 
 /// Clearance before the nearest and behind the farthest surface: antennas off the reference point, surfaces that are
@@ -10,6 +12,8 @@ const CLEARANCE_M: f64 = 0.3;
 const CLEARANCE_SHARE: f64 = 0.05;
 /// The window's main lobe, cells to each side.
 const LOBE: usize = 3;
+/// Power over that of the noise, from which on something stands still at a beat frequency: 10 dB, a factor of e^10 in likelihood.
+const STANDS: f64 = 10.0;
 
 /// Round-trip beat frequency of a range.
 pub fn beat_hz(evidence: &Evidence, range_m: f64) -> f64 {
@@ -47,4 +51,20 @@ pub fn empty_bins(evidence: &Evidence) -> Vec<bool> {
         // Without a room, the negative half and its edges stay clear of near parents only.
         None => (0..samples).map(|_| false).collect(),
     }
+}
+
+/// Beat frequencies at which nothing stands still, where nobody says how large the room is: what is there is below the noise of a chirp
+/// by as much as all chirps together have less of it.
+pub fn quiet_bins(evidence: &Evidence) -> Vec<bool> {
+    let [.., loops, samples] = evidence.cube.dims;
+    let spectra: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(spectrum).collect();
+    let chirps = (loops * evidence.split.training.len()).max(1) as f64;
+    let is_quiet = |bin: usize| {
+        let power = |(spectrum, noise): (&Vec<Complex64>, &f64)| spectrum[bin].norm_sqr() * chirps / noise.max(f64::MIN_POSITIVE);
+        spectra.iter().zip(evidence.noise()).map(power).sum::<f64>() < STANDS * spectra.len() as f64
+    };
+    let quiet: Vec<bool> = (0..samples).map(is_quiet).collect();
+    let beside = |bin: usize| (0..=2 * LOBE).all(|step| quiet[(bin + samples + step - LOBE) % samples]);
+    let noise_bins = evidence.noise_bins();
+    (0..samples).map(|bin| noise_bins.contains(&bin) && beside(bin)).collect()
 }

@@ -23,7 +23,7 @@ pub(super) fn is_displaced(candidate: &Candidate) -> bool {
 /// Whether it acts on every return, or on all of the body. What has no name does where nobody is tracked: most ranges share it then.
 fn is_on_all(candidate: &Candidate, evidence: &Evidence) -> bool {
     let id = candidate.id.unwrap_or_default();
-    (!id.is_empty() || evidence.body.is_none())
+    (!id.is_empty() || evidence.body.is_none() || is_displaced(candidate))
         && (id == effects::radar_vibration::ID
             || is_displaced(candidate)
             || candidate.place.stage.is_some_and(|stage| UPSTREAM.contains(&stage)))

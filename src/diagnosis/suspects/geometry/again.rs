@@ -128,6 +128,7 @@ mod tests {
 
     use super::super::displaced;
     use super::*;
+    use crate::diagnosis::behaviour::Behaviour;
     use crate::diagnosis::cube::Loaded;
     use crate::diagnosis::{BodyPrediction, Candidate, Correction, Evidence, Point};
     use crate::radar::{Radar, SPEED_OF_LIGHT};
@@ -214,5 +215,23 @@ mod tests {
             let again = found(&evidence.changed());
             assert!(again.is_none(), "after {found_first:?} still {again:?}");
         }
+    }
+
+    #[test]
+    fn a_body_elsewhere_is_observed_and_named_by_what_the_library_has() {
+        let lacking = |ids: &[&str]| {
+            let mut evidence = evidence(None);
+            evidence.library = evidence.library.iter().copied().filter(|info| !ids.contains(&info.id)).collect();
+            let body = evidence.body.as_mut().unwrap();
+            body.frames.iter_mut().flatten().for_each(|point| point.position_m[1] += 0.15);
+            found(&evidence.changed()).expect("nothing found")
+        };
+        assert_eq!(lacking(&[]).id, Some(effects::range_bias::ID));
+        let all = [effects::range_bias::ID, effects::slope_error::ID, effects::pose_offset::ID];
+        let clocks = [effects::clock_offset::ID, effects::clock_drift::ID, effects::frame_drop::ID];
+        let unknown = lacking(&[all, clocks].concat());
+        assert!(unknown.id.is_none() && unknown.estimates.is_empty() && unknown.look_alikes.is_empty(), "{unknown:?}");
+        assert_eq!(unknown.behaves_like, Behaviour::RangeOffset);
+        assert!(unknown.statement.contains("nearer"), "{}", unknown.statement);
     }
 }

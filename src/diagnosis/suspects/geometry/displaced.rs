@@ -11,10 +11,10 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::again;
 use super::change::{Change, Moves, frame_period_s};
-use super::fitted::{Fitted, refine};
+use super::fitted::{ALIKE_NATS, Fitted, refine};
+use super::lost::{is_step, lost_frames, predicted, ratio_p_value, step_p_value};
 use super::trial::{Score, Trial};
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::prediction::BEYOND;
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};
 use crate::effects::{Stage, clock_drift, clock_offset, frame_drop, pose_offset, range_bias, slope_error};
 
@@ -26,8 +26,6 @@ const CLOCK_FLOOR_S: f64 = 2e-3;
 const SCENE: f64 = 1.9;
 /// Standard deviation of a clock's offset between the poses, in frame periods.
 const CLOCK_ROUGH: f64 = 0.08;
-/// Alternatives within so many nats are said to be indistinguishable.
-const ALIKE_NATS: f64 = 4.6;
 /// Ranges looked at first.
 const RANGE_GRID_M: [f64; 11] = [-0.4, -0.3, -0.2, -0.12, -0.06, 0.0, 0.06, 0.12, 0.2, 0.3, 0.4];
 /// Times looked at first, in frame periods: a walking body leaves its cells in half of one.
@@ -39,11 +37,6 @@ const DRIFT_GRID: [f64; 7] = [-0.1, -0.03, -0.01, 0.0, 0.01, 0.03, 0.1];
 const UNSEEN_M: f64 = 0.2;
 /// Kinds of change that can be told apart, for the correction of the p-value.
 const KINDS: f64 = 3.0;
-/// Frames that a step must be followed by: one alone may have been bad.
-const FEWEST_AFTER: usize = 2;
-/// How overconfident the likelihood of a step is: cells are not independent, and the power model is rough.
-const STEP_INFLATION: f64 = 3.0;
-
 /// Errors of clocks.
 const TIMING: [&str; 3] = [clock_offset::ID, clock_drift::ID, frame_drop::ID];
 /// Displacements along the line of sight.
@@ -79,12 +72,15 @@ fn alternatives(trial: &Trial, null: &Score) -> Vec<Fitted> {
     fitted.extend(again::best(trial, &coarse));
     fitted.extend(lost_frames(trial, null));
     // Clocks that were set right leave a motion that is known less well, which looks like another error of the clocks.
-    if TIMING.iter().any(|id| accepted.contains(id)) {
+    let unnamed = &trial.evidence.accepted_unnamed;
+    if TIMING.iter().any(|id| accepted.contains(id)) || unnamed.contains(&Behaviour::TimeOffset) {
         fitted.retain(|fit| !TIMING.contains(&fit.id));
     }
     // A ramp's slope is wrong by no more than the library allows it.
     let most_slope = slope_error::INFO.parameters[0].most;
-    fitted.retain(|fit| trial.evidence.may_name(fit.id) && (fit.id != slope_error::ID || fit.value.abs() <= most_slope));
+    fitted.retain(|fit| fit.id != slope_error::ID || fit.value.abs() <= most_slope);
+    let told = |stage: Stage| stage != Stage::Propagation && unnamed.contains(&behaves_like(stage));
+    fitted.retain(|fit| !accepted.contains(&fit.id) && !told(stage(fit.score.change)));
     fitted
 }
 
@@ -123,7 +119,8 @@ fn clocks(trial: &Trial, coarse: &[usize], null: &Score) -> Vec<Fitted> {
     fitted
 }
 
-/// Of several alternatives, compared where all of them know the motion, where there is such a frame.
+/// Of several alternatives, compared where all of them know the motion, where there is such a frame. One without a name only where none
+/// with a name is hardly told from it.
 fn best<'a>(trial: &Trial, fitted: &'a [Fitted], null: &Score) -> Option<&'a Fitted> {
     let training = &trial.evidence.split.training;
     let known = |frame: &usize| fitted.iter().all(|fit| fit.score.known[*frame]);
@@ -134,7 +131,13 @@ fn best<'a>(trial: &Trial, fitted: &'a [Fitted], null: &Score) -> Option<&'a Fit
         let occam = if fit.id == pose_offset::ID { 1.5 * (training.len() as f64).ln() * fit.inflation } else { 0.0 };
         fit.score.gain_over(null, common) - occam
     };
-    fitted.iter().max_by(|a, b| gain(a).total_cmp(&gain(b)))
+    let named = |fit: &&Fitted| trial.evidence.info(fit.id).is_some();
+    let of = |fitted: Vec<&'a Fitted>| fitted.into_iter().max_by(|a, b| gain(a).total_cmp(&gain(b)));
+    let leading: Vec<&Fitted> = fitted.iter().filter(|fit| is_step(trial, fit)).collect();
+    let best_named = of(leading.iter().copied().filter(named).collect());
+    let best = of(leading)?;
+    let close = |other: &&Fitted| (gain(best) - gain(other)) / best.inflation < ALIKE_NATS;
+    Some(best_named.filter(close).unwrap_or(best))
 }
 
 /// What this recording hardly tells from the best alternative.
@@ -159,61 +162,6 @@ fn best_of(trial: &Trial, frames: &[usize], values: impl Iterator<Item = f64>, c
         .0
 }
 
-/// The step in time that explains most: from one frame on, a few frames later.
-fn lost_frames(trial: &Trial, null: &Score) -> Option<Fitted> {
-    let frames: Vec<usize> = (0..trial.evidence.cube.dims[0]).collect();
-    let training = &trial.evidence.split.training;
-    let mut best: Option<(f64, Change)> = None;
-    let most_lost = most_lost(frames.len());
-    for count in 1..=most_lost {
-        // All frames later by so many: what follows the step, whenever it is.
-        let later = trial.score(Change::Drop { at: 0, count }, training, false);
-        for at in 2..frames.len().saturating_sub(FEWEST_AFTER - 1) {
-            let after: Vec<usize> = training.iter().copied().filter(|&frame| frame >= at).collect();
-            let gain = later.gain_over(null, &after);
-            if best.is_none_or(|(most, _)| gain > most) {
-                best = Some((gain, Change::Drop { at, count }));
-            }
-        }
-    }
-    let (_, change) = best?;
-    let Change::Drop { at, count } = change else { return None };
-    // The weights were those of the unchanged body: with their own, other places and counts may be better.
-    let interesting = step_p_value(trial.score(change, training, true).gain_over(null, training), frames.len()) < 0.05;
-    let (reach, counts) = if interesting { (4, 1..=most_lost) } else { (0, count..=count) };
-    let near = counts.flat_map(|count| (at.saturating_sub(reach).max(1)..=at + reach).map(move |at| Change::Drop { at, count }));
-    let change = near
-        .filter(|change| matches!(change, Change::Drop { at, .. } if *at < frames.len()))
-        .map(|change| (trial.score(change, training, true).gain_over(null, training), change))
-        .max_by(|a, b| a.0.total_cmp(&b.0))?
-        .1;
-    let Change::Drop { at, count } = change else { return None };
-    // Held-out frames beside the date say themselves whether they came before or after it.
-    let held_out = |frame: &usize| !training.contains(frame);
-    let earlier = (1..at).rev().take_while(held_out);
-    let later = (at..frames.len() - 1).take_while(held_out).map(|frame| frame + 1);
-    let scores = earlier.chain(later).chain([at]).map(|at| trial.score(Change::Drop { at, count }, &frames, true));
-    let score = scores.max_by(|a, b| a.gain_over(null, &frames).total_cmp(&b.gain_over(null, &frames)))?;
-    Some(Fitted { id: frame_drop::ID, value: count as f64, deviation: 0.0, floor: 0.0, inflation: STEP_INFLATION, score })
-}
-
-/// Log-likelihood gain of frames from which the change was not estimated: the held-out ones. Where the motion is known in none of
-/// these after a step, the training frames with the weights of the body as it was.
-fn predicted(trial: &Trial, fit: &Fitted, null: &Score) -> f64 {
-    let held_out = &trial.evidence.split.held_out;
-    let Change::Drop { at, .. } = fit.score.change else { return fit.score.gain_over(null, held_out) };
-    let known = |frames: &[usize]| -> Vec<usize> {
-        frames.iter().copied().filter(|&frame| frame < at || fit.score.known[frame]).collect()
-    };
-    let after = |frames: &[usize]| frames.iter().any(|&frame| frame >= at);
-    let unseen = known(held_out);
-    if after(&unseen) || !after(held_out) {
-        return fit.score.gain_over(null, &unseen);
-    }
-    let training = known(&trial.evidence.split.training);
-    trial.score(fit.score.change, &training, false).gain_over(null, &training)
-}
-
 /// Under the null: a value beyond its floor by so many deviations; for a step, so much gained.
 fn p_value(fit: &Fitted, null: &Score, training: &[usize]) -> f64 {
     if let Change::Drop { .. } = fit.score.change {
@@ -231,23 +179,6 @@ fn p_value(fit: &Fitted, null: &Score, training: &[usize]) -> f64 {
     }
     let tail = StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| 2.0 * law.sf(t.max(0.0)));
     crate::diagnosis::statistics::corrected(tail.min(1.0), KINDS)
-}
-
-/// Most frames lost at once that are looked for among so many.
-fn most_lost(frames: usize) -> usize {
-    BEYOND.min(frames / 2)
-}
-
-/// A rule of thumb: a ratio of likelihoods of fixed laws would exceed e^x by chance with probability e^-x at most, and the
-/// weights that are fitted here are the same in number with and without the step. On 150 recordings without anything
-/// missing (two sealed sets that had been opened) the largest log-likelihood gain was 1.2 nats; from 30 on this is below 0.01.
-fn step_p_value(gain: f64, frames: usize) -> f64 {
-    ratio_p_value(gain, STEP_INFLATION, (most_lost(frames) * frames).max(1) as f64)
-}
-
-/// Of the best of several ratios of likelihoods (nats), which are overconfident by a factor.
-fn ratio_p_value(gain: f64, inflation: f64, tried: f64) -> f64 {
-    crate::diagnosis::statistics::corrected((-gain / inflation).exp().min(1.0), tried)
 }
 
 fn mean_range_m(trial: &Trial) -> f64 {
@@ -272,78 +203,100 @@ fn deviation(trial: &Trial, fit: &Fitted) -> f64 {
     fit.deviation.hypot(0.5 * fit.floor).hypot(rough)
 }
 
-/// Numbers, stage and statement of a change. `deviation`: of its value.
-fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> (Vec<Estimate>, Stage, String) {
+fn stage(change: Change) -> Stage {
+    match change {
+        Change::Range(_) | Change::Offset(_) => Stage::Scene,
+        Change::Scale(_) => Stage::Waveform,
+        Change::Clock(_) | Change::Drift(_) | Change::Drop { .. } => Stage::Timing,
+        Change::Again(_) => Stage::Propagation,
+    }
+}
+
+fn behaves_like(stage: Stage) -> Behaviour {
+    match stage {
+        Stage::Timing => Behaviour::TimeOffset,
+        Stage::Propagation => Behaviour::PathLike,
+        _ => Behaviour::RangeOffset,
+    }
+}
+
+/// Numbers of a change, and what is observed of it and what that is. `deviation`: of its value.
+fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> (Vec<Estimate>, [String; 2]) {
     let normal = |name| vec![Estimate::normal(name, fit.value, deviation)];
-    match fit.score.change {
+    let (estimates, observed, cause) = match fit.score.change {
         Change::Range(_) => (
             normal("offset_m"),
-            Stage::Scene,
-            format!("The body appears {} than it stands, at whatever range.", farther(fit.value)),
+            format!("The body appears {} than it stands", farther(fit.value)),
+            "all ranges are wrong by as much".into(),
         ),
         Change::Scale(_) => (
             normal("relative"),
-            Stage::Waveform,
             format!(
-                "Ranges are stretched by {:.2} %: the ramp climbs by that much faster than stated, {:.1} mm at the body's mean range.",
+                "Ranges are stretched by {:.2} %, {:.1} mm at the body's mean range",
                 1e2 * fit.value,
                 1e3 * fit.value * mean_range_m(trial)
             ),
+            "the ramp climbs by that much faster than stated".into(),
         ),
         Change::Offset(_) => (
             vec![Estimate::list("offset_m", &[0.0, fit.value, 0.0], &[UNSEEN_M, deviation, UNSEEN_M])],
-            Stage::Scene,
-            format!("The body stands {} along boresight than stated.", farther(fit.value)),
+            format!("The body appears {} along boresight", farther(fit.value)),
+            "it stands there, not where stated".into(),
         ),
         Change::Clock(_) => (
             normal("offset_s"),
-            Stage::Timing,
             format!(
-                "The body is {:.0} ms {} in its motion than the clocks say: the error grows with each limb's velocity.",
+                "The body is {:.0} ms {} in its motion than stated, and its error grows with each limb's velocity",
                 1e3 * fit.value.abs(),
                 if fit.value > 0.0 { "later" } else { "earlier" }
             ),
+            "the clocks of the motion and the radar differ".into(),
         ),
         Change::Drift(_) => (
             normal("relative"),
-            Stage::Timing,
-            format!("The motion's clock runs {:.2} % faster than the radar's.", 1e2 * fit.value),
+            format!("The motion runs {:.2} % faster than stated", 1e2 * fit.value),
+            "its clock does, against the radar's".into(),
         ),
         Change::Again(echo) => {
             let (estimates, statement) = again::described(trial, echo, fit.value, deviation);
-            (estimates, Stage::Propagation, statement)
+            return (estimates, [statement, String::new()]);
         }
         Change::Drop { at, count } => (
             vec![Estimate::normal("at", at as f64, 1.5), Estimate::normal("count", count as f64, 0.0)],
-            Stage::Timing,
-            format!("From frame {at} on the body is {count} frame(s) later in its motion: frames were lost there."),
+            format!("From frame {at} on the body is {count} frame(s) later in its motion"),
+            "frames were lost there".into(),
         ),
-    }
+    };
+    (estimates, [observed, cause])
 }
 
 fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, gain: f64) -> Candidate {
     let (evidence, change) = (trial.evidence, fit.score.change);
-    let (estimates, stage, statement) = described(trial, fit, deviation(trial, fit).hypot(SCENE * fit.floor));
+    let (estimates, [observed, cause]) = described(trial, fit, deviation(trial, fit).hypot(SCENE * fit.floor));
+    let stage = stage(change);
     let place = match change {
         Change::Drop { at, .. } => Place { frames: Some((at..evidence.cube.dims[0]).collect()), ..Place::at(stage) },
         Change::Again(echo) => again::place(trial, echo),
         _ => Place::at(stage),
     };
     let moves = Moves::new(evidence.radar.centre_m());
+    // That the body is elsewhere is observed; the library says why.
+    let id = evidence.info(fit.id).map(|info| info.id);
+    let statement = match (id, cause.is_empty()) {
+        (_, true) => observed,
+        (Some(_), _) => format!("{observed}: {cause}."),
+        (None, _) => format!("{observed}."),
+    };
     Candidate {
-        id: Some(fit.id),
-        behaves_like: match stage {
-            Stage::Timing => Behaviour::TimeOffset,
-            Stage::Propagation => Behaviour::PathLike,
-            _ => Behaviour::RangeOffset,
-        },
-        estimates,
+        id,
+        behaves_like: behaves_like(stage),
+        estimates: if id.is_some() { estimates } else { vec![] },
         choice: place.boundary.clone(),
         place,
         p_value,
         gain,
         errs_alike: true,
-        look_alikes,
+        look_alikes: if id.is_some() { look_alikes } else { vec![] },
         statement,
         curve: None,
         energy: energy(evidence),

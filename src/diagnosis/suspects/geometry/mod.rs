@@ -10,6 +10,7 @@ mod covariance;
 mod displaced;
 mod fitted;
 mod found;
+mod lost;
 mod mismatch;
 mod numbers;
 mod places;

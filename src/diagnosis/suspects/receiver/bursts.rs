@@ -28,8 +28,10 @@ const UNSEEN: f64 = 5.0;
 const NEXT: f64 = 6.0;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let [frames, _, rx, loops, samples] = evidence.cube.dims;
-    if loops < 8 || evidence.accepted.iter().any(|id| [interference::ID, impulsive_noise::ID, adc_saturation::ID].contains(id)) {
+    let [frames, _, _, loops, samples] = evidence.cube.dims;
+    let known = evidence.accepted.iter().any(|id| [interference::ID, impulsive_noise::ID, adc_saturation::ID].contains(id))
+        || evidence.accepted_unnamed.contains(&Behaviour::SparseAdditive);
+    if loops < 8 || known {
         return vec![];
     }
     let channels = evidence.cube.channels();
@@ -66,10 +68,10 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if gain <= 0.0 {
         return vec![];
     }
-    let Claim { id, look_alikes, estimates, place, statement } = claim(&bursts, hit, rx, crossings.as_ref());
+    let Claim { id, look_alikes, estimates, place, statement } = claim(evidence, &bursts, hit, crossings.as_ref());
     let volume = Volume { of_samples: Some(Arc::new(spread(evidence, &bursts, &powers))), ..Volume::KEPT };
     vec![Candidate {
-        id: Some(id),
+        id,
         behaves_like: Behaviour::SparseAdditive,
         estimates,
         choice: None,
@@ -87,15 +89,16 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
 
 /// What is said of bursts.
 struct Claim {
-    id: &'static str,
+    id: Option<&'static str>,
     look_alikes: Vec<&'static str>,
     estimates: Vec<Estimate>,
     place: Place,
     statement: String,
 }
 
-/// Another radar, or impulses; `hit`: samples of all bursts.
-fn claim(bursts: &[Burst], hit: usize, rx: usize, crossings: Option<&Crossings>) -> Claim {
+/// Another radar, or impulses, or what the library has no name for; `hit`: samples of all bursts.
+fn claim(evidence: &Evidence, bursts: &[Burst], hit: usize, crossings: Option<&Crossings>) -> Claim {
+    let rx = evidence.cube.dims[2];
     // Hits of one chirp in all receivers at once are one burst.
     let places: BTreeSet<(usize, usize, usize)> =
         bursts.iter().map(|burst| (burst.frame, burst.channel / rx, burst.chirp)).collect();
@@ -111,23 +114,26 @@ fn claim(bursts: &[Burst], hit: usize, rx: usize, crossings: Option<&Crossings>)
     };
     let lengths: f64 = hit as f64 / bursts.len() as f64;
     let single = lengths < 2.0;
-    let (id, look_alikes) = match (seen_by_all, single) {
-        (true, false) => (interference::ID, vec![]),
+    // Where there is one receiver, only its extent says what a burst is.
+    let (id, look_alikes) = match (seen_by_all || rx == 1 && !single, single) {
+        (true, false) => (interference::ID, if rx == 1 { vec![impulsive_noise::ID] } else { vec![] }),
         (true, true) => (interference::ID, vec![impulsive_noise::ID]),
-        (false, true) => (impulsive_noise::ID, vec![]),
+        (false, true) => (impulsive_noise::ID, if rx == 1 { vec![interference::ID] } else { vec![] }),
         (false, false) => (impulsive_noise::ID, vec![interference::ID]),
     };
-    let count = places.len() as f64;
-    let estimates = if id == interference::ID { vec![bursts_in_all(count, crossings)] } else { vec![] };
-    let statement = if id == interference::ID {
-        format!(
-            "{count} chirps hold a burst of {lengths:.0} samples that all receivers see at once and that neither the chirp before \
-             nor after has: another radar crosses the band",
-        )
+    let named = evidence.info(id).is_some();
+    let (count, number) = (places.len() as f64, bursts.len());
+    let estimates = if named && id == interference::ID { vec![bursts_in_all(count, crossings)] } else { vec![] };
+    let (observed, cause) = if id == interference::ID {
+        let all = if rx > 1 { "that all receivers see at once and " } else { "" };
+        let observed =
+            format!("{count} chirps hold a burst of {lengths:.0} samples {all}that neither the chirp before nor after has");
+        (observed, "another radar crosses the band")
     } else {
-        format!("{} single samples of {count} chirps stand far above the noise, each in one receiver: impulses", bursts.len())
+        (format!("{number} single samples of {count} chirps stand far above the noise, each in one receiver"), "impulses")
     };
-    Claim { id, look_alikes, estimates, place, statement }
+    let statement = if named { format!("{observed}: {cause}") } else { observed };
+    Claim { id: named.then_some(id), look_alikes, estimates, place, statement }
 }
 
 /// How unlikely it is that a sample is hit, and by so much, where another would have had noise: each burst's samples are measured
@@ -292,5 +298,14 @@ mod tests {
         // them through three times.
         let price = clean - after;
         assert!((price - 0.135).abs() < 0.02, "{price}");
+    }
+
+    #[test]
+    fn bursts_are_observed_where_the_library_has_no_name_for_them() {
+        let mut evidence = evidence(100.0);
+        evidence.library = evidence.library.iter().copied().filter(|info| info.id != interference::ID).collect();
+        let found = find(&evidence).pop().expect("bursts");
+        assert!(found.id.is_none() && found.behaves_like == Behaviour::SparseAdditive && found.estimates.is_empty());
+        assert!(find(&evidence.with(&found)).is_empty());
     }
 }

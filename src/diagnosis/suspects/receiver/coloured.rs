@@ -1,7 +1,9 @@
-//! Noise whose power over beat frequency follows a law with a knee, as 1/f noise does, beside white noise.
+//! Noise whose power differs between beat frequencies: after a law with a knee, as 1/f noise has beside white noise, or after none.
 
 use rayon::prelude::*;
 
+use super::shares::Shares;
+use super::support::UNLIKELY;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
@@ -12,6 +14,8 @@ use crate::effects::{self, Stage};
 const SHARED: f64 = 4.0;
 /// How well a real noise follows the law, as a logarithm's deviation.
 const LAW: f64 = 0.05;
+/// Bands of beat frequency that noise without a law is compared in.
+const BANDS: usize = 8;
 
 /// Over beat frequencies, the power that training frames have over the noise.
 struct Powers {
@@ -41,6 +45,42 @@ impl Powers {
         Fit { likelihood, level, shape }
     }
 
+    /// The best law with a knee, and its chance where there is none.
+    fn law(&self, rate: f64) -> Option<(Top, f64)> {
+        let white = self.fit(0.0, 1.0).likelihood;
+        let likelihood =
+            |[knee, power]: [f64; 2]| if knee < 0.5 * rate { self.fit(knee, power).likelihood } else { f64::NEG_INFINITY };
+        let grid = (0..40).flat_map(|i| (1..=10).map(move |j| (i, j)));
+        let grid = grid.map(|(i, j)| [0.05 * self.step * 1.22f64.powi(i), 0.25 * f64::from(j)]);
+        let first = grid.max_by(|a, b| likelihood(*a).total_cmp(&likelihood(*b)))?;
+        let top = climb(likelihood, first);
+        let p_value = corrected(chi2_tail(2.0 * (top.height - white), 2.0), 20.0);
+        Some((top, p_value))
+    }
+
+    /// Beat frequencies of a band.
+    fn width(&self) -> usize {
+        self.found.len().div_ceil(BANDS)
+    }
+
+    /// A level for each band, in the place of a law.
+    fn banded(&self) -> Fit {
+        let level = self.found.iter().sum::<f64>() / self.found.len() as f64;
+        let bands = self.found.chunks(self.width());
+        let of_band = |band: &[f64]| vec![band.iter().sum::<f64>() / band.len() as f64 / level; band.len()];
+        let shape: Vec<f64> = bands.flat_map(of_band).collect();
+        let likelihood = shape.iter().map(|s| -(level * s).ln() - 1.0).sum::<f64>() * self.count;
+        Fit { likelihood, level, shape }
+    }
+
+    /// Chance that what noise of a shape has over it differs so much between bands.
+    fn chance_beyond(&self, shape: &[f64]) -> f64 {
+        let flat = Self { found: self.found.iter().zip(shape).map(|(p, s)| p / s).collect(), hertz: vec![], ..*self };
+        let (fit, all) = (flat.banded(), flat.found.len());
+        let white = (-fit.level.ln() - 1.0) * all as f64 * self.count;
+        chi2_tail(2.0 * (fit.likelihood - white), all.div_ceil(self.width()) as f64 - 1.0)
+    }
+
     fn curve(self, fit: &Fit) -> Curve {
         let Self { hertz, found, .. } = self;
         Curve {
@@ -64,41 +104,93 @@ pub fn coloured(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     let found = spectrum(evidence, &evidence.split.training, bins);
     let count = per_frame * evidence.split.training.len() as f64;
     let powers = Powers { hertz, found, step: rate / samples as f64, count };
-    let white = powers.fit(0.0, 1.0);
-    let likelihood =
-        |[knee, power]: [f64; 2]| if knee < 0.5 * rate { powers.fit(knee, power).likelihood } else { f64::NEG_INFINITY };
-    let grid: Vec<[f64; 2]> = (0..40)
-        .flat_map(|i| (1..=10).map(move |j| [0.05 * rate / samples as f64 * 1.22f64.powi(i), 0.25 * f64::from(j)]))
-        .collect();
-    let first = grid.into_iter().max_by(|a, b| likelihood(*a).total_cmp(&likelihood(*b)))?;
-    let top = climb(likelihood, first);
-    let p_value = corrected(chi2_tail(2.0 * (top.height - white.likelihood), 2.0), 20.0);
-    if p_value > 1e-3 {
-        return None;
-    }
-    let fit = powers.fit(top.at[0], top.at[1]);
     let held = spectrum(evidence, &evidence.split.held_out, bins);
-    let gain: f64 = held
-        .iter()
-        .zip(&fit.shape)
-        .map(|(p, s)| -(fit.level * s).ln() - p / (fit.level * s) + white.level.ln() + p / white.level)
-        .sum::<f64>()
-        * (per_frame * evidence.split.held_out.len() as f64);
-    Some(candidate(evidence, powers, &top, &fit, p_value, gain))
+    let held_count = per_frame * evidence.split.held_out.len() as f64;
+    let white = powers.fit(0.0, 1.0).level;
+    // Of the held-out frames' log-likelihood, over noise that is level.
+    let gain = |fit: &Fit| {
+        let levels = held.iter().zip(&fit.shape).map(|(p, s)| (p, fit.level * s));
+        levels.map(|(p, level)| white.ln() + p / white - level.ln() - p / level).sum::<f64>() * held_count
+    };
+    let is_there = |fit: &Fit, p_value: f64| p_value < UNLIKELY && is_everywhere(evidence, bins, fit);
+    let law = evidence.info(effects::coloured_noise::ID).and_then(|_| powers.law(rate)).map(|(top, p_value)| {
+        let fit = powers.fit(top.at[0], top.at[1]);
+        (top, fit, p_value)
+    });
+    if let Some((top, fit, p_value)) = law
+        && is_there(&fit, p_value)
+        && powers.chance_beyond(&fit.shape) > UNLIKELY
+    {
+        let (gain, energy) = (gain(&fit), energy(evidence, &powers, &fit));
+        return Some(named(powers, &top, &fit, Evident { p_value, gain, energy }));
+    }
+    let p_value = corrected(powers.chance_beyond(&vec![1.0; bins.len()]), 2.0);
+    let fit = powers.banded();
+    is_there(&fit, p_value).then(|| {
+        let (gain, energy) = (gain(&fit), energy(evidence, &powers, &fit));
+        unnamed(powers, &fit, Evident { p_value, gain, energy })
+    })
 }
 
-fn candidate(evidence: &Evidence, powers: Powers, top: &Top, fit: &Fit, p_value: f64, gain: f64) -> Candidate {
-    let [knee, power] = top.at;
+/// Whether most Doppler rows, most beat frequencies and most frames have a shape.
+fn is_everywhere(evidence: &Evidence, bins: &[usize], fit: &Fit) -> bool {
+    let [frames, _, _, loops, samples] = evidence.cube.dims;
+    let mean = fit.shape.iter().sum::<f64>() / fit.shape.len() as f64;
+    let mut shares = Shares::new([samples, loops, frames]);
+    for &frame in &evidence.split.training {
+        for channel in 0..evidence.cube.channels() {
+            let map = evidence.range_doppler(frame, channel);
+            let level = evidence.noise()[channel].max(1e-300) * fit.level * mean;
+            for (&bin, shape) in bins.iter().zip(&fit.shape) {
+                let deviation = shape / mean - 1.0;
+                for row in 3..loops - 2 {
+                    let has = map[row * samples + bin].norm_sqr() / level - 1.0;
+                    shares.add([bin, row, frame], deviation * has, deviation * deviation);
+                }
+            }
+        }
+    }
+    shares.are_everywhere()
+}
+
+/// How sure a shape of the noise is, and how much it adds.
+struct Evident {
+    p_value: f64,
+    gain: f64,
+    energy: f64,
+}
+
+/// Beyond the noise's level.
+fn energy(evidence: &Evidence, powers: &Powers, fit: &Fit) -> f64 {
     let excess = powers.found.iter().sum::<f64>() / powers.found.len() as f64 / fit.level - 1.0;
     let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
+    excess.max(0.0) * fit.level * noise * evidence.cube.samples.len() as f64
+}
+
+fn named(powers: Powers, top: &Top, fit: &Fit, evident: Evident) -> Candidate {
+    let [knee, power] = top.at;
     let of = |name: &'static str, value: f64, deviation: f64| {
         let factor = (1.645 * deviation.hypot(LAW)).exp();
         Estimate { name, values: vec![value], ci90: vec![[value / factor, value * factor]] }
     };
     Candidate {
         id: Some(effects::coloured_noise::ID),
-        behaves_like: Behaviour::NoiseOverBeatFrequency,
         estimates: vec![of("knee_hz", knee, top.deviations[0]), of("power", power, top.deviations[1])],
+        statement: format!(
+            "the noise rises towards low beat frequencies, by 3 dB at {:.0} kHz and with the power {power:.2} of the frequency below: \
+             thermal noise would be level",
+            knee * 1e-3
+        ),
+        ..unnamed(powers, fit, evident)
+    }
+}
+
+fn unnamed(powers: Powers, fit: &Fit, Evident { p_value, gain, energy }: Evident) -> Candidate {
+    let (low, high) = fit.shape.iter().fold((f64::INFINITY, 0.0f64), |(low, high), &s| (low.min(s), high.max(s)));
+    Candidate {
+        id: None,
+        behaves_like: Behaviour::NoiseOverBeatFrequency,
+        estimates: vec![],
         choice: None,
         place: Place::at(Stage::Noise),
         p_value,
@@ -106,12 +198,11 @@ fn candidate(evidence: &Evidence, powers: Powers, top: &Top, fit: &Fit, p_value:
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
-            "the noise rises towards low beat frequencies, by 3 dB at {:.0} kHz and with the power {power:.2} of the frequency below: \
-             thermal noise would be level",
-            knee * 1e-3
+            "the noise's power differs by {:.1} dB between bands of beat frequency, where thermal noise would be level",
+            10.0 * (high / low.max(1e-300)).log10()
         ),
         curve: Some(powers.curve(fit)),
-        energy: excess.max(0.0) * fit.level * noise * evidence.cube.samples.len() as f64,
+        energy,
         correction: Correction::None,
     }
 }

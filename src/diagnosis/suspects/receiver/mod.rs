@@ -14,6 +14,7 @@ pub mod noise;
 pub mod open;
 pub mod rail;
 pub mod response;
+mod shares;
 pub mod slip;
 mod slow_spur;
 pub mod spur;

@@ -8,13 +8,14 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::coloured::coloured;
+use super::shares::Shares;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::folds;
-use crate::diagnosis::evidence::beat::empty_bins;
+use crate::diagnosis::evidence::beat::{empty_bins, quiet_bins, ranges_m};
 use crate::diagnosis::evidence::{hann, transform_under};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
-use crate::diagnosis::statistics::{chi2_tail, corrected, median};
+use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::effects::{self, Stage};
 
 /// A cell's power over the noise, beyond which it is a mover's.
@@ -27,10 +28,6 @@ const PER_PRODUCT: f64 = 35.0 / 18.0;
 /// Least correlation: far below a hundredth it does not matter, and the tails of movers begin to count.
 const LEAST_RHO: f64 = 0.005;
 
-/// Share of the correlation that the middle one of all Doppler rows, of all beat frequencies, and of all frames must have:
-/// what a mover's side lobes or some bursts share lies in a few of them.
-const EVERYWHERE: f64 = 0.4;
-
 /// Cells that are looked at.
 struct Cells {
     /// Windows' maps, `[channel][cell]`.
@@ -40,7 +37,7 @@ struct Cells {
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let empty = empty_bins(evidence);
+    let empty = if ranges_m(evidence).is_some() { empty_bins(evidence) } else { quiet_bins(evidence) };
     let samples = evidence.cube.dims[4];
     let bins: Vec<usize> = (2..samples - 1).filter(|&bin| empty[bin]).collect();
     if bins.len() < 8 || evidence.cube.dims[3] < 16 {
@@ -82,25 +79,19 @@ fn cells(evidence: &Evidence, frame: usize, bins: &[usize]) -> Cells {
 
 /// Whether most Doppler rows, most beat frequencies and most frames share a correlation between the receivers.
 fn is_everywhere(evidence: &Evidence, bins: &[usize], found: &DMatrix<Complex64>) -> bool {
-    let (rx, loops, samples) = (evidence.cube.dims[2], evidence.cube.dims[3], evidence.cube.dims[4]);
+    let [frames, _, rx, loops, samples] = evidence.cube.dims;
     let pairs: Vec<(usize, usize)> = pairs_of(rx).collect();
     let whole: f64 = pairs.iter().map(|&pair| found[pair].norm_sqr()).sum();
-    let (mut by_bin, mut by_row) = (vec![(0.0, 0.0); samples], vec![(0.0, 0.0); loops]);
-    let mut by_frame = vec![(0.0, 0.0); evidence.cube.dims[0]];
+    let mut shares = Shares::new([samples, loops, frames]);
     for &frame in &evidence.split.training {
         let cells = cells(evidence, frame, bins);
-        for (cell, [bin, row]) in cells.places.iter().enumerate() {
+        for (cell, &[bin, row]) in cells.places.iter().enumerate() {
             let value = |c: usize| cells.values[c][cell];
             let along: f64 = pairs.iter().map(|&(a, b)| (found[(a, b)].conj() * value(a) * value(b).conj()).re).sum();
-            for sums in [&mut by_bin[*bin], &mut by_row[*row], &mut by_frame[frame]] {
-                *sums = (sums.0 + along, sums.1 + whole);
-            }
+            shares.add([bin, row, frame], along, whole);
         }
     }
-    [by_bin, by_row, by_frame].into_iter().all(|sums| {
-        let mut shares: Vec<f64> = sums.into_iter().filter(|sums| sums.1 > 0.0).map(|sums| sums.0 / sums.1).collect();
-        median(&mut shares) > EVERYWHERE
-    })
+    shares.are_everywhere()
 }
 
 /// What receivers share, summed over cells.
@@ -206,10 +197,12 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     let error = (2.0 * independent * pairs).sqrt().recip() + 0.02 * rho;
     let over = if alike { "mean" } else { "root mean square" };
     let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
+    // That receivers share something is observed; the library says what.
+    let id = evidence.info(effects::correlated_noise::ID).map(|info| info.id);
     Some(Candidate {
-        id: Some(effects::correlated_noise::ID),
+        id,
         behaves_like: Behaviour::NoiseSharedByReceivers,
-        estimates: vec![Estimate::normal("rho", rho, error)],
+        estimates: id.map(|_| Estimate::normal("rho", rho, error)).into_iter().collect(),
         choice: None,
         place: Place::at(Stage::Noise),
         p_value,
@@ -308,5 +301,47 @@ mod tests {
         // 72 products: a standard error of 0.12.
         let mean = (0..12).map(of_frame).sum::<f64>() / 72.0;
         assert!((0.65..1.35).contains(&mean), "{mean}");
+    }
+
+    /// Noise of two receivers, whose power over beat frequency (bins from zero, to either side) is so many times what it is elsewhere.
+    fn shaped(power: impl Fn(f64) -> f64) -> Evidence {
+        let mut radar = Radar::small(12);
+        (radar.loops_per_frame, radar.samples_per_chirp) = (32, 64);
+        (radar.tx_m, radar.rx_m) = (vec![[0.0; 3]], vec![[0.0; 3], [0.0019, 0.0, 0.0]]);
+        let mut random = ChaCha8Rng::seed_from_u64(11);
+        let inverse = rustfft::FftPlanner::new().plan_fft_inverse(64);
+        let mut samples = vec![];
+        for _ in 0..12 * 2 * 32 {
+            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+            let mut chirp: Vec<Complex64> =
+                (0..64usize).map(|bin| Complex64::new(normal(), normal()) * power(bin.min(64 - bin) as f64).sqrt()).collect();
+            inverse.process(&mut chirp);
+            samples.extend(chirp);
+        }
+        Evidence::new(Loaded::of_samples(radar, samples, [-1e3, 1e3]), None, None)
+    }
+
+    #[test]
+    fn colour_has_a_name_where_it_follows_the_law_and_the_library_has_it() {
+        let bins: Vec<usize> = (2..63).collect();
+        let knee = |bin: f64| 1.0 + 6.0 / bin.max(0.5);
+        let law = coloured(&shaped(knee), &bins).expect("a colour");
+        assert_eq!(law.id, Some(effects::coloured_noise::ID));
+        // A quarter of the band is louder by 2 dB: no knee has that.
+        let other = coloured(&shaped(|bin| if (16.0..24.0).contains(&bin) { 1.6 } else { 1.0 }), &bins).expect("a colour");
+        assert!(other.id.is_none() && other.estimates.is_empty() && other.gain > 15.0, "{other:?}");
+        assert!(coloured(&shaped(|_| 1.0), &bins).is_none());
+        let mut lacks_it = shaped(knee);
+        lacks_it.library = lacks_it.library.iter().copied().filter(|info| info.id != effects::coloured_noise::ID).collect();
+        let unknown = coloured(&lacks_it, &bins).expect("a colour");
+        assert!(unknown.id.is_none() && unknown.gain > 15.0, "{unknown:?}");
+    }
+
+    #[test]
+    fn what_receivers_share_is_observed_where_the_library_has_no_name_for_it() {
+        let mut evidence = noise(|_, _| 0.3);
+        evidence.library = evidence.library.iter().copied().filter(|info| info.id != effects::correlated_noise::ID).collect();
+        let found = correlated(&evidence, &(2..63).collect::<Vec<_>>()).expect("nothing found");
+        assert!(found.id.is_none() && found.behaves_like == Behaviour::NoiseSharedByReceivers && found.gain > 15.0);
     }
 }

@@ -287,28 +287,30 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
     let beat = ZeroBeat::new(evidence, &term, variance);
     let channels = still.len();
     let (near_spread, far_spread) = (near.spread(near.peak), near.spread(near.far));
+    // What has less delay than the way between the nearest antennas is a constant, which the library may lack.
+    let constant = !evidence.is_real() && beat.may_be_constant() && !beat.may_be_leakage();
+    let id = (!constant || evidence.may_name(effects::dc_offset::ID)).then_some(effects::tx_leakage::ID);
+    let estimates = vec![Estimate::normal("range_m", range, 0.3 * resolution), Estimate::normal("level_db", level_db, 1.0)];
     Some(Candidate {
-        id: Some(effects::tx_leakage::ID),
+        id,
         behaves_like: Behaviour::AdditiveFastTime,
-        estimates: vec![Estimate::normal("range_m", range, 0.3 * resolution), Estimate::normal("level_db", level_db, 1.0)],
+        estimates: if id.is_some() { estimates } else { vec![] },
         choice: None,
         place: Place { range_m: Some([0.0, near.valley as f64 * near.bin_m]), ..Place::at(Stage::Receiver) },
         p_value: chi2_tail(2.0 * near.over_noise(near.peak) * channels as f64, 2.0 * channels as f64),
         gain: gain(evidence, &term),
         errs_alike: false,
-        look_alikes: [
-            (near.as_reflectors() > SIGNIFICANCE, effects::static_reflector::ID),
-            (!evidence.is_real() && beat.may_be_constant() && !beat.may_be_leakage(), effects::dc_offset::ID),
-        ]
-        .into_iter()
-        .filter_map(|(holds, id)| holds.then_some(id))
-        .collect(),
+        look_alikes: [(near.as_reflectors() > SIGNIFICANCE, effects::static_reflector::ID), (constant, effects::dc_offset::ID)]
+            .into_iter()
+            .filter_map(|(holds, id)| holds.then_some(id))
+            .collect(),
         statement: format!(
             "a strong return {range:.2} m away that never changes, {:.0} dB above the range sidelobes behind it; it differs by \
              {near_spread:.0} dB between the {channels} channels, while the strongest far return ({:.1} m) differs by \
-             {far_spread:.0} dB: the transmitters leak into the receivers",
+             {far_spread:.0} dB{}",
             near.depth_db(),
             near.far as f64 * near.bin_m,
+            if id.is_some() { ": the transmitters leak into the receivers" } else { "" },
         ),
         curve: None,
         energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * loops) as f64,

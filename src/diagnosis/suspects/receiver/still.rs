@@ -11,7 +11,7 @@ use super::elements::{Element, Images, choose, templates};
 use super::field::{Field, Fitted, add};
 use super::response;
 use super::still_term::{Chosen, is_bent, subtract};
-use super::support::energy;
+use super::support::{UNLIKELY, energy};
 use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Place};
@@ -22,8 +22,6 @@ use crate::effects::Stage;
 const ENOUGH: f64 = 0.8;
 /// Held-out log-likelihood that a free field must gain, nats.
 const LEAST_GAIN: f64 = 20.0;
-/// Chance of what a filter leaves below which it is another filter, or more than one.
-const UNLIKELY: f64 = 1e-3;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(field) = Field::new(evidence) else { return vec![] };

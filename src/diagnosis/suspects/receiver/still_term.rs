@@ -8,8 +8,9 @@ use num_complex::Complex64;
 use super::elements::{Element, Images, columns, refine, templates, unknowns};
 use super::field::{Field, Fitted, add};
 use super::support::{beat_hz, energy, range_m};
+use super::zero_beat::shortest_m;
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Cube, Evidence, denoised};
 use crate::effects::{self, Stage};
@@ -62,7 +63,7 @@ impl Chosen<'_> {
         };
         let [frames, _, _, loops, _] = evidence.cube.dims;
         Some(Candidate {
-            id: Some(id),
+            id,
             behaves_like: Behaviour::AdditiveFastTime,
             estimates,
             choice: None,
@@ -126,7 +127,7 @@ impl Chosen<'_> {
         let error = vec![deviation * 3.0 / (samples as f64).sqrt(); rx];
         let (i, q) = (each(|a| a.re), each(|a| a.im));
         Claim {
-            id: effects::dc_offset::ID,
+            id: Some(effects::dc_offset::ID),
             estimates: vec![Estimate::list("i", &i, &error), Estimate::list("q", &q, &error)],
             place: Place { range_m: Some([0.0, 0.0]), ..Place::at(Stage::Receiver) },
             statement: format!(
@@ -141,7 +142,7 @@ impl Chosen<'_> {
 
 /// What is said of an element.
 struct Claim {
-    id: &'static str,
+    id: Option<&'static str>,
     estimates: Vec<Estimate>,
     place: Place,
     statement: String,
@@ -191,10 +192,26 @@ impl Term {
         // One level stands for channels that differ.
         let level_deviation = denoised::PEAK_DB.hypot(0.3 * spread_db / (self.chirps.len() as f64).sqrt());
         let level_db = self.level_db;
+        let place = Place { range_m: Some([range - reach, range + reach]), ..Place::at(Stage::Receiver) };
+        // A leakage has the delay of the way between the nearest antennas at least.
+        let least = 0.5 * shortest_m(&evidence.radar);
+        if range + NINETY * error < least {
+            return Claim {
+                id: None,
+                estimates: vec![],
+                place,
+                statement: format!(
+                    "every chirp holds a tone that never changes, {level_db:.1} dB relative to the signal's peak sample; its delay is \
+                     that of a return {:.1} mm away, and the way between the nearest antennas is that of one {:.1} mm away",
+                    1e3 * range,
+                    1e3 * least
+                ),
+            };
+        }
         Claim {
-            id: effects::tx_leakage::ID,
+            id: Some(effects::tx_leakage::ID),
             estimates: vec![Estimate::normal("range_m", range, error), Estimate::normal("level_db", level_db, level_deviation)],
-            place: Place { range_m: Some([range - reach, range + reach]), ..Place::at(Stage::Receiver) },
+            place,
             statement: format!(
                 "a return {range:.3} m away, nearer than anything in the room, that never changes: the transmitters leak into \
                  the receivers over the board, {level_db:.1} dB relative to the signal's peak sample, {spread_db:.1} dB apart between \
@@ -208,7 +225,7 @@ impl Term {
         let scene = (field.still.iter().map(|chirp| energy(chirp)).sum::<f64>() / (channels * samples) as f64).sqrt();
         let level_deviation = denoised::PEAK_DB.hypot(8.7 * 0.7 * scene / (self.level * (channels as f64).sqrt()));
         Claim {
-            id: effects::ramp_edge_transient::ID,
+            id: Some(effects::ramp_edge_transient::ID),
             estimates: vec![
                 Estimate { name: "samples", values: vec![count as f64], ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]] },
                 Estimate::normal("level_db", self.level_db, level_deviation),

@@ -18,6 +18,9 @@ const MOST_SAMPLES: usize = 512;
 /// The scene's density may exceed its mean over the band by this.
 const UNEVEN: f64 = 10.0;
 
+/// Level of a goodness-of-fit test: what a law leaves is so unlikely under it that it is another law, or more than one.
+pub const UNLIKELY: f64 = 1e-3;
+
 /// Fast-time directions of the static scene's beat frequencies, `[direction][sample]`, orthogonal.
 pub struct Support {
     /// Where the scene exceeds the noise, of unit length.

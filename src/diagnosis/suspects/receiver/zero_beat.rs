@@ -7,7 +7,8 @@ use num_complex::Complex64;
 
 use crate::diagnosis::Evidence;
 use crate::diagnosis::finding::NINETY;
-use crate::radar::SPEED_OF_LIGHT;
+use crate::paths::distance;
+use crate::radar::{Radar, SPEED_OF_LIGHT};
 
 /// A beat frequency next to zero, in bins.
 pub struct ZeroBeat {
@@ -47,8 +48,12 @@ impl ZeroBeat {
 
 fn least_bins(evidence: &Evidence) -> f64 {
     let radar = &evidence.radar;
-    let apart = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt();
-    let all = radar.tx_m.iter().flat_map(|tx| radar.rx_m.iter().map(move |rx| apart(tx, rx)));
-    let shortest = all.reduce(f64::min).unwrap_or(0.0);
-    radar.slope_hz_per_s.abs() * shortest / SPEED_OF_LIGHT * evidence.cube.dims[4] as f64 / radar.sample_rate_hz
+    let delay_s = shortest_m(radar) / SPEED_OF_LIGHT;
+    radar.slope_hz_per_s.abs() * delay_s * evidence.cube.dims[4] as f64 / radar.sample_rate_hz
+}
+
+/// Shortest way from a transmitter to a receiver.
+pub fn shortest_m(radar: &Radar) -> f64 {
+    let all = radar.tx_m.iter().flat_map(|&tx| radar.rx_m.iter().map(move |&rx| distance(tx, rx)));
+    all.reduce(f64::min).unwrap_or(0.0)
 }
