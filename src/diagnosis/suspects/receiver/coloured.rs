@@ -12,7 +12,7 @@ use crate::effects::{self, Stage};
 
 /// Cells of a Hann-windowed map per independent one, with reserve for the quantile's inefficiency.
 const SHARED: f64 = 4.0;
-/// How well a real noise follows the law, as a logarithm's deviation.
+/// How well a real noise follows a law, as a logarithm's deviation.
 const LAW: f64 = 0.05;
 /// Bands of beat frequency that noise without a law is compared in.
 const BANDS: usize = 8;
@@ -73,12 +73,13 @@ impl Powers {
         Fit { likelihood, level, shape }
     }
 
-    /// Chance that what noise of a shape has over it differs so much between bands.
+    /// Chance that what noise of a shape has over it differs so much between bands, each of which may differ as a real noise does.
     fn chance_beyond(&self, shape: &[f64]) -> f64 {
         let flat = Self { found: self.found.iter().zip(shape).map(|(p, s)| p / s).collect(), hertz: vec![], ..*self };
         let (fit, all) = (flat.banded(), flat.found.len());
         let white = (-fit.level.ln() - 1.0) * all as f64 * self.count;
-        chi2_tail(2.0 * (fit.likelihood - white), all.div_ceil(self.width()) as f64 - 1.0)
+        let inflation = 1.0 + LAW * LAW * self.count * self.width() as f64;
+        chi2_tail(2.0 * (fit.likelihood - white) / inflation, all.div_ceil(self.width()) as f64 - 1.0)
     }
 
     fn curve(self, fit: &Fit) -> Curve {
