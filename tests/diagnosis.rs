@@ -384,7 +384,7 @@ fn nulls_stay_silent_and_their_p_values_are_uniform() {
     let chance = poisson_tail(alarmed.len(), DiagnosisConfig::default().alarm * nulls.len() as f64);
     assert!(chance > 0.05, "{} alarms, chance {chance:.3}: {alarmed:?}", alarmed.len());
     assert!(nulls.iter().all(|null| null.verdict != Verdict::Damaged), "{alarmed:?}");
-    // Once in a hundred seeds a law that is uniform fails this; a bound such as the suspects' own fails with all of them.
+    // Once in a hundred seeds a law that is uniform fails this; a bound such as the detectors' own fails with all of them.
     let uniform = |what: &str, of: &dyn Fn(&Report) -> Option<f64>| {
         let values: Vec<f64> = nulls.iter().filter_map(of).collect();
         let chance = uniform_chance(&values);
@@ -395,7 +395,7 @@ fn nulls_stay_silent_and_their_p_values_are_uniform() {
     uniform("beside the body, frames that the noise comes from", &|null| null.null.beside_training);
     uniform("beside the body, frames held out", &|null| null.null.beside_held_out);
     uniform("along the chirp", &|null| null.null.along_chirp);
-    let bounds: Vec<f64> = nulls.iter().filter_map(|null| null.null.suspicion).collect();
+    let bounds: Vec<f64> = nulls.iter().filter_map(|null| null.null.bound).collect();
     assert!(uniform_chance(&bounds) < 1e-6);
 }
 

@@ -5,7 +5,7 @@
 //! array) scatters: R = A·1 + (B − A)·a aᴴ/C with A = 1 + P (1 − γ) and B = A + γ C P, for the expected power P over the noise, coherence
 //! γ and steering vector a of C channels. The density has the heavy tails of Student's law: the expected power is itself uncertain, and
 //! what the prediction leaves out counts by its logarithm. Without other channels it is the law that the diagnosis compares displaced
-//! bodies by (`diagnosis/suspects/geometry/trial.rs`).
+//! bodies by (`diagnosis/detectors/geometry/trial.rs`).
 
 use num_complex::Complex32;
 

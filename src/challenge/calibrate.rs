@@ -23,8 +23,8 @@ use crate::data::files::read_json;
 use crate::data::{Recording, RecordingContents, Scratch, Shard, write_recording};
 use crate::diagnosis::DiagnosisConfig;
 use crate::diagnosis::calibration::{Calibration, FORMAT, FalseAlarms, Structure, program};
+use crate::diagnosis::detectors::DETECTORS;
 use crate::diagnosis::statistics::{binomial_interval, uniform_chance};
-use crate::diagnosis::suspects::SUSPECTS;
 use crate::error::{Error, Result};
 use crate::pictures::{Chart, Series};
 use crate::recorder::{EffectsConfig, RadarChoice, ReceiverConfig, Recorder, RecorderConfig, Returns, World};
@@ -280,8 +280,8 @@ pub fn gather(
         nulls: reports.len(),
         answered: p_values.len(),
         seeds,
-        suspicion: ascending(reports.iter().filter_map(|report| report.null.get("suspicion").copied().flatten())),
-        suspects: families(&reports),
+        bounds: ascending(reports.iter().filter_map(|report| report.null.get("suspicion").copied().flatten())),
+        detectors: families(&reports),
         false_alarms: FalseAlarms {
             level: settings.alarm,
             alarms,
@@ -318,8 +318,8 @@ fn ascending(values: impl Iterator<Item = f64>) -> Vec<f64> {
 
 /// Of all families, those too that had nothing to say.
 fn families(reports: &[Report]) -> BTreeMap<String, Vec<f64>> {
-    let of = |name: &str| ascending(reports.iter().filter_map(|report| report.suspects.get(name).copied()).filter(|p| *p < 1.0));
-    SUSPECTS.iter().map(|suspect| (suspect.name.to_string(), of(suspect.name))).collect()
+    let of = |name: &str| ascending(reports.iter().filter_map(|report| report.detectors.get(name).copied()).filter(|p| *p < 1.0));
+    DETECTORS.iter().map(|detector| (detector.name.to_string(), of(detector.name))).collect()
 }
 
 impl Calibrated {
@@ -355,7 +355,7 @@ impl Calibrated {
         let _ = write!(text, "\n{}\n![Share of nulls below a p-value](p_values.png)\n", markdown(&self.rows));
         text.push_str("\n### Families of detectors\n\nSmallest p-values, corrected within a family alone.\n\n");
         text.push_str("| family | nulls with a detection | smallest | below 0.01 | below 0.1 |\n|---|---|---|---|---|\n");
-        for (name, values) in &self.table.suspects {
+        for (name, values) in &self.table.detectors {
             let below = |level: f64| values.iter().filter(|value| **value < level).count();
             let smallest = values.first().map_or("–".into(), |value| format!("{value:.2e}"));
             let _ = writeln!(text, "| {name} | {} | {smallest} | {} | {} |", values.len(), below(0.01), below(0.1));

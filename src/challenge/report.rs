@@ -17,9 +17,9 @@ pub struct Report {
     pub p_value: Option<f64>,
     #[serde(default)]
     pub null: BTreeMap<String, Option<f64>>,
-    /// Smallest p-value of each family of suspects that had something to say.
-    #[serde(default)]
-    pub suspects: BTreeMap<String, f64>,
+    /// Smallest p-value of each family of detectors that had something to say.
+    #[serde(default, rename = "suspects")]
+    pub detectors: BTreeMap<String, f64>,
     #[serde(default)]
     pub reason: String,
     pub effects: Vec<Effect>,

@@ -40,10 +40,12 @@ pub struct Calibration {
     pub seeds: Vec<u64>,
     /// Ascending.
     pub p_values: Vec<f64>,
-    /// The smallest corrected p-value of all suspects, ascending.
-    pub suspicion: Vec<f64>,
-    /// Per family of suspects its smallest p-value in each null in which it had something to say, ascending; 1 in the others.
-    pub suspects: BTreeMap<String, Vec<f64>>,
+    /// The smallest corrected p-value of all detectors, ascending.
+    #[serde(rename = "suspicion")]
+    pub bounds: Vec<f64>,
+    /// Per family of detectors its smallest p-value in each null in which it had something to say, ascending; 1 in the others.
+    #[serde(rename = "suspects")]
+    pub detectors: BTreeMap<String, Vec<f64>>,
     pub false_alarms: FalseAlarms,
     /// Chance that p-values lie as far from uniform (Kolmogorov and Smirnov).
     pub uniform_chance: f64,
@@ -80,8 +82,9 @@ pub struct Calibrated {
     pub as_odd: usize,
     /// As it is without the table.
     pub p_value_raw: f64,
-    /// Of families of suspects with something to say: their rank among the nulls, as p-values, not corrected for their number.
-    pub suspects: BTreeMap<String, f64>,
+    /// Of families of detectors with something to say: their rank among the nulls, as p-values, not corrected for their number.
+    #[serde(rename = "suspects")]
+    pub detectors: BTreeMap<String, f64>,
 }
 
 /// The program as a table names it.
@@ -158,10 +161,10 @@ impl Table {
         ))
     }
 
-    /// Ranks a report's p-value, and those of its suspects.
-    pub fn calibrated(&self, p_value_raw: f64, suspects: &BTreeMap<String, f64>) -> Calibrated {
-        let Calibration { p_values, suspects: known, answered, .. } = &self.calibration;
-        let families = suspects.iter().map(|(name, value)| {
+    /// Ranks a report's p-value, and those of its detectors.
+    pub fn calibrated(&self, p_value_raw: f64, detectors: &BTreeMap<String, f64>) -> Calibrated {
+        let Calibration { p_values, detectors: known, answered, .. } = &self.calibration;
+        let families = detectors.iter().map(|(name, value)| {
             let as_odd = known.get(name).map_or(0, |nulls| as_odd(nulls, *value));
             (name.clone(), ranked(as_odd, *answered))
         });
@@ -171,7 +174,7 @@ impl Table {
             nulls: *answered,
             as_odd: as_odd(p_values, p_value_raw),
             p_value_raw,
-            suspects: families.collect(),
+            detectors: families.collect(),
         }
     }
 }
@@ -221,8 +224,8 @@ mod tests {
             nulls: p_values.len(),
             answered: p_values.len(),
             seeds: vec![],
-            suspicion: vec![1.0; p_values.len()],
-            suspects: [("spur".to_string(), vec![0.02])].into(),
+            bounds: vec![1.0; p_values.len()],
+            detectors: [("spur".to_string(), vec![0.02])].into(),
             false_alarms: FalseAlarms { level: 0.01, alarms: 0, of: 0, share: 0.0, interval: [0.0, 1.0] },
             uniform_chance: 1.0,
             p_values,
@@ -238,8 +241,8 @@ mod tests {
         assert_eq!([1e-30, 0.005, 0.01, 0.5, 1.0].map(of), [0.01, 0.01, 0.02, 0.51, 1.0]);
         let families = [("spur".to_string(), 1e-9), ("noise".to_string(), 1e-9)].into();
         let calibrated = table.calibrated(0.5, &families);
-        assert_eq!(calibrated.suspects, [("spur".to_string(), 0.01), ("noise".to_string(), 0.01)].into());
-        assert_eq!(table.calibrated(0.5, &[("spur".to_string(), 0.03)].into()).suspects["spur"], 0.02);
+        assert_eq!(calibrated.detectors, [("spur".to_string(), 0.01), ("noise".to_string(), 0.01)].into());
+        assert_eq!(table.calibrated(0.5, &[("spur".to_string(), 0.03)].into()).detectors["spur"], 0.02);
         // A p-value that is twice too small on these nulls is put right.
         let small = super::tests::table((1..=99).map(|rank| f64::from(rank) / 200.0).collect());
         assert_eq!(small.calibrated(0.025, &BTreeMap::new()).p_value(), 0.06);

@@ -1,4 +1,4 @@
-//! A recording as far as it is explained so far, and what every suspect needs of it.
+//! A recording as far as it is explained so far, and what every detector needs of it.
 
 pub mod beat;
 pub mod denoised;
@@ -40,7 +40,7 @@ const EMPTIED: f64 = 1e-20;
 /// Range of the farthest echo where no room is known.
 const FARTHEST_M: f64 = 10.0;
 
-/// What the suspects look at. Cheap products are computed once and shared.
+/// What the detectors look at. Cheap products are computed once and shared.
 #[derive(Clone)]
 pub struct Evidence {
     /// Its frames are those of the cube.

@@ -1,4 +1,4 @@
-//! What a suspect says: which effect, how large, where, how sure, and how to take it into account.
+//! What a detector says: which effect, how large, where, how sure, and how to take it into account.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -175,7 +175,7 @@ pub struct Candidate {
     /// A boundary or a part of the body.
     pub choice: Option<String>,
     pub place: Place,
-    /// Under the null, corrected for everything that this suspect looked at.
+    /// Under the null, corrected for everything that this detector looked at.
     pub p_value: f64,
     /// Log-likelihood that held-out frames gain, nats.
     pub gain: f64,
@@ -194,7 +194,7 @@ pub struct Candidate {
 
 impl Candidate {
     /// Without its name where all the numbers that it gives may as well be those at which the effect does nothing: something is
-    /// there, but not surely this. For suspects whose p-value says that something is there, and not that these numbers are.
+    /// there, but not surely this. For detectors whose p-value says that something is there, and not that these numbers are.
     pub fn named_if_sure(self) -> Self {
         let Some(info) = self.id.and_then(effects::info) else { return self };
         let (mut square, mut freedom) = (0.0, 0.0);

@@ -77,7 +77,7 @@ fn anything(report: &Report) -> Markup {
         ("beside body and room", null.beside),
         ("the body along the chirp", null.along_chirp),
         ("the body between receivers", null.between_receivers),
-        ("the most significant detector, at most", null.suspicion),
+        ("the most significant detector, at most", null.bound),
     ]
     .into_iter()
     .filter_map(|(what, chance)| Some((what, chance?)))

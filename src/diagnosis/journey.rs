@@ -6,6 +6,7 @@ use super::audit::{self, Check};
 use super::calibration::Table;
 use super::config::DiagnosisConfig;
 use super::cube::{Loaded, most_frames};
+use super::detectors::paths::body_rms;
 use super::evidence::Evidence;
 use super::limits::limits;
 use super::misfit::Misfit;
@@ -16,7 +17,6 @@ use super::report::{
     probability_of_nothing,
 };
 use super::select::{Explanation, explain};
-use super::suspects::paths::body_rms;
 use crate::data::Recording;
 use crate::effects::EffectSetting;
 use crate::error::{Error, Result};
@@ -125,7 +125,7 @@ fn undecided(recording: &Recording, held_out: HeldOut) -> Report {
         p_value: None,
         null: Null::default(),
         calibration: None,
-        suspects: BTreeMap::new(),
+        detectors: BTreeMap::new(),
         audit: vec![],
         effects: vec![],
         unexplained: vec![],
@@ -188,11 +188,11 @@ fn conclude(
     }
     let is_found = |id: &str| report.effects.iter().any(|effect| effect.id == id);
     report.not_detectable.retain(|limit| original.info(&limit.id).is_some() && !is_found(&limit.id));
-    report.null.suspicion = Some(explanation.suspicion);
-    report.suspects = explanation.suspects.clone();
+    report.null.bound = Some(explanation.bound);
+    report.detectors = explanation.detectors.clone();
     report.p_value = report.null.p_value();
     if let (Some(table), Some(raw)) = (table, report.p_value) {
-        let calibrated = table.calibrated(raw, &report.suspects);
+        let calibrated = table.calibrated(raw, &report.detectors);
         report.p_value = Some(calibrated.p_value());
         report.calibration = Some(calibrated);
     }

@@ -11,9 +11,9 @@ use rayon::prelude::*;
 
 use super::config::DiagnosisConfig;
 use super::cube::Cube;
+use super::detectors::DETECTORS;
 use super::evidence::Evidence;
 use super::score;
-use super::suspects::SUSPECTS;
 use crate::complex::Complex;
 use crate::effects::{self, Context, EffectSetting, Effects};
 
@@ -26,7 +26,7 @@ const MARGIN_DB: f64 = 10.0;
 struct Salt {
     id: &'static str,
     /// Who would find it.
-    suspects: &'static [&'static str],
+    detectors: &'static [&'static str],
     least: f64,
     most: f64,
     /// As a setting of some strength; levels are relative to the recording's peak.
@@ -40,51 +40,51 @@ const ALONG: &[&str] = &["along the chirp"];
 const SALTS: [Salt; 15] = [
     Salt {
         id: effects::chirp_ripple::ID,
-        suspects: &["chirp"],
+        detectors: &["chirp"],
         least: 1e3,
         most: 3e6,
         setting: |s, x, _| s.with("deviation_hz", [x]).with("ripple_hz", [4e5]),
     },
     Salt {
         id: effects::chirp_nonlinearity::ID,
-        suspects: ALONG,
+        detectors: ALONG,
         least: 3e4,
         most: 1e7,
         setting: |s, x, _| s.with("peak_hz", [x]),
     },
-    Salt { id: effects::chirp_droop::ID, suspects: ALONG, least: 0.1, most: 12.0, setting: |s, x, _| s.with("db", [x]) },
+    Salt { id: effects::chirp_droop::ID, detectors: ALONG, least: 0.1, most: 12.0, setting: |s, x, _| s.with("db", [x]) },
     Salt {
         id: effects::phase_noise::ID,
-        suspects: SLOW,
+        detectors: SLOW,
         least: 1e-4,
         most: 1.0,
         setting: |s, x, _| s.with("per_chirp_rad", [x]),
     },
     Salt {
         id: effects::chirp_start_jitter::ID,
-        suspects: SLOW,
+        detectors: SLOW,
         least: 1e-11,
         most: 1e-7,
         setting: |s, x, _| s.with("jitter_s", [x]),
     },
     Salt {
         id: effects::radar_vibration::ID,
-        suspects: SLOW,
+        detectors: SLOW,
         least: 1e-8,
         most: 1e-3,
         setting: |s, x, _| s.with("amplitude_m", [x]).with("frequency_hz", [20.0]),
     },
-    Salt { id: effects::gain_drift::ID, suspects: SLOW, least: 1e-3, most: 6.0, setting: |s, x, _| s.with("db", [x]) },
+    Salt { id: effects::gain_drift::ID, detectors: SLOW, least: 1e-3, most: 6.0, setting: |s, x, _| s.with("db", [x]) },
     Salt {
         id: effects::chirp_settling::ID,
-        suspects: SLOW,
+        detectors: SLOW,
         least: 1e-4,
         most: 0.6,
         setting: |s, x, _| s.with("depth", [x]).with("chirps", [4.0]),
     },
     Salt {
         id: effects::channel_mismatch::ID,
-        suspects: &["geometry"],
+        detectors: &["geometry"],
         least: 1e-2,
         most: 10.0,
         setting: |s, x, evidence| {
@@ -95,30 +95,30 @@ const SALTS: [Salt; 15] = [
     },
     Salt {
         id: effects::mutual_coupling::ID,
-        suspects: &["geometry"],
+        detectors: &["geometry"],
         least: 1e-3,
         most: 0.5,
         setting: |s, x, _| s.with("level_db", [db(x)]),
     },
     Salt {
         id: effects::tx_leakage::ID,
-        suspects: STILL,
+        detectors: STILL,
         least: 1e-5,
         most: 1.0,
         setting: |s, x, _| s.with("level_db", [db(x)]).with("range_m", [0.1]),
     },
     Salt {
         id: effects::ramp_edge_transient::ID,
-        suspects: STILL,
+        detectors: STILL,
         least: 1e-4,
         most: 3.0,
         setting: |s, x, _| s.with("level_db", [db(x)]).with("samples", [2.0]),
     },
-    Salt { id: effects::dc_offset::ID, suspects: STILL, least: 1e-6, most: 1.0, setting: |s, x, _| s.with("i", [x]) },
-    Salt { id: effects::if_highpass::ID, suspects: STILL, least: 1e3, most: 1e6, setting: |s, x, _| s.with("corner_hz", [x]) },
+    Salt { id: effects::dc_offset::ID, detectors: STILL, least: 1e-6, most: 1.0, setting: |s, x, _| s.with("i", [x]) },
+    Salt { id: effects::if_highpass::ID, detectors: STILL, least: 1e3, most: 1e6, setting: |s, x, _| s.with("corner_hz", [x]) },
     Salt {
         id: effects::spur::ID,
-        suspects: &["spur"],
+        detectors: &["spur"],
         least: 1e-6,
         most: 1.0,
         setting: |s, x, evidence| {
@@ -181,14 +181,14 @@ fn salted(evidence: &Evidence, salt: &Salt, strength: f64, reference: f64, thres
     let (cube, added) = put_in(evidence, &setting);
     let mut with = evidence.clone().changed();
     with.cube = cube;
-    let detected = |(index, suspect): (usize, &super::suspects::Suspect)| {
-        salt.suspects.contains(&suspect.name)
-            && (suspect.find)(&with).iter().any(|candidate| {
+    let detected = |(index, detector): (usize, &super::detectors::Detector)| {
+        salt.detectors.contains(&detector.name)
+            && (detector.find)(&with).iter().any(|candidate| {
                 let named = candidate.id == Some(salt.id) || candidate.look_alikes.contains(&salt.id);
                 named && thresholds.passes(index, candidate, true)
             })
     };
-    SUSPECTS.iter().enumerate().any(detected).then_some(added)
+    DETECTORS.iter().enumerate().any(detected).then_some(added)
 }
 
 /// The samples with an effect, and the energy that it added.
@@ -239,7 +239,7 @@ mod tests {
         };
         let evidence = Evidence::new(loaded, None, None);
         for salt in &SALTS {
-            assert!(SUSPECTS.iter().any(|suspect| salt.suspects.contains(&suspect.name)), "{}", salt.id);
+            assert!(DETECTORS.iter().any(|detector| salt.detectors.contains(&detector.name)), "{}", salt.id);
             let mut before = 0.0;
             for strength in [salt.least, salt.most] {
                 let setting = (salt.setting)(EffectSetting::neutral(salt.id), strength, &evidence);

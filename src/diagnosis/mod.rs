@@ -2,7 +2,7 @@
 //!
 //! The baseline is that of docs/diagnosis.md: the body's single bounce with free amplitudes, static clutter, thermal noise,
 //! millimetre errors of the mesh, unknown phase and gain. [`Evidence`] is a recording as far as it is explained; every
-//! suspect looks at it and may return [`Candidate`]s; the best one is accepted, undone in the samples or added to what is
+//! detector looks at it and may return [`Candidate`]s; the best one is accepted, undone in the samples or added to what is
 //! predicted, and all look again, until nobody has anything significant left to say.
 
 pub mod audit;
@@ -31,7 +31,7 @@ pub mod simulate;
 mod speckle;
 pub mod statistics;
 pub mod support;
-pub mod suspects;
+pub mod detectors;
 
 pub use config::DiagnosisConfig;
 pub use course::{Course, Of};

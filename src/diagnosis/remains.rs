@@ -1,7 +1,7 @@
 //! What an accepted effect leaves behind: itself, where it could not be removed in full, and what a rough correction makes.
 
+use super::detectors::paths;
 use super::finding::{Candidate, Correction};
-use super::suspects::paths;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::effects::{self, Stage};
 

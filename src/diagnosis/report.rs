@@ -168,9 +168,9 @@ pub struct Report {
     /// What the p-value was before nulls of this radar calibrated it, where they did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<Calibrated>,
-    /// Smallest p-value of each family of suspects that had something to say of the untouched recording.
-    #[serde(default)]
-    pub suspects: BTreeMap<String, f64>,
+    /// Smallest p-value of each family of detectors that had something to say of the untouched recording.
+    #[serde(default, rename = "suspects")]
+    pub detectors: BTreeMap<String, f64>,
     pub audit: Vec<Check>,
     pub effects: Vec<Effect>,
     pub unexplained: Vec<Unexplained>,

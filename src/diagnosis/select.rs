@@ -1,6 +1,6 @@
-//! Rounds of suspicion: all look, the best explanation is accepted and taken into account, all look again.
+//! Rounds: all detectors look, the best explanation is accepted and taken into account, all look again.
 //!
-//! A finding must be significant (family-wise over all suspects and places) *and* predict held-out frames better. What
+//! A finding must be significant (family-wise over all detectors and places) *and* predict held-out frames better. What
 //! was accepted early may only have mimicked what was found later, so at the end each one is asked to stand again with
 //! all others taken into account.
 
@@ -12,25 +12,25 @@ use crate::effects::{self, Stage};
 use std::collections::BTreeMap;
 
 use super::config::DiagnosisConfig;
+use super::detectors::{DETECTORS, Detector, by_detector, smallest_bound};
 use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
 use super::remains::{
     ROUGHLY, is_by_chirp, is_left_by, is_of_noise, is_of_receivers, is_of_remains, is_product, is_rough, is_same,
 };
-use super::suspects::{SUSPECTS, Suspect, by_suspect, strongest_suspicion};
 use precedence::{is_displaced, is_echo, upstream};
-use said::{said_by, suspicions};
+use said::{candidates, said_by};
 
 impl DiagnosisConfig {
-    /// Limit of one suspect's p-value.
-    fn p_value(&self, suspect: usize) -> f64 {
-        self.alarm * SUSPECTS[suspect].share / SUSPECTS.iter().map(|suspect| suspect.share).sum::<f64>()
+    /// Limit of one detector's p-value.
+    fn p_value(&self, detector: usize) -> f64 {
+        self.alarm * DETECTORS[detector].share / DETECTORS.iter().map(|detector| detector.share).sum::<f64>()
     }
 
     /// What has no name may be anything, so it must gain more, half as much more where chance cannot have made it. `untouched`:
     /// what was taken out of a recording leaves remains, which chance has not made either.
-    pub(super) fn passes(&self, suspect: usize, candidate: &Candidate, untouched: bool) -> bool {
+    pub(super) fn passes(&self, detector: usize, candidate: &Candidate, untouched: bool) -> bool {
         let sure = untouched && candidate.p_value < NO_CHANCE;
         let least = match candidate.id {
             Some(_) => self.gain,
@@ -40,9 +40,9 @@ impl DiagnosisConfig {
         // What predicts held-out frames better than it must is as much less likely to be chance: the likelihood's ratio on data
         // that were not fitted exceeds e^gain by chance with a probability of e^-gain at most. Not where the body's prediction has
         // a part: what errs in it errs in held-out frames alike; nor where the frames that predict are those of the p-value.
-        let surplus = untouched && !candidate.errs_alike && !SUSPECTS[suspect].predicts_all_frames;
+        let surplus = untouched && !candidate.errs_alike && !DETECTORS[detector].predicts_all_frames;
         let surplus = if surplus { (candidate.gain - least).exp().clamp(1.0, MOST_SURPLUS) } else { 1.0 };
-        candidate.p_value <= self.p_value(suspect) * surplus && candidate.gain >= least && candidate.gain.is_finite()
+        candidate.p_value <= self.p_value(detector) * surplus && candidate.gain >= least && candidate.gain.is_finite()
     }
 }
 
@@ -73,7 +73,7 @@ const MOST_ALIKE: usize = 6;
 /// An accepted candidate with what it changed.
 #[derive(Clone, Debug)]
 pub struct Accepted {
-    pub suspect: usize,
+    pub detector: usize,
     pub candidate: Candidate,
     /// What else would have explained this as well, as ids.
     pub rivals: Vec<&'static str>,
@@ -89,10 +89,10 @@ pub struct Explanation {
     pub accepted: Vec<Accepted>,
     /// The recording with everything taken into account.
     pub evidence: Evidence,
-    /// Smallest p-value of all suspects on the untouched recording, corrected for their number: a bound.
-    pub suspicion: f64,
-    /// Smallest p-value of each suspect that had something to say of it.
-    pub suspects: BTreeMap<String, f64>,
+    /// Smallest p-value of all detectors on the untouched recording, corrected for their number: a bound.
+    pub bound: f64,
+    /// Smallest p-value of each detector that had something to say of it.
+    pub detectors: BTreeMap<String, f64>,
     pub before: Misfit,
     pub after: Misfit,
 }
@@ -108,17 +108,17 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         misfit: before,
         accepted: vec![],
         pending: vec![],
-        first_suspected: None,
+        first_bounds: None,
         at_first: None,
         refused: vec![],
-        suspected: None,
+        unchanged: None,
     };
     for _ in 0..=thresholds.most {
         if !rounds.next(progress) {
             break;
         }
     }
-    let Rounds { current, accepted, first_suspected, .. } = rounds;
+    let Rounds { current, accepted, first_bounds, .. } = rounds;
     drop(current);
     let accepted = verified(&original, accepted, thresholds);
     let evidence = accepted.iter().fold(original.clone(), |evidence, effect| evidence.with(&effect.candidate));
@@ -127,8 +127,8 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     let held_out = original.split.held_out.len() * original.cube.channels() * original.cube.dims[3] * original.range_bins();
     let unseen = accepted.iter().filter(|effect| matches!(effect.candidate.correction, Correction::None));
     after.loglik_per_sample += unseen.map(|effect| effect.candidate.gain).sum::<f64>() / held_out.max(1) as f64;
-    let (suspicion, suspects) = first_suspected.unwrap_or((1.0, BTreeMap::new()));
-    Explanation { accepted, evidence, suspicion, suspects, before, after }
+    let (bound, detectors) = first_bounds.unwrap_or((1.0, BTreeMap::new()));
+    Explanation { accepted, evidence, bound, detectors, before, after }
 }
 
 /// What the rounds have found so far.
@@ -141,23 +141,23 @@ struct Rounds<'a> {
     accepted: Vec<Accepted>,
     /// Candidates of the round before that could still turn out to be the same thing as what was accepted in it.
     pending: Vec<Candidate>,
-    first_suspected: Option<(f64, BTreeMap<String, f64>)>,
+    first_bounds: Option<(f64, BTreeMap<String, f64>)>,
     /// Names that passed on the untouched recording, and what they gained.
     at_first: Option<Vec<(&'static str, f64)>>,
     /// Names that would make everything far worse.
     refused: Vec<&'static str>,
-    /// What was suspected in a round that only refused a name: nothing has changed since.
-    suspected: Option<Vec<(usize, Candidate)>>,
+    /// What was found in a round that only refused a name: nothing has changed since.
+    unchanged: Option<Vec<(usize, Candidate)>>,
 }
 
 impl Rounds<'_> {
     /// One round; whether another may follow.
     fn next(&mut self, progress: &mut dyn FnMut(&str)) -> bool {
         let evidence = self.current.as_ref().unwrap_or(self.original);
-        let found = self.suspected.take().unwrap_or_else(|| suspicions(evidence));
-        self.first_suspected.get_or_insert_with(|| (strongest_suspicion(&found), by_suspect(&found)));
+        let found = self.unchanged.take().unwrap_or_else(|| candidates(evidence));
+        self.first_bounds.get_or_insert_with(|| (smallest_bound(&found), by_detector(&found)));
         if self.at_first.is_none() {
-            let passing = found.iter().filter(|suspicion| self.passes(suspicion));
+            let passing = found.iter().filter(|candidate| self.passes(candidate));
             self.at_first = Some(passing.filter_map(|(_, candidate)| Some((candidate.id?, candidate.gain))).collect());
         }
         let passing = self.passing(evidence, &found);
@@ -168,15 +168,15 @@ impl Rounds<'_> {
         let Some(strongest) = strongest.filter(|_| self.accepted.len() < self.thresholds.most) else {
             return false;
         };
-        let (suspect, mut best) = strongest.clone();
+        let (detector, mut best) = strongest.clone();
         let mut next = evidence.with(&best);
         let mut after = Misfit::after(self.original, &next);
         if let Some(id) = best.id
             && after.db_mse > FAR_WORSE * self.misfit.db_mse
         {
-            if !SUSPECTS[suspect].last_in_chain {
+            if !DETECTORS[detector].last_in_chain {
                 self.refused.push(id);
-                self.suspected = Some(found);
+                self.unchanged = Some(found);
                 return true;
             }
             // What the codes themselves show is there, even where it cannot be undone.
@@ -188,14 +188,14 @@ impl Rounds<'_> {
         let others = passing.iter().filter(|other| !std::ptr::eq(**other, strongest));
         self.pending = others.map(|(_, other)| other.clone()).collect();
         let (before, rivals) = (self.misfit, best.look_alikes.clone());
-        self.accepted.push(Accepted { suspect, rivals, candidate: best, probability: 1.0, before, after });
+        self.accepted.push(Accepted { detector, rivals, candidate: best, probability: 1.0, before, after });
         self.misfit = after;
         self.current = Some(next);
         true
     }
 
-    fn passes(&self, (suspect, candidate): &(usize, Candidate)) -> bool {
-        self.thresholds.passes(*suspect, candidate, self.accepted.is_empty())
+    fn passes(&self, (detector, candidate): &(usize, Candidate)) -> bool {
+        self.thresholds.passes(*detector, candidate, self.accepted.is_empty())
     }
 
     /// Of what was found: what is significant, and neither known already nor a name that may not be given.
@@ -210,11 +210,11 @@ impl Rounds<'_> {
                 && !self.refused.contains(&id)
                 && self.accepted.iter().filter(|effect| effect.candidate.id == Some(id)).count() < MOST_ALIKE
         };
-        let passes = || found.iter().filter(|suspicion| self.passes(suspicion));
+        let passes = || found.iter().filter(|candidate| self.passes(candidate));
         let clocks_were_wrong = self.accepted.iter().any(|effect| effect.candidate.place.stage == Some(Stage::Timing));
         let elsewhere = clocks_were_wrong || passes().any(|(_, candidate)| is_displaced(candidate));
         passes()
-            .filter(|(suspect, _)| !(elsewhere && SUSPECTS[*suspect].trusts_the_place))
+            .filter(|(detector, _)| !(elsewhere && DETECTORS[*detector].trusts_the_place))
             .filter(|(_, candidate)| !self.known(candidate) && candidate.id.is_none_or(may_be_named))
             .collect()
     }
@@ -242,21 +242,21 @@ impl Rounds<'_> {
 
 /// What happened last in the signal's chain is undone first; else the strongest; what has no shape at all last.
 fn strongest<'a>(passing: &[&'a (usize, Candidate)]) -> Option<&'a (usize, Candidate)> {
-    let order = |(suspect, candidate): &(usize, Candidate)| {
-        let suspect = &SUSPECTS[*suspect];
+    let order = |(detector, candidate): &(usize, Candidate)| {
+        let detector = &DETECTORS[*detector];
         let worth = if is_rough(candidate) { ROUGHLY * candidate.gain } else { candidate.gain };
-        (suspect.last_in_chain, !suspect.last_resort, worth)
+        (detector.last_in_chain, !detector.last_resort, worth)
     };
-    let strongest_of = |may: fn(&Suspect) -> bool| {
-        let candidates = passing.iter().copied().filter(|(suspect, _)| may(&SUSPECTS[*suspect]));
+    let strongest_of = |may: fn(&Detector) -> bool| {
+        let candidates = passing.iter().copied().filter(|(detector, _)| may(&DETECTORS[*detector]));
         candidates.max_by(|a, b| order(a).partial_cmp(&order(b)).expect("gains are finite"))
     };
     let strongest = strongest_of(|_| true)?;
-    if SUSPECTS[strongest.0].last_in_chain || matches!(strongest.1.place.stage, Some(Stage::Receiver | Stage::Noise)) {
+    if DETECTORS[strongest.0].last_in_chain || matches!(strongest.1.place.stage, Some(Stage::Receiver | Stage::Noise)) {
         return Some(strongest);
     }
     // What the receiver does to everything that it receives lies behind what was done to it before.
-    strongest_of(|suspect| suspect.of_all_received).or(Some(strongest))
+    strongest_of(|detector| detector.of_all_received).or(Some(strongest))
 }
 
 /// How likely a look-alike is beforehand, against the effect that was accepted.
@@ -299,7 +299,7 @@ fn verified(original: &Evidence, mut accepted: Vec<Accepted>, thresholds: &Diagn
     let mut index = accepted.len();
     while index > 0 {
         index -= 1;
-        if SUSPECTS[accepted[index].suspect].last_in_chain {
+        if DETECTORS[accepted[index].detector].last_in_chain {
             continue;
         }
         if let Some(candidate) = again(original, &accepted, index, &[], thresholds) {
@@ -344,9 +344,9 @@ fn again(
     let same = |candidate: &Candidate| {
         candidate.id == effect.candidate.id
             && candidate.choice == effect.candidate.choice
-            && thresholds.passes(effect.suspect, candidate, true)
+            && thresholds.passes(effect.detector, candidate, true)
     };
-    let found = said_by(effect.suspect, &evidence).into_iter().filter(same);
+    let found = said_by(effect.detector, &evidence).into_iter().filter(same);
     found.max_by(|a, b| a.gain.total_cmp(&b.gain))
 }
 

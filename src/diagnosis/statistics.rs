@@ -1,4 +1,4 @@
-//! Small statistics that several suspects need; distributions come from `statrs`.
+//! Small statistics that several detectors need; distributions come from `statrs`.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Gamma, Normal, StudentsT};
 use statrs::function::beta::inv_beta_reg;

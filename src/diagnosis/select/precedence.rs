@@ -1,4 +1,4 @@
-//! Which of two suspects comes first, where one of them makes what the other one sees.
+//! Which of two detectors comes first, where one of them makes what the other one sees.
 
 use super::NEARLY;
 use super::said::said_by;
@@ -35,7 +35,7 @@ pub(super) fn is_echo(candidate: &Candidate) -> bool {
 }
 
 /// What acts on every return makes echoes of the body too, which look like paths of their own, and of the room beyond its ranges; and a
-/// body that is elsewhere than predicted looks like another one: where both are suspected, the one is accepted that leaves less.
+/// body that is elsewhere than predicted looks like another one: where both are found, the one is accepted that leaves less.
 pub(super) fn upstream<'a>(
     original: &Evidence,
     evidence: &Evidence,
@@ -64,8 +64,8 @@ pub(super) fn upstream<'a>(
     };
     // Seen from a wrong place, an echo of the body has no name: where the body is elsewhere with and without the echo, it is put right
     // first.
-    let stands = |(suspect, other): &(usize, Candidate)| {
-        let again = said_by(*suspect, &evidence.with(&best.1));
+    let stands = |(detector, other): &(usize, Candidate)| {
+        let again = said_by(*detector, &evidence.with(&best.1));
         again.iter().any(|found| found.id == other.id && found.gain > NEARLY * other.gain)
     };
     if best.1.id.is_none() && is_displaced(&other.1) && stands(other) {

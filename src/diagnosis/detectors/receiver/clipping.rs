@@ -1,0 +1,165 @@
+//! The converter's rail: components pile up at one value.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::declipping::{Declip, FARTHEST};
+use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::detectors::clutter::still_power;
+use crate::diagnosis::evidence::beat::empty_bins;
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
+use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::{Cube, Evidence, Volume, denoised};
+use crate::effects::{self, Stage};
+
+/// Fewest components at the rail.
+const FEWEST: usize = 8;
+/// Bins around zero beat frequency that a leakage fills, where its power is more than this share of the strongest return's.
+const BOARD_BINS: usize = 8;
+const LEAKING: f64 = 0.01;
+
+fn parts(value: &Complex64) -> [f64; 2] {
+    [value.re, value.im]
+}
+
+/// Components at the largest value, and just below it.
+struct Pile {
+    largest: f64,
+    tolerance: f64,
+    at: usize,
+    held_at: usize,
+    /// So many would be there by the values just below.
+    expected: f64,
+    /// Of each frame, at the largest value.
+    by_frame: Vec<usize>,
+}
+
+impl Pile {
+    fn new(evidence: &Evidence, largest: f64) -> Self {
+        // Within half a code, or a hair of the largest for samples that are no codes.
+        let tolerance = 1e-6 * largest;
+        let slab = 0.02 * largest;
+        let (mut at, mut below, mut held_at) = (0usize, 0usize, 0usize);
+        let [_, _, _, loops, samples] = evidence.cube.dims;
+        let per_frame = evidence.cube.channels() * loops * samples;
+        let mut by_frame = vec![0usize; evidence.cube.dims[0]];
+        for (index, value) in evidence.cube.samples.iter().enumerate() {
+            for part in parts(value) {
+                let magnitude = part.abs();
+                if magnitude >= largest - tolerance {
+                    at += 1;
+                    by_frame[index / per_frame] += 1;
+                    held_at += usize::from(evidence.split.held_out.contains(&(index / per_frame)));
+                } else if magnitude >= largest - slab {
+                    below += 1;
+                }
+            }
+        }
+        // A density that falls towards its end has fewer values in the last code than in any code of the slab before it.
+        let codes = slab.max(1.0);
+        let expected = (below as f64 / codes).max(0.2);
+        Self { largest, tolerance, at, held_at, expected, by_frame }
+    }
+
+    /// How far the signal would have gone, over the rail, with its interval: from what the empty beat frequencies say of it,
+    /// or else as for a Gaussian.
+    fn level(&self, evidence: &Evidence, declip: Option<&Declip>) -> (f64, [f64; 2]) {
+        if let Some(declip) = declip {
+            // The strongest of many restored values is one of the worse restored ones, and the noise is restored with it.
+            let beyond = strongest(evidence, declip, &self.by_frame) / self.largest - 1.0;
+            // What is below the rail without noise was there for moments, which say nothing of how far they went.
+            let ci90 = if beyond > 0.0 { [1.0 + 0.5 * beyond, 1.0 + 1.25 * beyond + 0.05] } else { [1.0, FARTHEST] };
+            return (1.0 + beyond.max(0.0), ci90);
+        }
+        let power = evidence.cube.samples.iter().map(Complex64::norm_sqr).sum::<f64>();
+        let rms = (power / (2 * evidence.cube.samples.len()) as f64).sqrt();
+        let level = (rms * (2.0 * (2.0 * evidence.cube.samples.len() as f64).ln()).sqrt() / self.largest).max(1.0);
+        (level, [0.6 * level, 1.8 * level])
+    }
+
+    fn frames(&self) -> Option<Vec<usize>> {
+        let frames: Vec<usize> = (0..self.by_frame.len()).filter(|&frame| self.by_frame[frame] > 0).collect();
+        let everywhere = frames.len() == self.by_frame.len();
+        (!everywhere).then_some(frames)
+    }
+}
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    // It is looked for once, in the samples as they were recorded.
+    let untouched = evidence.accepted.is_empty() && evidence.accepted_unnamed.is_empty();
+    if !untouched || evidence.is_real() {
+        return vec![];
+    }
+    let largest = evidence.extremes[1].max(-evidence.extremes[0]);
+    if largest <= 0.0 {
+        return vec![];
+    }
+    let pile = Pile::new(evidence, largest);
+    if pile.at < FEWEST || (pile.at as f64) < 5.0 * pile.expected {
+        return vec![];
+    }
+    vec![candidate(evidence, &pile)]
+}
+
+fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
+    let &Pile { largest, at, expected, .. } = pile;
+    let excess = at as f64 * (at as f64 / expected).ln() - (at as f64 - expected);
+    let held_share = pile.held_at as f64 / at as f64;
+    let share = at as f64 / (2 * evidence.cube.samples.len()) as f64;
+    let declip = Declip::new(&silent_bins(evidence), largest, pile.tolerance).map(Arc::new);
+    let (level, ci90) = pile.level(evidence, declip.as_deref());
+    let correction = match declip {
+        // That a sample lies beyond the rail is likelier than any one value there: the density of what is restored is a bound.
+        Some(declip) => {
+            let restore = move |cube: &mut Cube| cube.each_chirp(|_, chirp| declip.restore(chirp));
+            Correction::Inverse(Arc::new(restore), Volume::KEPT)
+        }
+        None => Correction::None,
+    };
+    Candidate {
+        id: Some(effects::adc_saturation::ID),
+        behaves_like: Behaviour::Amplitude,
+        estimates: vec![Estimate { name: "level", values: vec![level], ci90: vec![ci90] }],
+        choice: None,
+        place: Place { frames: pile.frames(), ..Place::at(Stage::Receiver) },
+        p_value: corrected((-excess).exp(), 2.0),
+        gain: excess * held_share,
+        errs_alike: false,
+        look_alikes: vec![],
+        statement: format!(
+            "{at} of the recorded components ({:.3} %) lie exactly at ±{largest:.0}, where {expected:.1} would by the values just \
+             below: the converter is at its rail and cuts the signal",
+            100.0 * share
+        ),
+        curve: None,
+        energy: at as f64 * (0.1 * largest).powi(2),
+        correction,
+    }
+}
+
+/// Beat frequencies where nothing returns: neither room nor body, nor what leaks over the board.
+fn silent_bins(evidence: &Evidence) -> Vec<bool> {
+    let mut empty = empty_bins(evidence);
+    let power = still_power(evidence);
+    let samples = power.len();
+    let near: Vec<usize> = (0..samples).filter(|&bin| bin.min(samples - bin) <= BOARD_BINS).collect();
+    let most = |bins: &[usize]| bins.iter().map(|&bin| power[bin]).fold(0.0, f64::max);
+    if most(&near) > LEAKING * power.iter().copied().fold(0.0, f64::max) {
+        near.iter().for_each(|&bin| empty[bin] = false);
+    }
+    empty
+}
+
+/// Largest component of the signal as it was before it was cut, without most of its noise.
+fn strongest(evidence: &Evidence, declip: &Declip, hits: &[usize]) -> f64 {
+    let mut whole = evidence.clone().changed();
+    whole.cube.each_chirp(|_, chirp| declip.restore(chirp));
+    let channels = whole.cube.channels();
+    let of = |index: usize| {
+        let clean = denoised::channel(&whole, index / channels, index % channels);
+        clean.iter().flat_map(parts).map(f64::abs).fold(0.0, f64::max)
+    };
+    (0..hits.len() * channels).into_par_iter().filter(|index| hits[index / channels] > 0).map(of).reduce(|| 0.0, f64::max)
+}

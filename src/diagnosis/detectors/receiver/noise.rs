@@ -1,0 +1,347 @@
+//! Noise that is not white over beat frequency, or not independent between receivers.
+//!
+//! Read from cells where neither room nor body can be; low quantiles and a bound on power keep movers out.
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use super::coloured::coloured;
+use super::shares::Shares;
+use crate::diagnosis::Evidence;
+use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::cube::folds;
+use crate::diagnosis::evidence::beat::{empty_bins, quiet_bins, ranges_m};
+use crate::diagnosis::evidence::{hann, transform_under};
+use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
+use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::effects::{self, Stage};
+
+/// A cell's power over the noise, beyond which it is a mover's.
+const MOVER: f64 = 8.0;
+
+/// Cells of a map under one Hann window per independent product of two receivers' noise: neighbours in range are correlated by 2/3
+/// and 1/6, and their products by the square of that.
+const PER_PRODUCT: f64 = 35.0 / 18.0;
+
+/// Least correlation: far below a hundredth it does not matter, and the tails of movers begin to count.
+const LEAST_RHO: f64 = 0.005;
+
+/// Cells that are looked at.
+struct Cells {
+    /// Windows' maps, `[channel][cell]`.
+    values: Vec<Vec<Complex64>>,
+    /// Beat-frequency bin and Doppler row, `[cell]`.
+    places: Vec<[usize; 2]>,
+}
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let empty = if ranges_m(evidence).is_some() { empty_bins(evidence) } else { quiet_bins(evidence) };
+    let samples = evidence.cube.dims[4];
+    let bins: Vec<usize> = (2..samples - 1).filter(|&bin| empty[bin]).collect();
+    if bins.len() < 8 || evidence.cube.dims[3] < 16 {
+        return vec![];
+    }
+    let filtered = [effects::if_highpass::ID, effects::if_lowpass::ID, effects::coloured_noise::ID]
+        .iter()
+        .any(|id| evidence.accepted.contains(id));
+    let colour = if filtered { None } else { coloured(evidence, &bins) };
+    // Receivers that were uncoupled again share the noise that each of them had for itself, and what a converter at its rail
+    // cut off bursts and peaks is the same in all of them.
+    let known = [effects::correlated_noise::ID, effects::mutual_coupling::ID, effects::adc_saturation::ID]
+        .iter()
+        .any(|id| evidence.accepted.contains(id));
+    let correlation = if known { None } else { correlated(evidence, &bins) };
+    colour.into_iter().chain(correlation).collect()
+}
+
+/// Whitened by each channel's own power; cells with a mover in any channel are left out.
+fn cells(evidence: &Evidence, frame: usize, bins: &[usize]) -> Cells {
+    let [_, _, rx, loops, samples] = evidence.cube.dims;
+    // Where nothing is, nothing leaks over Doppler: all chirps count alike.
+    let (slow, fast) = (vec![1.0 / (loops as f64).sqrt(); loops], hann(samples));
+    let maps: Vec<Vec<Complex64>> =
+        (0..rx).map(|channel| transform_under(&evidence.moving(frame, channel), &slow, &fast)).collect();
+    let mut cells = Cells { values: vec![vec![]; rx], places: vec![] };
+    for &bin in bins {
+        for doppler in 3..loops - 2 {
+            let at = doppler * samples + bin;
+            let ordinary = (0..rx).all(|c| maps[c][at].norm_sqr() < MOVER * evidence.noise()[c]);
+            if ordinary {
+                (0..rx).for_each(|c| cells.values[c].push(maps[c][at] / evidence.noise()[c].max(1e-300).sqrt()));
+                cells.places.push([bin, doppler]);
+            }
+        }
+    }
+    cells
+}
+
+/// Whether most Doppler rows, most beat frequencies and most frames share a correlation between the receivers.
+fn is_everywhere(evidence: &Evidence, bins: &[usize], found: &DMatrix<Complex64>) -> bool {
+    let [frames, _, rx, loops, samples] = evidence.cube.dims;
+    let pairs: Vec<(usize, usize)> = pairs_of(rx).collect();
+    let whole: f64 = pairs.iter().map(|&pair| found[pair].norm_sqr()).sum();
+    let mut shares = Shares::new([samples, loops, frames]);
+    for &frame in &evidence.split.training {
+        let cells = cells(evidence, frame, bins);
+        for (cell, &[bin, row]) in cells.places.iter().enumerate() {
+            let value = |c: usize| cells.values[c][cell];
+            let along: f64 = pairs.iter().map(|&(a, b)| (found[(a, b)].conj() * value(a) * value(b).conj()).re).sum();
+            shares.add([bin, row, frame], along, whole);
+        }
+    }
+    shares.are_everywhere()
+}
+
+/// What receivers share, summed over cells.
+struct Shared {
+    /// Products of every two, the second one conjugated.
+    products: DMatrix<Complex64>,
+    cells: f64,
+}
+
+impl Shared {
+    fn none(receivers: usize) -> Self {
+        Self { products: DMatrix::zeros(receivers, receivers), cells: 0.0 }
+    }
+
+    fn of(evidence: &Evidence, frame: usize, bins: &[usize]) -> Self {
+        let values = cells(evidence, frame, bins).values;
+        let product = |a: usize, b: usize| values[a].iter().zip(&values[b]).map(|(a, b)| a * b.conj()).sum();
+        Self { products: DMatrix::from_fn(values.len(), values.len(), product), cells: values[0].len() as f64 }
+    }
+
+    fn and(self, other: &Self) -> Self {
+        Self { products: self.products + &other.products, cells: self.cells + other.cells }
+    }
+
+    fn independent(&self) -> f64 {
+        self.cells / PER_PRODUCT
+    }
+
+    /// Root mean square of every receiver.
+    fn scales(&self) -> Vec<f64> {
+        (0..self.products.nrows()).map(|rx| (self.products[(rx, rx)].re / self.cells.max(1.0)).max(1e-300).sqrt()).collect()
+    }
+
+    fn correlations(&self, scales: &[f64]) -> DMatrix<Complex64> {
+        let receivers = self.products.nrows();
+        DMatrix::from_fn(receivers, receivers, |a, b| self.products[(a, b)] / (self.cells.max(1.0) * scales[a] * scales[b]))
+    }
+
+    /// Log-likelihood that other cells gain by correlations, beside these powers alone; `alike`: the same one in all pairs.
+    fn gain(&self, others: &Self, alike: bool) -> Option<f64> {
+        let scales = self.scales();
+        let (own, seen) = (self.correlations(&scales), others.correlations(&scales));
+        let expected = if alike { equal(own.nrows(), mean_correlation(&own)) } else { own };
+        let determinant = expected.determinant().re;
+        let inverse = expected.try_inverse()?;
+        (determinant > 0.0).then(|| others.independent() * (seen.trace().re - (inverse * seen).trace().re - determinant.ln()))
+    }
+}
+
+fn pairs_of(receivers: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..receivers).flat_map(|a| (0..a).map(move |b| (a, b)))
+}
+
+/// Mean over pairs of receivers; what is common to all of them is real.
+fn mean_correlation(correlations: &DMatrix<Complex64>) -> f64 {
+    let receivers = correlations.nrows();
+    pairs_of(receivers).map(|pair| correlations[pair].re).sum::<f64>() / pairs_of(receivers).count().max(1) as f64
+}
+
+/// One and the same correlation between any two.
+fn equal(receivers: usize, rho: f64) -> DMatrix<Complex64> {
+    DMatrix::from_fn(receivers, receivers, |a, b| Complex64::from(if a == b { 1.0 } else { rho }))
+}
+
+fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
+    let rx = evidence.cube.dims[2];
+    if rx < 2 {
+        return None;
+    }
+    let of_frames: Vec<Shared> =
+        (0..evidence.cube.dims[0]).into_par_iter().map(|frame| Shared::of(evidence, frame, bins)).collect();
+    let sum = |frames: &[usize]| frames.iter().fold(Shared::none(rx), |sum, &frame| sum.and(&of_frames[frame]));
+    let training = sum(&evidence.split.training);
+    if training.cells < 100.0 {
+        return None;
+    }
+    let found = training.correlations(&training.scales());
+    let independent = training.independent();
+    let pairs = (rx * (rx - 1) / 2) as f64;
+    let total: f64 = pairs_of(rx).map(|pair| found[pair].norm_sqr()).sum();
+    let mean = mean_correlation(&found);
+    // Any correlation of any two; and that of noise from one place, such as a supply, which is the same in all receivers: one
+    // number.
+    let chances =
+        [chi2_tail(2.0 * independent * total, 2.0 * pairs), Normal::standard().sf(mean * (2.0 * independent * pairs).sqrt())];
+    let alike = chances[1] < chances[0];
+    let p_value = corrected(chances[0].min(chances[1]), 2.0);
+    // Of what is found, chance has its share.
+    let rho = if alike { mean } else { (total / pairs - 1.0 / independent).max(0.0).sqrt() };
+    if p_value > 1e-3 || rho < LEAST_RHO {
+        return None;
+    }
+    if !is_everywhere(evidence, bins, &if alike { equal(rx, rho) } else { found }) {
+        return None;
+    }
+    // Few held-out frames say little of so many numbers: every frame is predicted by those of the other folds.
+    let gain: f64 = folds(of_frames.len())
+        .map(|parts| {
+            let [rest, fold] = parts.map(|frames| sum(&frames));
+            rest.gain(&fold, alike).unwrap_or(f64::NEG_INFINITY)
+        })
+        .sum();
+    let error = (2.0 * independent * pairs).sqrt().recip() + 0.02 * rho;
+    let over = if alike { "mean" } else { "root mean square" };
+    let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
+    // That receivers share something is observed; the library says what.
+    let id = evidence.info(effects::correlated_noise::ID).map(|info| info.id);
+    Some(Candidate {
+        id,
+        behaves_like: Behaviour::NoiseSharedByReceivers,
+        estimates: id.map(|_| Estimate::normal("rho", rho, error)).into_iter().collect(),
+        choice: None,
+        place: Place::at(Stage::Noise),
+        p_value,
+        gain,
+        errs_alike: false,
+        look_alikes: vec![],
+        statement: format!(
+            "the receivers' noise is not independent: where nothing is, they agree with a correlation of {rho:.3} ({over} \
+             over pairs), like a target in one fixed direction in every cell"
+        ),
+        curve: None,
+        energy: rho * noise * evidence.cube.samples.len() as f64,
+        correction: Correction::None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::diagnosis::cube::{Loaded, analytic};
+    use crate::radar::{Radar, Sampling};
+    use crate::room::Room;
+
+    /// Noise of four receivers; `shared`: amplitude of what is common to all of them, by frame and chirp.
+    fn noise(shared: impl Fn(usize, usize) -> f64) -> Evidence {
+        let mut radar = Radar::small(12);
+        (radar.loops_per_frame, radar.samples_per_chirp) = (32, 64);
+        radar.tx_m = vec![[0.0; 3]];
+        radar.rx_m = (0..4).map(|rx| [0.0019 * f64::from(rx), 0.0, 0.0]).collect();
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut normal =
+            || -> Complex64 { Complex64::new(StandardNormal.sample(&mut random), StandardNormal.sample(&mut random)) };
+        let mut samples = vec![];
+        for frame in 0..12 {
+            let common: Vec<Complex64> = (0..32 * 64).map(|i| normal() * shared(frame, i / 64)).collect();
+            for _ in 0..4 {
+                samples.extend(common.iter().map(|common| common + normal()));
+            }
+        }
+        Evidence::new(Loaded::of_samples(radar, samples, [-1e3, 1e3]), None, None)
+    }
+
+    /// White noise of a receiver without quadrature, in a room that is told.
+    fn real_noise(seed: u64) -> Evidence {
+        let mut radar = Radar::small(12);
+        (radar.loops_per_frame, radar.samples_per_chirp, radar.sampling) = (32, 128, Sampling::Real);
+        (radar.tx_m, radar.rx_m) = (vec![[0.0; 3]], vec![[0.0; 3], [0.0019, 0.0, 0.0]]);
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let parts: Vec<f32> = (0..12 * 2 * 32 * 128).map(|_| StandardNormal.sample(&mut random)).collect();
+        let room = Room { left_m: Some(1.2), right_m: Some(1.2), front_m: Some(3.0), ..Room::default() };
+        Evidence::new(Loaded::of_samples(radar, analytic(&parts, 128), [-1e3, 1e3]), Some(room), None)
+    }
+
+    #[test]
+    fn beat_frequencies_that_a_receiver_without_quadrature_has_twice_are_no_colour() {
+        let all = |evidence: &Evidence| {
+            let mut taken_for_complex = evidence.clone();
+            taken_for_complex.radar.sampling = Sampling::Complex;
+            let empty = empty_bins(&taken_for_complex);
+            coloured(evidence, &(2..127).filter(|&bin| empty[bin]).collect::<Vec<_>>())
+        };
+        let (mut found, mut found_in_all) = (0, 0);
+        for seed in 0..6 {
+            let evidence = real_noise(seed);
+            found += find(&evidence).len();
+            found_in_all += usize::from(all(&evidence).is_some());
+        }
+        // Where an analytic signal holds nothing, what is beside it has a colour.
+        assert_eq!((found, found_in_all), (0, 6));
+    }
+
+    #[test]
+    fn what_receivers_share_all_the_time_is_correlated_noise_and_bursts_are_none() {
+        let bins: Vec<usize> = (2..63).collect();
+        let always = correlated(&noise(|_, _| 0.3), &bins).expect("nothing found");
+        let rho = always.estimates[0].values[0];
+        assert!((rho - 0.09 / 1.09).abs() < 0.02, "{rho}");
+        let bursts = noise(|frame, chirp| if [0, 5].contains(&frame) && chirp % 8 == 0 { 2.0 } else { 0.0 });
+        assert!(correlated(&bursts, &bins).is_none());
+        assert!(correlated(&noise(|_, _| 0.0), &bins).is_none());
+    }
+
+    #[test]
+    fn products_of_independent_noise_scatter_as_so_many_independent_ones() {
+        let evidence = noise(|_, _| 0.0);
+        let bins: Vec<usize> = (2..63).collect();
+        let of_frame = |frame: usize| {
+            let shared = Shared::of(&evidence, frame, &bins);
+            let found = shared.correlations(&shared.scales());
+            pairs_of(4).map(|pair| found[pair].norm_sqr()).sum::<f64>() * shared.independent()
+        };
+        // 72 products: a standard error of 0.12.
+        let mean = (0..12).map(of_frame).sum::<f64>() / 72.0;
+        assert!((0.65..1.35).contains(&mean), "{mean}");
+    }
+
+    /// Noise of two receivers, whose power over beat frequency (bins from zero, to either side) is so many times what it is elsewhere.
+    fn shaped(power: impl Fn(f64) -> f64) -> Evidence {
+        let mut radar = Radar::small(12);
+        (radar.loops_per_frame, radar.samples_per_chirp) = (32, 64);
+        (radar.tx_m, radar.rx_m) = (vec![[0.0; 3]], vec![[0.0; 3], [0.0019, 0.0, 0.0]]);
+        let mut random = ChaCha8Rng::seed_from_u64(11);
+        let inverse = hybridsim_fft::FftPlanner::new().plan_fft_inverse(64);
+        let mut samples = vec![];
+        for _ in 0..12 * 2 * 32 {
+            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+            let mut chirp: Vec<Complex64> =
+                (0..64usize).map(|bin| Complex64::new(normal(), normal()) * power(bin.min(64 - bin) as f64).sqrt()).collect();
+            inverse.process(&mut chirp);
+            samples.extend(chirp);
+        }
+        Evidence::new(Loaded::of_samples(radar, samples, [-1e3, 1e3]), None, None)
+    }
+
+    #[test]
+    fn colour_has_a_name_where_it_follows_the_law_and_the_library_has_it() {
+        let bins: Vec<usize> = (2..63).collect();
+        let knee = |bin: f64| 1.0 + 6.0 / bin.max(0.5);
+        let law = coloured(&shaped(knee), &bins).expect("a colour");
+        assert_eq!(law.id, Some(effects::coloured_noise::ID));
+        // A quarter of the band is louder by 2 dB: no knee has that.
+        let other = coloured(&shaped(|bin| if (16.0..24.0).contains(&bin) { 1.6 } else { 1.0 }), &bins).expect("a colour");
+        assert!(other.id.is_none() && other.estimates.is_empty() && other.gain > 15.0, "{other:?}");
+        assert!(coloured(&shaped(|_| 1.0), &bins).is_none());
+        let mut lacks_it = shaped(knee);
+        lacks_it.library = lacks_it.library.iter().copied().filter(|info| info.id != effects::coloured_noise::ID).collect();
+        let unknown = coloured(&lacks_it, &bins).expect("a colour");
+        assert!(unknown.id.is_none() && unknown.gain > 15.0, "{unknown:?}");
+    }
+
+    #[test]
+    fn what_receivers_share_is_observed_where_the_library_has_no_name_for_it() {
+        let mut evidence = noise(|_, _| 0.3);
+        evidence.library = evidence.library.iter().copied().filter(|info| info.id != effects::correlated_noise::ID).collect();
+        let found = correlated(&evidence, &(2..63).collect::<Vec<_>>()).expect("nothing found");
+        assert!(found.id.is_none() && found.behaves_like == Behaviour::NoiseSharedByReceivers && found.gain > 15.0);
+    }
+}

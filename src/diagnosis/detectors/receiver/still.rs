@@ -1,0 +1,137 @@
+//! Additive fields that stand still outside the delays of the room: offsets, leakage, transients at the chirps' edges.
+//!
+//! Elements are chosen one after the other by their log-likelihood on the training frames less the Bayesian information
+//! criterion's penalty, together with the images that non-linear receivers make of the static scene (which belong to
+//! other detectors, but must not be taken for a leakage). Named elements are believed only if all together explain most
+//! of what a free field does.
+
+use num_complex::Complex64;
+
+use super::elements::{Element, Images, choose, templates};
+use super::field::{Field, Fitted, add};
+use super::response;
+use super::still_term::{Chosen, is_bent, subtract};
+use super::support::{UNLIKELY, energy};
+use crate::diagnosis::Evidence;
+use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::finding::{Candidate, Place};
+use crate::diagnosis::statistics::chi2_tail;
+use crate::effects::Stage;
+
+/// Share of what a free field explains that named elements must reach.
+const ENOUGH: f64 = 0.8;
+/// Held-out log-likelihood that a free field must gain, nats.
+const LEAST_GAIN: f64 = 20.0;
+
+pub fn find(evidence: &Evidence) -> Vec<Candidate> {
+    let Some(field) = Field::new(evidence) else { return vec![] };
+    let free = field.free_likelihood();
+    let p_free = chi2_tail(2.0 * free, field.freedom());
+    if p_free > 1e-4 {
+        return vec![];
+    }
+    let images = Images::new(evidence, &field);
+    let elements = choose(evidence, &field, &images);
+    let fitted = field.fit(&templates(&elements, &images));
+    let free_gain = field.gain(None, &field.mean);
+    let explained = field.gain(None, &fitted.predicted);
+    let named = elements.iter().any(|element| !matches!(element, Element::Image | Element::Square));
+    let without = residual(&elements, &fitted, &field, &images);
+    // A field far stronger than any filter's traces needs no second thought.
+    let plain = explained >= 0.98 * free_gain && fitted.likelihood > 1e5;
+    let bent = is_bent(evidence);
+    let filter = if plain || bent { None } else { response::find(evidence, &field, &without) };
+    // What is added explains itself as well as any filter does; a filter's traces it does not.
+    let filter = filter.filter(|found| {
+        found.likelihood > 12.0
+            && found.likelihood >= ENOUGH * (free - 0.5 * field.freedom())
+            && (!named || found.likelihood > found.additive)
+    });
+    match filter {
+        Some(found) if found.chance >= UNLIKELY => vec![found.candidate],
+        None if explained >= ENOUGH * free_gain => {
+            // The field is sure; what an element's numbers are is another question.
+            let chosen = Chosen { evidence, field: &field, images: &images, elements: &elements, fitted: &fitted };
+            let found = (0..elements.len()).filter_map(|index| chosen.candidate(index));
+            found.map(Candidate::named_if_sure).collect()
+        }
+        _ if free_gain < LEAST_GAIN || bent => vec![],
+        _ => unexplained(evidence, &field, p_free, free_gain).into_iter().collect(),
+    }
+}
+
+/// Still chirps less what the elements make of them.
+fn residual(elements: &[Element], fitted: &Fitted, field: &Field, images: &Images) -> Vec<Vec<Complex64>> {
+    let templates = templates(elements, images);
+    let mut rest = field.still.clone();
+    for (channel, chirp) in rest.iter_mut().enumerate() {
+        templates.own.iter().zip(&fitted.own[channel]).for_each(|(template, amplitude)| add(chirp, template, -amplitude));
+        templates.common.iter().zip(&fitted.common).for_each(|(template, amplitude)| add(chirp, &template[channel], -amplitude));
+    }
+    rest
+}
+
+/// What remains that no name explains.
+fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, gain: f64) -> Option<Candidate> {
+    let samples = evidence.cube.dims[4];
+    let term: Vec<Vec<Complex64>> = field
+        .mean
+        .iter()
+        .map(|coordinates| {
+            let mut sum = vec![Complex64::ZERO; samples];
+            field.support.outside.iter().zip(coordinates).for_each(|(direction, value)| add(&mut sum, direction, *value));
+            sum
+        })
+        .collect();
+    let energy_of_chirp = term.iter().map(|chirp| energy(chirp)).sum::<f64>();
+    let power_db = 10.0 * (energy_of_chirp / field.still.iter().map(|chirp| energy(chirp)).sum::<f64>().max(1e-300)).log10();
+    Some(Candidate {
+        id: None,
+        behaves_like: Behaviour::AdditiveFastTime,
+        estimates: vec![],
+        choice: None,
+        place: Place::at(Stage::Receiver),
+        p_value,
+        gain,
+        errs_alike: false,
+        look_alikes: vec![],
+        statement: format!(
+            "every chirp holds something that never changes at beat frequencies where the room ({:.1} to {:.1} m) has nothing, \
+             {power_db:.1} dB to all static clutter; no effect of the library explains its shape",
+            field.support.low_m, field.support.high_m
+        ),
+        curve: None,
+        energy: energy_of_chirp * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
+        correction: subtract(term),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects;
+    use crate::radar::Radar;
+    use crate::room::Room;
+
+    #[test]
+    fn a_leakage_that_no_single_tone_describes_is_one_and_is_taken_out_in_full() {
+        let radar = Radar { samples_per_chirp: 128, loops_per_frame: 16, ..Radar::small(12) };
+        let turns = |range_m: f64| 2.0 * range_m * radar.slope_hz_per_s / crate::radar::SPEED_OF_LIGHT / radar.sample_rate_hz;
+        let (wall, leak) = (turns(3.0), turns(0.08));
+        let mut evidence = Evidence::in_noise(radar.clone(), 7, |[_, rx, _, n]| {
+            let tone = |turns: f64| Complex64::cis(std::f64::consts::TAU * turns * n as f64 + rx as f64);
+            // It falls by 2.8 dB along the chirp.
+            tone(wall) * 30.0 + tone(leak) * 100.0 * (-0.32 * n as f64 / 128.0).exp()
+        });
+        let walls = Room { left_m: Some(2.0), right_m: Some(2.0), floor_m: Some(1.0), ceiling_m: Some(1.5), ..Room::default() };
+        evidence.room = Some(Room { front_m: Some(4.0), back_m: Some(1.0), ..walls });
+        let likelihood = |evidence: &Evidence| Field::new(evidence).expect("a field").free_likelihood();
+        let found = find(&evidence);
+        let leaks: Vec<&Candidate> = found.iter().filter(|found| found.id == Some(effects::tx_leakage::ID)).collect();
+        assert_eq!(leaks.len(), 1, "{found:?}");
+        let [low, high] = leaks[0].place.range_m.expect("a range");
+        assert!(low < 0.08 && 0.08 < high, "{low} to {high}");
+        let (before, after) = (likelihood(&evidence), likelihood(&evidence.with(leaks[0])));
+        assert!(after < 1e-3 * before, "{after} of {before}");
+    }
+}

@@ -1,0 +1,126 @@
+//! What most ranges share, with its size, its frequency and its correction.
+
+use std::f64::consts::{PI, SQRT_2};
+use std::sync::Arc;
+
+use num_complex::Complex64;
+
+use super::bets::{Shared, Spectrum, spectra};
+use super::course::Course;
+use super::deviations::Deviation;
+use crate::diagnosis::detectors::slow::candidates::{self, Description};
+use crate::diagnosis::detectors::slow::field::{PATTERN, Part};
+use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::finding::{Candidate, Estimate, Place};
+use crate::diagnosis::statistics;
+use crate::effects::{self, Stage};
+
+/// The phase that the ranges share.
+struct Phase {
+    /// `[frame · loops + loop]`
+    course: Vec<f64>,
+    rms: f64,
+    /// Nats per chirp.
+    spent: f64,
+    frequency_hz: f64,
+    /// Half of the band that holds half of its power.
+    width_hz: f64,
+}
+
+pub fn candidate(evidence: &Evidence, course: &Course, deviations: &[Deviation], shared: &Shared) -> Candidate {
+    let phase = Phase::new(course, &spectra(deviations, course, shared.part), &shared.members);
+    let Description { id, estimates, statement } =
+        if shared.part == Part::Delay { phase.of_delay(shared) } else { phase.of_vibration(evidence, course, shared) };
+    let Phase { course: phases, rms, spent, .. } = phase;
+    let loops = course.loops;
+    Candidate {
+        id,
+        behaves_like: candidates::behaves_like(shared.part),
+        estimates,
+        choice: None,
+        place: if id.is_some() { Place::at(Stage::Scene) } else { candidates::place(shared.part) },
+        p_value: (-shared.log_bets).exp().min(1.0),
+        gain: shared.log_bets,
+        errs_alike: false,
+        look_alikes: vec![],
+        statement,
+        curve: None,
+        energy: rms * rms * course.frames as f64 * loops as f64 * evidence.still().iter().map(|v| v.norm_sqr()).sum::<f64>(),
+        correction: candidates::correction(
+            evidence,
+            shared.part,
+            Arc::new(move |[frame, _, index]| phases[frame * loops + index]),
+            spent,
+        ),
+    }
+}
+
+impl Phase {
+    fn new(course: &Course, spectra: &[Spectrum], members: &[usize]) -> Self {
+        let members: Vec<&Spectrum> = members.iter().map(|&index| &spectra[index]).collect();
+        let information: f64 = members.iter().map(|member| member.variance.recip()).sum();
+        let count = course.frames * course.loops;
+        let mean = |i: usize| members.iter().map(|member| member.course[i] / member.variance).sum::<f64>() / information;
+        let phases = course.denoised(&(0..count).map(mean).collect::<Vec<f64>>(), information.recip());
+        let values = course.spectrum(&phases);
+        // A spectrum has one of two sides.
+        let rms = (2.0 * values.iter().map(Complex64::norm_sqr).sum::<f64>() / count as f64).sqrt();
+        let ratios = values.iter().map(|value| value.norm_sqr() * information);
+        let spent = statistics::learned(ratios.collect::<Vec<f64>>().into_iter()) * values.len() as f64 / count as f64;
+        let [low_hz, frequency_hz, high_hz] = quartiles(&course.frequencies_hz(), &values);
+        let width_hz = (0.5 * (high_hz - low_hz)).max(0.5 / course.duration_s());
+        Self { course: phases, rms, spent, frequency_hz, width_hz }
+    }
+
+    fn of_delay(&self, shared: &Shared) -> Description {
+        let at_3_m = self.rms * candidates::stated_delay_s();
+        Description::unnamed(format!(
+            "The phase of the static returns varies in proportion to their delay, by {at_3_m:.4} rad (standard deviation) at 3 m; {}.",
+            ranges(shared)
+        ))
+    }
+
+    fn of_vibration(&self, evidence: &Evidence, course: &Course, shared: &Shared) -> Description {
+        let Self { rms, frequency_hz, width_hz, .. } = *self;
+        let metres = evidence.radar.wavelength_m() / (4.0 * PI);
+        let amplitude_m = SQRT_2 * rms * metres;
+        let alias = if course.even {
+            String::new()
+        } else {
+            format!(" (or that beside a multiple of {:.2} Hz, the rate of the frames)", course.frame_s.recip())
+        };
+        Description {
+            id: Some(effects::radar_vibration::ID),
+            estimates: vec![
+                Estimate::normal("amplitude_m", amplitude_m, amplitude_m * PATTERN),
+                Estimate::normal("frequency_hz", frequency_hz, width_hz),
+            ],
+            statement: format!(
+                "The phases of all static returns fluctuate together, by {rms:.4} rad (standard deviation) at {frequency_hz:.2} ± \
+                 {width_hz:.2} Hz{alias}; {}: the radar itself vibrates, by {:.1} µm along its boresight (standard deviation).",
+                ranges(shared),
+                1e6 * rms * metres
+            ),
+        }
+    }
+}
+
+fn ranges(shared: &Shared) -> String {
+    format!("{} of the {} informative ranges share it", shared.sharing, shared.informative)
+}
+
+/// Frequencies below which a quarter, half and three quarters of a spectrum's power lie.
+fn quartiles(frequencies_hz: &[f64], values: &[Complex64]) -> [f64; 3] {
+    let mut powers: Vec<(f64, f64)> = frequencies_hz.iter().copied().zip(values.iter().map(Complex64::norm_sqr)).collect();
+    powers.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let all: f64 = powers.iter().map(|(_, power)| power).sum();
+    [0.25, 0.5, 0.75].map(|share| {
+        let mut sum = 0.0;
+        let below = |&&(_, power): &&(f64, f64)| {
+            sum += power;
+            sum < share * all
+        };
+        let count = powers.iter().take_while(below).count();
+        powers[count.min(powers.len() - 1)].0
+    })
+}

@@ -1,0 +1,94 @@
+//! How the static returns of groups of ranges deviate from their mean over time, chirp by chirp.
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use crate::diagnosis::detectors::slow::field::{Group, ahead};
+use crate::diagnosis::evidence::{Evidence, Tapered};
+use crate::grid::Grid;
+use crate::radar::SPEED_OF_LIGHT;
+
+/// Bins between two groups, across which windowed noise is hardly correlated.
+const GAP: usize = 2;
+/// Bins over which the window correlates noise: a sum over bins has so many times the variance of as many independent ones.
+const BINS_PER_VALUE: f64 = 2.0;
+
+/// Relative to the mean.
+pub struct Deviation {
+    pub group: Group,
+    /// `[frame · loops + loop]`
+    pub values: Vec<Complex64>,
+    /// Of the noise in each of them.
+    pub variance: f64,
+}
+
+/// Spectra of all chirps in units of the noise's deviation.
+struct Chirps {
+    /// `[frame, channel, loop, sample]`
+    spectra: Grid<Complex64, 4>,
+    /// `[channel, bin]`: mean over all frames.
+    still: Grid<Complex64, 2>,
+}
+
+/// None where the noise is unknown, or too few ranges have static returns.
+pub fn deviations(evidence: &Evidence) -> Option<Vec<Deviation>> {
+    let chirps = Chirps::new(evidence)?;
+    let width = (evidence.range_bins() / 16).max(4 + GAP);
+    let of_group = |g: usize| chirps.deviation(evidence, g * width..(g + 1) * width - GAP);
+    let deviations: Vec<Deviation> = (0..evidence.range_bins() / width).into_par_iter().filter_map(of_group).collect();
+    (deviations.len() > 2).then_some(deviations)
+}
+
+impl Chirps {
+    fn new(evidence: &Evidence) -> Option<Self> {
+        let [frames, _, _, loops, samples] = evidence.cube.dims;
+        let (channels, bins, noise) = (evidence.cube.channels(), evidence.range_bins(), evidence.noise());
+        if noise.iter().any(|variance| !variance.is_finite() || *variance <= 0.0) {
+            return None;
+        }
+        let tapered = Tapered::new(samples);
+        let mut spectra =
+            Grid::filled(["frame", "channel", "loop", "sample"], [frames, channels, loops, samples], Complex64::ZERO);
+        spectra.values_mut().par_chunks_exact_mut(loops * samples).enumerate().for_each(|(i, own)| {
+            let [frame, channel] = [i / channels, i % channels];
+            let scale = noise[channel].sqrt().recip();
+            own.copy_from_slice(&tapered.spectra(evidence.cube.channel(frame, channel), scale));
+        });
+        let mut still = Grid::filled(["channel", "bin"], [channels, bins], Complex64::ZERO);
+        for channel in 0..channels {
+            for (frame, index) in (0..frames).flat_map(|frame| (0..loops).map(move |index| (frame, index))) {
+                let sums = still.below_mut([channel]).iter_mut();
+                let chirp = spectra.below([frame, channel, index]);
+                sums.zip(chirp).for_each(|(sum, value)| *sum += value / (frames * loops) as f64);
+            }
+        }
+        Some(Self { spectra, still })
+    }
+
+    fn power(&self, bin: usize) -> f64 {
+        (0..self.still.shape()[0]).map(|channel| self.still[[channel, bin]].norm_sqr()).sum()
+    }
+
+    /// None where nothing stands still.
+    fn deviation(&self, evidence: &Evidence, range: std::ops::Range<usize>) -> Option<Deviation> {
+        let [frames, channels, loops, samples] = self.spectra.shape();
+        // As in `field`: static returns that are lost in the noise of a chirp teach nothing.
+        let own: Vec<usize> = range.clone().filter(|&bin| self.power(bin) > 3.0 * channels as f64).collect();
+        let sum: f64 = own.iter().map(|&bin| self.power(bin)).sum();
+        if sum <= 0.0 {
+            return None;
+        }
+        let delay_of_bin = evidence.radar.sample_rate_hz / (samples as f64 * evidence.radar.slope_hz_per_s);
+        let delay_s = own.iter().map(|&bin| self.power(bin) * bin as f64).sum::<f64>() / sum * delay_of_bin;
+        let ahead = ahead(evidence.room.as_ref(), 0.5 * SPEED_OF_LIGHT * delay_s);
+        let value = |[frame, index]: [usize; 2]| -> Complex64 {
+            let along = |channel: usize| {
+                let (values, mean) = (self.spectra.below([frame, channel, index]), self.still.below([channel]));
+                own.iter().map(|&bin| mean[bin].conj() * (values[bin] - mean[bin])).sum::<Complex64>()
+            };
+            (0..channels).map(along).sum::<Complex64>() / sum
+        };
+        let values = (0..frames).flat_map(|frame| (0..loops).map(move |index| [frame, index])).map(value).collect();
+        Some(Deviation { group: Group { delay_s, ahead, bins: range }, values, variance: BINS_PER_VALUE / sum })
+    }
+}
