@@ -18,6 +18,7 @@ use super::report::{Measures, Report};
 use super::rules::*;
 use super::seal::measured;
 use super::secret::Secret;
+use super::structures::Who;
 use super::table::{Row, markdown};
 use super::truth::Truth;
 use crate::data::atomic::write_text;
@@ -42,6 +43,8 @@ struct Case {
     oracle: Option<Measures>,
     baseline: Option<Statistics>,
     concealed: bool,
+    /// Somebody is there whom nobody tracks.
+    untracked: bool,
 }
 
 /// The whole result, as `score.json` keeps it.
@@ -161,6 +164,7 @@ fn one(challenge: &Path, folder: &Path, twins: Option<&Path>, answers: &Answers,
         oracle,
         baseline,
         concealed: false,
+        untracked: truth.structure.person == Who::Untracked,
     }
 }
 

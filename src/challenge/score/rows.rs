@@ -62,7 +62,9 @@ impl<'a> Groups<'a> {
                 Aim::AtLeast(0.95),
             ),
         ];
-        rows.extend(uniformity::rows(nulls.iter().filter_map(|case| case.report.as_ref())));
+        // Somebody who is there and whom nobody tracks is no null.
+        let empty = nulls.iter().filter(|case| !case.untracked);
+        rows.extend(uniformity::rows(empty.filter_map(|case| case.report.as_ref())));
         rows
     }
 

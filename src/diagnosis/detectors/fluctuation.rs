@@ -17,6 +17,7 @@ use std::sync::Arc;
 use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 
+use crate::diagnosis::BodyPrediction;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
@@ -36,14 +37,14 @@ const FEWEST_STRONG: usize = 5;
 const LEAST_LIKELY: f64 = 0.01;
 pub const ID: &str = effects::soft_occlusion::ID;
 
-/// Static clutter where the body never is.
+/// Static clutter where the body never is, if anybody is tracked.
 struct Free {
     returns: Returns,
     /// The strong returns, which all do the same unless something happens to them.
     strong: Vec<usize>,
     /// Of all ranges where nothing moves.
     quiet: Vec<usize>,
-    /// From here on the body may hide what is there.
+    /// From here on the body may hide what is there: nowhere without one.
     behind_m: f64,
     bin_m: f64,
 }
@@ -51,30 +52,34 @@ struct Free {
 impl Free {
     /// None where too little is known.
     fn new(evidence: &Evidence) -> Option<Self> {
-        let body = evidence.body.as_ref()?;
         let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
         if training.len() < FEWEST || held_out.is_empty() {
             return None;
         }
-        let centre = evidence.radar.centre_m();
-        let distance = |at: [f64; 3]| (0..3).map(|axis| (at[axis] - centre[axis]).powi(2)).sum::<f64>().sqrt();
-        let points = body.frames.iter().flatten().map(|point| distance(point.position_m));
-        let [near_m, far_m] = points.fold([f64::MAX, 0.0], |[near, far]: [f64; 2], d| [near.min(d), far.max(d)]);
-        if far_m <= 0.0 {
-            return None;
-        }
         let returns = Returns::new(evidence)?;
         let bin_m = evidence.radar.range_resolution_m();
-        let (before_m, behind_m) = (near_m - MARGIN_M, far_m + MARGIN_M);
-        let is_free = |bin: &usize| !(before_m..=behind_m).contains(&(*bin as f64 * bin_m));
+        let reach = match &evidence.body {
+            Some(body) => Some(reach(body, evidence.radar.centre_m())?),
+            None => None,
+        };
+        let is_free =
+            |bin: &usize| reach.is_none_or(|[before_m, behind_m]| !(before_m..=behind_m).contains(&(*bin as f64 * bin_m)));
         let quiet: Vec<usize> = returns.quiet().filter(is_free).collect();
         let mut strong = returns.strong(&quiet, training);
         if strong.len() < FEWEST_STRONG {
             // Little of a body is in the mean of a frame where nothing seems to move.
             strong = returns.strong(&returns.quiet().collect::<Vec<_>>(), training);
         }
-        Some(Self { returns, strong, quiet, behind_m, bin_m })
+        Some(Self { returns, strong, quiet, behind_m: reach.map_or(f64::INFINITY, |[_, behind_m]| behind_m), bin_m })
     }
+}
+
+/// Ranges that a body's own slow returns may reach. None where it has no points.
+fn reach(body: &BodyPrediction, centre_m: [f64; 3]) -> Option<[f64; 2]> {
+    let distance = |at: [f64; 3]| (0..3).map(|axis| (at[axis] - centre_m[axis]).powi(2)).sum::<f64>().sqrt();
+    let points = body.frames.iter().flatten().map(|point| distance(point.position_m));
+    let [near_m, far_m] = points.fold([f64::MAX, 0.0], |[near, far]: [f64; 2], d| [near.min(d), far.max(d)]);
+    (far_m > 0.0).then_some([near_m - MARGIN_M, far_m + MARGIN_M])
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {

@@ -152,8 +152,9 @@ fn candidate(
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
-            "The static return {range_m:.2} m away changes from frame to frame while the other static returns stay, and the body's \
-             silhouette alone does not explain it: something moves there, or passes in front of it."
+            "The static return {range_m:.2} m away changes from frame to frame while the other static returns stay{}: something moves \
+             there, or passes in front of it.",
+            if evidence.body.is_some() { ", and the body's silhouette alone does not explain it" } else { "" }
         ),
         curve: Some(Curve {
             title: format!("Change {range_m:.2} m away"),

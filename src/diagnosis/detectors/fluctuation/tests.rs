@@ -80,16 +80,26 @@ fn a_shadow_is_named_and_a_curtain_is_not() {
         evidence(2, |index, frame| Complex64::cis(if index == 2 { 0.6 * (TAU * frame as f64 / 7.3).sin() } else { 0.0 }));
     let found = find(&curtain);
     assert!(found.len() == 1 && found[0].id.is_none() && found[0].gain > 15.0, "{found:?}");
+    let found = find(&nobody_tracked(curtain));
+    assert!(found.len() == 1 && found[0].id.is_none() && found[0].gain > 15.0, "{found:?}");
+    assert!(!found[0].statement.contains("silhouette"));
+}
+
+fn nobody_tracked(mut evidence: Evidence) -> Evidence {
+    evidence.body = None;
+    evidence.changed()
 }
 
 #[test]
 fn noise_and_what_all_returns_do_is_nothing() {
     for seed in 3..9 {
-        assert!(find(&evidence(seed, |_, _| Complex64::ONE)).is_empty());
+        let noise = evidence(seed, |_, _| Complex64::ONE);
+        assert!(find(&noise).is_empty() && find(&nobody_tracked(noise)).is_empty());
         let drift = evidence(seed, |index, frame| {
             let turn = 0.01 * frame as f64 * (1.0 + [1.2, 4.2, FRONT_M][index]);
             Complex64::from_polar(1.0 + 0.02 * frame as f64, turn)
         });
         assert!(find(&drift).is_empty(), "{:?}", find(&drift));
+        assert!(find(&nobody_tracked(drift)).is_empty());
     }
 }

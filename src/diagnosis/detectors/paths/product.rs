@@ -82,7 +82,7 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
 /// Of all kinds that are not known yet, the best first.
 fn products(scene: &Scene) -> Vec<Product> {
     let clean: Vec<Vec<Vec<Complex64>>> = (0..scene.frames()).map(|frame| denoised::frame(scene.evidence, frame)).collect();
-    let unknown = KINDS.into_iter().filter(|kind| scene.evidence.may_name(kind.id()));
+    let unknown = KINDS.into_iter().filter(|kind| !scene.evidence.accepted.contains(&kind.id()));
     let mut products: Vec<Product> = unknown.map(|kind| fitted(scene, &clean, kind)).collect();
     products.sort_by(|a, b| b.fit.held_out.total_cmp(&a.fit.held_out));
     products
@@ -104,10 +104,12 @@ impl Product {
             Kind::Bounce(_) => (Behaviour::PathLike, Stage::Propagation, Volume::KEPT),
             Kind::Harmonic => (Behaviour::NonLinear, Stage::Receiver, Volume::BY_SAMPLE),
         };
+        // The phase between receivers is observed; the library says whose it is.
+        let id = scene.evidence.info(kind.id()).map(|info| info.id);
         Candidate {
-            id: Some(kind.id()),
-            behaves_like,
-            estimates: vec![estimate],
+            id,
+            behaves_like: if id.is_some() { behaves_like } else { Behaviour::Quadratic },
+            estimates: id.map(|_| estimate).into_iter().collect(),
             choice: None,
             place: Place::at(stage),
             p_value,

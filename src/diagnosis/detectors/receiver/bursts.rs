@@ -3,7 +3,7 @@
 //! What moves between neighbouring chirps of a channel is small, since Doppler turns phases slowly beside white noise:
 //! a chirp less the mean of its two neighbours is mostly noise, and a burst in one chirp stands out by its power.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use num_complex::Complex64;
@@ -102,8 +102,7 @@ fn claim(evidence: &Evidence, bursts: &[Burst], hit: usize, crossings: Option<&C
     // Hits of one chirp in all receivers at once are one burst.
     let places: BTreeSet<(usize, usize, usize)> =
         bursts.iter().map(|burst| (burst.frame, burst.channel / rx, burst.chirp)).collect();
-    let together = bursts.len() as f64 / places.len() as f64;
-    let seen_by_all = rx > 1 && together > 0.5 * rx as f64;
+    let seen_by_all = rx > 1 && together(bursts, rx) > 0.5;
     let list = |values: BTreeSet<usize>| Some(values.into_iter().collect::<Vec<_>>());
     let place = Place {
         frames: list(bursts.iter().map(|burst| burst.frame).collect()),
@@ -134,6 +133,20 @@ fn claim(evidence: &Evidence, bursts: &[Burst], hit: usize, crossings: Option<&C
     };
     let statement = if named { format!("{observed}: {cause}") } else { observed };
     Claim { id: named.then_some(id), look_alikes, estimates, place, statement }
+}
+
+/// Share of the other receivers that a burst hits too, at the same samples: mean over the bursts.
+fn together(bursts: &[Burst], rx: usize) -> f64 {
+    let mut of_chirp: BTreeMap<(usize, usize, usize), Vec<&Burst>> = BTreeMap::new();
+    for burst in bursts {
+        of_chirp.entry((burst.frame, burst.channel / rx, burst.chirp)).or_default().push(burst);
+    }
+    let hit_by = |burst: &Burst, all: &[&Burst]| {
+        let meets = |other: &&&Burst| other.channel != burst.channel && other.first <= burst.last && burst.first <= other.last;
+        all.iter().filter(meets).map(|other| other.channel).collect::<BTreeSet<_>>().len()
+    };
+    let hits: usize = of_chirp.values().flat_map(|all| all.iter().map(move |burst| hit_by(burst, all))).sum();
+    hits as f64 / (bursts.len() * (rx - 1)).max(1) as f64
 }
 
 /// How unlikely it is that a sample is hit, and by so much, where another would have had noise: each burst's samples are measured
