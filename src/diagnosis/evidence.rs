@@ -285,6 +285,12 @@ impl Evidence {
 
 #[cfg(test)]
 impl Evidence {
+    /// The same with effects fewer in the library.
+    pub fn lacking(mut self, ids: &[&str]) -> Self {
+        self.library = self.library.iter().copied().filter(|info| !ids.contains(&info.id)).collect();
+        self
+    }
+
     /// What `signal` says of frame, channel, loop and sample, in white noise of variance 2 (the real part alone, where the radar has no
     /// quadrature): for tests.
     pub fn in_noise(radar: Radar, seed: u64, signal: impl Fn([usize; 4]) -> Complex64) -> Self {

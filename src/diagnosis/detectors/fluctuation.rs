@@ -23,6 +23,7 @@ use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
 use crate::diagnosis::statistics::{DECIBEL, corrected};
 use crate::effects::{self, Stage};
+use crate::paths::distance;
 
 use course::Frames;
 use returns::{Returns, Series};
@@ -76,8 +77,7 @@ impl Free {
 
 /// Ranges that a body's own slow returns may reach. None where it has no points.
 fn reach(body: &BodyPrediction, centre_m: [f64; 3]) -> Option<[f64; 2]> {
-    let distance = |at: [f64; 3]| (0..3).map(|axis| (at[axis] - centre_m[axis]).powi(2)).sum::<f64>().sqrt();
-    let points = body.frames.iter().flatten().map(|point| distance(point.position_m));
+    let points = body.frames.iter().flatten().map(|point| distance(point.position_m, centre_m));
     let [near_m, far_m] = points.fold([f64::MAX, 0.0], |[near, far]: [f64; 2], d| [near.min(d), far.max(d)]);
     (far_m > 0.0).then_some([near_m - MARGIN_M, far_m + MARGIN_M])
 }

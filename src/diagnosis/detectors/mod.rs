@@ -5,6 +5,7 @@ pub mod body_worn;
 pub mod climb;
 pub mod clutter;
 pub mod codes;
+mod description;
 pub mod excess;
 pub mod fluctuation;
 pub mod geometry;

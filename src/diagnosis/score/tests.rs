@@ -177,14 +177,12 @@ fn something_else_at_the_mirrored_place_of_one_return_is_no_image() {
 
 #[test]
 fn without_its_effect_an_image_is_an_unknown_of_its_family() {
-    let mut evidence = evidence(11, |value, _| unbalanced(value, 0.4, 2.0));
-    let without = effects::library().iter().copied().filter(|info| info.id != effects::iq_imbalance::ID);
-    evidence.library = without.collect();
-    let found = find(&evidence);
+    let evidence = evidence(11, |value, _| unbalanced(value, 0.4, 2.0));
+    let lacking = evidence.clone().lacking(&[effects::iq_imbalance::ID]);
+    let found = find(&lacking);
     assert!(matches!(found.as_slice(), [Candidate { id: None, behaves_like: Behaviour::ConjugateImage, .. }]), "{found:?}");
-    assert!(found[0].gain > 100.0 && find(&evidence.with(&found[0])).is_empty());
+    assert!(found[0].gain > 100.0 && find(&lacking.with(&found[0])).is_empty());
     // With it, the field has nothing to add.
-    evidence.library = effects::library().into();
     let found = find(&evidence);
     assert!(
         found.iter().all(|candidate| candidate.id.is_some()) && named(&found, effects::iq_imbalance::ID).is_some(),

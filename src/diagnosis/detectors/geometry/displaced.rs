@@ -15,6 +15,7 @@ use super::lost::{is_step, lost_frames, predicted, ratio_p_value, step_p_value};
 use super::replica;
 use super::trial::{Score, Trial};
 use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::detectors::description::Description;
 use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};
 use crate::effects::{Stage, clock_drift, clock_offset, frame_drop, pose_offset, range_bias, slope_error};
 
@@ -131,13 +132,14 @@ fn best<'a>(trial: &Trial, fitted: &'a [Fitted], null: &Score) -> Option<&'a Fit
         let occam = if fit.id == pose_offset::ID { 1.5 * (training.len() as f64).ln() * fit.inflation } else { 0.0 };
         fit.score.gain_over(null, common) - occam
     };
-    let named = |fit: &&Fitted| trial.evidence.info(fit.id).is_some();
-    let of = |fitted: Vec<&'a Fitted>| fitted.into_iter().max_by(|a, b| gain(a).total_cmp(&gain(b)));
-    let leading: Vec<&Fitted> = fitted.iter().filter(|fit| is_step(trial, fit)).collect();
-    let best_named = of(leading.iter().copied().filter(named).collect());
-    let best = of(leading)?;
-    let close = |other: &&Fitted| (gain(best) - gain(other)) / best.inflation < ALIKE_NATS;
-    Some(best_named.filter(close).unwrap_or(best))
+    let mut ordered: Vec<&Fitted> = fitted.iter().collect();
+    ordered.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    let leads = |fit: &&&Fitted| is_step(trial, fit);
+    let best = *ordered.iter().find(leads)?;
+    let close = |other: &&&Fitted| (gain(best) - gain(other)) / best.inflation < ALIKE_NATS;
+    let named = |fit: &&&Fitted| trial.evidence.info(fit.id).is_some();
+    let best_named = ordered.iter().take_while(close).filter(named).find(leads);
+    Some(best_named.unwrap_or(&best))
 }
 
 /// What this recording hardly tells from the best alternative.
@@ -220,10 +222,10 @@ fn behaves_like(stage: Stage) -> Behaviour {
     }
 }
 
-/// Numbers of a change, and what is observed of it and what that is. `deviation`: of its value.
-fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> (Vec<Estimate>, [String; 2]) {
+/// That the body is elsewhere is observed; the library says why. `deviation`: of the change's value.
+fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> Description {
     let normal = |name| vec![Estimate::normal(name, fit.value, deviation)];
-    let (estimates, observed, cause) = match fit.score.change {
+    let (estimates, observed, cause): (_, _, String) = match fit.score.change {
         Change::Range(_) => (
             normal("offset_m"),
             format!("The body appears {} than it stands", farther(fit.value)),
@@ -259,7 +261,7 @@ fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> (Vec<Estimate>, [St
         ),
         Change::Again(echo) => {
             let (estimates, statement) = replica::described(trial, echo, fit.value, deviation);
-            return (estimates, [statement, String::new()]);
+            return Description { id: Some(fit.id), estimates, statement };
         }
         Change::Drop { at, count } => (
             vec![Estimate::normal("at", at as f64, 1.5), Estimate::normal("count", count as f64, 0.0)],
@@ -267,12 +269,12 @@ fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> (Vec<Estimate>, [St
             "frames were lost there".into(),
         ),
     };
-    (estimates, [observed, cause])
+    Description::named(trial.evidence, fit.id, estimates, [observed, cause])
 }
 
 fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, gain: f64) -> Candidate {
     let (evidence, change) = (trial.evidence, fit.score.change);
-    let (estimates, [observed, cause]) = described(trial, fit, deviation(trial, fit).hypot(SCENE * fit.floor));
+    let Description { id, estimates, statement } = described(trial, fit, deviation(trial, fit).hypot(SCENE * fit.floor));
     let stage = stage(change);
     let place = match change {
         Change::Drop { at, .. } => Place { frames: Some((at..evidence.cube.dims[0]).collect()), ..Place::at(stage) },
@@ -280,17 +282,10 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
         _ => Place::at(stage),
     };
     let moves = Moves::new(evidence.radar.centre_m());
-    // That the body is elsewhere is observed; the library says why.
-    let id = evidence.info(fit.id).map(|info| info.id);
-    let statement = match (id, cause.is_empty()) {
-        (_, true) => observed,
-        (Some(_), _) => format!("{observed}: {cause}."),
-        (None, _) => format!("{observed}."),
-    };
     Candidate {
         id,
         behaves_like: behaves_like(stage),
-        estimates: if id.is_some() { estimates } else { vec![] },
+        estimates,
         choice: place.boundary.clone(),
         place,
         p_value,

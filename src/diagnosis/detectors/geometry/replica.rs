@@ -220,8 +220,7 @@ mod tests {
     #[test]
     fn a_body_elsewhere_is_observed_and_named_by_what_the_library_has() {
         let lacking = |ids: &[&str]| {
-            let mut evidence = evidence(None);
-            evidence.library = evidence.library.iter().copied().filter(|info| !ids.contains(&info.id)).collect();
+            let mut evidence = evidence(None).lacking(ids);
             let body = evidence.body.as_mut().unwrap();
             body.frames.iter_mut().flatten().for_each(|point| point.position_m[1] += 0.15);
             found(&evidence.changed()).expect("nothing found")

@@ -155,10 +155,10 @@ impl Table {
 
     /// The best power that comes at one range and one Doppler in every frame, near a motion's ranges, and how many were tried: what
     /// is not steady about a thing that stands still, which never moves.
-    pub fn standing(&self, ranges: RangeInclusive<i64>) -> Option<(WallBearings, f64)> {
+    pub fn standing(&self, ranges: RangeInclusive<i64>) -> Option<(StaticTarget, f64)> {
         let places = |doppler: i64, range: i64| vec![(doppler, range); self.times_s.len()];
         let [rows, columns] = self.size().map(|length| length as i64);
-        let mut best: Option<WallBearings> = None;
+        let mut best: Option<StaticTarget> = None;
         let mut tried = 0.0;
         for range in ranges.filter(|range| (0..columns).contains(range)) {
             for doppler in 0..rows {
@@ -167,7 +167,7 @@ impl Table {
                     let (gain, level) = self.gain(&places(doppler, range), beam);
                     if best.as_ref().is_none_or(|best| f64::from(gain) > best.gain) {
                         let place = (doppler as f64 / FINE as f64, range as f64 / FINE as f64);
-                        best = Some(WallBearings { gain: gain.into(), place, sine, power: LEVELS[level].into() });
+                        best = Some(StaticTarget { gain: gain.into(), place, sine, power: LEVELS[level].into() });
                     }
                 }
             }
@@ -176,7 +176,7 @@ impl Table {
     }
 }
 
-pub struct WallBearings {
+pub struct StaticTarget {
     pub gain: f64,
     /// Doppler and range in cells.
     pub place: (f64, f64),

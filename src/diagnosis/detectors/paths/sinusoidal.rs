@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::bank::{LEAST_BINS, SinusoidalMotion, Table, WallBearings};
+use super::bank::{LEAST_BINS, SinusoidalMotion, StaticTarget, Table};
 use super::beams::Beams;
 use super::ground::{DEVIATIONS, Ground, STRONGER};
 use super::mover::{LARGEST_EXCURSION_M, Mover, middle_s};
@@ -170,7 +170,7 @@ impl<'a> Search<'a> {
         let ranges = table.places(ground.scene, motion.law).into_iter().map(|place| place.1);
         let ranges = ranges.clone().min()? - BESIDE..=ranges.max()? + BESIDE;
         // Where it stands out from what oscillates it is no side lobe of that.
-        let outstands = |standing: &WallBearings| {
+        let outstands = |standing: &StaticTarget| {
             ground.strength(&self.training, |_| standing.place, standing.sine)[0] + STRONGER
                 > ground.strength(&self.training, |frame| ground.place(motion.law, frame), motion.sine)[0]
         };

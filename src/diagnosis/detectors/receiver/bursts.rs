@@ -13,6 +13,7 @@ use super::burst::Burst;
 use super::crossings::{self, Crossings};
 use super::support::energy;
 use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::detectors::description::Description;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, OfSample, Place};
 use crate::diagnosis::statistics::{corrected, median};
 use crate::diagnosis::{Cube, Evidence, Volume};
@@ -68,7 +69,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if gain <= 0.0 {
         return vec![];
     }
-    let Claim { id, look_alikes, estimates, place, statement } = claim(evidence, &bursts, hit, crossings.as_ref());
+    let (Description { id, estimates, statement }, look_alikes, place) = claim(evidence, &bursts, hit, crossings.as_ref());
     let volume = Volume { of_samples: Some(Arc::new(spread(evidence, &bursts, &powers))), ..Volume::KEPT };
     vec![Candidate {
         id,
@@ -87,17 +88,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }]
 }
 
-/// What is said of bursts.
-struct Claim {
-    id: Option<&'static str>,
-    look_alikes: Vec<&'static str>,
-    estimates: Vec<Estimate>,
-    place: Place,
-    statement: String,
-}
-
-/// Another radar, or impulses, or what the library has no name for; `hit`: samples of all bursts.
-fn claim(evidence: &Evidence, bursts: &[Burst], hit: usize, crossings: Option<&Crossings>) -> Claim {
+/// Another radar, or impulses, or what the library has no name for, with what looks like it, and its place; `hit`: samples of all bursts.
+fn claim(
+    evidence: &Evidence,
+    bursts: &[Burst],
+    hit: usize,
+    crossings: Option<&Crossings>,
+) -> (Description, Vec<&'static str>, Place) {
     let rx = evidence.cube.dims[2];
     // Hits of one chirp in all receivers at once are one burst.
     let places: BTreeSet<(usize, usize, usize)> =
@@ -120,9 +117,8 @@ fn claim(evidence: &Evidence, bursts: &[Burst], hit: usize, crossings: Option<&C
         (false, true) => (impulsive_noise::ID, if rx == 1 { vec![interference::ID] } else { vec![] }),
         (false, false) => (impulsive_noise::ID, vec![interference::ID]),
     };
-    let named = evidence.info(id).is_some();
     let (count, number) = (places.len() as f64, bursts.len());
-    let estimates = if named && id == interference::ID { vec![bursts_in_all(count, crossings)] } else { vec![] };
+    let estimates = if id == interference::ID { vec![bursts_in_all(count, crossings)] } else { vec![] };
     let (observed, cause) = if id == interference::ID {
         let all = if rx > 1 { "that all receivers see at once and " } else { "" };
         let observed =
@@ -131,8 +127,7 @@ fn claim(evidence: &Evidence, bursts: &[Burst], hit: usize, crossings: Option<&C
     } else {
         (format!("{number} single samples of {count} chirps stand far above the noise, each in one receiver"), "impulses")
     };
-    let statement = if named { format!("{observed}: {cause}") } else { observed };
-    Claim { id: named.then_some(id), look_alikes, estimates, place, statement }
+    (Description::named(evidence, id, estimates, [observed, cause.into()]), look_alikes, place)
 }
 
 /// Share of the other receivers that a burst hits too, at the same samples: mean over the bursts.
@@ -315,8 +310,7 @@ mod tests {
 
     #[test]
     fn bursts_are_observed_where_the_library_has_no_name_for_them() {
-        let mut evidence = evidence(100.0);
-        evidence.library = evidence.library.iter().copied().filter(|info| info.id != interference::ID).collect();
+        let evidence = evidence(100.0).lacking(&[interference::ID]);
         let found = find(&evidence).pop().expect("bursts");
         assert!(found.id.is_none() && found.behaves_like == Behaviour::SparseAdditive && found.estimates.is_empty());
         assert!(find(&evidence.with(&found)).is_empty());

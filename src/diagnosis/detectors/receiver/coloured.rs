@@ -82,7 +82,7 @@ impl Powers {
         chi2_tail(2.0 * (fit.likelihood - white) / inflation, all.div_ceil(self.width()) as f64 - 1.0)
     }
 
-    fn curve(self, fit: &Fit) -> Curve {
+    fn curve(&self, fit: &Fit) -> Curve {
         let Self { hertz, found, .. } = self;
         Curve {
             title: "Noise over beat frequency".into(),
@@ -90,7 +90,7 @@ impl Powers {
             y_label: "power over the median, dB".into(),
             series: vec![
                 ("measured".into(), hertz.clone(), found.iter().map(|p| 10.0 * p.max(1e-12).log10()).collect()),
-                ("fitted".into(), hertz, fit.shape.iter().map(|s| 10.0 * (fit.level * s).log10()).collect()),
+                ("fitted".into(), hertz.clone(), fit.shape.iter().map(|s| 10.0 * (fit.level * s).log10()).collect()),
             ],
         }
     }
@@ -105,13 +105,14 @@ pub fn coloured(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     let found = spectrum(evidence, &evidence.split.training, bins);
     let count = per_frame * evidence.split.training.len() as f64;
     let powers = Powers { hertz, found, step: rate / samples as f64, count };
-    let held = spectrum(evidence, &evidence.split.held_out, bins);
-    let held_count = per_frame * evidence.split.held_out.len() as f64;
     let white = powers.fit(0.0, 1.0).level;
-    // Of the held-out frames' log-likelihood, over noise that is level.
-    let gain = |fit: &Fit| {
+    let evident = |fit: &Fit, p_value: f64| {
+        let held = spectrum(evidence, &evidence.split.held_out, bins);
         let levels = held.iter().zip(&fit.shape).map(|(p, s)| (p, fit.level * s));
-        levels.map(|(p, level)| white.ln() + p / white - level.ln() - p / level).sum::<f64>() * held_count
+        // Of the held-out frames' log-likelihood, over noise that is level.
+        let gain = levels.map(|(p, level)| white.ln() + p / white - level.ln() - p / level).sum::<f64>()
+            * (per_frame * evidence.split.held_out.len() as f64);
+        Evident { p_value, gain, energy: energy(evidence, &powers, fit) }
     };
     let is_there = |fit: &Fit, p_value: f64| p_value < UNLIKELY && is_everywhere(evidence, bins, fit);
     let law = evidence.info(effects::coloured_noise::ID).and_then(|_| powers.law(rate)).map(|(top, p_value)| {
@@ -122,15 +123,11 @@ pub fn coloured(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
         && is_there(&fit, p_value)
         && powers.chance_beyond(&fit.shape) > UNLIKELY
     {
-        let (gain, energy) = (gain(&fit), energy(evidence, &powers, &fit));
-        return Some(named(powers, &top, &fit, Evident { p_value, gain, energy }));
+        return Some(named(&powers, &top, &fit, evident(&fit, p_value)));
     }
     let p_value = corrected(powers.chance_beyond(&vec![1.0; bins.len()]), 2.0);
     let fit = powers.banded();
-    is_there(&fit, p_value).then(|| {
-        let (gain, energy) = (gain(&fit), energy(evidence, &powers, &fit));
-        unnamed(powers, &fit, Evident { p_value, gain, energy })
-    })
+    is_there(&fit, p_value).then(|| unnamed(&powers, &fit, evident(&fit, p_value)))
 }
 
 /// Whether most Doppler rows, most beat frequencies and most frames have a shape.
@@ -168,7 +165,7 @@ fn energy(evidence: &Evidence, powers: &Powers, fit: &Fit) -> f64 {
     excess.max(0.0) * fit.level * noise * evidence.cube.samples.len() as f64
 }
 
-fn named(powers: Powers, top: &Top, fit: &Fit, evident: Evident) -> Candidate {
+fn named(powers: &Powers, top: &Top, fit: &Fit, evident: Evident) -> Candidate {
     let [knee, power] = top.at;
     let of = |name: &'static str, value: f64, deviation: f64| {
         let factor = (1.645 * deviation.hypot(LAW)).exp();
@@ -186,7 +183,7 @@ fn named(powers: Powers, top: &Top, fit: &Fit, evident: Evident) -> Candidate {
     }
 }
 
-fn unnamed(powers: Powers, fit: &Fit, Evident { p_value, gain, energy }: Evident) -> Candidate {
+fn unnamed(powers: &Powers, fit: &Fit, Evident { p_value, gain, energy }: Evident) -> Candidate {
     let (low, high) = fit.shape.iter().fold((f64::INFINITY, 0.0f64), |(low, high), &s| (low.min(s), high.max(s)));
     Candidate {
         id: None,

@@ -331,16 +331,13 @@ mod tests {
         let other = coloured(&shaped(|bin| if (16.0..24.0).contains(&bin) { 1.6 } else { 1.0 }), &bins).expect("a colour");
         assert!(other.id.is_none() && other.estimates.is_empty() && other.gain > 15.0, "{other:?}");
         assert!(coloured(&shaped(|_| 1.0), &bins).is_none());
-        let mut lacks_it = shaped(knee);
-        lacks_it.library = lacks_it.library.iter().copied().filter(|info| info.id != effects::coloured_noise::ID).collect();
-        let unknown = coloured(&lacks_it, &bins).expect("a colour");
+        let unknown = coloured(&shaped(knee).lacking(&[effects::coloured_noise::ID]), &bins).expect("a colour");
         assert!(unknown.id.is_none() && unknown.gain > 15.0, "{unknown:?}");
     }
 
     #[test]
     fn what_receivers_share_is_observed_where_the_library_has_no_name_for_it() {
-        let mut evidence = noise(|_, _| 0.3);
-        evidence.library = evidence.library.iter().copied().filter(|info| info.id != effects::correlated_noise::ID).collect();
+        let evidence = noise(|_, _| 0.3).lacking(&[effects::correlated_noise::ID]);
         let found = correlated(&evidence, &(2..63).collect::<Vec<_>>()).expect("nothing found");
         assert!(found.id.is_none() && found.behaves_like == Behaviour::NoiseSharedByReceivers && found.gain > 15.0);
     }

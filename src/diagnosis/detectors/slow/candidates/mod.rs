@@ -13,9 +13,10 @@ use super::field::{Field, Part, ahead};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::course::{Course, Of};
 use crate::diagnosis::cube::Cube;
+pub(super) use crate::diagnosis::detectors::description::Description;
 use crate::diagnosis::detectors::undo;
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Correction, Estimate, Place, Volume};
+use crate::diagnosis::finding::{Correction, Place, Volume};
 use crate::effects::Stage;
 use crate::radar::SPEED_OF_LIGHT;
 
@@ -34,28 +35,6 @@ pub(super) fn stated_delay_s() -> f64 {
 
 /// Frame, transmitter and loop to the deviation of that chirp.
 pub(super) type Deviation = Arc<dyn Fn([usize; 3]) -> f64 + Send + Sync>;
-
-/// What a deviation is called, how large it is, and both in words.
-pub(super) struct Description {
-    pub id: Option<&'static str>,
-    pub estimates: Vec<Estimate>,
-    pub statement: String,
-}
-
-impl Description {
-    pub fn unnamed(statement: String) -> Self {
-        Self { id: None, estimates: vec![], statement }
-    }
-
-    /// `observed`: what the deviation does, and `cause`: what that is. A deviation that any cause may have is observed without it, where the
-    /// library has no such effect.
-    pub fn named(evidence: &Evidence, id: &'static str, estimates: Vec<Estimate>, [observed, cause]: [String; 2]) -> Self {
-        match evidence.info(id) {
-            Some(_) => Self { id: Some(id), estimates, statement: format!("{observed}: {cause}.") },
-            None => Self::unnamed(format!("{observed}.")),
-        }
-    }
-}
 
 /// `spent`: nats per chirp on deviations that no law predicts.
 pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, spent: f64) -> Correction {
