@@ -62,9 +62,9 @@ def killed(folder: Path, undone: Callable[[int], bool], lock: str) -> int:
 
 
 def holder(lock: Path) -> int | None:
-    """Who works where a lock lies."""
+    """Who works where a lock lies, once the number is written: a signal to 0 would be one to these tests."""
     try:
-        return int(lock.read_text() or 0)
+        return int(lock.read_text())
     except (OSError, ValueError):
         return None
 
