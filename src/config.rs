@@ -31,7 +31,7 @@ pub struct Config {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DataConfig {
-    /// Recording folders, relative to the config file's folder.
+    /// Recording folders, relative to the config file's folder; those of `--set` to the working folder.
     pub recordings: Vec<PathBuf>,
 }
 
@@ -63,11 +63,21 @@ impl Config {
     pub fn read(path: &Path, sets: &[String]) -> Result<Self> {
         let mut config: Self = settings::read_settings(path, sets)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let paths =
-            config.data.recordings.iter_mut().chain(&mut config.training.start_from).chain(&mut config.diagnosis.calibration);
-        for path in paths {
-            if path.is_relative() {
-                *path = folder.join(&*path);
+        for path in &mut config.data.recordings {
+            settings::place_path(path, "data.recordings", folder, sets)?;
+        }
+        for (key, path) in [
+            ("training.start_from", config.training.start_from.as_mut()),
+            ("diagnosis.calibration", config.diagnosis.calibration.as_mut()),
+        ] {
+            path.map_or(Ok(()), |path| settings::place_path(path, key, folder, sets))?;
+        }
+        if let Some(record) = &mut config.record {
+            for (key, path) in
+                [("record.person.body", &mut record.person.body), ("record.person.motion", &mut record.person.motion)]
+            {
+                // Those of the file are found beside it when it is recorded.
+                path.as_mut().map_or(Ok(()), |path| settings::place_path(path, key, Path::new(""), sets))?;
             }
         }
         config.training.check()?;

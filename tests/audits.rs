@@ -8,6 +8,7 @@ mod damage;
 use std::path::{Path, PathBuf};
 
 use damage::{Damage, damaged};
+use hybridsim::config::Config;
 use hybridsim::data::Recording;
 use hybridsim::data::settings::read_text;
 use hybridsim::diagnosis::audit::{Check, audit};
@@ -97,7 +98,7 @@ fn every_damage_is_told_by_name_and_whole_recordings_are_whole() {
 }
 
 #[test]
-fn transmitters_that_were_not_separated_are_told() {
+fn transmitters_that_were_not_separated_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let whole = recorded(folder.path(), "seed = 22\nmesh_error_m = 2e-3", TWO);
     assert_eq!(damage_of(&inspected(&whole)), None, "{:?}", inspected(&whole));
@@ -110,7 +111,7 @@ fn transmitters_that_were_not_separated_are_told() {
     assert!(one.found.contains("loops of 2 kinds take turns"), "{}", one.found);
 }
 
-/// Noise that stays below the converter's step, a converter at its rail and a receiver that sees nothing but itself are no damage.
+/// Noise that stays below the converter's step, an ADC that clips and a receiver that sees nothing but itself are no damage.
 #[test]
 fn quiet_clipped_and_still_recordings_are_whole() {
     for (name, text) in [
@@ -127,6 +128,28 @@ fn quiet_clipped_and_still_recordings_are_whole() {
         let found = inspected(&recorded(folder.path(), text, ONE));
         assert_eq!(damage_of(&found), None, "{name}: {found:?}");
     }
+}
+
+/// Somebody who walks close by is nearly the same in all loops of a frame, and two receivers see nearly the same.
+#[test]
+fn recordings_of_two_receivers_are_whole() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/test.toml");
+    let sets = ["record.frames=160", "record.radar.loops_per_frame=32"].map(String::from);
+    let config = Config::read(&path, &sets).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("long");
+    recorder::record_to(config.record(&path).unwrap(), folder.path(), &recording, &mut |_, _| {}).unwrap();
+    assert_eq!(damage_of(&inspected(&recording)), None);
+    // Chirps of few samples, and somebody who comes near in the second frame.
+    let near = "seed = 5\nperson.action = \"walk_back_forth\"\nwalls.patch_m = 0.2\n[surface]\nreturns = \"vertices\"\n\
+                [room]\nleft_m = 2.2\nright_m = 2.5\nfront_m = 5.4\nback_m = 0.6\nfloor_m = 1.0\nceiling_m = 1.7";
+    let radar = "[radar]\nstart_frequency_hz = 77.0e9\nslope_hz_per_s = 60.012e12\nsample_rate_hz = 4.4e6\nsamples_per_chirp = 64\n\
+                 loops_per_frame = 32\nadc_start_s = 6.0e-6\nchirp_period_s = 216.0e-6\nframe_period_s = 0.1\nframes = 16\n\
+                 tx_m = [[0.0, 0.0, 0.0]]\nrx_m = [[0.0, 0.0, 0.0], [0.0019467, 0.0, 0.0]]";
+    let config: RecorderConfig = read_text(&format!("{near}\n{radar}")).unwrap();
+    let short = folder.path().join("short");
+    recorder::record_to(&config, Path::new("."), &short, &mut |_, _| {}).unwrap();
+    assert_eq!(damage_of(&inspected(&short)), None);
 }
 
 fn report(folder: &Path) -> Report {

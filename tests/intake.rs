@@ -437,7 +437,62 @@ fn samples_that_were_written_as_wider_numbers_are_refused_by_their_type() {
         let found = error(&bin).unwrap_or_default();
         assert!(found.contains(&format!("`samples` is numbers of type {kind}, expected 16-bit integers")), "{kind}: {found}");
     }
-    // A frame that another program kept as complex numbers of twice 64 bits, beside its capture.
+    // A frame that another program kept as complex numbers of twice 64 bits, beside its capture: its type is asked for.
     let Some(frame) = support::shared("fixtures/raw/ti_iwr6843_mmwave_eyes/frame_1.bin") else { return };
-    assert!(error(&frame).unwrap_or_default().contains("numbers of type <f8"), "{:?}", error(&frame));
+    let found = capture::open(std::slice::from_ref(&frame), &Stated::default()).err().unwrap();
+    assert!(found.to_string().contains("numbers of type <f8"), "{found}");
+    assert!(found.hint().unwrap().contains("--layout \"frame loop tx rx sample complex128\""), "{:?}", found.hint());
+    let folder = tempfile::tempdir().unwrap();
+    let settings = [
+        "start_frequency_hz=77e9",
+        "slope_hz_per_s=46.85e12",
+        "sample_rate_hz=5e6",
+        "chirp_period_s=131.09e-6",
+        "frame_period_s=0.1",
+        "samples_per_chirp=128",
+        "loops_per_frame=128",
+    ]
+    .map(|set| format!("radar.{set}"));
+    let layout = ["--layout", "frame sample loop rx tx complex128", "--board", "IWR1843"];
+    let sets: Vec<&str> = settings.iter().flat_map(|set| ["--set", set]).collect();
+    let words = [&["import", frame.to_str().unwrap(), "--out", "out"], &layout[..], &sets[..]].concat();
+    // The stream was cut within a chirp (`import::capture::numbers`).
+    let refused = hybridsim(&words, folder.path());
+    let error = text(&refused.stderr);
+    assert!(error.contains("`chirp start`") && error.contains("breaks most at sample 31"), "{error}");
+    let kept = hybridsim(&[&words[..], &["--yes-as-stated"]].concat(), folder.path());
+    assert!(kept.status.success(), "{}", text(&kept.stderr));
+    assert_eq!(Recording::open(folder.path().join("out")).unwrap().radar.dims(), [1, 3, 4, 128, 128]);
+}
+
+/// Two profiles in turn: a recording of each, as `--profile` makes it, or nothing.
+#[test]
+fn a_frame_of_several_profiles_is_split() {
+    let cfg = CFG.replace(
+        "chirpCfg 0 0 0 0 0 0 0 1\nframeCfg 0 0 16 ",
+        "profileCfg 1 77.05 48 6 60 0 0 60.012 1 128 4400 0 0 30\nchirpCfg 0 0 0 0 0 0 0 1\nchirpCfg 1 1 1 0 0 0 0 1\nframeCfg 0 1 8 ",
+    );
+    assert_ne!(cfg, CFG);
+    let (folder, bin) = captured(&cfg, |_| {});
+    let import = |profile: &str, out: &str| {
+        hybridsim(&["import", bin.to_str().unwrap(), "--profile", profile, "--out", out], folder.path())
+    };
+    let output = import("all", "out");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert_eq!(names(&folder.path().join("out")), ["profile0", "profile1"]);
+    for (profile, start_hz) in [("0", 77e9), ("1", 77.05e9)] {
+        let alone = format!("alone{profile}");
+        assert!(import(profile, &alone).status.success());
+        let [split, alone] = [format!("out/profile{profile}"), alone].map(|name| folder.path().join(name));
+        for file in ["if.npy", "recording.toml"] {
+            assert_eq!(fs::read(split.join(file)).unwrap(), fs::read(alone.join(file)).unwrap(), "{file} of {profile}");
+        }
+        let radar = Recording::open(&split).unwrap().radar;
+        assert_eq!((radar.start_frequency_hz, radar.loops_per_frame), (start_hz, LOOPS / 2));
+    }
+    assert!(text(&import("both", "x").stderr).contains("expected the number of a profile, or all"));
+    let (folder, bin) = captured(&cfg, WRONG[0].2);
+    let output = hybridsim(&["import", bin.to_str().unwrap(), "--profile", "all", "--out", "out"], folder.path());
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    assert_eq!(names(folder.path()), ["adc_data.bin", "radar.cfg"]);
 }

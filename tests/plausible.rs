@@ -118,7 +118,7 @@ fn every_verb_refuses_a_person_behind_the_wall_and_a_user_can_keep_his_word() {
 fn a_person_too_far_around_the_radar_or_behind_it_is_not_simulated() {
     let folder = tempfile::tempdir().unwrap();
     let model = root("models/quickstart");
-    for (distance, told) in [
+    for (distance, message) in [
         ("20", "expected a body within the radar's unambiguous range of"),
         ("0", "the body around the radar at "),
         ("-2", "expected a body before the radar, which looks along +y"),
@@ -128,7 +128,7 @@ fn a_person_too_far_around_the_radar_or_behind_it_is_not_simulated() {
             ["infer", "--checkpoint", &model, "--action", "torso_rotation", &distance, "--frames", "2", "--device", "flex"];
         let output = hybridsim(&infer, folder.path());
         assert_eq!(output.status.code(), Some(2), "{}", err(&output));
-        assert!(err(&output).contains(told), "{distance}: {}", err(&output));
+        assert!(err(&output).contains(message), "{distance}: {}", err(&output));
     }
 }
 
@@ -218,8 +218,8 @@ fn check_states_no_velocity_of_one_chirp_a_frame_and_reads_a_falling_one() {
     assert!(output.status.success() && out(&output).contains(", falling"), "{}", err(&output));
     let output = hybridsim(&["diagnose", "recording", "--device", "flex"], folder.path());
     assert_eq!(output.status.code(), Some(2));
-    let told = "recording.toml: `radar.slope_hz_per_s` is -60012000000000, expected a rising chirp (above zero)";
-    assert!(err(&output).contains(told), "{}", err(&output));
+    let message = "recording.toml: `radar.slope_hz_per_s` is -60012000000000, expected a rising chirp (above zero)";
+    assert!(err(&output).contains(message), "{}", err(&output));
     let one = hybridsim(&["check", &root("configs/test.toml"), "--set", "record.radar.loops_per_frame=1"], folder.path());
     assert!(out(&one).contains("one chirp a frame measures none"), "{}\n{}", out(&one), err(&one));
 }

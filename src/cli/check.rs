@@ -6,19 +6,17 @@ use burn::tensor::Device;
 use clap::Args;
 
 use super::{
-    Common, Out, conventions,
-    conventions::Against,
-    describe,
+    Common, Out, conventions, describe,
     motion::{MotionReading, READING_HINT},
     plausible,
 };
 use crate::{
     config::Config,
     data::{Recording, atomic::AtomicFolder},
-    error::Result,
+    error::{Error, Result},
     evaluation,
     heatmap::HeatmapConfig,
-    integrity,
+    integrity::{self, Against},
     plausibility::Sources,
     radar::{self, Radar},
     room::Room,
@@ -69,16 +67,18 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     if path.is_dir() {
         let out = arguments.out.out.as_ref().map(AtomicFolder::create).transpose()?;
-        let recording = show_recording(path, common)?;
+        let (recording, is_whole) = show_recording(path, common)?;
         if let (Some(folder), Some(out)) = (out, &arguments.out.out) {
             draw(&recording, folder)?;
             say!("  heatmaps           {}", out.display());
         }
-        return Ok(());
+        return if is_whole { Ok(()) } else { Err(damaged(&recording)) };
     }
     let config = Config::read(path, &common.set)?;
+    let mut first_damaged = None;
     for recording in &config.data.recordings {
-        show_recording(recording, common)?;
+        let (recording, is_whole) = show_recording(recording, common)?;
+        first_damaged = first_damaged.or((!is_whole).then(|| damaged(&recording)));
     }
     if let Some(record) = &config.record {
         let world = record.world(path.parent().unwrap_or(Path::new("")))?;
@@ -90,7 +90,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         plausible::scene(Some(&world.radar), Some(&world.room), world.person.as_ref(), &Sources::one(path), common)?;
     }
     say!("resolved configuration:\n\n{}", config.to_toml());
-    Ok(())
+    first_damaged.map_or(Ok(()), Err)
 }
 
 /// Heatmaps of what was measured, for `--out`.
@@ -104,20 +104,29 @@ fn draw(recording: &Recording, folder: AtomicFolder) -> Result<()> {
 /// Frames that pictures over time show at most: they are held in memory together.
 const MOST_DRAWN: usize = 600;
 
-fn show_recording(folder: &Path, common: &Common) -> Result<Recording> {
+/// A recording, and whether its samples are whole.
+fn show_recording(folder: &Path, common: &Common) -> Result<(Recording, bool)> {
     let recording = Recording::open(folder)?;
-    show(&recording, common)?;
-    Ok(recording)
+    let is_whole = show(&recording, common)?;
+    Ok((recording, is_whole))
 }
 
-/// What a recording is, that all of its samples can be read, and what they say of themselves.
-fn show(recording: &Recording, common: &Common) -> Result<()> {
+/// What scripts are to notice.
+fn damaged(recording: &Recording) -> Error {
+    Error::field(recording.folder.join("recording.toml"), "files.if", "samples that are damaged or misread, see above", "whole samples")
+        .with_hint(
+            "what was lost is marked in valid.npy; what was misread is imported again with its right description; --as-stated keeps your word",
+        )
+}
+
+/// What a recording is, that all of its samples can be read, and what they say of themselves: whether they are whole.
+fn show(recording: &Recording, common: &Common) -> Result<bool> {
     report(recording, common)?;
     // Every whole frame is read once, so that a truncated or lying file shows here.
     let findings = integrity::inspect(recording, recording.radar.frames)?;
     say!("  samples            {}, all {} frames can be read", recording.number_type(), recording.whole_frames().count());
     conventions::show(&recording.radar, &findings, Against::Questioned);
-    Ok(())
+    Ok(common.as_stated || integrity::damage(&findings).is_none())
 }
 
 /// What is stated of a recording, and whether it can be.

@@ -1,17 +1,22 @@
 //! `hybridsim import`.
 
-use std::{collections::BTreeMap, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use clap::Args;
 
 use super::{
     Common, check, conventions,
-    conventions::Against,
     progress::{Progress, notes},
 };
 use crate::{
+    data::atomic::AtomicFolder,
     error::{Error, Result},
-    import::capture::{Layout, Preset, Stated},
+    import::capture::{self, Layout, Preset, Stated},
+    integrity::Against,
     verbs::{
         Notice, Notify,
         import::{Import, Seen, import},
@@ -30,7 +35,8 @@ pub(crate) struct Arguments {
     /// The board, whose antenna positions are then known, such as IWR6843ISK
     #[arg(long, value_name = "NAME")]
     board: Option<String>,
-    /// The order of an array's axes, outer to inner, of frame, tx, rx, loop, chirp, antenna, sample, lane, iq
+    /// The order of an array's axes, outer to inner, of frame, tx, rx, loop, chirp, antenna, sample, lane, iq; at the end, of a .bin
+    /// that holds no 16-bit words, the type of its numbers: float32, float64, complex64, complex128
     #[arg(long, value_name = "AXES")]
     layout: Option<Layout>,
     /// The array of a file that holds several; RE,IM where real and imaginary parts are two arrays
@@ -39,9 +45,9 @@ pub(crate) struct Arguments {
     /// A public data set whose layout and radar are known, such as uw_raw_adc
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
-    /// Which chirp profile, where a frame has several
-    #[arg(long, value_name = "ID")]
-    profile: Option<usize>,
+    /// Which chirp profile, where a frame has several; all: a recording of each, DIR/profile0 and so on
+    #[arg(long, value_name = "ID|all")]
+    profile: Option<Profile>,
     /// Which subframe of an advanced frame
     #[arg(long, value_name = "INDEX")]
     subframe: Option<usize>,
@@ -56,6 +62,24 @@ pub(crate) struct Arguments {
     out: PathBuf,
 }
 
+/// Which profiles of a frame.
+#[derive(Clone, Copy)]
+enum Profile {
+    One(usize),
+    All,
+}
+
+impl FromStr for Profile {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "all" => Ok(Self::All),
+            _ => text.parse().map(Self::One).map_err(|_| "expected the number of a profile, or all".into()),
+        }
+    }
+}
+
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let stated = Stated {
         configs: arguments.config.clone(),
@@ -63,7 +87,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         layout: arguments.layout.clone(),
         variable: arguments.variable.clone(),
         preset: arguments.preset.as_deref().map(Preset::named).transpose()?,
-        profile: arguments.profile,
+        profile: match arguments.profile {
+            Some(Profile::One(id)) => Some(id),
+            Some(Profile::All) | None => None,
+        },
         subframe: arguments.subframe,
         tx: arguments.tx,
         sets: common.set.clone(),
@@ -76,19 +103,39 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         Ok((name.trim().to_string(), text.trim().to_string()))
     });
     let labels = labels.collect::<Result<BTreeMap<_, _>>>()?;
-    let what = Import { sources: &arguments.sources, stated: &stated, labels, as_stated: common.as_stated, out: &arguments.out };
+    if !matches!(arguments.profile, Some(Profile::All)) {
+        one(&arguments.sources, &stated, labels, &arguments.out, common)?;
+        say!("imported: {}", arguments.out.display());
+        return Ok(());
+    }
+    // All appear together: one that is refused leaves nothing of the others.
+    let folder = AtomicFolder::create(&arguments.out)?;
+    let profiles = capture::profiles(&arguments.sources, &stated)?;
+    let name = |id: usize| format!("profile{id}");
+    for &id in &profiles {
+        let stated = Stated { profile: Some(id), ..stated.clone() };
+        say!("profile {id}:");
+        one(&arguments.sources, &stated, labels.clone(), &folder.path().join(name(id)), common)?;
+    }
+    folder.finish()?;
+    profiles.iter().for_each(|&id| say!("imported: {}", arguments.out.join(name(id)).display()));
+    Ok(())
+}
+
+/// One recording.
+fn one(sources: &[PathBuf], stated: &Stated, labels: BTreeMap<String, String>, out: &Path, common: &Common) -> Result<()> {
+    let what = Import { sources, stated, labels, as_stated: common.as_stated, out };
     let against = if common.as_stated { Against::Kept } else { Against::Refused };
     let mut show = |seen: Seen<'_>, _: &mut Notify<'_>| match seen {
         Seen::Written(recording) => check::describe(recording),
         Seen::Looked(recording, findings) => conventions::show(&recording.radar, findings, against),
     };
     let (mut bar, mut length) = (None, 0);
-    let recording = import(what, &mut show, &mut |notice| match notice {
+    import(what, &mut show, &mut |notice| match notice {
         Notice::Begun { what, steps } => (bar, length) = (Some(Progress::new(what, steps, common.quiet)), steps),
         Notice::Done(steps) if steps == length => bar.take().into_iter().for_each(Progress::finish),
         Notice::Done(steps) => bar.iter().for_each(|bar| bar.set(steps)),
         notice => notes(notice),
     })?;
-    say!("imported: {}", recording.folder.display());
     Ok(())
 }

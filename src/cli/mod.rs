@@ -92,7 +92,7 @@ pub(crate) struct Common {
     #[arg(long, global = true, value_name = "NAME", default_value = "auto")]
     pub device: String,
     /// Take radar, body, motion, place and the samples of a capture as they are stated, however implausible
-    #[arg(long, global = true, alias = "yes-as-stated")]
+    #[arg(long, global = true, visible_alias = "yes-as-stated")]
     pub as_stated: bool,
     /// Print results and errors only
     #[arg(short, long, global = true)]
@@ -117,8 +117,9 @@ enum Command {
     /// Write recordings in the layouts of others
     ///
     /// npz, hdf5: IF samples with their axes, radar and body. dca1000: _Raw_0.bin with .mmwave.json, as a capture of a TI
-    /// board. rover: a trace of roverd. maps: range-Doppler-angle power. points: a CFAR point cloud, also as PLY. Of several
-    /// recordings, or a site, also labels.csv and card.md, and with --split-by splits. --set KEY=VALUE: docs/export.md.
+    /// board. rover: a trace of roverd. maps: range-Doppler-angle power. points: a CFAR point cloud, also as PLY. body: the
+    /// posed body. A file for rerun: from Python. Of several recordings, or a site, also labels.csv and card.md, and with
+    /// --split-by splits. --set KEY=VALUE: docs/export.md.
     Export(export::Arguments),
     /// Make a recording of a person in a room, in a world that shares nothing with the simulator
     ///

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::few::FewConfig;
 use super::variants::Variant;
 use crate::body::{Sampling, SurfaceConfig};
-use crate::data::read_settings;
+use crate::data::{read_settings, settings::place_path};
 use crate::diagnosis::DiagnosisConfig;
 use crate::error::{Error, Result};
 use crate::evaluation::ComparisonConfig;
@@ -295,11 +295,12 @@ impl ReproduceConfig {
     pub fn read(path: &Path, sets: &[String]) -> Result<Self> {
         let mut config: Self = read_settings(path, sets)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let scene = config.second_scene.as_mut().map(|scene| &mut scene.site);
-        for site in std::iter::once(&mut config.site).chain(&mut config.second_room).chain(scene) {
-            if site.is_relative() {
-                *site = folder.join(&*site);
-            }
+        place_path(&mut config.site, "site", folder, sets)?;
+        for (key, site) in [
+            ("second_room", config.second_room.as_mut()),
+            ("second_scene.site", config.second_scene.as_mut().map(|scene| &mut scene.site)),
+        ] {
+            site.map_or(Ok(()), |site| place_path(site, key, folder, sets))?;
         }
         config.check()?;
         Ok(config)

@@ -6,127 +6,89 @@
 //! binomial, Bonferroni over m. What moves, or vibrates at a harmonic of the loops' rate, does so at its range alone: most returns must
 //! take turns. Loops of another gain or phase share one factor at all returns, as a receiver or a synthesiser that takes turns has; they
 //! must take turns beyond the best such factor, too.
+//!
+//! The loops of a frame are counted from its first one, as many whole rounds of the m kinds as it has. What frames are too short for, the
+//! frames themselves show where they split the rounds: the first loops of frames of n loops are of m / gcd(m, n) kinds. From frame to
+//! frame a vibration changes all returns together, so that they count once: most of them must exceed the whole alarm, and as a radar that
+//! is shaken does the same, that decides nothing. What neither shows is not decided.
 
 use hybridsim_fft::FftPlanner;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use num_complex::Complex64;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::stream::{Schedule, Stream};
-use super::tails::log_binomial_tail;
-use super::{ALARM, Finding, Inspector, Kind};
+use super::turns::{Sequence, TakenTurns, all_together, each_by_itself};
+use super::{Finding, Inspector, Kind, listed};
 
 const CHECK: &str = "transmitter_count";
 const EXPECTED: &str = "one loop like the next";
 /// Frames that are looked at: loops take the same turns in all.
 const FRAMES: usize = 4;
-/// Kinds of loops that are tried, at most: the transmitters of four chips (AWR2243 cascade: twelve) and more.
+/// Kinds of loops that are tried, and transmitters and receivers that are named, at most: those of four chips (AWR2243 cascade: twelve
+/// and sixteen).
 const MOST: usize = 16;
-/// Loops of each kind in a frame, at least.
-const FEWEST: usize = 3;
-/// Steps towards the common factor: each brings a cell that follows it nearer to its noise.
-const ITERATIONS: usize = 8;
-/// Level at which one return takes turns.
-const LEVEL: f64 = 0.05;
-
-/// What is summed over frames for loops of so many kinds; by range bin, over channels.
-struct Turns {
-    kinds: usize,
-    /// Energy of the kinds' means around their mean, that beyond a factor common to all returns, and that of loops around their kind's.
-    between: Vec<f64>,
-    beyond: Vec<f64>,
-    within: Vec<f64>,
-}
 
 pub(super) struct Alternation {
     schedule: Schedule,
-    turns: Vec<Turns>,
-    /// Energy of the mean loop by range bin, over channels.
-    still: Vec<f64>,
-    frames: usize,
+    loops: Sequence,
+    /// Kinds of loops that the loops of one frame do not show, and spectra of the first loops of frames that follow one another.
+    others: Vec<usize>,
+    firsts: Vec<Complex64>,
+    next: usize,
 }
 
 impl Alternation {
     pub fn new(schedule: Schedule) -> Self {
-        let is_possible = |kinds: &usize| schedule.loops.is_multiple_of(*kinds) && schedule.loops / kinds >= FEWEST;
-        let zeros = || vec![0.0; schedule.samples];
-        let of = |kinds| Turns { kinds, between: zeros(), beyond: zeros(), within: zeros() };
-        Self { schedule, turns: (2..=MOST).filter(is_possible).map(of).collect(), still: zeros(), frames: 0 }
+        let loops = Sequence::new(schedule, schedule.loops, 2..=MOST);
+        let others = (2..=MOST).filter(|kinds| !loops.has(*kinds)).collect();
+        Self { schedule, loops, others, firsts: vec![], next: 0 }
     }
 
-    /// Chance that energy in so many more means exceeds that within kinds as much.
-    fn chance(&self, means: usize, energy: f64, turns: &Turns, bin: usize) -> f64 {
-        let (above, below) = (means * self.frames, (self.schedule.loops - turns.kinds) * self.frames);
-        let within = turns.within[bin] / below as f64;
-        if within <= 0.0 {
-            return if energy > 0.0 { 0.0 } else { 1.0 };
+    /// Kinds of first loops where there are so many kinds of loops.
+    fn of_frames(&self, kinds: usize) -> usize {
+        kinds / gcd(kinds, self.schedule.loops)
+    }
+
+    /// The first loops in a row, with the kinds that the loops of one frame do not show.
+    fn frames(&self) -> Sequence {
+        let mut kinds: Vec<usize> = self.others.iter().map(|&kinds| self.of_frames(kinds)).filter(|kinds| *kinds > 1).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        let mut frames = Sequence::new(self.schedule, self.firsts.len() / self.schedule.period(), kinds.into_iter());
+        if !frames.is_empty() {
+            frames.add(&self.firsts);
         }
-        // Complex values: two degrees each. Channels share what they see and count once.
-        let law = FisherSnedecor::new(2.0 * above as f64, 2.0 * below as f64).expect("degrees of freedom");
-        law.sf(energy / above as f64 / within)
+        frames
     }
 
-    /// Range bins of the returns of the static scene, above the noise.
-    fn returns(&self, turns: &Turns) -> Vec<usize> {
-        let bins = self.schedule.samples;
-        let is_peak = |bin: usize| [bin + bins - 1, bin + 1].iter().all(|other| self.still[bin] > self.still[other % bins]);
-        let noise = |bin: usize| turns.within[bin] / (self.schedule.loops - turns.kinds) as f64;
-        // A real signal has each return twice.
-        let different = if self.schedule.is_real { bins / 2 } else { bins };
-        (0..different).filter(|&bin| is_peak(bin) && self.still[bin] > -ALARM.ln() * noise(bin)).collect()
-    }
-
-    /// At how many of the static returns loops of `turns` take turns beyond those of fewer kinds, of how many, and the chance of it.
-    fn taken(&self, fewer: Option<&Turns>, turns: &Turns) -> (usize, usize, f64) {
-        let returns = self.returns(turns);
-        let means = turns.kinds - fewer.map_or(1, |fewer| fewer.kinds);
-        let explained = |bin: usize| fewer.map_or(0.0, |fewer| fewer.between[bin]);
-        let any =
-            returns.iter().filter(|&&bin| self.chance(means, turns.between[bin] - explained(bin), turns, bin) < LEVEL).count();
-        let beyond = returns.iter().filter(|&&bin| self.chance(turns.kinds - 1, turns.beyond[bin], turns, bin) < LEVEL).count();
-        let log_p = |count| (self.turns.len() as f64).ln() + log_binomial_tail(count, returns.len(), LEVEL);
-        (any, returns.len(), log_p(any).max(log_p(beyond)))
+    /// Which counts of transmitters, and of receivers, make so many kinds of items, of which each is `loops` loops.
+    fn counts(&self, kinds: usize, loops: usize) -> String {
+        let Schedule { tx, rx, .. } = self.schedule;
+        let of =
+            |stated: usize| -> Vec<usize> { (1..=MOST).filter(|count| count / gcd(*count, stated * loops) == kinds).collect() };
+        let listed = [(of(tx), "transmitters that fired in turn", tx), (of(rx), "receivers", rx)];
+        let listed = listed.iter().filter(|(counts, ..)| !counts.is_empty());
+        let listed = listed.map(|(counts, what, stated)| format!("{} {what}, not {stated}", either(counts)));
+        listed.chain([format!("{kinds} kinds of chirps")]).collect::<Vec<_>>().join("; or ")
     }
 }
 
-/// The kinds' common factor `[kind]`, which leaves least of most cells: the first eigenvector of the means' products, in which each cell
-/// counts by what the factor before left of it and by its noise (a Lorentzian M-estimate by iteratively reweighted least squares: P. W.
-/// Holland and R. E. Welsch, Commun. Stat. A6, 1977). One strong return that moves by itself does not outweigh the others. Means
-/// `[kind, cell]`, their energies and that of noise in them `[cell]`.
-fn common(means: &DMatrix<Complex64>, energies: &[f64], noise: &[f64]) -> DVector<Complex64> {
-    let kinds = means.nrows();
-    // At first each counts alike.
-    let mut left = energies.to_vec();
-    let mut factor = DVector::zeros(kinds);
-    for _ in 0..ITERATIONS {
-        let mut products = DMatrix::<Complex64>::zeros(kinds, kinds);
-        for ((cell, left), noise) in means.column_iter().zip(&left).zip(noise) {
-            let weight = 1.0 / (left + noise).max(f64::MIN_POSITIVE);
-            products.gerc(weight.into(), &cell, &cell, Complex64::ONE);
-        }
-        let eigen = SymmetricEigen::new(products);
-        factor = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
-        let along = means.column_iter().map(|cell| factor.dotc(&cell).norm_sqr());
-        left = energies.iter().zip(along).map(|(energy, along)| (energy - along).max(0.0)).collect();
-    }
-    factor
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// Means of the loops of each kind, `[kind, cell]`, from spectra `[loop][cell]`.
-fn means(spectra: &[Complex64], cells: usize, kinds: usize) -> DMatrix<Complex64> {
-    let mut means = DMatrix::zeros(kinds, cells);
-    for (index, values) in spectra.chunks_exact(cells).enumerate() {
-        means.row_mut(index % kinds).iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+/// `3, 6 or 12`
+fn either(counts: &[usize]) -> String {
+    let listed: Vec<String> = counts.iter().map(usize::to_string).collect();
+    match listed.split_last() {
+        Some((last, others)) if !others.is_empty() => format!("{} or {last}", others.join(", ")),
+        _ => listed.concat(),
     }
-    means * Complex64::from(kinds as f64 * cells as f64 / spectra.len() as f64)
 }
 
-/// Windowed range spectra `[loop, channel, bin]`: Hann, so that a strong return does not take the place of the others.
-fn spectra(stream: &Stream) -> Vec<Complex64> {
-    let samples = stream.schedule.samples;
+/// Windowed range spectra of chirps, `[chirp, bin]`: Hann, so that a strong return does not take the place of the others.
+fn spectra(mut values: Vec<Complex64>, samples: usize) -> Vec<Complex64> {
     let angle = |n: usize| std::f64::consts::TAU * (n as f64 + 0.5) / samples as f64;
     let window: Vec<f64> = (0..samples).map(|n| 0.5 - 0.5 * angle(n).cos()).collect();
-    let mut values = stream.centred();
     for chirp in values.chunks_exact_mut(samples) {
         chirp.iter_mut().zip(&window).for_each(|(value, weight)| *value *= weight);
     }
@@ -136,66 +98,57 @@ fn spectra(stream: &Stream) -> Vec<Complex64> {
 
 impl Inspector for Alternation {
     fn see(&mut self, stream: &Stream) {
-        let Schedule { samples, loops, .. } = self.schedule;
-        if self.frames == FRAMES || self.turns.is_empty() {
-            return;
+        let Schedule { samples, .. } = self.schedule;
+        if self.loops.rows < FRAMES && !self.loops.is_empty() {
+            self.loops.add(&spectra(stream.centred(), samples));
         }
-        self.frames += 1;
-        let spectra = spectra(stream);
-        let cells = self.schedule.channels() * samples;
-        let mean = means(&spectra, cells, 1);
-        let mut energy = vec![0.0; cells];
-        for values in spectra.chunks_exact(cells) {
-            energy.iter_mut().zip(values).for_each(|(sum, value)| *sum += value.norm_sqr());
-        }
-        for (cell, value) in mean.iter().enumerate() {
-            self.still[cell % samples] += loops as f64 * value.norm_sqr();
-        }
-        for turns in &mut self.turns {
-            let each = (loops / turns.kinds) as f64;
-            let means = means(&spectra, cells, turns.kinds);
-            let of_kinds: Vec<f64> = means.column_iter().map(|cell| cell.norm_squared()).collect();
-            let within: Vec<f64> = energy.iter().zip(&of_kinds).map(|(all, kinds)| (all - each * kinds).max(0.0)).collect();
-            let of_means = (turns.kinds - 1) as f64 / each / (loops - turns.kinds) as f64;
-            let noise: Vec<f64> = within.iter().map(|within| of_means * within).collect();
-            let factor = common(&means, &of_kinds, &noise);
-            for (cell, values) in means.column_iter().enumerate() {
-                let bin = cell % samples;
-                turns.between[bin] += (each * of_kinds[cell] - loops as f64 * mean[cell].norm_sqr()).max(0.0);
-                turns.beyond[bin] += each * (of_kinds[cell] - factor.dotc(&values).norm_sqr()).max(0.0);
-                turns.within[bin] += within[cell];
+        let period = self.schedule.period();
+        if !self.others.is_empty() && self.firsts.len() < FRAMES * MOST * period {
+            if stream.frame != self.next {
+                self.firsts.clear();
             }
+            self.next = stream.frame + 1;
+            let mut first = stream.centred();
+            first.truncate(period);
+            self.firsts.extend(spectra(first, samples));
         }
     }
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
-        if self.frames == 0 {
-            return None;
+        let frames = self.frames();
+        let (by_loops, returns) = self.loops.found(each_by_itself);
+        let (by_frames, of_frames) = frames.found(all_together);
+        let sentence = |what: &str, loops: usize, found: &TakenTurns| {
+            let TakenTurns { kinds, places, .. } = found;
+            format!("{what} of {kinds} kinds take turns {places}: {}", self.counts(*kinds, loops))
+        };
+        if let Some(found) = by_loops {
+            return Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, sentence("loops", 1, &found), found.log_p));
         }
-        let mut found: Option<(&Turns, String, f64)> = None;
-        let mut most = 0;
-        for turns in &self.turns {
-            let fewer = found.as_ref().map(|(fewer, ..)| *fewer).filter(|fewer| turns.kinds % fewer.kinds == 0);
-            if found.is_some() && fewer.is_none() {
-                continue;
-            }
-            let (any, returns, log_p) = self.taken(fewer, turns);
-            most = most.max(returns);
-            if 2 * any > returns && log_p < ALARM.ln() {
-                found = Some((turns, format!("at {any} of {returns} static returns"), log_p));
-            }
+        // A radar that is shaken at a part of the frames' rate does the same.
+        if let Some(found) = by_frames {
+            let found = sentence("frames", self.schedule.loops, &found) + "; or a vibration";
+            return Some(Finding::undecided(CHECK, EXPECTED, found));
         }
-        match found {
-            None if most == 0 => Some(Finding::undecided(CHECK, EXPECTED, "no static return stands out of the noise")),
-            None => Some(Finding::as_stated(CHECK, EXPECTED, format!("at {most} static returns it is"))),
-            Some((Turns { kinds, .. }, places, log_p)) => {
-                let found = format!(
-                    "loops of {kinds} kinds take turns {places}: {kinds} times as many transmitters fired in turn as are stated, or {kinds} \
-                     kinds of chirps"
-                );
-                Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p))
-            }
+        let most = returns.max(of_frames);
+        if most == 0 {
+            return Some(Finding::undecided(CHECK, EXPECTED, "no static return stands out of the noise"));
         }
+        let is_hidden = |kinds: &&usize| !frames.has(self.of_frames(**kinds));
+        let hidden: Vec<usize> = self.others.iter().filter(is_hidden).copied().collect();
+        let of = |counted: &str| format!("{counted} take no turns (static returns that were looked at: {most})");
+        if !self.loops.is_empty() && returns < self.loops.fewest_returns() {
+            return Some(Finding::undecided(
+                CHECK,
+                EXPECTED,
+                format!("too few static returns stand out of the noise: {returns}"),
+            ));
+        }
+        if hidden.is_empty() {
+            return Some(Finding::as_stated(CHECK, EXPECTED, of("loops")));
+        }
+        let why = format!("{}, but {} kinds of them would not show: too few loops and frames", of("loops"), listed(&hidden));
+        Some(Finding::undecided(CHECK, EXPECTED, why))
     }
 }
 
@@ -205,18 +158,23 @@ mod tests {
     use crate::data::IfFrame;
     use crate::support::numbers;
 
-    const LOOPS: usize = 24;
     const SAMPLES: usize = 64;
     const RX: usize = 2;
 
-    /// What multiplies a return of a direction (−1 … 1) in a loop.
+    /// What multiplies a return of a direction (−1 … 1) in a loop, counted through all frames.
     type Turn = fn(usize, f64) -> Complex64;
 
-    /// Eight static returns from several directions, and a stronger one that turns by half a turn from loop to loop.
-    fn seen(turn: Turn, noise: f64) -> Finding {
-        let schedule =
-            Schedule { tx: 1, rx: RX, loops: LOOPS, samples: SAMPLES, is_real: false, is_falling: false, farthest_bin: None };
-        let (phases, drawn) = (numbers(3, 16, 0.0, std::f64::consts::TAU), numbers(4, 2 * LOOPS * RX * SAMPLES, -noise, noise));
+    /// Eight static returns from several directions, and a stronger one that turns by half a turn from loop to loop, in so many frames
+    /// of so many loops.
+    fn seen(shape: [usize; 2], turn: Turn, noise: f64) -> Finding {
+        seen_by(shape, turn, noise, 1.0, false)
+    }
+
+    /// The same in other units, and with a second receiver that sends one code.
+    fn seen_by([frames, loops]: [usize; 2], turn: Turn, noise: f64, scale: f64, is_dead: bool) -> Finding {
+        let schedule = Schedule { tx: 1, rx: RX, loops, samples: SAMPLES, is_real: false, is_falling: false, farthest_bin: None };
+        let length = RX * loops * SAMPLES;
+        let (phases, drawn) = (numbers(3, 16, 0.0, std::f64::consts::TAU), numbers(4, 2 * frames * length, -noise, noise));
         let value = |rx: usize, index: usize, sample: usize| {
             let tone =
                 |bin: f64, phase: f64| Complex64::from_polar(1.0, std::f64::consts::TAU * bin * sample as f64 / 64.0 + phase);
@@ -225,20 +183,25 @@ mod tests {
                 let phase = phases[at] + std::f64::consts::PI * direction * rx as f64;
                 tone(5.0 + 7.0 * at as f64, phase) * turn(index, direction)
             });
-            let vibrating = 3.0 * tone(37.3, phases[9]) * [1.0, -1.0][index % 2];
+            // Its side lobes take turns at all returns, which the noise covers.
+            let vibrating = if noise > 0.0 { 3.0 } else { 0.0 } * tone(37.3, phases[9]) * [1.0, -1.0][index % 2];
             still.sum::<Complex64>() + vibrating
         };
-        let (mut re, mut im) = (vec![], vec![]);
-        for (rx, index) in (0..RX).flat_map(|rx| (0..LOOPS).map(move |index| (rx, index))) {
-            for sample in 0..SAMPLES {
-                let value = value(rx, index, sample);
-                let place = 2 * ((rx * LOOPS + index) * SAMPLES + sample);
-                re.push((value.re + drawn[place]) as f32);
-                im.push((value.im + drawn[place + 1]) as f32);
-            }
-        }
         let mut inspector = Box::new(Alternation::new(schedule));
-        inspector.see(&Stream::of(schedule, 0, &IfFrame::new([1, RX, LOOPS, SAMPLES], re, Some(im))));
+        for frame in 0..frames {
+            let (mut re, mut im) = (vec![], vec![]);
+            for (rx, index) in (0..RX).flat_map(|rx| (0..loops).map(move |index| (rx, index))) {
+                for sample in 0..SAMPLES {
+                    let value = value(rx, frame * loops + index, sample);
+                    let place = 2 * (frame * length + (rx * loops + index) * SAMPLES + sample);
+                    let seen = [value.re + drawn[place], value.im + drawn[place + 1]].map(|value| (scale * value) as f32);
+                    let [i, q] = if is_dead && rx == 1 { [3.0; 2] } else { seen };
+                    re.push(i);
+                    im.push(q);
+                }
+            }
+            inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, RX, loops, SAMPLES], re, Some(im))));
+        }
         inspector.conclude().unwrap()
     }
 
@@ -247,22 +210,65 @@ mod tests {
         Complex64::from_polar(1.0, 4.0 * std::f64::consts::PI * direction * (index % kinds) as f64)
     }
 
+    const TURNS: [(usize, Turn); 3] = [
+        (2, |index, direction| by_transmitter(2, index, direction)),
+        (3, |index, direction| by_transmitter(3, index, direction)),
+        (4, |index, direction| by_transmitter(4, index, direction)),
+    ];
+
     #[test]
-    fn transmitters_that_take_turns_are_counted() {
-        let turns: [(usize, Turn); 3] = [
-            (2, |index, direction| by_transmitter(2, index, direction)),
-            (3, |index, direction| by_transmitter(3, index, direction)),
-            (4, |index, direction| by_transmitter(4, index, direction)),
-        ];
-        for (kinds, turn) in turns {
-            for noise in [0.05, 0.5] {
-                let found = seen(turn, noise);
+    fn transmitters_that_take_turns_are_counted_whatever_the_loops() {
+        for (kinds, turn) in TURNS {
+            // Whole rounds, and frames that split them.
+            for (shape, noise) in [([1, 24], 0.05), ([1, 24], 0.5), ([1, 32], 0.5), ([3, 25], 0.5)] {
+                let found = seen(shape, turn, noise);
                 assert!(
                     found.is_refusal() && found.found.contains(&format!("loops of {kinds} kinds")),
-                    "{kinds}, {noise}: {found:?}"
+                    "{kinds}, {shape:?}, {noise}: {found:?}"
                 );
+                assert!(found.found.contains(&format!(": {kinds} transmitters that fired in turn, not 1; or ")), "{found:?}");
             }
         }
+    }
+
+    #[test]
+    fn frames_of_a_few_loops_show_turns_where_they_split_them() {
+        let split = seen([24, 4], TURNS[1].1, 0.1);
+        assert!(split.ok && !split.decided && split.found.contains("frames of 3 kinds"), "{split:?}");
+        // Frames of four loops do not split four kinds.
+        let still = seen([40, 4], |_, _| Complex64::ONE, 0.1);
+        assert!(still.ok && !still.decided && still.found.contains("but 4 kinds"), "{still:?}");
+        // Something that moves from frame to frame, and a first loop of another gain.
+        let turns: [Turn; 2] = [
+            |index, direction| Complex64::from_polar(1.0, 3.0 * direction * ((index / 4 * index) as f64).sin()),
+            |index, _| Complex64::from([0.6, 0.9, 1.0, 1.0][index % 4]),
+        ];
+        for turn in turns {
+            for shape in [[24, 4], [40, 1]] {
+                let found = seen(shape, turn, 0.1);
+                assert!(found.ok, "{shape:?}: {found:?}");
+            }
+        }
+    }
+
+    /// Equal loops differ by rounding alone, and a dead receiver by nothing: neither tells kinds of them.
+    #[test]
+    fn loops_without_noise_and_a_dead_receiver_accuse_nobody() {
+        for (shape, scale) in [([1, 24], 1e-3), ([1, 50], 1e-3), ([1, 24], 1e3)] {
+            let found = seen_by([shape[0], shape[1]], |_, _| Complex64::ONE, 0.0, scale, false);
+            assert!(found.ok, "{shape:?}, {scale}: {found:?}");
+        }
+        let gains: Turn = |index, _| Complex64::from([1.3, 1.0, 1.0][index % 3]);
+        assert!(seen_by([1, 24], gains, 0.05, 1.0, true).ok);
+        let found = seen_by([1, 24], TURNS[1].1, 0.05, 1.0, true);
+        assert!(found.is_refusal() && found.found.contains("loops of 3 kinds"), "{found:?}");
+    }
+
+    #[test]
+    fn what_was_not_looked_at_is_not_as_stated() {
+        let found = seen([1, 8], |_, _| Complex64::ONE, 0.1);
+        assert!(found.ok && !found.decided && found.found.contains("5, 6, 7"), "{found:?}");
+        assert!(seen([1, 32], |_, _| Complex64::ONE, 0.1).decided);
     }
 
     #[test]
@@ -273,12 +279,28 @@ mod tests {
             |index, _| Complex64::from_polar(1.0, [0.7, 0.0][index % 2]),
         ];
         for (case, turn) in turns.into_iter().enumerate() {
-            for noise in [0.02, 0.5, 5.0] {
-                let found = seen(turn, noise);
-                assert!(found.ok, "{case}, {noise}: {found:?}");
+            for shape in [[1, 24], [1, 32]] {
+                for noise in [0.02, 0.5, 5.0] {
+                    let found = seen(shape, turn, noise);
+                    assert!(found.ok, "{case}, {shape:?}, {noise}: {found:?}");
+                }
             }
         }
-        let found = seen(|_, _| Complex64::ZERO, 1.0);
+        let found = seen([1, 24], |_, _| Complex64::ZERO, 1.0);
         assert!(found.ok, "{found:?}");
+    }
+
+    /// Three kinds of loops of two transmitters: three or six; four receivers of two.
+    #[test]
+    fn all_counts_that_fit_are_named() {
+        let counts = |tx, rx, kinds| {
+            let schedule = Schedule { tx, rx, loops: 24, samples: 8, is_real: false, is_falling: false, farthest_bin: None };
+            Alternation::new(schedule).counts(kinds, 1)
+        };
+        assert_eq!(
+            counts(2, 5, 3),
+            "3 or 6 transmitters that fired in turn, not 2; or 3 or 15 receivers, not 5; or 3 kinds of chirps"
+        );
+        assert_eq!(counts(3, 2, 2), "2 or 6 transmitters that fired in turn, not 3; or 4 receivers, not 2; or 2 kinds of chirps");
     }
 }

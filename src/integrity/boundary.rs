@@ -11,7 +11,7 @@ use super::stream::{Schedule, Stream};
 use super::tails::{log_binomial_tail, log_same_place, most_frequent};
 use super::{ALARM, Finding, Inspector, Kind};
 
-const CHECK: &str = "frame_boundary";
+pub(super) const CHECK: &str = "frame_boundary";
 const EXPECTED: &str = "the first loop of a frame first";
 /// Fewest loops of a frame whose steps can be compared.
 const FEWEST_LOOPS: usize = 4;
@@ -53,7 +53,9 @@ impl Inspector for Boundary {
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
         if self.steps.len() < 2 {
-            return None;
+            let is_short = self.schedule.loops < FEWEST_LOOPS;
+            let why = if is_short { "frames of so few loops show no boundary" } else { "one frame alone shows no boundary" };
+            return Some(Finding::undecided(CHECK, EXPECTED, why));
         }
         let places: Vec<usize> = self.steps.iter().map(|(place, ..)| *place).collect();
         let (place, count) = most_frequent(&places)?;
@@ -107,6 +109,18 @@ mod tests {
             inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, 1, LOOPS, 16], re, None)));
         }
         inspector.conclude().unwrap()
+    }
+
+    #[test]
+    fn one_frame_decides_nothing() {
+        let schedule = Schedule { tx: 1, rx: 1, loops: LOOPS, samples: 16, is_real: true, is_falling: false, farthest_bin: None };
+        let mut inspector = Box::new(Boundary::new(schedule));
+        inspector.see(&Stream::of(
+            schedule,
+            0,
+            &IfFrame::new([1, 1, LOOPS, 16], numbers(8, LOOPS * 16, -1.0, 1.0).iter().map(|value| *value as f32).collect(), None),
+        ));
+        assert!(!inspector.conclude().unwrap().decided);
     }
 
     #[test]

@@ -1,11 +1,13 @@
-//! Chirps of another length than is stated, by a whole factor: samples and chirps exchanged, a description of another capture.
+//! Chirps of another length than is stated, by a whole factor, or as long as the loops are many: samples and loops exchanged, a description
+//! of another capture.
 //!
 //! Within a chirp each sample is predicted by those before it (linear prediction, J. Makhoul, Proc. IEEE 63, 1975), across the start of
 //! a chirp it is not. The squared error of the prediction is exponentially distributed around its mean: that of starts, or that within
 //! chirps, for which the largest one within the stated chirp stands. A start inside a stated chirp, and a stated start that is none,
 //! are likelihood ratios of these two laws, with one look for each start that differs: a static scene repeats all others.
 //! Where chirps are longer than stated, so are loops: the stream then correlates more with itself after several loops than after one, a
-//! likelihood ratio as in `loop_length`, which adds to the other one. Bonferroni over the factors.
+//! likelihood ratio as in `loop_length`, which adds to the other one. Where the lengths have no common factor, the mean errors at the
+//! starts of either length alone stand against each other. Bonferroni over the lengths.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -32,12 +34,14 @@ pub(super) struct ChirpLength {
     errors: Vec<f64>,
     /// Squared correlation of the stream with itself after so many loops, summed over frames.
     squares: [f64; MOST + 1],
+    /// The same after a loop of chirps as long as the loops are many.
+    exchanged: f64,
     frames: usize,
 }
 
 impl ChirpLength {
     pub fn new(schedule: Schedule) -> Self {
-        Self { schedule, errors: vec![], squares: [0.0; MOST + 1], frames: 0 }
+        Self { schedule, errors: vec![], squares: [0.0; MOST + 1], exchanged: 0.0, frames: 0 }
     }
 
     fn order(&self) -> usize {
@@ -86,6 +90,42 @@ impl ChirpLength {
         // As many looks as channels, at most; those of other loops repeat them.
         let looks = sum * others.len().min(channels) as f64 / others.len() as f64;
         if looks > -ALONE.ln() { looks + self.of_longer_loops(factor) } else { looks.min(0.0) }
+    }
+
+    /// Log-likelihood of chirps as long as the loops are many, and of as many loops as chirps are long, against stated ones, of the starts
+    /// that only one of them has; each channel of a loop counts once.
+    fn of_exchanged(&self) -> f64 {
+        let Schedule { samples: stated, loops: length, .. } = self.schedule;
+        let order = self.order();
+        // What begins or ends with a chirp breaks a few samples beside its start.
+        let is_start = |place: usize, chirp: usize| place % chirp < order || place % chirp + order >= chirp;
+        let channels = self.schedule.channels();
+        let (mut starts, mut own) = (vec![(0.0, 0.0); channels], (0.0, 0.0));
+        let mut inner = vec![(0.0, 0.0); length];
+        for (place, error) in self.errors.iter().enumerate() {
+            let sum = match [length, stated].map(|chirp| is_start(place, chirp)) {
+                [true, true] => continue,
+                [true, false] => &mut starts[(place + order) / length % channels],
+                [false, true] => &mut own,
+                [false, false] => &mut inner[place % length],
+            };
+            *sum = (sum.0 + error, sum.1 + 1.0);
+        }
+        let mean = |(sum, count): (f64, f64)| f64::max(sum / f64::max(count, 1.0), f64::MIN_POSITIVE);
+        // Parts of longer chirps begin anew in some channels: three of four must.
+        let mut starts: Vec<f64> = starts.into_iter().map(mean).collect();
+        starts.sort_by(f64::total_cmp);
+        let (other, own) = (starts[channels / 4], mean(own));
+        // Each start against the other, whose mean is that of what goes on.
+        let looks = channels as f64 * (other / own + own / other - 2.0);
+        if other <= own {
+            return -looks;
+        }
+        if other <= largest(inner.into_iter().map(mean)) {
+            return 0.0;
+        }
+        let repeats = [self.squares[1], self.exchanged].map(|square| square / self.frames as f64);
+        if looks > -ALONE.ln() { looks + repeating((stated * self.frames) as f64, repeats) } else { looks.min(0.0) }
     }
 
     fn of_longer_loops(&self, factor: usize) -> f64 {
@@ -148,18 +188,22 @@ impl Inspector for ChirpLength {
         for loops in 1..=MOST.min(self.schedule.loops - 1) {
             self.squares[loops] += correlation(&values, loops * self.schedule.period());
         }
+        self.exchanged += correlation(&values, self.schedule.loops * self.schedule.channels());
     }
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
         if self.frames == 0 {
-            return None;
+            return Some(Finding::undecided(CHECK, EXPECTED, "a chirp is too short, or there is one alone"));
         }
         let Schedule { samples, loops, .. } = self.schedule;
         let is_shorter = |factor: &usize| samples % factor == 0 && samples / factor > 2 * self.order();
         let channels = self.folded(self.schedule.channels());
         let shorter = (2..=MOST).filter(is_shorter).map(|factor| (samples / factor, self.of_shorter(factor, &channels)));
         let longer = (2..=MOST).filter(|factor| 2 * factor <= loops).map(|factor| (samples * factor, self.of_longer(factor)));
-        let tried: Vec<(usize, f64)> = shorter.chain(longer).collect();
+        // Whole factors are tried already.
+        let is_other = loops > 2 * self.order() && !loops.is_multiple_of(samples) && !samples.is_multiple_of(loops);
+        let exchanged = is_other.then(|| (loops, self.of_exchanged()));
+        let tried: Vec<(usize, f64)> = shorter.chain(longer).chain(exchanged).collect();
         let Some(&(length, best)) = tried.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else {
             return Some(Finding::undecided(CHECK, EXPECTED, "a chirp is too short"));
         };
@@ -167,7 +211,7 @@ impl Inspector for ChirpLength {
         if log_p < ALARM.ln() {
             let found = format!(
                 "the signal begins anew every {length} samples, not every {samples}: the number of samples is another capture's, or samples \
-                 and chirps were exchanged"
+                 and loops were exchanged"
             );
             return Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p));
         }
@@ -189,9 +233,13 @@ mod tests {
 
     /// A static room of tones under noise, other in every receiver, in chirps of `sent` samples, cut into those of `stated`.
     fn seen(sent: usize, stated: usize, noise: f64) -> Finding {
-        const ALL: usize = 32 * 128;
+        seen_of(32 * 128, sent, stated, noise)
+    }
+
+    /// Of so many samples of each receiver.
+    fn seen_of(all: usize, sent: usize, stated: usize, noise: f64) -> Finding {
         let phases = numbers(3, RX * 20, 0.0, std::f64::consts::TAU);
-        let drawn = numbers(4, 2 * RX * ALL, -noise, noise);
+        let drawn = numbers(4, 2 * RX * all, -noise, noise);
         let value = |place: usize| {
             let (rx, sample) = (place / sent % RX, place % sent);
             let tone = |bin: usize| {
@@ -200,7 +248,7 @@ mod tests {
             };
             (0..20).map(tone).sum::<Complex64>() + Complex64::new(drawn[2 * place], drawn[2 * place + 1])
         };
-        let loops = ALL / stated;
+        let loops = all / stated;
         let schedule = Schedule { tx: 1, rx: RX, loops, samples: stated, is_real: false, is_falling: false, farthest_bin: None };
         let (mut re, mut im) = (vec![], vec![]);
         for (rx, index) in (0..RX).flat_map(|rx| (0..loops).map(move |index| (rx, index))) {
@@ -222,6 +270,24 @@ mod tests {
         for other in [32, 64, 256, 512] {
             let found = seen(128, other, 0.05);
             assert!(found.is_refusal() && found.found.contains("every 128 samples, not"), "{other}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn samples_and_loops_exchanged_are_found_without_a_common_factor() {
+        for loops in [48, 72, 81] {
+            let found = seen_of(loops * 128, 128, loops, 0.05);
+            assert!(found.is_refusal() && found.found.contains(&format!("every 128 samples, not every {loops}")), "{found:?}");
+            let stated = seen_of(loops * 128, 128, 128, 0.05);
+            assert!(stated.ok && stated.decided, "{loops}: {stated:?}");
+        }
+    }
+
+    #[test]
+    fn parts_of_the_chirps_that_were_sent_are_not_named() {
+        for (stated, loops) in [(90, 16), (100, 32), (144, 64)] {
+            let found = seen_of(stated * loops, 128, stated, 0.05);
+            assert!(found.ok, "{stated} x {loops}: {found:?}");
         }
     }
 

@@ -63,7 +63,7 @@ impl Halves {
     /// `what` was exchanged.
     pub fn text(&self, what: &str) -> String {
         let [far, far_after] = self.shares.map(|share| 100.0 * share);
-        format!("the far half of the spectrum holds {far:.1} % of the still energy, and {far_after:.1} % with {what} exchanged")
+        format!("the far half of the spectrum holds {far:.1} % of the static energy, and {far_after:.1} % with {what} exchanged")
     }
 }
 

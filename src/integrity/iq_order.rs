@@ -70,8 +70,10 @@ impl Inspector for IqOrder {
         }
         let mean_db = 10.0 / std::f64::consts::LN_10 * ratios.iter().sum::<f64>() / ratios.len() as f64;
         let found = format!(
-            "of {} pairs of beat frequencies with static returns, the far one is {mean_db:+.1} dB stronger",
-            ratios.len()
+            "of {} pairs of beat frequencies with static returns, the far one is {:.1} dB {}",
+            ratios.len(),
+            mean_db.abs(),
+            if mean_db < 0.0 { "weaker" } else { "stronger" }
         );
         let strongest = pairs.iter().flatten().copied().max_by(|a, b| power[*a].total_cmp(&power[*b])).expect("there are two");
         let from_edge = strongest.min(samples - strongest) as f64 / samples as f64;

@@ -49,7 +49,7 @@ impl Inspector for Lanes {
         let samples = self.schedule.samples;
         // Neighbours of two chirps would be exchanged otherwise.
         if !samples.is_multiple_of(2) {
-            return None;
+            return Some(Finding::undecided(CHECK, EXPECTED, "a chirp of an odd number of samples"));
         }
         let chirps: Vec<Vec<Complex64>> = self.sum.chirps().map(exchanged).collect();
         let halves = Halves::of(&self.sum, &chirps, samples, self.groups().into_iter());

@@ -24,6 +24,7 @@ mod still;
 mod stream;
 mod tails;
 mod transmitters;
+mod turns;
 mod words;
 
 use crate::data::Recording;
@@ -102,11 +103,11 @@ pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>
         Box::new(numbers::Numbers::new(numbers::BYTE_ORDER)),
         Box::new(numbers::Numbers::new(numbers::SIGN)),
         Box::new(shift::Shift::new(schedule)),
-        // Chirps in the order of firing repeat as a longer loop does: the special case first.
-        Box::new(transmitters::Transmitters::new(schedule)),
-        Box::new(alternation::Alternation::new(schedule)),
+        // Chirps and loops of another length, and chirps in the order of firing, repeat as longer loops do: special cases first.
         Box::new(chirp_length::ChirpLength::new(schedule)),
         Box::new(period::Period::new(schedule)),
+        Box::new(transmitters::Transmitters::new(schedule)),
+        Box::new(alternation::Alternation::new(schedule)),
         Box::new(start::Start::new(schedule)),
         Box::new(boundary::Boundary::new(schedule)),
         Box::new(words::Words::new(schedule)),
@@ -130,6 +131,26 @@ pub fn inspect(recording: &Recording, most_frames: usize) -> Result<Vec<Finding>
     Ok(findings)
 }
 
+/// Weighs what follows the only frame of a capture, as a share of a frame: frames may have more loops.
+pub fn weigh_rest(findings: &mut [Finding], radar: &Radar, share: f64) {
+    let is_misread = findings.iter().any(|finding| !finding.ok && finding.kind == Kind::Misread);
+    if radar.frames > 1 || share <= 0.0 || is_misread {
+        return;
+    }
+    let loops = share * radar.loops_per_frame as f64;
+    let rest = if (loops - loops.round()).abs() < 1e-6 {
+        let all = radar.loops_per_frame + loops.round() as usize;
+        format!("what follows the only frame is {loops:.0} of its loops, and a frame of {all} loops would leave nothing")
+    } else {
+        format!(
+            "what follows the only frame is {loops:.2} of its loops, which no number of loops explains: the capture was broken off or cut off"
+        )
+    };
+    for finding in findings.iter_mut().filter(|finding| finding.check == boundary::CHECK && !finding.decided) {
+        *finding = Finding::undecided(finding.check, finding.expected, &rest);
+    }
+}
+
 /// Conventions that samples alone never decide, for tables of all that is stated.
 pub fn never_decided(radar: &Radar) -> Vec<Finding> {
     let body = "a body whose motion is known decides it (`hybridsim diagnose`)";
@@ -140,13 +161,45 @@ pub fn never_decided(radar: &Radar) -> Vec<Finding> {
     if radar.tx_m.len() > 1 {
         undecided.push(Finding::undecided("tx_order", "transmitters fire in the order of tx_m", body));
     }
+    if radar.tx_m.len() * radar.rx_m.len() > 1 {
+        undecided.push(Finding::undecided("left_and_right", "antennas on the sides that tx_m and rx_m state", body));
+    }
     undecided
 }
 
+/// What becomes of a statement that the samples contradict.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Against {
+    /// Nothing is decided: a recording is only looked at.
+    Questioned,
+    /// It is refused.
+    Refused,
+    /// The user keeps his word.
+    Kept,
+}
+
 impl Finding {
+    /// What was kept of what is stated.
+    pub fn kept(&self, against: Against) -> &'static str {
+        match (self.ok, self.kind, against) {
+            (true, ..) if self.decided => "as stated",
+            (true, ..) => "as stated, undecided",
+            (false, Kind::Lost, Against::Questioned) => "questioned",
+            (false, Kind::Lost, _) => "what was lost is left out",
+            (false, _, Against::Questioned) => "questioned",
+            (false, _, Against::Refused) => "refused",
+            (false, _, Against::Kept) => "as stated, against the data",
+        }
+    }
+
     /// Of the check, as people read it: `byte order`.
     pub fn name(&self) -> String {
         self.check.trim_start_matches("integrity_").replace('_', " ")
+    }
+
+    /// What was found, as what a field "is".
+    pub fn contradiction(&self) -> String {
+        format!("contradicted by the samples ({})", self.found)
     }
 
     /// Whether the samples cannot be used as they are, nor in part.
@@ -173,4 +226,51 @@ fn listed(numbers: &[usize]) -> String {
 /// `frame 3` or `frames 3, 4`
 fn frames_listed(frames: &[usize]) -> String {
     format!("{} {}", if frames.len() == 1 { "frame" } else { "frames" }, listed(frames))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// After a row that is wrong or not.
+    fn weighed(is_misread: bool, frames: usize, share: f64) -> Finding {
+        let radar = Radar { loops_per_frame: 64, frames, ..Radar::mmmesh(frames) };
+        let before = match is_misread {
+            true => Finding::wrong(Kind::Misread, "chirp_length", "", String::new(), -9.0),
+            false => Finding::as_stated("chirp_length", "", ""),
+        };
+        let mut findings = [before, Finding::undecided(boundary::CHECK, "", "one frame alone shows no boundary")];
+        weigh_rest(&mut findings, &radar, share);
+        let [_, finding] = findings;
+        finding
+    }
+
+    #[test]
+    fn what_follows_the_only_frame_is_weighed() {
+        let third = 21.0 / 64.0;
+        assert!(weighed(false, 1, third).found.contains("is 21 of its loops, and a frame of 85 loops"));
+        assert!(weighed(false, 1, 0.4).found.contains("is 25.60 of its loops, which no number"));
+        for (is_misread, frames, share) in [(false, 1, 0.0), (false, 2, third), (true, 1, third)] {
+            assert!(weighed(is_misread, frames, share).found.contains("one frame alone"));
+        }
+    }
+
+    /// What samples never decide has a row wherever there is anything to decide.
+    #[test]
+    fn sides_and_order_have_a_row_where_there_are_several_antennas() {
+        let radar = Radar::mmmesh(1);
+        let rows = |radar: &Radar| never_decided(radar).iter().map(Finding::name).collect::<Vec<_>>();
+        assert_eq!(rows(&radar), ["adc start", "doppler sign", "tx order", "left and right"]);
+        let one = Radar { tx_m: radar.tx_m[..1].to_vec(), rx_m: radar.rx_m[..1].to_vec(), ..radar };
+        assert_eq!(rows(&one), ["adc start", "doppler sign"]);
+    }
+
+    #[test]
+    fn a_refusal_is_a_sentence() {
+        let finding = Finding::wrong(Kind::Misread, "integrity_stream", "", "from frame 0 on, samples come earlier".into(), -9.0);
+        assert_eq!(
+            format!("`{}` is {}", finding.name(), finding.contradiction()),
+            "`stream` is contradicted by the samples (from frame 0 on, samples come earlier)"
+        );
+    }
 }

@@ -4,7 +4,8 @@
 //! (Cauchy and Schwarz). With a correlation r, a share 1 − r² of the energy is left, so ln((1 − r²) / (1 − r'²)) for every loop is the log
 //! of a likelihood ratio of another length r'; it must exceed the number of lengths that were tried (Bonferroni). A loop counts once, as
 //! all of its samples show one scene. Lengths near whole numbers of chirps are not tried: the receivers of one chirp share its phase, and
-//! neighbouring chirps what moves.
+//! neighbouring chirps what moves. But another length must explain more than those up to twice as long do, too: chirps that take turns
+//! make a loop of whole chirps (`transmitter_count`), and other lengths are the better the nearer they are to it.
 
 use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
@@ -73,7 +74,7 @@ impl Inspector for Period {
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
         if self.frames == 0 {
-            return None;
+            return Some(Finding::undecided(CHECK, EXPECTED, "too few loops"));
         }
         let Schedule { samples, rx, loops, .. } = self.schedule;
         let period = self.schedule.period();
@@ -86,11 +87,14 @@ impl Inspector for Period {
         };
         let looks = (loops * self.frames) as f64;
         let tried = (shifts.len() as f64).ln();
-        let log_p = tried - repeating(looks, [square(period), square(best)]);
         // Twice a length is as good as the length itself: the shortest peak is reported that is no worse than the best one.
         let is_peak = |shift: usize| square(shift) >= square(shift - 1).max(square((shift + 1).min(self.squares.len() - 1)));
         let is_as_good = |shift: usize| tried - repeating(looks, [square(shift), square(best)]) >= ALARM.ln();
         let best = shifts.iter().copied().find(|&shift| is_peak(shift) && is_as_good(shift)).unwrap_or(best);
+        // Where the loop is as long as the best length, it is twice as long at the first whole chirps.
+        let shorter = (rx..).map(|chirps| chirps * samples).take_while(|&shift| shift < (2 * best).min(self.squares.len()));
+        let whole_chirps = shorter.map(square).fold(square(period), f64::max);
+        let log_p = tried - repeating(looks, [whole_chirps, square(best)]);
         let found = format!(
             "shifted by the {period} samples of a loop, the stream correlates to {:.2} with itself",
             square(period).sqrt()
@@ -115,7 +119,12 @@ mod tests {
     /// A stream that repeats itself after so many samples, under noise, cut into loops of 2 x 2 x 32.
     fn seen(period: usize, noise: f64) -> Finding {
         let (still, drawn) = (numbers(4, period, -1.0, 1.0), numbers(5, 16 * 128, -1.0, 1.0));
-        let values: Vec<f32> = (0..16 * 128).map(|i| (still[i % period] + noise * drawn[i]) as f32).collect();
+        of(|i| still[i % period] + noise * drawn[i])
+    }
+
+    /// Of a stream in such loops.
+    fn of(value: impl Fn(usize) -> f64) -> Finding {
+        let values: Vec<f32> = (0..16 * 128).map(|i| value(i) as f32).collect();
         let schedule = Schedule { tx: 2, rx: 2, loops: 16, samples: 32, is_real: true, is_falling: false, farthest_bin: None };
         let mut arranged = vec![];
         for channel in 0..4 {
@@ -134,5 +143,14 @@ mod tests {
         let other = seen(140, 0.3);
         assert!(other.is_refusal() && other.found.contains("shifted by 140 samples"), "{other:?}");
         assert!(seen(140, 30.0).ok);
+    }
+
+    /// Tones that are slow against a chirp, in loops that take turns: a shift by a little more than a chirp is better than the stated loop,
+    /// and that by the chirps of a whole round still better.
+    #[test]
+    fn a_loop_of_whole_chirps_is_left_to_the_count_of_transmitters() {
+        let (phases, drawn) = (numbers(4, 24, 0.0, std::f64::consts::TAU), numbers(5, 16 * 128, -0.05, 0.05));
+        let found = of(|i| (0.05 * (i % 32) as f64 + phases[i / 32 % 6]).sin() + drawn[i]);
+        assert!(found.ok, "{found:?}");
     }
 }

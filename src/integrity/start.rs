@@ -4,7 +4,8 @@
 //! of the still chirps predicts what goes on, so its error is largest where chirps begin. Within a chirp that is as stated, noise
 //! makes the error as large at one sample as at any other, and independently in every channel: that the same few samples come first
 //! in several channels has a binomial law, Bonferroni over the samples. Errors across the stated beginning compete, and a
-//! break within a few samples of it is taken for a transient.
+//! break within a few samples of it is taken for a transient. Where receivers lie one after the other and are read as interleaved, each
+//! stated chirp holds a part of every receiver's: breaks lie at whole parts of a chirp, one for each receiver.
 
 use num_complex::Complex64;
 
@@ -29,6 +30,14 @@ pub(super) struct Start {
 impl Start {
     pub fn new(schedule: Schedule) -> Self {
         Self { schedule, sum: vec![Complex64::ZERO; schedule.period()] }
+    }
+}
+
+impl Start {
+    /// Whether a break shortly after a sample is one of those between the parts of a chirp, one for each receiver.
+    fn is_part(&self, place: usize) -> bool {
+        let Schedule { rx, samples, .. } = self.schedule;
+        (1..rx).any(|part| (part * samples / rx).abs_diff(place) <= ORDER)
     }
 }
 
@@ -90,7 +99,13 @@ impl Inspector for Start {
         if place < beside || place + beside >= samples {
             return Some(Finding::as_stated(CHECK, EXPECTED, found));
         }
-        let found = format!("{found}: chirps begin there; a header lies before the first sample, or samples were cut off");
+        let causes = if self.is_part(place) {
+            "the receivers' samples lie one after the other and are not interleaved as stated, or a header lies before the first sample, or \
+             samples were cut off"
+        } else {
+            "a header lies before the first sample, or samples were cut off"
+        };
+        let found = format!("{found}: chirps begin there; {causes}");
         Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p))
     }
 }
@@ -104,7 +119,8 @@ mod tests {
     /// Chirps of 6 channels with five returns each, turned by so many samples of the stream.
     fn seen(turn: usize, noise: f64) -> Finding {
         let (channels, samples, loops) = (6, 64, 4);
-        let schedule = Schedule { tx: 1, rx: channels, loops, samples, is_real: false, is_falling: false, farthest_bin: None };
+        let schedule =
+            Schedule { tx: channels / 2, rx: 2, loops, samples, is_real: false, is_falling: false, farthest_bin: None };
         let (phases, drawn) =
             (numbers(6, 5 * channels, 0.0, std::f64::consts::TAU), numbers(7, 2 * channels * samples * loops, -1.0, 1.0));
         let of_stream = |place: usize| -> Complex64 {
@@ -121,8 +137,16 @@ mod tests {
         }
         let (re, im) = values.iter().map(|value| (value.re as f32, value.im as f32)).unzip();
         let mut inspector = Box::new(Start::new(schedule));
-        inspector.see(&Stream::of(schedule, 0, &IfFrame::new([1, channels, loops, samples], re, Some(im))));
+        inspector.see(&Stream::of(schedule, 0, &IfFrame::new([channels / 2, 2, loops, samples], re, Some(im))));
         inspector.conclude().unwrap()
+    }
+
+    #[test]
+    fn a_break_between_parts_of_a_chirp_may_be_one_between_receivers() {
+        let elsewhere = seen(44, 0.5);
+        assert!(elsewhere.is_refusal() && !elsewhere.found.contains("receivers"), "{elsewhere:?}");
+        let half = seen(32, 0.5);
+        assert!(half.is_refusal() && half.found.contains("receivers' samples lie one after the other"), "{half:?}");
     }
 
     #[test]

@@ -69,8 +69,11 @@ impl Inspector for Transmitters {
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
         let Schedule { tx, loops, .. } = self.schedule;
-        if tx < 2 || loops < 2 * tx {
+        if tx < 2 {
             return None;
+        }
+        if loops < 2 * tx {
+            return Some(Finding::undecided(CHECK, EXPECTED, "too few loops"));
         }
         let separated = self.left(|of, _| of);
         let unseparated = self.left(|of, remainder| (of * loops + remainder) % tx);

@@ -98,9 +98,12 @@ impl Inspector for Words {
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
         let samples = self.schedule.samples;
-        // Words of two chirps would share a group otherwise.
-        if self.schedule.is_real || !samples.is_multiple_of(2) {
+        if self.schedule.is_real {
             return None;
+        }
+        // Words of two chirps would share a group otherwise.
+        if !samples.is_multiple_of(2) {
+            return Some(Finding::undecided(CHECK, EXPECTED, "a chirp of an odd number of samples"));
         }
         let chirps: Vec<Vec<Complex64>> = self.sum.chirps().map(exchanged).collect();
         let half = samples / 2;

@@ -81,7 +81,7 @@ pub fn speed_of_limbs(facts: &Facts) -> Vec<Finding> {
     }
     let (_, part) = path_key(facts);
     let field = if facts.motion.is_some() { "poses" } else { "vertices" };
-    let found = format!("a part of the body of {fastest:.1} m/s at {time_s:.2} s");
+    let found = format!("a part of the body that moves at {fastest:.1} m/s at {time_s:.2} s");
     let expected = format!("no part of a body faster than {FASTEST_HAND_MPS} m/s, the fastest throw on record");
     vec![
         Finding::new(Kind::Refuse, part, field, found, expected)

@@ -126,7 +126,7 @@ pub fn unambiguous_velocity(facts: &Facts) -> Vec<Finding> {
     let limit = radar.max_tracked_velocity_mps();
     let radial = |look: &Look| look.speed_mps.map_or(0.0, |[_, radial]| radial);
     let Some((fastest, look)) = worst(facts, radial).filter(|(fastest, _)| *fastest > limit) else { return vec![] };
-    let found = format!("a part of the body of {fastest:.2} m/s along the line of sight at {:.2} s", look.time_s);
+    let found = format!("a part of the body that moves at {fastest:.2} m/s along the line of sight at {:.2} s", look.time_s);
     let from = if radar.loops_per_frame == 1 { "from frame to frame" } else { "from loop to loop" };
     let expected = format!("at most {limit:.2} m/s, which the radar measures without ambiguity {from}");
     let (field, part) = if facts.motion.is_some() { ("poses", Part::Motion) } else { ("vertices", Part::Body) };

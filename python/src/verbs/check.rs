@@ -38,20 +38,25 @@ pub fn check(py: Python<'_>, path: PathBuf, as_stated: bool, notify: &Bound<'_, 
         }));
         notify(Notice::Done(2));
         // Every frame is read once, so that a truncated or lying file shows here.
-        all.extend(integrity::inspect(&recording, recording.radar.frames)?.into_iter().map(|finding| {
-            json!({
-                "about": "integrity",
-                "check": finding.check,
-                "expected": finding.expected,
-                "found": finding.found,
-                "ok": finding.ok,
-                "frames": finding.frames,
-                "p_value": finding.p_value,
-            })
-        }));
+        let found = integrity::inspect(&recording, recording.radar.frames)?;
+        all.extend(found.iter().chain(&integrity::never_decided(&recording.radar)).map(convention));
         notify(Notice::Done(3));
         let about = json!({ "radar": radar_json(&recording.radar), "notes": recording.notes, "findings": all });
         Ok(about.to_string())
+    })
+}
+
+/// A row of the table that `hybridsim check` prints.
+fn convention(finding: &integrity::Finding) -> Value {
+    json!({
+        "about": "integrity",
+        "check": finding.check,
+        "kept": finding.kept(integrity::Against::Questioned),
+        "expected": finding.expected,
+        "found": finding.found,
+        "ok": finding.ok,
+        "frames": finding.frames,
+        "p_value": finding.p_value,
     })
 }
 

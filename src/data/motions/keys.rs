@@ -15,7 +15,8 @@ const ROOT: [&str; 2] = ["global_orient", "root_orient"];
 /// All other joints of the body.
 const BODY: [&str; 2] = ["body_pose", "pose_body"];
 /// `trans` of AMASS, `transl` of smplx, ROMP's place in the camera's frame, AIST++.
-const TRANSLATION: [&str; 5] = ["trans", "transl", "translation", "cam_trans", "smpl_trans"];
+const TRANSLATION: [&str; 5] = ["trans", "transl", "translation", IN_CAMERA, "smpl_trans"];
+const IN_CAMERA: &str = "cam_trans";
 const BETAS: [&str; 5] = ["betas", "smpl_betas", "shape", "pred_betas", "beta"];
 /// AMASS has written the rate under the first two names.
 pub const RATE: [&str; 6] = ["mocap_framerate", "mocap_frame_rate", "mocap_fps", "fps", "framerate", "frame_rate"];
@@ -52,7 +53,13 @@ pub fn read(npz: &mut Npz) -> Result<Raw> {
     let (layout, rotations) = rotations(npz, &mut notes)?;
     let poses = rotations.len();
     let translations = match first(npz, &TRANSLATION) {
-        Some(key) => Some((key, translation(npz, key, poses)?)),
+        Some(key) => {
+            if key != TRANSLATION[0] {
+                let frame = if key == IN_CAMERA { ", the root in the camera's frame" } else { "" };
+                notes.push(format!("translation: from `{key}`{frame}"));
+            }
+            Some((key, translation(npz, key, poses)?))
+        }
         None => {
             notes.extend(
                 first(npz, &IN_PICTURE).map(|key| format!("no translation: `{key}` is a place in a picture, not in metres")),

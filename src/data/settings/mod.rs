@@ -113,6 +113,22 @@ pub fn merge(mut parent: Table, child: Table) -> Table {
     parent
 }
 
+/// Where a path of settings leads from the working folder: a file states it from its own folder, `--set` from the working folder.
+///
+/// # Errors
+/// No working folder.
+pub fn place_path(path: &mut PathBuf, key: &str, folder: &Path, sets: &[String]) -> Result<()> {
+    let is_set = sets.iter().filter_map(|set| set.split_once('=')).any(|(set, _)| {
+        let rest = key.strip_prefix(set.trim());
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    });
+    *path = match is_set {
+        true => std::path::absolute(&*path).map_err(|error| Error::read(&*path, error))?,
+        false => folder.join(&*path),
+    };
+    Ok(())
+}
+
 /// Applies overrides in order, each `a.b.c=value`. A value that is no TOML is a string.
 pub fn apply_sets(table: &mut Table, sets: &[String]) -> Result<()> {
     sets.iter().try_for_each(|set| apply_set(table, set))

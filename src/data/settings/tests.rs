@@ -176,3 +176,17 @@ fn a_number_that_nothing_can_have_is_refused_with_its_key_and_file() {
     // Seeds may be anything.
     assert_eq!(folder.read("d.toml", &["training.epochs=3"]).unwrap().seed, i64::MAX as u64);
 }
+
+#[test]
+fn a_path_of_a_set_is_from_where_it_was_typed_and_one_of_a_file_from_its_folder() {
+    let placed = |set: &str| {
+        let mut path = PathBuf::from("runs/capture");
+        place_path(&mut path, "data.recordings", Path::new("configs"), &[set.to_string()]).unwrap();
+        path
+    };
+    assert_eq!(placed("training.epochs=3"), Path::new("configs/runs/capture"));
+    assert_eq!(placed("data.recordings_m=3"), Path::new("configs/runs/capture"));
+    let here = std::env::current_dir().unwrap().join("runs/capture");
+    assert_eq!(placed("data.recordings=[\"runs/capture\"]"), here);
+    assert_eq!(placed("data={recordings=[\"runs/capture\"]}"), here);
+}

@@ -8,9 +8,10 @@ use super::boards::Board;
 use super::container;
 use super::cube::{Cube, half_scale_note};
 use super::layout::{Axis, Layout};
-use super::radar_table::{finished, place_antennas, radar_table, table_of};
+use super::radar_table::{finished, missing, place_antennas, radar_table, table_of};
 use super::words::{Lengths, WordArray};
-use super::{Capture, Stated, coloradar};
+use super::{Capture, Stated, coloradar, numbers};
+use crate::data::arrays::Kind;
 use crate::data::entries::entries;
 use crate::error::{Error, Result};
 use crate::radar::Radar;
@@ -35,13 +36,19 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         preset.map(|preset| format!("laid out as {} ({})", preset.title, preset.page)).into_iter().collect();
     notes.extend(preset.iter().flat_map(|preset| preset.notes.clone()));
     let mut settings = Settings::of(stated, &layout, &mut notes)?;
-    if is_words(&files[0]) {
+    let number = layout.number.filter(|number| is_words(&files[0]) && number.kind != Kind::Int);
+    if is_words(&files[0]) && number.is_none() {
         let frame_files = preset.is_some_and(|preset| preset.frame_files);
         let words = WordArray::open(&files, &layout, settings.lengths(&mut notes)?, frame_files, &mut notes)?;
         return one(&files[0], Cube::of_words(words, layout), settings, notes);
     }
-    let variable = stated.variable.as_deref().or_else(|| preset?.variable.as_deref());
-    let cube = Cube::open(&files[0], variable, layout.clone())?;
+    let variable = stated.variable.clone().or_else(|| preset?.variable.clone());
+    let lengths = number.map(|_| settings.lengths(&mut notes)).transpose()?;
+    let opened = move |path: &Path, notes: &mut Vec<String>| match number.zip(lengths) {
+        Some((number, lengths)) => Cube::of(numbers::open(path, number, &layout, lengths, notes)?, layout.clone()),
+        None => Cube::open(path, variable.as_deref(), layout.clone()),
+    };
+    let cube = opened(&files[0], &mut notes)?;
     if files.len() == 1 {
         return one(&files[0], cube, settings, notes);
     }
@@ -51,26 +58,28 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
             hint: Some("several files are joined where each is one frame; import others one by one".into()),
         });
     }
-    settings.fill(&cube, &mut notes);
+    settings.fill(&cube, &mut notes)?;
+    let board = settings.board;
     let one_frame = settings.finish(&mut notes)?;
     cube.check(&one_frame)?;
     notes.push(format!("{} files, in the order of the numbers in their names, are the frames", files.len()));
     notes.extend(half_scale_note(&cube)?);
     let radar = Radar { frames: files.len(), ..one_frame.clone() };
     radar.check("radar")?;
-    let (stored_as, wrapped, variable) = (cube.stored_as(), cube.wrapped, variable.map(String::from));
+    let (stored_as, wrapped) = (cube.stored_as(), cube.wrapped);
     let source = files[0].clone();
     let frame = move |index: usize| {
-        let mut cube = Cube::open(&files[index], variable.as_deref(), layout.clone())?;
+        let mut cube = opened(&files[index], &mut vec![])?;
         cube.wrapped = wrapped;
         cube.check(&one_frame)?;
         cube.frame(0)
     };
-    Ok(Capture { source, radar, layout: stored_as, notes, lost: vec![], frame: Box::new(frame) })
+    Ok(Capture { source, radar, layout: stored_as, board, notes, lost: vec![], rest: 0.0, frame: Box::new(frame) })
 }
 
 fn one(path: &Path, cube: Cube, mut settings: Settings, mut notes: Vec<String>) -> Result<Capture> {
-    settings.fill(&cube, &mut notes);
+    settings.fill(&cube, &mut notes)?;
+    let board = settings.board;
     let radar = settings.finish(&mut notes)?;
     cube.check(&radar)?;
     notes.extend(half_scale_note(&cube)?);
@@ -78,8 +87,10 @@ fn one(path: &Path, cube: Cube, mut settings: Settings, mut notes: Vec<String>) 
         source: path.into(),
         layout: cube.stored_as(),
         radar,
+        board,
         notes,
         lost: vec![],
+        rest: 0.0,
         frame: Box::new(move |index| cube.frame(index)),
     })
 }
@@ -138,6 +149,8 @@ struct Settings {
     table: Table,
     board: Option<&'static Board>,
     transmitters: Option<Vec<usize>>,
+    /// Where what is left open could be found.
+    page: Option<String>,
     /// Whether the layout counts transmitters only together with something else.
     is_by_chirp: bool,
     has_tx: bool,
@@ -166,6 +179,7 @@ impl Settings {
             table,
             board,
             transmitters: preset.and_then(|preset| preset.transmitters.clone()),
+            page: preset.map(|preset| preset.page.clone()),
             is_by_chirp: has(&[Axis::Chirp, Axis::Antenna]),
             has_tx: has(&[Axis::Tx, Axis::Chirp, Axis::Antenna]),
             has_rx: has(&[Axis::Rx, Axis::Antenna]),
@@ -198,12 +212,14 @@ impl Settings {
     /// Lengths that words alone do not say.
     fn lengths(&mut self, notes: &mut Vec<String>) -> Result<Lengths> {
         self.place_antennas((!self.has_tx).then_some(1), (!self.has_rx).then_some(1), notes);
-        let hint = "words alone do not say their lengths: give it with --set, or in a file with --config";
-        let (tx, rx) = (self.antennas("tx_m"), self.antennas("rx_m"));
-        let missing = |key: &str| Error::setting(format!("radar.{key}"), "missing", "a value").with_hint(hint);
-        let (tx, rx) = (tx.ok_or_else(|| missing("tx_m"))?, rx.ok_or_else(|| missing("rx_m"))?);
+        self.refuse_missing(&["frames"])?;
+        let places = |own: Option<usize>, key: &str| {
+            own.filter(|&count| count > 0)
+                .ok_or_else(|| Error::setting(format!("radar.{key}"), "none", "places [x, y, z], one of each antenna"))
+        };
+        let (tx, rx) = (places(self.antennas("tx_m"), "tx_m")?, places(self.antennas("rx_m"), "rx_m")?);
         let mut count = |key: &str| {
-            let value = self.radar().get(key).cloned().ok_or_else(|| missing(key))?;
+            let value = self.radar().get(key).cloned().expect("nothing is missing");
             value
                 .as_integer()
                 .and_then(|count| usize::try_from(count).ok())
@@ -214,13 +230,17 @@ impl Settings {
     }
 
     /// What the array itself says fills what is left open.
-    fn fill(&mut self, cube: &Cube, notes: &mut Vec<String>) {
+    ///
+    /// # Errors
+    /// More antennas than the board has; settings that neither the array nor anybody states.
+    fn fill(&mut self, cube: &Cube, notes: &mut Vec<String>) -> Result<()> {
         let by_axis = |axis: Axis| cube.has(axis).then(|| cube.length(axis));
         let (tx, rx) = if cube.has(Axis::Antenna) {
             (None, None)
         } else {
             (by_axis(Axis::Tx).or_else(|| (!self.is_by_chirp).then_some(1)), Some(cube.length(Axis::Rx)))
         };
+        self.refuse_more_than_the_board(cube, tx, rx)?;
         self.place_antennas(tx, rx, notes);
         let transmitters = self.antennas("tx_m").unwrap_or(1).max(1);
         let chirps = cube.length(Axis::Loop) * cube.length(Axis::Chirp);
@@ -230,6 +250,38 @@ impl Settings {
             radar.entry(key).or_insert(Value::Integer(number as i64));
         }
         radar.entry("sampling").or_insert_with(|| Value::String(format!("{:?}", cube.sampling()).to_lowercase()));
+        self.refuse_missing(&[])
+    }
+
+    /// Refuses an array of more antennas than the board has, where nothing else places them.
+    fn refuse_more_than_the_board(&mut self, cube: &Cube, tx: Option<usize>, rx: Option<usize>) -> Result<()> {
+        let Some(board) = self.board else { return Ok(()) };
+        let of_board = [board.tx_half_wavelengths.len(), board.rx_half_wavelengths.len()];
+        for (key, what, count, most) in [("tx_m", "transmitters", tx, of_board[0]), ("rx_m", "receivers", rx, of_board[1])] {
+            let Some(count) = count.filter(|count| *count > most && !self.radar().contains_key(key)) else { continue };
+            let found = format!("{} with {count} {what}", cube.describe());
+            return Err(cube.wrong(found, format!("at most {most}, those of the {}", board.name)).with_hint(format!(
+                "name the board of this capture with --board, correct --layout, or state the places with --set radar.{key}=[…]"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Refuses a radar of which something is not stated, all of it at once. `later`: what the file itself will say.
+    fn refuse_missing(&mut self, later: &[&str]) -> Result<()> {
+        let mut open = missing(self.radar());
+        open.retain(|key| !later.contains(key));
+        if open.is_empty() {
+            return Ok(());
+        }
+        let why = match &self.page {
+            Some(page) => format!("{page} leaves this open"),
+            None => "the file does not say this".into(),
+        };
+        let antennas = if open.iter().any(|key| key.ends_with("x_m")) { "; --board places antennas" } else { "" };
+        let hint =
+            format!("{why}: give each with --set radar.KEY=VALUE, or all in a TOML file with [radar] with --config{antennas}");
+        Err(Error::field(&self.name, "radar", format!("without {}", open.join(", ")), "all of its settings").with_hint(hint))
     }
 
     fn finish(self, notes: &mut Vec<String>) -> Result<Radar> {

@@ -3,8 +3,18 @@
 //! Positions are in half wavelengths of the board's design frequency, x to the right and z up as the radar looks, in
 //! the board's own numbering of transmitters and receivers.
 
+use std::path::Path;
+
 use crate::error::{Error, Result};
-use crate::radar::SPEED_OF_LIGHT;
+use crate::radar::{Radar, SPEED_OF_LIGHT};
+
+/// Frequencies that a device sweeps, and the document that states them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Band {
+    pub low_hz: f64,
+    pub high_hz: f64,
+    pub source: &'static str,
+}
 
 /// A board: where its antennas are, and which receivers are fed the other way round.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,6 +23,7 @@ pub struct Board {
     /// The document that the positions are taken from.
     pub source: &'static str,
     pub design_frequency_hz: f64,
+    pub band: Band,
     /// `[x, z]`.
     pub tx_half_wavelengths: &'static [[f64; 2]],
     pub rx_half_wavelengths: &'static [[f64; 2]],
@@ -25,20 +36,33 @@ const RX_LINE: &[[f64; 2]] = &[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]];
 const TX_RAISED: &[[f64; 2]] = &[[0.0, 0.0], [2.0, 1.0], [4.0, 0.0]];
 const PEOPLE_TRACKING: &str = "TI 3D People Tracking, chirp configurations: antGeometry0, antGeometry1, antPhaseRot";
 
+const IWR6843: &str = "TI data sheet IWR6843, SWRS219, section Features, page 1";
+/// What the maker's own driver lets the device sweep.
+const AVIAN: &str = "Infineon Radar SDK, lib_avian, ifxAvian_DeviceTraits.cpp: allowed_rf_range";
+
 /// Four AWR2243 that share their clocks.
 pub const CASCADE: &str = "MMWCASRFEVM";
 
+const fn at_77(source: &'static str) -> Band {
+    Band { low_hz: 76.0e9, high_hz: 81.0e9, source }
+}
+
+const fn at_60(source: &'static str) -> Band {
+    Band { low_hz: 60.0e9, high_hz: 64.0e9, source }
+}
+
 /// Every board that is known.
 pub const BOARDS: &[Board] = &[
-    raised("IWR1443BOOST", "TI user's guide SWRU518", 77.0e9),
-    raised("AWR1243BOOST", "TI user's guide SWRU507", 77.0e9),
-    raised("AWR1843BOOST", "TI user's guide SPRUIM4", 77.0e9),
-    raised("AWR2243BOOST", "TI user's guide SPRUIT8", 77.0e9),
-    raised("IWR6843ISK", "TI user's guide SWRU546; TI 3D People Tracking, antGeometry0 and antGeometry1", 62.0e9),
+    raised("IWR1443BOOST", "TI user's guide SWRU518", 77.0e9, at_77("TI data sheet IWR1443, SWRS211, section Features, page 1")),
+    raised("AWR1243BOOST", "TI user's guide SWRU507", 77.0e9, at_77("TI data sheet AWR1243, SWRS188, section Features, page 1")),
+    raised("AWR1843BOOST", "TI user's guide SPRUIM4", 77.0e9, at_77("TI data sheet AWR1843, SWRS222, section Features, page 1")),
+    raised("AWR2243BOOST", "TI user's guide SPRUIT8", 77.0e9, at_77("TI data sheet AWR2243, SWRS223, section Features, page 1")),
+    raised("IWR6843ISK", "TI user's guide SWRU546; TI 3D People Tracking, antGeometry0 and antGeometry1", 62.0e9, at_60(IWR6843)),
     Board {
         name: "IWR1642BOOST",
         source: "TI user's guide SWRU521",
         design_frequency_hz: 77.0e9,
+        band: at_77("TI data sheet IWR1642, SWRS212, section Features, page 1"),
         tx_half_wavelengths: &[[0.0, 0.0], [4.0, 0.0]],
         rx_half_wavelengths: RX_LINE,
         inverted_rx: &[],
@@ -47,6 +71,7 @@ pub const BOARDS: &[Board] = &[
         name: "IWR6843AOP",
         source: PEOPLE_TRACKING,
         design_frequency_hz: 62.0e9,
+        band: at_60("TI data sheet IWR6843AOP, SWRS237, section Features, page 1"),
         tx_half_wavelengths: &[[0.0, 0.0], [2.0, -2.0], [0.0, -2.0]],
         rx_half_wavelengths: &[[1.0, -1.0], [1.0, 0.0], [0.0, -1.0], [0.0, 0.0]],
         inverted_rx: &[0, 2],
@@ -55,6 +80,7 @@ pub const BOARDS: &[Board] = &[
         name: "IWR6843ODS",
         source: PEOPLE_TRACKING,
         design_frequency_hz: 62.0e9,
+        band: at_60(IWR6843),
         tx_half_wavelengths: &[[0.0, 0.0], [2.0, 0.0], [2.0, -2.0]],
         rx_half_wavelengths: &[[0.0, 0.0], [0.0, -1.0], [1.0, -1.0], [1.0, 0.0]],
         inverted_rx: &[1, 2],
@@ -64,6 +90,7 @@ pub const BOARDS: &[Board] = &[
         source: "TI user's guide SWRU553; TI cascade MATLAB examples of mmWave Studio, module_param.m: TI_Cascade_TX_position_azi, \
                  TI_Cascade_TX_position_ele, TI_Cascade_RX_position_azi, TI_Cascade_Antenna_DesignFreq",
         design_frequency_hz: 76.8e9,
+        band: at_77("TI data sheet AWR2243, SWRS223, section Features, page 1"),
         // Three of the master and of each slave in turn.
         tx_half_wavelengths: &[
             [11.0, 6.0],
@@ -104,6 +131,7 @@ pub const BOARDS: &[Board] = &[
         name: "BGT60TR13C",
         source: "Infineon data sheet BGT60TR13C: one transmitter, receivers 1 and 3 side by side, 2 and 3 one above the other",
         design_frequency_hz: 60.75e9,
+        band: Band { low_hz: 58.0e9, high_hz: 63.5e9, source: AVIAN },
         tx_half_wavelengths: &[[0.0, 0.0]],
         rx_half_wavelengths: &[[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]],
         inverted_rx: &[],
@@ -112,46 +140,82 @@ pub const BOARDS: &[Board] = &[
         name: "BGT60UTR11",
         source: "Infineon data sheet BGT60UTR11AIP: one transmitter, one receiver",
         design_frequency_hz: 60.75e9,
+        band: Band { low_hz: 57.4e9, high_hz: 63.0e9, source: AVIAN },
         tx_half_wavelengths: &[[0.0, 0.0]],
         rx_half_wavelengths: &[[0.0, 0.0]],
         inverted_rx: &[],
     },
 ];
 
-/// Other names of the same boards.
-const ALIASES: &[(&str, &str)] = &[
-    ("AWR1443BOOST", "IWR1443BOOST"),
-    ("IWR1843BOOST", "AWR1843BOOST"),
-    ("AWR1642BOOST", "IWR1642BOOST"),
-    ("IWR6843AOPEVM", "IWR6843AOP"),
-    ("IWR6843ISKODS", "IWR6843ODS"),
-    ("BGT60UTR11AIP", "BGT60UTR11"),
-    ("MMWCAS", CASCADE),
-    ("MMWCASRF", CASCADE),
-];
+/// Other names of the same boards, as [`key`] writes them. The MMWCAS-DSP-EVM is the capture card of the MMWCAS-RF-EVM.
+const ALIASES: &[(&str, &str)] =
+    &[("WR6843ISKODS", "WR6843ODS"), ("BGT60UTR11AIP", "BGT60UTR11"), ("MMWCAS", "MMWCASRF"), ("MMWCASDSP", "MMWCASRF")];
 
-const fn raised(name: &'static str, source: &'static str, design_frequency_hz: f64) -> Board {
-    Board { name, source, design_frequency_hz, tx_half_wavelengths: TX_RAISED, rx_half_wavelengths: RX_LINE, inverted_rx: &[] }
+/// The shortest name that can stand for the only board of its device.
+const DEVICE: usize = "WR1843".len();
+
+const fn raised(name: &'static str, source: &'static str, design_frequency_hz: f64, band: Band) -> Board {
+    let (tx_half_wavelengths, rx_half_wavelengths) = (TX_RAISED, RX_LINE);
+    Board { name, source, design_frequency_hz, band, tx_half_wavelengths, rx_half_wavelengths, inverted_rx: &[] }
+}
+
+/// What boards of one array share: letters and digits of a name alone, without the A, I or x of TI's device names and without the words
+/// for a board.
+fn key(name: &str) -> String {
+    let mut plain: String = name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_uppercase();
+    if plain.get(1..).is_some_and(|rest| rest.starts_with("WR")) && plain.starts_with(['A', 'I', 'X']) {
+        plain.remove(0);
+    }
+    while let Some(shorter) = ["EVM", "BOOST"].iter().find_map(|end| plain.strip_suffix(end)) {
+        plain.truncate(shorter.len());
+    }
+    plain
 }
 
 impl Board {
-    /// The board of a name as people write it: letters and digits count, `AWR` and `IWR` of one number are one board.
+    /// The board of a name as people write it: see [`key`]. A device alone stands for its board where it has only one.
+    ///
+    /// # Errors
+    /// A name of no board, or of a device that is on several.
     pub fn named(name: &str) -> Result<&'static Self> {
-        let plain: String = name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_uppercase();
-        let known = ALIASES.iter().find(|(alias, _)| *alias == plain).map_or(plain.as_str(), |(_, board)| board);
-        let exact = BOARDS.iter().find(|board| board.name == known);
-        let started = || {
-            let of_chip: Vec<_> =
-                BOARDS.iter().filter(|board| plain.len() >= 7 && board.name.starts_with(plain.as_str())).collect();
-            if let [only] = of_chip[..] { Some(only) } else { None }
+        let plain = key(name);
+        let plain = ALIASES.iter().find(|(alias, _)| *alias == plain).map_or(plain.as_str(), |(_, board)| board);
+        if let Some(exact) = BOARDS.iter().find(|board| key(board.name) == plain) {
+            return Ok(exact);
+        }
+        let is_of_device = |board: &&Self| plain.len() >= DEVICE && key(board.name).starts_with(plain);
+        let names = |boards: &[&Self]| boards.iter().map(|board| board.name).collect::<Vec<_>>().join(", ");
+        let (message, known) = match BOARDS.iter().filter(is_of_device).collect::<Vec<_>>()[..] {
+            [only] => return Ok(only),
+            [] => (format!("no board `{name}`"), names(&BOARDS.iter().collect::<Vec<_>>())),
+            ref several => (format!("no board `{name}`: the device is on {} boards", several.len()), names(several)),
         };
-        exact.or_else(started).ok_or_else(|| Error::Usage {
-            message: format!("no board `{name}`"),
-            hint: Some(format!(
-                "known are {}; give other antennas with --set radar.tx_m=[…] and --set radar.rx_m=[…]",
-                BOARDS.iter().map(|board| board.name).collect::<Vec<_>>().join(", ")
-            )),
+        Err(Error::Usage {
+            message,
+            hint: Some(format!("known are {known}; give other antennas with --set radar.tx_m=[…] and --set radar.rx_m=[…]")),
         })
+    }
+
+    /// Refuses a chirp that starts or ends outside of the device's band. Frequencies count in kilohertz, as Infineon's driver holds them;
+    /// the steps of TI's registers (53.6 Hz at 77 GHz) round to them.
+    pub fn hold_band(&self, radar: &Radar, source: &Path) -> Result<()> {
+        let gigahertz = |hz: f64| (hz / 1e3).round() / 1e6;
+        let Band { low_hz, high_hz, source: sheet } = self.band;
+        let last_s = radar.samples_per_chirp.saturating_sub(1) as f64 / radar.sample_rate_hz;
+        for (key, hz) in [
+            ("radar.start_frequency_hz", radar.start_frequency_hz),
+            ("frequency at the last sample", radar.carrier_hz() + radar.slope_hz_per_s * last_s),
+        ] {
+            if !(gigahertz(low_hz)..=gigahertz(high_hz)).contains(&gigahertz(hz)) {
+                let (low, high) = (gigahertz(low_hz), gigahertz(high_hz));
+                let expected = format!("{low} to {high} GHz, the band of the {} ({sheet})", self.name);
+                return Err(Error::field(source, key, format!("{} GHz", gigahertz(hz)), expected).with_hint(
+                    "name the board of this capture with --board, or take the description of this capture; of a board that is not known \
+                     state --set radar.tx_m=[…] and --set radar.rx_m=[…] instead",
+                ));
+            }
+        }
+        Ok(())
     }
 
     fn half_m(&self) -> f64 {
@@ -203,11 +267,70 @@ mod tests {
             ("IWR6843-AOP", "IWR6843AOP"),
             ("awr1642 boost", "IWR1642BOOST"),
             ("AWR1843", "AWR1843BOOST"),
+            ("IWR6843ISK-ODS", "IWR6843ODS"),
+            ("BGT60UTR11AIP", "BGT60UTR11"),
+            ("MMWCAS-DSP-EVM", CASCADE),
         ] {
             assert_eq!(Board::named(written).unwrap().name, name);
         }
         // The chip alone has three boards: nobody chooses for the user.
-        assert!(Board::named("IWR6843").unwrap_err().to_string().contains("no board `IWR6843`"));
+        for written in ["IWR6843", "awr6843"] {
+            let error = Board::named(written).unwrap_err();
+            assert!(error.to_string().contains(&format!("no board `{written}`")), "{error}");
+            assert!(error.hint().unwrap().starts_with("known are IWR6843ISK, IWR6843AOP, IWR6843ODS;"), "{error}");
+        }
+        // Boards of other arrays.
+        for written in ["AWR1843AOP", "AWR1642BOOST-ODS", "BGT60", "WR", ""] {
+            assert!(Board::named(written).is_err(), "{written}");
+        }
+    }
+
+    /// Every name, of every maker's line, with and without the word for a board.
+    #[test]
+    fn a_board_of_ti_is_found_by_every_prefix_and_suffix() {
+        for board in BOARDS {
+            let plain = key(board.name);
+            let prefixes: &[&str] = if plain.starts_with("WR") { &["A", "I", "x", "X"] } else { &[""] };
+            for (prefix, suffix) in prefixes.iter().flat_map(|prefix| ["", "BOOST", "EVM", "-EVM"].map(|suffix| (prefix, suffix)))
+            {
+                let written = format!("{prefix}{plain}{suffix}");
+                assert_eq!(Board::named(&written).unwrap().name, board.name, "{written}");
+                assert_eq!(Board::named(&written.to_lowercase()).unwrap().name, board.name, "{written}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_chirp_outside_of_the_band_of_its_device_is_refused_to_the_kilohertz() {
+        let file = Path::new("adc_data.bin");
+        for board in BOARDS {
+            let Band { low_hz, high_hz, .. } = board.band;
+            // The whole band, while sampling.
+            let slope_hz_per_s = (high_hz - low_hz) * 1e6 / 63.0;
+            let whole = Radar {
+                start_frequency_hz: low_hz,
+                slope_hz_per_s,
+                sample_rate_hz: 1e6,
+                samples_per_chirp: 64,
+                adc_start_s: 0.0,
+                ..Radar::small(1)
+            };
+            board.hold_band(&whole, file).unwrap();
+            let falling = Radar { start_frequency_hz: high_hz, slope_hz_per_s: -slope_hz_per_s, ..whole.clone() };
+            board.hold_band(&falling, file).unwrap();
+            for (key, radar) in [
+                ("`radar.start_frequency_hz`", Radar { start_frequency_hz: low_hz - 1e3, ..whole.clone() }),
+                ("`frequency at the last sample`", Radar { start_frequency_hz: low_hz + 1e3, ..whole.clone() }),
+                ("`radar.start_frequency_hz`", Radar { start_frequency_hz: high_hz + 1e3, ..falling.clone() }),
+            ] {
+                let error = board.hold_band(&radar, file).unwrap_err();
+                assert!(error.to_string().starts_with(&format!("adc_data.bin: {key} is ")), "{error}");
+                assert!(
+                    error.to_string().ends_with(&format!("the band of the {} ({})", board.name, board.band.source)),
+                    "{error}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -52,13 +52,14 @@ pub fn is_folder(folder: &Path) -> bool {
 pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     let parts = parts(sources)?;
     let mut notes = Vec::new();
-    let (configs, _) = descriptions(&parts[0][0], stated, &mut notes)?;
+    let (config, _) = descriptions(&parts[0][0], stated, &mut notes)?;
     let mut stated = stated.clone();
     if stated.board.is_none() {
         notes.push("no board was named: a cascade of four devices is taken for the MMWCAS-RF-EVM".into());
         stated.board = Some(CASCADE.into());
     }
-    let config = &configs[0];
+    let config = &config;
+    let board = stated.board.as_deref().map(Board::named).transpose()?;
     if config.extension().is_some_and(|extension| extension == "toml") {
         let (mut radar, asked) = radar_of(config, &stated, &mut notes)?;
         let words_per_frame = (radar.samples_per_chirp * radar.tx_m.len() * radar.loops_per_frame * RECEIVERS * 2) as u64;
@@ -69,7 +70,8 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         let senders = radar.tx_m.len() as u64;
         let start = |index: u64| (0..senders).map(|tx| (index * senders + tx) * chirp).collect();
         let starts = (0..radar.loops_per_frame as u64).map(start).collect();
-        return Ok(placed(grid, capture(parts, streams, radar, words_per_frame, starts, false, notes)));
+        let capture = capture(parts, streams, radar, words_per_frame, starts, false, notes);
+        return Ok(placed(grid, Capture { board, ..capture }));
     }
     let radar = ti_json::read_cascade(config)?;
     let words_per_frame = radar.words_per_frame()?;
@@ -77,7 +79,14 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     let Selection { radar: found, words_per_frame, starts, notes: more, .. } = radar.select(&stated, &|_, _| Ok(frames))?;
     notes.extend(more);
     let shaped = radar_table::apply(found, &stated.sets)?;
-    Ok(placed(grid, capture(parts, streams, shaped, words_per_frame, starts, radar.lanes.q_first, notes)))
+    let capture = capture(parts, streams, shaped, words_per_frame, starts, radar.lanes.q_first, notes);
+    Ok(placed(grid, Capture { board, ..capture }))
+}
+
+/// The profiles of the chirps in a frame.
+pub fn profiles(sources: &[PathBuf], stated: &Stated) -> Result<Vec<usize>> {
+    let (config, _) = descriptions(&parts(sources)?[0][0], stated, &mut vec![])?;
+    ti_json::read_cascade(&config)?.profiles_in_frame(stated)
 }
 
 /// Frames where they came, as far as the indices say.
@@ -103,7 +112,8 @@ fn capture(
         let blocks = streams.iter().map(read).collect::<Result<Vec<_>>>()?;
         Ok(arrange(&blocks, &starts, [n_tx, n_rx, loops, samples], q_first))
     };
-    Capture { source: parts[0][0].clone(), radar, layout: IfLayout::Codes, notes, lost: vec![], frame: Box::new(frame) }
+    let source = parts[0][0].clone();
+    Capture { source, radar, layout: IfLayout::Codes, board: None, notes, lost: vec![], rest: 0.0, frame: Box::new(frame) }
 }
 
 /// The words of a frame, device by device, as `[tx, rx, loop, sample]`.

@@ -32,15 +32,26 @@ pub struct Cube {
 impl Cube {
     /// Finds the array in its file, holds the number of axes against the layout, and looks at the first frame's numbers.
     pub fn open(path: &Path, variable: Option<&str>, layout: Layout) -> Result<Self> {
-        let source = container::open(path, variable, layout.0.len())?;
-        if source.shape().len() != layout.0.len() {
+        Self::of(container::open(path, variable, layout.axes.len())?, layout)
+    }
+
+    /// An array that was found.
+    pub fn of(source: Source, layout: Layout) -> Result<Self> {
+        if source.shape().len() != layout.axes.len() {
             return Err(source
-                .wrong(source.describe(), format!("{} axes: {}", layout.0.len(), layout.describe()))
+                .wrong(source.describe(), format!("{} axes: {}", layout.axes.len(), layout.describe()))
                 .with_hint("write --layout with one word for every axis of the array"));
         }
         let pairs = layout.place(Axis::Iq).map(|place| source.shape()[place]);
         if pairs.is_some_and(|pairs| pairs != 2) || pairs.is_some() && source.is_complex() {
-            return Err(source.wrong(source.describe(), "an axis `iq` of length 2 and real numbers"));
+            return Err(source
+                .wrong(source.describe(), "an axis `iq` of length 2 and real numbers")
+                .with_hint("leave `iq` out of --layout where every number has an imaginary part"));
+        }
+        if let Some(number) = layout.number.filter(|number| (number.kind, number.bytes) != source.number()) {
+            return Err(source
+                .wrong(source.describe(), format!("numbers of type {}, as --layout states", number.name()))
+                .with_hint("leave the type out: the file states it"));
         }
         let mut cube = Self { numbers: Numbers::Array(source), layout, transmitters: 1.into(), wrapped: false };
         cube.wrapped = cube.looks_wrapped()?;
@@ -59,14 +70,15 @@ impl Cube {
         }
     }
 
-    fn describe(&self) -> String {
+    pub fn describe(&self) -> String {
         match &self.numbers {
             Numbers::Array(source) => source.describe(),
             Numbers::Words(words) => format!("int16 {:?}", words.shape),
         }
     }
 
-    fn wrong(&self, found: String, expected: String) -> Error {
+    /// The error for what is wrong about the array.
+    pub fn wrong(&self, found: String, expected: String) -> Error {
         match &self.numbers {
             Numbers::Array(source) => source.wrong(found, expected),
             Numbers::Words(words) => Error::field(words.words.first(), "samples", found, expected),
@@ -117,7 +129,7 @@ impl Cube {
     /// Refuses a radar of other lengths.
     pub fn check(&self, radar: &Radar) -> Result<()> {
         let [frames, tx, rx, loops, samples] = radar.dims();
-        let expected = self.layout.0.iter().map(|axis| match axis {
+        let expected = self.layout.axes.iter().map(|axis| match axis {
             Axis::Frame => frames,
             Axis::Tx => tx,
             Axis::Rx => rx,
@@ -158,7 +170,7 @@ impl Cube {
         let senders = if self.has(Axis::Antenna) { 1 } else { n_tx };
         let loops = self.length(Axis::Loop) * self.length(Axis::Chirp) * self.length(Axis::Tx) / senders;
         let (samples, lanes) = (self.samples(), self.length(Axis::Lane));
-        let inner: Vec<Axis> = self.layout.0.iter().copied().filter(|axis| *axis != Axis::Frame).collect();
+        let inner: Vec<Axis> = self.layout.axes.iter().copied().filter(|axis| *axis != Axis::Frame).collect();
         let mut strides = vec![1; inner.len()];
         for place in (1..inner.len()).rev() {
             strides[place - 1] = strides[place] * self.length(inner[place]);

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::boards::Board;
 use super::descriptions::descriptions;
 use super::radar_table::apply;
 use super::schedule::{Selection, TiRadar};
@@ -17,7 +18,7 @@ use crate::radar::Sampling;
 /// joined in the order in which they are named.
 pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     let mut notes = Vec::new();
-    let (configs, setup) = descriptions(&sources[0], stated, &mut notes)?;
+    let (config, setup) = descriptions(&sources[0], stated, &mut notes)?;
     let mut stated = stated.clone();
     if stated.board.is_none()
         && let Some(device) = &setup.device
@@ -25,28 +26,54 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         notes.push(format!("the set-up names the device {device}; --board NAME says which board carries it"));
     }
     let words = Words::open(sources)?;
-    let radar = match configs.as_slice() {
-        [config] => read(config)?,
-        _ => unreachable!("descriptions gives one"),
-    };
+    let radar = read(&config)?;
     let Selection { radar: found, words_per_frame, starts, inverted_rx, notes: more } =
         radar.select(&stated, &|words_per_frame, notes| radar.frames_present(&words, words_per_frame, notes))?;
     notes.extend(more);
     notes.extend(parts::note_of_others(sources));
     notes.extend(log_beside(&sources[0]));
     let shaped = apply(found, &std::mem::take(&mut stated.sets))?;
+    let board = stated.board.as_deref().map(Board::named).transpose()?;
     let lanes = radar.lanes;
     let [_, n_tx, n_rx, loops, samples] = shaped.dims();
+    // Of one frame all of which is kept: then its loops are those of the description.
+    let of_kept = (n_tx * n_rx * loops * samples * if lanes.sampling == Sampling::Complex { 2 } else { 1 }) as u64;
+    let is_alone = words.len() / words_per_frame == 1 && of_kept == words_per_frame;
+    let rest = if is_alone { (words.len() % words_per_frame) as f64 / words_per_frame as f64 } else { 0.0 };
     let frame = move |index: usize| {
         let words = words.read(index as u64 * words_per_frame, words_per_frame as usize)?;
         Ok(arrange(&words, &starts, lanes, [n_tx, n_rx, loops, samples], &inverted_rx))
     };
     let layout = if lanes.sampling == Sampling::Complex { IfLayout::Codes } else { IfLayout::RealCodes };
-    Ok(Capture { source: sources[0].clone(), radar: shaped, layout, notes, lost: vec![], frame: Box::new(frame) })
+    Ok(Capture { source: sources[0].clone(), radar: shaped, layout, board, notes, lost: vec![], rest, frame: Box::new(frame) })
 }
 
 /// Opens the files that a `.setup.json` of mmWave Studio names.
 pub fn open_setup(path: &Path, stated: &Stated) -> Result<Capture> {
+    let (files, stated) = of_setup(path, stated)?;
+    if files.iter().any(|file| cascade::is_part(file)) {
+        return cascade::open(&files, &stated);
+    }
+    open(&parts::in_order(&files)?, &stated)
+}
+
+/// The profiles of the chirps in a frame.
+pub fn profiles(sources: &[PathBuf], stated: &Stated) -> Result<Vec<usize>> {
+    let (config, _) = descriptions(&sources[0], stated, &mut vec![])?;
+    read(&config)?.profiles_in_frame(stated)
+}
+
+/// As [`profiles`], of what a `.setup.json` names.
+pub fn profiles_of_setup(path: &Path, stated: &Stated) -> Result<Vec<usize>> {
+    let (files, stated) = of_setup(path, stated)?;
+    if files.iter().any(|file| cascade::is_part(file)) {
+        return cascade::profiles(&files, &stated);
+    }
+    profiles(&files, &stated)
+}
+
+/// The files that a `.setup.json` names, and what it adds to what is stated.
+fn of_setup(path: &Path, stated: &Stated) -> Result<(Vec<PathBuf>, Stated)> {
     let setup = ti_json::read_setup(path)?;
     if setup.files.is_empty() {
         return Err(Error::field(path, "capturedFiles.files", "none", "the files of the capture")
@@ -57,10 +84,7 @@ pub fn open_setup(path: &Path, stated: &Stated) -> Result<Capture> {
         stated.configs.extend(setup.config.clone());
     }
     stated.configs.push(path.into());
-    if setup.files.iter().any(|file| cascade::is_part(file)) {
-        return cascade::open(&setup.files, &stated);
-    }
-    open(&parts::in_order(&setup.files)?, &stated)
+    Ok((setup.files, stated))
 }
 
 fn read(config: &Path) -> Result<TiRadar> {

@@ -1,16 +1,18 @@
 //! Recording folders of Infineon's Radar SDK (`RadarIfxAvian_00`) and of ifxdaq.
 //!
 //! Source: Infineon Radar SDK, `config.json` of a recording; `radar.npy` is `[frame, rx, chirp, sample]`, unsigned
-//! ADC codes around half scale. ifxdaq writes `radar_timestamp.csv` beside it: on each line when a frame came, in seconds since 1970.
+//! ADC codes around half scale; under time division `rx` counts the receivers of the first transmitter, then those of the second (`[Tx][Rx]`,
+//! "Virtual Rx antenna ordering" of the SDK's guide). ifxdaq writes `radar_timestamp.csv` beside it: on each line when a frame came, in seconds since 1970.
 
 use std::path::{Path, PathBuf};
 
 use super::boards::Board;
 use super::cube::{Cube, half_scale_note};
+use super::infineon_shape::Shape;
 use super::json::Json;
 use super::time_stamps::Grid;
 use super::{Capture, Layout, Stated, radar_table::apply};
-use crate::data::{IfLayout, entries::entries, files};
+use crate::data::{IfFrame, IfLayout, entries::entries, files};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
 
@@ -25,20 +27,24 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
     let folder = device_folder(folder)?;
     let mut notes = Vec::new();
     let config = Json::read(&stated.configs.first().cloned().unwrap_or_else(|| folder.join("config.json")))?;
-    let shape = shape_of(&config)?;
+    let shape = Shape::of(&config)?;
+    let tx = chosen(&config, &shape, stated)?;
     let board = board(stated, description(&folder)?.as_deref(), &mut notes)?;
     let source = folder.join(SAMPLES);
     let cube = Cube::open(&source, None, Layout::parse("frame rx loop sample")?)?;
-    let radar = radar(&config, &shape, board, cube.frames(), &mut notes)?;
+    let radar = radar(&config, &shape, tx, board, cube.frames(), &mut notes)?;
     let (layout, radar) = stored_as(&cube, radar, &mut notes)?;
     let radar = apply(radar, &stated.sets)?;
-    cube.check(&Radar { frames: cube.frames(), ..radar.clone() })?;
+    let of_all = radar.rx_m.repeat(shape.tx.len());
+    cube.check(&Radar { frames: cube.frames(), rx_m: of_all, ..radar.clone() })?;
+    let [_, _, receivers, loops, samples] = radar.dims();
     notes.extend(half_scale_note(&cube)?);
     let grid = grid(&folder, &source, cube.frames(), &mut notes)?;
     if let Some((stamps, grid)) = &grid {
         grid.hold(stamps, radar.frame_period_s, stated.has_set("radar.frame_period_s"), &mut notes)?;
     }
-    let capture = Capture { source, radar, layout, notes, lost: vec![], frame: Box::new(move |index| cube.frame(index)) };
+    let frame = move |index: usize| Ok(of_transmitter(cube.frame(index)?, tx, [1, receivers, loops, samples]));
+    let capture = Capture { source, radar, layout, board, notes, lost: vec![], rest: 0.0, frame: Box::new(frame) };
     Ok(match grid {
         Some((stamps, grid)) => grid.place(&stamps, capture),
         None => capture,
@@ -140,22 +146,6 @@ fn device_folder(folder: &Path) -> Result<PathBuf> {
     }
 }
 
-/// The part of a configuration that describes the chirps, under whichever of the SDK's names.
-fn shape_of(config: &Json) -> Result<Json> {
-    let device = config.find("device_config").unwrap_or_else(|| config.clone());
-    let shape = device.find("fmcw_single_shape").unwrap_or(device);
-    if shape.find("num_samples_per_chirp").is_none() {
-        return Err(Error::field(
-            config.file(),
-            "device_config.fmcw_single_shape",
-            format!("keys {:?}", shape.keys()),
-            "one FMCW shape: num_samples_per_chirp, start_frequency_Hz, …",
-        )
-        .with_hint("sequences of several shapes are not read yet"));
-    }
-    Ok(shape)
-}
-
 /// The board of the antennas; none where `--set` states them all.
 fn board(stated: &Stated, description: Option<&str>, notes: &mut Vec<String>) -> Result<Option<&'static Board>> {
     if stated.has_set("radar.tx_m") && stated.has_set("radar.rx_m") {
@@ -173,45 +163,72 @@ fn board(stated: &Stated, description: Option<&str>, notes: &mut Vec<String>) ->
     Ok(Some(board))
 }
 
-/// Places of the antennas that a shape names under a key; zeros without a board, for `--set` to state.
-fn places(shape: &Json, key: &str, board: Option<&Board>, of: fn(&Board, usize) -> Option<[f64; 3]>) -> Result<Vec<[f64; 3]>> {
-    let place = |entry: &Json| {
-        let antenna = entry.count()?;
-        let index = antenna.checked_sub(1).ok_or_else(|| entry.wrong("antennas from 1 on"))?;
+/// Places of antennas by their numbers from 1; zeros without a board, for `--set` to state.
+fn places(
+    config: &Json,
+    what: &str,
+    antennas: &[usize],
+    board: Option<&Board>,
+    of: fn(&Board, usize) -> Option<[f64; 3]>,
+) -> Result<Vec<[f64; 3]>> {
+    let place = |&antenna: &usize| {
         let Some(board) = board else { return Ok([0.0; 3]) };
-        of(board, index).ok_or_else(|| {
-            Error::field(shape.file(), key, format!("antenna {antenna}"), format!("those of the {}", board.name))
+        of(board, antenna - 1).ok_or_else(|| {
+            Error::field(config.file(), what, format!("antenna {antenna}"), format!("those of the {}", board.name))
                 .with_hint("name the board with --board")
         })
     };
-    shape.get(key)?.items()?.iter().map(place).collect()
+    antennas.iter().map(place).collect()
 }
 
-fn radar(config: &Json, shape: &Json, board: Option<&Board>, frames: usize, notes: &mut Vec<String>) -> Result<Radar> {
-    let number = |key: &str| shape.get(key)?.number();
-    let (start_hz, end_hz) = (number("start_frequency_Hz")?, number("end_frequency_Hz")?);
-    let (rate_hz, samples) = (number("sample_rate_Hz")?, shape.get("num_samples_per_chirp")?.count()?);
-    let tx_m = places(shape, "tx_antennas", board, Board::tx_m)?;
-    if tx_m.len() > 1 {
-        return Err(shape.get("tx_antennas")?.wrong("one transmitter: several are not read yet"));
+/// Which of the transmitters that take turns is imported, by its place among them.
+///
+/// # Errors
+/// Several and none chosen: the second follows the first at once, and a recording's chirps are evenly spaced.
+fn chosen(config: &Json, shape: &Shape, stated: &Stated) -> Result<usize> {
+    let expected = |text: String| Error::field(config.file(), "transmitters", format!("numbers {:?} (from 1)", shape.tx), text);
+    match stated.tx {
+        None if shape.tx.len() == 1 => Ok(0),
+        None => Err(expected("one, or several at even steps: the second sends right after the first".into())
+            .with_hint("import each transmitter by itself with --tx 0, --tx 1: the chirps of one are evenly spaced")),
+        Some(tx) => shape.tx.iter().position(|own| *own == tx + 1).ok_or_else(|| {
+            expected(format!("number {}, as --tx {tx} asks for", tx + 1))
+                .with_hint("leave --tx out, or name a transmitter that sends")
+        }),
     }
+}
+
+fn radar(
+    config: &Json,
+    shape: &Shape,
+    tx: usize,
+    board: Option<&Board>,
+    frames: usize,
+    notes: &mut Vec<String>,
+) -> Result<Radar> {
     notes.push("the first sample is taken to be at the start of the ramp".into());
     let bits =
         Json::read(&config.file().with_file_name("meta.json")).ok().and_then(|meta| meta.find("adc_resolution")?.count().ok());
     Ok(Radar {
-        start_frequency_hz: start_hz,
-        slope_hz_per_s: (end_hz - start_hz) * rate_hz / samples as f64,
-        sample_rate_hz: rate_hz,
+        start_frequency_hz: shape.start_hz,
+        slope_hz_per_s: (shape.end_hz - shape.start_hz) * shape.rate_hz / shape.samples as f64,
+        sample_rate_hz: shape.rate_hz,
         sampling: Sampling::Real,
-        samples_per_chirp: samples,
-        loops_per_frame: shape.get("num_chirps_per_frame")?.count()?,
+        samples_per_chirp: shape.samples,
+        loops_per_frame: shape.chirps,
         adc_start_s: 0.0,
-        chirp_period_s: number("chirp_repetition_time_s")?,
-        frame_period_s: number("frame_repetition_time_s")?,
+        chirp_period_s: shape.period_s,
+        frame_period_s: shape.frame_period_s,
         frames,
         position_m: [0.0; 3],
-        tx_m,
-        rx_m: places(shape, "rx_antennas", board, Board::rx_m)?,
+        tx_m: places(config, "tx_antennas", &shape.tx[tx..tx + 1], board, Board::tx_m)?,
+        rx_m: places(config, "rx_antennas", &shape.rx, board, Board::rx_m)?,
         full_scale_codes: bits.map(|bits| f64::from(1u32 << bits.min(16)) - 1.0),
     })
+}
+
+/// One transmitter's receivers among all that a frame holds, which are those of each transmitter in turn.
+fn of_transmitter(frame: IfFrame, tx: usize, dims: [usize; 4]) -> IfFrame {
+    let block = dims.iter().product::<usize>();
+    IfFrame::new(dims, frame.re[tx * block..][..block].to_vec(), None)
 }

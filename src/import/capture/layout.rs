@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 
+use crate::data::arrays::{Kind, Stored};
 use crate::error::{Error, Result};
 
 /// An axis of an array of samples.
@@ -34,24 +35,45 @@ const NAMES: [(&str, Axis); 9] = [
     ("iq", Axis::Iq),
 ];
 
-/// Axes, outer to inner.
+/// Types of the numbers of a file that does not say its type, as NumPy names them; little-endian.
+const NUMBERS: [(&str, Kind, usize); 5] = [
+    ("int16", Kind::Int, 2),
+    ("float32", Kind::Float, 4),
+    ("float64", Kind::Float, 8),
+    ("complex64", Kind::Complex, 8),
+    ("complex128", Kind::Complex, 16),
+];
+
+/// Axes, outer to inner, and the type of the numbers where it is stated.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Layout(pub Vec<Axis>);
+pub struct Layout {
+    pub axes: Vec<Axis>,
+    pub number: Option<Stored>,
+}
 
 impl Layout {
     /// # Errors
-    /// A word that is no axis, an axis named twice, no samples, or chirps beside loops or transmitters.
+    /// A word that is neither an axis nor a type, one named twice, no samples, or chirps beside loops or transmitters.
     pub fn parse(text: &str) -> Result<Self> {
         let known = NAMES.map(|(name, _)| name).join(", ");
+        let types = NUMBERS.map(|(name, ..)| name).join(", ");
         let refuse = |message: String| Error::Usage {
             message: format!("--layout \"{text}\": {message}"),
             hint: Some(format!(
-                "write the axes from the outermost to the innermost, such as \"frame loop rx sample\"; known are {known}"
+                "write the axes from the outermost to the innermost, such as \"frame loop rx sample\"; known are {known}; at the end, of a \
+                 .bin that holds no 16-bit words, the type of its numbers: {types}"
             )),
         };
-        let mut axes = Vec::new();
+        let (mut axes, mut number) = (Vec::new(), None);
         for word in text.split([' ', ',']).filter(|word| !word.is_empty()) {
             let singular = word.to_lowercase();
+            if number.is_some() {
+                return Err(refuse(format!("`{word}` stands after the type of the numbers")));
+            }
+            if let Some(&(_, kind, bytes)) = NUMBERS.iter().find(|(name, ..)| *name == singular) {
+                number = Some(Stored { kind, bytes, big_endian: false });
+                continue;
+            }
             let singular = singular.strip_suffix('s').filter(|_| singular != "s").unwrap_or(&singular);
             let (_, axis) =
                 NAMES.iter().find(|(name, _)| *name == singular).ok_or_else(|| refuse(format!("`{word}` is no axis")))?;
@@ -70,18 +92,19 @@ impl Layout {
         if with(Axis::Antenna, &[Axis::Tx, Axis::Rx, Axis::Chirp]) {
             return Err(refuse("`antenna` is transmitters and receivers together".into()));
         }
-        Ok(Self(axes))
+        Ok(Self { axes, number })
     }
 
-    /// `frame loop rx sample`
+    /// `frame loop rx sample`; with the type of the numbers where it is stated.
     pub fn describe(&self) -> String {
         let name = |axis: &Axis| NAMES.iter().find(|(_, other)| other == axis).map_or("", |(name, _)| name);
-        self.0.iter().map(name).collect::<Vec<_>>().join(" ")
+        let axes = self.axes.iter().map(name).map(String::from);
+        axes.chain(self.number.map(Stored::name)).collect::<Vec<_>>().join(" ")
     }
 
     /// The place of an axis.
     pub fn place(&self, axis: Axis) -> Option<usize> {
-        self.0.iter().position(|other| *other == axis)
+        self.axes.iter().position(|other| *other == axis)
     }
 }
 
@@ -100,8 +123,16 @@ mod tests {
     #[test]
     fn axes_are_read_in_their_order() {
         let layout = Layout::parse("frames, chirps rx samples").unwrap();
-        assert_eq!(layout.0, [Axis::Frame, Axis::Chirp, Axis::Rx, Axis::Sample]);
-        assert_eq!(layout.describe(), "frame chirp rx sample");
+        assert_eq!(layout.axes, [Axis::Frame, Axis::Chirp, Axis::Rx, Axis::Sample]);
+        assert_eq!((layout.describe().as_str(), layout.number), ("frame chirp rx sample", None));
+    }
+
+    #[test]
+    fn the_type_of_the_numbers_stands_at_the_end() {
+        let layout = Layout::parse("frame sample loop rx tx complex128").unwrap();
+        assert_eq!(layout.axes.len(), 5);
+        assert_eq!(layout.number, Some(Stored { kind: Kind::Complex, bytes: 16, big_endian: false }));
+        assert_eq!(layout.describe(), "frame sample loop rx tx complex128");
     }
 
     #[test]
@@ -112,6 +143,8 @@ mod tests {
             ("frame rx rx sample", "stands twice"),
             ("frame rx", "no axis of samples"),
             ("chirp tx sample", "together"),
+            ("frame float32 sample", "`sample` stands after the type"),
+            ("frame sample float16", "`float16` is no axis"),
         ] {
             assert!(Layout::parse(text).unwrap_err().to_string().contains(part), "{text}");
         }

@@ -3,7 +3,7 @@
 //! A source says which radar it is of and gives its samples frame by frame; nothing of it is held in memory but the
 //! frame at hand. What had to be assumed is a note. One layout, one file: `dca1000` (TI boards with a DCA1000 capture
 //! card), `cascade` (four devices on an MMWCAS-DSP-EVM), `infineon` (folders of the Radar SDK and of ifxdaq), `rover` (traces of roverd),
-//! `arrays` (arrays of any order of axes, in any file of `container` or as words alone).
+//! `arrays` (arrays of any order of axes, in any file of `container`, as words alone or as `numbers` of a stated type).
 
 mod arrays;
 pub mod boards;
@@ -16,9 +16,11 @@ mod dca1000;
 mod described;
 mod descriptions;
 mod infineon;
+mod infineon_shape;
 mod json;
 pub mod lanes;
 mod layout;
+mod numbers;
 mod parts;
 mod presets;
 mod radar_table;
@@ -41,6 +43,7 @@ use crate::error::{Error, Result};
 use crate::integrity::{self, Finding};
 use crate::radar::Radar;
 
+use boards::Board;
 pub use layout::Layout;
 pub use presets::Preset;
 
@@ -79,18 +82,29 @@ pub struct Capture {
     pub source: PathBuf,
     pub radar: Radar,
     pub layout: IfLayout,
+    /// The board, where it is known.
+    pub board: Option<&'static Board>,
     pub notes: Vec<String>,
     /// Frames that were lost, wholly or in part, as the capture itself says.
     pub lost: Vec<usize>,
+    /// Share of a frame that follows the last whole one.
+    pub rest: f64,
     /// Gives the samples of a frame.
     pub frame: Box<dyn FnMut(usize) -> Result<IfFrame>>,
 }
 
-/// Understands what `sources` are and how they are laid out.
-///
-/// # Errors
-/// A source of no known kind, a description that is missing, contradicts itself or does not fit the samples.
-pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
+/// What a capture's files are.
+enum Kind {
+    Cascade,
+    Array,
+    Rover(PathBuf),
+    Infineon(PathBuf),
+    Dca1000(Vec<PathBuf>),
+    /// The `.setup.json` of a capture of either kind of TI's.
+    Setup(PathBuf),
+}
+
+fn kind(sources: &[PathBuf], stated: &Stated) -> Result<Kind> {
     let first = sources.first().ok_or_else(|| Error::Usage {
         message: "nothing to import".into(),
         hint: Some("name the capture: adc_data.bin, a folder of the Infineon SDK, or an array".into()),
@@ -98,31 +112,69 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     let is_laid_out = stated.layout.is_some() || stated.preset.is_some();
     if first.is_dir() {
         let folder = one(sources)?;
-        return match () {
-            () if cascade::is_folder(folder) => cascade::open(sources, stated),
-            () if is_laid_out => arrays::open(sources, stated),
-            () if rover::is_folder(folder) => rover::open(folder, stated),
-            () => match parts::in_folder(folder)?.as_slice() {
-                [] => infineon::open(folder, stated),
-                parts => dca1000::open(parts, stated),
+        return Ok(match () {
+            () if cascade::is_folder(folder) => Kind::Cascade,
+            () if is_laid_out => Kind::Array,
+            () if rover::is_folder(folder) => Kind::Rover(folder.into()),
+            () => match parts::in_folder(folder)? {
+                parts if parts.is_empty() => Kind::Infineon(folder.into()),
+                parts => Kind::Dca1000(parts),
             },
-        };
+        });
     }
     let extension = first.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-    match extension.as_deref() {
-        Some("bin") if cascade::is_part(first) => cascade::open(sources, stated),
-        Some("bin") if is_laid_out => arrays::open(sources, stated),
-        Some("bin") => dca1000::open(&parts::in_order(sources)?, stated),
-        Some("json") => dca1000::open_setup(one(sources)?, stated),
-        Some("npy") if infineon::is_samples(first) => infineon::open(first.parent().unwrap_or(Path::new("")), stated),
-        Some(kind) if container::EXTENSIONS.contains(&kind) => arrays::open(sources, stated),
-        other => Err(Error::Usage {
-            message: format!("{}: a capture of type `{}`", first.display(), other.unwrap_or("none")),
-            hint: Some(
-                "known are .bin or .setup.json (DCA1000), folders with master_0000_data.bin and so on (cascades), with radar.npy and \
-                 config.json (Infineon) or with meta.json and iq (roverd), and .npy, .npz, .mat, .h5 or .bin with --layout or --preset"
-                    .into(),
-            ),
+    Ok(match extension.as_deref() {
+        Some("bin") if cascade::is_part(first) => Kind::Cascade,
+        Some("bin") if is_laid_out => Kind::Array,
+        Some("bin") => Kind::Dca1000(parts::in_order(sources)?),
+        Some("json") => Kind::Setup(one(sources)?.into()),
+        Some("npy") if infineon::is_samples(first) => Kind::Infineon(first.parent().unwrap_or(Path::new("")).into()),
+        Some(kind) if container::EXTENSIONS.contains(&kind) => Kind::Array,
+        other => {
+            return Err(Error::Usage {
+                message: format!("{}: a capture of type `{}`", first.display(), other.unwrap_or("none")),
+                hint: Some(
+                    "known are .bin or .setup.json (DCA1000), folders with master_0000_data.bin and so on (cascades), with radar.npy and \
+                     config.json (Infineon) or with meta.json and iq (roverd), and .npy, .npz, .mat, .h5 or .bin with --layout or --preset"
+                        .into(),
+                ),
+            });
+        }
+    })
+}
+
+/// Understands what `sources` are and how they are laid out.
+///
+/// # Errors
+/// A source of no known kind, a description that is missing, contradicts itself or does not fit the samples; a chirp outside of the band
+/// of the board's device.
+pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
+    let capture = match kind(sources, stated)? {
+        Kind::Cascade => cascade::open(sources, stated),
+        Kind::Array => arrays::open(sources, stated),
+        Kind::Rover(folder) => rover::open(&folder, stated),
+        Kind::Infineon(folder) => infineon::open(&folder, stated),
+        Kind::Dca1000(parts) => dca1000::open(&parts, stated),
+        Kind::Setup(path) => dca1000::open_setup(&path, stated),
+    }?;
+    if let Some(board) = capture.board {
+        board.hold_band(&capture.radar, &capture.source)?;
+    }
+    Ok(capture)
+}
+
+/// The chirp profiles that the frames of a capture of TI's hold, each of which can be imported by itself.
+///
+/// # Errors
+/// A capture whose description has no profiles; several subframes and none chosen.
+pub fn profiles(sources: &[PathBuf], stated: &Stated) -> Result<Vec<usize>> {
+    match kind(sources, stated)? {
+        Kind::Cascade => cascade::profiles(sources, stated),
+        Kind::Dca1000(parts) => dca1000::profiles(&parts, stated),
+        Kind::Setup(path) => dca1000::profiles_of_setup(&path, stated),
+        _ => Err(Error::Usage {
+            message: format!("{}: no description with chirp profiles", sources[0].display()),
+            hint: Some("leave --profile out: only .mmwave.json and .cfg of TI describe several profiles in a frame".into()),
         }),
     }
 }
@@ -149,7 +201,7 @@ impl Draft {
     /// Samples that contradict what is stated of them, unless `as_stated`; no frame without a lost chirp.
     pub fn publish(mut self, as_stated: bool) -> Result<Recording> {
         if let Some(finding) = self.findings.iter().find(|finding| finding.is_refusal() && !as_stated) {
-            return Err(Error::field(&self.source, finding.name(), &finding.found, finding.expected).with_hint(
+            return Err(Error::field(&self.source, finding.name(), finding.contradiction(), finding.expected).with_hint(
                 "correct the description or the layout, or take the samples of another file; --as-stated keeps your word against the data",
             ));
         }
@@ -200,7 +252,8 @@ pub fn draft(
         staged.set_valid(&Valid::without(&capture.radar, lost.iter().copied()))?;
     }
     staged.recording.notes.splice(0..0, capture.notes);
-    let findings = integrity::inspect(&staged.recording, staged.recording.radar.frames)?;
+    let mut findings = integrity::inspect(&staged.recording, staged.recording.radar.frames)?;
+    integrity::weigh_rest(&mut findings, &staged.recording.radar, capture.rest);
     Ok(Draft { source: capture.source, staged, lost, findings })
 }
 
@@ -238,5 +291,7 @@ fn one(sources: &[PathBuf]) -> Result<&Path> {
 
 #[cfg(test)]
 mod array_tests;
+#[cfg(test)]
+mod board_tests;
 #[cfg(test)]
 mod tests;

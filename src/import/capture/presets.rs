@@ -10,6 +10,21 @@ use crate::data::settings::{nearest, read_text};
 use crate::error::{Error, Result};
 
 const TABLE: &str = include_str!("presets.toml");
+const WITHOUT_SAMPLES: &str = include_str!("presets_without_samples.toml");
+
+/// A data set that cannot be imported, and why.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Refused {
+    title: String,
+    page: String,
+    reason: String,
+}
+
+/// Letters and digits of a name alone: `K-Radar`, `k_radar` and `KRadar` are one.
+fn plain(name: &str) -> String {
+    name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase()
+}
 
 /// What the page of a data set says of its samples.
 #[derive(Clone, Debug, Deserialize)]
@@ -36,24 +51,41 @@ pub struct Preset {
 }
 
 impl Preset {
-    /// A data set by its name, in capitals or not.
+    /// A data set by its name or by what only its name begins with; letters and digits count, in capitals or not.
     ///
     /// # Errors
-    /// A name that the table has not; the hint names the one that looks most alike, and all.
+    /// A name that several begin with, that of a data set without raw samples, or one that the tables have not; the hint then names the
+    /// one that looks most alike, and all.
     pub fn named(name: &str) -> Result<Self> {
-        let plain = name.trim().to_lowercase();
+        let written = plain(name);
         let mut all = Self::all();
-        if let Some(preset) = all.remove(&plain) {
-            return Ok(preset);
+        let keys = |is: &dyn Fn(&str) -> bool| all.keys().filter(|key| is(&plain(key))).cloned().collect::<Vec<_>>();
+        let refused: BTreeMap<String, Refused> = read_text(WITHOUT_SAMPLES).expect("the table is tested");
+        let is_named = |key: &str| key == written;
+        let begins = |key: &str| !written.is_empty() && key.starts_with(&written);
+        if let Some((_, Refused { title, page, reason })) = refused.iter().find(|(key, _)| is_named(&plain(key))) {
+            return Err(Error::Usage {
+                message: format!("{title} cannot be imported: {reason}"),
+                hint: Some(format!(
+                    "see {page}; other files of it are described with --layout, --board and --set radar.KEY=VALUE"
+                )),
+            });
         }
-        let nearest = nearest(&plain, all.keys().map(String::as_str)).expect("the table is not empty");
         let known = all.keys().cloned().collect::<Vec<_>>().join(", ");
-        Err(Error::Usage {
-            message: format!("no data set `{name}`"),
-            hint: Some(format!(
-                "did you mean `{nearest}`? Known are {known}; describe others with --layout, --board and --set radar.KEY=VALUE"
-            )),
-        })
+        let (exact, mut begun) = (keys(&is_named), keys(&begins));
+        begun.extend(refused.keys().filter(|key| begins(&plain(key))).cloned());
+        let hint = match (&exact[..], &begun[..]) {
+            ([only], _) | ([], [only]) => return all.remove(only).map_or_else(|| Self::named(only), Ok),
+            ([], []) => {
+                let nearest =
+                    nearest(&written, all.keys().chain(refused.keys()).map(String::as_str)).expect("the tables are not empty");
+                format!(
+                    "did you mean `{nearest}`? Known are {known}; describe others with --layout, --board and --set radar.KEY=VALUE"
+                )
+            }
+            _ => format!("several begin with it: name one of {}", begun.join(", ")),
+        };
+        Err(Error::Usage { message: format!("no data set `{name}`"), hint: Some(hint) })
     }
 
     fn all() -> BTreeMap<String, Self> {
@@ -87,6 +119,13 @@ mod tests {
             }
         }
         assert!(Preset::named("nothing").unwrap_err().hint().unwrap().contains("uw_raw_adc"));
+        let refused: BTreeMap<String, Refused> = read_text(WITHOUT_SAMPLES).unwrap();
+        for (name, refused) in &refused {
+            assert!(refused.page.starts_with("https://"), "{name}");
+            let error = Preset::named(name).unwrap_err().to_string();
+            assert_eq!(error, format!("{} cannot be imported: {}", refused.title, refused.reason));
+            assert!(!Preset::all().contains_key(name), "{name}");
+        }
     }
 
     #[test]
@@ -94,10 +133,24 @@ mod tests {
         for (written, name) in [("mmMesh", "mmmesh"), ("HuPR", "hupr"), ("RADDet", "raddet"), ("CubeLearn", "cubelearn")] {
             assert_eq!(Preset::named(written).unwrap().title, Preset::all()[name].title);
         }
-        for (written, name) in [("coloradar-cascade", "coloradar_cascade"), ("mmesh", "mmmesh"), ("RaDICaL", "radical_indoor")] {
+        for (written, name) in
+            [("ColoRadar-Cascade", "coloradar_cascade"), ("RaDICaL indoor", "radical_indoor"), ("UW", "uw_raw_adc")]
+        {
+            assert_eq!(Preset::named(written).unwrap().title, Preset::all()[name].title);
+        }
+        for (written, name) in [("mmesh", "mmmesh"), ("K Radr", "k_radar")] {
             let hint = Preset::named(written).unwrap_err().hint().unwrap().to_string();
             assert!(hint.starts_with(&format!("did you mean `{name}`?")), "{hint}");
         }
+        let hint = Preset::named("ColoRadar").unwrap_err().hint().unwrap();
+        assert_eq!(hint, "several begin with it: name one of coloradar_cascade, coloradar_single_chip");
+        for (written, part) in
+            [("RADIal", "send at once"), ("K-Radar", "no raw samples"), ("RaDICaL outdoor", "indoor recordings alone")]
+        {
+            let error = Preset::named(written).unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        }
+        assert!(Preset::named("").is_err());
         assert!(Preset::all().keys().all(|name| *name == name.to_lowercase()));
     }
 
@@ -153,7 +206,7 @@ mod tests {
                 Axis::Sample => samples / length_of_group(&layout),
                 Axis::Lane | Axis::Iq => 2,
             };
-            let shape = layout.0.iter().map(length).collect();
+            let shape = layout.axes.iter().map(length).collect();
             Self { preset, layout, dims, shape }
         }
 
@@ -166,7 +219,7 @@ mod tests {
         fn place(&self, mut rank: usize, file: usize) -> [usize; 6] {
             let [tx, rx, ..] = self.dims;
             let mut at = [file, 0, 0, 0, 0, 0];
-            for (axis, &length) in self.layout.0.iter().zip(&self.shape).rev() {
+            for (axis, &length) in self.layout.axes.iter().zip(&self.shape).rev() {
                 let index = rank % length;
                 rank /= length;
                 match axis {

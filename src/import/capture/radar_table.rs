@@ -44,6 +44,24 @@ pub fn place_antennas(radar: &mut Table, board: &Board, transmitters: &[usize], 
     filled
 }
 
+/// What a radar's table must state, and this one does not.
+pub fn missing(radar: &Table) -> Vec<&'static str> {
+    let mut keys = vec![
+        "start_frequency_hz",
+        "slope_hz_per_s",
+        "sample_rate_hz",
+        "samples_per_chirp",
+        "loops_per_frame",
+        "chirp_period_s",
+        "frame_period_s",
+        "frames",
+        "tx_m",
+        "rx_m",
+    ];
+    keys.retain(|key| !radar.contains_key(*key));
+    keys
+}
+
 /// The radar of a table that says all but perhaps when the ADC starts.
 pub fn finished(mut table: Table, name: &Path, notes: &mut Vec<String>) -> Result<Radar> {
     #[derive(serde::Deserialize)]

@@ -9,6 +9,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::boards::Board;
 use super::json::Json;
 use super::lanes::Lanes;
 use super::rover_radar::{Frames, radar_of};
@@ -84,7 +85,8 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
         Ok(arrange(&words, lanes, [n_tx, n_rx, loops, samples], &inverted_rx))
     };
     let layout = if lanes.sampling == Sampling::Complex { IfLayout::Codes } else { IfLayout::RealCodes };
-    let capture = Capture { source: sensor.join(SAMPLES), radar, layout, notes, lost, frame: Box::new(frame) };
+    let board = stated.board.as_deref().map(Board::named).transpose()?;
+    let capture = Capture { source: sensor.join(SAMPLES), radar, layout, board, notes, lost, rest: 0.0, frame: Box::new(frame) };
     Ok(match grid {
         Some(grid) => grid.place(&stamps, capture),
         None => capture,

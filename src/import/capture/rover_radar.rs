@@ -12,7 +12,7 @@ use toml::{Table, Value};
 use super::Stated;
 use super::boards::Board;
 use super::json::Json;
-use super::radar_table::{finished, hold_frames, place_antennas, radar_table, table_of};
+use super::radar_table::{finished, hold_frames, missing, place_antennas, radar_table, table_of};
 use super::time_stamps::Grid;
 use crate::data::files;
 use crate::error::{Error, Result};
@@ -74,7 +74,7 @@ pub fn radar_of(sensor: &Path, found: &Frames, stated: &Stated, notes: &mut Vec<
     if let Some(intrinsics) = &intrinsics {
         fill_from_resolutions(radar, intrinsics, found.shape, notes)?;
     }
-    refuse_missing(radar, &config)?;
+    refuse_missing(radar, &config, board)?;
     let radar = finished(table, stated.configs.first().unwrap_or(&config), notes)?;
     hold_against_channels(&radar, found, stated, notes)?;
     if let Some(intrinsics) = &intrinsics {
@@ -209,13 +209,25 @@ fn resolution(intrinsics: &Json, key: &str) -> Result<Option<f64>> {
     Ok(value.filter(|value| *value > 0.0))
 }
 
-fn refuse_missing(radar: &Table, config: &Path) -> Result<()> {
-    let keys = ["start_frequency_hz", "sample_rate_hz", "slope_hz_per_s", "chirp_period_s", PERIOD, "tx_m", "rx_m"];
-    let Some(key) = keys.into_iter().find(|key| !radar.contains_key(*key)) else { return Ok(()) };
-    let hint = match key {
-        "tx_m" | "rx_m" => "name the board with --board, or give radar.tx_m and radar.rx_m with --set".into(),
-        _ => format!("give --set radar.{key}=VALUE, or the radar's settings with --config FILE.toml"),
+fn refuse_missing(radar: &Table, config: &Path, board: Option<&Board>) -> Result<()> {
+    let open = missing(radar);
+    let Some(key) = open.first() else { return Ok(()) };
+    let antennas = match board {
+        _ if !open.iter().any(|key| key.ends_with("x_m")) => String::new(),
+        None => "; --board NAME places antennas".into(),
+        Some(board) => format!(
+            "; the {} has {} transmitters and {} receivers, fewer than the trace",
+            board.name,
+            board.tx_half_wavelengths.len(),
+            board.rx_half_wavelengths.len()
+        ),
     };
+    let hint = format!(
+        "a rover's trace says its radar in config.yaml beside the folder of the radar (frequency, idle_time, adc_start_time, ramp_end_time, \
+         freq_slope, sample_rate, frame_period), and its resolutions in radar.json; without them give {} with --set radar.KEY=VALUE or \
+         --config FILE.toml{antennas}",
+        open.join(", ")
+    );
     Err(Error::field(config, format!("radar.{key}"), "missing", "a value").with_hint(hint))
 }
 

@@ -39,6 +39,16 @@ pub struct Burst {
     pub loops: usize,
 }
 
+impl Burst {
+    /// The profiles of its chirps, each once.
+    fn profiles(&self) -> Vec<usize> {
+        let mut used: Vec<usize> = self.chirps.iter().map(|chirp| chirp.profile).collect();
+        used.sort_unstable();
+        used.dedup();
+        used
+    }
+}
+
 /// All that a description says of a TI radar.
 #[derive(Clone, Debug)]
 pub struct TiRadar {
@@ -179,10 +189,13 @@ impl TiRadar {
         }
     }
 
+    /// The profiles of the chosen subframe's chirps.
+    pub fn profiles_in_frame(&self, stated: &Stated) -> Result<Vec<usize>> {
+        Ok(self.bursts[self.chosen_burst(stated)?].profiles())
+    }
+
     fn chosen_profile(&self, burst: &Burst, stated: &Stated) -> Result<usize> {
-        let mut used: Vec<usize> = burst.chirps.iter().map(|chirp| chirp.profile).collect();
-        used.sort_unstable();
-        used.dedup();
+        let used = burst.profiles();
         match (stated.profile, &used[..]) {
             (None, &[only]) => Ok(only),
             (Some(id), _) if used.contains(&id) => Ok(id),
@@ -191,7 +204,7 @@ impl TiRadar {
                     Some(id) => format!("--profile {id}: no chirp of the frame has it"),
                     None => format!("{}: {} profiles in a frame, expected one", self.file.display(), used.len()),
                 },
-                hint: Some(format!("choose one with --profile, of {used:?}; import each by itself")),
+                hint: Some(format!("choose one with --profile, of {used:?}, or --profile all: a recording of each")),
             }),
         }
     }
@@ -266,18 +279,26 @@ impl TiRadar {
         let Some(name) = &stated.board else {
             // A line of half wavelengths is no board's array, but ranges and velocities need no array.
             let half = crate::radar::SPEED_OF_LIGHT / profile.start_frequency_hz / 2.0;
-            notes.push(
-                "no board was named: antennas are assumed on a line, half a wavelength apart; angles mean nothing until \
-                 --board NAME, or --set radar.tx_m and radar.rx_m, says where they are"
+            let open: Vec<&str> = ["radar.tx_m", "radar.rx_m"].into_iter().filter(|key| !stated.has_set(key)).collect();
+            notes.push(match open.is_empty() {
+                true => "no board was named: antennas are those of --set radar.tx_m and radar.rx_m, and no receiver is taken to be fed \
+                         from the opposite side"
                     .into(),
-            );
+                false => format!(
+                    "no board was named: antennas are assumed on a line, half a wavelength apart; angles mean nothing until --board \
+                     NAME, or --set {}, says where they are",
+                    open.join(" and ")
+                ),
+            });
             let line = |index: usize, step: f64| [index as f64 * step * half, 0.0, 0.0];
             let tx = (0..masks.len()).map(|index| line(index, receivers.len() as f64)).collect();
             return Ok((tx, (0..receivers.len()).map(|index| line(index, 1.0)).collect(), Vec::new()));
         };
         let board = Board::named(name)?;
         let missing = |what: &str, index: usize| {
-            Error::field(&self.file, what, format!("number {index} is on"), format!("those of the {}", board.name))
+            let of_board = if what == "receivers" { board.rx_half_wavelengths.len() } else { board.tx_half_wavelengths.len() };
+            let expected = format!("numbers below {of_board}: the {} has {of_board} {what}", board.name);
+            Error::field(&self.file, what, format!("number {index} (from 0) is on"), expected)
                 .with_hint("the capture is of another board: name it with --board")
         };
         let middle = |mask: usize| -> Result<[f64; 3]> {

@@ -40,9 +40,19 @@ impl Words {
     fn refuse_wider(&self) -> Result<()> {
         let begin = self.read(0, self.len().min(word_kind::LOOKED_AT as u64) as usize)?;
         let Some(kind) = word_kind::wider(&begin) else { return Ok(()) };
-        let read = format!("numpy.save(\"capture.npy\", numpy.fromfile(\"{}\", \"{kind}\"))", self.first().display());
-        Err(Error::field(self.first(), "samples", format!("numbers of type {kind}"), "16-bit integers")
-            .with_hint(format!("shape and keep them as an array, {read}, and import that with --layout")))
+        let as_array = format!("numpy.save(\"capture.npy\", numpy.fromfile(\"{}\", \"{kind}\"))", self.first().display());
+        let typed = |complex: &str, real: &str| {
+            format!(
+                "state their type at the end of --layout, such as --layout \"frame loop tx rx sample {complex}\" ({real} where no number \
+                 has an imaginary part or `iq` is an axis), and the radar with --config FILE.toml or --board and --set radar.KEY=VALUE"
+            )
+        };
+        let hint = match kind {
+            "<f8" => typed("complex128", "float64"),
+            "<f4" => typed("complex64", "float32"),
+            _ => format!("shape and keep them as an array, {as_array}, and import that with --layout"),
+        };
+        Err(Error::field(self.first(), "samples", format!("numbers of type {kind}"), "16-bit integers").with_hint(hint))
     }
 
     /// The first so many words of each file.

@@ -21,7 +21,7 @@ pub(super) fn code(place: [usize; 5]) -> [i16; 2] {
 }
 
 /// A 2-lane file as SWRA581B draws it: I0 I1 Q0 Q1 of one receiver after the other.
-fn two_lane_words() -> Vec<i16> {
+pub(super) fn two_lane_words() -> Vec<i16> {
     let mut words = Vec::new();
     for frame in 0..FRAMES {
         for index in 0..LOOPS {
@@ -43,7 +43,7 @@ fn write_words(path: &Path, words: &[i16]) {
 }
 
 /// An mmWave Studio configuration of that capture.
-fn mmwave_json() -> String {
+pub(super) fn mmwave_json() -> String {
     let chirps: Vec<String> = (0..TX)
         .map(|tx| {
             format!(
@@ -69,7 +69,7 @@ fn mmwave_json() -> String {
     )
 }
 
-const CFG: &str = "
+pub(super) const CFG: &str = "
 sensorStop % a comment
 channelCfg 15 7 0
 adcCfg 2 1
@@ -83,7 +83,7 @@ sensorStart
 ";
 
 /// A folder with `adc_data.bin` and its description.
-fn capture_folder(words: &[i16], config: &str, text: &str) -> (tempfile::TempDir, PathBuf) {
+pub(super) fn capture_folder(words: &[i16], config: &str, text: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let bin = folder.path().join("adc_data.bin");
     write_words(&bin, words);
@@ -91,7 +91,7 @@ fn capture_folder(words: &[i16], config: &str, text: &str) -> (tempfile::TempDir
     (folder, bin)
 }
 
-fn isk() -> Stated {
+pub(super) fn isk() -> Stated {
     Stated { board: Some("IWR6843ISK".into()), ..Stated::default() }
 }
 
@@ -189,7 +189,7 @@ fn four_lanes_are_interleaved_by_receiver() {
             }
         }
     }
-    let cfg = CFG.replace("adcbufCfg -1 0 0 1 1", "adcbufCfg 0 0 0 1");
+    let cfg = CFG.replace("adcbufCfg -1 0 0 1 1", "adcbufCfg 0 0 0 1").replace("profileCfg 0 60", "profileCfg 0 77");
     let (_folder, bin) = capture_folder(&words, "profile.cfg", &cfg);
     assert_frames(&mut open(&[bin], &Stated { board: Some("IWR1443".into()), ..Stated::default() }).unwrap(), code);
 }

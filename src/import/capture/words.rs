@@ -33,6 +33,19 @@ impl Lengths {
             Axis::Iq => 2,
         }
     }
+
+    /// Of every axis, of one frame.
+    ///
+    /// # Errors
+    /// Samples that do not fill an axis of lanes.
+    pub fn shape(&self, layout: &Layout) -> Result<Vec<usize>> {
+        let lanes = if layout.place(Axis::Lane).is_some() { LANES } else { 1 };
+        if !self.samples.is_multiple_of(lanes) {
+            let expected = format!("a multiple of {lanes}: one sample for each lane");
+            return Err(Error::setting("radar.samples_per_chirp", self.samples, expected));
+        }
+        Ok(layout.axes.iter().map(|axis| self.of(*axis, lanes)).collect())
+    }
 }
 
 /// Words as an array, frames outermost.
@@ -65,16 +78,7 @@ impl WordArray {
         if layout.place(Axis::Frame).is_some_and(|place| place > 0) {
             return Err(refuse("frames are not outermost"));
         }
-        let samples = lengths.samples;
-        let lanes = if layout.place(Axis::Lane).is_some() { LANES } else { 1 };
-        if !samples.is_multiple_of(lanes) {
-            return Err(Error::setting(
-                "radar.samples_per_chirp",
-                samples,
-                format!("a multiple of {lanes}: one sample for each lane"),
-            ));
-        }
-        let mut shape: Vec<usize> = layout.0.iter().map(|axis| lengths.of(*axis, lanes)).collect();
+        let mut shape = lengths.shape(layout)?;
         let block = shape.iter().try_fold(1u64, |all, &length| all.checked_mul(length as u64)).unwrap_or(u64::MAX).max(1);
         let words = Words::open(files)?;
         if let Some((file, own)) = words.lengths().find(|(_, own)| frame_files && *own != block) {

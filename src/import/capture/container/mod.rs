@@ -92,6 +92,12 @@ pub fn open(path: &Path, variable: Option<&str>, axes: usize) -> Result<Source> 
     Source::new(path, names.join(","), laid, scratch)
 }
 
+/// The numbers of a file that holds nothing else, the last axis the fastest.
+pub fn plain(path: &Path, stored: Stored, shape: Vec<usize>) -> Result<Source> {
+    let planes = vec![Plane { file: path.into(), start: 0, stored }];
+    Source::new(path, "samples".into(), Laid { shape, fortran: false, planes }, Scratch::new()?)
+}
+
 /// The names of the array, or of its two parts.
 fn chosen(path: &Path, entries: &[Entry], others: &[Other], variable: Option<&str>, axes: usize) -> Result<Vec<String>> {
     if let Some(variable) = variable {
