@@ -173,6 +173,8 @@ class Finding:
         frames: damaged frames; empty where nothing is damaged, or all are.
         p_value: bound on the chance that a whole recording looks like this; ``None`` where nothing was found.
         file: the file it is about, of plausibility.
+        kept: of integrity what becomes of the statement: ``"as stated"``, ``"as stated, undecided"`` (the samples cannot say) or
+            ``"questioned"`` (they contradict it).
     """
 
     about: str
@@ -184,6 +186,7 @@ class Finding:
     frames: list[int] = field(default_factory=list)
     p_value: float | None = None
     file: str | None = None
+    kept: str | None = None
 
 
 @dataclass(frozen=True)

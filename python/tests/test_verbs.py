@@ -48,7 +48,18 @@ def test_check_finds_what_is_damaged(recording: hybridsim.Recording, tmp_path: P
     np.save(tmp_path / "if.npy", samples)
     damaged = [finding for finding in hybridsim.check(tmp_path).findings if not finding.ok]
     assert [finding.about for finding in damaged] == ["integrity"] and damaged[0].frames == [3]
+    assert damaged[0].kept == "questioned"
     assert damaged[0].p_value is not None and damaged[0].p_value < 1e-3
+
+
+def test_check_has_the_rows_of_its_table(recording: hybridsim.Recording) -> None:
+    rows = {finding.check: finding for finding in hybridsim.check(recording).findings if finding.about == "integrity"}
+    assert {finding.kept for finding in rows.values()} == {"as stated", "as stated, undecided"}
+    assert rows["byte_order"].kept == "as stated" and rows["byte_order"].found.startswith("codes from")
+    # What samples alone never decide is listed, too.
+    for check in ("adc_start", "doppler_sign", "left_and_right"):
+        assert rows[check].kept == "as stated, undecided" and rows[check].found.startswith("undecided: ")
+    assert all(finding.kept is None for finding in hybridsim.check(recording).findings if finding.about != "integrity")
 
 
 def test_a_point_peaks_at_its_range_and_velocity(recording: hybridsim.Recording) -> None:

@@ -16,9 +16,9 @@ pub(crate) struct Arguments {
     /// Recordings, folders of recordings, or the folder of a site
     #[arg(required = true, value_name = "RECORDING")]
     sources: Vec<PathBuf>,
-    /// npz, hdf5, dca1000, rover, maps or points
+    /// npz, hdf5, dca1000, rover, maps, points or body
     #[arg(long, value_name = "TARGET")]
-    to: Target,
+    to: String,
     /// The board that is imitated, such as IWR6843ISK: its lanes, and its numbers of the transmitters
     #[arg(long, value_name = "NAME")]
     board: Option<String>,
@@ -31,9 +31,11 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
+    // Not parsed by clap, which leaves hints out.
+    let target: Target = arguments.to.parse()?;
     let what = Export {
         sources: &arguments.sources,
-        target: arguments.to,
+        target,
         board: arguments.board.as_deref(),
         split_by: arguments.split_by.clone(),
         sets: &common.set,
@@ -43,6 +45,6 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let [recordings, frames] = verbs::export::export(&what, &mut |notice| shown.show(notice))?;
     shown.finish();
     let recordings = if recordings == 1 { "1 recording".to_string() } else { format!("{recordings} recordings") };
-    say!("{recordings}, {frames} frames as {}: {}", arguments.to.name, arguments.out.display());
+    say!("{recordings}, {frames} frames as {}: {}", target.name, arguments.out.display());
     Ok(())
 }

@@ -92,7 +92,7 @@ pub fn line(sink: &mut dyn Sink, name: &str, axis: &str, unit: &str, values: &[f
 }
 
 /// The body's vertices at the start of every frame, in the radar frame: what is to be learned from the samples.
-fn body(recording: &Recording, frames: Range<usize>, sink: &mut dyn Sink, notes: &mut Vec<String>) -> Result<()> {
+pub fn body(recording: &Recording, frames: Range<usize>, sink: &mut dyn Sink, notes: &mut Vec<String>) -> Result<()> {
     let Some(person) = recording.person() else { return Ok(()) };
     let body = MovingBody::new(person, Interpolation::default())?;
     let weights: Option<Vec<_>> =

@@ -5,6 +5,7 @@
 //! shard, beside a table of labels and a card.
 
 mod beams;
+mod body;
 pub mod capture_files;
 mod card;
 mod codes;
@@ -62,13 +63,14 @@ pub struct Target {
 }
 
 /// All of them.
-pub const TARGETS: [Target; 6] = [
+pub const TARGETS: [Target; 7] = [
     Target { name: "npz", writes: "IF samples with their axes, radar and body (NumPy)", write: npz::write },
     Target { name: "hdf5", writes: "the same (HDF5)", write: hdf5::write },
     Target { name: "dca1000", writes: "_Raw_0.bin with .mmwave.json (TI mmWave Studio)", write: dca1000::write },
     Target { name: "rover", writes: "a trace with the sensor radar (roverd, xwr)", write: rover::write },
     Target { name: "maps", writes: "range-Doppler-angle power with its axes (NumPy)", write: maps::write },
     Target { name: "points", writes: "a CFAR point cloud (NumPy, and PLY for each frame)", write: points::write },
+    Target { name: "body", writes: "the body at every frame, and the room (NumPy)", write: body::write },
 ];
 
 impl Target {
@@ -92,9 +94,16 @@ impl FromStr for Target {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        TARGETS.into_iter().find(|target| target.name == name).ok_or_else(|| Error::Usage {
-            message: format!("no target `{name}`, known are {}", TARGETS.map(|target| target.name).join(", ")),
-            hint: None,
+        TARGETS.into_iter().find(|target| target.name == name).ok_or_else(|| match name {
+            // Its crate brings two hundred others.
+            "rerun" => Error::Usage {
+                message: "the target `rerun` is written from Python alone".into(),
+                hint: Some("pip install \"./python[rerun]\"; hybridsim.export(RECORDING, \"rerun\", OUT) in Python".into()),
+            },
+            _ => Error::Usage {
+                message: format!("no target `{name}`, known are {}", TARGETS.map(|target| target.name).join(", ")),
+                hint: Some("`rerun` is written from Python".into()),
+            },
         })
     }
 }
@@ -110,4 +119,17 @@ fn not_carried(recording: &Recording, parts: &[&str]) -> Option<String> {
     };
     let left: Vec<&str> = parts.iter().copied().filter(|part| has(part)).collect();
     (!left.is_empty()).then(|| format!("not carried: {}", left.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_target_is_found_by_its_name_and_rerun_says_where_it_is() {
+        assert!(TARGETS.iter().all(|target| target.name.parse::<Target>().unwrap().writes == target.writes));
+        let error = "rerun".parse::<Target>().unwrap_err();
+        assert!(error.to_string().contains("from Python") && error.hint().unwrap().contains("hybridsim.export("), "{error}");
+        assert!("mat".parse::<Target>().unwrap_err().to_string().starts_with("no target `mat`, known are npz, "));
+    }
 }
