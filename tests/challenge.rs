@@ -224,16 +224,16 @@ fn structures_differ_in_what_is_recorded_and_told_and_an_effect_left_out_is_publ
     }
     assert!(of_structure.values().all(|count| (6..=7).contains(count)) && of_structure.len() == 3, "{of_structure:?}");
     assert!(left_out[0] == left_out[1] && left_out[1] >= 3, "{left_out:?}");
-    // Whoever diagnoses is told what to leave out, and of which case.
-    let told = parent.path().join("told");
+    // Whoever diagnoses is given what to leave out, and of which case.
+    let arguments = parent.path().join("arguments");
     let config = program(
         parent.path(),
-        &format!("echo \"$@\" >> {}; printf '%s' '{}' > \"$4/report.json\"", told.display(), silent_report()),
+        &format!("echo \"$@\" >> {}; printf '%s' '{}' > \"$4/report.json\"", arguments.display(), silent_report()),
     );
     answer::run(&challenge, &parent.path().join("answers"), &config, &mut |_| {}).unwrap();
-    let told = fs::read_to_string(&told).unwrap();
-    let lines: Vec<&str> = told.lines().filter(|line| line.contains("diagnosis.left_out=")).collect();
-    assert_eq!((lines.len(), told.lines().count()), (commitment.left_out.len(), 20));
+    let arguments = fs::read_to_string(&arguments).unwrap();
+    let lines: Vec<&str> = arguments.lines().filter(|line| line.contains("diagnosis.left_out=")).collect();
+    assert_eq!((lines.len(), arguments.lines().count()), (commitment.left_out.len(), 20));
     assert!(commitment.left_out.values().all(|id| lines.iter().any(|line| line.contains(&format!("left_out=[\"{id}\"]")))));
     let text = score(&challenge, &parent.path().join("answers"), None, false, &|_| {}).unwrap().markdown();
     assert!(text.contains("### By structure") && text.contains("| untracked | "), "{text}");
@@ -327,7 +327,7 @@ fn made_up_answers_get_the_score_that_they_deserve() {
     assert_eq!(row("nulls with a confident wrong name").estimate, Some(1.0 / nulls as f64));
     let right = row("first name is right");
     assert!(right.n > 0 && right.estimate == Some(1.0), "{right:?}");
-    // The twin's likelihood is −5 as told by the same program, but for the receiver's scale; half of 9 − 5 was removed.
+    // The twin's likelihood is −5 by the same program, but for the receiver's scale; half of 9 − 5 was removed.
     let recovered = row("misfit recovered");
     assert!(recovered.n > 0 && (recovered.estimate.unwrap() - 0.5).abs() < 0.1, "{recovered:?}");
     assert!(scored.failures.iter().any(|line| line.contains(first_null) && line.contains("false alarm")));

@@ -209,7 +209,7 @@ fn changed(change: Change) -> Option<Report> {
 
 /// The antennas come first: undone out of turn, they would turn the image of every receiver by another angle.
 #[test]
-fn receivers_that_differ_and_the_image_after_them_are_both_told() {
+fn receivers_that_differ_and_the_image_after_them_are_both_found() {
     let differ = [(1.0, 0.0), (1.2, 0.4), (0.9, -0.3), (1.05, 0.2)].map(|(gain, phase)| Complex32::from_polar(gain, phase));
     let Some(report) = changed(&|_, re, im| {
         for (at, (re, im)) in re.iter_mut().zip(im).enumerate() {
@@ -416,7 +416,7 @@ fn what_was_not_found_has_a_limit_that_a_louder_one_exceeds() {
     assert_eq!(clean.report.verdict, Verdict::NoMismatch);
     let at_most_db = limit(&clean.report, "dc_offset").unwrap();
     assert!(limit(&clean.report, "iq_imbalance").is_some());
-    // The recorder's own offset, whose energy is told by its mean square.
+    // The recorder's own offset, whose energy is its mean square.
     let with = asked("offset", "effects.dc_offset = { i = 0.05, q = 0.0 }");
     assert_eq!(ids(&with.report), ["dc_offset"]);
     assert!(limit(&with.report, "dc_offset").is_none());

@@ -84,10 +84,10 @@ fn strong_effects_are_found_in_a_recording_weak_ones_are_not_and_nothing_is_done
         "t",
     ];
     // Stopped after one copy, as if killed: no truth is opened.
-    let told = done(&[&salt[..], &["--most", "1"]].concat());
-    assert!(told.contains("1 copies are answered, not all") && !out.join("results.md").exists(), "{told}");
-    let told = done(&salt);
-    assert!(told.contains("| gain_drift |"), "{told}");
+    let printed = done(&[&salt[..], &["--most", "1"]].concat());
+    assert!(printed.contains("1 copies are answered, not all") && !out.join("results.md").exists(), "{printed}");
+    let printed = done(&salt);
+    assert!(printed.contains("| gain_drift |"), "{printed}");
     let result = json(&out.join("dose.json"));
     let rows = result["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 4);
@@ -135,8 +135,8 @@ fn effects_that_samples_alone_cannot_be_given_are_refused_by_name() {
     for (effect, reason) in
         [("breathing", "it acts on the person"), ("if_highpass", "before and after the window"), ("gost", "no such effect")]
     {
-        let told = refused(&["challenge", "salt", text(&recording), "--out", text(&out), "--effects", effect]);
-        assert!(told.contains(effect) && told.contains(reason), "{told}");
+        let printed = refused(&["challenge", "salt", text(&recording), "--out", text(&out), "--effects", effect]);
+        assert!(printed.contains(effect) && printed.contains(reason), "{printed}");
     }
     assert!(!out.exists());
 }
@@ -146,8 +146,8 @@ fn a_table_of_nulls_calibrates_p_values_of_its_radar_and_of_no_other() {
     let parent = tempfile::tempdir().unwrap();
     let (own, out) = (config(parent.path(), "own", 48), parent.path().join("calibration"));
     let calibrate = ["challenge", "calibrate", text(&own), "--out", text(&out), "--nulls", "4"];
-    let told = done(&[&calibrate[..], &["--most", "1"]].concat());
-    assert!(told.contains("3 of 4 nulls are missing yet"), "{told}");
+    let printed = done(&[&calibrate[..], &["--most", "1"]].concat());
+    assert!(printed.contains("3 of 4 nulls are missing yet"), "{printed}");
     done(&calibrate);
     let path = out.join("calibration.json");
     let table: Calibration = serde_json::from_value(json(&path)).unwrap();
@@ -175,12 +175,15 @@ fn a_table_of_nulls_calibrates_p_values_of_its_radar_and_of_no_other() {
     assert!(report["settings"].as_str().unwrap().contains("calibration table 1 "), "{}", report["settings"]);
     // Another radar, and another program.
     let other = recorded(&config(parent.path(), "other", 32));
-    let told = refused(&["diagnose", text(&other), "--out", text(&parent.path().join("no")), "--set", &with]);
-    assert!(told.contains("`structure.radar.samples_per_chirp` is 48, expected 32, as ") && told.contains("calibrate"), "{told}");
+    let printed = refused(&["diagnose", text(&other), "--out", text(&parent.path().join("no")), "--set", &with]);
+    assert!(
+        printed.contains("`structure.radar.samples_per_chirp` is 48, expected 32, as ") && printed.contains("calibrate"),
+        "{printed}"
+    );
     let foreign = parent.path().join("foreign.json");
     fs::write(&foreign, fs::read_to_string(&path).unwrap().replace("sources ", "sources of ")).unwrap();
-    let told = refused(&["diagnose", text(&recording), "--set", &format!("diagnosis.calibration={}", foreign.display())]);
-    assert!(told.contains("`program` is hybridsim"), "{told}");
+    let printed = refused(&["diagnose", text(&recording), "--set", &format!("diagnosis.calibration={}", foreign.display())]);
+    assert!(printed.contains("`program` is hybridsim"), "{printed}");
     // The nulls of a recording have its structure.
     let of_recording = parent.path().join("of_recording");
     done(&["challenge", "calibrate", text(&recording), "--out", text(&of_recording), "--nulls", "2"]);

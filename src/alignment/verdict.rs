@@ -46,7 +46,7 @@ pub fn alignment(found: &Found, recording: String) -> Alignment {
     let alternatives = best.map_or_else(Vec::new, |best| alternatives(found, best, &estimates));
     let reason = cannot_tell(found, &gain, &estimates);
     let sentence_of = |verdict, as_stated| sentence(verdict, reason.as_deref(), &estimates, alternatives.len(), as_stated);
-    let identified = told_apart(estimates.clone(), &alternatives);
+    let identified = identified(estimates.clone(), &alternatives);
     let verdict = match (&reason, alternatives.is_empty()) {
         (Some(_), _) => Verdict::CannotTell,
         (None, false) => Verdict::Ambiguous,
@@ -126,7 +126,7 @@ fn difference(name: &str, a: f64, b: f64) -> f64 {
 }
 
 /// A number is not identified where an alternative has another one.
-fn told_apart(mut estimates: BTreeMap<&'static str, Estimate>, alternatives: &[Alternative]) -> BTreeMap<&'static str, Estimate> {
+fn identified(mut estimates: BTreeMap<&'static str, Estimate>, alternatives: &[Alternative]) -> BTreeMap<&'static str, Estimate> {
     for (name, estimate) in &mut estimates {
         let Some([low, high]) = estimate.ci90 else { continue };
         let others = alternatives.iter().map(|alternative| alternative.values[name]);

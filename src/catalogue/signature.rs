@@ -22,8 +22,8 @@ use crate::recorder::{EffectsConfig, RadarChoice, Recorder, RecorderConfig, Retu
 const SEED: u64 = 7;
 /// Before the first chirp and after the last the person moves for so long, so that clocks may be wrong and frames lost.
 const SPARE_S: f64 = 0.8;
-/// Below the strongest cell, dB; the noise of the scene lies some 70 dB below its walls.
-const DEPTH_DB: f64 = 80.0;
+/// Colours begin so far below the scene's noise, dB: what an effect changes may be weaker than the noise.
+const BELOW_NOISE_DB: f64 = 20.0;
 
 /// What all effects are planted into.
 pub(super) struct Scene {
@@ -98,7 +98,7 @@ impl Signature {
         let given: Vec<String> = settings.as_object().into_iter().flatten().filter_map(said).collect();
         format!(
             "Recorded by the independent recorder: a person walks in a room; without the effect, with it, and the difference of the two \
-             recordings, all in dB of the strongest cell without it. Above: the middle frame over range (m) and velocity (m/s); below: power \
+             recordings, all in dB over the noise without it. Above: the middle frame over range (m) and velocity (m/s); below: power \
              over time (s) and velocity. Planted: {}.",
             given.join(", ").replace('"', "")
         )
@@ -140,15 +140,19 @@ impl Signature {
         let maps = [samples.iter().map(frame).collect(), samples.iter().map(over_time).collect()].map(relative);
         let columns = ["without", "with", "difference"].map(String::from);
         let rows = ["one frame", "all frames"].map(String::from);
-        let grid = Grid { title: &self.title, columns: &columns, rows: &rows, low: -DEPTH_DB, high: 0.0, unit: Some("dB") };
+        let high = maps.iter().flatten().map(Map::max).fold(0.0, f64::max);
+        let unit = Some("dB over the noise");
+        let grid = Grid { title: &self.title, columns: &columns, rows: &rows, low: -BELOW_NOISE_DB, high, unit };
         grid.save(path, &maps)
     }
 }
 
-/// In dB of the strongest cell of the first.
+/// In dB of the noise of the first, the median of its cells: most hold nothing else.
 fn relative(maps: Vec<Map>) -> Vec<Map> {
-    let peak = maps[0].max().max(f64::MIN_POSITIVE);
-    maps.iter().map(|map| map.with_values(map.values.iter().map(|power| power / peak).collect()).db(0.0)).collect()
+    let mut cells = maps[0].values.clone();
+    let middle = cells.len() / 2;
+    let noise = cells.select_nth_unstable_by(middle, f64::total_cmp).1.max(f64::MIN_POSITIVE);
+    maps.iter().map(|map| map.with_values(map.values.iter().map(|power| power / noise).collect()).db(0.0)).collect()
 }
 
 /// Samples in units of the transmitted wave, so that recordings with gains of their own can be compared.

@@ -26,7 +26,7 @@ use crate::diagnosis::calibration::{Calibration, FORMAT, FalseAlarms, Structure,
 use crate::diagnosis::detectors::DETECTORS;
 use crate::diagnosis::statistics::{binomial_interval, uniform_chance};
 use crate::error::{Error, Result};
-use crate::pictures::{Chart, Series};
+use crate::pictures::{Chart, Scale, Series};
 use crate::recorder::{EffectsConfig, RadarChoice, ReceiverConfig, Recorder, RecorderConfig, Returns, World};
 use crate::room::Room;
 use crate::text::shown;
@@ -85,11 +85,12 @@ impl Source {
         let receiver = ReceiverConfig { adc: recording.holds_codes(), ..ReceiverConfig::default() };
         let mut world = World { radar: radar.clone(), room, person: recording.person().cloned(), receiver, ..World::default() };
         world.check().map_err(|error| error.in_file(&settings))?;
-        let rail = radar.full_scale_codes.unwrap_or(f64::from(i16::MAX)).min(i16::MAX.into());
-        // The peak holds noise; codes have a rail that a null stays below, other samples any unit.
+        let full_scale = radar.full_scale_codes.unwrap_or(f64::from(i16::MAX)).min(i16::MAX.into());
+        // The peak holds noise; codes have a full scale that a null stays below, other samples any unit.
         let signal = (ground.largest_component - DEVIATIONS * noise).max(noise);
-        let unit = if world.receiver.adc { 1.0 } else { world.receiver.peak_fraction * rail / signal.max(f64::MIN_POSITIVE) };
-        world.receiver.peak_fraction = (unit * signal / rail).clamp(f64::MIN_POSITIVE, 1.0);
+        let unit =
+            if world.receiver.adc { 1.0 } else { world.receiver.peak_fraction * full_scale / signal.max(f64::MIN_POSITIVE) };
+        world.receiver.peak_fraction = (unit * signal / full_scale).clamp(f64::MIN_POSITIVE, 1.0);
         let mut level = Recorder::new(&world)?.level();
         level.noise_codes = unit * noise;
         world.receiver.level = Some(level);
@@ -377,6 +378,8 @@ impl Calibrated {
             title: "p-values of nulls".into(),
             x_label: "p-value".into(),
             y_label: "share of nulls at most there".into(),
+            x_scale: Scale::Linear,
+            y_scale: Scale::Linear,
             series: vec![
                 Series { name: "nulls".into(), points: found.collect() },
                 Series { name: "uniform".into(), points: vec![[0.0, 0.0], [1.0, 1.0]] },

@@ -21,7 +21,7 @@ pub struct Strength {
     pub d_prime: f64,
     /// The same for the held-out frames alone.
     pub d_prime_held_out: f64,
-    /// What is left of it for sure when neither the body's phases nor the room's amplitudes are known (rung E).
+    /// What is left of it for sure when neither the body's phases nor the room's amplitudes are known (capacity level E).
     pub d_prime_surviving: f64,
     /// Nine tenths of the effect's energy lie in range-Doppler cells whose return is stronger by at least this, dB.
     pub below_cover_db: f64,

@@ -1,6 +1,6 @@
 //! How detection grows with strength: shares in bins, and a logistic curve through all cases.
 
-use crate::pictures::{Chart, Series};
+use crate::pictures::{Chart, Scale, Series};
 
 /// p = 1 / (1 + exp(−slope · (log₁₀ d′ − middle))).
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -61,18 +61,20 @@ pub fn chart(points: &[(f64, bool)], fit: Option<Logistic>) -> Chart {
         .chunks(per_bin)
         .map(|bin| {
             let n = bin.len() as f64;
-            [bin.iter().map(|(x, _)| x).sum::<f64>() / n, bin.iter().filter(|(_, hit)| *hit).count() as f64 / n]
+            [10f64.powf(bin.iter().map(|(x, _)| x).sum::<f64>() / n), bin.iter().filter(|(_, hit)| *hit).count() as f64 / n]
         })
         .collect();
     let mut series = vec![Series { name: "detected, tenths of the cases".into(), points: bins }];
     if let Some(fit) = fit.filter(|_| low < high) {
-        let points = (0..=100).map(|i| low + (high - low) * f64::from(i) / 100.0).map(|x| [x, fit.at(x)]).collect();
+        let points = (0..=100).map(|i| low + (high - low) * f64::from(i) / 100.0).map(|x| [10f64.powf(x), fit.at(x)]).collect();
         series.push(Series { name: "logistic fit".into(), points });
     }
     Chart {
         title: "detection against strength".into(),
-        x_label: "log10 of d' (effect against noise)".into(),
+        x_label: "d' (effect against noise)".into(),
         y_label: "share detected".into(),
+        x_scale: Scale::Log,
+        y_scale: Scale::Linear,
         series,
     }
 }

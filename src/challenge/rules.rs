@@ -6,9 +6,9 @@ use crate::effects;
 /// A name is confident from this probability on.
 pub const CONFIDENT: f64 = 0.8;
 /// An effect below this coherent d′ (square root of twice its energy over the noise's variance) cannot be detected by
-/// anybody; one whose surviving d′ (rung E) is below it can be all unknown phases and amplitudes.
+/// anybody; one whose surviving d′ (capacity level E) is below it can be all unknown phases and amplitudes.
 pub const UNDETECTABLE_D_PRIME: f64 = 2.0;
-/// From here on (rung E) an effect is strong enough that missing it is a fault.
+/// From here on (capacity level E) an effect is strong enough that missing it is a fault.
 pub const OBVIOUS_D_PRIME: f64 = 8.0;
 /// A masked effect lies so far below the return that covers it, for nine tenths of its energy.
 pub const MASKED_DB: f64 = 20.0;
@@ -30,7 +30,7 @@ pub const LOOK_ALIKES: &[&[&str]] = &[
     &[effects::phase_noise::ID, effects::chirp_start_jitter::ID],
 ];
 
-/// What a person is of whom nothing is told, and what a report without a name says of one: where such a person is, these are no false
+/// What an untracked person is, and what a report without a name says of one: where such a person is, these are no false
 /// alarms and no wrong names, and they are not planted.
 pub const SOMEBODY: [&str; 3] = [effects::moving_reflector::ID, effects::breathing::ID, effects::heartbeat::ID];
 pub const LIKE_SOMEBODY: [Behaviour; 4] =

@@ -63,7 +63,7 @@ pub struct Score {
     points: Vec<(f64, bool)>,
 }
 
-/// Verifies and scores. `twins`: the folder of [`super::twins`], where there is one. `again`: strengths are measured anew, by
+/// Verifies and scores. `twins`: the folder of [`super::twins`], where there is one. `remeasure`: strengths are measured anew, by
 /// the measure of this program, and not taken from the truths.
 ///
 /// # Errors
@@ -72,7 +72,7 @@ pub fn score(
     challenge: &Path,
     answers_folder: &Path,
     twins: Option<&Path>,
-    again: bool,
+    remeasure: bool,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Score> {
     let commitments = Commitment::read_all(challenge)?;
@@ -101,7 +101,7 @@ pub fn score(
                     format!("{:?}, as the truth has it", truth.left_out),
                 ));
             }
-            if again && truth.strength.is_some() {
+            if remeasure && truth.strength.is_some() {
                 truth.strength = Some(measured(&truth.settings, Path::new(name))?);
             }
             let case = one(challenge, answers_folder, twins, &answers, name, &truth);

@@ -190,15 +190,15 @@ fn draws(settings: &RecorderConfig) -> Result<Draws> {
     let (world, empty) = (settings.world(folder)?, empty.world(folder)?);
     let first = Recorder::new(&world)?;
     let level = first.level();
-    let again = |world: &World, redraw: u64| {
+    let redrawn = |world: &World, redraw: u64| {
         let receiver = ReceiverConfig { level: Some(level), ..world.receiver };
         frames_of(&World { redraw, other_skin: redraw, receiver, ..world.clone() })
     };
     let mut frames = vec![first.frames().collect::<Result<Vec<_>>>()?];
     for redraw in 1..DRAWS {
-        frames.push(again(&world, redraw)?);
+        frames.push(redrawn(&world, redraw)?);
     }
-    let empty = (0..EMPTY_DRAWS).map(|redraw| again(&empty, redraw)).collect::<Result<_>>()?;
+    let empty = (0..EMPTY_DRAWS).map(|redraw| redrawn(&empty, redraw)).collect::<Result<_>>()?;
     Ok(Draws { frames, empty, gain: level.gain })
 }
 
@@ -293,13 +293,13 @@ mod tests {
         let clean = draws(&scene("")).unwrap();
         let world = scene("").world(Path::new(".")).unwrap();
         let level = Some(Recorder::new(&world).unwrap().level());
-        let again = |redraw: u64| {
+        let redrawn_frames = |redraw: u64| {
             let receiver = ReceiverConfig { level, ..world.receiver };
             let redraw = redraw + 100;
             frames_of(&World { redraw, other_skin: redraw, receiver, ..world.clone() }).unwrap()
         };
         let redrawn =
-            Draws { frames: (0..DRAWS).map(again).collect(), empty: draws(&scene("")).unwrap().empty, gain: clean.gain };
+            Draws { frames: (0..DRAWS).map(redrawn_frames).collect(), empty: draws(&scene("")).unwrap().empty, gain: clean.gain };
         let none = strength(&clean, &redrawn);
         assert!(none.d_prime > 1000.0 && none.d_prime_surviving < 4.0, "{none:?}");
         let of = |effects: &str| strength(&clean, &draws(&scene(effects)).unwrap());

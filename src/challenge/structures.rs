@@ -1,4 +1,4 @@
-//! Structures of recordings: frames, chirps, channels and sampling, and what is told of the scene.
+//! Structures of recordings: frames, chirps, channels and sampling, and what is stated of the scene.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,10 +12,10 @@ use crate::radar::Radar;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Who {
-    /// A person whose motion is told.
+    /// A person whose motion is stated.
     #[default]
     Tracked,
-    /// A person of whom nothing is told.
+    /// A person of whom nothing is stated.
     Untracked,
     Nobody,
 }
@@ -27,20 +27,20 @@ pub struct Structure {
     pub name: String,
     #[serde(default)]
     pub person: Who,
-    /// Whether the walls are told.
-    #[serde(default = "told")]
+    /// Whether the walls are stated.
+    #[serde(default = "stated")]
     pub room: bool,
     /// Keys of `[radar]` that differ.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     pub radar: toml::Table,
 }
 
-fn told() -> bool {
+fn stated() -> bool {
     true
 }
 
 impl Default for Structure {
-    /// The radar as it is, a tracked person, and a room that is told: the one structure that needs no name.
+    /// The radar as it is, a tracked person, and a stated room: the one structure that needs no name.
     fn default() -> Self {
         Self { name: String::new(), person: Who::Tracked, room: true, radar: toml::Table::new() }
     }
@@ -62,7 +62,7 @@ impl Structure {
         Ok(radar)
     }
 
-    /// Whether the person's motion is told.
+    /// Whether the person's motion is stated.
     pub fn is_tracked(&self) -> bool {
         self.person == Who::Tracked
     }

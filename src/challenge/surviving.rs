@@ -67,7 +67,7 @@ pub fn d_prime(draws: &[Draw], empty: &[Draw], noise: f64) -> f64 {
         moving.add(&maps, frames.dims, noise);
     }
     let chirps = (frames.count() * frames.dims[1]) as f64;
-    let mut squared = standing([&room, &beside, &clean], noise / chirps);
+    let mut squared = static_squared([&room, &beside, &clean], noise / chirps);
     squared.add(moving.squared());
     squared.sure()
 }
@@ -76,20 +76,20 @@ pub fn d_prime(draws: &[Draw], empty: &[Draw], noise: f64) -> f64 {
 struct Parted<'a> {
     frames: &'a Frames,
     /// The mean chirp, `[channel][sample]`.
-    still: Vec<Vec<Complex64>>,
+    clutter: Vec<Vec<Complex64>>,
 }
 
 impl<'a> Parted<'a> {
     fn new(frames: &'a Frames) -> Self {
         let [channels, loops, samples] = frames.dims;
         let weight = 1.0 / (loops * frames.count()) as f64;
-        let mut still = vec![vec![Complex64::ZERO; samples]; channels];
+        let mut clutter = vec![vec![Complex64::ZERO; samples]; channels];
         for frame in &frames.values {
             for (index, value) in frame.iter().enumerate() {
-                still[index / (loops * samples)][index % samples] += value * weight;
+                clutter[index / (loops * samples)][index % samples] += value * weight;
             }
         }
-        Self { frames, still }
+        Self { frames, clutter }
     }
 
     /// The maps of a frame without static clutter, `[channel][doppler · range]`.
@@ -97,9 +97,9 @@ impl<'a> Parted<'a> {
         let [_, loops, samples] = self.frames.dims;
         let channels = self.frames.values[frame].chunks_exact(loops * samples);
         channels
-            .zip(&self.still)
-            .map(|(channel, still)| {
-                let moving: Vec<Complex64> = channel.iter().enumerate().map(|(i, value)| value - still[i % samples]).collect();
+            .zip(&self.clutter)
+            .map(|(channel, clutter)| {
+                let moving: Vec<Complex64> = channel.iter().enumerate().map(|(i, value)| value - clutter[i % samples]).collect();
                 transform(&moving, samples)
             })
             .collect()
@@ -156,8 +156,8 @@ impl Pairs {
 
 /// Of the mean chirps: what stands out of any amplitudes that the room could have, and is no turn of all of it. `room`: without
 /// the person, `effect`: what is added there, `scene`: with the person, whose mean is noise to it.
-fn standing([room, effect, scene]: [&[Parted]; 3], floor: f64) -> Squared {
-    let spectra = |of: &Parted| of.still.iter().map(|still| spectrum(still)).collect::<Vec<_>>();
+fn static_squared([room, effect, scene]: [&[Parted]; 3], floor: f64) -> Squared {
+    let spectra = |of: &Parted| of.clutter.iter().map(|clutter| spectrum(clutter)).collect::<Vec<_>>();
     let [room, scene] = [room, scene].map(|of| of.iter().map(spectra).collect::<Vec<_>>());
     let effect: Vec<_> = effect.iter().zip(&room).map(|(effect, room)| unturned(room, spectra(effect))).collect();
     let bins = room[0][0].len();

@@ -65,7 +65,7 @@ pub struct FalseAlarms {
 /// What two recordings must share for their p-values to have one law.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Structure {
-    /// With as many frames as a diagnosis looks at; the rail may differ.
+    /// With as many frames as a diagnosis looks at; the clipping level may differ.
     pub radar: Radar,
     pub room: bool,
     pub person: bool,
@@ -255,8 +255,8 @@ mod tests {
         let table = table(vec![0.2, 0.7]);
         std::fs::write(&path, &table.bytes).unwrap();
         // As it is read: the last digit of a number may not survive being written.
-        let again: Calibration = serde_json::from_slice(&table.bytes).unwrap();
-        assert_eq!(Table::read(&path).unwrap().calibration, again);
+        let read: Calibration = serde_json::from_slice(&table.bytes).unwrap();
+        assert_eq!(Table::read(&path).unwrap().calibration, read);
         let with = |key: &str, value: serde_json::Value| {
             let mut changed = serde_json::to_value(&table.calibration).unwrap();
             changed[key] = value;

@@ -18,7 +18,7 @@ pub struct Component {
     pub counts: [Counts; 2],
 }
 
-/// Codes at the rail do not count.
+/// Clipped codes do not count.
 #[derive(Clone, Debug)]
 pub struct Counts {
     /// `[bit, sample]`

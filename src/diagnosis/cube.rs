@@ -34,7 +34,7 @@ pub struct Loaded {
     pub split: Split,
     /// Radar time at which each frame (or block of loops) begins.
     pub starts_s: Vec<f64>,
-    /// Of the raw components, for the converter's rail.
+    /// Of the raw components, for the ADC's clipping level.
     pub extremes: [f64; 2],
 }
 
@@ -98,7 +98,7 @@ impl Cube {
     }
 
     /// Mean over all chirps of some frames, `[tx · rx, sample]`.
-    pub fn still(&self, frames: &[usize]) -> Vec<Complex64> {
+    pub fn clutter(&self, frames: &[usize]) -> Vec<Complex64> {
         let samples = self.dims[4];
         let chirps = |channel: usize| frames.iter().flat_map(move |&frame| self.channel(frame, channel).chunks_exact(samples));
         (0..self.channels()).flat_map(|channel| mean_chirp(chirps(channel), samples)).collect()

@@ -23,7 +23,7 @@ pub struct Estimated {
     /// How much better each fold of the frames is predicted by the others than by zeros, nats; and the part of it that errors of
     /// the prediction cannot make.
     pub likelihood: f64,
-    pub gain: f64,
+    pub nats: f64,
 }
 
 /// Steps to the most likely numbers, at most, and a step that is none.
@@ -115,7 +115,7 @@ impl Estimated {
         let own = square / without_floors.max(f64::MIN_POSITIVE);
         let likelihood = folds(frames.len()).map(gain).sum::<Option<f64>>()?;
         let gain = own * likelihood;
-        (p_value.is_finite() && gain.is_finite()).then_some(Self { values, covariance, square, p_value, likelihood, gain })
+        (p_value.is_finite() && gain.is_finite()).then_some(Self { values, covariance, square, p_value, likelihood, nats: gain })
     }
 
     /// Chance that some combinations of the values, `[value, combination]`, are zero.

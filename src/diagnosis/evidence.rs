@@ -65,7 +65,7 @@ pub struct Evidence {
     /// Of the raw samples; none where they are no whole numbers.
     pub codes: Option<Arc<Vec<Component>>>,
     pub(super) noise: OnceLock<Vec<f64>>,
-    still: OnceLock<Vec<Complex64>>,
+    clutter: OnceLock<Vec<Complex64>>,
     maps: OnceLock<Grid<f32, 3>>,
     power: OnceLock<Option<Arc<PowerModel>>>,
     products: OnceLock<Products>,
@@ -91,7 +91,7 @@ impl Evidence {
             extremes,
             codes,
             noise: OnceLock::new(),
-            still: OnceLock::new(),
+            clutter: OnceLock::new(),
             maps: OnceLock::new(),
             power: OnceLock::new(),
             products: OnceLock::new(),
@@ -103,7 +103,7 @@ impl Evidence {
     pub fn changed(self) -> Self {
         Self {
             noise: OnceLock::new(),
-            still: OnceLock::new(),
+            clutter: OnceLock::new(),
             maps: OnceLock::new(),
             power: OnceLock::new(),
             products: OnceLock::new(),
@@ -146,8 +146,8 @@ impl Evidence {
     }
 
     /// Mean over all chirps of the training frames, `[tx · rx, sample]`: static clutter.
-    pub fn still(&self) -> &[Complex64] {
-        self.still.get_or_init(|| self.cube.still(&self.split.training))
+    pub fn clutter(&self) -> &[Complex64] {
+        self.clutter.get_or_init(|| self.cube.clutter(&self.split.training))
     }
 
     /// Variance of the noise in a complex sample, by channel (tx · rx); from the quieter cells of the range-Doppler
@@ -210,9 +210,9 @@ impl Evidence {
     /// A channel of a frame without static clutter, `[loop · sample]`.
     pub fn moving(&self, frame: usize, channel: usize) -> Vec<Complex64> {
         let samples = self.cube.dims[4];
-        let still = &self.still()[channel * samples..][..samples];
+        let clutter = &self.clutter()[channel * samples..][..samples];
         let chirps = self.cube.channel(frame, channel).chunks_exact(samples);
-        chirps.flat_map(|chirp| chirp.iter().zip(still).map(|(value, mean)| value - mean)).collect()
+        chirps.flat_map(|chirp| chirp.iter().zip(clutter).map(|(value, mean)| value - mean)).collect()
     }
 
     /// One frame and channel after the transforms with Hann windows of unit energy (white noise keeps its variance),

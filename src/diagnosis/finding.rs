@@ -118,9 +118,9 @@ impl Volume {
     pub const KEPT: Self = Self { by_sample: false, alike: 0.0, of_samples: None };
     pub const BY_SAMPLE: Self = Self { by_sample: true, alike: 0.0, of_samples: None };
 
-    /// Of a law with a number that every chirp or frame of so many samples has for itself: what its distribution loses by being
-    /// learned from these, nats each (Laplace's approximation).
-    pub fn spent(self, nats: f64, samples: usize) -> Self {
+    /// Of a law with a number that every chirp or frame of so many samples has for itself: the coding cost of these,
+    /// nats each (Laplace's approximation).
+    pub fn with_coding_cost(self, nats: f64, samples: usize) -> Self {
         Self { alike: self.alike - nats / samples.max(1) as f64, ..self }
     }
 }
@@ -178,7 +178,7 @@ pub struct Candidate {
     /// Under the null, corrected for everything that this detector looked at.
     pub p_value: f64,
     /// Log-likelihood that held-out frames gain, nats.
-    pub gain: f64,
+    pub nats: f64,
     /// Whether what it rests on (where the motion puts the body, a mesh, a chest) may err in held-out frames as in the others: a gain
     /// beyond the least then says nothing more.
     pub errs_alike: bool,
@@ -264,7 +264,7 @@ impl std::fmt::Debug for Candidate {
             "{} p {:.1e} gain {:.1} {:?} {}",
             self.id.unwrap_or(self.behaves_like.words()),
             self.p_value,
-            self.gain,
+            self.nats,
             self.estimates.iter().map(|e| (e.name, &e.values)).collect::<Vec<_>>(),
             self.statement
         )
@@ -281,7 +281,7 @@ pub(crate) fn nameless(behaves_like: Behaviour) -> Candidate {
         choice: None,
         place: Place::at(Stage::Receiver),
         p_value: 0.0,
-        gain: 1.0,
+        nats: 1.0,
         errs_alike: false,
         look_alikes: vec![],
         statement: String::new(),
@@ -303,7 +303,7 @@ mod tests {
             choice: None,
             place: Place::at(Stage::Receiver),
             p_value: 1e-9,
-            gain: 30.0,
+            nats: 30.0,
             errs_alike: true,
             look_alikes: vec![effects::tx_leakage::ID],
             statement: "Something.".into(),

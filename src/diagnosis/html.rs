@@ -1,6 +1,7 @@
 //! `report.html`: the same as `report.json` for people; one file, nothing to load.
 
 mod pictures;
+mod quantity;
 
 use super::finding::Place;
 use super::journey::Diagnosis;
@@ -117,9 +118,7 @@ fn section(number: usize, effect: &Effect, curve: Option<&Markup>) -> Markup {
     let parameters: Vec<Vec<Markup>> = effect
         .parameters
         .iter()
-        .map(|(name, found)| {
-            [shown(name), number_text(&found.value), number_text(&found.ci90)].map(|text| html! { (text) }).to_vec()
-        })
+        .map(|(name, found)| quantity::row(&effect.id, name, &found.value, &found.ci90).map(|text| html! { (text) }).to_vec())
         .collect();
     let names: Vec<Markup> = effect.indistinguishable_from.iter().map(|id| html! { code { (shown(id)) } }).collect();
     html! {
@@ -130,10 +129,13 @@ fn section(number: usize, effect: &Effect, curve: Option<&Markup>) -> Markup {
         }
         (table(&["parameter", "value", "90 % interval"], &parameters))
         p {
-            "How sure: chance of such a finding with nothing missing " (probability(evidence.p_value))
-            "; the held-out data's log-likelihood grows by " (format!("{:.0}", evidence.held_out_loglik_gain))
-            " nats; mean squared dB error on held-out cells "
-            (format!("{:.2} → {:.2}", evidence.held_out_db_mse_before, evidence.held_out_db_mse_after)) " dB²."
+            "How sure: " (percent(effect.probability)) " that it is this and none of what it is weighed against; chance of \
+             such a finding with nothing missing " (probability(evidence.p_value)) "; the held-out data's log-likelihood grows by "
+            (format!("{:.0}", evidence.held_out_loglik_gain)) " nats"
+            @let [before, after] = [evidence.held_out_db_mse_before, evidence.held_out_db_mse_after].map(|db2| format!("{db2:.2}"));
+            // The mean over all cells does not see what changes few.
+            @if before != after { "; mean squared dB error of all held-out cells " (before) " → " (after) " dB²" }
+            "."
         }
         @if names.is_empty() {
             p { "Nothing else in the library explains this recording as well." }
@@ -172,20 +174,23 @@ fn where_and_how(place: &Place, curve: Option<&Markup>) -> Markup {
 
 fn fit(report: &Report, pictures: &Pictures) -> Markup {
     let [before, after] = [report.fit.before, report.fit.after];
-    let rows = [("baseline", before), ("with the effects", after)].map(|(name, misfit)| {
+    let nothing_found = report.effects.is_empty() && report.unexplained.is_empty();
+    let shown_fits = if nothing_found { 1 } else { 2 };
+    let rows = [("baseline", before), ("with what was found", after)].into_iter().take(shown_fits).map(|(name, misfit)| {
         let numbers =
             [format!("{:.4}", misfit.loglik_per_sample), format!("{:.2}", misfit.db_mse), format!("{:.2}", misfit.psnr_db)];
         std::iter::once(html! { (name) }).chain(numbers.map(|text| html! { (text) })).collect()
     });
+    let rows: Vec<Vec<Markup>> = rows.collect();
     html! {
-        h2 { "Held-out data, before and after" }
+        h2 { @if nothing_found { "Held-out data" } @else { "Held-out data, before and after" } }
         p {
             (shown(&held_out(report))) ": static clutter, noise and the body's powers come from the others, and a \
              simulator is trained on those. Held-out data are not untouched: a finding stands only where it makes them more probable, and what \
              changes from chirp to chirp or from frame to frame is read in all frames."
         }
         (table(&["", "log-likelihood per sample", "error, dB²", "PSNR, dB"], &rows))
-        @if !report.effects.is_empty() && after.loglik_per_sample <= before.loglik_per_sample {
+        @if !nothing_found && after.loglik_per_sample <= before.loglik_per_sample {
             p {
                 "These are windowed range-Doppler cells, amplitudes free, as the usual scores see them: what was found hardly shows \
                  there. It shows in its own test on the same held-out data, given with each effect above."
@@ -252,16 +257,20 @@ fn location(report: &Report, pictures: &Pictures) -> Markup {
                 })
                 .collect();
             @if !standing_out.is_empty() {
-                p { (title) " at whose cells there is more than expected:" }
+                p { (title) " at whose cells there is more than expected (whatever else is at those cells counts, too):" }
                 (table(&["where", "excess", "chance"], &standing_out))
             }
         }
         @if !pictures.profiles.is_empty() {
-            p.small {
-                "Significance is of each value alone: of a hundred values of a recording with nothing missing, one reaches 2."
+            // Where nothing is missing they show nothing: they are there for whoever asks.
+            details open[report.verdict != Verdict::NoMismatch] {
+                summary { "Excess and significance along time, frequency and channels" }
+                p.small {
+                    "Significance is that of each value by itself: where nothing is missing, one value of a hundred exceeds 2 by chance."
+                }
+                @for picture in &pictures.profiles { p { (picture) } }
             }
         }
-        @for picture in &pictures.profiles { p { (picture) } }
     }
 }
 
@@ -320,36 +329,15 @@ fn place_text(place: &Place) -> String {
     parts.join("; ")
 }
 
+fn percent(probability: f64) -> String {
+    if probability > 0.995 { "over 99 %".into() } else { format!("{:.0} %", 100.0 * probability) }
+}
+
 fn probability(p: f64) -> Markup {
     if p < 1e-3 {
         let exponent = format!("{:.0}", p.max(1e-300).log10().ceil());
         html! { "below 10" sup { (exponent) } }
     } else {
         html! { (format!("{p:.3}")) }
-    }
-}
-
-fn number_text(value: &serde_json::Value) -> String {
-    match value {
-        serde_json::Value::Number(number) => short(number.as_f64().unwrap_or(0.0)),
-        serde_json::Value::Array(list) => format!("[{}]", list.iter().map(number_text).collect::<Vec<_>>().join(", ")),
-        serde_json::Value::String(text) => shown(text),
-        _ => "–".into(),
-    }
-}
-
-/// Four digits, without a tail of zeros.
-fn short(value: f64) -> String {
-    let size = value.abs();
-    if size >= 1e5 || (size > 0.0 && size < 1e-3) { format!("{value:.3e}") } else { format!("{:.*}", digits(size), value) }
-}
-
-fn digits(size: f64) -> usize {
-    if size >= 100.0 {
-        1
-    } else if size >= 1.0 {
-        3
-    } else {
-        4
     }
 }

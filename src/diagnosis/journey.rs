@@ -152,7 +152,7 @@ fn first_to_be_mended(
     if let Some(reason) = audit::undecidable(original, checks) {
         return Some(reason);
     }
-    observed_again(original, config, checks, progress);
+    observed_once_unmasked(original, config, checks, progress);
     let wrong = audit::wrong_conventions(checks);
     let (first, others) = wrong.split_first()?;
     // Physics fitted under a wrong convention would only imitate it.
@@ -211,7 +211,7 @@ fn conclude(
 
 /// A body that is not observed may be masked by what needs no body to be found (a phase noise spreads the static clutter over all
 /// velocities): where it is observed once that is undone, nothing is wrong with the scene.
-fn observed_again(original: &Evidence, config: &DiagnosisConfig, checks: &mut [Check], progress: &mut dyn FnMut(&str)) {
+fn observed_once_unmasked(original: &Evidence, config: &DiagnosisConfig, checks: &mut [Check], progress: &mut dyn FnMut(&str)) {
     let Some(silent) = checks.iter_mut().find(|check| audit::is_silent(check)) else { return };
     progress("no body is observed: looking for what masks it");
     let mut alone = original.clone();

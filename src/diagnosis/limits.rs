@@ -33,7 +33,7 @@ struct Salt {
     setting: fn(EffectSetting, f64, &Evidence) -> EffectSetting,
 }
 
-const STILL: &[&str] = &["still field", "still field, room unknown"];
+const STATIC_FIELD: &[&str] = &["still field", "still field, room unknown"];
 const SLOW: &[&str] = &["slow time"];
 const ALONG: &[&str] = &["along the chirp"];
 
@@ -102,20 +102,26 @@ const SALTS: [Salt; 15] = [
     },
     Salt {
         id: effects::tx_leakage::ID,
-        detectors: STILL,
+        detectors: STATIC_FIELD,
         least: 1e-5,
         most: 1.0,
         setting: |s, x, _| s.with("level_db", [db(x)]).with("range_m", [0.1]),
     },
     Salt {
         id: effects::ramp_edge_transient::ID,
-        detectors: STILL,
+        detectors: STATIC_FIELD,
         least: 1e-4,
         most: 3.0,
         setting: |s, x, _| s.with("level_db", [db(x)]).with("samples", [2.0]),
     },
-    Salt { id: effects::dc_offset::ID, detectors: STILL, least: 1e-6, most: 1.0, setting: |s, x, _| s.with("i", [x]) },
-    Salt { id: effects::if_highpass::ID, detectors: STILL, least: 1e3, most: 1e6, setting: |s, x, _| s.with("corner_hz", [x]) },
+    Salt { id: effects::dc_offset::ID, detectors: STATIC_FIELD, least: 1e-6, most: 1.0, setting: |s, x, _| s.with("i", [x]) },
+    Salt {
+        id: effects::if_highpass::ID,
+        detectors: STATIC_FIELD,
+        least: 1e3,
+        most: 1e6,
+        setting: |s, x, _| s.with("corner_hz", [x]),
+    },
     Salt {
         id: effects::spur::ID,
         detectors: &["spur"],

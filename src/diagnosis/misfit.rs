@@ -51,7 +51,7 @@ impl Sums {
 }
 
 impl Misfit {
-    /// The static part is what of the training mean can come from the room; the moving part of a cell is expected to
+    /// Static clutter is what of the training mean can come from the room; the moving part of a cell is expected to
     /// have the power that the same cell's neighbourhood predicts from body and noise.
     pub fn of(evidence: &Evidence) -> Self {
         Self::after(evidence, evidence)
@@ -165,35 +165,35 @@ fn log_sum(values: &[f64]) -> f64 {
 /// Static clutter, and the noise.
 struct Baseline {
     /// `[channel][doppler · range]`
-    still: Vec<Vec<Complex64>>,
+    clutter: Vec<Vec<Complex64>>,
     /// By channel.
     variance: Vec<f64>,
 }
 
 impl Baseline {
-    /// `more`: stands still besides what can come from the room, `[channel · sample]`.
+    /// `more`: static besides what can come from the room, `[channel · sample]`.
     fn new(evidence: &Evidence, support: &Support, more: Option<&[Complex64]>, noise: &[f64]) -> Self {
         let [_, _, _, loops, samples] = evidence.cube.dims;
         let of_channel = |channel: usize| {
             let of = channel * samples..(channel + 1) * samples;
-            let mut chirp = support.project(&evidence.still()[of.clone()]);
+            let mut chirp = support.project(&evidence.clutter()[of.clone()]);
             if let Some(more) = more {
                 chirp.iter_mut().zip(&more[of]).for_each(|(room, more)| *room += more);
             }
             transform(&chirp.repeat(loops), samples)
         };
         let variance = noise.iter().map(|noise| noise.max(f64::MIN_POSITIVE)).collect();
-        Self { still: (0..evidence.cube.channels()).into_par_iter().map(of_channel).collect(), variance }
+        Self { clutter: (0..evidence.cube.channels()).into_par_iter().map(of_channel).collect(), variance }
     }
 
     fn law<'a>(&'a self, channel: usize, moving: &'a [f32], more: Option<&'a Vec<f32>>) -> Law<'a> {
-        Law { still: &self.still[channel], variance: self.variance[channel], moving, more }
+        Law { clutter: &self.clutter[channel], variance: self.variance[channel], moving, more }
     }
 }
 
 /// The law of a channel's cells: a circular Gaussian about static clutter.
 struct Law<'a> {
-    still: &'a [Complex64],
+    clutter: &'a [Complex64],
     variance: f64,
     /// Of what moves and of noise, over the noise.
     moving: &'a [f32],
@@ -207,12 +207,12 @@ impl Law<'_> {
 
     fn log_density(&self, cell: usize, measured: Complex64) -> f64 {
         let spread = self.spread(cell);
-        -(measured - self.still[cell]).norm_sqr() / spread - (std::f64::consts::PI * spread).ln()
+        -(measured - self.clutter[cell]).norm_sqr() / spread - (std::f64::consts::PI * spread).ln()
     }
 
     /// Expected.
     fn power(&self, cell: usize) -> f64 {
-        self.still[cell].norm_sqr() + self.spread(cell)
+        self.clutter[cell].norm_sqr() + self.spread(cell)
     }
 }
 
@@ -229,7 +229,7 @@ impl<'a> Explained<'a> {
         let quieter = recording.noise().iter().zip(explained.noise()).map(|(a, b)| a.min(*b));
         let removed = Removed::new(recording, explained, quieter.collect());
         let baseline = match &removed {
-            Some(removed) => Baseline::new(explained, support, Some(&removed.still), &removed.noise),
+            Some(removed) => Baseline::new(explained, support, Some(&removed.clutter), &removed.noise),
             None => Baseline::new(explained, support, None, explained.noise()),
         };
         Self { baseline, removed }
@@ -322,7 +322,7 @@ struct Removed<'a> {
     /// Variance by channel, of which powers are multiples.
     noise: Vec<f64>,
     /// Mean over the training frames, `[channel · sample]`.
-    still: Vec<Complex64>,
+    clutter: Vec<Complex64>,
     /// Mean power of the rest over the training frames, `[channel][doppler · range]`.
     usual: Vec<Vec<f32>>,
 }
@@ -334,8 +334,8 @@ impl<'a> Removed<'a> {
             return None;
         }
         let noise = noise.into_iter().map(|noise| noise.max(f64::MIN_POSITIVE)).collect();
-        let still = recording.still().iter().zip(explained.still()).map(|(before, after)| before - after).collect();
-        let mut removed = Self { recording, explained, noise, still, usual: vec![] };
+        let clutter = recording.clutter().iter().zip(explained.clutter()).map(|(before, after)| before - after).collect();
+        let mut removed = Self { recording, explained, noise, clutter, usual: vec![] };
         let training = &recording.split.training;
         let frames: Vec<usize> = training.iter().copied().step_by(training.len().div_ceil(MOST_TRAINING).max(1)).collect();
         let of_channel = |channel: usize| {
@@ -353,10 +353,10 @@ impl<'a> Removed<'a> {
     /// Range-Doppler map of the power of what was taken out of a frame beyond the mean.
     fn power(&self, frame: usize, channel: usize) -> Vec<f32> {
         let samples = self.recording.cube.dims[4];
-        let still = self.still[channel * samples..][..samples].iter().cycle();
+        let clutter = self.clutter[channel * samples..][..samples].iter().cycle();
         let (before, after) = (self.recording.cube.channel(frame, channel), self.explained.cube.channel(frame, channel));
         let moving: Vec<Complex64> =
-            before.iter().zip(after).zip(still).map(|((before, after), still)| before - after - still).collect();
+            before.iter().zip(after).zip(clutter).map(|((before, after), clutter)| before - after - clutter).collect();
         transform(&moving, samples).iter().map(|value| (value.norm_sqr() / self.noise[channel]) as f32).collect()
     }
 

@@ -6,8 +6,8 @@ use crate::diagnosis::{Candidate, Correction, Place, Volume};
 use crate::effects::Stage;
 use crate::radar::Radar;
 
-/// A return that stands still, whose samples have an image where nothing can stand.
-fn still(image: Complex64) -> Evidence {
+/// A static return, whose samples have an image where no reflector can be.
+fn static_return(image: Complex64) -> Evidence {
     let mut radar = Radar::small(12);
     (radar.loops_per_frame, radar.samples_per_chirp) = (16, 64);
     let mut evidence = Evidence::in_noise(radar, 3, |[.., n]| Complex64::cis(0.8 * n as f64) * 30.0);
@@ -27,7 +27,7 @@ fn without(image: Complex64) -> Candidate {
         choice: None,
         place: Place::at(Stage::Receiver),
         p_value: 0.0,
-        gain: 0.0,
+        nats: 0.0,
         errs_alike: false,
         look_alikes: vec![],
         statement: String::new(),
@@ -40,7 +40,7 @@ fn without(image: Complex64) -> Candidate {
 #[test]
 fn a_law_that_is_inverted_leaves_what_there_was_without_it() {
     let image = Complex64::new(0.06, -0.08);
-    let (with, clean) = (still(image), Misfit::of(&still(Complex64::ZERO)));
+    let (with, clean) = (static_return(image), Misfit::of(&static_return(Complex64::ZERO)));
     let before = Misfit::of(&with);
     let after = |image: Complex64| Misfit::after(&with, &with.with(&without(image))).loglik_per_sample;
     // As a density of what was recorded: its volumes were shrunk by 1 − |μ|².
@@ -53,7 +53,7 @@ fn a_law_that_is_inverted_leaves_what_there_was_without_it() {
 
 #[test]
 fn a_stretch_changes_no_likelihood_but_by_its_volume() {
-    let with = still(Complex64::ZERO);
+    let with = static_return(Complex64::ZERO);
     let twice = |cube: &mut Cube| cube.samples.iter_mut().for_each(|value| *value *= 2.0);
     for volume in [Volume::BY_SAMPLE, Volume { alike: 2.0 * 2f64.ln(), ..Volume::KEPT }] {
         let candidate =

@@ -23,7 +23,7 @@ pub mod misfit;
 pub mod never;
 pub mod null;
 pub mod prediction;
-mod remains;
+mod residual;
 pub mod report;
 pub mod score;
 pub mod select;

@@ -18,8 +18,8 @@ const NEVER: [Never; 5] = [
     Never {
         ids: &[effects::start_frequency_error::ID, effects::adc_start_error::ID, effects::if_delay::ID],
         of_the_tracked: false,
-        reason: "all three only turn every return by a phase in proportion to its delay, and phases of returns are free: millimetres of the \
-         mesh and of the room do the same; they would show only if known ranges were good to a fiftieth of a millimetre",
+        reason: "it only turns every return by a phase in proportion to its delay, and phases of returns are free: millimetres of the \
+         mesh and of the room do the same; it would show only if known ranges were good to a fiftieth of a millimetre",
     },
     Never {
         ids: &[effects::antenna_pattern::ID],

@@ -57,7 +57,7 @@ pub struct BodyPrediction {
     pub tracks: Vec<Track>,
     /// The frames that would follow, as far as the motion goes: a recording that lost some shows them.
     pub beyond: Vec<(Vec<Point>, Track)>,
-    /// In which ways it is seen again.
+    /// Ways by which replicas of it are seen.
     pub echoes: Vec<Echo>,
 }
 
@@ -108,8 +108,8 @@ impl BodyPrediction {
 
     /// Points with what is seen of them by longer ways.
     pub fn with_echoes(&self, radar: &Radar, mut points: Vec<Point>, more: Option<Echo>) -> Vec<Point> {
-        let again: Vec<Point> = self.echoes.iter().chain(&more).flat_map(|echo| echo.points(radar, &points)).collect();
-        points.extend(again);
+        let replicas: Vec<Point> = self.echoes.iter().chain(&more).flat_map(|echo| echo.points(radar, &points)).collect();
+        points.extend(replicas);
         points
     }
 

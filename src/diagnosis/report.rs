@@ -206,9 +206,9 @@ impl HeldOut {
 pub fn moving_energy(evidence: &super::Evidence) -> f64 {
     let cube = &evidence.cube;
     let all: Vec<usize> = (0..cube.dims[0]).collect();
-    let still: f64 = cube.still(&all).iter().map(|value| value.norm_sqr()).sum();
+    let clutter_energy: f64 = cube.clutter(&all).iter().map(|value| value.norm_sqr()).sum();
     let total: f64 = cube.samples.iter().map(|value| value.norm_sqr()).sum();
-    total - still * (cube.dims[0] * cube.dims[3]) as f64
+    total - clutter_energy * (cube.dims[0] * cube.dims[3]) as f64
 }
 
 /// With a capital in front and a stop behind.
@@ -276,7 +276,7 @@ impl Effect {
             parameters,
             place,
             evidence: Evidence {
-                held_out_loglik_gain: candidate.gain,
+                held_out_loglik_gain: candidate.nats,
                 held_out_db_mse_before: accepted.before.db_mse,
                 held_out_db_mse_after: accepted.after.db_mse,
                 p_value: candidate.p_value,
@@ -303,7 +303,7 @@ impl Findings {
         let mut effects = vec![];
         let mut unexplained = vec![];
         let mut accepted: Vec<&Accepted> = explanation.accepted.iter().collect();
-        accepted.sort_by(|a, b| b.candidate.gain.total_cmp(&a.candidate.gain));
+        accepted.sort_by(|a, b| b.candidate.nats.total_cmp(&a.candidate.nats));
         for effect in accepted {
             let candidate = &effect.candidate;
             match candidate.id {
@@ -314,7 +314,7 @@ impl Findings {
                     behaves_like: candidate.behaves_like.words().into(),
                     fraction_of_energy_db: decibels(candidate.energy / moving_energy.max(f64::MIN_POSITIVE)),
                     statement: sentence(&candidate.statement),
-                    held_out_loglik_gain: candidate.gain,
+                    held_out_loglik_gain: candidate.nats,
                 }),
             }
         }

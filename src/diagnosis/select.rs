@@ -1,7 +1,7 @@
 //! Rounds: all detectors look, the best explanation is accepted and taken into account, all look again.
 //!
 //! A finding must be significant (family-wise over all detectors and places) *and* predict held-out frames better. What
-//! was accepted early may only have mimicked what was found later, so at the end each one is asked to stand again with
+//! was accepted early may only have mimicked what was found later, so at the end each one is refit with
 //! all others taken into account.
 
 mod precedence;
@@ -16,8 +16,8 @@ use super::detectors::{DETECTORS, Detector, by_detector, smallest_bound};
 use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
-use super::remains::{
-    ROUGHLY, is_by_chirp, is_left_by, is_of_noise, is_of_receivers, is_of_remains, is_product, is_rough, is_same,
+use super::residual::{
+    ROUGHLY, is_by_chirp, is_left_by, is_of_noise, is_of_receivers, is_of_residual, is_product, is_rough, is_same,
 };
 use precedence::{is_displaced, is_echo, upstream};
 use said::{candidates, said_by};
@@ -29,7 +29,7 @@ impl DiagnosisConfig {
     }
 
     /// What has no name may be anything, so it must gain more, half as much more where chance cannot have made it. `untouched`:
-    /// what was taken out of a recording leaves remains, which chance has not made either.
+    /// what was subtracted from a recording leaves a residual, which chance has not made either.
     pub(super) fn passes(&self, detector: usize, candidate: &Candidate, untouched: bool) -> bool {
         let sure = untouched && candidate.p_value < NO_CHANCE;
         let least = match candidate.id {
@@ -41,8 +41,8 @@ impl DiagnosisConfig {
         // that were not fitted exceeds e^gain by chance with a probability of e^-gain at most. Not where the body's prediction has
         // a part: what errs in it errs in held-out frames alike; nor where the frames that predict are those of the p-value.
         let surplus = untouched && !candidate.errs_alike && !DETECTORS[detector].predicts_all_frames;
-        let surplus = if surplus { (candidate.gain - least).exp().clamp(1.0, MOST_SURPLUS) } else { 1.0 };
-        candidate.p_value <= self.p_value(detector) * surplus && candidate.gain >= least && candidate.gain.is_finite()
+        let surplus = if surplus { (candidate.nats - least).exp().clamp(1.0, MOST_SURPLUS) } else { 1.0 };
+        candidate.p_value <= self.p_value(detector) * surplus && candidate.nats >= least && candidate.nats.is_finite()
     }
 }
 
@@ -126,7 +126,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
     // What changes neither samples nor prediction, such as a law of the noise, gains what its own test says.
     let held_out = original.split.held_out.len() * original.cube.channels() * original.cube.dims[3] * original.range_bins();
     let unseen = accepted.iter().filter(|effect| matches!(effect.candidate.correction, Correction::None));
-    after.loglik_per_sample += unseen.map(|effect| effect.candidate.gain).sum::<f64>() / held_out.max(1) as f64;
+    after.loglik_per_sample += unseen.map(|effect| effect.candidate.nats).sum::<f64>() / held_out.max(1) as f64;
     let (bound, detectors) = first_bounds.unwrap_or((1.0, BTreeMap::new()));
     Explanation { accepted, evidence, bound, detectors, before, after }
 }
@@ -158,7 +158,7 @@ impl Rounds<'_> {
         self.first_bounds.get_or_insert_with(|| (smallest_bound(&found), by_detector(&found)));
         if self.at_first.is_none() {
             let passing = found.iter().filter(|candidate| self.passes(candidate));
-            self.at_first = Some(passing.filter_map(|(_, candidate)| Some((candidate.id?, candidate.gain))).collect());
+            self.at_first = Some(passing.filter_map(|(_, candidate)| Some((candidate.id?, candidate.nats))).collect());
         }
         let passing = self.passing(evidence, &found);
         if let Some(last) = self.accepted.last_mut() {
@@ -229,10 +229,10 @@ impl Rounds<'_> {
     }
 
     /// What a radar that vibrates leaves, or paths of what differs between receivers, or that of their noise, is less than there
-    /// was before; and a tone, a product or a law of the noise that was there before is no remains. What has no name was there before,
+    /// was before; and a tone, a product or a law of the noise that was there before is no residual. What has no name was there before,
     /// too, and bent what differs between receivers as much as what is left of it does.
     fn was_there(&self, effect: &Accepted, candidate: &Candidate) -> bool {
-        let as_much = |&(id, gain): &(&str, f64)| candidate.id == Some(id) && candidate.gain > NEARLY * gain;
+        let as_much = |&(id, gain): &(&str, f64)| candidate.id == Some(id) && candidate.nats > NEARLY * gain;
         let vibrates = effect.candidate.id == Some(effects::radar_vibration::ID);
         let of_receivers = is_of_receivers(candidate) && effect.candidate.id.is_some() || is_of_receivers(&effect.candidate);
         (vibrates || of_receivers || candidate.id == Some(effects::spur::ID) || is_product(candidate) || is_of_noise(candidate))
@@ -244,7 +244,7 @@ impl Rounds<'_> {
 fn strongest<'a>(passing: &[&'a (usize, Candidate)]) -> Option<&'a (usize, Candidate)> {
     let order = |(detector, candidate): &(usize, Candidate)| {
         let detector = &DETECTORS[*detector];
-        let worth = if is_rough(candidate) { ROUGHLY * candidate.gain } else { candidate.gain };
+        let worth = if is_rough(candidate) { ROUGHLY * candidate.nats } else { candidate.nats };
         (detector.last_in_chain, !detector.last_resort, worth)
     };
     let strongest_of = |may: fn(&Detector) -> bool| {
@@ -275,12 +275,12 @@ fn settle_rivals(last: &mut Accepted, pending: &[Candidate], passing: &[&(usize,
     for rival in pending {
         let Some(id) = rival.id else { continue };
         // Without the body at its place, echoes of it are as strong as the body.
-        if is_displaced(&last.candidate) && (is_echo(rival) || is_of_remains(rival)) {
+        if is_displaced(&last.candidate) && (is_echo(rival) || is_of_residual(rival)) {
             continue;
         }
         let silent = !passing.iter().any(|(_, candidate)| candidate.id == Some(id));
         if silent && Some(id) != last.candidate.id {
-            let behind = last.candidate.gain - rival.gain;
+            let behind = last.candidate.nats - rival.nats;
             weight += (-behind).exp().min(1.0);
             if behind <= thresholds.tie && !last.rivals.contains(&id) {
                 last.rivals.push(id);
@@ -290,7 +290,7 @@ fn settle_rivals(last: &mut Accepted, pending: &[Candidate], passing: &[&(usize,
     last.probability = 1.0 / weight;
 }
 
-/// Asks everyone accepted to stand again with all others taken into account; the rest keep the parameters of this last
+/// Refits every accepted one with all others taken into account; what is found keeps the parameters of this last
 /// fit. Whoever falls only because somebody later is there competes with that one: the one that gains more alone stays.
 fn verified(original: &Evidence, mut accepted: Vec<Accepted>, thresholds: &DiagnosisConfig) -> Vec<Accepted> {
     if accepted.len() < 2 {
@@ -302,15 +302,15 @@ fn verified(original: &Evidence, mut accepted: Vec<Accepted>, thresholds: &Diagn
         if DETECTORS[accepted[index].detector].last_in_chain {
             continue;
         }
-        if let Some(candidate) = again(original, &accepted, index, &[], thresholds) {
+        if let Some(candidate) = refit(original, &accepted, index, &[], thresholds) {
             accepted[index].candidate = candidate;
             continue;
         }
         // The latest first: what came last is the most likely to be a remainder.
         let rival = (index + 1..accepted.len()).rev().find_map(|other| {
-            let alone = again(original, &accepted, index, &[other], thresholds)?;
-            let other_alone = again(original, &accepted, other, &[index], thresholds).map_or(0.0, |other| other.gain);
-            (alone.gain > other_alone).then_some((other, alone))
+            let alone = refit(original, &accepted, index, &[other], thresholds)?;
+            let other_alone = refit(original, &accepted, other, &[index], thresholds).map_or(0.0, |other| other.nats);
+            (alone.nats > other_alone).then_some((other, alone))
         });
         match rival {
             Some((other, alone)) => {
@@ -325,8 +325,8 @@ fn verified(original: &Evidence, mut accepted: Vec<Accepted>, thresholds: &Diagn
     accepted
 }
 
-/// What one of the accepted says once more when all others but some are taken into account.
-fn again(
+/// One of the accepted, refit with all others but some taken into account.
+fn refit(
     original: &Evidence,
     accepted: &[Accepted],
     index: usize,
@@ -347,7 +347,7 @@ fn again(
             && thresholds.passes(effect.detector, candidate, true)
     };
     let found = said_by(effect.detector, &evidence).into_iter().filter(same);
-    found.max_by(|a, b| a.gain.total_cmp(&b.gain))
+    found.max_by(|a, b| a.nats.total_cmp(&b.nats))
 }
 
 impl Evidence {

@@ -99,7 +99,7 @@ pub fn before_and_after(
         None => train(&config, &learning, "without")?,
     };
     let before = Held::of(&recordings[0], &baseline, &held_out, start.seed)?;
-    // What the checkpoint knows already stays, unless it was found again.
+    // What the checkpoint knows already stays, unless it was found anew.
     let known = config.effects.iter().filter(|known| effects.iter().all(|found| found.id != known.id)).cloned();
     let with = SimulatorConfig { effects: known.chain(effects.iter().cloned()).collect(), ..config.clone() };
     let after = match effects {

@@ -12,7 +12,7 @@ use super::tables::tables;
 use super::variants::Variant;
 use crate::data::{atomic, files};
 use crate::error::Result;
-use crate::pictures::{Chart, Series};
+use crate::pictures::{Chart, Scale, Series};
 use crate::text::shown;
 use crate::training::EpochMetrics;
 
@@ -82,18 +82,15 @@ fn stability(results: &Results) -> [Chart; 2] {
     let chart = |what: &str, unit: &str, value: fn(&EpochMetrics) -> Option<f64>| Chart {
         title: format!("Largest {what} of a step"),
         x_label: "epoch".into(),
-        y_label: format!("log10 of the largest {what}{unit}"),
+        y_label: format!("largest {what}{unit}"),
+        x_scale: Scale::Linear,
+        y_scale: Scale::Log,
         series: results
             .stability
             .iter()
             .map(|found| Series {
                 name: if found.variant == Variant::WithoutGcn { "without GCN" } else { "with GCN" }.into(),
-                points: found
-                    .run
-                    .history
-                    .iter()
-                    .filter_map(|epoch| Some([(epoch.epoch + 1) as f64, value(epoch)?.log10()]))
-                    .collect(),
+                points: found.run.history.iter().filter_map(|epoch| Some([(epoch.epoch + 1) as f64, value(epoch)?])).collect(),
             })
             .collect(),
     };
@@ -108,13 +105,15 @@ fn few(results: &Results) -> Chart {
             .few
             .iter()
             .filter(|found| found.material == material)
-            .map(|found| [(found.recordings as f64).log2(), 100.0 * found.recognised.accuracy.value])
+            .map(|found| [found.recordings as f64, 100.0 * found.recognised.accuracy.value])
             .collect(),
     };
     Chart {
         title: "Recognition from few recordings".into(),
-        x_label: "log2(recordings of each action)".into(),
+        x_label: "recordings of each action".into(),
         y_label: "accuracy (%)".into(),
+        x_scale: Scale::Log,
+        y_scale: Scale::Linear,
         series: Material::ALL.map(curve).to_vec(),
     }
 }
@@ -124,11 +123,7 @@ fn adaptation(results: &Results) -> Option<Chart> {
     let psnr = |found: &MethodResults| Some(found.intra.as_ref()?.moving.as_ref()?.psnr_db.mean);
     let curve = |name: &str, frames: fn(Method) -> Option<usize>| Series {
         name: name.into(),
-        points: results
-            .methods
-            .iter()
-            .filter_map(|found| Some([(frames(found.method)? as f64 + 1.0).log2(), psnr(found)?]))
-            .collect(),
+        points: results.methods.iter().filter_map(|found| Some([frames(found.method)? as f64, psnr(found)?])).collect(),
     };
     let series = vec![
         curve("adapted from the first room", |method| match method {
@@ -142,8 +137,10 @@ fn adaptation(results: &Results) -> Option<Chart> {
     ];
     series.iter().any(|series| series.points.len() > 1).then(|| Chart {
         title: "Second room, held-out frames, static removed".into(),
-        x_label: "log2(1 + frames learned from)".into(),
+        x_label: "frames learned from".into(),
         y_label: "PSNR (dB)".into(),
+        x_scale: Scale::LogOfCounts,
+        y_scale: Scale::Linear,
         series,
     })
 }

@@ -4,8 +4,13 @@ use std::path::Path;
 
 use plotters::prelude::*;
 
-use super::{INK, letters, save, tick};
+use super::heatmap::under;
+use super::{Area, DrawResult, INK, Scale, letters, save};
 use crate::error::Result;
+
+/// Heights of the line of names and of the title, pixels.
+const LEGEND_HEIGHT: u32 = 34;
+const TITLE_HEIGHT: u32 = 44;
 
 /// One curve.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +26,8 @@ pub struct Chart {
     /// What the axes show, with unit: "time (s)".
     pub x_label: String,
     pub y_label: String,
+    pub x_scale: Scale,
+    pub y_scale: Scale,
     pub series: Vec<Series>,
 }
 
@@ -35,16 +42,24 @@ const COLOURS: [RGBColor; 6] = [
 ];
 
 impl Chart {
-    /// Write the chart as PNG. Points that are not finite are gaps.
+    /// Write the chart as PNG. Points that are not finite, and those that the scale has no place for, are gaps.
     pub fn save(&self, path: &Path) -> Result<()> {
         save(path, (900, 560), |area| {
-            let mut chart = ChartBuilder::on(area)
-                .caption(&self.title, letters(26))
+            let area = under(area, &self.title, 26, TITLE_HEIGHT)?;
+            let area = match self.drawn().count() {
+                0 | 1 => area,
+                _ => {
+                    let (names, rest) = area.split_vertically(LEGEND_HEIGHT);
+                    self.draw_names(&names)?;
+                    rest
+                }
+            };
+            let mut chart = ChartBuilder::on(&area)
                 .margin(14)
                 .margin_right(28)
                 .x_label_area_size(54)
                 .y_label_area_size(80)
-                .build_cartesian_2d(self.span(0), self.span(1))?;
+                .build_cartesian_2d(self.x_scale.axis(self.span(0)), self.y_scale.axis(self.span(1)))?;
             chart
                 .configure_mesh()
                 .x_desc(&self.x_label)
@@ -54,37 +69,53 @@ impl Chart {
                 .axis_style(INK)
                 .bold_line_style(BLACK.mix(0.12))
                 .light_line_style(TRANSPARENT)
-                .x_label_formatter(&tick)
-                .y_label_formatter(&tick)
+                .x_label_formatter(&|place| self.x_scale.label(*place))
+                .y_label_formatter(&|place| self.y_scale.label(*place))
                 .draw()?;
-            for (series, colour) in self.series.iter().zip(COLOURS.iter().cycle()) {
-                for (index, part) in series.points.split(|point| !finite(point)).filter(|part| !part.is_empty()).enumerate() {
-                    let line = LineSeries::new(part.iter().map(|&[x, y]| (x, y)), colour.stroke_width(2));
-                    let drawn = chart.draw_series(line)?;
-                    if index == 0 {
-                        let stroke = colour.stroke_width(3);
-                        drawn.label(&series.name).legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], stroke));
+            for (series, colour) in self.drawn() {
+                let places: Vec<[f64; 2]> = series.points.iter().map(|point| self.place(point)).collect();
+                for part in places.split(|point| !finite(point)) {
+                    match part {
+                        // A line of one point is none.
+                        [[x, y]] => drop(chart.draw_series([Circle::new((*x, *y), 4, colour.filled())])?),
+                        _ => drop(chart.draw_series(LineSeries::new(part.iter().map(|&[x, y]| (x, y)), colour.stroke_width(2)))?),
                     }
                 }
-            }
-            if self.series.len() > 1 {
-                chart
-                    .configure_series_labels()
-                    .position(SeriesLabelPosition::UpperRight)
-                    .label_font(letters(18))
-                    .background_style(WHITE.mix(0.85))
-                    .border_style(BLACK.mix(0.2))
-                    .margin(10)
-                    .legend_area_size(30)
-                    .draw()?;
             }
             Ok(())
         })
     }
 
-    /// From the smallest to the largest number of an axis, with some air above and below for y.
+    /// The curves' names in one line, where no curve is.
+    fn draw_names(&self, area: &Area<'_>) -> DrawResult {
+        const STROKE: i32 = 26;
+        const GAP: i32 = 8;
+        let style = letters(18);
+        let middle = area.dim_in_pixel().1 as i32 / 2;
+        let mut left = 94;
+        for (series, colour) in self.drawn() {
+            let (width, height) = area.estimate_text_size(&series.name, &style)?;
+            area.draw(&PathElement::new([(left, middle), (left + STROKE, middle)], colour.stroke_width(3)))?;
+            area.draw_text(&series.name, &style, (left + STROKE + GAP, middle - height as i32 / 2))?;
+            left += STROKE + width as i32 + 3 * GAP;
+        }
+        Ok(())
+    }
+
+    /// Curves that have a point, and their colours.
+    fn drawn(&self) -> impl Iterator<Item = (&Series, &'static RGBColor)> {
+        let has_point = |series: &Series| series.points.iter().any(|point| finite(&self.place(point)));
+        self.series.iter().zip(COLOURS.iter().cycle()).filter(move |(series, _)| has_point(series))
+    }
+
+    fn place(&self, point: &[f64; 2]) -> [f64; 2] {
+        [self.x_scale.place(point[0]), self.y_scale.place(point[1])]
+    }
+
+    /// From the smallest to the largest place of an axis, with some air above and below for y.
     fn span(&self, axis: usize) -> std::ops::Range<f64> {
-        let values = self.series.iter().flat_map(|series| &series.points).filter(|point| finite(point)).map(|point| point[axis]);
+        let places = self.series.iter().flat_map(|series| &series.points).map(|point| self.place(point));
+        let values = places.filter(finite).map(|point| point[axis]);
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         if low > high {
             return 0.0..1.0;
@@ -106,7 +137,8 @@ mod tests {
 
     fn chart(points: Vec<[f64; 2]>) -> Chart {
         let series = vec![Series { name: "training".into(), points }];
-        Chart { title: "loss".into(), x_label: "step".into(), y_label: "loss".into(), series }
+        let [x_scale, y_scale] = [Scale::Linear; 2];
+        Chart { title: "loss".into(), x_label: "step".into(), y_label: "loss".into(), x_scale, y_scale, series }
     }
 
     #[test]

@@ -24,6 +24,21 @@ pub fn heatmap(path: &Path, title: &str, map_db: &Map, window: DbWindow) -> Resu
     })
 }
 
+/// The words over a comparison of two maps.
+#[derive(Clone, Copy, Debug)]
+pub struct Captions<'a> {
+    pub title: &'a str,
+    pub first: &'a str,
+    pub second: &'a str,
+}
+
+impl<'a> Captions<'a> {
+    /// Of a recording and its simulation.
+    pub fn simulated(title: &'a str) -> Self {
+        Self { title, first: "measured", second: "simulated" }
+    }
+}
+
 /// Measured, simulated, and simulated less measured.
 ///
 /// The window limits the first two, so that the difference does not count what neither shows; it spans ± half the window,
@@ -31,7 +46,7 @@ pub fn heatmap(path: &Path, title: &str, map_db: &Map, window: DbWindow) -> Resu
 ///
 /// # Panics
 /// When the shapes of the maps differ.
-pub fn comparison(path: &Path, title: &str, measured_db: &Map, simulated_db: &Map, window: DbWindow) -> Result<()> {
+pub fn comparison(path: &Path, captions: Captions<'_>, measured_db: &Map, simulated_db: &Map, window: DbWindow) -> Result<()> {
     assert_eq!(measured_db.dims(), simulated_db.dims(), "comparison: maps of different shapes");
     let within = |db: f64| db.clamp(window.low_db, window.high_db);
     let pairs = measured_db.values.iter().zip(&simulated_db.values);
@@ -39,16 +54,17 @@ pub fn comparison(path: &Path, title: &str, measured_db: &Map, simulated_db: &Ma
     let (levels, differences) =
         (Colours::sequential(window), Colours::diverging((0.5 * (window.high_db - window.low_db)).min(30.0)));
     save(path, (1760, 600), |area| {
-        let area = under(area, title, 26, TITLE_HEIGHT)?;
+        let area = under(area, captions.title, 26, TITLE_HEIGHT)?;
         let picture = (area.dim_in_pixel().0 - 2 * BAR_WIDTH) / 3;
         let (measured, rest) = area.split_horizontally(picture);
         let (simulated, rest) = rest.split_horizontally(picture);
         let (bar, rest) = rest.split_horizontally(BAR_WIDTH);
         let (third, last_bar) = rest.split_horizontally(picture);
-        draw_map(&under(&measured, "measured", 20, CAPTION_HEIGHT)?, measured_db, &levels)?;
-        draw_map(&under(&simulated, "simulated", 20, CAPTION_HEIGHT)?, simulated_db, &levels)?;
+        draw_map(&under(&measured, captions.first, 20, CAPTION_HEIGHT)?, measured_db, &levels)?;
+        draw_map(&under(&simulated, captions.second, 20, CAPTION_HEIGHT)?, simulated_db, &levels)?;
         draw_bar(&under(&bar, "", 20, CAPTION_HEIGHT)?, "dB", &levels)?;
-        draw_map(&under(&third, "simulated − measured", 20, CAPTION_HEIGHT)?, &difference, &differences)?;
+        let less = format!("({}) − ({})", captions.second, captions.first);
+        draw_map(&under(&third, &less, 20, CAPTION_HEIGHT)?, &difference, &differences)?;
         draw_bar(&under(&last_bar, "", 20, CAPTION_HEIGHT)?, "dB", &differences)
     })
 }
@@ -250,7 +266,7 @@ mod tests {
         let path = folder.path().join("difference.png");
         let mut simulated = map();
         simulated.values[20] = -50.0;
-        comparison(&path, "compared", &map(), &simulated, DbWindow { low_db: -80.0, high_db: 0.0 }).unwrap();
+        comparison(&path, Captions::simulated("compared"), &map(), &simulated, DbWindow { low_db: -80.0, high_db: 0.0 }).unwrap();
         let red = colorous::RED_BLUE.eval_continuous(0.0).as_array();
         let blue = colorous::RED_BLUE.eval_continuous(1.0).as_array();
         let (width, pixels) = pixels(&path);

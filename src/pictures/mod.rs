@@ -9,14 +9,16 @@ mod heatmap;
 mod overlay;
 pub mod page;
 mod panels;
+mod scale;
 mod window;
 
 pub use chart::{Chart, Series};
 pub use confusion::confusion;
 pub use grid::Grid;
-pub use heatmap::{comparison, heatmap};
+pub use heatmap::{Captions, comparison, heatmap};
 pub use overlay::{Line, overlay};
 pub use panels::{Panel, panels};
+pub use scale::Scale;
 pub use window::window;
 
 use std::{io, path::Path, sync::Once};
@@ -60,12 +62,17 @@ fn save(path: &Path, size: (u32, u32), draw: impl FnOnce(&Area<'_>) -> DrawResul
     })
 }
 
-/// Ticks without needless digits.
+/// Ticks without needless digits; thousands and millions as k and M, where plain numbers would be long.
 fn tick(value: &f64) -> String {
+    let (scale, suffix) = match value.abs() {
+        size if size >= 1e6 => (1e6, "M"),
+        size if size >= 1e4 => (1e3, "k"),
+        _ => (1.0, ""),
+    };
     // −0 reads as 0
-    let text = format!("{:.3}", value + 0.0);
+    let text = format!("{:.3}", value / scale + 0.0);
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.replace('-', "−") }
+    if text == "-0" { "0".into() } else { text.replace('-', "−") + suffix }
 }
 
 #[cfg(test)]
@@ -76,8 +83,8 @@ mod tests {
     #[test]
     fn ticks_have_no_needless_digits() {
         assert_eq!(
-            [0.0, -0.0, 2.5, -40.0, 100.0, 0.125, -0.0001].map(|v| tick(&v)),
-            ["0", "0", "2.5", "−40", "100", "0.125", "0"]
+            [0.0, -0.0, 2.5, -40.0, 100.0, 0.125, -0.0001, 9999.0, 350e3, -2.5e6].map(|v| tick(&v)),
+            ["0", "0", "2.5", "−40", "100", "0.125", "0", "9999", "350k", "−2.5M"]
         );
     }
 

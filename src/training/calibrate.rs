@@ -31,8 +31,8 @@ const ABOVE_NOISE: f64 = 30.0;
 struct Levels {
     measured_moving: f64,
     simulated_moving: f64,
-    measured_still: f64,
-    simulated_still: f64,
+    measured_clutter: f64,
+    simulated_clutter: f64,
     /// Of everything, whether or not it can be told apart.
     simulated: f64,
     /// Noise variance of one component of a sample, summed over frames.
@@ -66,7 +66,7 @@ pub fn fit_levels(
     levels.check()?;
     let ratio = |measured: f64, simulated: f64| (measured > 0.0 && simulated > 0.0).then(|| (measured / simulated).sqrt());
     let body = ratio(levels.measured_moving, levels.simulated_moving);
-    let room = ratio(levels.measured_still, levels.simulated_still);
+    let room = ratio(levels.measured_clutter, levels.simulated_clutter);
     // Where one of them cannot be told apart, the other's level is the best guess.
     let gains = simulator.config().equations.gains;
     let decoders = &mut simulator.decoders;
@@ -102,7 +102,7 @@ fn decode(plain: &Simulator, prepared: &[Prepared]) -> Vec<Surfaces> {
 
 impl Levels {
     fn measured(&self) -> f64 {
-        self.measured_moving + self.measured_still
+        self.measured_moving + self.measured_clutter
     }
 
     fn check(&self) -> Result<()> {
@@ -167,9 +167,9 @@ impl Levels {
                 self.simulated_moving += simulated;
             }
         }
-        let still = |signal: Complex<4>| values(signal.mean_dim(2).power()).iter().sum::<f64>();
-        self.measured_still += still(measured);
-        self.simulated_still += still(of_room);
+        let clutter = |signal: Complex<4>| values(signal.mean_dim(2).power()).iter().sum::<f64>();
+        self.measured_clutter += clutter(measured);
+        self.simulated_clutter += clutter(of_room);
         Ok(())
     }
 }

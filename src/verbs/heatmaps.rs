@@ -78,7 +78,13 @@ impl Pictures {
     fn compared(&self, folder: &Path, measured: &Heatmap, simulated: &Heatmap) -> Result<Drawn> {
         let file = folder.join(format!("{}.png", measured.name));
         let [measured_db, simulated_db] = [measured, simulated].map(|heatmap| self.db(&heatmap.map, &measured.map));
-        pictures::comparison(&file, measured.title, &measured_db, &simulated_db, pictures::window(&measured_db))?;
+        pictures::comparison(
+            &file,
+            pictures::Captions::simulated(measured.title),
+            &measured_db,
+            &simulated_db,
+            pictures::window(&measured_db),
+        )?;
         Ok((measured.title, file))
     }
 

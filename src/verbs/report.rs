@@ -16,7 +16,7 @@ use crate::{
     evaluation::{self, Evaluation, FrameMaps, Simulation, measured_frame},
     metrics::MetricsConfig,
     pictures::{
-        self, Chart, Series,
+        self, Chart, Scale, Series,
         page::{self, html, picture},
     },
     text::shown,
@@ -109,6 +109,8 @@ impl RunReport<'_> {
             title: "Loss".into(),
             x_label: "epoch".into(),
             y_label: format!("loss ({})", self.config.training.loss.scale.unit()),
+            x_scale: Scale::Linear,
+            y_scale: Scale::Linear,
             series: vec![
                 series("training", &|metrics| Some(metrics.training_loss)),
                 series("held out", &|metrics| metrics.validation_loss),
@@ -206,7 +208,13 @@ const PICTURES: [(&str, &str); 4] = [
 pub(crate) fn draw_frame(folder: &Path, which: &str, all: &FrameMaps, moving: &FrameMaps) -> Result<[PathBuf; 2]> {
     let draw = |name: &str, what: &str, maps: &FrameMaps| {
         let (file, title) = (folder.join(name), format!("Range-Doppler, {which}{what}"));
-        pictures::comparison(&file, &title, &maps.measured, &maps.simulated, pictures::window(&maps.measured))?;
+        pictures::comparison(
+            &file,
+            pictures::Captions::simulated(&title),
+            &maps.measured,
+            &maps.simulated,
+            pictures::window(&maps.measured),
+        )?;
         Ok(file)
     };
     Ok([draw("range_doppler.png", "", all)?, draw("range_doppler_moving.png", ", static removed", moving)?])

@@ -17,7 +17,7 @@ use crate::data::Recording;
 use crate::data::atomic::write_text;
 use crate::diagnosis::statistics::{binomial_interval, median};
 use crate::error::{Error, Result};
-use crate::pictures::{Panel, panels};
+use crate::pictures::{Panel, Scale, panels};
 use crate::text::shown;
 
 /// `dose.json`.
@@ -194,14 +194,15 @@ impl Dose {
         let of = |rows: &[Row]| {
             let point = |row: &Row| {
                 let share = (row.found + row.nameless) as f64 / row.copies.max(1) as f64;
-                [row.strength.log10(), share, row.interval[0], row.interval[1]]
+                [row.strength, share, row.interval[0], row.interval[1]]
             };
             let points: Vec<[f64; 4]> = rows.iter().map(point).collect();
-            let (low, high) = (points[0][0], points[points.len() - 1][0]);
+            let [low, high] = [points[0], points[points.len() - 1]].map(|point| point[0].log10());
             let logistic = self.curves.iter().find(|curve| curve.effect == rows[0].effect).map(|curve| curve.logistic);
             let along = (0..=100).map(|step| low + (high - low) * f64::from(step) / 100.0);
-            let curve = logistic.map_or(vec![], |law| along.map(|x| [x, law.at(x)]).collect());
-            Panel { title: rows[0].effect.clone(), x_label: format!("log10 of the strength ({})", rows[0].unit), points, curve }
+            let curve = logistic.map_or(vec![], |law| along.map(|x| [10f64.powf(x), law.at(x)]).collect());
+            let (title, x_label) = (rows[0].effect.clone(), format!("strength ({})", rows[0].unit));
+            Panel { title, x_label, x_scale: Scale::Log, points, curve }
         };
         self.rows.chunk_by(|a, b| a.effect == b.effect).map(of).collect()
     }

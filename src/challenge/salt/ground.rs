@@ -1,4 +1,4 @@
-//! What effects need to know of somebody's samples: their peak, their noise, their zero and their rail.
+//! What effects need to know of somebody's samples: their peak, their noise, their zero and their full scale.
 
 use num_complex::Complex64;
 
@@ -58,7 +58,7 @@ pub fn ground(recording: &Recording) -> Result<Ground> {
             largest = largest.max(value.re.abs()).max(value.im.abs());
         }
     }
-    Ok(Ground { peak, largest_component: largest, sigma: sigma(recording)?, zero, rail: rail(recording, &extent) })
+    Ok(Ground { peak, largest_component: largest, sigma: sigma(recording)?, zero, rail: full_scale(recording, &extent) })
 }
 
 /// The noise as a diagnosis estimates it, per component.
@@ -71,14 +71,14 @@ fn sigma(recording: &Recording) -> Result<f64> {
 }
 
 /// Smallest and largest code: as the radar states it, or those of 16 bits. Codes without a sign begin at zero.
-fn rail(recording: &Recording, extent: &Extent) -> Option<[f64; 2]> {
+fn full_scale(recording: &Recording, extent: &Extent) -> Option<[f64; 2]> {
     if !recording.holds_codes() {
         return None;
     }
     let unsigned = extent.low.iter().filter(|low| low.is_finite()).all(|low| *low >= 0.0);
     let largest =
         recording.radar.full_scale_codes.unwrap_or(f64::from(if unsigned { i32::from(u16::MAX) } else { i16::MAX.into() }));
-    // What was recorded was within the rail, whatever is stated.
+    // What was recorded was within the full scale, whatever is stated.
     let high = extent.high.into_iter().filter(|high| high.is_finite()).fold(largest, f64::max);
     Some([if unsigned { 0.0 } else { extent.low.into_iter().fold(-largest - 1.0, f64::min) }, high])
 }

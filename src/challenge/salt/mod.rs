@@ -3,7 +3,7 @@
 //! The way of a salted recording, in the order of the files:
 //! - [`offered`]: which effects samples alone can be given
 //! - [`plan`]: every effect at every grade
-//! - [`ground`]: peak, noise, zero and rail of the samples
+//! - [`ground`]: peak, noise, zero and full scale of the samples
 //! - [`background`], [`seal`], [`answer()`], here: what the recording says of itself; copies with effects, their truths locked away and
 //!   committed to; one process for each, which sees the copy alone
 //! - [`outcome`], [`dose`]: what a report says that the background does not, and how that grows with strength

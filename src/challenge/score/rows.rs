@@ -130,7 +130,7 @@ impl<'a> Groups<'a> {
             share("detected singles that are named at all", detected.iter().map(|case| case.all_found()), Aim::None),
             share("planted cases with a confident wrong name (overclaims)", planted().map(Case::overclaims), Aim::AtMost(0.05)),
             share(
-                "planted cases that name a twin as the only possibility",
+                "planted cases that name a look-alike as the only possibility",
                 planted().map(|case| !case.judgement.twins_overclaimed.is_empty()),
                 Aim::AtMost(0.02),
             ),

@@ -1,4 +1,4 @@
-//! Channels that hold nothing, and a converter at its rail.
+//! Channels that hold nothing, and ADC clipping.
 
 use num_complex::Complex64;
 
@@ -10,11 +10,11 @@ use crate::diagnosis::statistics::median;
 const NO_SIGNAL_DB: f64 = 20.0;
 
 /// Power of a channel's strongest static return over the noise of its mean.
-pub(super) fn strongest_still(evidence: &Evidence, channel: usize) -> f64 {
+pub(super) fn strongest_clutter(evidence: &Evidence, channel: usize) -> f64 {
     let samples = evidence.cube.dims[4];
     let loops = (evidence.cube.dims[3] * evidence.split.training.len()) as f64;
     let variance = evidence.noise()[channel].max(f64::MIN_POSITIVE);
-    let spectrum = spectrum(&evidence.still()[channel * samples..][..samples]);
+    let spectrum = spectrum(&evidence.clutter()[channel * samples..][..samples]);
     spectrum.into_iter().map(|value| value.norm_sqr() * loops / variance).fold(0.0, f64::max)
 }
 
@@ -42,7 +42,7 @@ pub(super) fn channels(evidence: &Evidence) -> Vec<Check> {
         }
     }
     if bad.is_empty() {
-        let returns: Vec<f64> = (0..evidence.cube.channels()).map(|channel| strongest_still(evidence, channel)).collect();
+        let returns: Vec<f64> = (0..evidence.cube.channels()).map(|channel| strongest_clutter(evidence, channel)).collect();
         let middle = median(&mut returns.clone());
         let no_signal = |&channel: &usize| {
             returns[channel] < RETURN && 10.0 * (middle / returns[channel].max(f64::MIN_POSITIVE)).log10() > NO_SIGNAL_DB
@@ -54,11 +54,11 @@ pub(super) fn channels(evidence: &Evidence) -> Vec<Check> {
 }
 
 /// Share of the sampled components that lie at the recording's extremes.
-pub(super) fn rail_share(evidence: &Evidence) -> f64 {
+pub(super) fn clipped_share(evidence: &Evidence) -> f64 {
     let [low, high] = evidence.extremes;
     // Half a code, or a hair of the range for samples that are no codes.
     let tolerance = if evidence.codes.is_some() { 0.5 } else { 1e-6 * (high - low) };
-    let at = |value: f64, rail: f64| (value - rail).abs() <= tolerance;
+    let at = |value: f64, level: f64| (value - level).abs() <= tolerance;
     // Of a receiver without quadrature, the imaginary part was never sampled.
     let sampled = if evidence.is_real() { 1 } else { 2 };
     let parts = evidence.cube.samples.iter().flat_map(|value| [value.re, value.im].into_iter().take(sampled));
@@ -70,10 +70,10 @@ pub(super) fn rail_share(evidence: &Evidence) -> f64 {
     count as f64 / all.max(1) as f64
 }
 
-/// Samples that pile up at a converter's rail.
-pub(super) fn rail(evidence: &Evidence) -> Check {
+/// Samples that pile up at the ADC's clipping level.
+pub(super) fn clipping(evidence: &Evidence) -> Check {
     let [low, high] = evidence.extremes;
-    let share = rail_share(evidence);
+    let share = clipped_share(evidence);
     // The extremes of a recording without clipping are reached once or twice.
     let ok = share < 1e-4;
     Check::new(

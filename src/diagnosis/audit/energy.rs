@@ -5,8 +5,8 @@ use crate::diagnosis::prediction::Point;
 use crate::diagnosis::statistics::ratio_tail;
 use crate::radar::Radar;
 
-/// Below that many Doppler cells, static clutter leaks.
-const STILL_CELLS: f64 = 2.5;
+/// Doppler cells about zero that static clutter leaks into.
+const CLUTTER_CELLS: f64 = 2.5;
 
 /// Count, sum, and sum of squares of ln power over the noise.
 #[derive(Clone, Copy, Debug, Default)]
@@ -108,14 +108,14 @@ impl Fit {
 pub(super) fn fit(evidence: &Evidence, shown: impl Fn(usize) -> Option<usize>, cell: impl Fn(&Point) -> Option<[f64; 2]>) -> Fit {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let Some(body) = &evidence.body else { return Fit::default() };
-    let moving: Vec<usize> = (0..loops).filter(|&row| row.min(loops - row) as f64 >= STILL_CELLS).collect();
+    let moving: Vec<usize> = (0..loops).filter(|&row| row.min(loops - row) as f64 >= CLUTTER_CELLS).collect();
     let of_frame = |frame: usize| {
         let points = shown(frame).and_then(|shown| body.frames.get(shown))?;
         let mut predicted = vec![false; loops * samples];
         for [range_m, velocity] in points.iter().filter_map(&cell) {
             let bin = (range_m / evidence.radar.range_resolution_m()).round() as i64;
             let doppler = velocity / evidence.radar.velocity_resolution_mps();
-            if doppler.abs() >= STILL_CELLS {
+            if doppler.abs() >= CLUTTER_CELLS {
                 let row = (doppler.round() as i64).rem_euclid(loops as i64) as usize;
                 predicted[row * samples + bin.rem_euclid(samples as i64) as usize] = true;
             }
@@ -140,7 +140,7 @@ pub fn range_and_velocity(point: &Point, radar: &Radar) -> [f64; 2] {
 
 /// Whether the body ever moves fast enough to be distinguished from static returns.
 pub(super) fn moves(evidence: &Evidence) -> bool {
-    let fast = STILL_CELLS * evidence.radar.velocity_resolution_mps();
+    let fast = CLUTTER_CELLS * evidence.radar.velocity_resolution_mps();
     let points = evidence.body.iter().flat_map(|body| body.frames.iter().flatten());
     points.map(|point| range_and_velocity(point, &evidence.radar)[1].abs()).any(|speed| speed > fast)
 }

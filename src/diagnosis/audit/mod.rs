@@ -17,7 +17,7 @@ mod room_ranges;
 
 use serde::{Deserialize, Serialize};
 
-use channels::{rail_share, strongest_still};
+use channels::{clipped_share, strongest_clutter};
 pub use placement::body_place;
 
 use super::cube::Loaded;
@@ -65,7 +65,7 @@ const FEWEST_SAMPLES: usize = 16;
 /// All checks. `origin_m`: of the motion, where it has one.
 pub fn audit(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<Check> {
     let mut checks = channels::channels(evidence);
-    checks.push(channels::rail(evidence));
+    checks.push(channels::clipping(evidence));
     checks.extend(body_in_room::body_in_room(evidence));
     checks.extend(placement::placement(evidence, origin_m));
     if !checks.iter().any(|check| !check.ok && is_convention(check)) {
@@ -122,11 +122,11 @@ pub fn undecidable(evidence: &Evidence, checks: &[Check]) -> Option<String> {
     if let Some(bad) = checks.iter().find(|check| check.check == "channels" && !check.ok) {
         return Some(format!("a channel holds no signal: {}", bad.found));
     }
-    let at_rail = rail_share(evidence);
-    if at_rail > SATURATED {
-        return Some(format!("saturated: {:.0} % of the samples lie at the ends of the converter's range", 100.0 * at_rail));
+    let clipped = clipped_share(evidence);
+    if clipped > SATURATED {
+        return Some(format!("saturated: {:.0} % of the samples lie at the ends of the converter's range", 100.0 * clipped));
     }
-    let strongest = (0..evidence.cube.channels()).map(|channel| strongest_still(evidence, channel)).fold(0.0, f64::max);
+    let strongest = (0..evidence.cube.channels()).map(|channel| strongest_clutter(evidence, channel)).fold(0.0, f64::max);
     let moving = evidence.maps().values().iter().copied().fold(0.0, f32::max);
     // The mean of many cells' strongest noise value is about its logarithm.
     if strongest < RETURN && moving < RETURN as f32 {

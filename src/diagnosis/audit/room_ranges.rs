@@ -14,7 +14,7 @@ pub(super) fn room_ranges(evidence: &Evidence) -> Option<Check> {
     let bin_of = |range: f64| (range / radar.range_resolution_m()) as usize;
     let (mut inside, mut beyond) = (0.0f64, 0.0f64);
     for channel in 0..evidence.cube.channels() {
-        let spectrum = spectrum(&evidence.still()[channel * samples..][..samples]);
+        let spectrum = spectrum(&evidence.clutter()[channel * samples..][..samples]);
         for (bin, value) in spectrum.iter().enumerate().take(evidence.range_bins()) {
             let range = bin as f64 * radar.range_resolution_m();
             if range > far + 0.6 && bin < bin_of(radar.max_range_m() * 0.9) {

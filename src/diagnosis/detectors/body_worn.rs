@@ -45,9 +45,9 @@ struct Found {
 fn find(evidence: &Evidence) -> Vec<Candidate> {
     let (Some(model), Some(body)) = (evidence.power(), evidence.body.as_ref()) else { return vec![] };
     let parts = body.parts.len();
-    // Remains of paths that were taken out are near the body, too, and in a copied frame the body is not where it is said to be.
-    let remains = paths::LEAVE_REMAINS.iter().any(|id| evidence.accepted.contains(id));
-    if parts < 2 || remains || body.centres.len() != body.frames.len() || !evidence.may_name(effects::carried_reflector::ID) {
+    // Residuals of paths that were subtracted are near the body, too, and in a copied frame the body is not where it is said to be.
+    let residual = paths::LEAVE_RESIDUAL.iter().any(|id| evidence.accepted.contains(id));
+    if parts < 2 || residual || body.centres.len() != body.frames.len() || !evidence.may_name(effects::carried_reflector::ID) {
         return vec![];
     }
     let skin: Vec<Vec<Template>> = (0..body.frames.len()).into_par_iter().map(|frame| skin(model, frame)).collect();
@@ -81,7 +81,7 @@ fn find(evidence: &Evidence) -> Vec<Candidate> {
         .filter(|other| other.part != best.part && gain(other) > NEARLY * gain(best))
         .map(|other| body.parts[other.part].as_str())
         .collect();
-    vec![Candidate { p_value, gain: nats * best.held_out, ..candidate(evidence, model, body, best, &others, &skin) }]
+    vec![Candidate { p_value, nats: nats * best.held_out, ..candidate(evidence, model, body, best, &others, &skin) }]
 }
 
 /// Of the whole body, by lobe.
@@ -175,7 +175,7 @@ fn candidate(
         choice: None,
         place: Place { body_part: Some(name.into()), ..place },
         p_value: 1.0,
-        gain: 0.0,
+        nats: 0.0,
         errs_alike: true,
         look_alikes: vec![effects::part_reflectivity::ID],
         statement: format!(
@@ -274,10 +274,10 @@ mod tests {
         let found = find(&evidence(1, 12.0));
         assert!(found.len() == 1 && found[0].id == Some(effects::carried_reflector::ID), "{found:?}");
         assert_eq!(found[0].place.body_part.as_deref(), Some("left_hand"));
-        assert!(found[0].p_value < 1e-6 && found[0].gain > 6.0, "{found:?}");
+        assert!(found[0].p_value < 1e-6 && found[0].nats > 6.0, "{found:?}");
         for seed in 2..8 {
             let found = find(&evidence(seed, 0.0));
-            assert!(found.iter().all(|found| found.p_value > 1e-3 || found.gain < 3.0), "{found:?}");
+            assert!(found.iter().all(|found| found.p_value > 1e-3 || found.nats < 3.0), "{found:?}");
         }
     }
 }

@@ -28,7 +28,7 @@ const SURE: f64 = 1e-3;
 struct Floor {
     /// Median over velocities, of the training frames.
     level: Vec<f64>,
-    still: Vec<f64>,
+    clutter: Vec<f64>,
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -50,23 +50,23 @@ impl Floor {
         let mean = |doppler: usize, bin: usize| mean_power(evidence, &evidence.split.training, doppler * samples + bin);
         let level =
             (0..bins).map(|bin| median(&mut moving(loops).map(|doppler| mean(doppler, bin)).collect::<Vec<_>>())).collect();
-        let mut still = vec![0.0; bins];
-        for (channel, chirp) in evidence.still().chunks_exact(samples).enumerate() {
+        let mut clutter = vec![0.0; bins];
+        for (channel, chirp) in evidence.clutter().chunks_exact(samples).enumerate() {
             let weight = (evidence.noise()[channel].max(f64::MIN_POSITIVE) * channels as f64).recip();
-            still.iter_mut().zip(spectrum(chirp)).for_each(|(sum, value)| *sum += weight * value.norm_sqr());
+            clutter.iter_mut().zip(spectrum(chirp)).for_each(|(sum, value)| *sum += weight * value.norm_sqr());
         }
-        Self { level, still }
+        Self { level, clutter }
     }
 
     /// Whether static returns elsewhere say that what is at a range is there alone.
     fn is_alone(&self, bin: usize, ends: [usize; 2]) -> bool {
-        let ratio = (self.level[bin] - 1.0) / self.still[bin].max(f64::MIN_POSITIVE);
+        let ratio = (self.level[bin] - 1.0) / self.clutter[bin].max(f64::MIN_POSITIVE);
         let (mut informative, mut denying) = (0, 0);
         let mut other = 0;
         while other < self.level.len() {
             // A phase of the oscillator grows with the delay at most in proportion.
             let nearer = ((other as f64 + 1.0) / (bin as f64 + 1.0)).min(1.0).powi(2);
-            let expected = ratio * self.still[other] * nearer;
+            let expected = ratio * self.clutter[other] * nearer;
             let aside = other + HANN_LOBE < ends[0] || other > ends[1] + HANN_LOBE;
             if !aside || expected < INFORMATIVE {
                 other += 1;
@@ -119,7 +119,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
             ..Place::at(Stage::Scene)
         },
         p_value,
-        gain,
+        nats: gain,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
@@ -195,7 +195,7 @@ mod tests {
         let evidence = evidence(true, 0.0, 0.0);
         let found = find(&evidence).pop().expect("a fan");
         assert_eq!(found.id, Some(effects::moving_reflector::ID));
-        assert!(found.p_value < 1e-9 && found.gain > 100.0, "{found:?}");
+        assert!(found.p_value < 1e-9 && found.nats > 100.0, "{found:?}");
         let bin_m = evidence.radar.range_resolution_m();
         let [low, high] = found.place.range_m.unwrap();
         assert!(low < 5.0 * bin_m && 5.0 * bin_m < high && high < 12.0 * bin_m, "{low} to {high}");

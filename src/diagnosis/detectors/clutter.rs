@@ -3,13 +3,13 @@
 use crate::diagnosis::evidence::{Evidence, transform};
 
 /// Power of static clutter over the noise of one frame's map, by range, mean over channels.
-pub fn still_power(evidence: &Evidence) -> Vec<f64> {
+pub fn clutter_power(evidence: &Evidence) -> Vec<f64> {
     let samples = evidence.cube.dims[4];
     let count = evidence.cube.channels() as f64;
     let mut power = vec![0.0; samples];
-    for (channel, still) in evidence.still().chunks_exact(samples).enumerate() {
+    for (channel, clutter) in evidence.clutter().chunks_exact(samples).enumerate() {
         // One loop: a window of unit energy is one, so that the Doppler transform does nothing.
-        let spectrum = transform(still, samples);
+        let spectrum = transform(clutter, samples);
         let noise = evidence.noise()[channel].max(f64::MIN_POSITIVE);
         power.iter_mut().zip(spectrum).for_each(|(sum, value)| *sum += value.norm_sqr() / (noise * count));
     }

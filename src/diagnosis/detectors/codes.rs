@@ -112,7 +112,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             }
         }
     }
-    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    found.sort_by(|a, b| b.nats.total_cmp(&a.nats));
     found.truncate(1);
     found
 }
@@ -140,7 +140,7 @@ fn candidate(evidence: &Evidence, component: &Component, bit: usize, share: f64,
         choice: None,
         place: Place { rx: Some(vec![rx]), ..Place::at(Stage::Receiver) },
         p_value: p_value.max(f64::MIN_POSITIVE),
-        gain,
+        nats: gain,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn a_stuck_bit_is_detected_and_a_coarse_converter_is_not() {
         let found = find(&evidence(|rx, code| if rx == 1 { code | 8 } else { code }));
-        assert!(found.len() == 1 && found[0].p_value < 1e-6 && found[0].gain > 20.0, "{found:?}");
+        assert!(found.len() == 1 && found[0].p_value < 1e-6 && found[0].nats > 20.0, "{found:?}");
         assert_eq!(found[0].place.rx, Some(vec![1]));
         assert!(found[0].statement.starts_with("Bit 3 "), "{}", found[0].statement);
         assert!(find(&evidence(|_, code| code)).is_empty());

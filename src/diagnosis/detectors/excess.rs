@@ -27,7 +27,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         choice: None,
         place: Place { stage: Some(Stage::Propagation), ..place.clone() },
         p_value: found.p_value,
-        gain: found.gain,
+        nats: found.gain,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(

@@ -106,21 +106,21 @@ fn shadow(evidence: &Evidence, free: &Free) -> Option<Candidate> {
         .filter_map(|&bin| {
             let series = returns.relative(bin, strong)?;
             let p_value = corrected(series.p_value(frames.training), behind.len() as f64);
-            let gain = evidence.split.held_out_share() * series.gain(frames);
-            let keeps = p_value < LEAST_LIKELY && gain > 0.0 && returns.same_pattern(bin, &series, frames.training);
-            keeps.then_some((bin, series, p_value, gain))
+            let nats = evidence.split.held_out_share() * series.nats(frames);
+            let keeps = p_value < LEAST_LIKELY && nats > 0.0 && returns.same_pattern(bin, &series, frames.training);
+            keeps.then_some((bin, series, p_value, nats))
         })
         .max_by(|a, b| a.3.total_cmp(&b.3))?;
-    let (bin, series, p_value, gain) = best;
+    let (bin, series, p_value, nats) = best;
     let seen = silhouette::seen(evidence, evidence.body.as_ref()?, bin as f64 * bin_m, 1.5 * bin_m)?;
-    series.follows(&seen, frames).then(|| candidate(evidence, bin, &series, p_value, gain))
+    series.follows(&seen, frames).then(|| candidate(evidence, bin, &series, p_value, nats))
 }
 
-fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, gain: f64) -> Candidate {
+fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, nats: f64) -> Candidate {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let bin_m = evidence.radar.range_resolution_m();
     let range_m = bin as f64 * bin_m;
-    let echo = around(evidence.still().to_vec(), samples, bin..=bin);
+    let echo = around(evidence.clutter().to_vec(), samples, bin..=bin);
     let own: f64 = echo.iter().map(|value| value.norm_sqr()).sum();
     let square: f64 = series.change.iter().map(|value| value.norm_sqr()).sum();
     let rms = (square / series.change.len() as f64).sqrt();
@@ -138,7 +138,7 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, gai
             ..Place::at(Stage::Propagation)
         },
         p_value: p_value.max(f64::MIN_POSITIVE),
-        gain,
+        nats,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(

@@ -62,7 +62,7 @@ impl Detector {
 
 /// All of them. Each answers on its own, within its family; the selection chooses between families.
 pub const DETECTORS: &[Detector] = &[
-    Detector::new("still field", receiver::still::find),
+    Detector::new("still field", receiver::additive::find),
     Detector::new("still field, room unknown", receiver::open::find),
     Detector { predicts_all_frames: true, of_all_received: true, ..Detector::new("operators of the library", score::find) },
     Detector { predicts_all_frames: true, ..Detector::new("non-linear receiver", receiver::harmonic::find) },

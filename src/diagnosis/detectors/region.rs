@@ -14,11 +14,11 @@ pub struct Region {
 }
 
 /// Doppler bins around zero where a Hann window leaves static clutter.
-pub const STILL_BINS: usize = 1;
+pub const CLUTTER_BINS: usize = 1;
 
 /// Whether a Doppler bin is none of those.
 pub fn moves(doppler: usize, loops: usize) -> bool {
-    doppler.min(loops - doppler) > STILL_BINS
+    doppler.min(loops - doppler) > CLUTTER_BINS
 }
 
 /// Mean of a cell of the maps, `doppler · samples + range`, over some frames.
@@ -77,9 +77,9 @@ pub fn run(evidence: &Evidence) -> usize {
 
 /// Consecutive frames of one channel as one, `[loop, sample]`, less static clutter over the training frames of this
 /// cube.
-pub fn joined(cube: &Cube, still: &[Complex64], frames: std::ops::Range<usize>, channel: usize) -> Vec<Complex64> {
+pub fn joined(cube: &Cube, clutter: &[Complex64], frames: std::ops::Range<usize>, channel: usize) -> Vec<Complex64> {
     let samples = cube.dims[4];
-    let mean = &still[channel * samples..][..samples];
+    let mean = &clutter[channel * samples..][..samples];
     frames
         .flat_map(|frame| cube.channel(frame, channel).chunks_exact(samples))
         .flat_map(|chirp| chirp.iter().zip(mean).map(|(value, mean)| value - mean))
@@ -87,17 +87,17 @@ pub fn joined(cube: &Cube, still: &[Complex64], frames: std::ops::Range<usize>, 
 }
 
 /// Subtracts from every run of frames what deviates, within the region, from static clutter over the training frames.
-/// That is the mean of the cube at hand: other things that stand still may have been taken away or may not.
+/// That is the mean of the cube at hand: other static returns may have been subtracted or may not.
 pub fn remove(cube: &mut Cube, training: &[usize], run: usize, region: Region) {
     let [frames, _, _, loops, samples] = cube.dims;
     let channels = cube.channels();
-    let still = cube.still(training);
+    let clutter = cube.clutter(training);
     let (fast, slow) = (tones(samples, region.range), tones(run * loops, region.doppler));
     let parts: Vec<(usize, usize)> = (0..frames / run).flat_map(|part| (0..channels).map(move |c| (part, c))).collect();
     let found: Vec<Vec<Complex64>> = parts
         .par_iter()
         .map(|&(part, channel)| {
-            let moving = joined(cube, &still, part * run..(part + 1) * run, channel);
+            let moving = joined(cube, &clutter, part * run..(part + 1) * run, channel);
             within(&moving, samples, &fast, &slow)
         })
         .collect();
@@ -149,7 +149,7 @@ mod tests {
         let left = |range: f64, doppler: f64| {
             let mut values = tone(range, doppler);
             values.extend(vec![Complex64::ZERO; loops * samples]);
-            // The second frame alone is for training: nothing stands still.
+            // The second frame alone is for training: there is no static clutter.
             let mut cube = Cube::new([2, 1, 1, loops, samples], values);
             remove(&mut cube, &[1], 1, region);
             cube.samples.iter().map(|v| v.norm_sqr()).sum::<f64>() / (loops * samples) as f64
@@ -161,16 +161,16 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_still_stays_whatever_was_known_of_it_before() {
+    fn static_clutter_stays_whatever_was_known_of_it_before() {
         let (loops, samples) = (8, 32);
-        let still = |i: usize| Complex64::cis(std::f64::consts::TAU * 4.3 * (i % samples) as f64 / samples as f64) * 1e3;
+        let clutter = |i: usize| Complex64::cis(std::f64::consts::TAU * 4.3 * (i % samples) as f64 / samples as f64) * 1e3;
         let slow =
             |i: usize| Complex64::cis(std::f64::consts::TAU * 3.0 * (i / samples % (2 * loops)) as f64 / (2 * loops) as f64);
-        let values: Vec<Complex64> = (0..4 * loops * samples).map(|i| still(i) + still(i) * 0.01 * slow(i)).collect();
+        let values: Vec<Complex64> = (0..4 * loops * samples).map(|i| clutter(i) + clutter(i) * 0.01 * slow(i)).collect();
         let mut cube = Cube::new([4, 1, 1, loops, samples], values);
         // The same mean over training frames as over all, because whole periods fit.
         remove(&mut cube, &[0, 1], 2, Region { range: [3.0, 6.0], doppler: [2.0, 4.0] });
-        let worst = cube.samples.iter().enumerate().map(|(i, v)| (v - still(i)).norm()).fold(0.0, f64::max);
-        assert!(worst < 0.5, "{worst} of a mover of 10 is left, or still returns of 1000 are gone");
+        let worst = cube.samples.iter().enumerate().map(|(i, v)| (v - clutter(i)).norm()).fold(0.0, f64::max);
+        assert!(worst < 0.5, "{worst} of a mover of 10 is left, or static returns of 1000 are gone");
     }
 }

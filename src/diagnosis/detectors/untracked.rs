@@ -11,7 +11,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::receiver::wandering;
-use super::region::{Region, STILL_BINS, joined, mean_power, moves, power_gain, remove, run};
+use super::region::{CLUTTER_BINS, Region, joined, mean_power, moves, power_gain, remove, run};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::{Evidence, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
@@ -189,7 +189,7 @@ impl<'a> Mover<'a> {
                 ..Place::at(Stage::Scene)
             },
             p_value,
-            gain,
+            nats: gain,
             errs_alike: false,
             look_alikes: vec![],
             statement: format!(
@@ -224,7 +224,7 @@ impl Stretch {
             .filter(|part| run > 1 || evidence.split.training.contains(part))
             .map(|part| {
                 let frames = part * run..(part + 1) * run;
-                let map = |c| transform(&joined(&evidence.cube, evidence.still(), frames.clone(), c), samples);
+                let map = |c| transform(&joined(&evidence.cube, evidence.clutter(), frames.clone(), c), samples);
                 (0..channels).map(map).collect()
             })
             .collect();
@@ -248,7 +248,7 @@ impl Stretch {
 
     /// Whether a cell moves in a direction (+1 or −1).
     fn moves(&self, doppler: i64, sign: i64) -> bool {
-        doppler * sign > STILL_BINS as i64 && 2 * doppler.abs() <= self.loops as i64
+        doppler * sign > CLUTTER_BINS as i64 && 2 * doppler.abs() <= self.loops as i64
     }
 
     /// Strongest cell near another that moves the same way.
@@ -383,7 +383,7 @@ mod tests {
             let found = find(&evidence);
             assert_eq!(found.len(), 1);
             let [low, high] = found[0].place.velocity_mps.unwrap();
-            assert!(found[0].p_value < 1e-6 && found[0].gain > 10.0, "{found:?}");
+            assert!(found[0].p_value < 1e-6 && found[0].nats > 10.0, "{found:?}");
             assert!(low < doppler * bin_mps && doppler * bin_mps < high && low * high > 0.0, "{low} to {high} m/s");
             evidence = evidence.with(&found[0]);
         }
@@ -391,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_seen_in_a_still_room() {
+    fn nobody_is_seen_in_a_static_room() {
         let found = find(&evidence(&[]));
         assert!(found.iter().all(|candidate| candidate.p_value > 5e-4), "{found:?}");
     }

@@ -12,8 +12,8 @@ const CLEARANCE_M: f64 = 0.3;
 const CLEARANCE_SHARE: f64 = 0.05;
 /// The window's main lobe, cells to each side.
 const LOBE: usize = 3;
-/// Power over that of the noise, from which on something stands still at a beat frequency: 10 dB, a factor of e^10 in likelihood.
-const STANDS: f64 = 10.0;
+/// Power over that of the noise, from which on there is a static return at a beat frequency: 10 dB, a factor of e^10 in likelihood.
+const STATIC_RETURN: f64 = 10.0;
 
 /// Round-trip beat frequency of a range.
 pub fn beat_hz(evidence: &Evidence, range_m: f64) -> f64 {
@@ -24,7 +24,7 @@ pub fn range_m(evidence: &Evidence, beat_hz: f64) -> f64 {
     beat_hz * SPEED_OF_LIGHT / (2.0 * evidence.radar.slope_hz_per_s)
 }
 
-/// Ranges of still surfaces: none unless the room is closed in front and on both sides.
+/// Ranges of static surfaces: none unless the room is closed in front and on both sides.
 pub fn ranges_m(evidence: &Evidence) -> Option<[f64; 2]> {
     let room = evidence.room.as_ref()?;
     room.front_m.and(room.left_m).and(room.right_m)?;
@@ -53,15 +53,15 @@ pub fn empty_bins(evidence: &Evidence) -> Vec<bool> {
     }
 }
 
-/// Beat frequencies at which nothing stands still, where nobody says how large the room is: what is there is below the noise of a chirp
+/// Beat frequencies without static clutter, where nobody says how large the room is: what is there is below the noise of a chirp
 /// by as much as all chirps together have less of it.
 pub fn quiet_bins(evidence: &Evidence) -> Vec<bool> {
     let [.., loops, samples] = evidence.cube.dims;
-    let spectra: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(spectrum).collect();
+    let spectra: Vec<Vec<Complex64>> = evidence.clutter().chunks_exact(samples).map(spectrum).collect();
     let chirps = (loops * evidence.split.training.len()).max(1) as f64;
     let is_quiet = |bin: usize| {
         let power = |(spectrum, noise): (&Vec<Complex64>, &f64)| spectrum[bin].norm_sqr() * chirps / noise.max(f64::MIN_POSITIVE);
-        spectra.iter().zip(evidence.noise()).map(power).sum::<f64>() < STANDS * spectra.len() as f64
+        spectra.iter().zip(evidence.noise()).map(power).sum::<f64>() < STATIC_RETURN * spectra.len() as f64
     };
     let quiet: Vec<bool> = (0..samples).map(is_quiet).collect();
     let beside = |bin: usize| (0..=2 * LOBE).all(|step| quiet[(bin + samples + step - LOBE) % samples]);

@@ -16,7 +16,7 @@ pub const PEAK_DB: f64 = 0.7;
 /// Static clutter and the range-Doppler cells that stand out, `[loop, sample]` of one frame and channel.
 pub fn channel(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Complex64> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let still = &evidence.still()[channel * samples..][..samples];
+    let clutter = &evidence.clutter()[channel * samples..][..samples];
     let mut moving = evidence.moving(frame, channel);
     // Without a window, so that the transform can be taken back; a cell's noise is the sum over the samples.
     let count = (loops * samples) as f64;
@@ -24,7 +24,7 @@ pub fn channel(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Complex
     fft_2d(&mut moving, samples, FftDirection::Forward);
     moving.iter_mut().filter(|value| value.norm_sqr() < least).for_each(|value| *value = Complex64::ZERO);
     fft_2d(&mut moving, samples, FftDirection::Inverse);
-    moving.iter().enumerate().map(|(i, value)| value / count + still[i % samples]).collect()
+    moving.iter().enumerate().map(|(i, value)| value / count + clutter[i % samples]).collect()
 }
 
 /// All channels of a frame, `[tx · rx][loop · sample]`.

@@ -18,8 +18,8 @@ use super::Evidence;
 use crate::diagnosis::prediction::{Point, range_and_velocity};
 use crate::radar::Radar;
 
-/// Doppler bins on either side of zero that hold remains of static clutter.
-pub const STILL_BINS: usize = 2;
+/// Doppler bins on either side of zero that hold residuals of static clutter.
+pub const CLUTTER_BINS: usize = 2;
 /// Expected power of a part, over the noise, from which on it counts as support.
 const SUPPORT_LEVEL: f32 = 0.1;
 /// Cells by which the support is widened: accelerations, errors of the mesh, speckle above its mean.
@@ -191,10 +191,8 @@ fn add(map: &mut [f32], template: &Template, weight: f64) {
 
 /// Cells that mean something, `[doppler, range]`: away from static clutter, and in range of the receiver.
 pub fn usable(cells: &Cells) -> Vec<bool> {
-    let far_from_still = |doppler: usize| cells.loops < 8 || doppler.min(cells.loops - doppler) > STILL_BINS;
-    (0..cells.loops * cells.samples)
-        .map(|cell| far_from_still(cell / cells.samples) && cell % cells.samples < cells.bins)
-        .collect()
+    let off_clutter = |doppler: usize| cells.loops < 8 || doppler.min(cells.loops - doppler) > CLUTTER_BINS;
+    (0..cells.loops * cells.samples).map(|cell| off_clutter(cell / cells.samples) && cell % cells.samples < cells.bins).collect()
 }
 
 /// Cells with body power, and their neighbours.

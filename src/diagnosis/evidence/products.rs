@@ -97,8 +97,8 @@ impl Products {
     }
 
     /// Square and magnitude squared, if the latter is there and nearly as large: no mere second harmonic and no second
-    /// trip. An oscillator that the signal pulls does it, or mixers whose I and Q are bent each on its own. Then nothing
-    /// that stands still, and no tone, is distinguishable from such a product.
+    /// trip. An oscillator that the signal pulls does it, or mixers whose I and Q are bent each on its own. Then no static
+    /// return, and no tone, is distinguishable from such a product.
     pub fn mixed(&self) -> Option<Vec<Law>> {
         let magnitude = self.magnitude.filter(|law| law.p_value < SURELY && law.gain > LEAST_GAIN)?;
         // A receiver that compresses leaves a little of it too.
@@ -155,18 +155,18 @@ fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool]) -> [Sums; 3] {
     for channel in 0..evidence.cube.channels() {
         let noise = evidence.noise()[channel].max(1e-300);
         let clean = denoised::channel(evidence, frame, channel);
-        let [found, still] = moving_and_still(evidence.cube.channel(frame, channel).to_vec(), samples);
+        let [found, clutter] = moving_and_clutter(evidence.cube.channel(frame, channel).to_vec(), samples);
         for (product, sums) in PRODUCTS.into_iter().zip(&mut sums) {
             let scale = product.scale(evidence.peak());
             let template = clean.iter().map(|value| product.of(*value) * scale).collect();
-            let [expected, mean] = moving_and_still(template, samples);
+            let [expected, mean] = moving_and_clutter(template, samples);
             for range in (0..samples).filter(|&range| empty[range]) {
                 for doppler in 1..loops {
                     sums.count(found[doppler * samples + range], expected[doppler * samples + range], noise);
                 }
                 // An offset or a leakage is near zero; static clutter elsewhere counts.
                 if range > 8 && range + 8 < samples {
-                    sums.count(still[range], mean[range], noise / loops as f64);
+                    sums.count(clutter[range], mean[range], noise / loops as f64);
                 }
             }
         }
@@ -175,17 +175,17 @@ fn of_frame(evidence: &Evidence, frame: usize, empty: &[bool]) -> [Sums; 3] {
 }
 
 /// The map of what changes within a frame, `[doppler, range]`, and the spectrum of what does not, `[range]`.
-fn moving_and_still(mut signal: Vec<Complex64>, samples: usize) -> [Vec<Complex64>; 2] {
-    let still = mean_chirp(signal.chunks_exact(samples), samples);
+fn moving_and_clutter(mut signal: Vec<Complex64>, samples: usize) -> [Vec<Complex64>; 2] {
+    let clutter = mean_chirp(signal.chunks_exact(samples), samples);
     for chirp in signal.chunks_exact_mut(samples) {
-        chirp.iter_mut().zip(&still).for_each(|(value, still)| *value -= still);
+        chirp.iter_mut().zip(&clutter).for_each(|(value, clutter)| *value -= clutter);
     }
-    [transform(&signal, samples), spectrum(&still)]
+    [transform(&signal, samples), spectrum(&clutter)]
 }
 
 impl Sums {
     fn count(&mut self, found: Complex64, expected: Complex64, noise: f64) {
-        // Strangers far above what could be predicted are left out by a bound on their say.
+        // Untracked movers far above what could be predicted are left out by a bound on their say.
         let bounded = found * (6.0 * (noise + 0.01 * expected.norm_sqr()).sqrt() / found.norm().max(1e-300)).min(1.0);
         self.cross += expected.conj() * bounded / noise;
         self.template += expected.norm_sqr() / noise;

@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::heatmap::{Axis, Map, range_axis, velocity_axis};
 use crate::metrics::DbWindow;
 use crate::pictures::page::{Markup, picture};
-use crate::pictures::{Chart, Series, comparison, window};
+use crate::pictures::{Captions, Chart, Scale, Series, comparison, window};
 use crate::radar::Radar;
 
 /// Titles or names, and what they are of.
@@ -29,10 +29,11 @@ impl Pictures {
         let path = folder.path().join("picture.png");
         // One scale for both, from the noise (0 dB) up.
         let mut shown: Option<DbWindow> = None;
-        for (title, evidence) in [
-            ("Before: the recording against the baseline", &diagnosis.original),
+        for (title, first, evidence) in [
+            ("Before: the recording against the baseline", "recording", &diagnosis.original),
             (
-                "After: what of the recording is left with the effects taken out (what they hid is dark), against the baseline",
+                "After: the recording with the effects taken out (what they hid is dark), against the baseline",
+                "recording less effects",
                 &explanation.evidence,
             ),
         ] {
@@ -41,13 +42,14 @@ impl Pictures {
             }
             let [measured, expected] = held_out_maps(evidence, &diagnosis.radar);
             let window = *shown.get_or_insert_with(|| DbWindow { low_db: 0.0, high_db: measured.max().max(20.0) });
-            comparison(&path, "", &measured, &expected, window)?;
+            let captions = Captions { title: "Held-out data, dB over the noise", first, second: "baseline" };
+            comparison(&path, captions, &measured, &expected, window)?;
             pictures.maps.push((title.into(), picture(&path, title)?));
         }
         if let Some(Simulated { maps: [measured, before, after], .. }) = simulated {
             let window = window(measured);
             for (title, map) in [("The trained simulator", before), ("The trained simulator with the effects", after)] {
-                comparison(&path, "", measured, map, window)?;
+                comparison(&path, Captions::simulated(title), measured, map, window)?;
                 pictures.maps.push((title.into(), picture(&path, title)?));
             }
         }
@@ -92,7 +94,8 @@ fn along(before: &locate::Profile, after: Option<&locate::Profile>) -> Vec<Chart
         };
         let mut lines = vec![series("before", before)];
         lines.extend(after.map(|after| series("with the effects", after)));
-        Chart { title, x_label: x_label.clone(), y_label: y_label.into(), series: lines }
+        let [x_scale, y_scale] = [Scale::Linear; 2];
+        Chart { title, x_label: x_label.clone(), y_label: y_label.into(), x_scale, y_scale, series: lines }
     };
     // A product of probabilities may be too small for a number.
     let significance = |profile: &locate::Profile| profile.p_value.iter().map(|p| -p.max(f64::MIN_POSITIVE).log10()).collect();
@@ -110,7 +113,14 @@ fn chart(curve: &Curve) -> Chart {
         .series
         .iter()
         .map(|(name, x, y)| Series { name: name.clone(), points: x.iter().zip(y).map(|(&x, &y)| [x, y]).collect() });
-    Chart { title: curve.title.clone(), x_label: curve.x_label.clone(), y_label: curve.y_label.clone(), series: series.collect() }
+    Chart {
+        title: curve.title.clone(),
+        x_label: curve.x_label.clone(),
+        y_label: curve.y_label.clone(),
+        x_scale: Scale::Linear,
+        y_scale: Scale::Linear,
+        series: series.collect(),
+    }
 }
 
 /// Power over the noise, dB, mean over held-out frames and channels: measured, and what the baseline expects.
@@ -122,13 +132,13 @@ fn held_out_maps(evidence: &Evidence, radar: &Radar) -> [Map; 2] {
     let (mut measured, mut expected) = (vec![0.0; loops * samples], vec![0.0; loops * samples]);
     for channel in 0..channels {
         let variance = evidence.noise()[channel].max(f64::MIN_POSITIVE) * count;
-        let still = transform(&support.project(&evidence.still()[channel * samples..][..samples]).repeat(loops), samples);
+        let clutter = transform(&support.project(&evidence.clutter()[channel * samples..][..samples]).repeat(loops), samples);
         for &frame in &evidence.split.held_out {
             let seen = transform(evidence.cube.channel(frame, channel), samples);
             let moving = evidence.expected(frame);
             for cell in 0..loops * samples {
                 measured[cell] += seen[cell].norm_sqr() / variance;
-                expected[cell] += still[cell].norm_sqr() / variance + f64::from(moving[cell]) / count;
+                expected[cell] += clutter[cell].norm_sqr() / variance + f64::from(moving[cell]) / count;
             }
         }
     }

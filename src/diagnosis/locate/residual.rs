@@ -1,7 +1,7 @@
 //! Measured over expected power, cell by cell.
 
 use crate::diagnosis::Evidence;
-use crate::diagnosis::power::STILL_BINS;
+use crate::diagnosis::power::CLUTTER_BINS;
 use crate::grid::Grid;
 
 /// Σ |correlation|² of neighbouring cells of two Hann windows.
@@ -36,8 +36,8 @@ impl Residual {
             let support = model.as_ref().map(|model| model.support(frame));
             for cell in 0..size {
                 let (doppler, range) = (cell / samples, cell % samples);
-                let still = loops >= 8 && doppler.min(loops - doppler) <= STILL_BINS;
-                if !noise_bins.contains(&range) || still || !ratio[cell].is_finite() {
+                let in_clutter = loops >= 8 && doppler.min(loops - doppler) <= CLUTTER_BINS;
+                if !noise_bins.contains(&range) || in_clutter || !ratio[cell].is_finite() {
                     ratio[cell] = 1.0;
                     continue;
                 }

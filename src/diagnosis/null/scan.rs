@@ -16,13 +16,13 @@ use rayon::prelude::*;
 
 use crate::diagnosis::Evidence;
 use crate::diagnosis::locate::{Table, intervals};
-use crate::diagnosis::power::STILL_BINS;
+use crate::diagnosis::power::CLUTTER_BINS;
 use crate::diagnosis::statistics::{exponential_scale, gumbel_tail, median};
 use crate::grid::Grid;
 
 /// Draws of the null.
 const DRAWS: u64 = 99;
-/// Loops without which no velocity is free of what stands still.
+/// Fewest loops of which some Doppler bins are free of static clutter.
 const FEWEST_LOOPS: usize = 8;
 /// Quantile that the noise's level is taken from: large values do not count.
 const QUANTILE: f64 = 0.35;
@@ -237,10 +237,10 @@ impl Cells {
 /// Expected power over the noise's; zero where body or room is.
 fn expected(evidence: &Evidence, frame: usize, doppler: usize, cell: usize) -> f32 {
     let loops = evidence.cube.dims[3];
-    let still = loops < FEWEST_LOOPS || doppler.min(loops - doppler) <= STILL_BINS;
+    let in_clutter = loops < FEWEST_LOOPS || doppler.min(loops - doppler) <= CLUTTER_BINS;
     let range = cell % evidence.cube.dims[4];
     match evidence.power() {
-        _ if still || !evidence.noise_bins().contains(&range) => 0.0,
+        _ if in_clutter || !evidence.noise_bins().contains(&range) => 0.0,
         Some(model) if model.support(frame)[cell] => 0.0,
         Some(model) => model.expected(frame)[cell],
         None => 1.0,

@@ -168,14 +168,14 @@ mod tests {
             part: 3,
         };
         let direct = range_and_velocity(&radar, point.position_m, point.velocity_mps);
-        let again = |echo: Echo| -> Vec<(f64, f64)> {
+        let replica = |echo: Echo| -> Vec<(f64, f64)> {
             let of = |point: &Point| range_and_velocity(&radar, point.position_m, point.velocity_mps);
             echo.points(&radar, &[point]).iter().map(of).collect()
         };
-        let delayed = again(Echo::Delayed { extra_m: 0.5, coefficient: 0.3 })[0];
+        let delayed = replica(Echo::Delayed { extra_m: 0.5, coefficient: 0.3 })[0];
         // Antennas are a few centimetres apart.
         assert!((delayed.0 - direct.0 - 0.5).abs() < 1e-3 && (delayed.1 - direct.1).abs() < 1e-2, "{delayed:?} {direct:?}");
-        let mirrors = again(Echo::Mirror { boundary: Boundary::Right, distance_m: 2.0, coefficient: 0.5 });
+        let mirrors = replica(Echo::Mirror { boundary: Boundary::Right, distance_m: 2.0, coefficient: 0.5 });
         // The image stands at x = 3.6.
         let image = range_and_velocity(&radar, [3.6, 3.0, 0.1], [-0.3, 1.0, 0.0]);
         assert!((mirrors[0].0 - 0.5 * (direct.0 + image.0)).abs() < 2e-3, "{mirrors:?}");

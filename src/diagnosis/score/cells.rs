@@ -1,7 +1,7 @@
 //! Cells of range and Doppler in which what an operator puts there stands out of the signal that it acts on.
 //!
 //! A cell's own returns have free amplitudes: a small change of them is no evidence. So a cell counts where what the effect can put there
-//! exceeds, by far, all that the clean signal has around it in any channel. What is left there is noise, weak strangers, and the effect.
+//! exceeds, by far, all that the clean signal has around it in any channel. What is left there is noise, weak movers, and the effect.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -43,7 +43,7 @@ impl Cell {
 #[derive(Clone, Copy, Debug)]
 pub enum Part {
     Moving,
-    Still,
+    Clutter,
 }
 
 /// Cells by which an effect's pattern is shifted, `[doppler, range]`: none is where the effect puts it.
@@ -52,7 +52,7 @@ pub type Shift = [usize; 2];
 /// What changes within a frame, `[doppler, range]`, and what does not, `[0, range]`.
 struct Maps {
     moving: Grid<Complex64, 2>,
-    still: Grid<Complex64, 2>,
+    clutter: Grid<Complex64, 2>,
 }
 
 /// Of the windows over loops and samples.
@@ -75,7 +75,7 @@ impl Windows {
         let grid = |loops: usize, values: Vec<Complex64>| Grid::new(["doppler", "range"], [loops, samples], values);
         Maps {
             moving: grid(loops, transform_under(&moving, &self.slow, &self.fast)),
-            still: grid(1, transform_under(&mean, &[1.0], &self.fast)),
+            clutter: grid(1, transform_under(&mean, &[1.0], &self.fast)),
         }
     }
 }
@@ -130,7 +130,7 @@ pub fn of_frame(evidence: &Evidence, effects: &[(Drive, Vec<Direction>)], frame:
     let shared = Arc::new(Shared {
         noise: evidence.noise().iter().map(|noise| noise.max(f64::MIN_POSITIVE)).collect(),
         found: (0..evidence.cube.channels()).map(|channel| windows.maps(evidence.cube.channel(frame, channel))).collect(),
-        around: [around(of_clean.iter().map(|maps| &maps.moving)), around(of_clean.iter().map(|maps| &maps.still))],
+        around: [around(of_clean.iter().map(|maps| &maps.moving)), around(of_clean.iter().map(|maps| &maps.clutter))],
         receivers,
         ranges: evidence.noise_bins(),
     });
@@ -157,7 +157,7 @@ impl Pattern {
         let Shared { noise, found, around, receivers, ranges } = &*self.shared;
         let (of, around): (fn(&Maps) -> &Grid<Complex64, 2>, _) = match part {
             Part::Moving => (|maps| &maps.moving, &around[0]),
-            Part::Still => (|maps| &maps.still, &around[1]),
+            Part::Clutter => (|maps| &maps.clutter, &around[1]),
         };
         let Some(around) = around else { return vec![] };
         let mut cells = vec![];
@@ -196,7 +196,7 @@ impl Pattern {
         let along = |count: usize| (0..count).step_by(LOBE + 1).filter(move |shift| *shift == 0 || count - shift > LOBE);
         let rows = match part {
             Part::Moving => loops,
-            Part::Still => 1,
+            Part::Clutter => 1,
         };
         let all: Vec<Shift> = along(rows).flat_map(|doppler| along(samples).map(move |range| [doppler, range])).skip(1).collect();
         let count = all.len().min(most);

@@ -28,21 +28,21 @@ const CONVERGED: f64 = 0.1;
 /// Of one frame: cells of what changes within it, and of what does not.
 struct Frame {
     moving: Vec<Cell>,
-    still: Vec<Cell>,
+    clutter: Vec<Cell>,
     /// Sum over all samples of |tangent|², by amplitude.
     energies: Vec<f64>,
 }
 
 impl Frame {
     fn new(pattern: Pattern) -> Self {
-        let [moving, still] = [Part::Moving, Part::Still].map(|part| pattern.cells(part, Shift::default()));
-        Self { moving, still, energies: pattern.energies }
+        let [moving, clutter] = [Part::Moving, Part::Clutter].map(|part| pattern.cells(part, Shift::default()));
+        Self { moving, clutter, energies: pattern.energies }
     }
 
     fn cells(&self, part: Part) -> &[Cell] {
         match part {
             Part::Moving => &self.moving,
-            Part::Still => &self.still,
+            Part::Clutter => &self.clutter,
         }
     }
 }
@@ -56,7 +56,7 @@ pub struct Fit {
     pub deviations: Vec<f64>,
     pub p_value: f64,
     /// Of each part of the frames, predicted by the others, nats.
-    pub gain: f64,
+    pub nats: f64,
     /// Of the power above the noise where the effect is above it: the share that the effect does not explain.
     pub left: f64,
     /// Energy that an amplitude of one adds to a frame, by direction.
@@ -79,7 +79,7 @@ impl Fit {
         asked.into_iter().zip(by_effect).map(of).collect()
     }
 
-    /// By what moves or by what stands still, with a value of all receivers or, where these differ, of each; whichever says most.
+    /// By movers or by static clutter, with a value of all receivers or, where these differ, of each; whichever says most.
     fn best(evidence: &Evidence, asked: (Drive, Vec<Direction>), frames: &[Frame]) -> Option<Self> {
         let may_differ = asked.1.iter().all(|direction| direction.parameter.role == Role::AmplitudeOfReceivers);
         let receivers = evidence.cube.dims[2];
@@ -88,13 +88,13 @@ impl Fit {
         let of = |(part, receivers)| {
             let cells: Vec<&[Cell]> = frames.iter().map(|frame| frame.cells(part)).collect();
             let fit = Self::of(&cells, &energies, &asked.1, receivers, part)?;
-            if fit.p_value > WORTH_REFINING || fit.gain < WORTH_GAINING {
+            if fit.p_value > WORTH_REFINING || fit.nats < WORTH_GAINING {
                 return Some(Self { p_value: fit.p_value.max(WORTH_REFINING), ..fit });
             }
             fit.refined(evidence, &asked).filter(|fit| receivers == 1 || fit.receivers_differ())
         };
         let tests =
-            [Part::Moving, Part::Still].into_iter().flat_map(|part| numbers.iter().map(move |&receivers| (part, receivers)));
+            [Part::Moving, Part::Clutter].into_iter().flat_map(|part| numbers.iter().map(move |&receivers| (part, receivers)));
         let fit = tests.filter_map(of).min_by(|a, b| a.p_value.total_cmp(&b.p_value))?;
         Some(Self { p_value: corrected(fit.p_value, 2.0 * numbers.len() as f64), ..fit })
     }
@@ -117,7 +117,7 @@ impl Fit {
         Some(Self {
             deviations: (0..count).map(|index| found.deviation(&unit(index))).collect(),
             p_value: found.p_value,
-            gain: found.gain,
+            nats: found.nats,
             left: left(cells.iter().flat_map(AsRef::as_ref), &amplitudes),
             frame_energies: energies.to_vec(),
             amplitudes,
@@ -154,8 +154,8 @@ impl Fit {
     fn against(self, law: &Law) -> Self {
         let errors = || self.deviations.iter().zip(&law.deviations).map(|(own, least)| own.max(*least));
         let wider = errors().zip(&self.deviations).map(|(error, own)| (error / own).powi(2)).sum::<f64>();
-        let gain = self.gain * self.deviations.len() as f64 / wider;
-        Self { p_value: self.p_value.max(law.p_value), gain, deviations: errors().collect(), ..self }
+        let gain = self.nats * self.deviations.len() as f64 / wider;
+        Self { p_value: self.p_value.max(law.p_value), nats: gain, deviations: errors().collect(), ..self }
     }
 
     /// Whether values of receivers differ by more than their errors.

@@ -14,7 +14,7 @@ const PLACE: usize = LOBE;
 const BLOCK: usize = 2;
 
 /// Scores and information of the amplitudes, by ranges. What is in the cells besides has the power that is left in them: cells that
-/// strangers fill say as much less.
+/// untracked movers fill say as much less.
 pub fn of_cells(cells: &[Cell], at: &Amplitudes) -> BTreeMap<usize, Look> {
     let left: Vec<Complex64> = cells.iter().map(|cell| cell.found - cell.expected(at)).collect();
     let block = |cell: &Cell| (cell.range / BLOCK, cell.doppler / BLOCK);

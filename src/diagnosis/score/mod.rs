@@ -66,9 +66,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     };
     let mut fits: Vec<Option<Fit>> = at_zero(evidence, &asked).into_iter().map(of).collect();
     let of_fields = fits.split_off(named.len().min(fits.len()));
-    let laws: Vec<[f64; 2]> = fits.iter().flatten().map(|fit| [fit.left, fit.gain]).collect();
+    let laws: Vec<[f64; 2]> = fits.iter().flatten().map(|fit| [fit.left, fit.nats]).collect();
     let is_explained =
-        |field: &Fit| laws.iter().any(|[left, gain]| *left < LEFT_BY_A_LAW || *gain > (1.0 - LEFT_BY_A_LAW) * field.gain);
+        |field: &Fit| laws.iter().any(|[left, gain]| *left < LEFT_BY_A_LAW || *gain > (1.0 - LEFT_BY_A_LAW) * field.nats);
     let candidates = named.iter().zip(fits).filter_map(|(info, fit)| candidate(evidence, info, &fit?));
     let nameless = fields.iter().zip(of_fields).filter_map(|(field, fit)| {
         let fit = fit.filter(|fit| !is_explained(fit))?;
@@ -120,7 +120,7 @@ fn candidate(evidence: &Evidence, info: &'static EffectInfo, fit: &Fit) -> Optio
         choice: None,
         place: Place::at(info.stage),
         p_value: fit.p_value,
-        gain: fit.gain,
+        nats: fit.nats,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!("{} ({}). {}", info.title, numbers.join(", "), info.explanation),

@@ -1,9 +1,9 @@
 //! An effect's pattern against the same pattern elsewhere.
 //!
-//! What else is in the cells where an effect would be (weak strangers, tails, what stands still and so makes the same coincidence in all
+//! What else is in the cells where an effect would be (untracked movers, tails, static clutter, which makes the same coincidence in all
 //! frames) agrees with the pattern no more than with one that is shifted by more than a main lobe. So the statistic of the pattern is held
-//! against that of shifted ones: F-test, with the degrees of freedom that the scatter of the latter has (Satterthwaite 1946). Of what stands
-//! still, no range decides alone: that which says most is left out, of the pattern and of shifted ones.
+//! against that of shifted ones: F-test, with the degrees of freedom that the scatter of the latter has (Satterthwaite 1946). Of static
+//! clutter, no range decides alone: that which says most is left out, of the pattern and of shifted ones.
 
 use std::collections::BTreeMap;
 
@@ -59,7 +59,7 @@ fn level_and_chance(found: f64, others: &[f64], freedom: f64) -> (f64, f64) {
 
 /// The most likely amplitudes, where cells have the power that these leave.
 struct Fitted {
-    /// θ̂ᵀ I θ̂; of what stands still, without the range that says most.
+    /// θ̂ᵀ I θ̂; of static clutter, without the range that says most.
     square: f64,
     information: DMatrix<f64>,
 }
@@ -82,7 +82,7 @@ impl Fitted {
             at += &step;
         }
         let information = Look::sum(places.values(), count).information;
-        if matches!(part, Part::Still) {
+        if matches!(part, Part::Clutter) {
             // A coincidence at one range is the same in all frames, and as wide as the main lobe.
             let receivers = of.receivers();
             for receiver in 0..receivers {

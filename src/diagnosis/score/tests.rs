@@ -37,7 +37,7 @@ fn interleaved(signal: Complex<4>, values: &Values, context: &Context<'_>) -> Co
     signal.clone().add(signal.mul(factor))
 }
 
-/// Things that move and things that stand still, seen by a receiver that does something to every sample.
+/// Movers and static clutter, seen by a receiver that does something to every sample.
 fn evidence(seed: u64, receiver: impl Fn(Complex64, usize) -> Complex64) -> Evidence {
     of_receivers(seed, |_, value, sample| receiver(value, sample))
 }
@@ -181,7 +181,7 @@ fn without_its_effect_an_image_is_an_unknown_of_its_family() {
     let lacking = evidence.clone().lacking(&[effects::iq_imbalance::ID]);
     let found = find(&lacking);
     assert!(matches!(found.as_slice(), [Candidate { id: None, behaves_like: Behaviour::ConjugateImage, .. }]), "{found:?}");
-    assert!(found[0].gain > 100.0 && find(&lacking.with(&found[0])).is_empty());
+    assert!(found[0].nats > 100.0 && find(&lacking.with(&found[0])).is_empty());
     // With it, the field has nothing to add.
     let found = find(&evidence);
     assert!(
@@ -239,7 +239,7 @@ fn chances_are_bounds_where_nothing_is_there() {
         })
         .collect();
     assert!(chances.len() >= 60, "{}", chances.len());
-    // Corrected for what moves and what stands still, and for receivers together and apart, of which some say the same.
+    // Corrected for movers and static clutter, and for receivers together and apart, of which some say the same.
     for level in [0.01, 0.05, 0.2, 0.5] {
         let below = chances.iter().filter(|chance| **chance < level).count();
         let chance = crate::diagnosis::statistics::poisson_tail(below, level * chances.len() as f64);

@@ -6,7 +6,7 @@ use crate::diagnosis::course::Of;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction};
 use crate::diagnosis::misfit::Misfit;
-use crate::diagnosis::remains::{is_rough, is_same};
+use crate::diagnosis::residual::{is_rough, is_same};
 use crate::effects::{self, Stage};
 
 /// What never changes and may be a return or added behind the mixer: what turns all returns distinguishes the two, and goes first.
@@ -44,7 +44,7 @@ pub(super) fn upstream<'a>(
 ) -> &'a (usize, Candidate) {
     let turns_all = |(_, candidate): &&&(usize, Candidate)| matches!(&candidate.correction, Correction::Followed(_, course) if course.of == Of::All);
     if ADDED.iter().any(|id| best.1.id == Some(id))
-        && let Some(course) = passing.iter().filter(turns_all).max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))
+        && let Some(course) = passing.iter().filter(turns_all).max_by(|a, b| a.1.nats.total_cmp(&b.1.nats))
     {
         return course;
     }
@@ -59,22 +59,22 @@ pub(super) fn upstream<'a>(
         return simpler.find(|(_, candidate)| !left(&evidence.with(candidate))).copied().unwrap_or(best);
     }
     let others = passing.iter().filter(|(_, candidate)| is_on_all(candidate, evidence));
-    let Some(other) = others.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|_| is_echo(&best.1)) else {
+    let Some(other) = others.max_by(|a, b| a.1.nats.total_cmp(&b.1.nats)).filter(|_| is_echo(&best.1)) else {
         return best;
     };
     // Seen from a wrong place, an echo of the body has no name: where the body is elsewhere with and without the echo, it is put right
     // first.
     let stands = |(detector, other): &(usize, Candidate)| {
-        let again = said_by(*detector, &evidence.with(&best.1));
-        again.iter().any(|found| found.id == other.id && found.gain > NEARLY * other.gain)
+        let found = said_by(*detector, &evidence.with(&best.1));
+        found.iter().any(|found| found.id == other.id && found.nats > NEARLY * other.nats)
     };
     if best.1.id.is_none() && is_displaced(&other.1) && stands(other) {
         return other;
     }
     if evidence.body.is_none() {
         // Nobody predicts where something moves: it does where it still seems to once what all returns share is undone.
-        let again = said_by(best.0, &evidence.with(&other.1));
-        let stands = again.iter().any(|found| is_same(&best.1, found) && found.gain > NEARLY * best.1.gain);
+        let found = said_by(best.0, &evidence.with(&other.1));
+        let stands = found.iter().any(|found| is_same(&best.1, found) && found.nats > NEARLY * best.1.nats);
         return if stands { best } else { other };
     }
     let left = |candidate: &Candidate| Misfit::after(original, &evidence.with(candidate)).loglik_per_sample;

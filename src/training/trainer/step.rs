@@ -5,6 +5,7 @@ use burn::optim::{GradientsAccumulator, GradientsParams};
 use burn::tensor::{Device, Tensor};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 use super::{Learned, Trainer};
 use crate::complex::Complex;
@@ -53,7 +54,7 @@ impl Trainer<'_> {
         }
     }
 
-    /// Every device on a thread of its own, with a copy of the weights; gradients come back to the first.
+    /// All devices side by side, each with a copy of the weights; gradients come back to the first.
     fn shared_gradients(
         &self,
         simulator: &Simulator,
@@ -62,22 +63,14 @@ impl Trainer<'_> {
         of: usize,
         mode: Mode,
     ) -> Result<Vec<(GradientsParams, f64)>> {
-        std::thread::scope(|scope| {
-            let threads: Vec<_> = self
-                .devices
-                .iter()
-                .zip(prepared)
-                .zip(shares)
-                .map(|((device, prepared), share)| {
-                    let copy = simulator.clone().fork(&device.clone().autodiff());
-                    scope.spawn(move || -> Result<(GradientsParams, f64)> {
-                        let (gradients, loss) = self.gradients(&copy, prepared, share, of, mode, device)?;
-                        Ok((gradients.to_device(self.device(), &copy), loss))
-                    })
-                })
-                .collect();
-            threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
-        })
+        let copies: Vec<Simulator> =
+            self.devices.iter().take(shares.len()).map(|device| simulator.clone().fork(&device.clone().autodiff())).collect();
+        let of_device = |index: usize| -> Result<(GradientsParams, f64)> {
+            let (device, copy) = (&self.devices[index], &copies[index]);
+            let (gradients, loss) = self.gradients(copy, &prepared[index], shares[index], of, mode, device)?;
+            Ok((gradients.to_device(self.device(), copy), loss))
+        };
+        (0..shares.len()).into_par_iter().map(of_device).collect()
     }
 
     /// Of the part that some frames have in the mean loss of `of` frames; and that part.

@@ -148,7 +148,7 @@ fn candidate(
             ..Place::at(Stage::Scene)
         },
         p_value: change.p_value.max(f64::MIN_POSITIVE),
-        gain,
+        nats: gain,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(

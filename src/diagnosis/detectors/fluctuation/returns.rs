@@ -34,10 +34,10 @@ pub struct Returns {
     /// `[frame, channel, bin]`
     spectra: Vec<Complex64>,
     /// `[channel, bin]`: mean over the training frames.
-    still: Vec<Complex64>,
+    clutter: Vec<Complex64>,
     /// Variance `[frame, channel, bin]`.
     variance: Vec<f64>,
-    /// `[bin]`: of what is not still within a frame, over the noise.
+    /// `[bin]`: of what changes within a frame, over the noise.
     unrest: Vec<f64>,
 }
 
@@ -71,16 +71,16 @@ impl Returns {
             }
         }
         unrest.iter_mut().for_each(|value| *value /= (frames * channels) as f64);
-        let mut still = vec![Complex64::ZERO; channels * bins];
+        let mut clutter = vec![Complex64::ZERO; channels * bins];
         for &frame in &evidence.split.training {
-            still.iter_mut().zip(&spectra[frame * channels * bins..]).for_each(|(sum, value)| *sum += value);
+            clutter.iter_mut().zip(&spectra[frame * channels * bins..]).for_each(|(sum, value)| *sum += value);
         }
-        still.iter_mut().for_each(|value| *value /= evidence.split.training.len() as f64);
-        Some(Self { bins, channels, spectra, still, variance, unrest })
+        clutter.iter_mut().for_each(|value| *value /= evidence.split.training.len() as f64);
+        Some(Self { bins, channels, spectra, clutter, variance, unrest })
     }
 
     pub fn power(&self, bin: usize) -> f64 {
-        (0..self.channels).map(|channel| self.still[channel * self.bins + bin].norm_sqr()).sum()
+        (0..self.channels).map(|channel| self.clutter[channel * self.bins + bin].norm_sqr()).sum()
     }
 
     /// Mean over the channels: they hardly differ.
@@ -113,12 +113,12 @@ impl Returns {
     }
 
     fn deviation(&self, frame: usize, channel: usize, bin: usize) -> Complex64 {
-        self.spectra[(frame * self.channels + channel) * self.bins + bin] - self.still[channel * self.bins + bin]
+        self.spectra[(frame * self.channels + channel) * self.bins + bin] - self.clutter[channel * self.bins + bin]
     }
 
     fn change(&self, frame: usize, bin: usize) -> Complex64 {
         let sum: Complex64 = (0..self.channels)
-            .map(|channel| self.still[channel * self.bins + bin].conj() * self.deviation(frame, channel, bin))
+            .map(|channel| self.clutter[channel * self.bins + bin].conj() * self.deviation(frame, channel, bin))
             .sum();
         sum / self.power(bin).max(f64::MIN_POSITIVE)
     }
@@ -126,8 +126,8 @@ impl Returns {
     /// The part of a deviation that does not look across the channels as the return does.
     pub fn beside(&self, frame: usize, bin: usize) -> Vec<Complex64> {
         let change = self.change(frame, bin);
-        let still = |channel: usize| self.still[channel * self.bins + bin];
-        (0..self.channels).map(|channel| self.deviation(frame, channel, bin) - change * still(channel)).collect()
+        let clutter = |channel: usize| self.clutter[channel * self.bins + bin];
+        (0..self.channels).map(|channel| self.deviation(frame, channel, bin) - change * clutter(channel)).collect()
     }
 
     /// A return's change beyond what those of some that are not beside it predict: a gain, a phase, and a phase in proportion to the
@@ -174,8 +174,8 @@ impl Returns {
             let variance = self.variance(frame, bin);
             let common = self.change(frame, bin) - series.change[frame];
             for channel in 0..self.channels {
-                let still = self.still[channel * self.bins + bin];
-                all += (self.deviation(frame, channel, bin) - common * still).norm_sqr() / variance - 1.0;
+                let clutter = self.clutter[channel * self.bins + bin];
+                all += (self.deviation(frame, channel, bin) - common * clutter).norm_sqr() / variance - 1.0;
             }
             own += series.change[frame].norm_sqr() * self.power(bin) / variance - 1.0;
         }
@@ -209,7 +209,7 @@ impl Series {
     }
 
     /// Log-likelihood gain of the courses in all frames, each predicted by the others, nats.
-    pub fn gain(&self, frames: Frames) -> f64 {
+    pub fn nats(&self, frames: Frames) -> f64 {
         self.courses(frames).iter().map(|course| course.predicted).sum()
     }
 

@@ -67,21 +67,21 @@ fn evidence(seed: u64, change: impl Fn(usize, usize) -> Complex64) -> Evidence {
 fn a_shadow_is_named_and_a_curtain_is_not() {
     let shadow = evidence(1, |index, frame| Complex64::from(if index == 2 && covers(frame) { 0.5 } else { 1.0 }));
     let found = find(&shadow);
-    assert!(found.len() == 1 && found[0].id == Some(ID) && found[0].p_value < 1e-6 && found[0].gain > 15.0, "{found:?}");
+    assert!(found.len() == 1 && found[0].id == Some(ID) && found[0].p_value < 1e-6 && found[0].nats > 15.0, "{found:?}");
     let [near, far] = found[0].place.range_m.unwrap();
     assert!(near < FRONT_M && far > FRONT_M);
     // What was taken out is gone, though nothing forbids to find it again.
     let mut next = shadow.with(&found[0]);
     next.accepted.clear();
     next.accepted_unnamed.clear();
-    assert!(find(&next).iter().all(|again| again.gain < 0.05 * found[0].gain), "{:?}", find(&next));
+    assert!(find(&next).iter().all(|left| left.nats < 0.05 * found[0].nats), "{:?}", find(&next));
 
     let curtain =
         evidence(2, |index, frame| Complex64::cis(if index == 2 { 0.6 * (TAU * frame as f64 / 7.3).sin() } else { 0.0 }));
     let found = find(&curtain);
-    assert!(found.len() == 1 && found[0].id.is_none() && found[0].gain > 15.0, "{found:?}");
+    assert!(found.len() == 1 && found[0].id.is_none() && found[0].nats > 15.0, "{found:?}");
     let found = find(&nobody_tracked(curtain));
-    assert!(found.len() == 1 && found[0].id.is_none() && found[0].gain > 15.0, "{found:?}");
+    assert!(found.len() == 1 && found[0].id.is_none() && found[0].nats > 15.0, "{found:?}");
     assert!(!found[0].statement.contains("silhouette"));
 }
 

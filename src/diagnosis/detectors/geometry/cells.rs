@@ -16,14 +16,14 @@ use crate::radar::Radar;
 /// Expected power over the noise, noise included, from which on a cell is used.
 const LEAST_POWER: f32 = 3.0;
 /// Share of the static returns that may be left at low Doppler when they were taken out.
-const STILL_LEFT: f64 = 1e-3;
+const CLUTTER_LEFT: f64 = 1e-3;
 /// Fewest cells of a frame.
 const FEWEST_CELLS: usize = 10;
 /// Cells of a group that errors are taken from, at least, and groups of a frame, at most.
 const GROUP_CELLS: usize = 8;
 const MOST_GROUPS: usize = 6;
 /// Ranges that what hardly moves is taken together of.
-const STILL_RANGES: usize = 2;
+const SLOW_RANGES: usize = 2;
 
 /// Neighbouring cells of a frame.
 #[derive(Clone, Debug)]
@@ -53,8 +53,8 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// `still`: power of the static returns, by range.
-    pub fn new(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &[f64]) -> Self {
+    /// `clutter_power`: power of static clutter, by range.
+    pub fn new(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, clutter_power: &[f64]) -> Self {
         let radar = &evidence.radar;
         let noise = evidence.noise();
         let mean = noise.iter().sum::<f64>() / noise.len() as f64;
@@ -65,7 +65,7 @@ impl Cells {
         };
         let frames = (0..evidence.cube.dims[0])
             .into_par_iter()
-            .map(|frame| groups(cells(evidence, model, body, still, frame, mean)))
+            .map(|frame| groups(cells(evidence, model, body, clutter_power, frame, mean)))
             .collect();
         Self { radar: radar.clone(), frames, noise: (0..receivers).map(of_receiver).collect() }
     }
@@ -75,8 +75,8 @@ impl Cells {
     }
 }
 
-/// `moving`, `still`: cells that move, and cells that hardly do, with their ranges.
-fn groups([moving, mut still]: [Vec<(usize, Cell)>; 2]) -> Vec<Group> {
+/// `moving`, `slow`: cells of the body away from zero Doppler, and near it, with their ranges.
+fn groups([moving, mut slow]: [Vec<(usize, Cell)>; 2]) -> Vec<Group> {
     let count = (moving.len() / GROUP_CELLS).clamp(1, MOST_GROUPS);
     // The last ones first.
     let mut groups: Vec<Group> = speckle::groups(moving, count)
@@ -84,22 +84,22 @@ fn groups([moving, mut still]: [Vec<(usize, Cell)>; 2]) -> Vec<Group> {
         .rev()
         .map(|cells| Group { cells: cells.into_iter().map(|(_, cell)| cell).collect(), place: None })
         .collect();
-    still.sort_by_key(|(range, _)| range / STILL_RANGES);
-    groups.extend(still.chunk_by(|a, b| a.0 / STILL_RANGES == b.0 / STILL_RANGES).map(|chunk| Group {
+    slow.sort_by_key(|(range, _)| range / SLOW_RANGES);
+    groups.extend(slow.chunk_by(|a, b| a.0 / SLOW_RANGES == b.0 / SLOW_RANGES).map(|chunk| Group {
         cells: chunk.iter().map(|(_, cell)| cell.clone()).collect(),
-        place: Some(chunk[0].0 / STILL_RANGES),
+        place: Some(chunk[0].0 / SLOW_RANGES),
     }));
     groups.retain(|group| !group.cells.is_empty());
     groups
 }
 
 /// Cells of a frame in which the body is expected to be stronger than `least`, noise included, and seen. None where these are too few.
-pub fn used(evidence: &Evidence, model: &PowerModel, still: &[f64], frame: usize, least: f32) -> Option<Vec<usize>> {
+pub fn used(evidence: &Evidence, model: &PowerModel, clutter_power: &[f64], frame: usize, least: f32) -> Option<Vec<usize>> {
     let expected = model.expected(frame);
     let map = evidence.maps().below([frame]);
     let samples = evidence.cube.dims[4];
     // A body that hardly moves is known by what it leaves of itself where static clutter was taken out.
-    let of_the_body = |cell: usize| model.usable()[cell] || f64::from(map[cell]) > STILL_LEFT * still[cell % samples];
+    let of_the_body = |cell: usize| model.usable()[cell] || f64::from(map[cell]) > CLUTTER_LEFT * clutter_power[cell % samples];
     let used: Vec<usize> = (0..model.size()).filter(|&cell| expected[cell] > least && of_the_body(cell)).collect();
     (used.len() >= FEWEST_CELLS).then_some(used)
 }
@@ -108,13 +108,13 @@ fn cells(
     evidence: &Evidence,
     model: &PowerModel,
     body: &BodyPrediction,
-    still: &[f64],
+    clutter_power: &[f64],
     frame: usize,
     noise: f64,
 ) -> [Vec<(usize, Cell)>; 2] {
     let radar = &evidence.radar;
     let (receivers, samples) = (radar.rx_m.len(), evidence.cube.dims[4]);
-    let Some(used) = used(evidence, model, still, frame, LEAST_POWER) else { return [vec![], vec![]] };
+    let Some(used) = used(evidence, model, clutter_power, frame, LEAST_POWER) else { return [vec![], vec![]] };
     let mut slots = vec![usize::MAX; model.size()];
     used.iter().enumerate().for_each(|(slot, &cell)| slots[cell] = slot);
     let mut sums = vec![[DMatrix::<Complex64>::zeros(receivers, receivers), DMatrix::zeros(receivers, receivers)]; used.len()];

@@ -18,7 +18,7 @@ pub enum Change {
     /// From frame `at` on, `count` frames later.
     Drop { at: usize, count: usize },
     /// The body is seen by a longer way, too.
-    Again(Echo),
+    Replica(Echo),
 }
 
 /// The body with changes of place and time.
@@ -69,7 +69,7 @@ impl Moves {
 
     /// The whole prediction after the change.
     pub fn apply(&self, body: &mut BodyPrediction, change: Change) {
-        if let Change::Again(echo) = change {
+        if let Change::Replica(echo) = change {
             body.echoes.push(echo);
             return;
         }

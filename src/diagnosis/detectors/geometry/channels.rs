@@ -1,6 +1,6 @@
 //! Which of the ways in which receivers may differ it is, and bodies that stand to one side.
 //!
-//! Every cell that the body fills comes from a direction that the prediction knows, so what remains of the phase between
+//! Every cell that the body fills comes from a direction that the prediction knows, so the residual phase between
 //! two receivers belongs to the receivers. A phase that grows in proportion to the receivers' places is a direction, and
 //! might as well be the body's.
 
@@ -17,7 +17,7 @@ use super::covariance::Array;
 use super::found::{AS_WELL, Found, UNEVEN};
 use super::{coupling, mismatch, places, skew};
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::detectors::clutter::still_power;
+use crate::diagnosis::detectors::clutter::clutter_power;
 use crate::diagnosis::power::{PowerModel, part_templates};
 use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place};
 use crate::effects::{self, Stage};
@@ -41,16 +41,16 @@ impl Observed {
         if evidence.radar.rx_m.len() < 2 {
             return None;
         }
-        let still = still_power(evidence);
+        let clutter_power = clutter_power(evidence);
         let sums: Vec<Option<Sums>> =
-            (0..evidence.cube.dims[0]).into_par_iter().map(|frame| sums(evidence, model, body, &still, frame)).collect();
+            (0..evidence.cube.dims[0]).into_par_iter().map(|frame| sums(evidence, model, body, &clutter_power, frame)).collect();
         let of = |frames: &[usize]| frames.iter().filter_map(|&frame| sums[frame].clone()).collect::<Vec<Sums>>();
         let (training, held_out) = (of(&evidence.split.training), of(&evidence.split.held_out));
         if training.len() < 6 || held_out.is_empty() {
             return None;
         }
         let bearing = bearing(&evidence.radar, &training);
-        let array = Array::new(Cells::new(evidence, model, body, &still), bearing);
+        let array = Array::new(Cells::new(evidence, model, body, &clutter_power), bearing);
         Some(Self { training, held_out, array })
     }
 }
@@ -72,12 +72,12 @@ pub fn find(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, move
     if bearing.p_value < UNEVEN {
         let wave = TAU / radar.wavelength_m();
         let amplitudes: Vec<Complex64> = along(radar).iter().map(|x| Complex64::cis(-bearing.sine * wave * x)).collect();
-        let gain = likelihood_gain(&training, &held_out, &amplitudes);
+        let nats = log_likelihood_gain(&training, &held_out, &amplitudes);
         let range_m = training.iter().map(|sums| sums.range_m).sum::<f64>() / training.len() as f64;
-        if let Some(skew) = skew::find(evidence, &training, bearing, gain) {
+        if let Some(skew) = skew::find(evidence, &training, bearing, nats) {
             return vec![skew];
         }
-        return (gain > 0.0).then(|| aside_of(evidence, bearing, range_m, moves, gain)).into_iter().collect();
+        return (nats > 0.0).then(|| aside_of(evidence, bearing, range_m, moves, nats)).into_iter().collect();
     }
     vec![]
 }
@@ -102,7 +102,7 @@ fn differ(evidence: &Evidence, array: &Array, displaced: bool) -> Option<Candida
 /// Of what is unlikely to be chance, what predicts held-out frames best; what does so nearly as well looks alike. A coupling
 /// comes before any gains and phases where it leaves the receivers alike: few that differ in any other way look like that.
 fn best(mut found: Vec<Found>) -> Option<Candidate> {
-    found.retain(|found| found.candidate.p_value < UNEVEN && found.candidate.gain > 0.0);
+    found.retain(|found| found.candidate.p_value < UNEVEN && found.candidate.nats > 0.0);
     if found.iter().any(|found| found.explains_all && found.candidate.p_value < UNLIKELY) {
         found.retain(|found| found.candidate.id != Some(effects::channel_mismatch::ID));
     }
@@ -116,12 +116,12 @@ fn best(mut found: Vec<Found>) -> Option<Candidate> {
     Some(best)
 }
 
-/// None where the body fills too few cells. `still`: power of static clutter, by range.
-fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &[f64], frame: usize) -> Option<Sums> {
+/// None where the body fills too few cells. `clutter_power`: power of static clutter, by range.
+fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, clutter_power: &[f64], frame: usize) -> Option<Sums> {
     let radar = &evidence.radar;
     let (receivers, transmitters) = (radar.rx_m.len(), radar.tx_m.len());
     let expected = model.expected(frame);
-    let cells = used(evidence, model, still, frame, LEAST_POWER)?;
+    let cells = used(evidence, model, clutter_power, frame, LEAST_POWER)?;
     let points = &body.frames[frame];
     let (centre, wave) = (radar.centre_m(), TAU / radar.wavelength_m());
     // Mean direction and range of each cell: templates weighted with them. The centre may lie aside: sines need no care.
@@ -165,8 +165,8 @@ fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, still: &
 
 /// Of held-out frames, pair by pair with the first receiver: circular Gaussian fields with equal powers and a real
 /// correlation, against the same with the amplitudes put in.
-fn likelihood_gain(training: &[Sums], held_out: &[Sums], amplitudes: &[Complex64]) -> f64 {
-    let mut gain = 0.0;
+fn log_likelihood_gain(training: &[Sums], held_out: &[Sums], amplitudes: &[Complex64]) -> f64 {
+    let mut nats = 0.0;
     for (rx, amplitude) in amplitudes.iter().enumerate().skip(1) {
         let undone = |sums: &[Sums], amplitude: Complex64| {
             let cells: f64 = sums.iter().map(|sums| sums.cells).sum::<f64>().max(1.0);
@@ -183,12 +183,12 @@ fn likelihood_gain(training: &[Sums], held_out: &[Sums], amplitudes: &[Complex64
             // The Jacobian of the amplitude counts, too.
             -cells * (determinant.ln() + amplitude.norm_sqr().ln() + fit)
         };
-        gain += log_likelihood(*amplitude) - log_likelihood(Complex64::ONE);
+        nats += log_likelihood(*amplitude) - log_likelihood(Complex64::ONE);
     }
-    gain / CELLS_PER_DRAW
+    nats / CELLS_PER_DRAW
 }
 
-fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, gain: f64) -> Candidate {
+fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, nats: f64) -> Candidate {
     let (offset, deviation) = (bearing.sine * range_m, bearing.deviation.hypot(0.5 * PHASE_FLOOR_RAD / PI) * range_m);
     let change = Change::Offset([offset, 0.0, 0.0]);
     let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
@@ -202,7 +202,7 @@ fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, g
         choice: None,
         place: Place::at(Stage::Scene),
         p_value: bearing.p_value,
-        gain,
+        nats,
         errs_alike: true,
         // A phase in proportion to the receivers' places is a direction, whoever makes it.
         look_alikes: vec![effects::channel_mismatch::ID],
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn receivers_that_differ_are_told_with_their_gains_and_phases() {
+    fn receivers_that_differ_are_found_with_their_gains_and_phases() {
         // Slightly, and so much that it is not linear.
         for scale in [1.0, 4.0] {
             let [gains, phases] =
@@ -255,7 +255,7 @@ mod tests {
             let array = DMatrix::from_diagonal(&DVector::from_fn(4, |rx, _| Complex64::from_polar(gains[rx].exp(), phases[rx])));
             let found = found(1, |_, _| Complex64::ONE, &array);
             assert!(found.len() == 1 && found[0].id == Some(effects::channel_mismatch::ID), "{scale} {found:?}");
-            assert!(found[0].p_value < 1e-6 && found[0].gain > 10.0, "{scale} {found:?}");
+            assert!(found[0].p_value < 1e-6 && found[0].nats > 10.0, "{scale} {found:?}");
             holds(&found[0].estimates[0], &gains.map(|gain| gain * statistics::DECIBEL));
             holds(&found[0].estimates[1], &phases.map(f64::to_degrees));
         }
@@ -304,7 +304,7 @@ mod tests {
         let offsets_m = [0.0, 2e-4, -1e-4, 1e-4];
         let displaced = look(3, offsets_m);
         assert!(displaced.len() == 1 && displaced[0].id == Some(effects::antenna_position::ID), "{displaced:?}");
-        assert!(displaced[0].p_value < 1e-5 && displaced[0].gain > 6.0, "{displaced:?}");
+        assert!(displaced[0].p_value < 1e-5 && displaced[0].nats > 6.0, "{displaced:?}");
         holds(&displaced[0].estimates[0], &offsets_m);
         // As the simulator takes them: of every antenna, along all axes.
         let setting = displaced[0].setting(1.0, 1.0, &four_receivers()).expect("no setting");

@@ -131,7 +131,7 @@ fn candidate(evidence: &Evidence, strength: Complex64, found: &Estimated) -> Can
         choice: None,
         place: Place::at(Stage::Antenna),
         p_value: statistics::corrected(found.p_value, LOOKS),
-        gain: found.gain,
+        nats: found.nats,
         errs_alike: true,
         // Of three receivers only the middle one is odd.
         look_alikes: if receivers < 4 { vec![effects::channel_mismatch::ID] } else { vec![] },

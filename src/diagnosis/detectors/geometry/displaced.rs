@@ -36,7 +36,7 @@ const CLOCK_GRID: [f64; 19] =
 const DRIFT_GRID: [f64; 7] = [-0.1, -0.03, -0.01, 0.0, 0.01, 0.03, 0.1];
 /// Standard deviation of a displacement across the line of sight, which ranges do not show.
 const UNSEEN_M: f64 = 0.2;
-/// Kinds of change that can be told apart, for the correction of the p-value.
+/// Kinds of change that are distinguishable, for the correction of the p-value.
 const KINDS: f64 = 3.0;
 /// Errors of clocks.
 const TIMING: [&str; 3] = [clock_offset::ID, clock_drift::ID, frame_drop::ID];
@@ -80,8 +80,8 @@ fn alternatives(trial: &Trial, null: &Score) -> Vec<Fitted> {
     // A ramp's slope is wrong by no more than the library allows it.
     let most_slope = slope_error::INFO.parameters[0].most;
     fitted.retain(|fit| fit.id != slope_error::ID || fit.value.abs() <= most_slope);
-    let told = |stage: Stage| stage != Stage::Propagation && unnamed.contains(&behaves_like(stage));
-    fitted.retain(|fit| !accepted.contains(&fit.id) && !told(stage(fit.score.change)));
+    let is_explained = |stage: Stage| stage != Stage::Propagation && unnamed.contains(&behaves_like(stage));
+    fitted.retain(|fit| !accepted.contains(&fit.id) && !is_explained(stage(fit.score.change)));
     fitted
 }
 
@@ -121,7 +121,7 @@ fn clocks(trial: &Trial, coarse: &[usize], null: &Score) -> Vec<Fitted> {
 }
 
 /// Of several alternatives, compared where all of them know the motion, where there is such a frame. One without a name only where none
-/// with a name is hardly told from it.
+/// with a name is nearly as likely.
 fn best<'a>(trial: &Trial, fitted: &'a [Fitted], null: &Score) -> Option<&'a Fitted> {
     let training = &trial.evidence.split.training;
     let known = |frame: &usize| fitted.iter().all(|fit| fit.score.known[*frame]);
@@ -169,7 +169,7 @@ fn p_value(fit: &Fitted, null: &Score, training: &[usize]) -> f64 {
     if let Change::Drop { .. } = fit.score.change {
         return step_p_value(fit.score.gain_over(null, training), fit.score.inside.len());
     }
-    if let Change::Again(_) = fit.score.change {
+    if let Change::Replica(_) = fit.score.change {
         let gain = fit.score.gain_over(null, training) / fit.inflation;
         return ratio_p_value(gain, replica::INFLATION, replica::tried());
     }
@@ -210,7 +210,7 @@ fn stage(change: Change) -> Stage {
         Change::Range(_) | Change::Offset(_) => Stage::Scene,
         Change::Scale(_) => Stage::Waveform,
         Change::Clock(_) | Change::Drift(_) | Change::Drop { .. } => Stage::Timing,
-        Change::Again(_) => Stage::Propagation,
+        Change::Replica(_) => Stage::Propagation,
     }
 }
 
@@ -259,7 +259,7 @@ fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> Description {
             format!("The motion runs {:.2} % faster than stated", 1e2 * fit.value),
             "its clock does, against the radar's".into(),
         ),
-        Change::Again(echo) => {
+        Change::Replica(echo) => {
             let (estimates, statement) = replica::described(trial, echo, fit.value, deviation);
             return Description { id: Some(fit.id), estimates, statement };
         }
@@ -272,13 +272,13 @@ fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> Description {
     Description::named(trial.evidence, fit.id, estimates, [observed, cause])
 }
 
-fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, gain: f64) -> Candidate {
+fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, nats: f64) -> Candidate {
     let (evidence, change) = (trial.evidence, fit.score.change);
     let Description { id, estimates, statement } = described(trial, fit, deviation(trial, fit).hypot(SCENE * fit.floor));
     let stage = stage(change);
     let place = match change {
         Change::Drop { at, .. } => Place { frames: Some((at..evidence.cube.dims[0]).collect()), ..Place::at(stage) },
-        Change::Again(echo) => replica::place(trial, echo),
+        Change::Replica(echo) => replica::place(trial, echo),
         _ => Place::at(stage),
     };
     let moves = Moves::new(evidence.radar.centre_m());
@@ -289,7 +289,7 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
         choice: place.boundary.clone(),
         place,
         p_value,
-        gain,
+        nats,
         errs_alike: true,
         look_alikes: if id.is_some() { look_alikes } else { vec![] },
         statement,

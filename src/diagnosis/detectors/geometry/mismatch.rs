@@ -78,12 +78,12 @@ pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
         *deviation = deviation.hypot((share * of_the_body).sqrt() * x).hypot(either * x);
     }
     let p_value = corrected(found.p_value, LOOKS);
-    let candidate = candidate(evidence, &against_first(&|rx| numbers.gain(rx)), &phases, p_value, found.gain);
+    let candidate = candidate(evidence, &against_first(&|rx| numbers.gain(rx)), &phases, p_value, found.nats);
     Some(Found { candidate, likelihood: found.likelihood, explains_all: false })
 }
 
 /// Values and deviations against the first receiver, logarithmic gains and radian.
-fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_value: f64, gain: f64) -> Candidate {
+fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_value: f64, nats: f64) -> Candidate {
     let scaled =
         |of: &[[f64; 2]], unit: f64| -> [Vec<f64>; 2] { [0, 1].map(|part| of.iter().map(|value| value[part] * unit).collect()) };
     let [gains_db, gain_deviations] = scaled(gains, DECIBEL);
@@ -118,7 +118,7 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
         choice: None,
         place: Place { rx: Some((1..receivers).collect()), ..Place::at(Stage::Antenna) },
         p_value,
-        gain,
+        nats,
         errs_alike: true,
         look_alikes: vec![],
         curve: None,

@@ -41,7 +41,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // Beside another mover that is stronger than the body, the body's place and time are not estimable.
     let outshone = evidence.accepted_unnamed.contains(&Behaviour::PathLikeOverTheBody);
     let mut found = if outshone { vec![] } else { displaced::find(&Trial::new(evidence, model, body)) };
-    let displaced = found.iter().any(|found| found.p_value < DISPLACED && found.gain > 0.0);
+    let displaced = found.iter().any(|found| found.p_value < DISPLACED && found.nats > 0.0);
     found.extend(channels::find(evidence, model, body, Moves::new(evidence.radar.centre_m()), displaced));
     found
 }
@@ -98,8 +98,8 @@ mod tests {
                 let mut next = evidence.with(&candidate);
                 next.accepted.clear();
                 next.accepted_unnamed.clear();
-                for again in find(&next) {
-                    println!("      again {again:?}");
+                for left in find(&next) {
+                    println!("      left {left:?}");
                 }
             }
         }

@@ -62,7 +62,7 @@ fn candidate(evidence: &Evidence, cells: &Cells, directions: &DMatrix<f64>, foun
         choice: None,
         place: Place::at(Stage::Antenna),
         p_value: corrected(found.p_value, LOOKS),
-        gain: found.gain,
+        nats: found.nats,
         errs_alike: true,
         look_alikes: vec![],
         statement: format!(

@@ -54,7 +54,7 @@ pub fn best(trial: &Trial, coarse: &[usize]) -> Vec<Fitted> {
         .chain(delayed)
         .filter(|echo| evidence.may_name(id(*echo)))
         .filter_map(|echo| {
-            let gain = |power: f64| trial.score(Change::Again(of_power(echo, power)), coarse, true).gain_over(&none, coarse);
+            let gain = |power: f64| trial.score(Change::Replica(of_power(echo, power)), coarse, true).gain_over(&none, coarse);
             let least = gain(POWERS[0]);
             let more = POWERS[1..].iter().map(|&power| (echo, power, gain(power)));
             (least > 0.0).then(|| more.fold((echo, POWERS[0], least), |best, tried| if tried.2 > best.2 { tried } else { best }))
@@ -67,12 +67,12 @@ pub fn best(trial: &Trial, coarse: &[usize]) -> Vec<Fitted> {
         if let Echo::Delayed { extra_m, .. } = echo {
             // Longer ways than those that are tried, and what comes before its cause, are something else.
             let before = of_power(Echo::Delayed { extra_m: -extra_m, coefficient: 0.0 }, power);
-            let early = trial.score(Change::Again(before), coarse, true).gain_over(&none, coarse);
+            let early = trial.score(Change::Replica(before), coarse, true).gain_over(&none, coarse);
             if extra_m > (FARTHEST_CELLS as f64 - 0.5) * cell_m || early > BEFORE * gain {
                 continue;
             }
         }
-        let fit = refine(trial, name, power, 0.5 * power, FLOOR, |power| Change::Again(of_power(echo, power)));
+        let fit = refine(trial, name, power, 0.5 * power, FLOOR, |power| Change::Replica(of_power(echo, power)));
         found.extend(fit);
     }
     found
@@ -212,8 +212,8 @@ mod tests {
             let Correction::Body(change) = &found_first.correction else { panic!() };
             change(evidence.body.as_mut().unwrap());
             evidence.accepted.extend(found_first.id);
-            let again = found(&evidence.changed());
-            assert!(again.is_none(), "after {found_first:?} still {again:?}");
+            let left = found(&evidence.changed());
+            assert!(left.is_none(), "after {found_first:?} still {left:?}");
         }
     }
 

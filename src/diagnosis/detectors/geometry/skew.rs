@@ -34,35 +34,35 @@ fn fit(frames: &[[f64; 3]], mean_m: f64, power: f64) -> (f64, f64) {
     (size, -0.5 * frames.len() as f64 * left.max(f64::MIN_POSITIVE).ln())
 }
 
-/// The size at the mean range where it grows with the range, the mean range, and what the walls gain by it. `standing`: log-likelihood of
+/// The size at the mean range where it grows with the range, the mean range, and what the walls gain by it. `of_walls`: log-likelihood of
 /// static clutter, by the size at the mean range, that range, and the power of the range with which the sine of everything grows.
-fn later(frames: &[[f64; 3]], standing: impl Fn(f64, f64, f64) -> f64) -> Option<(f64, f64, f64)> {
+fn later(frames: &[[f64; 3]], of_walls: impl Fn(f64, f64, f64) -> f64) -> Option<(f64, f64, f64)> {
     let weights: f64 = frames.iter().map(|frame| frame[2]).sum();
     let mean_m = frames.iter().map(|[_, range, weight]| range * weight).sum::<f64>() / weights;
     let (size, likelihood) = fit(frames, mean_m, LATER);
     // The body alone; or everything, where the radar is turned.
-    let alone = standing(0.0, mean_m, ASIDE[0]);
+    let alone = of_walls(0.0, mean_m, ASIDE[0]);
     let other = ASIDE.map(|power| {
         let (size, likelihood) = fit(frames, mean_m, power);
-        let walls = if power == 0.0 { standing(size, mean_m, power).max(alone) } else { alone };
+        let walls = if power == 0.0 { of_walls(size, mean_m, power).max(alone) } else { alone };
         likelihood + ROUGHLY * walls
     });
-    let walls = standing(size, mean_m, LATER);
+    let walls = of_walls(size, mean_m, LATER);
     let better = likelihood + ROUGHLY * walls - other.into_iter().fold(f64::NEG_INFINITY, f64::max);
     (size.is_finite() && mean_m.is_finite() && better > MUCH_BETTER).then_some((size, mean_m, ROUGHLY * (walls - alone)))
 }
 
 /// Instead of a body that is seen aside: None where the phases do not grow with the range.
-pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, gain: f64) -> Option<Candidate> {
+pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, nats: f64) -> Option<Candidate> {
     let radar = &evidence.radar;
     let frames: Vec<[f64; 3]> = training.iter().map(|sums| sums.sine(radar)).collect();
     let (places, wave) = (along(radar), TAU / radar.wavelength_m());
     let walls = WallBearings::new(evidence);
-    let standing = |size: f64, mean_m: f64, power: f64| {
+    let of_walls = |size: f64, mean_m: f64, power: f64| {
         let off = |range_m: f64, rx: usize| -size * (range_m / mean_m).powf(power) * wave * places[rx];
         walls.as_ref().map_or(0.0, |walls| walls.log_likelihood(off))
     };
-    let (size, mean_m, walls_gain) = later(&frames, standing)?;
+    let (size, mean_m, walls_gain) = later(&frames, of_walls)?;
     // Radian of a beat of one hertz, by receiver.
     let beat_hz = 2.0 * radar.slope_hz_per_s * mean_m / SPEED_OF_LIGHT;
     let turns: Vec<f64> = places.iter().map(|x| -size * wave * x / beat_hz).collect();
@@ -76,7 +76,7 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, gain: f64)
         place: Place { rx: Some((1..radar.rx_m.len()).collect()), ..Place::at(Stage::Receiver) },
         // The ratio of the walls' likelihoods, whose numbers the body gave, is one on average by chance: a p-value may be divided by it.
         p_value: (bearing.p_value * (-walls_gain).exp()).clamp(f64::MIN_POSITIVE, 1.0),
-        gain,
+        nats,
         errs_alike: true,
         look_alikes: vec![],
         statement: format!(
@@ -89,21 +89,21 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, gain: f64)
         energy: total * evidence.noise().iter().sum::<f64>() * (farthest * beat_hz).powi(2) / 3.0,
         correction: Correction::Inverse(
             Arc::new({
-                let (radar, still): (Radar, _) = (radar.clone(), evidence.still().to_vec());
+                let (radar, clutter): (Radar, _) = (radar.clone(), evidence.clutter().to_vec());
                 // Of what moves: static clutter would wrap around the chirps' ends, and how strong it is in every receiver is free.
-                let add_still = move |cube: &mut Cube, sign: f64| {
+                let add_clutter = move |cube: &mut Cube, sign: f64| {
                     let samples = cube.dims[4];
                     cube.each_chirp(|[_, channel, _], chirp| {
-                        let still = &still[channel * samples..][..samples];
-                        chirp.iter_mut().zip(still).for_each(|(value, still)| *value += sign * still);
+                        let clutter = &clutter[channel * samples..][..samples];
+                        chirp.iter_mut().zip(clutter).for_each(|(value, clutter)| *value += sign * clutter);
                     });
                 };
                 move |cube: &mut Cube| {
                     let receivers = cube.dims[2];
                     let lever = |delay_s: f64| radar.slope_hz_per_s * delay_s;
-                    add_still(cube, -1.0);
+                    add_clutter(cube, -1.0);
                     undo::delay_phase(cube, &radar, lever, |[_, channel, _]| turns[channel % receivers]);
-                    add_still(cube, 1.0);
+                    add_clutter(cube, 1.0);
                 }
             }),
             Volume::KEPT,

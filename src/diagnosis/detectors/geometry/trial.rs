@@ -67,8 +67,8 @@ impl<'a> Trial<'a> {
             .par_iter()
             .map(|&frame| {
                 let (points, inside) = self.moves.points(self.body, frame, change);
-                let again = if let Change::Again(echo) = change { Some(echo) } else { None };
-                let points = self.body.with_echoes(&self.evidence.radar, points, again);
+                let replica = if let Change::Replica(echo) = change { Some(echo) } else { None };
+                let points = self.body.with_echoes(&self.evidence.radar, points, replica);
                 let templates = part_templates(&self.evidence.radar, &self.model.cells, &points, self.body.parts.len());
                 (frame, Reach::new(maps.below([frame]), &templates, self.model.usable()), inside)
             })

@@ -65,7 +65,7 @@ impl WallBearings {
             Some(source(image, SMOOTH * PI * range_m.powi(2), range_m))
         });
         let sources: Vec<_> = rough.chain(smooth).collect();
-        let spectra: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(spectrum).collect();
+        let spectra: Vec<Vec<Complex64>> = evidence.clutter().chunks_exact(samples).map(spectrum).collect();
         let noise = evidence.noise().iter().sum::<f64>() / (spectra.len() * loops * evidence.split.training.len()).max(1) as f64;
         let cell = |bin: usize| -> Option<Cell> {
             let mut expected = DMatrix::<Complex64>::zeros(receivers, receivers);

@@ -16,7 +16,7 @@ pub struct Fit {
     /// What is added behind the mixer, `[channel][sample]`.
     pub added: Vec<Vec<Complex64>>,
     /// Static returns, `[channel][sample]`.
-    still: Vec<Vec<Complex64>>,
+    clutter: Vec<Vec<Complex64>>,
     /// `[tx]`: energy of e^{−jθ} beside a constant; noise of a variance errs in what is added by that variance over this.
     pub own: Vec<f64>,
     /// `[tx]`: mean of e^{−jθ}, which a constant predicts of it.
@@ -57,8 +57,8 @@ impl Fit {
             Some(std::array::from_fn(|order| solved.iter().map(|solution| solution[order]).collect()))
         };
         let channels: Vec<[Vec<Complex64>; 2]> = (0..tx * rx).into_par_iter().map(of_channel).collect::<Option<Vec<_>>>()?;
-        let (still, added) = channels.into_iter().map(|[still, added]| (still, added)).unzip();
-        Some(Self { course: course.clone(), added, still, own, share, tx, loops })
+        let (clutter, added) = channels.into_iter().map(|[clutter, added]| (clutter, added)).unzip();
+        Some(Self { course: course.clone(), added, clutter, own, share, tx, loops })
     }
 
     /// e^{jθ} of a chirp.
@@ -72,8 +72,8 @@ impl Fit {
         let of_channel = |channel: usize| -> f64 {
             let t = channel / rx;
             // A mean alone has its share of what is added.
-            let parts = self.still[channel].iter().zip(&self.added[channel]);
-            let mean: Vec<Complex64> = parts.map(|(still, added)| still + self.share[t] * added).collect();
+            let parts = self.clutter[channel].iter().zip(&self.added[channel]);
+            let mean: Vec<Complex64> = parts.map(|(clutter, added)| clutter + self.share[t] * added).collect();
             let mut gain = 0.0;
             for &frame in &evidence.split.held_out {
                 for (index, chirp) in evidence.cube.channel(frame, channel).chunks_exact(samples).enumerate() {

@@ -30,10 +30,10 @@ pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     // Errors as what is left says, which is more than the noise.
     let deviation = |r: usize| (0.5 * excess * error(r) / (samples * tx) as f64).sqrt();
     let term: Vec<Vec<Complex64>> = (0..tx * rx).map(|channel| vec![offsets[channel % rx]; samples]).collect();
-    let gain = fit.held_out_gain(evidence, &term) / excess;
+    let nats = fit.held_out_gain(evidence, &term) / excess;
     let beat = ZeroBeat::new(evidence, &fit.added, |channel| excess * error(channel));
     // Neither by its frequency: something else that does not turn.
-    if gain <= 0.0 || !beat.may_be_constant() {
+    if nats <= 0.0 || !beat.may_be_constant() {
         return None;
     }
     let parts = |part: fn(&Complex64) -> f64| -> Vec<f64> { offsets.iter().map(part).collect() };
@@ -47,7 +47,7 @@ pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
         choice: None,
         place: Place { range_m: Some([0.0, 0.0]), ..Place::at(Stage::Receiver) },
         p_value,
-        gain,
+        nats,
         errs_alike: false,
         look_alikes: if beat.may_be_leakage() { vec![effects::tx_leakage::ID] } else { vec![] },
         statement: format!(

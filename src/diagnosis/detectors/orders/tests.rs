@@ -24,8 +24,8 @@ fn turned(seed: u64, offset: Complex64) -> Evidence {
     let course = |frame: usize| 0.9 * (TAU * 0.7 * frame as f64 / FRAMES as f64).sin();
     let evidence = Evidence::in_noise(radar(), seed, |[frame, channel, _, n]| {
         let room = |bin: f64| tone(bin, n) * Complex64::from_polar(30.0, channel as f64 + bin);
-        let still = [14.0, 23.4, 37.0].into_iter().map(room).sum::<Complex64>() * Complex64::cis(course(frame));
-        still + offset
+        let clutter = [14.0, 23.4, 37.0].into_iter().map(room).sum::<Complex64>() * Complex64::cis(course(frame));
+        clutter + offset
     });
     let [_, tx, _, loops, _] = evidence.cube.dims;
     let turned: Vec<Complex64> = (0..FRAMES * tx * loops).map(|i| Complex64::cis(course(i / (tx * loops)))).collect();
@@ -45,7 +45,7 @@ fn after(evidence: Evidence, correction: Correction) -> Evidence {
 }
 
 fn sure(evidence: &Evidence) -> Vec<Candidate> {
-    find(evidence).into_iter().filter(|found| found.p_value < 1e-4 && found.gain > 5.0).collect()
+    find(evidence).into_iter().filter(|found| found.p_value < 1e-4 && found.nats > 5.0).collect()
 }
 
 #[test]

@@ -94,7 +94,7 @@ fn candidate(
         choice: None,
         place: Place { range_m: Some(window(best.bin).map(|bin| bin * bin_m)), ..Place::at(Stage::Propagation) },
         p_value,
-        gain,
+        nats: gain,
         errs_alike: false,
         look_alikes,
         statement: format!(

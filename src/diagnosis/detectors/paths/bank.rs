@@ -153,9 +153,9 @@ impl Table {
         (gain, SinusoidalMotion { law, log_power: f64::from(LEVELS[level]).ln(), ..motion })
     }
 
-    /// The best power that comes at one range and one Doppler in every frame, near a motion's ranges, and how many were tried: what
-    /// is not steady about a thing that stands still, which never moves.
-    pub fn standing(&self, ranges: RangeInclusive<i64>) -> Option<(StaticTarget, f64)> {
+    /// The best power that comes at one range and one Doppler in every frame, near a motion's ranges, and how many were tried: the
+    /// fluctuation of a static target, which never moves.
+    pub fn static_target(&self, ranges: RangeInclusive<i64>) -> Option<(StaticTarget, f64)> {
         let places = |doppler: i64, range: i64| vec![(doppler, range); self.times_s.len()];
         let [rows, columns] = self.size().map(|length| length as i64);
         let mut best: Option<StaticTarget> = None;

@@ -16,9 +16,9 @@ use crate::diagnosis::evidence::fft_2d;
 
 /// Cells of the grid per cell of the transform.
 pub const FINE: usize = 2;
-/// Conjugate gradients stop when the remains are so small a share of the noise, or after so many steps: a body far above the noise is
+/// Conjugate gradients stop when the residual is so small a share of the noise, or after so many steps: a body far above the noise is
 /// then undone in part, which costs sight of what is beside it, but no more (what stays of a tone is measured in the same steps).
-const REMAINS: f64 = 0.1;
+const TOLERANCE: f64 = 0.1;
 const MOST_STEPS: usize = 100;
 
 /// Samples are `[loop, sample]`, cells of the grid `[range, doppler]`, both in the transforms' order.
@@ -137,26 +137,26 @@ impl Coloured {
         let size = frame.len();
         let mut work = self.work();
         let mut cells = vec![Complex64::ZERO; self.some.len() * FINE * self.dims[0]];
-        let (mut solution, mut remains) = (vec![Complex64::ZERO; size], frame.to_vec());
+        let (mut solution, mut residual) = (vec![Complex64::ZERO; size], frame.to_vec());
         let (mut nearly, mut times) = (vec![Complex64::ZERO; size], vec![Complex64::ZERO; size]);
-        self.nearly(&remains, &mut nearly, &mut work);
+        self.nearly(&residual, &mut nearly, &mut work);
         let mut step = nearly.clone();
-        let mut along = product(&remains, &nearly);
-        let enough = REMAINS * REMAINS * size as f64;
+        let mut along = product(&residual, &nearly);
+        let enough = TOLERANCE * TOLERANCE * size as f64;
         for _ in 0..MOST_STEPS {
-            if energy(&remains) <= enough {
+            if energy(&residual) <= enough {
                 break;
             }
             self.times(&step, &mut cells, &mut times, &mut work);
             let length = along / product(&step, &times).max(f64::MIN_POSITIVE);
-            for ((solution, remains), (step, times)) in solution.iter_mut().zip(&mut remains).zip(step.iter().zip(&times)) {
+            for ((solution, residual), (step, times)) in solution.iter_mut().zip(&mut residual).zip(step.iter().zip(&times)) {
                 *solution += step * length;
-                *remains -= times * length;
+                *residual -= times * length;
             }
-            self.nearly(&remains, &mut nearly, &mut work);
-            let before = std::mem::replace(&mut along, product(&remains, &nearly));
-            let again = along / before.max(f64::MIN_POSITIVE);
-            step.iter_mut().zip(&nearly).for_each(|(step, nearly)| *step = nearly + *step * again);
+            self.nearly(&residual, &mut nearly, &mut work);
+            let before = std::mem::replace(&mut along, product(&residual, &nearly));
+            let conjugate = along / before.max(f64::MIN_POSITIVE);
+            step.iter_mut().zip(&nearly).for_each(|(step, nearly)| *step = nearly + *step * conjugate);
         }
         solution
     }
@@ -232,10 +232,10 @@ mod tests {
         let [white, drawn] = coloured.draw(&mut random);
         let whitened = coloured.whitened(&drawn);
         let mut cells = vec![Complex64::ZERO; coloured.some.len() * FINE * loops];
-        let mut again = whitened.clone();
-        coloured.times(&whitened, &mut cells, &mut again, &mut coloured.work());
-        let remains: Vec<Complex64> = again.iter().zip(&drawn).map(|(a, b)| a - b).collect();
-        assert!(energy(&drawn) > 10.0 * energy(&white) && energy(&remains) < 0.02 * energy(&white), "{}", energy(&remains));
+        let mut coloured_back = whitened.clone();
+        coloured.times(&whitened, &mut cells, &mut coloured_back, &mut coloured.work());
+        let residual: Vec<Complex64> = coloured_back.iter().zip(&drawn).map(|(a, b)| a - b).collect();
+        assert!(energy(&drawn) > 10.0 * energy(&white) && energy(&residual) < 0.02 * energy(&white), "{}", energy(&residual));
         // Far from the tones noise stays what it was.
         let (before, after) = (coloured.cells(&white), coloured.cells(&whitened));
         let far = |cells: &[Complex64]| cells[50 * FINE * loops..].iter().map(Complex64::norm_sqr).sum::<f64>();

@@ -107,7 +107,7 @@ impl Bounce {
             choice: None,
             place: Place::at(Stage::Propagation),
             p_value,
-            gain: self.fit.held_out,
+            nats: self.fit.held_out,
             errs_alike: false,
             look_alikes: vec![],
             statement: format!(
@@ -123,14 +123,14 @@ impl Bounce {
 
     fn undo(&self, scene: &Scene) -> Undo {
         let (factor, rate, samples) = (self.fit.factor, rate(&scene.evidence.radar, self.extra_m), scene.samples);
-        let still = scene.evidence.still().to_vec();
+        let clutter = scene.evidence.clutter().to_vec();
         Arc::new(move |cube: &mut Cube| {
             cube.each_chirp(|[_, channel, _], chirp| {
-                let still = &still[channel * samples..][..samples];
+                let clutter = &clutter[channel * samples..][..samples];
                 for (n, value) in chirp.iter_mut().enumerate() {
                     // The measured signal holds the copy, too: undo 1 + κ D, to third order.
                     let copy = factor * Complex64::cis(rate * n as f64);
-                    *value -= (*value - still[n]) * copy * (1.0 - copy + copy * copy);
+                    *value -= (*value - clutter[n]) * copy * (1.0 - copy + copy * copy);
                 }
             });
         })

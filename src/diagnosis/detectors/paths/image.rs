@@ -12,7 +12,7 @@ use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Candidate, Correction, Estimate, Place};
 use crate::effects::Stage;
 
-/// Log-likelihood within which two boundaries are not told apart.
+/// Log-likelihood within which two boundaries are not distinguishable.
 const CLOSE: f64 = 4.6;
 
 pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Candidate {
@@ -49,7 +49,7 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
             patch(&expected, scene.map(frame), scene.model.support(frame), scene.samples, 0.1)
         })
         .collect();
-    let still = evidence.still().to_vec();
+    let clutter = evidence.clutter().to_vec();
     let power: f64 = (ghost.templates.iter())
         .map(|template| ghost.weight * template.power.iter().map(|&power| f64::from(power)).sum::<f64>())
         .sum();
@@ -60,7 +60,7 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
         choice: Some(name.into()),
         place: Place { boundary: Some(name.into()), ..place },
         p_value: corrected(chi2_tail(2.0 * ghost.gain_all, 2.0), tried),
-        gain: ghost.gain,
+        nats: ghost.gain,
         errs_alike: false,
         look_alikes,
         statement,
@@ -69,7 +69,7 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
         energy: energy(scene, power / 2.25),
         correction: Correction::Samples(Arc::new(move |cube| {
             for (frame, cells) in cells.iter().enumerate() {
-                empty_cells(cube, &still, frame, cells);
+                empty_cells(cube, &clutter, frame, cells);
             }
         })),
     }

@@ -42,10 +42,10 @@ const LEAST_GAIN_TRACK: f64 = 12.0;
 /// to one, and faint images do. What is strong among the body's returns, and comes from aside, is neither.
 const LEAST_GAIN_SINUSOIDAL: f64 = 8.0;
 const STRONG: f64 = 100.0;
-/// Of a track that follows no law of motion: remains of a strong path that was taken out look like that.
+/// Of a track that follows no law of motion: the residual of a strong path that was subtracted looks like that.
 const LEAST_GAIN_UNNAMED: f64 = 25.0;
-/// Of a second path: it must be no remains of the first.
-const LEAST_GAIN_AGAIN: f64 = 50.0;
+/// Of a second path: it must be no residual of the first.
+const LEAST_GAIN_SECOND: f64 = 50.0;
 /// Share of a track's or an image's gain from which on a product of the signal with itself explains as much.
 const NEARLY: f64 = 0.5;
 /// Share of a mirror image's gain from which on a copy of the body, phases and all, may be the same thing; and a wall returns no
@@ -58,9 +58,9 @@ const TRIED: f64 = 6.0;
 /// Effects of which there may be several.
 pub const MANY: [&str; 3] = [effects::wall_ghost::ID, effects::floor_bounce::ID, effects::moving_reflector::ID];
 
-/// What leaves remains when it is taken out that no single frame shows and that move by a law: how the body is seen otherwise or
-/// again, things that move themselves, and a receiver in which all these change one another.
-pub const LEAVE_REMAINS: [&str; 8] = [
+/// What leaves a residual when it is subtracted that no single frame shows and that moves by a law: other views and replicas of the
+/// body, movers, and a receiver in which all these change one another.
+pub const LEAVE_RESIDUAL: [&str; 8] = [
     effects::wall_ghost::ID,
     effects::floor_bounce::ID,
     effects::body_multibounce::ID,
@@ -76,13 +76,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let mut found: Vec<Candidate> = static_point::find(evidence).into_iter().collect();
     if let Some(scene) = Scene::new(evidence) {
         let moving = moving(&scene);
-        let elsewhere = moving.iter().any(|found| found.gain > LEAST_GAIN);
+        let elsewhere = moving.iter().any(|found| found.nats > LEAST_GAIN);
         found.extend(moving);
         if !elsewhere {
-            let remains = LEAVE_REMAINS.iter().any(|id| evidence.accepted.contains(id));
+            let residual = LEAVE_RESIDUAL.iter().any(|id| evidence.accepted.contains(id));
             // Noise that receivers share comes from one direction, as if something were there.
             let shared = evidence.accepted.contains(&effects::correlated_noise::ID);
-            let motion = (!remains && !shared).then(|| sinusoidal::strongest(&scene)).flatten();
+            let motion = (!residual && !shared).then(|| sinusoidal::strongest(&scene)).flatten();
             let least = |mover: &mover::Mover| {
                 let distinct = mover.power > STRONG && mover::aside(&scene, &mover.track.sightings);
                 if distinct { LEAST_GAIN } else { LEAST_GAIN_SINUSOIDAL }
@@ -93,11 +93,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             found.extend(over_the_body(&over).or_else(|| motion.map(|motion| moves_sinusoidally(&motion, &over))));
         }
     }
-    let again = |id: &str| evidence.accepted.contains(&id);
+    let is_accepted = |id: &str| evidence.accepted.contains(&id);
     found.retain(|found| match found.id {
-        Some(id) if again(id) => MANY.contains(&id) && found.gain > LEAST_GAIN_AGAIN,
-        Some(id) => !MANY.contains(&id) || !MANY.into_iter().any(again) || found.gain > LEAST_GAIN_UNNAMED,
-        None => !MANY.into_iter().any(again) || found.gain > LEAST_GAIN_AGAIN,
+        Some(id) if is_accepted(id) => MANY.contains(&id) && found.nats > LEAST_GAIN_SECOND,
+        Some(id) => !MANY.contains(&id) || !MANY.into_iter().any(is_accepted) || found.nats > LEAST_GAIN_UNNAMED,
+        None => !MANY.into_iter().any(is_accepted) || found.nats > LEAST_GAIN_SECOND,
     });
     found
 }
@@ -136,25 +136,26 @@ fn moving(scene: &Scene) -> Vec<Candidate> {
         _ => {}
     }
     let product = product::find(scene, TRIED);
-    // One number that explains as much as a track or an image does comes first; the others are asked again without it.
+    // One number that explains as much as a track or an image does comes first; the others are tested without it.
     if let Some(product) = &product {
-        found.retain(|found| product.gain < NEARLY * found.gain);
+        found.retain(|found| product.nats < NEARLY * found.nats);
     }
-    let mut again = echo::multibounce(scene, TRIED);
-    if let Some(again) = &mut again {
-        told_apart(&mut found, again);
+    let mut multibounce = echo::multibounce(scene, TRIED);
+    if let Some(multibounce) = &mut multibounce {
+        keep_one(&mut found, multibounce);
     }
-    found.extend(again.into_iter().chain(product));
+    found.extend(multibounce.into_iter().chain(product));
     found
 }
 
-/// A wall behind the radar returns nearly the same of a body before it as the body's own echoes do: a copy that keeps its phases.
-fn told_apart(found: &mut Vec<Candidate>, again: &mut Candidate) {
-    let alike = |found: &Candidate| found.id == Some(effects::wall_ghost::ID) && again.gain > ALIKE * found.gain;
+/// Of a multibounce and a wall's image that explain the same, the one that is possible; the other becomes its look-alike. A wall behind
+/// the radar returns nearly the same of a body before it as the body's own echoes do: a copy that keeps its phases.
+fn keep_one(found: &mut Vec<Candidate>, multibounce: &mut Candidate) {
+    let alike = |found: &Candidate| found.id == Some(effects::wall_ghost::ID) && multibounce.nats > ALIKE * found.nats;
     let Some(index) = found.iter().position(alike) else { return };
     if found[index].estimates.iter().any(|estimate| estimate.name == "coefficient" && estimate.values[0].abs() > STRONGEST_WALL) {
         found.remove(index);
-        again.look_alikes.push(effects::wall_ghost::ID);
+        multibounce.look_alikes.push(effects::wall_ghost::ID);
     } else {
         found[index].look_alikes.push(effects::body_multibounce::ID);
     }

@@ -74,7 +74,7 @@ impl Mover {
     pub fn candidate(&self, scene: &Scene, tried: f64) -> Candidate {
         let (evidence, sightings) = (scene.evidence, &self.track.sightings);
         let seen = Whereabouts::new(scene, sightings, self.oscillation.as_ref(), self.sine_error);
-        let (cells, still) = (self.cells(scene), evidence.still().to_vec());
+        let (cells, clutter) = (self.cells(scene), evidence.clutter().to_vec());
         let is_reflector = self.id == Some(effects::moving_reflector::ID);
         Candidate {
             id: self.id,
@@ -83,7 +83,7 @@ impl Mover {
             choice: None,
             place: self.place(scene, &seen),
             p_value: corrected(self.track.p_value, tried),
-            gain: self.gain,
+            nats: self.gain,
             errs_alike: false,
             look_alikes: self.look_alikes(scene),
             statement: self.statement(&seen),
@@ -91,7 +91,7 @@ impl Mover {
             energy: energy(scene, sightings.iter().map(|s| s.power).sum()),
             correction: Correction::Samples(Arc::new(move |cube| {
                 for (frame, cells) in &cells {
-                    empty_cells(cube, &still, *frame, cells);
+                    empty_cells(cube, &clutter, *frame, cells);
                 }
             })),
         }

@@ -60,7 +60,7 @@ impl Oscillation {
             })?;
         }
         let ([mean_m, sine_m, cosine_m], chi2) = misfit(sightings, times_s, errors, span_mps, rate);
-        let still = sightings.iter().map(|s| (s.velocity_mps / errors[1]).powi(2)).sum::<f64>();
+        let without_motion = sightings.iter().map(|s| (s.velocity_mps / errors[1]).powi(2)).sum::<f64>();
         let freedom = (2 * sightings.len()).saturating_sub(4).max(1) as f64;
         // Errors as large as they turn out to be.
         let scale = (chi2 / freedom).max(1.0).sqrt();
@@ -75,7 +75,7 @@ impl Oscillation {
             sine_m,
             cosine_m,
             rate_hz: rate,
-            left: chi2 / still.max(1e-12),
+            left: chi2 / without_motion.max(1e-12),
             deviations: [scale * errors[0] / count.sqrt(), excursion_error, rate_error],
         })
     }

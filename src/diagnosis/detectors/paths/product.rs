@@ -17,7 +17,7 @@ use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Volume};
 use crate::effects::{self, Stage};
 
-/// Log-likelihood within which two explanations are not told apart.
+/// Log-likelihood within which two explanations are not distinguishable.
 pub const CLOSE: f64 = 4.6;
 /// What was measured holds the products already: so often they are taken out of their own template.
 const ROUNDS: usize = 3;
@@ -113,7 +113,7 @@ impl Product {
             choice: None,
             place: Place::at(stage),
             p_value,
-            gain: self.fit.held_out,
+            nats: self.fit.held_out,
             errs_alike: false,
             look_alikes,
             statement,
@@ -152,11 +152,11 @@ fn fitted(scene: &Scene, clean: &[Vec<Vec<Complex64>>], kind: Kind) -> Product {
     let samples = scene.samples;
     let judge = |products: &[Vec<Vec<Complex64>>]| {
         // As in the measured maps, static clutter in all frames is left out.
-        let still: Vec<Vec<Complex64>> = (0..products[0].len())
+        let clutter: Vec<Vec<Complex64>> = (0..products[0].len())
             .map(|channel| mean_chirp(products.iter().flat_map(|frame| frame[channel].chunks_exact(samples)), samples))
             .collect();
         let moving = |frame: usize, channel: usize| -> Vec<Complex64> {
-            products[frame][channel].iter().enumerate().map(|(i, value)| value - still[channel][i % samples]).collect()
+            products[frame][channel].iter().enumerate().map(|(i, value)| value - clutter[channel][i % samples]).collect()
         };
         fit(scene, &matches(scene, |frame, channel| transform(&moving(frame, channel), samples)))
     };
@@ -172,11 +172,11 @@ fn fitted(scene: &Scene, clean: &[Vec<Vec<Complex64>>], kind: Kind) -> Product {
             kind.product(&linear)
         };
         let refined: Vec<Vec<Vec<Complex64>>> = clean.par_iter().zip(&products).map(without).collect();
-        let again = judge(&refined);
-        if again.training <= found.training {
+        let refit = judge(&refined);
+        if refit.training <= found.training {
             break;
         }
-        (products, found) = (refined, again);
+        (products, found) = (refined, refit);
     }
     let energy = products.iter().flatten().flatten().map(|value| (found.factor * value).norm_sqr()).sum();
     Product { kind, fit: found, energy }

@@ -11,8 +11,8 @@ const LEAST: f64 = 1e-3;
 const MOST_CELLS: usize = 300;
 
 /// Subtracts from a frame's moving part the smallest signal that empties the cells `[doppler · samples + range]`, in
-/// every channel. `still` is `[channel, sample]`, static clutter.
-pub fn empty_cells(cube: &mut Cube, still: &[Complex64], frame: usize, cells: &[usize]) {
+/// every channel. `clutter` is static clutter, `[channel, sample]`.
+pub fn empty_cells(cube: &mut Cube, clutter: &[Complex64], frame: usize, cells: &[usize]) {
     let cells = &cells[..cells.len().min(MOST_CELLS)];
     if cells.is_empty() {
         return;
@@ -21,11 +21,11 @@ pub fn empty_cells(cube: &mut Cube, still: &[Complex64], frame: usize, cells: &[
     let (slow, fast) = (hann(loops), hann(samples));
     let Some(factor) = cholesky(&gram(cells, &slow, &fast), cells.len()) else { return };
     for channel in 0..cube.channels() {
-        let still = &still[channel * samples..][..samples];
+        let clutter = &clutter[channel * samples..][..samples];
         let moving: Vec<Complex64> = cube
             .channel(frame, channel)
             .chunks_exact(samples)
-            .flat_map(|chirp| chirp.iter().zip(still).map(|(value, mean)| value - mean))
+            .flat_map(|chirp| chirp.iter().zip(clutter).map(|(value, mean)| value - mean))
             .collect();
         let map = transform(&moving, samples);
         let amounts = solve(&factor, cells.iter().map(|&cell| map[cell]).collect());

@@ -7,7 +7,7 @@ use super::coloured::FINE;
 use super::scene::Scene;
 use crate::diagnosis::Point;
 use crate::diagnosis::cube::mean_chirp;
-use crate::diagnosis::detectors::clutter::still_power;
+use crate::diagnosis::detectors::clutter::clutter_power;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::grid::Grid;
 
@@ -21,11 +21,11 @@ const FAINTEST: f64 = 0.03;
 pub struct Returns<'a> {
     pub scene: &'a Scene<'a>,
     /// Static clutter, `[channel · samples + sample]`.
-    still: Vec<Complex64>,
+    clutter: Vec<Complex64>,
     /// Mean power of the body's tones that is left in that, in a sample over the noise, by range.
     rest: Vec<f64>,
     /// Power of static clutter over the noise of a frame's map, by range.
-    pub clutter: Vec<f64>,
+    pub clutter_power: Vec<f64>,
     /// The body's points in every frame with the power that each is expected to have in the peak.
     body: Vec<Vec<(Point, f64)>>,
 }
@@ -33,8 +33,8 @@ pub struct Returns<'a> {
 impl<'a> Returns<'a> {
     pub fn new(scene: &'a Scene<'a>) -> Self {
         let body = (0..scene.frames()).into_par_iter().map(|frame| body(scene, frame)).collect();
-        let mut returns = Self { scene, still: vec![], rest: vec![], clutter: still_power(scene.evidence), body };
-        (returns.still, returns.rest) = returns.what_stands();
+        let mut returns = Self { scene, clutter: vec![], rest: vec![], clutter_power: clutter_power(scene.evidence), body };
+        (returns.clutter, returns.rest) = returns.static_clutter();
         returns
     }
 
@@ -46,7 +46,7 @@ impl<'a> Returns<'a> {
     /// A channel of a frame without static clutter, over the noise, `[loop · sample]`.
     pub fn moving(&self, frame: usize, channel: usize) -> Vec<Complex64> {
         let (evidence, samples) = (self.scene.evidence, self.scene.samples);
-        let mean = &self.still[channel * samples..][..samples];
+        let mean = &self.clutter[channel * samples..][..samples];
         let scale = evidence.noise()[channel].max(f64::MIN_POSITIVE).sqrt().recip();
         let chirps = evidence.cube.channel(frame, channel).chunks_exact(samples);
         chirps.flat_map(|chirp| chirp.iter().zip(mean).map(|(value, mean)| (value - mean) * scale)).collect()
@@ -91,7 +91,7 @@ impl<'a> Returns<'a> {
 
     /// Static clutter, `[channel · samples + sample]`: the mean over the training frames, at every range of those most in
     /// which the body is elsewhere; and the power of the body that is left in it.
-    fn what_stands(&self) -> (Vec<Complex64>, Vec<f64>) {
+    fn static_clutter(&self) -> (Vec<Complex64>, Vec<f64>) {
         let evidence = self.scene.evidence;
         let (loops, samples, training) = (self.scene.loops, self.scene.samples, &evidence.split.training);
         let rows = FINE * loops;

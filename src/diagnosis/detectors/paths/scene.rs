@@ -5,14 +5,14 @@ use rayon::prelude::*;
 use super::background;
 use super::sidelobes::Sidelobes;
 use crate::diagnosis::Evidence;
-use crate::diagnosis::detectors::clutter::still_power;
+use crate::diagnosis::detectors::clutter::clutter_power;
 use crate::diagnosis::locate::{BODY_FACTOR, CELLS_PER_VALUE};
 use crate::diagnosis::power::{PowerModel, Template};
 use crate::effects;
 use crate::grid::Grid;
 
-/// Doppler bins around zero in which static clutter leaves remains wherever the body was in some frame.
-pub const STILL_BINS: i64 = 2;
+/// Doppler bins around zero in which static clutter leaves a residual wherever the body was in some frame.
+pub const CLUTTER_BINS: i64 = 2;
 /// Cells by which the body's support grows along Doppler: accelerations within a frame.
 const DOPPLER_MARGIN: i64 = 2;
 /// Whose undoing leaves leakage of the body at fixed ranges.
@@ -27,7 +27,7 @@ pub struct Scene<'a> {
     pub bins: usize,
     /// Channels that a power is the mean of.
     pub channels: f64,
-    /// Cells of a map where in every frame remains of the room can be, or nothing is received.
+    /// Cells of a map where in every frame a residual of static clutter can be, or nothing is received.
     never: Vec<bool>,
     /// These, and where the body can be.
     taken: Grid<bool, 3>,
@@ -88,7 +88,7 @@ impl<'a> Scene<'a> {
             return None;
         }
         let model = evidence.power()?;
-        let (never, clutter) = (never(evidence, model), still_power(evidence));
+        let (never, clutter) = (never(evidence, model), clutter_power(evidence));
         // Before the frames ask for them all at once.
         let maps = evidence.maps();
         let one = |frame: usize| Frames::one(evidence, model, frame, &never, &clutter);
@@ -193,7 +193,7 @@ impl<'a> Scene<'a> {
     pub fn moving(&self, template: &Template) -> Template {
         let moves = |cell: u32| {
             let doppler = cell as usize / self.samples;
-            doppler.min(self.loops - doppler) as i64 > STILL_BINS
+            doppler.min(self.loops - doppler) as i64 > CLUTTER_BINS
         };
         let kept = template.cells.iter().zip(&template.power).filter(|(cell, _)| moves(**cell));
         let (cells, power) = kept.map(|(&cell, &power)| (cell, power)).unzip();
@@ -255,14 +255,14 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Cells of a map where in every frame remains of the room can be, or nothing is received.
+/// Cells of a map where in every frame a residual of static clutter can be, or nothing is received.
 fn never(evidence: &Evidence, model: &PowerModel) -> Vec<bool> {
     let ([frames, _, _, loops, samples], bins) = (evidence.cube.dims, evidence.range_bins());
     let visited = visited_ranges(model, frames, samples);
     let is_never = |cell: usize| {
         let (doppler, range) = (cell / samples, cell % samples);
-        let still = doppler.min(loops - doppler) as i64;
-        range >= bins || (still <= STILL_BINS && visited[range]) || still == 0
+        let off_zero = doppler.min(loops - doppler) as i64;
+        range >= bins || (off_zero <= CLUTTER_BINS && visited[range]) || off_zero == 0
     };
     (0..loops * samples).map(is_never).collect()
 }

@@ -154,30 +154,30 @@ impl<'a> Search<'a> {
     }
 
     /// A likelihood ratio is large by chance no more often than its inverse says: that of all frames, one of all that were tried.
-    /// Where a static return is not steady, it must be beaten. None where that return explains as much.
+    /// It must explain more than a static return that fluctuates. None where that return explains as much.
     fn p_value(&self, best: Judged, table: &Table, tried: f64) -> Option<f64> {
-        let (standing, chances) = self.standing(best.motion, table)?;
-        if best.held_out <= 0.0 || standing > NEARLY * best.gain() {
+        let (of_static, chances) = self.of_static_target(best.motion, table)?;
+        if best.held_out <= 0.0 || of_static > NEARLY * best.gain() {
             return None;
         }
-        let nats = tried.ln() + (standing - chances).max(0.0) - best.training - best.held_out;
+        let nats = tried.ln() + (of_static - chances).max(0.0) - best.training - best.held_out;
         Some(nats.min(0.0).exp())
     }
 
     /// What a static return near a motion gains, and the logarithm of how many were tried.
-    fn standing(&self, motion: SinusoidalMotion, table: &Table) -> Option<(f64, f64)> {
+    fn of_static_target(&self, motion: SinusoidalMotion, table: &Table) -> Option<(f64, f64)> {
         let ground = &self.ground;
         let ranges = table.places(ground.scene, motion.law).into_iter().map(|place| place.1);
         let ranges = ranges.clone().min()? - BESIDE..=ranges.max()? + BESIDE;
-        // Where it stands out from what oscillates it is no side lobe of that.
-        let outstands = |standing: &StaticTarget| {
-            ground.strength(&self.training, |_| standing.place, standing.sine)[0] + STRONGER
+        // Where it is stronger than what oscillates it is no side lobe of that.
+        let is_stronger = |target: &StaticTarget| {
+            ground.strength(&self.training, |_| target.place, target.sine)[0] + STRONGER
                 > ground.strength(&self.training, |frame| ground.place(motion.law, frame), motion.sine)[0]
         };
-        let found = table.standing(ranges).filter(|(standing, _)| outstands(standing));
-        Some(found.map_or((0.0, 0.0), |(standing, tried)| {
-            let of_frame = |&frame: &usize| ground.gain_at(frame, standing.place, standing.sine, standing.power);
-            (standing.gain + self.held_out.iter().map(of_frame).sum::<f64>(), tried.ln())
+        let found = table.static_target(ranges).filter(|(target, _)| is_stronger(target));
+        Some(found.map_or((0.0, 0.0), |(target, tried)| {
+            let of_frame = |&frame: &usize| ground.gain_at(frame, target.place, target.sine, target.power);
+            (target.gain + self.held_out.iter().map(of_frame).sum::<f64>(), tried.ln())
         }))
     }
 

@@ -1,5 +1,5 @@
-//! A static return that stands out of the static clutter (`static_reflector`): in one range cell, from one direction, in every
-//! frame. What the clutter's own roughness may do is the null: its power in a cell is speckle about the mean of the
+//! A static return that is stronger than the static clutter around it (`static_reflector`): in one range cell, from one direction,
+//! in every frame. What the clutter's own roughness may do is the null: its power in a cell is speckle about the mean of the
 //! ranges around it. Boundaries, edges and corners return more than their surroundings at known ranges, and are left out.
 
 use std::sync::Arc;
@@ -48,23 +48,23 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let room = evidence.room.as_ref().filter(|room| !room.boundaries().is_empty())?;
     let frames: Vec<Spectra> = (0..evidence.cube.dims[0]).map(|frame| spectra(&evidence.cube, &[frame])).collect();
     let training = spectra(&evidence.cube, &evidence.split.training);
-    let steady = steady(&frames);
-    let (peak, tried) = strongest(evidence, room, &training, &steady)?;
+    let constant = constant(&frames);
+    let (peak, tried) = strongest(evidence, room, &training, &constant)?;
     let held_out = spectra(&evidence.cube, &evidence.split.held_out);
     let ratio = beam(&evidence.radar, &held_out, peak.bin, peak.sine) / mean(&held_out, &peak.around);
-    let again = tail(ratio, peak.around.len());
+    let held_out_p = tail(ratio, peak.around.len());
     let p_value = corrected(peak.p_value, tried * super::TRIED);
-    let gain = -(peak.p_value.max(again).max(1e-300) * tried).ln();
-    (gain > super::LEAST_GAIN && p_value < 1e-3).then(|| candidate(evidence, &peak, p_value, gain))
+    let nats = -(peak.p_value.max(held_out_p).max(1e-300) * tried).ln();
+    (nats > super::LEAST_GAIN && p_value < 1e-3).then(|| candidate(evidence, &peak, p_value, nats))
 }
 
 fn spectra(cube: &Cube, frames: &[usize]) -> Spectra {
     let samples = cube.dims[4];
-    cube.still(frames).chunks_exact(samples).map(|mean| transform(mean, samples)).collect()
+    cube.clutter(frames).chunks_exact(samples).map(|mean| transform(mean, samples)).collect()
 }
 
 /// Whether a range returns the same in every frame.
-fn steady(frames: &[Spectra]) -> Vec<bool> {
+fn constant(frames: &[Spectra]) -> Vec<bool> {
     let (channels, bins, count) = (frames[0].len(), frames[0][0].len(), frames.len() as f64);
     (0..bins)
         .map(|bin| {
@@ -80,7 +80,7 @@ fn steady(frames: &[Spectra]) -> Vec<bool> {
 }
 
 /// The least likely cell under speckle, and how many were looked at.
-fn strongest(evidence: &Evidence, room: &Room, spectra: &Spectra, steady: &[bool]) -> Option<(Peak, f64)> {
+fn strongest(evidence: &Evidence, room: &Room, spectra: &Spectra, constant: &[bool]) -> Option<(Peak, f64)> {
     let radar = &evidence.radar;
     let cell_m = SPEED_OF_LIGHT * radar.sample_rate_hz / (2.0 * radar.slope_hz_per_s * radar.samples_per_chirp as f64);
     let known = known_m(room);
@@ -92,7 +92,7 @@ fn strongest(evidence: &Evidence, room: &Room, spectra: &Spectra, steady: &[bool
         if directed(radar) { (0..SINES).map(|i| Some(2.0 * i as f64 / (SINES - 1) as f64 - 1.0)).collect() } else { vec![None] };
     let mut best: Option<Peak> = None;
     let mut tried = 0.0;
-    for bin in (1..bins).filter(|&bin| inside(bin) && steady[bin]) {
+    for bin in (1..bins).filter(|&bin| inside(bin) && constant[bin]) {
         let around: Vec<usize> =
             (bin.saturating_sub(AROUND)..=bin + AROUND).filter(|&other| other.abs_diff(bin) > PEAK && inside(other)).collect();
         if around.len() < FEWEST_AROUND {
@@ -181,7 +181,7 @@ impl Tone {
         let turns: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(rate * n as f64)).collect();
         // Through the window, so that other ranges do not leak in.
         let window: Vec<f64> = hann(samples).iter().map(|w| w * w).collect();
-        let amplitudes = (evidence.still().chunks_exact(samples))
+        let amplitudes = (evidence.clutter().chunks_exact(samples))
             .map(|mean| mean.iter().zip(&turns).zip(&window).map(|((value, turn), w)| value * turn.conj() * w).sum())
             .collect();
         Self { turns, amplitudes }
@@ -269,7 +269,7 @@ fn degrees(sine: f64) -> f64 {
     sine.clamp(-1.0, 1.0).asin().to_degrees()
 }
 
-fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candidate {
+fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, nats: f64) -> Candidate {
     let (radar, [frames, _, _, loops, samples]) = (&evidence.radar, evidence.cube.dims);
     let tone = Tone::of(evidence, peak);
     Candidate {
@@ -279,7 +279,7 @@ fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, gain: f64) -> Candi
         choice: None,
         place: peak.place(radar),
         p_value,
-        gain,
+        nats,
         errs_alike: false,
         look_alikes: vec![],
         statement: peak.statement(),

@@ -36,13 +36,13 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Body walking away, with a mirror on the right, an oscillating stranger before it, or neither.
-fn evidence(mirror: f64, stranger: f64) -> Evidence {
-    made(mirror, stranger, 1.0)
+/// Body walking away, with a mirror on the right, an oscillating untracked mover before it, or neither.
+fn evidence(mirror: f64, untracked: f64) -> Evidence {
+    made(mirror, untracked, 1.0)
 }
 
-/// `centre_m`: about which the stranger oscillates.
-fn made(mirror: f64, stranger: f64, centre_m: f64) -> Evidence {
+/// `centre_m`: about which the untracked mover oscillates.
+fn made(mirror: f64, untracked: f64, centre_m: f64) -> Evidence {
     let mut radar = Radar { samples_per_chirp: 64, loops_per_frame: 64, frames: FRAMES, ..Radar::mmmesh(FRAMES) };
     radar.tx_m.truncate(1);
     radar.chirp_period_s *= 3.0;
@@ -80,11 +80,11 @@ fn made(mirror: f64, stranger: f64, centre_m: f64) -> Evidence {
             points.push(Point { position_m: middle, velocity_mps: velocity, normal, area_m2: 0.01, part: 0 });
         }
         frames.push(points);
-        if stranger > 0.0 {
+        if untracked > 0.0 {
             let phase = std::f64::consts::TAU * 0.8 * time_s;
             let (range, velocity) = (centre_m + 0.12 * phase.sin(), 0.12 * std::f64::consts::TAU * 0.8 * phase.cos());
             for rx in 0..2 {
-                path(&mut cube, &radar, frame, rx, (2.0 * range, 2.0 * velocity), Complex64::from(stranger));
+                path(&mut cube, &radar, frame, rx, (2.0 * range, 2.0 * velocity), Complex64::from(untracked));
             }
         }
     }
@@ -92,6 +92,11 @@ fn made(mirror: f64, stranger: f64, centre_m: f64) -> Evidence {
         let (level, angle) = ((-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt(), random.random::<f64>());
         *value += Complex64::from_polar(level, std::f64::consts::TAU * angle);
     }
+    in_a_room(radar, cube, frames)
+}
+
+/// `points`: of the body, by frame.
+fn in_a_room(radar: Radar, cube: Cube, points: Vec<Vec<Point>>) -> Evidence {
     let starts_s: Vec<f64> = (0..FRAMES).map(|frame| frame as f64 * radar.frame_period_s).collect();
     let middle_s = starts_s.iter().map(|start| start + 0.5 * radar.frame_duration_s()).collect();
     let (held_out, training) = (0..FRAMES).partition(|frame| frame % 4 == 2);
@@ -99,7 +104,7 @@ fn made(mirror: f64, stranger: f64, centre_m: f64) -> Evidence {
     let room = Room { left_m: Some(1.3), right_m: Some(RIGHT_M), front_m: Some(4.0), ..Room::default() };
     let body = BodyPrediction {
         parts: vec!["body".into()],
-        frames,
+        frames: points,
         centres: vec![],
         middle_s,
         tracks: vec![],
@@ -139,7 +144,7 @@ fn a_mirror_on_the_right_is_found_and_removed() {
     );
     let [low, high] = found[0].estimates[0].ci90[0];
     assert!(low < 0.4 && 0.4 < high, "{low} {high}");
-    assert!(found[0].gain > 20.0);
+    assert!(found[0].nats > 20.0);
     let after = believed(&corrected(evidence, &found[0]));
     assert!(after.is_empty(), "{after:?}");
 }
@@ -227,5 +232,5 @@ fn away_from_the_body_looks_are_those_of_noise_and_where_it_is_a_tone_must_be_st
 fn something_far_stronger_than_the_body_is_seen_where_the_body_is() {
     // It oscillates where the body walks, 20 dB above all of it.
     let found = believed(&made(0.0, 60.0, 2.2));
-    assert!(found.iter().any(|found| found.behaves_like.is_path() && found.gain > 100.0), "{found:?}");
+    assert!(found.iter().any(|found| found.behaves_like.is_path() && found.nats > 100.0), "{found:?}");
 }

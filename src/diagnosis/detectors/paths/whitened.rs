@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::coloured::{Coloured, FINE};
 use super::returns::Returns;
-use super::scene::STILL_BINS;
+use super::scene::CLUTTER_BINS;
 use crate::diagnosis::detectors::steering::steering;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::statistics::median;
@@ -72,17 +72,17 @@ fn expected(returns: &Returns, frame: usize, sines: &[f64], share: &Grid<f32, 2>
     })
 }
 
-/// Raises what is expected beside zero Doppler to a share of the power that stands at each range. `cells`: by channel, of the
+/// Raises what is expected beside zero Doppler to a share of the power of static clutter at each range. `cells`: by channel, of the
 /// whitened samples on the fine grid.
 fn raise_what_stands(returns: &Returns, cells: &[Vec<Complex64>], share: &Grid<f32, 2>, expected: &mut Grid<f32, 3>) {
     const STRONG: f64 = 100.0;
     const FEWEST: usize = 8;
-    let (scene, clutter) = (returns.scene, &returns.clutter);
+    let (scene, clutter) = (returns.scene, &returns.clutter_power);
     let [beams, columns, rows] = expected.shape();
     let scale = 1.0 / (scene.size() * cells.len()) as f64;
     let power =
         |column: usize, row: usize| cells.iter().map(|channel| channel[column * rows + row].norm_sqr()).sum::<f64>() * scale;
-    for slow in -STILL_BINS..=STILL_BINS {
+    for slow in -CLUTTER_BINS..=CLUTTER_BINS {
         let row = (FINE as i64 * slow).rem_euclid(rows as i64) as usize;
         let mut shares: Vec<f64> = (0..scene.bins)
             .filter(|&range| clutter[range] > STRONG)

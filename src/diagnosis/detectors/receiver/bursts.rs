@@ -56,17 +56,17 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let alone = corrected((-HIGH * strong as f64).exp(), total);
     let p_value = crossings.as_ref().map_or(alone, |crossings| alone.min(crossings.p_value));
     let powers: Vec<Vec<f64>> = bursts.iter().map(|burst| powers(&evidence.cube, burst)).collect();
-    let (mut gain, mut removed) = (0.0, 0.0);
+    let (mut nats, mut removed) = (0.0, 0.0);
     for (burst, powers) in bursts.iter().zip(&powers) {
         let energy: f64 = powers.iter().sum();
         removed += energy;
         let unforeseen = stencil_noise(burst.chirp, loops);
-        gain += energy / (unforeseen * evidence.noise()[burst.channel]).max(1e-300) - powers.len() as f64;
+        nats += energy / (unforeseen * evidence.noise()[burst.channel]).max(1e-300) - powers.len() as f64;
     }
     // Few bursts may all be in training frames. Each is judged by what its neighbours predict, in whatever frame it is: the
     // gain is what held-out frames would show in the mean over which of them are held out.
-    gain *= evidence.split.held_out_share();
-    if gain <= 0.0 {
+    nats *= evidence.split.held_out_share();
+    if nats <= 0.0 {
         return vec![];
     }
     let (Description { id, estimates, statement }, look_alikes, place) = claim(evidence, &bursts, hit, crossings.as_ref());
@@ -78,7 +78,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         choice: None,
         place,
         p_value,
-        gain,
+        nats,
         errs_alike: false,
         look_alikes,
         statement,

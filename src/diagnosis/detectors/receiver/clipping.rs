@@ -1,4 +1,4 @@
-//! The converter's rail: components pile up at one value.
+//! ADC clipping: components pile up at one value.
 
 use std::sync::Arc;
 
@@ -7,14 +7,14 @@ use rayon::prelude::*;
 
 use super::declipping::{Declip, FARTHEST};
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::detectors::clutter::still_power;
+use crate::diagnosis::detectors::clutter::clutter_power;
 use crate::diagnosis::evidence::beat::empty_bins;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::corrected;
 use crate::diagnosis::{Cube, Evidence, Volume, denoised};
 use crate::effects::{self, Stage};
 
-/// Fewest components at the rail.
+/// Fewest clipped components.
 const FEWEST: usize = 8;
 /// Bins around zero beat frequency that a leakage fills, where its power is more than this share of the strongest return's.
 const BOARD_BINS: usize = 8;
@@ -63,13 +63,13 @@ impl Pile {
         Self { largest, tolerance, at, held_at, expected, by_frame }
     }
 
-    /// How far the signal would have gone, over the rail, with its interval: from what the empty beat frequencies say of it,
+    /// How far the signal would have gone, over the clipping level, with its interval: from what the empty beat frequencies say of it,
     /// or else as for a Gaussian.
     fn level(&self, evidence: &Evidence, declip: Option<&Declip>) -> (f64, [f64; 2]) {
         if let Some(declip) = declip {
             // The strongest of many restored values is one of the worse restored ones, and the noise is restored with it.
             let beyond = strongest(evidence, declip, &self.by_frame) / self.largest - 1.0;
-            // What is below the rail without noise was there for moments, which say nothing of how far they went.
+            // What is below the clipping level without noise was there for moments, which say nothing of how far they went.
             let ci90 = if beyond > 0.0 { [1.0 + 0.5 * beyond, 1.0 + 1.25 * beyond + 0.05] } else { [1.0, FARTHEST] };
             return (1.0 + beyond.max(0.0), ci90);
         }
@@ -111,7 +111,7 @@ fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
     let declip = Declip::new(&silent_bins(evidence), largest, pile.tolerance).map(Arc::new);
     let (level, ci90) = pile.level(evidence, declip.as_deref());
     let correction = match declip {
-        // That a sample lies beyond the rail is likelier than any one value there: the density of what is restored is a bound.
+        // That a sample lies beyond the clipping level is likelier than any one value there: the density of what is restored is a bound.
         Some(declip) => {
             let restore = move |cube: &mut Cube| cube.each_chirp(|_, chirp| declip.restore(chirp));
             Correction::Inverse(Arc::new(restore), Volume::KEPT)
@@ -125,7 +125,7 @@ fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
         choice: None,
         place: Place { frames: pile.frames(), ..Place::at(Stage::Receiver) },
         p_value: corrected((-excess).exp(), 2.0),
-        gain: excess * held_share,
+        nats: excess * held_share,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
@@ -142,7 +142,7 @@ fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
 /// Beat frequencies where nothing returns: neither room nor body, nor what leaks over the board.
 fn silent_bins(evidence: &Evidence) -> Vec<bool> {
     let mut empty = empty_bins(evidence);
-    let power = still_power(evidence);
+    let power = clutter_power(evidence);
     let samples = power.len();
     let near: Vec<usize> = (0..samples).filter(|&bin| bin.min(samples - bin) <= BOARD_BINS).collect();
     let most = |bins: &[usize]| bins.iter().map(|&bin| power[bin]).fold(0.0, f64::max);

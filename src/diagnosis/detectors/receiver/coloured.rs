@@ -192,7 +192,7 @@ fn unnamed(powers: &Powers, fit: &Fit, Evident { p_value, gain, energy }: Eviden
         choice: None,
         place: Place::at(Stage::Noise),
         p_value,
-        gain,
+        nats: gain,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(

@@ -6,16 +6,16 @@ use std::f64::consts::PI;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-/// A chirp with more of its components at the rail, as a share of the empty frequencies, is not restored.
+/// A chirp with more clipped components, as a share of the empty frequencies, is not restored.
 const MOST: f64 = 0.5;
-/// Of the equations' diagonal, so that neighbours at the rail stay solvable.
+/// Of the equations' diagonal, so that clipped neighbours stay solvable.
 const RIDGE: f64 = 1e-3;
-/// Clipping may hide so much and not more, as a factor of the rail.
+/// Clipping may hide so much and not more, as a factor of the clipping level.
 pub const FARTHEST: f64 = 8.0;
 
 /// Restores the chirps of one recording.
 pub struct Declip {
-    rail: f64,
+    clipping_level: f64,
     tolerance: f64,
     empty: usize,
     /// Autocorrelation of the projection onto the empty frequencies, by distance in samples (cyclic).
@@ -26,7 +26,7 @@ pub struct Declip {
 
 impl Declip {
     /// `empty`: by beat frequency in FFT order, what can hold no return. `None` where there is too little of it.
-    pub fn new(empty: &[bool], rail: f64, tolerance: f64) -> Option<Self> {
+    pub fn new(empty: &[bool], clipping_level: f64, tolerance: f64) -> Option<Self> {
         let count = empty.iter().filter(|&&empty| empty).count();
         if count < 8 {
             return None;
@@ -40,11 +40,11 @@ impl Declip {
             })
             .collect();
         let window = (0..empty.len()).map(|sample| (PI * (sample as f64 + 0.5) / samples).sin()).collect();
-        Some(Self { rail, tolerance, empty: count, kernel, window })
+        Some(Self { clipping_level, tolerance, empty: count, kernel, window })
     }
 
-    fn at_rail(&self, part: f64) -> bool {
-        part.abs() >= self.rail - self.tolerance
+    fn is_clipped(&self, part: f64) -> bool {
+        part.abs() >= self.clipping_level - self.tolerance
     }
 
     /// The chirp as it would have been, or as it is where too much of it is lost.
@@ -54,7 +54,7 @@ impl Declip {
             .iter()
             .enumerate()
             .flat_map(|(n, value)| [(n, false, value.re), (n, true, value.im)])
-            .filter(|&(_, _, part)| self.at_rail(part))
+            .filter(|&(_, _, part)| self.is_clipped(part))
             .map(|(n, imaginary, _)| (n, imaginary))
             .collect();
         if unknown.is_empty() || unknown.len() as f64 > MOST * 2.0 * self.empty as f64 {
@@ -78,7 +78,7 @@ impl Declip {
         for (&(n, imaginary), addition) in unknown.iter().zip(solved.solve(&right).iter()) {
             let part = if imaginary { chirp[n].im } else { chirp[n].re };
             // Clipping only ever makes smaller.
-            let restored = part + (addition * part.signum()).clamp(0.0, (FARTHEST - 1.0) * self.rail) * part.signum();
+            let restored = part + (addition * part.signum()).clamp(0.0, (FARTHEST - 1.0) * self.clipping_level) * part.signum();
             if imaginary {
                 chirp[n].im = restored;
             } else {
@@ -101,8 +101,8 @@ mod tests {
         // Between the bins, so that the side lobes of a chirp without a window are everywhere.
         let tones: Vec<Complex64> =
             (0..samples).map(|n| turn(4.4 * n as f64) * 100.0 + turn(11.3 * n as f64 + 10.0) * 70.0).collect();
-        let rail = 120.0;
-        let cut = |part: f64| part.clamp(-rail, rail);
+        let clipping_level = 120.0;
+        let cut = |part: f64| part.clamp(-clipping_level, clipping_level);
         let mut chirp: Vec<Complex64> = tones.iter().map(|value| Complex64::new(cut(value.re), cut(value.im))).collect();
         let wrong = |chirp: &[Complex64], of: Range<usize>| {
             chirp[of.clone()].iter().zip(&tones[of]).map(|(a, b)| (a - b).norm_sqr()).sum::<f64>()
@@ -112,13 +112,13 @@ mod tests {
         // the upper half of the spectrum holds nothing but the tones' skirts
         let empty: Vec<bool> = (0..samples).map(|bin| (20..60).contains(&bin)).collect();
         let before = [wrong(&chirp, all.clone()), wrong(&chirp, middle.clone())];
-        Declip::new(&empty, rail, 1e-9).unwrap().restore(&mut chirp);
+        Declip::new(&empty, clipping_level, 1e-9).unwrap().restore(&mut chirp);
         let after = [wrong(&chirp, all), wrong(&chirp, middle)];
         assert!(before[1] > 1000.0 && after[1] < 1e-3 * before[1] && after[0] < 0.1 * before[0], "{before:?} to {after:?}");
-        // What was not at the rail is not touched.
+        // What was not clipped is not touched.
         for (value, tone) in chirp.iter().zip(&tones) {
-            assert!(tone.re.abs() >= rail || value.re == tone.re);
+            assert!(tone.re.abs() >= clipping_level || value.re == tone.re);
         }
-        assert!(Declip::new(&[false; 64], rail, 1e-9).is_none());
+        assert!(Declip::new(&[false; 64], clipping_level, 1e-9).is_none());
     }
 }

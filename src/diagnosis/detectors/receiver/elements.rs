@@ -1,4 +1,4 @@
-//! Elements of a still field, chosen one after the other by their log-likelihood less the price of what they leave open.
+//! Elements of a static additive field, chosen one after the other by their log-likelihood less the price of what they leave open.
 
 use num_complex::Complex64;
 
@@ -49,7 +49,7 @@ pub struct Images {
 
 impl Images {
     pub fn new(evidence: &Evidence, field: &Field) -> Self {
-        let conjugate = field.still.iter().map(|chirp| chirp.iter().map(Complex64::conj).collect()).collect();
+        let conjugate = field.clutter.iter().map(|chirp| chirp.iter().map(Complex64::conj).collect()).collect();
         let samples = evidence.cube.dims[4];
         let mut square = vec![vec![Complex64::ZERO; samples]; field.channels()];
         // A few chirps of each frame are enough: the scene's own square hardly changes within it.
@@ -152,7 +152,7 @@ impl<'a> Next<'a> {
             .map(|(found, predicted)| found.iter().zip(predicted).map(|(found, predicted)| found - predicted).collect())
             .collect();
         let basis = orthonormal(&templates(chosen, images).own.iter().map(|own| field.project(own)).collect::<Vec<_>>());
-        Self { field, images, chosen, fitted, rest, basis, samples: field.still[0].len() }
+        Self { field, images, chosen, fitted, rest, basis, samples: field.clutter[0].len() }
     }
 
     /// Log-likelihood that an element of fast time gains, less its price.

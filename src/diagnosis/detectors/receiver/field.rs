@@ -1,4 +1,4 @@
-//! What is static where nothing can stand: the frames' mean chirps, projected on the directions of fast time that the
+//! Static returns at delays where no reflector can be: the frames' mean chirps, projected on the directions of fast time that the
 //! room's delays do not reach, and linear models of what is there.
 
 use nalgebra::{DMatrix, DVector};
@@ -16,7 +16,7 @@ pub struct Field {
     /// Over the training frames, `[channel][direction]`.
     pub mean: Vec<Vec<Complex64>>,
     /// Over the training frames, `[channel][sample]`.
-    pub still: Vec<Vec<Complex64>>,
+    pub clutter: Vec<Vec<Complex64>>,
     /// Of a coordinate of a frame's mean chirp, by channel.
     pub variance: Vec<f64>,
     training: Vec<usize>,
@@ -47,18 +47,19 @@ impl Field {
         let channels = evidence.cube.channels();
         let training = evidence.split.training.clone();
         let white: Vec<f64> = evidence.noise().iter().map(|variance| variance / loops as f64).collect();
-        let still: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
-        let strongest = still.iter().zip(&white).map(|(still, white)| energy(still) / white.max(1e-300)).fold(0.0, f64::max);
+        let clutter: Vec<Vec<Complex64>> = evidence.clutter().chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
+        let strongest =
+            clutter.iter().zip(&white).map(|(clutter, white)| energy(clutter) / white.max(1e-300)).fold(0.0, f64::max);
         let support = support(evidence, strongest * training.len() as f64)?;
         // Of scaled directions: how many whole ones they are worth.
         let worth: f64 = support.outside.iter().map(|direction| energy(direction)).sum();
         let coordinates: Vec<Vec<Vec<Complex64>>> = (0..frames)
             .into_par_iter()
             .map(|frame| {
-                evidence.cube.still(&[frame]).chunks_exact(samples).map(|chirp| project(&support.outside, chirp)).collect()
+                evidence.cube.clutter(&[frame]).chunks_exact(samples).map(|chirp| project(&support.outside, chirp)).collect()
             })
             .collect();
-        let mean: Vec<Vec<Complex64>> = still.iter().map(|chirp| project(&support.outside, chirp)).collect();
+        let mean: Vec<Vec<Complex64>> = clutter.iter().map(|chirp| project(&support.outside, chirp)).collect();
         let variance = (0..channels)
             .map(|channel| {
                 let scatter: f64 =
@@ -68,7 +69,7 @@ impl Field {
             })
             .collect();
         let held_out = evidence.split.held_out.clone();
-        Some(Self { support, coordinates, mean, still, variance, training, held_out })
+        Some(Self { support, coordinates, mean, clutter, variance, training, held_out })
     }
 
     pub fn channels(&self) -> usize {

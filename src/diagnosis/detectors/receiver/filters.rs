@@ -73,8 +73,8 @@ impl Shape {
                     Estimate { name: "order", values: vec![order.into()], ci90: vec![[f64::from(order), f64::from(order)]] },
                 ],
                 format!(
-                    "the receiver weakens and turns low beat frequencies: a high-pass filter of order {order} with its corner at \
-                     {:.0} kHz{}; near ranges appear too weak",
+                    "the receiver attenuates low beat frequencies and turns their phase: a high-pass filter of order {order} with its \
+                     corner at {:.0} kHz{}; near ranges appear too weak",
                     value * 1e-3,
                     if from_rest { ", which starts from rest in each chirp and leaves a transient" } else { "" }
                 ),

@@ -31,7 +31,7 @@ fn nameless(evidence: &Evidence, laws: Vec<Law>) -> Candidate {
         level(Product::Magnitude),
         level(Product::Square)
     );
-    let (p_value, gain) = (laws.iter().map(|law| law.p_value).fold(1.0, f64::min), laws.iter().map(|law| law.gain).sum());
+    let (p_value, nats) = (laws.iter().map(|law| law.p_value).fold(1.0, f64::min), laws.iter().map(|law| law.gain).sum());
     let energy = evidence.cube.samples.iter().map(|&value| (value - without(&laws, value)).norm_sqr()).sum();
     Candidate {
         id: None,
@@ -40,7 +40,7 @@ fn nameless(evidence: &Evidence, laws: Vec<Law>) -> Candidate {
         choice: None,
         place: Place::at(Stage::Receiver),
         p_value,
-        gain,
+        nats,
         errs_alike: false,
         look_alikes: vec![],
         statement,

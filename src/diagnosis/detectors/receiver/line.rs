@@ -9,7 +9,7 @@ use crate::diagnosis::Evidence;
 use crate::diagnosis::evidence::beat::empty_bins;
 use crate::diagnosis::evidence::transform;
 use crate::diagnosis::locate::Residual;
-use crate::diagnosis::power::{Cells, STILL_BINS};
+use crate::diagnosis::power::{CLUTTER_BINS, Cells};
 use crate::diagnosis::statistics::median;
 
 /// Range bins that a mover must have passed during the recording.
@@ -122,7 +122,7 @@ impl<'a> Line<'a> {
 /// 1994), and never less than the noise.
 fn levels(evidence: &Evidence) -> Vec<f64> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let rows: Vec<usize> = (0..loops).filter(|&row| row.min(loops - row) > STILL_BINS).collect();
+    let rows: Vec<usize> = (0..loops).filter(|&row| row.min(loops - row) > CLUTTER_BINS).collect();
     if rows.len() < FEWEST_ROWS {
         return vec![1.0; samples];
     }

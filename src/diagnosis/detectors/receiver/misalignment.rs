@@ -50,8 +50,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // Of every frame against the one before: the lag, and what it gains.
     let steps: Vec<(i64, f64)> =
         (1..frames).into_par_iter().map(|frame| step(&means[frame - 1], &means[frame], evidence.noise(), reach)).collect();
-    let gain: f64 = steps.iter().map(|step| step.1 * independent).sum();
-    if gain <= 0.0 {
+    let nats: f64 = steps.iter().map(|step| step.1 * independent).sum();
+    if nats <= 0.0 {
         return vec![];
     }
     let offsets: Vec<i64> = std::iter::once(0)
@@ -75,8 +75,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         behaves_like: Behaviour::SlippedSamples,
         estimates: vec![],
         choice: None,
-        p_value: corrected((-gain).exp(), tried).max(f64::MIN_POSITIVE),
-        gain,
+        p_value: corrected((-nats).exp(), tried).max(f64::MIN_POSITIVE),
+        nats,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
@@ -95,7 +95,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }]
 }
 
-/// By how many samples a frame's mean chirps lag behind those of the frame before (0: none is detected), and the gain of that for
+/// By how many samples a frame's mean chirps lag behind those of the frame before (0: none is detected), and what (nats) it gains for
 /// one value.
 fn step(before: &[[Vec<Complex64>; 2]], after: &[[Vec<Complex64>; 2]], noise: &[f64], reach: usize) -> (i64, f64) {
     let inner = reach..before[0][0].len() - reach;
@@ -160,7 +160,7 @@ mod tests {
         let slipped = evidence(3, 0.0);
         let found = find(&slipped);
         assert_eq!(found[0].place.frames.as_deref(), Some(&[5, 6, 7][..]));
-        assert!(found[0].p_value < 1e-9 && found[0].gain > 50.0, "{} {}", found[0].p_value, found[0].gain);
+        assert!(found[0].p_value < 1e-9 && found[0].nats > 50.0, "{} {}", found[0].p_value, found[0].nats);
         let undone = slipped.with(&found[0]);
         let right = evidence(0, 0.0);
         let pairs = undone.cube.channel(6, 0).iter().zip(right.cube.channel(6, 0)).enumerate().filter(|(i, _)| i % 64 < 60);

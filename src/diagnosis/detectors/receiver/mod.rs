@@ -1,5 +1,7 @@
 //! The receiver and its noise: what lives in fast time, beat frequency and amplitude, and needs no body to be seen.
 
+pub mod additive;
+mod additive_term;
 mod burst;
 pub mod bursts;
 mod coloured;
@@ -18,8 +20,6 @@ mod shares;
 pub mod misalignment;
 mod slow_spur;
 pub mod spur;
-pub mod still;
-mod still_term;
 pub mod support;
 pub mod wandering;
 pub mod zero_beat;

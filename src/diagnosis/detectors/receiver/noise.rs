@@ -47,7 +47,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         .iter()
         .any(|id| evidence.accepted.contains(id));
     let colour = if filtered { None } else { coloured(evidence, &bins) };
-    // Receivers that were uncoupled again share the noise that each of them had for itself, and what a converter at its rail
+    // Receivers that were uncoupled again share the noise that each of them had for itself, and what an ADC that clips
     // cut off bursts and peaks is the same in all of them.
     let known = [effects::correlated_noise::ID, effects::mutual_coupling::ID, effects::adc_saturation::ID]
         .iter()
@@ -156,6 +156,42 @@ fn equal(receivers: usize, rho: f64) -> DMatrix<Complex64> {
     DMatrix::from_fn(receivers, receivers, |a, b| Complex64::from(if a == b { 1.0 } else { rho }))
 }
 
+/// A correlation of receivers that is significant.
+struct Correlation {
+    /// The same one in all pairs, or the root mean square of several.
+    alike: bool,
+    rho: f64,
+    p_value: f64,
+    /// Number of products that it was estimated from.
+    products: f64,
+    found: DMatrix<Complex64>,
+}
+
+impl Correlation {
+    /// Any correlation of any two; or that of noise from one place, such as a supply, which is the same in all receivers: one number.
+    fn of(training: &Shared, rx: usize) -> Option<Self> {
+        let found = training.correlations(&training.scales());
+        let independent = training.independent();
+        let pairs = (rx * (rx - 1) / 2) as f64;
+        let total: f64 = pairs_of(rx).map(|pair| found[pair].norm_sqr()).sum();
+        let mean = mean_correlation(&found);
+        let chances =
+            [chi2_tail(2.0 * independent * total, 2.0 * pairs), Normal::standard().sf(mean * (2.0 * independent * pairs).sqrt())];
+        let alike = chances[1] < chances[0];
+        let p_value = corrected(chances[0].min(chances[1]), 2.0);
+        // Of what is found, chance has its share.
+        let rho = if alike { mean } else { (total / pairs - 1.0 / independent).max(0.0).sqrt() };
+        if p_value > 1e-3 || rho < LEAST_RHO {
+            return None;
+        }
+        Some(Self { alike, rho, p_value, products: independent * pairs, found })
+    }
+
+    fn expected(&self) -> DMatrix<Complex64> {
+        if self.alike { equal(self.found.nrows(), self.rho) } else { self.found.clone() }
+    }
+}
+
 fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     let rx = evidence.cube.dims[2];
     if rx < 2 {
@@ -168,45 +204,35 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     if training.cells < 100.0 {
         return None;
     }
-    let found = training.correlations(&training.scales());
-    let independent = training.independent();
-    let pairs = (rx * (rx - 1) / 2) as f64;
-    let total: f64 = pairs_of(rx).map(|pair| found[pair].norm_sqr()).sum();
-    let mean = mean_correlation(&found);
-    // Any correlation of any two; and that of noise from one place, such as a supply, which is the same in all receivers: one
-    // number.
-    let chances =
-        [chi2_tail(2.0 * independent * total, 2.0 * pairs), Normal::standard().sf(mean * (2.0 * independent * pairs).sqrt())];
-    let alike = chances[1] < chances[0];
-    let p_value = corrected(chances[0].min(chances[1]), 2.0);
-    // Of what is found, chance has its share.
-    let rho = if alike { mean } else { (total / pairs - 1.0 / independent).max(0.0).sqrt() };
-    if p_value > 1e-3 || rho < LEAST_RHO {
-        return None;
-    }
-    if !is_everywhere(evidence, bins, &if alike { equal(rx, rho) } else { found }) {
+    let correlation = Correlation::of(&training, rx)?;
+    if !is_everywhere(evidence, bins, &correlation.expected()) {
         return None;
     }
     // Few held-out frames say little of so many numbers: every frame is predicted by those of the other folds.
-    let gain: f64 = folds(of_frames.len())
+    let nats: f64 = folds(of_frames.len())
         .map(|parts| {
             let [rest, fold] = parts.map(|frames| sum(&frames));
-            rest.gain(&fold, alike).unwrap_or(f64::NEG_INFINITY)
+            rest.gain(&fold, correlation.alike).unwrap_or(f64::NEG_INFINITY)
         })
         .sum();
-    let error = (2.0 * independent * pairs).sqrt().recip() + 0.02 * rho;
+    Some(shared_noise(evidence, &correlation, nats))
+}
+
+fn shared_noise(evidence: &Evidence, correlation: &Correlation, nats: f64) -> Candidate {
+    let &Correlation { alike, rho, p_value, products, .. } = correlation;
+    let error = (2.0 * products).sqrt().recip() + 0.02 * rho;
     let over = if alike { "mean" } else { "root mean square" };
     let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
     // That receivers share something is observed; the library says what.
     let id = evidence.info(effects::correlated_noise::ID).map(|info| info.id);
-    Some(Candidate {
+    Candidate {
         id,
         behaves_like: Behaviour::NoiseSharedByReceivers,
         estimates: id.map(|_| Estimate::normal("rho", rho, error)).into_iter().collect(),
         choice: None,
         place: Place::at(Stage::Noise),
         p_value,
-        gain,
+        nats,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
@@ -216,7 +242,7 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
         curve: None,
         energy: rho * noise * evidence.cube.samples.len() as f64,
         correction: Correction::None,
-    })
+    }
 }
 
 #[cfg(test)]
@@ -249,7 +275,7 @@ mod tests {
         Evidence::new(Loaded::of_samples(radar, samples, [-1e3, 1e3]), None, None)
     }
 
-    /// White noise of a receiver without quadrature, in a room that is told.
+    /// White noise of a receiver without quadrature, in a stated room.
     fn real_noise(seed: u64) -> Evidence {
         let mut radar = Radar::small(12);
         (radar.loops_per_frame, radar.samples_per_chirp, radar.sampling) = (32, 128, Sampling::Real);
@@ -329,16 +355,16 @@ mod tests {
         assert_eq!(law.id, Some(effects::coloured_noise::ID));
         // A quarter of the band is louder by 2 dB: no knee has that.
         let other = coloured(&shaped(|bin| if (16.0..24.0).contains(&bin) { 1.6 } else { 1.0 }), &bins).expect("a colour");
-        assert!(other.id.is_none() && other.estimates.is_empty() && other.gain > 15.0, "{other:?}");
+        assert!(other.id.is_none() && other.estimates.is_empty() && other.nats > 15.0, "{other:?}");
         assert!(coloured(&shaped(|_| 1.0), &bins).is_none());
         let unknown = coloured(&shaped(knee).lacking(&[effects::coloured_noise::ID]), &bins).expect("a colour");
-        assert!(unknown.id.is_none() && unknown.gain > 15.0, "{unknown:?}");
+        assert!(unknown.id.is_none() && unknown.nats > 15.0, "{unknown:?}");
     }
 
     #[test]
     fn what_receivers_share_is_observed_where_the_library_has_no_name_for_it() {
         let evidence = noise(|_, _| 0.3).lacking(&[effects::correlated_noise::ID]);
         let found = correlated(&evidence, &(2..63).collect::<Vec<_>>()).expect("nothing found");
-        assert!(found.id.is_none() && found.behaves_like == Behaviour::NoiseSharedByReceivers && found.gain > 15.0);
+        assert!(found.id.is_none() && found.behaves_like == Behaviour::NoiseSharedByReceivers && found.nats > 15.0);
     }
 }

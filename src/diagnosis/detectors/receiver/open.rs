@@ -7,7 +7,7 @@ use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::still_term::subtract;
+use super::additive_term::subtract;
 use super::support::{energy, range_m, ranges_m, tone};
 use super::zero_beat::ZeroBeat;
 use crate::diagnosis::behaviour::Behaviour;
@@ -38,29 +38,29 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         return vec![];
     }
     let samples = evidence.cube.dims[4];
-    let still: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
+    let clutter: Vec<Vec<Complex64>> = evidence.clutter().chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
     if evidence.may_name(effects::ramp_edge_transient::ID) {
-        let edge: Vec<Candidate> = [false, true].into_iter().filter_map(|at_end| edge(evidence, &still, at_end)).collect();
+        let edge: Vec<Candidate> = [false, true].into_iter().filter_map(|at_end| edge(evidence, &clutter, at_end)).collect();
         let edge: Vec<Candidate> = edge.into_iter().filter(|edge| edge.p_value < 1e-6).collect();
         if !edge.is_empty() {
             return edge;
         }
     }
     if evidence.is_real() && evidence.may_name(effects::dc_offset::ID) {
-        let offset = offset(evidence, &still);
+        let offset = offset(evidence, &clutter);
         if offset.is_some() {
             return offset.into_iter().collect();
         }
     }
-    if evidence.may_name(effects::tx_leakage::ID) { leakage(evidence, &still).into_iter().collect() } else { vec![] }
+    if evidence.may_name(effects::tx_leakage::ID) { leakage(evidence, &clutter).into_iter().collect() } else { vec![] }
 }
 
-/// Held-out log-likelihood gained by taking a still term away, samples outside `range` untouched.
+/// Held-out log-likelihood gained by subtracting a static term, samples outside `range` untouched.
 fn gain(evidence: &Evidence, term: &[Vec<Complex64>]) -> f64 {
     let [.., loops, samples] = evidence.cube.dims;
     let mut gain = 0.0;
     for &frame in &evidence.split.held_out {
-        let found = evidence.cube.still(&[frame]);
+        let found = evidence.cube.clutter(&[frame]);
         for (channel, term) in term.iter().enumerate() {
             let found = &found[channel * samples..][..samples];
             let better: f64 = found.iter().zip(term).map(|(value, term)| value.norm_sqr() - (value - term).norm_sqr()).sum();
@@ -70,7 +70,7 @@ fn gain(evidence: &Evidence, term: &[Vec<Complex64>]) -> f64 {
     gain
 }
 
-fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<Candidate> {
+fn edge(evidence: &Evidence, clutter: &[Vec<Complex64>], at_end: bool) -> Option<Candidate> {
     let samples = evidence.cube.dims[4];
     let power: Vec<f64> = (0..samples)
         .map(|n| {
@@ -78,7 +78,7 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
             let centre = |chirp: &Vec<Complex64>| {
                 if evidence.is_real() { chirp.iter().sum::<Complex64>() / samples as f64 } else { Complex64::ZERO }
             };
-            still.iter().map(|chirp| (chirp[n] - centre(chirp)).norm_sqr()).sum::<f64>() / still.len() as f64
+            clutter.iter().map(|chirp| (chirp[n] - centre(chirp)).norm_sqr()).sum::<f64>() / clutter.len() as f64
         })
         .collect();
     let between = &power[samples / 8..samples - samples / 8];
@@ -90,7 +90,7 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
     }
     let wildest = (0..count).map(|i| power[at(i)]).fold(0.0, f64::max);
     let indices: Vec<usize> = if at_end { (samples - count..samples).collect() } else { (0..count).collect() };
-    let term: Vec<Vec<Complex64>> = still
+    let term: Vec<Vec<Complex64>> = clutter
         .iter()
         .map(|chirp| (0..samples).map(|n| if indices.contains(&n) { chirp[n] } else { Complex64::ZERO }).collect())
         .collect();
@@ -108,7 +108,7 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
         choice: None,
         place: Place { samples: Some(indices), ..Place::at(Stage::Receiver) },
         p_value: corrected((-wildest / mean.max(1e-300)).exp(), samples as f64),
-        gain: gain(evidence, &term),
+        nats: gain(evidence, &term),
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
@@ -131,15 +131,15 @@ fn edge(evidence: &Evidence, still: &[Vec<Complex64>], at_end: bool) -> Option<C
 }
 
 /// The constant of a converter without quadrature.
-fn offset(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
+fn offset(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Candidate> {
     let [_, tx, rx, _, samples] = evidence.cube.dims;
     // The window keeps what is near zero, but not at it, from tilting the mean.
     let window = hann(samples);
     let sum: f64 = window.iter().sum();
     let mean = |chirp: &Vec<Complex64>| chirp.iter().zip(&window).map(|(value, w)| value.re * w).sum::<f64>() / sum;
     let values: Vec<f64> =
-        (0..rx).map(|receiver| (0..tx).map(|t| mean(&still[t * rx + receiver])).sum::<f64>() / tx as f64).collect();
-    let rest: Vec<f64> = still
+        (0..rx).map(|receiver| (0..tx).map(|t| mean(&clutter[t * rx + receiver])).sum::<f64>() / tx as f64).collect();
+    let rest: Vec<f64> = clutter
         .iter()
         .map(|chirp| {
             let mean = mean(chirp);
@@ -161,7 +161,7 @@ fn offset(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         choice: None,
         place: Place { range_m: Some([0.0, 0.0]), ..Place::at(Stage::Receiver) },
         p_value: corrected((-0.5 * (smallest / swing.max(1e-300)).powi(2) * samples as f64).exp(), 1.0),
-        gain: gain(evidence, &term),
+        nats: gain(evidence, &term),
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
@@ -177,7 +177,7 @@ fn offset(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
     })
 }
 
-/// What is nearest in the spectra of still chirps, apart from what is behind it.
+/// What is nearest in the spectra of mean chirps, apart from what is behind it.
 struct Near {
     /// Zero-padded, `[channel][bin]`, and their mean over the channels.
     spectra: Vec<Vec<f64>>,
@@ -189,15 +189,15 @@ struct Near {
     /// Bins from here on are not looked at.
     last: usize,
     bin_m: f64,
-    /// Power of the noise in a still chirp.
+    /// Power of the noise in a mean chirp.
     white: f64,
 }
 
 impl Near {
-    fn find(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Self> {
+    fn find(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Self> {
         let [_, _, _, loops, samples] = evidence.cube.dims;
         let long = samples * ZERO_PADDING;
-        let spectra = spectra(still);
+        let spectra = spectra(clutter);
         let mean: Vec<f64> = (0..long).map(|bin| spectra.iter().map(|s| s[bin]).sum::<f64>() / spectra.len() as f64).collect();
         let bin_m = range_m(evidence, evidence.radar.sample_rate_hz / long as f64);
         let near = (NEAR_M / bin_m).floor() as usize;
@@ -254,11 +254,11 @@ fn decibels(ratio: f64) -> f64 {
 }
 
 /// Powers under a Hann window, zero-padded, `[channel][bin]`.
-fn spectra(still: &[Vec<Complex64>]) -> Vec<Vec<f64>> {
-    let samples = still[0].len();
+fn spectra(clutter: &[Vec<Complex64>]) -> Vec<Vec<f64>> {
+    let samples = clutter[0].len();
     let window = hann(samples);
     let long = samples * ZERO_PADDING;
-    still
+    clutter
         .iter()
         .map(|chirp| {
             let mut padded = vec![Complex64::ZERO; long];
@@ -271,21 +271,21 @@ fn spectra(still: &[Vec<Complex64>]) -> Vec<Vec<f64>> {
         .collect()
 }
 
-fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
+fn leakage(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Candidate> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let near = Near::find(evidence, still)?;
+    let near = Near::find(evidence, clutter)?;
     let range = (near.peak as f64 * near.bin_m).max(0.0);
     let end = near.valley as f64 / ZERO_PADDING as f64;
     let part = near_part(&near.mean, end, near.white, samples, evidence.is_real())?;
     let term: Vec<Vec<Complex64>> =
-        still.iter().map(|chirp| (&part * DVector::from_column_slice(chirp)).iter().copied().collect()).collect();
+        clutter.iter().map(|chirp| (&part * DVector::from_column_slice(chirp)).iter().copied().collect()).collect();
     let largest = term.iter().flatten().map(|value| value.norm()).fold(0.0, f64::max);
     let peak_sample = denoised::peak_beside(evidence, |channel, n| Some(term[channel][n]));
     let level_db = 20.0 * (largest / peak_sample.max(1e-300)).log10();
     let resolution = range_m(evidence, evidence.radar.sample_rate_hz / samples as f64);
     let variance = |channel: usize| evidence.noise()[channel] / (loops * evidence.split.training.len()) as f64;
     let beat = ZeroBeat::new(evidence, &term, variance);
-    let channels = still.len();
+    let channels = clutter.len();
     let (near_spread, far_spread) = (near.spread(near.peak), near.spread(near.far));
     // What has less delay than the way between the nearest antennas is a constant, which the library may lack.
     let constant = !evidence.is_real() && beat.may_be_constant() && !beat.may_be_leakage();
@@ -298,7 +298,7 @@ fn leakage(evidence: &Evidence, still: &[Vec<Complex64>]) -> Option<Candidate> {
         choice: None,
         place: Place { range_m: Some([0.0, near.valley as f64 * near.bin_m]), ..Place::at(Stage::Receiver) },
         p_value: chi2_tail(2.0 * near.over_noise(near.peak) * channels as f64, 2.0 * channels as f64),
-        gain: gain(evidence, &term),
+        nats: gain(evidence, &term),
         errs_alike: false,
         look_alikes: [(near.as_reflectors() > SIGNIFICANCE, effects::static_reflector::ID), (constant, effects::dc_offset::ID)]
             .into_iter()
@@ -324,8 +324,8 @@ fn rank_chance(value: f64, others: impl Iterator<Item = f64>) -> f64 {
     as_large / all
 }
 
-/// The part of a still chirp that comes from beat frequencies below `end` (bins), as a matrix on its samples: every beat frequency has a
-/// random amplitude with the power of the spectrum `mean` (zero-padded), so that what is far is told from what is near (Wiener's filter).
+/// The part of a mean chirp that comes from beat frequencies below `end` (bins), as a matrix on its samples: every beat frequency has a
+/// random amplitude with the power of the spectrum `mean` (zero-padded), so that near and far are separated (Wiener's filter).
 fn near_part(mean: &[f64], end: f64, noise: f64, samples: usize, real: bool) -> Option<DMatrix<Complex64>> {
     let step = ZERO_PADDING / 2;
     let total: f64 = mean.iter().step_by(step).sum();
@@ -375,7 +375,7 @@ mod tests {
     fn what_is_near_leaks_and_the_flank_of_what_lies_behind_does_not() {
         let found = said(0.1);
         assert_eq!(found.iter().filter_map(|found| found.id).collect::<Vec<_>>(), [effects::tx_leakage::ID]);
-        assert!(found[0].gain > 100.0 && found[0].estimates[0].values[0] < 0.2, "{found:?}");
+        assert!(found[0].nats > 100.0 && found[0].estimates[0].values[0] < 0.2, "{found:?}");
         assert!(said(NEAR_M + 0.1).is_empty(), "{:?}", said(NEAR_M + 0.1));
     }
 }

@@ -38,7 +38,7 @@ pub struct Found {
 
 /// The best of the library's responses.
 ///
-/// `without`: the still chirps less an additive term that competes with it.
+/// `without`: the mean chirps less an additive term that competes with it.
 pub fn find(evidence: &Evidence, field: &Field, without: &[Vec<Complex64>]) -> Option<Found> {
     let search = Search::new(evidence, field);
     // What an additive term would make of the same scene.
@@ -56,14 +56,14 @@ pub fn find(evidence: &Evidence, field: &Field, without: &[Vec<Complex64>]) -> O
         .collect();
     look_alikes.dedup();
     let candidate = search.candidate(best[0], p_value, look_alikes);
-    let chance = search.process.chance(&field.still, &search.of_mean, (shape, best[0].2), search.rate);
+    let chance = search.process.chance(&field.clutter, &search.of_mean, (shape, best[0].2), search.rate);
     Some(Found { candidate, likelihood: top, additive, chance })
 }
 
 /// A shape with its value, after the log-likelihood that it gains.
 type Tried = (f64, Shape, f64);
 
-/// Responses by what they make of the still chirps.
+/// Responses by what they make of the mean chirps.
 struct Search<'a> {
     evidence: &'a Evidence,
     field: &'a Field,
@@ -82,12 +82,12 @@ impl<'a> Search<'a> {
         let process = Process::new(field, band(field.support.low_m), band(field.support.high_m));
         let training = evidence.split.training.len() as f64;
         let of_mean: Vec<f64> = field.variance.iter().map(|variance| variance / training).collect();
-        let nothing = process.likelihood(&field.still, &of_mean, None, rate);
+        let nothing = process.likelihood(&field.clutter, &of_mean, None, rate);
         Self { evidence, field, process, rate, of_mean, nothing }
     }
 
     fn likelihood(&self, shape: Shape, value: f64) -> f64 {
-        self.process.likelihood(&self.field.still, &self.of_mean, Some((shape, value)), self.rate) - self.nothing
+        self.process.likelihood(&self.field.clutter, &self.of_mean, Some((shape, value)), self.rate) - self.nothing
     }
 
     /// The best of the most promising shapes, best first, and how many were tried.
@@ -121,11 +121,11 @@ impl<'a> Search<'a> {
     }
 
     /// Log-likelihood that the held-out frames gain.
-    fn gain(&self, shape: Shape, value: f64) -> f64 {
+    fn log_likelihood_gain(&self, shape: Shape, value: f64) -> f64 {
         let Self { evidence, field, process, rate, .. } = self;
         let samples = evidence.cube.dims[4];
         let held_out: Vec<Vec<Complex64>> =
-            evidence.cube.still(field.held_out()).chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
+            evidence.cube.clutter(field.held_out()).chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
         let of_held_out: Vec<f64> =
             field.variance.iter().map(|variance| variance / field.held_out().len().max(1) as f64).collect();
         process.likelihood(&held_out, &of_held_out, Some((shape, value)), *rate)
@@ -143,11 +143,11 @@ impl<'a> Search<'a> {
         let (evidence, field, (_, shape, value)) = (self.evidence, self.field, best);
         let (estimates, statement) = shape.described(value, self.deviation(best));
         let response = shape.response(value, evidence.cube.dims[4], self.rate);
-        let (fitted, still) = restored(field, shape, value, self.rate);
+        let (fitted, clutter) = restored(field, shape, value, self.rate);
         let energy = field
-            .still
+            .clutter
             .iter()
-            .zip(&still)
+            .zip(&clutter)
             .map(|(found, clean)| found.iter().zip(clean).map(|(a, b)| (a - b).norm_sqr()).sum::<f64>())
             .sum::<f64>()
             * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
@@ -158,13 +158,13 @@ impl<'a> Search<'a> {
             choice: None,
             place: Place::at(Stage::Receiver),
             p_value,
-            gain: self.gain(shape, value),
+            nats: self.log_likelihood_gain(shape, value),
             errs_alike: false,
             look_alikes,
             statement,
             curve: Some(curve(&response, self.rate)),
             energy,
-            correction: undo(&response, fitted, still),
+            correction: undo(&response, fitted, clutter),
         }
     }
 }
@@ -192,15 +192,15 @@ struct Process {
 
 impl Process {
     fn new(field: &Field, low: f64, high: f64) -> Self {
-        let samples = field.still[0].len();
+        let samples = field.clutter[0].len();
         let window = hann(samples);
         let long = 2 * samples;
         let mut density = vec![0.0; long];
-        for chirp in &field.still {
+        for chirp in &field.clutter {
             let mut padded = vec![Complex64::ZERO; long];
             (0..samples).for_each(|n| padded[n] = chirp[n] * window[n]);
             FftPlanner::new().plan_fft_forward(long).process(&mut padded);
-            density.iter_mut().zip(&padded).for_each(|(sum, value)| *sum += value.norm_sqr() / field.still.len() as f64);
+            density.iter_mut().zip(&padded).for_each(|(sum, value)| *sum += value.norm_sqr() / field.clutter.len() as f64);
         }
         let noise = field.variance.iter().sum::<f64>() / field.variance.len() as f64;
         let (first, last) = ((low * long as f64).floor() as usize, (high * long as f64).ceil() as usize);
@@ -304,7 +304,7 @@ fn space(field: &Field, shape: Shape, value: f64, rate: f64) -> Vec<Vec<Complex6
         .collect()
 }
 
-/// The still chirps as the response leaves them, and as they were before it, `[channel][sample]` each.
+/// The mean chirps as the response leaves them, and as they were before it, `[channel][sample]` each.
 fn restored(field: &Field, shape: Shape, value: f64, rate: f64) -> (Vec<Vec<Complex64>>, Vec<Vec<Complex64>>) {
     let columns = space(field, shape, value, rate);
     let inside = &field.support.inside;
@@ -313,7 +313,7 @@ fn restored(field: &Field, shape: Shape, value: f64, rate: f64) -> (Vec<Vec<Comp
     let cut = 1e-3 * decomposed.singular_values.max();
     let mut fitted = vec![];
     let mut before = vec![];
-    for chirp in &field.still {
+    for chirp in &field.clutter {
         let solved = decomposed.solve(&DVector::from_column_slice(chirp), cut).unwrap_or_else(|_| DVector::zeros(columns.len()));
         let mut behind = vec![Complex64::ZERO; samples];
         let mut clean = vec![Complex64::ZERO; samples];
@@ -329,8 +329,8 @@ fn restored(field: &Field, shape: Shape, value: f64, rate: f64) -> (Vec<Vec<Comp
     (fitted, before)
 }
 
-/// Moving parts are amplified back where the response is not too weak; the still part is replaced by its fit.
-fn undo(response: &[Complex64], fitted: Vec<Vec<Complex64>>, still: Vec<Vec<Complex64>>) -> Correction {
+/// Moving parts are amplified back where the response is not too weak; static clutter is replaced by its fit.
+fn undo(response: &[Complex64], fitted: Vec<Vec<Complex64>>, clutter: Vec<Vec<Complex64>>) -> Correction {
     // Where hardly anything comes through, the inverse would raise nothing but noise: it falls off instead.
     let inverse: Vec<Complex64> = response.iter().map(|h| h.conj() / h.norm_sqr().max(LEAST_POWER)).collect();
     let filter = Filter::new(&inverse);
@@ -340,7 +340,7 @@ fn undo(response: &[Complex64], fitted: Vec<Vec<Complex64>>, still: Vec<Vec<Comp
             cube.each_chirp(|[_, channel, _], chirp| {
                 chirp.iter_mut().zip(&fitted[channel]).for_each(|(value, fitted)| *value -= fitted);
                 filter.apply(chirp);
-                chirp.iter_mut().zip(&still[channel]).for_each(|(value, still)| *value += still);
+                chirp.iter_mut().zip(&clutter[channel]).for_each(|(value, clutter)| *value += clutter);
             });
         }),
         Volume { alike: stretched, ..Volume::KEPT },

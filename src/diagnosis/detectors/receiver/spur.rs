@@ -160,7 +160,7 @@ fn candidate(evidence: &Evidence, tone: Tone) -> Candidate {
         choice: None,
         place: Place::at(Stage::Receiver),
         p_value,
-        gain,
+        nats: gain,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
@@ -224,7 +224,7 @@ fn is_sideband(evidence: &Evidence, slow: f64, fast: f64) -> bool {
     let own = fast * samples as f64;
     let apart = |bin: usize| (bin as f64 - own + 0.5 * samples as f64).rem_euclid(samples as f64) - 0.5 * samples as f64;
     let elsewhere: Vec<usize> = (0..samples).filter(|&bin| apart(bin).abs() > AROUND as f64).collect();
-    let still: Vec<Vec<Complex64>> = evidence.still().chunks_exact(samples).map(spectrum).collect();
+    let clutter: Vec<Vec<Complex64>> = evidence.clutter().chunks_exact(samples).map(spectrum).collect();
     let line = |frame: usize, channel: usize| {
         let mut line = vec![Complex64::ZERO; samples];
         // The window's side lobes of static clutter are in proportion to it, too.
@@ -236,16 +236,16 @@ fn is_sideband(evidence: &Evidence, slow: f64, fast: f64) -> bool {
     };
     // All channels are modulated alike.
     let coherence = |&frame: &usize| {
-        let (mut shared, mut lines, mut stills) = (Complex64::ZERO, 0.0, 0.0);
-        for (channel, still) in still.iter().enumerate() {
+        let (mut shared, mut lines, mut clutters) = (Complex64::ZERO, 0.0, 0.0);
+        for (channel, clutter) in clutter.iter().enumerate() {
             let line = line(frame, channel);
             for &bin in &elsewhere {
-                shared += still[bin].conj() * line[bin];
+                shared += clutter[bin].conj() * line[bin];
                 lines += line[bin].norm_sqr();
-                stills += still[bin].norm_sqr();
+                clutters += clutter[bin].norm_sqr();
             }
         }
-        shared.norm_sqr() / (lines * stills).max(f64::MIN_POSITIVE)
+        shared.norm_sqr() / (lines * clutters).max(f64::MIN_POSITIVE)
     };
     median(&mut evidence.split.training.par_iter().map(coherence).collect::<Vec<f64>>()) > SIDEBAND
 }
@@ -303,17 +303,17 @@ mod tests {
     use crate::radar::Radar;
 
     #[test]
-    fn a_line_is_a_sideband_where_what_stands_still_has_it_too() {
+    fn a_line_is_a_sideband_where_static_clutter_has_it_too() {
         let radar = Radar { samples_per_chirp: 64, loops_per_frame: 32, ..Radar::small(6) };
-        let still =
+        let clutter =
             |n: usize| [9.0, 14.0, 23.0].map(|bin| 30.0 * Complex64::cis(TAU * bin * n as f64 / 64.0)).iter().sum::<Complex64>();
         let (slow, fast) = (0.5, 23.0 / 64.0);
         let alternating = |chirp: usize| if chirp.is_multiple_of(2) { 1.02 } else { 0.98 };
-        let modulated = Evidence::in_noise(radar.clone(), 3, |[_, _, chirp, n]| still(n) * alternating(chirp));
+        let modulated = Evidence::in_noise(radar.clone(), 3, |[_, _, chirp, n]| clutter(n) * alternating(chirp));
         assert!(is_sideband(&modulated, slow, fast));
         // Near static clutter, whose side lobes are no sidebands, and far from it.
         for slow in [4.4 / 32.0, slow] {
-            let spur = Evidence::in_noise(radar.clone(), 4, |[_, _, chirp, n]| still(n) + 0.6 * tone(slow, fast, chirp, n));
+            let spur = Evidence::in_noise(radar.clone(), 4, |[_, _, chirp, n]| clutter(n) + 0.6 * tone(slow, fast, chirp, n));
             assert!(!is_sideband(&spur, slow, fast), "{slow}");
         }
     }

@@ -45,7 +45,7 @@ pub fn energy(a: &[Complex64]) -> f64 {
     a.iter().map(Complex64::norm_sqr).sum()
 }
 
-/// `contrast`: energy of a still chirp over the variance of the noise in a sample of it.
+/// `contrast`: energy of a mean chirp over the variance of the noise in a sample of it.
 pub fn support(evidence: &Evidence, contrast: f64) -> Option<Support> {
     let samples = evidence.cube.dims[4];
     if evidence.is_real() || !(16..=MOST_SAMPLES).contains(&samples) || evidence.radar.slope_hz_per_s <= 0.0 {

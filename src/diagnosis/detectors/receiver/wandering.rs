@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::detectors::climb::climb;
 use crate::diagnosis::evidence::{Evidence, hann};
-use crate::diagnosis::power::STILL_BINS;
+use crate::diagnosis::power::CLUTTER_BINS;
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median, normal_tails};
 use crate::grid::Grid;
 
@@ -99,7 +99,7 @@ fn most_steady(evidence: &Evidence) -> Option<(usize, f64)> {
 fn strongest_doppler(evidence: &Evidence, frame: usize, bin: usize) -> usize {
     let loops = evidence.cube.dims[3];
     let power = |doppler: usize| evidence.maps()[[frame, doppler, bin]];
-    let moving = (0..loops).filter(|&doppler| doppler.min(loops - doppler) > STILL_BINS);
+    let moving = (0..loops).filter(|&doppler| doppler.min(loops - doppler) > CLUTTER_BINS);
     moving.max_by(|&a, &b| power(a).total_cmp(&power(b))).unwrap_or(0)
 }
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::steady::Steady;
+use super::frame_clutter::FrameClutter;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::folds;
 use crate::diagnosis::detectors::geometry;
@@ -71,15 +71,15 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if units.is_empty() {
         return vec![];
     }
-    let Some(steady) = Steady::new(evidence) else { return vec![] };
+    let Some(clutter) = FrameClutter::new(evidence) else { return vec![] };
     let tried = units.len() as f64;
     // They concern receivers only.
     let of_body = if receivers >= FEWEST { geometry::gains(evidence) } else { None };
     let best = units
         .iter()
-        .filter_map(|&unit| judged(evidence, &steady, of_body.as_deref(), unit))
+        .filter_map(|&unit| judged(evidence, &clutter, of_body.as_deref(), unit))
         .filter(|judged| judged.p_value < 0.01)
-        .max_by(|a, b| a.gain.total_cmp(&b.gain));
+        .max_by(|a, b| a.nats.total_cmp(&b.nats));
     best.map(|judged| judged.candidate(evidence, tried)).into_iter().collect()
 }
 
@@ -88,15 +88,16 @@ struct Judged {
     members: Vec<usize>,
     series: Series,
     p_value: f64,
-    gain: f64,
+    /// Log-likelihood that held-out frames gain.
+    nats: f64,
     /// Of the gains.
     variance: f64,
 }
 
 /// `of_body`: gains of what is observed of the body, `[rx][frame][group]`, with inverse variances.
-fn judged(evidence: &Evidence, steady: &Steady, of_body: Option<&[Vec<Vec<[f64; 2]>>]>, unit: Axis) -> Option<Judged> {
+fn judged(evidence: &Evidence, clutter: &FrameClutter, of_body: Option<&[Vec<Vec<[f64; 2]>>]>, unit: Axis) -> Option<Judged> {
     let training = &evidence.split.training;
-    let mut relative = Relative::new(steady, evidence.cube.dims[2], unit, training);
+    let mut relative = Relative::new(clutter, evidence.cube.dims[2], unit, training);
     if let (Axis::Receiver(rx), Some(of_body)) = (unit, of_body) {
         relative.add_body(&of_body[rx], training);
     }
@@ -121,9 +122,11 @@ fn judged(evidence: &Evidence, steady: &Steady, of_body: Option<&[Vec<Vec<[f64; 
     // Gains drawn from one law in every frame. Few held-out frames may all have the same one: every frame is predicted by those of
     // the other folds.
     let seen = |frames: &[usize]| frames.iter().copied().filter(|&f| all.weight[f] > 0.0).collect::<Vec<usize>>();
-    let gain = folds(evidence.cube.dims[0]).map(|[rest, fold]| Law::of(&all, &seen(&rest)).gain(&all, &seen(&fold))).sum();
+    let nats = folds(evidence.cube.dims[0])
+        .map(|[rest, fold]| Law::of(&all, &seen(&rest)).log_likelihood_gain(&all, &seen(&fold)))
+        .sum();
     let variance = Law::of(&all, &seen(training)).variance;
-    Some(Judged { unit, members: relative.members, series: all, p_value, gain, variance })
+    Some(Judged { unit, members: relative.members, series: all, p_value, nats, variance })
 }
 
 /// Of gains: where they are, and how much they vary.
@@ -141,7 +144,7 @@ impl Law {
     }
 
     /// Log-likelihood that frames gain over gains that stay as they are.
-    fn gain(&self, series: &Series, frames: &[usize]) -> f64 {
+    fn log_likelihood_gain(&self, series: &Series, frames: &[usize]) -> f64 {
         let of_frame = |&f: &usize| {
             let ratio = 1.0 + self.variance * series.weight[f];
             (series.value[f] - self.mean).norm_sqr() * series.weight[f] * (1.0 - 1.0 / ratio) - ratio.ln()
@@ -186,29 +189,29 @@ fn correlation(halves: &[Series; 2], frames: &[usize]) -> f64 {
 }
 
 impl Relative {
-    fn new(steady: &Steady, receivers: usize, unit: Axis, training: &[usize]) -> Self {
+    fn new(clutter: &FrameClutter, receivers: usize, unit: Axis, training: &[usize]) -> Self {
         let belongs = |channel: usize| match unit {
             Axis::Receiver(rx) => channel % receivers == rx,
             Axis::Transmitter(tx) => channel / receivers == tx,
         };
-        let (members, others): (Vec<usize>, Vec<usize>) = (0..steady.channels).partition(|&c| belongs(c));
-        let width = (steady.bins / 16).max(4 + GAP);
-        let groups = steady.bins / width;
-        let power = |bin: usize| (0..steady.channels).map(|c| steady.still[c * steady.bins + bin].norm_sqr()).sum::<f64>();
+        let (members, others): (Vec<usize>, Vec<usize>) = (0..clutter.channels).partition(|&c| belongs(c));
+        let width = (clutter.bins / 16).max(4 + GAP);
+        let groups = clutter.bins / width;
+        let power = |bin: usize| (0..clutter.channels).map(|c| clutter.mean[c * clutter.bins + bin].norm_sqr()).sum::<f64>();
         // What is lost in the noise teaches nothing.
-        let strong: Vec<bool> = (0..steady.bins).map(|bin| power(bin) > 3.0 * steady.channels as f64).collect();
+        let strong: Vec<bool> = (0..clutter.bins).map(|bin| power(bin) > 3.0 * clutter.channels as f64).collect();
         let (mut value, mut weight) = (vec![], vec![]);
-        for frame in 0..steady.frames {
+        for frame in 0..clutter.frames {
             for group in 0..groups {
                 let bins: Vec<usize> =
-                    (group * width..(group + 1) * width - GAP).filter(|&bin| strong[bin] && steady.quiet(frame, bin)).collect();
+                    (group * width..(group + 1) * width - GAP).filter(|&bin| strong[bin] && clutter.quiet(frame, bin)).collect();
                 let gain = |channels: &[usize]| {
                     let (mut dot, mut own) = (Complex64::ZERO, 0.0);
                     for &channel in channels {
                         for &bin in &bins {
-                            let still = steady.still[channel * steady.bins + bin];
-                            dot += still.conj() * steady.deviation(frame, channel, bin);
-                            own += still.norm_sqr();
+                            let mean = clutter.mean[channel * clutter.bins + bin];
+                            dot += mean.conj() * clutter.deviation(frame, channel, bin);
+                            own += mean.norm_sqr();
                         }
                     }
                     (dot / own.max(f64::MIN_POSITIVE), own)
@@ -239,10 +242,10 @@ impl Relative {
         let middle = cells().map(|i| body.value[i] * body.weight[i]).sum::<Complex64>() / all.max(f64::MIN_POSITIVE);
         let (mut value, mut weight) = (vec![], vec![]);
         for frame in 0..of_body.len() {
-            let (still, moving) = (frame * self.groups..(frame + 1) * self.groups, frame * groups..(frame + 1) * groups);
-            value.extend_from_slice(&self.value[still.clone()]);
+            let (clutter, moving) = (frame * self.groups..(frame + 1) * self.groups, frame * groups..(frame + 1) * groups);
+            value.extend_from_slice(&self.value[clutter.clone()]);
             value.extend(body.value[moving.clone()].iter().map(|gain| gain - middle));
-            weight.extend_from_slice(&self.weight[still]);
+            weight.extend_from_slice(&self.weight[clutter]);
             weight.extend(body.weight[moving].iter().map(|weight| 0.5 * weight));
         }
         (self.value, self.weight, self.groups) = (value, weight, self.groups + groups);
@@ -304,7 +307,8 @@ impl Judged {
         let known = self.known();
         let decibel: Vec<f64> = known.iter().map(|&f| DECIBEL * (1.0 + self.series.value[f]).norm().max(1e-3).ln()).collect();
         let (what, index, others) = self.unit.words();
-        let own: f64 = self.members.iter().flat_map(|&c| &evidence.still()[c * samples..][..samples]).map(|v| v.norm_sqr()).sum();
+        let own: f64 =
+            self.members.iter().flat_map(|&c| &evidence.clutter()[c * samples..][..samples]).map(|v| v.norm_sqr()).sum();
         let square: f64 = known.iter().map(|&f| self.series.value[f].norm_sqr()).sum();
         Candidate {
             id: None,
@@ -317,7 +321,7 @@ impl Judged {
                 ..Place::at(Stage::Receiver)
             },
             p_value: statistics::corrected(self.p_value, tried).max(f64::MIN_POSITIVE),
-            gain: self.gain,
+            nats: self.nats,
             errs_alike: false,
             look_alikes: vec![],
             statement: self.statement(&decibel),
@@ -365,7 +369,7 @@ impl Judged {
         let members = self.members.clone();
         // Of every frame, for all channels: the complex gain of one of them.
         let known = self.known();
-        let spent = 2.0 * statistics::learned(known.iter().map(|&f| self.variance * self.series.weight[f]));
+        let coding_cost = 2.0 * statistics::learned(known.iter().map(|&f| self.variance * self.series.weight[f]));
         let size = loops * samples * evidence.cube.channels();
         Correction::Inverse(
             Arc::new(move |cube| {
@@ -375,7 +379,7 @@ impl Judged {
                     }
                 });
             }),
-            Volume::BY_SAMPLE.spent(spent, size),
+            Volume::BY_SAMPLE.with_coding_cost(coding_cost, size),
         )
     }
 }

@@ -35,7 +35,7 @@ fn halves_that_change_alike_are_told_in_noise_and_others_are_not() {
 }
 
 #[test]
-fn the_body_says_of_a_receivers_gain_what_the_still_ranges_say_and_groups_that_differ_say_less() {
+fn the_body_says_of_a_receivers_gain_what_the_static_ranges_say_and_groups_that_differ_say_less() {
     let relative = || Relative {
         members: vec![0],
         value: [0.1, -0.1, 0.1, -0.1, 0.1, -0.1].map(Complex64::from).to_vec(),

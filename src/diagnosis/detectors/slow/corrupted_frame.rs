@@ -1,6 +1,6 @@
 //! One frame of one channel that is not like the others: samples that slipped, a frame that was written over.
 //!
-//! Static clutter is alike in all frames. Movers leave remains in it, which all channels of a frame share in power,
+//! Static clutter is alike in all frames. Movers leave a residual in it, which all channels of a frame share in power,
 //! range by range; so the odd one stands out from its frame's other channels, by more than any other does. A frame is
 //! all there is of it, so its even chirps propose and its odd chirps judge.
 
@@ -151,9 +151,9 @@ impl Odd {
                 tx: (transmitters > 1).then(|| vec![channel / receivers]),
                 ..Place::at(Stage::Receiver)
             },
-            // Scores of remains of movers have a longer tail than a normal law's.
+            // Scores of residuals of movers have a longer tail than a normal law's.
             p_value: corrected((-self.score).exp(), self.deviations.values().len() as f64).max(f64::MIN_POSITIVE),
-            gain: self.gain(evidence),
+            nats: self.gain(evidence),
             errs_alike: false,
             look_alikes: vec![],
             statement: format!(
@@ -221,7 +221,7 @@ mod tests {
         let found = find(&evidence(3));
         let place = &found[0].place;
         assert_eq!((place.frames.as_deref(), place.rx.as_deref()), (Some(&[3][..]), Some(&[1][..])));
-        assert!(found[0].p_value < 1e-6 && found[0].gain > 15.0, "{} {}", found[0].p_value, found[0].gain);
+        assert!(found[0].p_value < 1e-6 && found[0].nats > 15.0, "{} {}", found[0].p_value, found[0].nats);
         assert!(find(&evidence(3).with(&found[0])).is_empty());
         assert!(find(&evidence(0)).is_empty());
     }

@@ -22,7 +22,7 @@ pub struct Drift {
     /// Of the better of two tests, against the scatter of the frames about the shape and against what the body's slow parts
     /// do, corrected for the shapes that were tried.
     pub p_value: f64,
-    pub held_out_gain: f64,
+    pub held_out_nats: f64,
     frames: usize,
 }
 
@@ -180,11 +180,11 @@ pub fn best(field: &Field, part: Part, series: &Series, training: &[usize], held
         shape,
         deviation: (variance * excess).sqrt(),
         p_value: statistics::corrected(p, tried),
-        held_out_gain: 0.0,
+        held_out_nats: 0.0,
         frames: field.frames,
     };
-    let held_out_gain = series.gain(field, held_out, |frame, _, _| drift.predicted(training, frame)) / excess;
-    Some(Drift { held_out_gain, ..drift.dated(series, training) })
+    let held_out_nats = series.log_likelihood_gain(field, held_out, |frame, _, _| drift.predicted(training, frame)) / excess;
+    Some(Drift { held_out_nats, ..drift.dated(series, training) })
 }
 
 /// Probability of a drift that moves the training frames' scatter by `scatter` (with `freedom` parameters), were it the body's

@@ -18,8 +18,8 @@ pub struct Line {
     /// What makes its mean over the training frames zero.
     pub constant: f64,
     /// Log-likelihood that the training frames gain, nats.
-    pub training_gain: f64,
-    pub held_out_gain: f64,
+    pub training_nats: f64,
+    pub held_out_nats: f64,
     /// Independent frequencies that were looked at.
     pub tried: f64,
     pub frequency_deviation_hz: f64,
@@ -34,7 +34,7 @@ pub struct Line {
 const HARMONICS: usize = 4;
 /// A harmonic that gains less (nats) is left out.
 const HARMONIC_GAIN: f64 = 10.0;
-/// Aliases that explain only so much less (nats) cannot be told apart.
+/// Aliases that explain only so much less (nats) are not resolved.
 const ALIAS_GAIN: f64 = 4.6;
 /// A background above this many times the noise is more than noise.
 pub const LOUD: f64 = 1.5;
@@ -79,7 +79,7 @@ pub fn strongest(field: &Field, series: &Series, training: &[usize], held_out: &
     let judged: Vec<usize> = training.iter().chain(held_out).copied().filter(|&f| series.weight[f] > 0.0).collect();
     let background = judged.iter().map(|&frame| leftover(field, series, frame, &line)).sum::<f64>() / judged.len() as f64;
     search.judge(&mut line, background.max(1.0));
-    line.held_out_gain = series.gain(field, held_out, |_, _, time| line.value(time)) / line.background;
+    line.held_out_nats = series.log_likelihood_gain(field, held_out, |_, _, time| line.value(time)) / line.background;
     Some(line)
 }
 
@@ -163,14 +163,14 @@ impl<'a> Search<'a> {
     /// `weight`: of all chirps.
     fn line(&self, frequency_hz: f64, gain: f64, weight: f64) -> Line {
         let mut harmonics = 1;
-        let (mut amplitudes, mut constant, mut training_gain) = self.fit(frequency_hz, 1);
+        let (mut amplitudes, mut constant, mut training_nats) = self.fit(frequency_hz, 1);
         for more in 2..=HARMONICS {
             if frequency_hz * more as f64 >= self.highest_hz {
                 break;
             }
             let (found, offset, better) = self.fit(frequency_hz, more);
-            if better > training_gain + HARMONIC_GAIN {
-                (harmonics, amplitudes, constant, training_gain) = (more, found, offset, better);
+            if better > training_nats + HARMONIC_GAIN {
+                (harmonics, amplitudes, constant, training_nats) = (more, found, offset, better);
             }
         }
         amplitudes.truncate(harmonics);
@@ -181,8 +181,8 @@ impl<'a> Search<'a> {
             frequency_hz,
             amplitudes,
             constant,
-            training_gain,
-            held_out_gain: 0.0,
+            training_nats,
+            held_out_nats: 0.0,
             tried: (self.highest_hz - self.lowest_hz) * self.duration_s * 3.0,
             frequency_deviation_hz: if known { curvature.sqrt().recip() } else { 0.5 / self.duration_s },
             amplitude_deviation: (2.0 / weight).sqrt(),
@@ -201,7 +201,7 @@ impl<'a> Search<'a> {
         } else if slow {
             line.freedom = Some(own + KNOWN);
         }
-        line.training_gain /= background;
+        line.training_nats /= background;
         line.frequency_deviation_hz = (line.frequency_deviation_hz * background.sqrt()).hypot(COLOURED / self.duration_s);
         line.amplitude_deviation *= background.sqrt();
         // What may be the noise alone is the same for all laws that are compared.

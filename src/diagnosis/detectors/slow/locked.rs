@@ -32,7 +32,7 @@ const FEWEST_RETURNS: usize = 3;
 struct Channel {
     mean: Vec<Vec<Complex64>>,
     scatter: Vec<Vec<f64>>,
-    still: Vec<Complex64>,
+    clutter: Vec<Complex64>,
     noise: f64,
 }
 
@@ -90,16 +90,16 @@ fn of_channel(evidence: &Evidence, channel: usize) -> Channel {
         scatter.push((0..bins).map(of_bin).map(|sum: f64| sum.max(least)).collect());
         mean.push(means);
     }
-    let still = (0..bins).map(|bin| frames.iter().map(|frame| frame[bin]).sum::<Complex64>() / (root * count as f64)).collect();
+    let clutter = (0..bins).map(|bin| frames.iter().map(|frame| frame[bin]).sum::<Complex64>() / (root * count as f64)).collect();
     let noise = evidence.noise()[channel] / (loops * count) as f64;
-    Channel { mean, scatter, still, noise }
+    Channel { mean, scatter, clutter, noise }
 }
 
 /// Takes what all static returns do alike out of the means.
 fn take_common(channels: &mut [Channel], bins: usize) {
     let strong: Vec<(usize, usize)> = (0..channels.len())
         .flat_map(|channel| (0..bins).map(move |bin| (channel, bin)))
-        .filter(|&(channel, bin)| channels[channel].still[bin].norm_sqr() > STRONG * channels[channel].noise)
+        .filter(|&(channel, bin)| channels[channel].clutter[bin].norm_sqr() > STRONG * channels[channel].noise)
         .collect();
     let mut ranges: Vec<usize> = strong.iter().map(|place| place.1).collect();
     ranges.sort_unstable();
@@ -109,12 +109,12 @@ fn take_common(channels: &mut [Channel], bins: usize) {
         return;
     }
     for harmonic in 0..channels[0].mean.len() {
-        let ratios = strong.iter().map(|&(channel, bin)| channels[channel].mean[harmonic][bin] / channels[channel].still[bin]);
+        let ratios = strong.iter().map(|&(channel, bin)| channels[channel].mean[harmonic][bin] / channels[channel].clutter[bin]);
         let (mut real, mut imaginary): (Vec<f64>, Vec<f64>) = ratios.map(|ratio| (ratio.re, ratio.im)).unzip();
         let common = Complex64::new(median(&mut real), median(&mut imaginary));
         for channel in channels.iter_mut() {
-            let own = channel.mean[harmonic].iter_mut().zip(&channel.still);
-            own.for_each(|(mean, still)| *mean -= common * still);
+            let own = channel.mean[harmonic].iter_mut().zip(&channel.clutter);
+            own.for_each(|(mean, clutter)| *mean -= common * clutter);
         }
     }
 }
@@ -148,7 +148,7 @@ fn strongest(evidence: &Evidence, channels: &[Channel]) -> Option<Candidate> {
     let cells: Vec<Vec<usize>> = has.iter().map(of_channel).collect();
     let undo = undo(evidence, has.clone(), cells);
     let candidate = candidate(evidence, &channels[channel], &has, bin, undo);
-    Some(Candidate { p_value, gain, ..candidate })
+    Some(Candidate { p_value, nats: gain, ..candidate })
 }
 
 /// Log-likelihood that held-out frames gain at a cell, by harmonic in the scatter of the training frames.
@@ -230,7 +230,7 @@ fn candidate(evidence: &Evidence, own: &Channel, has: &[usize], bin: usize, undo
             ..Place::at(Stage::Receiver)
         },
         p_value: 1.0,
-        gain: 0.0,
+        nats: 0.0,
         errs_alike: false,
         look_alikes: vec![],
         statement,
@@ -267,9 +267,9 @@ fn undo(evidence: &Evidence, channels: Vec<usize>, cells: Vec<Vec<usize>>) -> Un
                     let values = cube.channel(frame, channel);
                     mean.iter_mut().zip(values).for_each(|(sum, value)| *sum += value / training.len() as f64);
                 }
-                let still = mean_chirp(mean.chunks_exact(samples), samples);
+                let clutter = mean_chirp(mean.chunks_exact(samples), samples);
                 for chirp in mean.chunks_exact_mut(samples) {
-                    chirp.iter_mut().zip(&still).for_each(|(value, still)| *value -= still);
+                    chirp.iter_mut().zip(&clutter).for_each(|(value, clutter)| *value -= clutter);
                     forward.process(chirp);
                     let keep = |k: usize| if near(cells, k) { 1.0 / samples as f64 } else { 0.0 };
                     chirp.iter_mut().enumerate().for_each(|(k, value)| *value *= keep(k));
@@ -313,12 +313,12 @@ mod tests {
         let evidence = evidence(1, |_, index| settles(index).into(), |_| 0.0);
         let found = find(&evidence).pop().expect("a settling");
         assert_eq!((found.id, found.behaves_like), (None, Behaviour::SlowTimeSettlingOfOneReturn), "{found:?}");
-        assert!(found.p_value < 1e-9 && found.gain > 20.0, "{found:?}");
+        assert!(found.p_value < 1e-9 && found.nats > 20.0, "{found:?}");
         let bin_m = evidence.radar.range_resolution_m();
         let [low, high] = found.place.range_m.unwrap();
         assert!(low < 2.0 * bin_m && 2.0 * bin_m < high, "{low} to {high}");
-        let again = find(&evidence.with(&found));
-        assert!(again.iter().all(|again| again.p_value > 1e-3), "{again:?}");
+        let left = find(&evidence.with(&found));
+        assert!(left.iter().all(|left| left.p_value > 1e-3), "{left:?}");
     }
 
     #[test]
@@ -329,8 +329,8 @@ mod tests {
             let time_s = |frame: usize, index: usize| frame as f64 * period_s + index as f64 * common.radar.loop_period_s();
             let drifts = evidence(seed, |frame, index| (0.3 * time_s(frame, index) / (12.0 * period_s)).into(), |_| 0.0);
             let moves = evidence(seed, |frame, index| Complex64::cis(TAU * 531.7 * time_s(frame, index)) * 0.3, |_| 0.0);
-            let still = evidence(seed, |_, _| Complex64::ZERO, |_| 0.0);
-            for (what, evidence) in [("common", &common), ("drifts", &drifts), ("moves", &moves), ("still", &still)] {
+            let clutter = evidence(seed, |_, _| Complex64::ZERO, |_| 0.0);
+            for (what, evidence) in [("common", &common), ("drifts", &drifts), ("moves", &moves), ("static", &clutter)] {
                 let found = find(evidence);
                 assert!(found.is_empty(), "{what}: {found:?}");
             }

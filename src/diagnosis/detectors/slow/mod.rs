@@ -17,7 +17,7 @@ pub mod random;
 pub mod settling;
 mod selection;
 mod shared;
-pub mod steady;
+pub mod frame_clutter;
 #[cfg(test)]
 mod tests;
 
@@ -44,7 +44,7 @@ const PARTS: [Part; 4] = [Part::Gain, Part::Phase, Part::Delay, Part::Boresight]
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let known = |candidate: &Candidate| candidate.id.is_some_and(|id| evidence.accepted.contains(&id));
-    let reported = |candidate: &Candidate| candidate.p_value < PASSED_ON && candidate.gain > LEAST_GAIN && !known(candidate);
+    let reported = |candidate: &Candidate| candidate.p_value < PASSED_ON && candidate.nats > LEAST_GAIN && !known(candidate);
     let of_all = |found: Candidate| Candidate { p_value: statistics::corrected(found.p_value, LOOKS), ..found };
     // Where nobody is tracked and no law in time holds, what most ranges share is reported without one.
     let shared = || evidence.body.is_none().then(|| shared::find(evidence)).flatten().map(of_all).filter(reported);
@@ -115,12 +115,12 @@ fn line(evidence: &Evidence, field: &Field, part: Part, series: &Series) -> Opti
     if !field.shared(|frame, index, group| part.deviation(value(frame, index), group)) {
         return None;
     }
-    let p_value = |freedom| (-lines::unsure(line.training_gain, freedom)).exp();
+    let p_value = |freedom| (-lines::unsure(line.training_nats, freedom)).exp();
     let unsure = |freedom| (freedom, statistics::corrected(p_value(freedom), line.tried * LOOKS));
     let candidate = candidates::of_line(evidence, field, part, &line);
     let unsure = line.freedom.map(unsure);
     let within_frames = line.frequency_hz * evidence.radar.frame_duration_s() > DISTINCT_TURNS;
-    let over_noise = line.background * candidate.gain;
-    let explained = if selection::is_sure(unsure) && within_frames { over_noise } else { candidate.gain };
+    let over_noise = line.background * candidate.nats;
+    let explained = if selection::is_sure(unsure) && within_frames { over_noise } else { candidate.nats };
     Some(Found { explained, over_noise, candidate, unsure, loud: line.background > lines::LOUD, within_frames })
 }

@@ -54,7 +54,7 @@ impl<'a> Periodogram<'a> {
     }
 
     /// Log-likelihood that a sinusoid gains beside a free constant (frames may see the same part of every period); nought where the
-    /// two cannot be told apart.
+    /// two are not distinguishable.
     pub fn gain(&self, frequency_hz: f64) -> f64 {
         let (data, once, twice) = self.sums(frequency_hz);
         let (cosine, sine) = (once.re, -once.im);

@@ -13,10 +13,10 @@ pub struct Random {
     pub deviation: f64,
     pub deviation_error: f64,
     pub p_value: f64,
-    pub held_out_gain: f64,
+    pub held_out_nats: f64,
     /// Of that, what chirps show beside a straight line through their frame: what is random from chirp to chirp loses nothing by it, and
     /// what fluctuates slowly nearly all.
-    pub gain_within: f64,
+    pub nats_within: f64,
     /// Two values instead of a bell: their distance, its error, the share of the upper one, and the held-out gain.
     pub two: Option<Two>,
 }
@@ -33,7 +33,7 @@ pub struct Two {
     pub distance: f64,
     pub distance_error: f64,
     pub share: f64,
-    pub held_out_gain: f64,
+    pub held_out_nats: f64,
 }
 
 pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -> Option<Random> {
@@ -72,8 +72,8 @@ pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -
         deviation,
         deviation_error: 0.5 / (information.sqrt() * deviation),
         p_value,
-        held_out_gain: all(&series, variance, held_out),
-        gain_within: all(&within_frames(&series), variance, held_out),
+        held_out_nats: all(&series, variance, held_out),
+        nats_within: all(&within_frames(&series), variance, held_out),
         two: two_valued(&series, &training, held_out, deviation),
     })
 }
@@ -193,7 +193,7 @@ fn two_valued(series: &Series, training: &[usize], held_out: &[usize], deviation
         distance,
         distance_error: if curvature > 0.0 { curvature.sqrt().recip() } else { distance },
         share,
-        held_out_gain: gain(distance, share, held_out),
+        held_out_nats: gain(distance, share, held_out),
     })
 }
 

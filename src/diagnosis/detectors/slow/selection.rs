@@ -29,7 +29,7 @@ pub(super) struct Found {
 
 impl From<Candidate> for Found {
     fn from(candidate: Candidate) -> Self {
-        Self { explained: candidate.gain, over_noise: candidate.gain, candidate, unsure: None, loud: false, within_frames: true }
+        Self { explained: candidate.nats, over_noise: candidate.nats, candidate, unsure: None, loud: false, within_frames: true }
     }
 }
 
@@ -57,7 +57,7 @@ pub(super) fn selected(mut found: Vec<Found>, mut free: Vec<Found>) -> Vec<Found
         found.append(&mut free);
     }
     keep_names(&mut found);
-    found.sort_by(|a, b| b.candidate.gain.total_cmp(&a.candidate.gain));
+    found.sort_by(|a, b| b.candidate.nats.total_cmp(&a.candidate.nats));
     name_rivals(&mut found);
     found
 }
@@ -86,12 +86,12 @@ fn keep_names(found: &mut Vec<Found>) {
 
 /// Names between which the recording does not decide are each other's look-alikes.
 fn name_rivals(found: &mut [Found]) {
-    let rivals: Vec<(Option<&'static str>, f64)> = found.iter().map(|found| (found.candidate.id, found.candidate.gain)).collect();
+    let rivals: Vec<(Option<&'static str>, f64)> = found.iter().map(|found| (found.candidate.id, found.candidate.nats)).collect();
     for Found { candidate, .. } in found {
         for &(id, gain) in &rivals {
             if let Some(id) = id
                 && Some(id) != candidate.id
-                && (gain - candidate.gain).abs() < UNDECIDED
+                && (gain - candidate.nats).abs() < UNDECIDED
                 && !candidate.look_alikes.contains(&id)
             {
                 candidate.look_alikes.push(id);
@@ -105,7 +105,7 @@ fn name_rivals(found: &mut [Found]) {
 pub(super) fn judged(Found { mut candidate, unsure, within_frames, .. }: Found) -> Candidate {
     if let Some((freedom, p_value)) = unsure {
         if p_value > SURE || !within_frames {
-            candidate.gain = lines::unsure(candidate.gain, freedom);
+            candidate.nats = lines::unsure(candidate.nats, freedom);
         }
         candidate.p_value = p_value;
     }

@@ -15,11 +15,11 @@ pub struct Settling {
     pub loops_deviation: f64,
     pub constant: Complex64,
     pub p_value: f64,
-    pub training_gain: f64,
-    pub held_out_gain: f64,
+    pub training_nats: f64,
+    pub held_out_nats: f64,
     /// What an amplitude modulation at the mains' frequency gains in training, where its periods fit into the frames': it is then
     /// alike in all of them.
-    pub hum_gain: f64,
+    pub modulation_nats: f64,
     /// What a free function of the loop gains on held-out frames.
     pub free: Free,
 }
@@ -30,7 +30,7 @@ pub struct Free {
     /// `[loop]`, its mean over loops is zero.
     pub values: Vec<Complex64>,
     pub p_value: f64,
-    pub held_out_gain: f64,
+    pub held_out_nats: f64,
 }
 
 /// Share of what a free function of the loop gains that a decay must reach.
@@ -49,12 +49,12 @@ const FEWEST_LOOPS: f64 = 0.5;
 impl Settling {
     /// Whether this is a decay, and not the best decay for something else: a modulation that is locked to the frames, say.
     pub fn is_named(&self) -> bool {
-        let rest = self.free.held_out_gain - self.held_out_gain;
-        self.held_out_gain > ENOUGH * self.free.held_out_gain
-            && (rest < PLAIN || rest < LEFT_OVER * self.free.held_out_gain)
+        let rest = self.free.held_out_nats - self.held_out_nats;
+        self.held_out_nats > ENOUGH * self.free.held_out_nats
+            && (rest < PLAIN || rest < LEFT_OVER * self.free.held_out_nats)
             && self.amplitude.re.abs() > self.amplitude.im.abs()
             && self.loops > FEWEST_LOOPS
-            && self.training_gain > self.hum_gain
+            && self.training_nats > self.modulation_nats
     }
 
     /// Relative to the settled state.
@@ -103,7 +103,7 @@ struct Fit {
     amplitude: Complex64,
     constant: Complex64,
     /// Log-likelihood.
-    gain: f64,
+    nats: f64,
     /// Of the shape.
     energy: f64,
 }
@@ -130,23 +130,23 @@ impl Pattern {
 
     fn fit(&self, length: f64) -> Fit {
         let Decay { amplitude, level, energy } = Decay::fit(&self.values, length);
-        let gain = 0.5 * self.weight * amplitude.norm_sqr() * energy;
-        Fit { amplitude, constant: self.centre - amplitude * level, gain, energy }
+        let nats = 0.5 * self.weight * amplitude.norm_sqr() * energy;
+        Fit { amplitude, constant: self.centre - amplitude * level, nats, energy }
     }
 
     /// Of the decay that fits best, in loops. Longer than half a frame is a slope.
     fn length(&self) -> Option<f64> {
         let longest = 0.5 * self.values.len() as f64;
         let lengths: Vec<f64> = Decay::lengths(longest).collect();
-        let gains: Vec<f64> = lengths.iter().map(|&length| self.fit(length).gain).collect();
-        let at = (0..lengths.len()).max_by(|&a, &b| gains[a].total_cmp(&gains[b]))?;
-        let gain = |l: f64| if (0.3..=longest).contains(&l) { self.fit(l).gain } else { f64::NEG_INFINITY };
+        let nats: Vec<f64> = lengths.iter().map(|&length| self.fit(length).nats).collect();
+        let at = (0..lengths.len()).max_by(|&a, &b| nats[a].total_cmp(&nats[b]))?;
+        let nats = |l: f64| if (0.3..=longest).contains(&l) { self.fit(l).nats } else { f64::NEG_INFINITY };
         let mut length = lengths[at];
         let mut width = 0.05 * length;
         while width > 1e-4 * length {
-            if gain(length + width) > gain(length) {
+            if nats(length + width) > nats(length) {
                 length += width;
-            } else if gain(length - width) > gain(length) {
+            } else if nats(length - width) > nats(length) {
                 length -= width;
             } else {
                 width *= 0.5;
@@ -158,14 +158,14 @@ impl Pattern {
     /// Error of that length, by the curvature of the likelihood.
     fn length_deviation(&self, length: f64) -> f64 {
         let h = 0.1 * length;
-        let curvature = (2.0 * self.fit(length).gain - self.fit(length + h).gain - self.fit(length - h).gain) / (h * h);
+        let curvature = (2.0 * self.fit(length).nats - self.fit(length + h).nats - self.fit(length - h).nats) / (h * h);
         if curvature > 0.0 { curvature.sqrt().recip() } else { length }
     }
 
     /// Log-likelihood that held-out frames gain by a function of the loop.
-    fn held_out_gain(&self, field: &Field, held_out: &[usize], model: impl Fn(usize) -> Complex64) -> f64 {
-        self.parts[0].gain(field, held_out, |_, index, _| model(index).re)
-            + self.parts[1].gain(field, held_out, |_, index, _| model(index).im)
+    fn held_out_nats(&self, field: &Field, held_out: &[usize], model: impl Fn(usize) -> Complex64) -> f64 {
+        self.parts[0].log_likelihood_gain(field, held_out, |_, index, _| model(index).re)
+            + self.parts[1].log_likelihood_gain(field, held_out, |_, index, _| model(index).im)
     }
 
     /// Any function of the loop.
@@ -174,7 +174,7 @@ impl Pattern {
         let chi2: f64 = values.iter().map(|v| self.weight * v.norm_sqr()).sum();
         Free {
             p_value: statistics::chi2_tail(chi2, 2.0 * (values.len() - 1) as f64),
-            held_out_gain: self.held_out_gain(field, held_out, |index| values[index]),
+            held_out_nats: self.held_out_nats(field, held_out, |index| values[index]),
             values,
         }
     }
@@ -186,10 +186,10 @@ pub fn best(field: &Field, training: &[usize], held_out: &[usize]) -> Option<Set
     }
     let pattern = Pattern::new(field, training)?;
     let length = pattern.length()?;
-    let Fit { amplitude, constant, gain, energy } = pattern.fit(length);
+    let Fit { amplitude, constant, nats, energy } = pattern.fit(length);
     let free = pattern.free(field, held_out);
     let decay = |index: usize| amplitude * (-(index as f64) / length).exp() + constant;
-    let hum = locked(field).map(|hertz| explained(field, &free.values, hertz)).fold(0.0, f64::max);
+    let modulation = locked(field).map(|hertz| explained(field, &free.values, hertz)).fold(0.0, f64::max);
     Some(Settling {
         amplitude,
         amplitude_deviation: (1.0 / (pattern.weight * energy)).sqrt(),
@@ -197,10 +197,10 @@ pub fn best(field: &Field, training: &[usize], held_out: &[usize]) -> Option<Set
         loops_deviation: pattern.length_deviation(length),
         constant,
         // A decay has a length (about ten are apart) and a complex amplitude.
-        p_value: statistics::corrected((-gain).exp(), 10.0),
-        training_gain: gain,
-        hum_gain: 0.5 * pattern.weight * hum,
-        held_out_gain: pattern.held_out_gain(field, held_out, decay),
+        p_value: statistics::corrected((-nats).exp(), 10.0),
+        training_nats: nats,
+        modulation_nats: 0.5 * pattern.weight * modulation,
+        held_out_nats: pattern.held_out_nats(field, held_out, decay),
         free,
     })
 }

@@ -51,7 +51,7 @@ fn evidence(seed: u64, change: impl Fn(f64, usize, usize, f64) -> Complex64) -> 
 }
 
 fn best(evidence: &Evidence) -> Option<Candidate> {
-    find(evidence).into_iter().filter(|c| c.p_value < 5e-4).max_by(|a, b| a.gain.total_cmp(&b.gain))
+    find(evidence).into_iter().filter(|c| c.p_value < 5e-4).max_by(|a, b| a.nats.total_cmp(&b.nats))
 }
 
 /// Found and undone, nothing is left to find.
@@ -59,8 +59,8 @@ fn found_once(mut evidence: Evidence) -> Candidate {
     let candidate = best(&evidence).expect("nothing found");
     let undo = candidate.correction.undo().expect("no correction of samples");
     undo(&mut evidence.cube);
-    let again = best(&evidence.changed());
-    assert!(again.is_none(), "after {candidate:?} still {again:?}");
+    let left = best(&evidence.changed());
+    assert!(left.is_none(), "after {candidate:?} still {left:?}");
     candidate
 }
 
@@ -219,12 +219,12 @@ fn one_receiver_that_hops_is_distinguished_from_all_that_drift() {
     assert!(super::channels::find(&hopping(false)).iter().all(|c| c.p_value > 5e-4));
     let mut evidence_hopping = hopping(true);
     let found = super::channels::find(&evidence_hopping);
-    assert!(found.len() == 1 && found[0].p_value < 1e-6 && found[0].gain > 10.0, "{found:?}");
+    assert!(found.len() == 1 && found[0].p_value < 1e-6 && found[0].nats > 10.0, "{found:?}");
     assert_eq!(found[0].place.rx, Some(vec![2]));
     let undo = found[0].correction.undo().expect("no correction of samples");
     undo(&mut evidence_hopping.cube);
-    let again = super::channels::find(&evidence_hopping.changed());
-    assert!(again.iter().all(|c| c.p_value > 5e-4), "{again:?}");
+    let left = super::channels::find(&evidence_hopping.changed());
+    assert!(left.iter().all(|c| c.p_value > 5e-4), "{left:?}");
     let drifting = evidence(12, |_, frame, _, _| (1.0 + 0.01 * frame as f64).into());
     assert!(super::channels::find(&drifting).iter().all(|c| c.p_value > 5e-4));
 }

@@ -10,7 +10,8 @@ use super::frames::Frames;
 pub struct Reflector {
     pub bin: usize,
     pub cells: Vec<usize>,
-    pub still: Vec<Complex64>,
+    /// The constant `c` of each cell.
+    pub clutter: Vec<Complex64>,
     pub amplitude: Vec<Complex64>,
     /// `[frame]`, unwrapped.
     pub phase: Vec<f64>,
@@ -52,16 +53,18 @@ fn reflector(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize]) 
     let channels = data.noise.len();
     let cells: Vec<usize> = (0..channels).map(|c| c * data.bins + bin).collect();
     let weight: Vec<f64> = data.noise.iter().map(|v| 1.0 / v).collect();
-    let mut still: Vec<Complex64> = cells.iter().map(|&cell| centre(data, mean, cell, training)).collect();
+    let mut clutter: Vec<Complex64> = cells.iter().map(|&cell| centre(data, mean, cell, training)).collect();
     // First amplitudes: relative phases of the channels about their centres.
     let reference = cells[0];
     let mut amplitude: Vec<Complex64> = cells
         .iter()
         .enumerate()
         .map(|(i, &cell)| {
-            let product: Complex64 =
-                training.iter().map(|&f| (data.values[f][cell] - still[i]) * (data.values[f][reference] - still[0]).conj()).sum();
-            let power: f64 = training.iter().map(|&f| (data.values[f][reference] - still[0]).norm_sqr()).sum();
+            let product: Complex64 = training
+                .iter()
+                .map(|&f| (data.values[f][cell] - clutter[i]) * (data.values[f][reference] - clutter[0]).conj())
+                .sum();
+            let power: f64 = training.iter().map(|&f| (data.values[f][reference] - clutter[0]).norm_sqr()).sum();
             product / power.max(f64::MIN_POSITIVE)
         })
         .collect();
@@ -71,7 +74,7 @@ fn reflector(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize]) 
             let sum: Complex64 = cells
                 .iter()
                 .enumerate()
-                .map(|(i, &cell)| amplitude[i].conj() * (data.values[frame][cell] - still[i]) * weight[i])
+                .map(|(i, &cell)| amplitude[i].conj() * (data.values[frame][cell] - clutter[i]) * weight[i])
                 .sum();
             if sum.norm() > 0.0 {
                 *turn = sum / sum.norm();
@@ -86,7 +89,7 @@ fn reflector(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize]) 
         for (i, &cell) in cells.iter().enumerate() {
             let product = training.iter().map(|&f| data.values[f][cell] * (turned[f] - centre).conj()).sum::<Complex64>() / count;
             amplitude[i] = product / spread;
-            still[i] = mean[cell] - amplitude[i] * centre;
+            clutter[i] = mean[cell] - amplitude[i] * centre;
         }
     }
     let variance = cells
@@ -94,7 +97,7 @@ fn reflector(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize]) 
         .enumerate()
         .map(|(i, &cell)| {
             let left: f64 =
-                training.iter().map(|&f| (data.values[f][cell] - still[i] - amplitude[i] * turned[f]).norm_sqr()).sum();
+                training.iter().map(|&f| (data.values[f][cell] - clutter[i] - amplitude[i] * turned[f]).norm_sqr()).sum();
             (left / training.len() as f64).max(data.noise[i])
         })
         .collect();
@@ -103,7 +106,7 @@ fn reflector(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize]) 
         let jump = phase[frame] - phase[frame - 1];
         phase[frame] -= TAU * (jump / TAU).round();
     }
-    Some(Reflector { bin, cells, still, amplitude, phase, variance })
+    Some(Reflector { bin, cells, clutter, amplitude, phase, variance })
 }
 
 /// Centre of the circle through a cell's values (Kåsa's least squares).

@@ -118,7 +118,7 @@ fn held_out_gain(evidence: &Evidence, data: &Frames, mean: &[Complex64], best: &
                 .enumerate()
                 .map(|(i, &cell)| {
                     let value = data.values[f][cell];
-                    let left = value - best.still[i] - best.amplitude[i] * turned;
+                    let left = value - best.clutter[i] - best.amplitude[i] * turned;
                     ((value - mean[cell]).norm_sqr() - left.norm_sqr()) / best.variance[i]
                 })
                 .sum::<f64>()
@@ -211,7 +211,7 @@ impl Motion<'_> {
                 ..Place::at(if self.named.is_some() { Stage::Body } else { Stage::Scene })
             },
             p_value,
-            gain,
+            nats: gain,
             errs_alike: true,
             // A curtain in the wind does the same; so does whatever oscillates there.
             look_alikes: if self.named.is_some() { vec![effects::moving_reflector::ID] } else { vec![] },

@@ -84,7 +84,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             .filter(|changing| once.as_ref().is_none_or(|once| changing.likelihood > once.likelihood + AS_WELL));
         found.extend(changing.or(once).map(|found| (found.likelihood, chirps.bend(evidence, &found))));
     }
-    found.retain(|(_, candidate)| candidate.p_value < 1e-2 && candidate.gain > 0.0);
+    found.retain(|(_, candidate)| candidate.p_value < 1e-2 && candidate.nats > 0.0);
     // Either leaves a little of the other.
     found.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, candidate)| candidate).into_iter().collect()
 }
@@ -223,7 +223,7 @@ impl Chirps {
             choice: None,
             place: Place::at(Stage::Receiver),
             p_value: corrected(found.p_value, LOOKS),
-            gain: found.gain,
+            nats: found.nats,
             errs_alike: true,
             look_alikes: vec![],
             statement: format!(
@@ -264,7 +264,7 @@ impl Chirps {
             choice: None,
             place: Place::at(Stage::Waveform),
             p_value: corrected(found.p_value, LOOKS),
-            gain: found.gain,
+            nats: found.nats,
             errs_alike: true,
             look_alikes: vec![],
             statement: format!(

@@ -41,7 +41,7 @@ fn converged(chirps: &Chirps, numbers: &[usize]) -> Estimated {
 #[test]
 fn a_bend_a_changing_bend_and_a_tilt_are_told_with_their_sizes() {
     let bend = converged(&chirps(1, |_, x| Complex64::cis(0.2 * legendre(2, x))), &[BEND]);
-    assert!((bend.values[0] - 0.2).abs() < 0.03 && bend.p_value < 1e-6 && bend.gain > 10.0, "{:?}", bend.values);
+    assert!((bend.values[0] - 0.2).abs() < 0.03 && bend.p_value < 1e-6 && bend.nats > 10.0, "{:?}", bend.values);
     let changing = chirps(2, |frame, x| Complex64::cis(0.2 * (frame as f64 / 5.5 - 1.0) * legendre(2, x)));
     let changing = converged(&changing, &[BEND, TREND]);
     assert!((changing.values[1] - 0.2).abs() < 0.04 && changing.values[0].abs() < 0.03, "{:?}", changing.values);

@@ -24,7 +24,7 @@ const PADDING: usize = 4;
 /// Half of the window's main lobe down to the noise, bins.
 const LOBE: usize = 3;
 /// Doppler bins about zero that hold static clutter.
-const STILL_BINS: usize = 3;
+const CLUTTER_BINS: usize = 3;
 /// Metres beyond the body's surface that its own returns may reach.
 const BODY_MARGIN_M: f64 = 0.15;
 /// Share of what free, unequal echoes on the two sides explain.
@@ -103,8 +103,8 @@ fn support(evidence: &Evidence, frame: usize) -> [Option<[usize; 2]>; 2] {
         Some([near, far])
     });
     // The body is there too, with its slow parts.
-    let still = room.map(|[near, far]| body.map_or([near, far], |b| [near.min(b[0]), far.max(b[1])]));
-    [still, body].map(|span| span.map(|[near, far]| bins(near, far)))
+    let slow = room.map(|[near, far]| body.map_or([near, far], |b| [near.min(b[0]), far.max(b[1])]));
+    [slow, body].map(|span| span.map(|[near, far]| bins(near, far)))
 }
 
 pub fn find(evidence: &Evidence) -> Option<Candidate> {
@@ -139,9 +139,9 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     }
     let (alpha, score) = training[best].paired();
     let p_value = statistics::corrected((-score / scale).exp(), shifts.len() as f64);
-    let gain = held_out[best].gain(alpha) / scale;
+    let nats = held_out[best].gain(alpha) / scale;
     let pair = Pair { shift: shifts[best] as f64 + summit(&scores, best), alpha, score, scale, sums: training[best] };
-    if p_value > 0.01 || gain < 3.0 || pair.stated() > LARGEST {
+    if p_value > 0.01 || nats < 3.0 || pair.stated() > LARGEST {
         return None;
     }
     let bin_hz = radar.sample_rate_hz / samples as f64;
@@ -155,7 +155,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
             scores.iter().map(|s| s / scale).collect(),
         )],
     };
-    Some(pair.candidate(evidence, p_value, gain, curve))
+    Some(pair.candidate(evidence, p_value, nats, curve))
 }
 
 /// Top of the parabola through a score and its neighbours, in shifts from it.
@@ -189,7 +189,7 @@ impl Pair {
         PI * self.deviation_hz() * 2.0 * 3.0 / SPEED_OF_LIGHT
     }
 
-    fn candidate(&self, evidence: &Evidence, p_value: f64, gain: f64, curve: Curve) -> Candidate {
+    fn candidate(&self, evidence: &Evidence, p_value: f64, nats: f64, curve: Curve) -> Candidate {
         let &Self { shift, alpha, score, scale, sums } = self;
         let (radar, [frames, _, _, loops, samples]) = (&evidence.radar, evidence.cube.dims);
         let (deviation_hz, stated) = (self.deviation_hz(), self.stated());
@@ -199,7 +199,7 @@ impl Pair {
         // A line of a few cells: so well is its frequency known.
         let frequency_error = bin_hz * 0.5 / (score / scale).sqrt().max(1.0);
         let named = score >= PAIRED * sums.free();
-        let still: f64 = evidence.still().iter().map(|v| v.norm_sqr()).sum();
+        let clutter_energy: f64 = evidence.clutter().iter().map(|v| v.norm_sqr()).sum();
         let chirps = (frames * loops) as f64;
         let (radar_copy, turned_hz) = (radar.clone(), ripple_hz);
         Candidate {
@@ -216,7 +216,7 @@ impl Pair {
             choice: None,
             place: Place::at(Stage::Waveform),
             p_value,
-            gain,
+            nats,
             errs_alike: false,
             look_alikes: vec![],
             statement: format!(
@@ -229,7 +229,7 @@ impl Pair {
                 1e-3 * ripple_hz
             ),
             curve: Some(curve),
-            energy: still * chirps * 2.0 * (stated * stated),
+            energy: clutter_energy * chirps * 2.0 * (stated * stated),
             correction: Correction::Samples(Arc::new(move |cube| undo(cube, &radar_copy, alpha, turned_hz))),
         }
     }
@@ -262,8 +262,8 @@ fn of_frame(evidence: &Evidence, frame: usize, shifts: &[usize]) -> Vec<Sums> {
         let mut spectrum = vec![Complex64::ZERO; padded];
         let mut template = vec![Complex64::ZERO; padded];
         for doppler in 0..loops {
-            let still = doppler.min(loops - doppler) <= STILL_BINS;
-            let Some([near, far]) = spans[usize::from(!still)] else { continue };
+            let in_clutter = doppler.min(loops - doppler) <= CLUTTER_BINS;
+            let Some([near, far]) = spans[usize::from(!in_clutter)] else { continue };
             spectrum.fill(Complex64::ZERO);
             for n in 0..samples {
                 spectrum[n] = columns[n * loops + doppler] * fast[n];

@@ -26,7 +26,7 @@ const ELSEWHERE: f64 = 0.01;
 pub struct Chirps<'a> {
     pub evidence: &'a Evidence,
     /// Static returns, `[channel, bin]`.
-    pub still: Grid<Complex64, 2>,
+    pub clutter: Grid<Complex64, 2>,
     /// Of every frame, `[loop, channel, bin]`.
     pub spectra: Vec<Grid<Complex64, 3>>,
     /// First and last of ranges that are looked at together.
@@ -48,7 +48,7 @@ impl<'a> Chirps<'a> {
             return None;
         }
         let tapered = Tapered::new(samples);
-        let still = tapered.spectra(evidence.still(), 1.0);
+        let clutter = tapered.spectra(evidence.clutter(), 1.0);
         let of_frame = |frame: usize| {
             let mut spectra = Grid::filled(["loop", "channel", "bin"], [loops, channels, bins], Complex64::ZERO);
             for channel in 0..channels {
@@ -65,12 +65,12 @@ impl<'a> Chirps<'a> {
         };
         let loop_s = evidence.radar.loop_period_s();
         let middle = 0.5 * (loops - 1) as f64;
-        let still = Grid::from_fn(["channel", "bin"], [channels, bins], |[channel, bin]| still[channel * samples + bin]);
+        let clutter = Grid::from_fn(["channel", "bin"], [channels, bins], |[channel, bin]| clutter[channel * samples + bin]);
         Some(Self {
             evidence,
-            windows: windows(&still),
+            windows: windows(&clutter),
             spectra: (0..frames).into_par_iter().map(of_frame).collect(),
-            still,
+            clutter,
             loops_s: (0..loops).map(|index| (index as f64 - middle) * loop_s).collect(),
             middles_s: evidence.starts_s.iter().map(|start| start + middle * loop_s).collect(),
         })
@@ -87,7 +87,7 @@ impl<'a> Chirps<'a> {
 
     /// At plus and minus a frequency, with the phases of the frames' middles.
     pub fn sidebands(&self, frequency_hz: f64) -> Sidebands {
-        let [channels, bins] = self.still.shape();
+        let [channels, bins] = self.clutter.shape();
         [1.0, -1.0].map(|sign| {
             let turns: Vec<Complex64> =
                 self.loops_s.iter().map(|time| Complex64::cis(-sign * TAU * frequency_hz * time)).collect();
@@ -127,12 +127,12 @@ pub fn reached(first: usize, last: usize) -> RangeInclusive<usize> {
     first.saturating_sub(REACH)..=last + REACH
 }
 
-/// First and last of ranges to look at together, beside which there are static returns. `still`: `[channel, bin]`.
-fn windows(still: &Grid<Complex64, 2>) -> Vec<[usize; 2]> {
-    let [channels, bins] = still.shape();
+/// First and last of ranges to look at together, beside which there are static returns. `clutter`: `[channel, bin]`.
+fn windows(clutter: &Grid<Complex64, 2>) -> Vec<[usize; 2]> {
+    let [channels, bins] = clutter.shape();
     let mut powers = vec![0.0; bins];
     for channel in 0..channels {
-        powers.iter_mut().zip(still.below([channel])).for_each(|(power, value)| *power += value.norm_sqr());
+        powers.iter_mut().zip(clutter.below([channel])).for_each(|(power, value)| *power += value.norm_sqr());
     }
     let all: f64 = powers.iter().sum();
     let of_width = |width: usize| {

@@ -20,9 +20,9 @@ struct Depth {
 
 impl Chirps<'_> {
     /// Log-likelihood gain of the held-out frames by the training frames' mean, nats.
-    pub fn gain(&self, line: &Line, sidebands: &Sidebands) -> f64 {
+    pub fn nats(&self, line: &Line, sidebands: &Sidebands) -> f64 {
         let (training, held_out) = (&self.evidence.split.training, &self.evidence.split.held_out);
-        let [channels, _] = self.still.shape();
+        let [channels, _] = self.clutter.shape();
         let (mut gained, mut scatter) = (0.0, 0.0);
         for values in sidebands {
             for (channel, bin) in (0..channels).flat_map(|channel| line.bins().map(move |bin| (channel, bin))) {
@@ -61,7 +61,7 @@ impl Chirps<'_> {
     /// Modulation depth of some static returns, mean of the training frames; ranges count the less the more their frames scatter.
     fn depth(&self, values: &Grid<Complex64, 3>, wanted: &dyn Fn(usize) -> bool) -> Depth {
         let training = &self.evidence.split.training;
-        let ([channels, bins], count) = (self.still.shape(), training.len() as f64);
+        let ([channels, bins], count) = (self.clutter.shape(), training.len() as f64);
         let mut depths = vec![Complex64::ZERO; training.len()];
         let mut all = 0.0;
         for bin in (0..bins).filter(|&bin| wanted(bin)) {
@@ -69,10 +69,10 @@ impl Chirps<'_> {
             let scatter: f64 = (0..channels).map(|channel| self.spread(|frame| sideband(channel, frame)).1).sum();
             let weight = 1.0 / scatter.max(f64::MIN_POSITIVE);
             for channel in 0..channels {
-                let still = self.still[[channel, bin]];
-                let own = training.iter().map(|&frame| still.conj() * sideband(channel, frame) * weight);
+                let clutter = self.clutter[[channel, bin]];
+                let own = training.iter().map(|&frame| clutter.conj() * sideband(channel, frame) * weight);
                 depths.iter_mut().zip(own).for_each(|(depth, own)| *depth += own);
-                all += still.norm_sqr() * weight;
+                all += clutter.norm_sqr() * weight;
             }
         }
         depths.iter_mut().for_each(|depth| *depth /= all.max(f64::MIN_POSITIVE));

@@ -46,7 +46,7 @@ impl Chirps<'_> {
     /// The ranges at which a frequency stands out most.
     pub fn strongest(&self, sidebands: &Sidebands, frequency_hz: f64) -> Option<Line> {
         let training = &self.evidence.split.training;
-        let ([channels, _], count) = (self.still.shape(), training.len() as f64);
+        let ([channels, _], count) = (self.clutter.shape(), training.len() as f64);
         let before = self.before(sidebands, frequency_hz);
         let line = |&[first, last]: &[usize; 2]| {
             let width = last + 1 - first;
@@ -64,7 +64,7 @@ impl Chirps<'_> {
     /// Sums over the bins before every bin: power of the training frames' mean by sideband, and what scatters around it.
     fn before(&self, sidebands: &Sidebands, frequency_hz: f64) -> Vec<[f64; 3]> {
         let training = &self.evidence.split.training;
-        let ([channels, bins], count) = (self.still.shape(), training.len() as f64);
+        let ([channels, bins], count) = (self.clutter.shape(), training.len() as f64);
         let mut before = vec![[0.0; 3]; bins + 1];
         for (sideband, values) in sidebands.iter().enumerate() {
             let turns = self.turns(frequency_hz, sideband);

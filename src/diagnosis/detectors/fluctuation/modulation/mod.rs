@@ -55,21 +55,21 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     };
     let line = (0..cells).into_par_iter().filter_map(strongest).max_by(Line::weaker)?;
     let line = chirps.refined(line, 0.5 * fine);
-    let tried = (highest_hz - lowest_hz) * duration_s * (chirps.still.shape()[1] / 2 * TOGETHER.len()) as f64;
+    let tried = (highest_hz - lowest_hz) * duration_s * (chirps.clutter.shape()[1] / 2 * TOGETHER.len()) as f64;
     let p_value = corrected(line.chance, tried);
     if p_value >= 0.01 {
         return None;
     }
     let sidebands = chirps.referenced(line.frequency_hz);
-    let gain = chirps.gain(&line, &sidebands);
-    if gain > 0.0 && chirps.others_are_constant(&line, &sidebands) {
-        candidate(&chirps, &chirps.settled(line), p_value, gain)
+    let nats = chirps.nats(&line, &sidebands);
+    if nats > 0.0 && chirps.others_are_constant(&line, &sidebands) {
+        candidate(&chirps, &chirps.settled(line), p_value, nats)
     } else {
         None
     }
 }
 
-fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Candidate> {
+fn candidate(chirps: &Chirps, line: &Line, p_value: f64, nats: f64) -> Option<Candidate> {
     let evidence = chirps.evidence;
     let bin_m = evidence.radar.range_resolution_m();
     let range_m = line.middle() * bin_m;
@@ -88,7 +88,7 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, gain: f64) -> Option<Ca
         choice: None,
         place: Place { range_m: Some([near_m, far_m]), ..Place::at(Stage::Scene) },
         p_value: p_value.max(f64::MIN_POSITIVE),
-        gain,
+        nats,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(

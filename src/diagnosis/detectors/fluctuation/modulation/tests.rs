@@ -32,11 +32,11 @@ fn a_modulated_return_is_found_at_its_range_and_is_gone_once_it_is_explained() {
     let [near, far] = found.place.range_m.unwrap();
     let wanted = 1.8 / TAU * 64.0 * before.radar.range_resolution_m();
     assert!((near..far).contains(&wanted), "{wanted} in {near} to {far}");
-    assert!(found.p_value < 1e-4 && found.gain > 10.0, "{} {}", found.p_value, found.gain);
+    assert!(found.p_value < 1e-4 && found.nats > 10.0, "{} {}", found.p_value, found.nats);
     let after = before.with(&found);
     let energy = |evidence: &Evidence| evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum::<f64>();
     let removed = energy(&before) - energy(&after);
-    // Every frame sees the same half of a turn: its mean stands still.
+    // Every frame sees the same half of a turn: its mean is static.
     let radar = &before.radar;
     let times = (0..8).flat_map(|frame| (0..16).map(move |slow| radar.chirp_time_s(frame, 0, slow)));
     let waves: Vec<f64> = times.map(|time| 8.0 * 0.3 * (TAU * MODULATION_HZ * time).cos()).collect();

@@ -36,7 +36,7 @@ impl Chirps<'_> {
 
     /// Energy that a sinusoid explains at a range beyond what is constant, and what it leaves.
     fn explained(&self, sinusoid: &Sinusoid, bin: usize) -> [f64; 2] {
-        let [channels, _] = self.still.shape();
+        let [channels, _] = self.clutter.shape();
         let of_channel = |channel: usize| {
             let value = |frame: usize, index: usize| self.spectra[frame][[index, channel, bin]];
             let sums = sinusoid.sums(value);
@@ -57,8 +57,11 @@ impl Chirps<'_> {
             explained * sinusoid.basis.len() as f64 > PLAIN * 2.0 * left
         };
         let first = (0..line.first).rev().take(WIDEST).take_while(|&bin| modulated_too(bin)).last().unwrap_or(line.first);
-        let last =
-            (line.last + 1..self.still.shape()[1]).take(WIDEST).take_while(|&bin| modulated_too(bin)).last().unwrap_or(line.last);
+        let last = (line.last + 1..self.clutter.shape()[1])
+            .take(WIDEST)
+            .take_while(|&bin| modulated_too(bin))
+            .last()
+            .unwrap_or(line.last);
         let reached = reached(line.first, line.last);
         first.min(*reached.start())..=last.max(*reached.end())
     }

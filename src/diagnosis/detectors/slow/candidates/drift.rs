@@ -27,7 +27,7 @@ pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -
             ..place(part)
         },
         p_value: drift.p_value,
-        gain: drift.held_out_gain,
+        nats: drift.held_out_nats,
         errs_alike: false,
         look_alikes: vec![],
         statement,

@@ -36,8 +36,8 @@ pub(super) fn stated_delay_s() -> f64 {
 /// Frame, transmitter and loop to the deviation of that chirp.
 pub(super) type Deviation = Arc<dyn Fn([usize; 3]) -> f64 + Send + Sync>;
 
-/// `spent`: nats per chirp on deviations that no law predicts.
-pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, spent: f64) -> Correction {
+/// `coding_cost`: nats per chirp of deviations that no law predicts.
+pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, coding_cost: f64) -> Correction {
     let (radar, room) = (evidence.radar.clone(), evidence.room.clone());
     let known = deviation.clone();
     let undo = move |cube: &mut Cube| {
@@ -59,7 +59,7 @@ pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, 
     let [frames, tx, _, loops, _] = evidence.cube.dims;
     let phase = |i: usize| Complex64::cis(deviation([i / (tx * loops), i / loops % tx, i % loops]));
     let course = (part == Part::Phase).then(|| Course { of: Of::All, turned: (0..frames * tx * loops).map(phase).collect() });
-    let correction = Correction::Inverse(Arc::new(undo), volume.spent(spent, samples));
+    let correction = Correction::Inverse(Arc::new(undo), volume.with_coding_cost(coding_cost, samples));
     match course {
         Some(course) => Correction::Followed(Box::new(correction), Arc::new(course)),
         None => correction,
@@ -68,7 +68,7 @@ pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, 
 
 /// Energy that a deviation adds to static clutter.
 fn energy(evidence: &Evidence, field: &Field, part: Part, deviation: &dyn Fn([usize; 3]) -> f64) -> f64 {
-    let still: f64 = evidence.still().iter().map(|v| v.norm_sqr()).sum();
+    let clutter_energy: f64 = evidence.clutter().iter().map(|v| v.norm_sqr()).sum();
     // Phases in proportion to the delay act as much as at the typical delay.
     let lever = match part {
         Part::Delay => typical_delay_s(field),
@@ -78,7 +78,7 @@ fn energy(evidence: &Evidence, field: &Field, part: Part, deviation: &dyn Fn([us
         .flat_map(|frame| (0..field.loops).map(move |index| (frame, index)))
         .map(|(frame, index)| (deviation([frame, 0, index]) * lever).powi(2))
         .sum();
-    still * square
+    clutter_energy * square
 }
 
 fn typical_delay_s(field: &Field) -> f64 {

@@ -13,15 +13,15 @@ use crate::diagnosis::statistics;
 use crate::effects;
 
 pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random) -> Candidate {
-    let (deviation, spent) = most_probable(field, part, random);
-    let one = random.held_out_gain;
+    let (deviation, coding_cost) = most_probable(field, part, random);
+    let one = random.held_out_nats;
     let (Description { id, estimates, statement }, look_alikes, gain) = match (part, &random.two) {
-        (Part::Delay, Some(two)) if two.held_out_gain > one => {
-            let rivals = if two.held_out_gain < one + UNDECIDED { vec![effects::phase_noise::ID] } else { vec![] };
-            (start_jitter(evidence, two), rivals, two.held_out_gain)
+        (Part::Delay, Some(two)) if two.held_out_nats > one => {
+            let rivals = if two.held_out_nats < one + UNDECIDED { vec![effects::phase_noise::ID] } else { vec![] };
+            (start_jitter(evidence, two), rivals, two.held_out_nats)
         }
         (Part::Delay, two) => {
-            let close = two.as_ref().is_some_and(|two| two.held_out_gain > one - UNDECIDED);
+            let close = two.as_ref().is_some_and(|two| two.held_out_nats > one - UNDECIDED);
             (phase_noise(evidence, random), if close { vec![effects::chirp_start_jitter::ID] } else { vec![] }, one)
         }
         (part, _) => (common(part, random), vec![], one),
@@ -33,25 +33,25 @@ pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random
         choice: None,
         place: place(part),
         p_value: random.p_value,
-        gain: gain.min(random.gain_within),
+        nats: gain.min(random.nats_within),
         errs_alike: false,
         look_alikes,
         statement,
         curve: None,
         energy: energy(evidence, field, part, &*deviation),
-        correction: correction(evidence, part, deviation, spent),
+        correction: correction(evidence, part, deviation, coding_cost),
     }
 }
 
-/// The most probable deviation of every chirp, given its noise, and what of its density is spent on that (nats).
+/// The most probable deviation of every chirp, given its noise, and their coding cost (nats).
 fn most_probable(field: &Field, part: Part, random: &Random) -> (Deviation, f64) {
     let series = field.series(part, |_| true);
     let variance = random.deviation.powi(2);
     let loops = series.loops;
     let ratio = |i: usize| variance * series.weight[i / loops];
     let values: Vec<f64> = series.value.iter().enumerate().map(|(i, value)| value * statistics::kept(ratio(i))).collect();
-    let spent = statistics::learned((0..values.len()).map(ratio));
-    (Arc::new(move |[frame, _, index]| values[frame * loops + index]), spent)
+    let coding_cost = statistics::learned((0..values.len()).map(ratio));
+    (Arc::new(move |[frame, _, index]| values[frame * loops + index]), coding_cost)
 }
 
 fn start_jitter(evidence: &Evidence, two: &Two) -> Description {

@@ -21,7 +21,7 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
     let (named, free) = (is_named(evidence, settling), &settling.free);
     let deviation = deviation(settling, named);
     let square: f64 = (0..field.loops).map(|i| deviation(i).norm_sqr()).sum::<f64>() * field.frames as f64;
-    let energy = square * evidence.still().iter().map(|v| v.norm_sqr()).sum::<f64>();
+    let energy = square * evidence.clutter().iter().map(|v| v.norm_sqr()).sum::<f64>();
     let Description { id, estimates, statement } = if named { decay(settling, transmitters as f64) } else { pattern(settling) };
     let curve = curve(settling, transmitters, &deviation);
     let reach = (3.0 * settling.loops).ceil() as usize;
@@ -35,7 +35,7 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
             ..Place::at(Stage::Receiver)
         },
         p_value: if named { settling.p_value } else { free.p_value },
-        gain: if named { settling.held_out_gain } else { free.held_out_gain },
+        nats: if named { settling.held_out_nats } else { free.held_out_nats },
         errs_alike: false,
         look_alikes: vec![],
         statement,

@@ -1,10 +1,10 @@
 //! What all strong static returns have in common in a chirp: their complex gain relative to their mean over time.
 
+mod clutter_spectra;
 mod part;
 mod scale;
 mod series;
 mod sharing;
-mod still;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -12,11 +12,11 @@ use rayon::prelude::*;
 use crate::diagnosis::evidence::Evidence;
 use crate::grid::Grid;
 
+pub use clutter_spectra::free;
+use clutter_spectra::{ClutterSpectra, OfFrame};
 pub use part::{Group, PATTERN, Part, ahead};
 use scale::FARTHEST;
 pub use series::Series;
-pub use still::free;
-use still::{OfFrame, Still};
 
 /// Deviation of the gain of the static returns from one, group by group of ranges.
 pub struct Field {
@@ -36,15 +36,15 @@ pub struct Field {
 }
 
 impl Field {
-    /// None where too little of the recording stands still.
+    /// None where too little of the recording is static clutter.
     pub fn new(evidence: &Evidence) -> Option<Self> {
         let [frames, _, _, loops, _] = evidence.cube.dims;
-        let still = Still::new(evidence)?;
-        let groups = still.groups();
+        let clutter = ClutterSpectra::new(evidence)?;
+        let groups = clutter.groups();
         if groups.len() < 2 || evidence.split.held_out.is_empty() {
             return None;
         }
-        let per_frame: Vec<OfFrame> = (0..frames).into_par_iter().map(|frame| still.of_frame(frame, &groups)).collect();
+        let per_frame: Vec<OfFrame> = (0..frames).into_par_iter().map(|frame| clutter.of_frame(frame, &groups)).collect();
         let (mut deviation, mut weight) = (vec![], vec![]);
         for of_frame in per_frame {
             deviation.extend(of_frame.deviation.into_values());

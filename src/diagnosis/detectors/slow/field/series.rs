@@ -44,7 +44,7 @@ impl Series {
     }
 
     /// Log-likelihood that some frames gain by a prediction, of which `predicted` gives frame, loop and radar time.
-    pub fn gain(&self, field: &Field, frames: &[usize], predicted: impl Fn(usize, usize, f64) -> f64) -> f64 {
+    pub fn log_likelihood_gain(&self, field: &Field, frames: &[usize], predicted: impl Fn(usize, usize, f64) -> f64) -> f64 {
         let mut gain = 0.0;
         for &frame in frames {
             for index in 0..self.loops {

@@ -8,8 +8,8 @@ use super::part::Group;
 /// What a range would gain (nats) by a deviation that it shares, for its absence to be informative.
 const INFORMATIVE_GAIN: f64 = 10.0;
 
-/// Whether most ranges, as [`Field::gains`] has them, gain more than a share of what they could; nothing contradicts where none is
-/// informative.
+/// Whether most ranges, as [`Field::log_likelihood_gains`] has them, gain more than a share of what they could; nothing
+/// contradicts where none is informative.
 fn most_have(gains: &[[f64; 2]], share: f64) -> bool {
     2 * gains.iter().filter(|[gain, most]| *gain > share * most).count() > gains.len() || gains.is_empty()
 }
@@ -18,14 +18,14 @@ impl Field {
     /// Whether most of the ranges that could contradict a deviation share it: one that is far stronger than the others (a
     /// body that stands still for a while) must not speak for all. `predicted` gives it for frame, loop and group.
     pub fn shared(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> bool {
-        most_have(&self.gains(predicted, |_| true), 0.0)
+        most_have(&self.log_likelihood_gains(predicted, |_| true), 0.0)
     }
 
     /// The same of a deviation that was read from these ranges chirp by chirp, in which the strongest one finds itself: most of the
     /// others must have most of it, and one of them at least must be informative. The body's ranges are not, while it is there: its
     /// own slow returns move with it.
     pub fn shared_by_others(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> bool {
-        let mut gains = self.gains(predicted, |at| self.free[at]);
+        let mut gains = self.log_likelihood_gains(predicted, |at| self.free[at]);
         let strongest = gains.iter().enumerate().max_by(|(_, a), (_, b)| a[1].total_cmp(&b[1])).map(|(index, _)| index);
         strongest.map(|index| gains.swap_remove(index));
         !gains.is_empty() && most_have(&gains, 0.5)
@@ -33,7 +33,11 @@ impl Field {
 
     /// What ranges gain by a deviation, and what they would if all of it were theirs (nats): the informative ones. `wanted`:
     /// of frame and group.
-    fn gains(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64, wanted: impl Fn([usize; 2]) -> bool) -> Vec<[f64; 2]> {
+    fn log_likelihood_gains(
+        &self,
+        predicted: impl Fn(usize, usize, &Group) -> Complex64,
+        wanted: impl Fn([usize; 2]) -> bool,
+    ) -> Vec<[f64; 2]> {
         let of_group = |(g, group): (usize, &Group)| {
             let (mut gain, mut most) = (0.0, 0.0);
             for frame in (0..self.frames).filter(|frame| wanted([*frame, g])) {

@@ -21,20 +21,20 @@ const LARGEST: f64 = 1.5;
 /// Of the phase along the boresight (rad), with its sign, and its deviation; none where the ranges do not share it.
 pub fn amplitude(evidence: &Evidence, cells: &Cells, vibration: &Vibration) -> Option<(f64, f64)> {
     let bin_m = evidence.radar.range_resolution_m();
-    let (mut groups, mut along, mut of_still, mut of_pattern) = (vec![], Complex64::ZERO, 0.0, 0.0);
-    let [channels, bins] = cells.still.shape();
+    let (mut groups, mut along, mut of_clutter, mut of_pattern) = (vec![], Complex64::ZERO, 0.0, 0.0);
+    let [channels, bins] = cells.clutter.shape();
     for start in (0..bins).step_by(GROUP_BINS) {
         let lever = ahead(evidence.room.as_ref(), (start as f64 + 0.5 * GROUP_BINS as f64) * bin_m).powi(2);
         let (mut shown, mut wanted, mut noise) = (0.0, 0.0, 0.0);
         let group = start..(start + GROUP_BINS).min(bins);
         for cell in (0..channels).flat_map(|channel| group.clone().map(move |bin| [channel, bin])) {
             let Some((pattern, information)) = vibration.pattern[cell] else { continue };
-            let still = cells.still[cell];
+            let clutter = cells.clutter[cell];
             shown += pattern.norm_sqr() - 1.0 / information;
             noise += 1.0 / information;
-            wanted += lever * still.norm_sqr();
-            along += still.conj() * pattern;
-            of_still += still.norm_sqr();
+            wanted += lever * clutter.norm_sqr();
+            along += clutter.conj() * pattern;
+            of_clutter += clutter.norm_sqr();
             of_pattern += pattern.norm_sqr();
         }
         if wanted > 0.0 {
@@ -46,7 +46,7 @@ pub fn amplitude(evidence: &Evidence, cells: &Cells, vibration: &Vibration) -> O
         shown / f64::max(wanted, f64::MIN_POSITIVE)
     };
     let square = ratio(&groups);
-    if square <= 0.0 || along.re.abs() > GAIN_LIKE * (of_still * of_pattern).sqrt() {
+    if square <= 0.0 || along.re.abs() > GAIN_LIKE * (of_clutter * of_pattern).sqrt() {
         return None;
     }
     let informative: Vec<&(f64, f64, f64)> = groups.iter().filter(|(_, wanted, noise)| square * wanted > 10.0 * noise).collect();

@@ -17,7 +17,7 @@ const BINS_PER_VALUE: f64 = 2.0;
 const SEARCHED: usize = 48;
 /// Phases that are tried before the best is refined.
 const PHASES: usize = 8;
-/// Least determinant at which a cosine and a sine can be told apart.
+/// Least determinant at which a cosine and a sine are distinguishable.
 const DETERMINED: f64 = 0.05;
 
 /// Deviations of the free cells from their mean, in units of the noise.
@@ -25,7 +25,7 @@ pub struct Cells {
     /// `[frame, channel, bin]`, each `[loop]`; none where the body may be.
     deviation: Grid<Option<Vec<Complex64>>, 3>,
     /// `[channel, bin]`
-    pub still: Grid<Complex64, 2>,
+    pub clutter: Grid<Complex64, 2>,
     pub loops: usize,
     starts_s: Vec<f64>,
     pub loop_s: f64,
@@ -51,20 +51,21 @@ impl Cells {
             return None;
         }
         let tapered = Tapered::new(samples);
-        let still = (0..channels).flat_map(|channel| {
-            let own = &evidence.still()[channel * samples..][..samples];
+        let clutter = (0..channels).flat_map(|channel| {
+            let own = &evidence.clutter()[channel * samples..][..samples];
             tapered.spectra(own, 1.0 / noise[channel].sqrt())[..bins].to_vec()
         });
-        let still = Grid::new(["channel", "bin"], [channels, bins], still.collect());
-        let strong: Vec<bool> =
-            (0..bins).map(|bin| (0..channels).map(|c| still[[c, bin]].norm_sqr()).sum::<f64>() > 3.0 * channels as f64).collect();
+        let clutter = Grid::new(["channel", "bin"], [channels, bins], clutter.collect());
+        let strong: Vec<bool> = (0..bins)
+            .map(|bin| (0..channels).map(|c| clutter[[c, bin]].norm_sqr()).sum::<f64>() > 3.0 * channels as f64)
+            .collect();
         let of_frame = |frame: usize| -> Vec<Option<Vec<Complex64>>> {
             let free = free(evidence, frame, bins);
             let mut cells = Vec::with_capacity(channels * bins);
             for channel in 0..channels {
                 let spectra = tapered.spectra(evidence.cube.channel(frame, channel), 1.0 / noise[channel].sqrt());
                 for bin in 0..bins {
-                    let mean = still[[channel, bin]];
+                    let mean = clutter[[channel, bin]];
                     let values = || spectra[bin..].iter().step_by(samples).map(|value| value - mean).collect();
                     cells.push((free[bin] && strong[bin]).then(values));
                 }
@@ -75,12 +76,12 @@ impl Cells {
         let deviation = Grid::new(["frame", "channel", "bin"], [frames, channels, bins], deviation);
         let middle_s = 0.5 * (tx as f64 - 1.0) * evidence.radar.chirp_period_s;
         let starts_s = evidence.starts_s.iter().map(|start| start + middle_s).collect();
-        Some(Self { deviation, still, loops, starts_s, loop_s: evidence.radar.loop_period_s() })
+        Some(Self { deviation, clutter, loops, starts_s, loop_s: evidence.radar.loop_period_s() })
     }
 
     /// Channel and bin of all cells.
     pub fn all(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
-        let [channels, bins] = self.still.shape();
+        let [channels, bins] = self.clutter.shape();
         (0..channels).flat_map(move |channel| (0..bins).map(move |bin| [channel, bin]))
     }
 
@@ -121,7 +122,7 @@ impl Cells {
                 })
             })
             .collect();
-        let pattern = Grid::new(["channel", "bin"], self.still.shape(), pattern);
+        let pattern = Grid::new(["channel", "bin"], self.clutter.shape(), pattern);
         // Noise alone has one unit in each of two courses in time.
         let (count, both) = (known.len() as f64, known.iter().map(|sums| sums.both()).sum::<f64>());
         let likeness = (top - count) / (both - 2.0 * count).max(f64::MIN_POSITIVE);
@@ -131,8 +132,8 @@ impl Cells {
     /// Those that suffice for a search.
     pub fn strongest(&self) -> Grid<bool, 2> {
         let mut order: Vec<[usize; 2]> = self.all().collect();
-        order.sort_by(|&a, &b| self.still[b].norm_sqr().total_cmp(&self.still[a].norm_sqr()));
-        let mut kept = Grid::filled(["channel", "bin"], self.still.shape(), false);
+        order.sort_by(|&a, &b| self.clutter[b].norm_sqr().total_cmp(&self.clutter[a].norm_sqr()));
+        let mut kept = Grid::filled(["channel", "bin"], self.clutter.shape(), false);
         order.iter().take(SEARCHED).for_each(|&cell| kept[cell] = true);
         kept
     }

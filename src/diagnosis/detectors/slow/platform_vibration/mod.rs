@@ -24,7 +24,7 @@ use undo::undo;
 
 /// Share of what a sinusoid explains whose phase is the same everywhere; half of what turns one way.
 const LIKENESS: f64 = 0.75;
-/// Teeth of the comb of aliases to either side, and by how much less (nats) one may explain that is not told apart.
+/// Teeth of the comb of aliases to either side, and by how much less (nats) one may explain that is not resolved.
 const TEETH: i32 = 4;
 const ALIAS_GAIN: f64 = 4.6;
 /// No mount of a radar vibrates faster with an amplitude that is measurable.
@@ -100,7 +100,7 @@ impl Measured {
             choice: None,
             place: Place::at(Stage::Scene),
             p_value: self.p_value,
-            gain: self.gain,
+            nats: self.gain,
             errs_alike: false,
             look_alikes: vec![],
             statement: format!(

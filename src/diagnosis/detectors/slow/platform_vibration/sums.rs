@@ -37,7 +37,7 @@ impl Sums {
         Self { data: [self.data[0] - c * self.all, self.data[1] - s * self.all], squares, ..self }
     }
 
-    /// Whether cosine and sine can be told apart: one where they are orthogonal.
+    /// Whether cosine and sine are distinguishable: one where they are orthogonal.
     pub fn determinant(&self) -> f64 {
         let [cc, cs, ss] = self.squares;
         if self.count > 0.0 { 4.0 * (cc * ss - cs * cs) / (self.count * self.count) } else { 0.0 }

@@ -54,7 +54,7 @@ fn a_radar_that_vibrates_before_returns_from_all_directions_is_known_and_undone(
     let mut evidence = evidence(1, |t, ahead, _| Complex64::cis(0.3 * ahead * (TAU * 31.7 * t + 0.4).cos()));
     let found = find(&evidence).expect("nothing found");
     assert_eq!(found.id, Some(effects::radar_vibration::ID));
-    assert!(found.p_value < 1e-9 && found.gain > 100.0, "{found:?}");
+    assert!(found.p_value < 1e-9 && found.nats > 100.0, "{found:?}");
     let of = |name: &str| found.estimates.iter().find(|e| e.name == name).unwrap().values[0];
     assert!((of("frequency_hz") - 31.7).abs() < 0.1, "{}", of("frequency_hz"));
     // Without a room all returns count as if they lay ahead.
@@ -62,13 +62,13 @@ fn a_radar_that_vibrates_before_returns_from_all_directions_is_known_and_undone(
     assert!((0.7..1.1).contains(&(of("amplitude_m") / ahead)), "{} of {ahead}", of("amplitude_m"));
     let undo = found.correction.undo().unwrap();
     undo(&mut evidence.cube);
-    let again = find(&evidence.changed());
-    assert!(again.as_ref().is_none_or(|again| again.gain < 0.01 * found.gain), "{again:?}");
+    let left = find(&evidence.changed());
+    assert!(left.as_ref().is_none_or(|left| left.nats < 0.01 * found.nats), "{left:?}");
 }
 
 #[test]
 fn what_one_range_does_or_what_turns_one_way_or_what_all_amplitudes_do_is_no_vibration() {
-    let silent = |evidence: &Evidence| find(evidence).filter(|found| found.p_value < 1e-3 && found.gain > 3.0).is_none();
+    let silent = |evidence: &Evidence| find(evidence).filter(|found| found.p_value < 1e-3 && found.nats > 3.0).is_none();
     assert!(silent(&evidence(2, |_, _, _| Complex64::ONE)));
     // A lamp or a fan at some ranges.
     let one = |t: f64, _: f64, bin: f64| 1.0 + if bin > 40.0 { 0.3 * (TAU * 31.7 * t).cos() } else { 0.0 };

@@ -34,8 +34,8 @@ pub fn undo(evidence: &Evidence, cells: &Cells, vibration: &Vibration, radians: 
                 let vibration: Complex64 =
                     (1..=HARMONICS).map(|order| patterns[[order, channel, n]] * (order as f64 * turn).cos()).sum();
                 // What moves lies ahead.
-                let still = patterns[[0, channel, n]];
-                *value = still + (*value - vibration - still) * back;
+                let clutter = patterns[[0, channel, n]];
+                *value = clutter + (*value - vibration - clutter) * back;
             }
         });
     };

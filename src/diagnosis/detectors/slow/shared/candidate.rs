@@ -20,8 +20,8 @@ struct Phase {
     /// `[frame · loops + loop]`
     course: Vec<f64>,
     rms: f64,
-    /// Nats per chirp.
-    spent: f64,
+    /// Coding cost of the course, nats per chirp.
+    coding_cost: f64,
     frequency_hz: f64,
     /// Half of the band that holds half of its power.
     width_hz: f64,
@@ -31,7 +31,7 @@ pub fn candidate(evidence: &Evidence, course: &Course, deviations: &[Deviation],
     let phase = Phase::new(course, &spectra(deviations, course, shared.part), &shared.members);
     let Description { id, estimates, statement } =
         if shared.part == Part::Delay { phase.of_delay(shared) } else { phase.of_vibration(evidence, course, shared) };
-    let Phase { course: phases, rms, spent, .. } = phase;
+    let Phase { course: phases, rms, coding_cost, .. } = phase;
     let loops = course.loops;
     Candidate {
         id,
@@ -40,17 +40,17 @@ pub fn candidate(evidence: &Evidence, course: &Course, deviations: &[Deviation],
         choice: None,
         place: if id.is_some() { Place::at(Stage::Scene) } else { candidates::place(shared.part) },
         p_value: (-shared.log_bets).exp().min(1.0),
-        gain: shared.log_bets,
+        nats: shared.log_bets,
         errs_alike: false,
         look_alikes: vec![],
         statement,
         curve: None,
-        energy: rms * rms * course.frames as f64 * loops as f64 * evidence.still().iter().map(|v| v.norm_sqr()).sum::<f64>(),
+        energy: rms * rms * course.frames as f64 * loops as f64 * evidence.clutter().iter().map(|v| v.norm_sqr()).sum::<f64>(),
         correction: candidates::correction(
             evidence,
             shared.part,
             Arc::new(move |[frame, _, index]| phases[frame * loops + index]),
-            spent,
+            coding_cost,
         ),
     }
 }
@@ -66,10 +66,10 @@ impl Phase {
         // A spectrum has one of two sides.
         let rms = (2.0 * values.iter().map(Complex64::norm_sqr).sum::<f64>() / count as f64).sqrt();
         let ratios = values.iter().map(|value| value.norm_sqr() * information);
-        let spent = statistics::learned(ratios.collect::<Vec<f64>>().into_iter()) * values.len() as f64 / count as f64;
+        let coding_cost = statistics::learned(ratios.collect::<Vec<f64>>().into_iter()) * values.len() as f64 / count as f64;
         let [low_hz, frequency_hz, high_hz] = quartiles(&course.frequencies_hz(), &values);
         let width_hz = (0.5 * (high_hz - low_hz)).max(0.5 / course.duration_s());
-        Self { course: phases, rms, spent, frequency_hz, width_hz }
+        Self { course: phases, rms, coding_cost, frequency_hz, width_hz }
     }
 
     fn of_delay(&self, shared: &Shared) -> Description {

@@ -27,7 +27,7 @@ struct Chirps {
     /// `[frame, channel, loop, sample]`
     spectra: Grid<Complex64, 4>,
     /// `[channel, bin]`: mean over all frames.
-    still: Grid<Complex64, 2>,
+    clutter: Grid<Complex64, 2>,
 }
 
 /// None where the noise is unknown, or too few ranges have static returns.
@@ -54,22 +54,22 @@ impl Chirps {
             let scale = noise[channel].sqrt().recip();
             own.copy_from_slice(&tapered.spectra(evidence.cube.channel(frame, channel), scale));
         });
-        let mut still = Grid::filled(["channel", "bin"], [channels, bins], Complex64::ZERO);
+        let mut clutter = Grid::filled(["channel", "bin"], [channels, bins], Complex64::ZERO);
         for channel in 0..channels {
             for (frame, index) in (0..frames).flat_map(|frame| (0..loops).map(move |index| (frame, index))) {
-                let sums = still.below_mut([channel]).iter_mut();
+                let sums = clutter.below_mut([channel]).iter_mut();
                 let chirp = spectra.below([frame, channel, index]);
                 sums.zip(chirp).for_each(|(sum, value)| *sum += value / (frames * loops) as f64);
             }
         }
-        Some(Self { spectra, still })
+        Some(Self { spectra, clutter })
     }
 
     fn power(&self, bin: usize) -> f64 {
-        (0..self.still.shape()[0]).map(|channel| self.still[[channel, bin]].norm_sqr()).sum()
+        (0..self.clutter.shape()[0]).map(|channel| self.clutter[[channel, bin]].norm_sqr()).sum()
     }
 
-    /// None where nothing stands still.
+    /// None where there is no static clutter.
     fn deviation(&self, evidence: &Evidence, range: std::ops::Range<usize>) -> Option<Deviation> {
         let [frames, channels, loops, samples] = self.spectra.shape();
         // As in `field`: static returns that are lost in the noise of a chirp teach nothing.
@@ -83,7 +83,7 @@ impl Chirps {
         let ahead = ahead(evidence.room.as_ref(), 0.5 * SPEED_OF_LIGHT * delay_s);
         let value = |[frame, index]: [usize; 2]| -> Complex64 {
             let along = |channel: usize| {
-                let (values, mean) = (self.spectra.below([frame, channel, index]), self.still.below([channel]));
+                let (values, mean) = (self.spectra.below([frame, channel, index]), self.clutter.below([channel]));
                 own.iter().map(|&bin| mean[bin].conj() * (values[bin] - mean[bin])).sum::<Complex64>()
             };
             (0..channels).map(along).sum::<Complex64>() / sum

@@ -1,6 +1,6 @@
 //! A phase of any course in time that the static returns of most ranges share, where nobody is tracked.
 //!
-//! Without a body whose returns could be set aside, something that moves may be stronger than everything that stands still. So no
+//! Without a body whose returns could be set aside, a mover may be stronger than all static clutter. So no
 //! mean over the ranges is taken: each range is predicted by the others, frequency by frequency of slow time, and a range that does
 //! not share what they have is left out. Where ranges vary each for itself, the phases of their spectra are independent of one
 //! another and uniform, whatever the spectra's magnitudes are. A bet on each phase (von Mises' law about the one that is predicted,

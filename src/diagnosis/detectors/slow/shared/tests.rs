@@ -77,7 +77,7 @@ fn a_phase_that_most_ranges_share_is_found_beside_what_moves_by_itself() {
     for gap_s in [0.0, 0.02] {
         let found = find(&evidence(gap_s, 2, shakes, own)).expect("a shared phase");
         assert_eq!(found.id, Some(effects::radar_vibration::ID), "{}", found.statement);
-        assert!(found.p_value < 1e-6 && found.gain > 13.0, "{} {}", found.p_value, found.gain);
+        assert!(found.p_value < 1e-6 && found.nats > 13.0, "{} {}", found.p_value, found.nats);
     }
     // Slower than the recording, it is a drift, which other laws describe.
     let duration_s = 24.0 * 16.0 * evidence(0.0, 1, |_| 0.0, own).radar.loop_period_s();

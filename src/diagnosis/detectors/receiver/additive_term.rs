@@ -1,4 +1,4 @@
-//! An element of the still field as a candidate: what it adds to every chirp, its numbers, and what is said of it.
+//! An element of a static additive field as a candidate: what it adds to every chirp, its numbers, and what is said of it.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use crate::effects::{self, Stage};
 
 /// Half the size of a board.
 const BOARD_M: f64 = 0.01;
-/// Of the peak sample: beside a converter at its rail, a smaller constant may be what was guessed of the lost samples.
+/// Of the peak sample: beside ADC clipping, a smaller constant may be what was guessed of the lost samples.
 const LEAST_BENT_OFFSET_DB: f64 = -40.0;
 
 /// The elements that were chosen, and how they fit together.
@@ -49,7 +49,7 @@ impl Chosen<'_> {
         };
         let freedom: f64 = group.iter().map(|&index| 2.0 * unknowns(&elements[index], field.channels())).sum();
         let p_value = corrected(chi2_tail(2.0 * (self.fitted.likelihood - without.likelihood).max(0.0), freedom), 200.0);
-        let gain = field.gain(Some(&without.predicted), &self.fitted.predicted);
+        let nats = field.gain(Some(&without.predicted), &self.fitted.predicted);
         let (first, chirps) = self.term(&group)?;
         let term = Term::new(evidence, element, chirps);
         if is_bent(evidence) && *element == Element::Offset && term.level_db < LEAST_BENT_OFFSET_DB {
@@ -69,7 +69,7 @@ impl Chosen<'_> {
             choice: None,
             place,
             p_value,
-            gain,
+            nats,
             errs_alike: false,
             look_alikes: vec![],
             statement,
@@ -148,7 +148,7 @@ struct Claim {
     statement: String,
 }
 
-/// What an element adds to the still chirps, `[channel][sample]`, and how large it is.
+/// What an element adds to the mean chirps, `[channel][sample]`, and how large it is.
 struct Term {
     chirps: Vec<Vec<Complex64>>,
     largest: f64,
@@ -222,7 +222,7 @@ impl Term {
 
     fn edge(&self, field: &Field, count: usize, at_end: bool) -> Claim {
         let (channels, samples) = (self.chirps.len(), self.chirps[0].len());
-        let scene = (field.still.iter().map(|chirp| energy(chirp)).sum::<f64>() / (channels * samples) as f64).sqrt();
+        let scene = (field.clutter.iter().map(|chirp| energy(chirp)).sum::<f64>() / (channels * samples) as f64).sqrt();
         let level_deviation = denoised::PEAK_DB.hypot(8.7 * 0.7 * scene / (self.level * (channels as f64).sqrt()));
         Claim {
             id: Some(effects::ramp_edge_transient::ID),
@@ -250,12 +250,12 @@ fn edge(samples: usize, count: usize, at_end: bool) -> Range<usize> {
     if at_end { samples - count..samples } else { 0..count }
 }
 
-/// A converter at its rail bends everything; what remains of it has no shape of its own, least of all a filter's.
+/// An ADC that clips distorts everything; the residual has no shape of its own, least of all a filter's.
 pub fn is_bent(evidence: &Evidence) -> bool {
     evidence.accepted.contains(&effects::adc_saturation::ID)
 }
 
-/// Takes a still chirp away from every chirp of its channel.
+/// Subtracts a static term from every chirp of its channel.
 pub fn subtract(term: Vec<Vec<Complex64>>) -> Correction {
     Correction::Samples(Arc::new(move |cube: &mut Cube| {
         cube.each_chirp(|[_, channel, _], chirp| chirp.iter_mut().zip(&term[channel]).for_each(|(value, term)| *value -= term));

@@ -1,4 +1,4 @@
-//! The static returns that every chirp is compared with.
+//! Spectra of static clutter, which every chirp is compared with.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ const ASIDE: f64 = 0.03;
 const MARGIN: usize = 2;
 
 /// Spectra under a taper, in units of the noise's deviation.
-pub struct Still<'a> {
+pub struct ClutterSpectra<'a> {
     evidence: &'a Evidence,
     taper: Vec<f64>,
     fft: Arc<dyn Fft<f64>>,
@@ -38,7 +38,7 @@ pub struct OfFrame {
     pub weight: Vec<f64>,
 }
 
-impl<'a> Still<'a> {
+impl<'a> ClutterSpectra<'a> {
     /// None where the noise is unknown.
     pub fn new(evidence: &'a Evidence) -> Option<Self> {
         let (channels, samples) = (evidence.cube.channels(), evidence.cube.dims[4]);
@@ -48,7 +48,7 @@ impl<'a> Still<'a> {
         }
         let taper = blackman_harris(samples);
         let fft = FftPlanner::new().plan_fft_forward(samples);
-        let mut mean: Vec<Complex64> = evidence.still().iter().enumerate().map(|(i, v)| v * taper[i % samples]).collect();
+        let mut mean: Vec<Complex64> = evidence.clutter().iter().enumerate().map(|(i, v)| v * taper[i % samples]).collect();
         fft.process(&mut mean);
         for (channel, spectrum) in mean.chunks_exact_mut(samples).enumerate() {
             spectrum.iter_mut().for_each(|v| *v /= noise[channel].sqrt());
@@ -67,7 +67,7 @@ impl<'a> Still<'a> {
         self.power[bin] > 3.0 * self.channels() as f64
     }
 
-    /// Those in which something stands still.
+    /// Groups of ranges with static returns.
     pub fn groups(&self) -> Vec<Group> {
         let (bins, radar) = (self.power.len(), &self.evidence.radar);
         let width = (bins / 16).max(4 + GAP);
@@ -116,8 +116,8 @@ impl<'a> Still<'a> {
         }
         self.fft.process(&mut spectra);
         for (chirp, spectrum) in spectra.chunks_exact_mut(samples).enumerate() {
-            let still = self.mean.below([chirp / loops]);
-            spectrum.iter_mut().zip(still).for_each(|(value, still)| *value -= still);
+            let mean = self.mean.below([chirp / loops]);
+            spectrum.iter_mut().zip(mean).for_each(|(value, mean)| *value -= mean);
         }
         Grid::new(["channel", "loop", "bin"], [self.channels(), loops, samples], spectra)
     }

@@ -1,4 +1,4 @@
-//! What an accepted effect leaves behind: itself, where it could not be removed in full, and what a rough correction makes.
+//! Residuals of corrections: the accepted effect itself, where it could not be removed in full, and what a rough correction makes.
 
 use super::detectors::paths;
 use super::finding::{Candidate, Correction};
@@ -29,8 +29,8 @@ const FAINT: [&str; 4] =
 /// Products of the signal with itself, of which either is hardly taken out in full: one that was never there makes the other.
 const PRODUCTS: [&str; 2] = [effects::object_radar_object::ID, effects::second_harmonic::ID];
 
-/// What explains a little of anything that moves near the body: remains of a strong path that was taken out.
-const OF_REMAINS: [&str; 2] = [effects::body_multibounce::ID, effects::carried_reflector::ID];
+/// What explains a little of anything that moves near the body: the residual of a strong path that was subtracted.
+const OF_RESIDUAL: [&str; 2] = [effects::body_multibounce::ID, effects::carried_reflector::ID];
 
 /// The body by way of a boundary.
 const IMAGES: [&str; 2] = [effects::floor_bounce::ID, effects::wall_ghost::ID];
@@ -77,8 +77,8 @@ pub fn is_of_noise(candidate: &Candidate) -> bool {
 }
 
 /// Whether it explains a little of whatever is near the body.
-pub fn is_of_remains(candidate: &Candidate) -> bool {
-    is_one_of(candidate, &OF_REMAINS)
+pub fn is_of_residual(candidate: &Candidate) -> bool {
+    is_one_of(candidate, &OF_RESIDUAL)
 }
 
 /// Whether it is a product of the signal with itself.
@@ -96,10 +96,10 @@ fn is_one_of(candidate: &Candidate, ids: &[&str]) -> bool {
 
 /// Whether a candidate may be no more than what a rough correction left, or what a moving path left around its range.
 pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
-    let of_remains = is_of_remains(candidate);
+    let of_residual = is_of_residual(candidate);
     // An image of the body is all over the place: what else is there is something else.
     let beside = is_path(accepted)
-        && (is_path(candidate) || of_remains)
+        && (is_path(candidate) || of_residual)
         && accepted.place.boundary.is_none()
         && !apart(accepted.place.range_m, candidate.place.range_m)
         && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
@@ -123,7 +123,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it
     // and among its images, and what a part may carry, the last resort, is never sure there.
     let timed = accepted.place.stage == Some(Stage::Timing);
-    let behind = timed && of_remains;
+    let behind = timed && of_residual;
     let image = timed && is_one_of(candidate, &IMAGES);
     let hardly = timed && candidate.id == Some(effects::carried_reflector::ID);
     let products = is_product(accepted) && is_product(candidate);
@@ -140,7 +140,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let line = no_single && candidate.id == Some(effects::spur::ID);
     let rest = no_single && is_path(candidate);
     let smeared = vibrates || timed || is_by_chirp(accepted) || path_like;
-    let uneven = (smeared || is_one_of(accepted, &OF_REMAINS)) && is_of_receivers(candidate);
+    let uneven = (smeared || is_one_of(accepted, &OF_RESIDUAL)) && is_of_receivers(candidate);
     // Chirps that start at random differ from their neighbours, and go on doing so a little.
     let unlike = is_by_chirp(accepted) && candidate.behaves_like == Behaviour::SparseAdditive;
     // Up to which share of what was gained.
@@ -152,7 +152,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
         (by_chirp || faint, SLIGHTLY),
     ]
     .into_iter()
-    .any(|(holds, share)| holds && candidate.gain < share * accepted.gain)
+    .any(|(holds, share)| holds && candidate.nats < share * accepted.nats)
 }
 
 /// Whether it is in the noise as an accepted correction mixes it, or in the products of a signal that is cut.
@@ -178,7 +178,7 @@ mod tests {
 
     fn of(id: Option<&'static str>, behaves_like: Behaviour, gain: f64) -> Candidate {
         let place = Place::at(Stage::Scene);
-        Candidate { id, gain, place, ..crate::diagnosis::finding::nameless(behaves_like) }
+        Candidate { id, nats: gain, place, ..crate::diagnosis::finding::nameless(behaves_like) }
     }
 
     #[test]

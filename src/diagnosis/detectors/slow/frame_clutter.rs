@@ -6,12 +6,12 @@ use rayon::prelude::*;
 use crate::diagnosis::evidence::{Evidence, Tapered};
 
 /// Spectra in units of the noise's deviation of a frame's mean chirp.
-pub struct Steady {
+pub struct FrameClutter {
     pub frames: usize,
     pub channels: usize,
     pub bins: usize,
     /// `[channel, bin]`, mean of the training frames.
-    pub still: Vec<Complex64>,
+    pub mean: Vec<Complex64>,
     /// `[frame, channel, bin]`, what a frame deviates from it.
     deviation: Vec<Complex64>,
     /// `[frame, bin]`, variance within the frame over the noise's, mean over the channels.
@@ -23,7 +23,7 @@ pub struct Steady {
 /// Scatter over the noise that a cell without a mover may have; its law is narrower than this.
 const CLEAN: f64 = 1.25;
 
-impl Steady {
+impl FrameClutter {
     /// None without noise to measure by, or with too few chirps.
     pub fn new(evidence: &Evidence) -> Option<Self> {
         let [frames, _, _, loops, samples] = evidence.cube.dims;
@@ -48,13 +48,13 @@ impl Steady {
         };
         let per_frame: Vec<(Vec<Complex64>, Vec<f64>)> = (0..frames).into_par_iter().map(of_frame).collect();
         let training = &evidence.split.training;
-        let still: Vec<Complex64> = (0..channels * bins)
+        let mean: Vec<Complex64> = (0..channels * bins)
             .map(|i| training.iter().map(|&f| per_frame[f].0[i]).sum::<Complex64>() / training.len().max(1) as f64)
             .collect();
-        let deviation = per_frame.iter().flat_map(|(means, _)| means.iter().zip(&still).map(|(m, s)| m - s)).collect();
+        let deviation = per_frame.iter().flat_map(|(means, _)| means.iter().zip(&mean).map(|(m, s)| m - s)).collect();
         let scatter = per_frame.into_iter().flat_map(|(_, scatter)| scatter).collect();
         let limit = CLEAN.max(1.0 + 5.0 / ((channels * loops) as f64).sqrt());
-        Some(Self { frames, channels, bins, still, deviation, scatter, limit })
+        Some(Self { frames, channels, bins, mean, deviation, scatter, limit })
     }
 
     pub fn deviation(&self, frame: usize, channel: usize, bin: usize) -> Complex64 {

@@ -1,4 +1,4 @@
-//! Additive fields that stand still outside the delays of the room: offsets, leakage, transients at the chirps' edges.
+//! Additive fields that are static and lie outside the delays of the room: offsets, leakage, transients at the chirps' edges.
 //!
 //! Elements are chosen one after the other by their log-likelihood on the training frames less the Bayesian information
 //! criterion's penalty, together with the images that non-linear receivers make of the static scene (which belong to
@@ -7,10 +7,10 @@
 
 use num_complex::Complex64;
 
+use super::additive_term::{Chosen, is_bent, subtract};
 use super::elements::{Element, Images, choose, templates};
 use super::field::{Field, Fitted, add};
 use super::response;
-use super::still_term::{Chosen, is_bent, subtract};
 use super::support::{UNLIKELY, energy};
 use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
@@ -60,10 +60,10 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
 }
 
-/// Still chirps less what the elements make of them.
+/// Mean chirps less what the elements add to them.
 fn residual(elements: &[Element], fitted: &Fitted, field: &Field, images: &Images) -> Vec<Vec<Complex64>> {
     let templates = templates(elements, images);
-    let mut rest = field.still.clone();
+    let mut rest = field.clutter.clone();
     for (channel, chirp) in rest.iter_mut().enumerate() {
         templates.own.iter().zip(&fitted.own[channel]).for_each(|(template, amplitude)| add(chirp, template, -amplitude));
         templates.common.iter().zip(&fitted.common).for_each(|(template, amplitude)| add(chirp, &template[channel], -amplitude));
@@ -71,8 +71,8 @@ fn residual(elements: &[Element], fitted: &Fitted, field: &Field, images: &Image
     rest
 }
 
-/// What remains that no name explains.
-fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, gain: f64) -> Option<Candidate> {
+/// The residual that no name explains.
+fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, nats: f64) -> Option<Candidate> {
     let samples = evidence.cube.dims[4];
     let term: Vec<Vec<Complex64>> = field
         .mean
@@ -84,7 +84,7 @@ fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, gain: f64) -> O
         })
         .collect();
     let energy_of_chirp = term.iter().map(|chirp| energy(chirp)).sum::<f64>();
-    let power_db = 10.0 * (energy_of_chirp / field.still.iter().map(|chirp| energy(chirp)).sum::<f64>().max(1e-300)).log10();
+    let power_db = 10.0 * (energy_of_chirp / field.clutter.iter().map(|chirp| energy(chirp)).sum::<f64>().max(1e-300)).log10();
     Some(Candidate {
         id: None,
         behaves_like: Behaviour::AdditiveFastTime,
@@ -92,7 +92,7 @@ fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, gain: f64) -> O
         choice: None,
         place: Place::at(Stage::Receiver),
         p_value,
-        gain,
+        nats,
         errs_alike: false,
         look_alikes: vec![],
         statement: format!(
