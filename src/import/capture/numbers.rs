@@ -147,7 +147,7 @@ mod tests {
             let whole = bytes(&numbers(parts), width);
             fs::write(&path, &whole).unwrap();
             let all = format!("frame sample loop rx tx {word}");
-            assert_read(open(&[path.clone()], &stated(&all)).unwrap(), 0..FRAMES, parts);
+            assert_read(open(std::slice::from_ref(&path), &stated(&all)).unwrap(), 0..FRAMES, parts);
             // A file for each frame.
             let files: Vec<PathBuf> = (0..FRAMES).map(|frame| folder.path().join(format!("frame_{frame}.bin"))).collect();
             for (file, part) in files.iter().zip(whole.chunks(whole.len() / FRAMES)) {
@@ -157,12 +157,12 @@ mod tests {
             assert_read(open(&files, &stated(&each)).unwrap(), 0..FRAMES, parts);
             // Cut off: whole frames are kept, and what is left out is said.
             fs::write(&path, &whole[..whole.len() - 1]).unwrap();
-            let cut = open(&[path.clone()], &stated(&all)).unwrap();
+            let cut = open(std::slice::from_ref(&path), &stated(&all)).unwrap();
             assert!(cut.notes.iter().any(|note| note.contains("after the last whole frame")), "{:?}", cut.notes);
             assert_read(cut, 0..1, parts);
             fs::write(&path, &whole[..whole.len() / FRAMES - 1]).unwrap();
             for layout in [&all, &each] {
-                let error = refused(open(&[path.clone()], &stated(layout)));
+                let error = refused(open(std::slice::from_ref(&path), &stated(layout)));
                 assert!(error.contains(&format!("expected {} bytes, one frame of", whole.len() / FRAMES)), "{error}");
             }
         }
@@ -232,10 +232,10 @@ mod tests {
         let path = folder.path().join("capture.bin");
         fs::write(&path, bytes(&numbers(2), 8)).unwrap();
         for word in ["float32", "complex64"] {
-            let error = refused(open(&[path.clone()], &stated(&format!("frame sample loop rx tx {word}"))));
+            let error = refused(open(std::slice::from_ref(&path), &stated(&format!("frame sample loop rx tx {word}"))));
             assert!(error.contains(&format!("`samples` is numbers of type <f8, expected {word}, as --layout states")), "{error}");
         }
-        let error = refused(open(&[path.clone()], &stated("frame sample loop rx tx iq complex128")));
+        let error = refused(open(std::slice::from_ref(&path), &stated("frame sample loop rx tx iq complex128")));
         assert!(error.contains("an axis `iq` of length 2 and real numbers"), "{error}");
         // Without a type, 16-bit words are expected, and the hint says how to state another.
         let error = open(&[path], &stated("frame sample loop rx tx iq")).err().unwrap();
