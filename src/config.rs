@@ -66,19 +66,17 @@ impl Config {
         for path in &mut config.data.recordings {
             settings::place_path(path, "data.recordings", folder, sets)?;
         }
-        for (key, path) in [
-            ("training.start_from", config.training.start_from.as_mut()),
-            ("diagnosis.calibration", config.diagnosis.calibration.as_mut()),
+        let person = config.record.as_mut().map(|record| &mut record.person);
+        let (body, motion) = person.map_or((None, None), |person| (person.body.as_mut(), person.motion.as_mut()));
+        // Those of a recording are found beside the file when it is made.
+        let later = Path::new("");
+        for (key, folder, path) in [
+            ("training.start_from", folder, config.training.start_from.as_mut()),
+            ("diagnosis.calibration", folder, config.diagnosis.calibration.as_mut()),
+            ("record.person.body", later, body),
+            ("record.person.motion", later, motion),
         ] {
             path.map_or(Ok(()), |path| settings::place_path(path, key, folder, sets))?;
-        }
-        if let Some(record) = &mut config.record {
-            for (key, path) in
-                [("record.person.body", &mut record.person.body), ("record.person.motion", &mut record.person.motion)]
-            {
-                // Those of the file are found beside it when it is recorded.
-                path.as_mut().map_or(Ok(()), |path| settings::place_path(path, key, Path::new(""), sets))?;
-            }
         }
         config.training.check()?;
         config.simulator.check()?;

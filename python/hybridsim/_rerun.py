@@ -52,7 +52,7 @@ class Scenes:
             self._out.parent.mkdir(parents=True, exist_ok=True)
             self._work = tempfile.TemporaryDirectory(prefix=f".{self._out.name}.", dir=self._out.parent)
         except OSError as error:
-            raise FileError(f"{self._out}: cannot be written: {error}", None, str(self._out), error.errno) from error
+            raise self._unwritable(error) from error
         self._made = Path(self._work.name) / "made"
         self._made.mkdir()
         return self
@@ -62,9 +62,12 @@ class Scenes:
             if kind is None:
                 self._made.replace(self._out)
         except OSError as error:
-            raise FileError(f"{self._out}: cannot be written: {error}", None, str(self._out), error.errno) from error
+            raise self._unwritable(error) from error
         finally:
             self._work.cleanup()
+
+    def _unwritable(self, error: OSError) -> FileError:
+        return FileError(f"{self._out}: cannot be written: {error}", None, str(self._out), error.errno)
 
     def parts(self, name: str) -> dict[str, Path]:
         """Folders for the exports of a recording."""

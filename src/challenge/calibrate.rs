@@ -26,7 +26,7 @@ use crate::diagnosis::calibration::{Calibration, FORMAT, FalseAlarms, Structure,
 use crate::diagnosis::detectors::DETECTORS;
 use crate::diagnosis::statistics::{binomial_interval, uniform_chance};
 use crate::error::{Error, Result};
-use crate::pictures::{Chart, Scale, Series};
+use crate::pictures::{Chart, Series};
 use crate::recorder::{EffectsConfig, RadarChoice, ReceiverConfig, Recorder, RecorderConfig, Returns, World};
 use crate::room::Room;
 use crate::text::shown;
@@ -378,12 +378,11 @@ impl Calibrated {
             title: "p-values of nulls".into(),
             x_label: "p-value".into(),
             y_label: "share of nulls at most there".into(),
-            x_scale: Scale::Linear,
-            y_scale: Scale::Linear,
             series: vec![
                 Series { name: "nulls".into(), points: found.collect() },
                 Series { name: "uniform".into(), points: vec![[0.0, 0.0], [1.0, 1.0]] },
             ],
+            ..Chart::default()
         }
     }
 }

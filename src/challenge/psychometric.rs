@@ -74,8 +74,8 @@ pub fn chart(points: &[(f64, bool)], fit: Option<Logistic>) -> Chart {
         x_label: "d' (effect against noise)".into(),
         y_label: "share detected".into(),
         x_scale: Scale::Log,
-        y_scale: Scale::Linear,
         series,
+        ..Chart::default()
     }
 }
 

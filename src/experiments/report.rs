@@ -83,7 +83,6 @@ fn stability(results: &Results) -> [Chart; 2] {
         title: format!("Largest {what} of a step"),
         x_label: "epoch".into(),
         y_label: format!("largest {what}{unit}"),
-        x_scale: Scale::Linear,
         y_scale: Scale::Log,
         series: results
             .stability
@@ -93,6 +92,7 @@ fn stability(results: &Results) -> [Chart; 2] {
                 points: found.run.history.iter().filter_map(|epoch| Some([(epoch.epoch + 1) as f64, value(epoch)?])).collect(),
             })
             .collect(),
+        ..Chart::default()
     };
     [chart("loss", " (dB²)", |epoch| epoch.largest_loss), chart("gradient", "", |epoch| epoch.largest_gradient)]
 }
@@ -113,8 +113,8 @@ fn few(results: &Results) -> Chart {
         x_label: "recordings of each action".into(),
         y_label: "accuracy (%)".into(),
         x_scale: Scale::Log,
-        y_scale: Scale::Linear,
         series: Material::ALL.map(curve).to_vec(),
+        ..Chart::default()
     }
 }
 
@@ -140,7 +140,7 @@ fn adaptation(results: &Results) -> Option<Chart> {
         x_label: "frames learned from".into(),
         y_label: "PSNR (dB)".into(),
         x_scale: Scale::LogOfCounts,
-        y_scale: Scale::Linear,
         series,
+        ..Chart::default()
     })
 }

@@ -98,19 +98,26 @@ fn spectra(mut values: Vec<Complex64>, samples: usize) -> Vec<Complex64> {
 
 impl Inspector for Alternation {
     fn see(&mut self, stream: &Stream) {
-        let Schedule { samples, .. } = self.schedule;
-        if self.loops.rows < FRAMES && !self.loops.is_empty() {
-            self.loops.add(&spectra(stream.centred(), samples));
-        }
         let period = self.schedule.period();
-        if !self.others.is_empty() && self.firsts.len() < FRAMES * MOST * period {
+        let needs_all = self.loops.rows < FRAMES && !self.loops.is_empty();
+        let needs_first = !self.others.is_empty() && self.firsts.len() < FRAMES * MOST * period;
+        if !needs_all && !needs_first {
+            return;
+        }
+        let mut loops = stream.centred();
+        if !needs_all {
+            loops.truncate(period);
+        }
+        let spectra = spectra(loops, self.schedule.samples);
+        if needs_all {
+            self.loops.add(&spectra);
+        }
+        if needs_first {
             if stream.frame != self.next {
                 self.firsts.clear();
             }
             self.next = stream.frame + 1;
-            let mut first = stream.centred();
-            first.truncate(period);
-            self.firsts.extend(spectra(first, samples));
+            self.firsts.extend(&spectra[..period]);
         }
     }
 
@@ -136,7 +143,7 @@ impl Inspector for Alternation {
         }
         let is_hidden = |kinds: &&usize| !frames.has(self.of_frames(**kinds));
         let hidden: Vec<usize> = self.others.iter().filter(is_hidden).copied().collect();
-        let of = |counted: &str| format!("{counted} take no turns (static returns that were looked at: {most})");
+        let found = format!("loops take no turns (static returns that were looked at: {most})");
         if !self.loops.is_empty() && returns < self.loops.fewest_returns() {
             return Some(Finding::undecided(
                 CHECK,
@@ -145,9 +152,9 @@ impl Inspector for Alternation {
             ));
         }
         if hidden.is_empty() {
-            return Some(Finding::as_stated(CHECK, EXPECTED, of("loops")));
+            return Some(Finding::as_stated(CHECK, EXPECTED, found));
         }
-        let why = format!("{}, but {} kinds of them would not show: too few loops and frames", of("loops"), listed(&hidden));
+        let why = format!("{found}, but {} kinds of them would not show: too few loops and frames", listed(&hidden));
         Some(Finding::undecided(CHECK, EXPECTED, why))
     }
 }

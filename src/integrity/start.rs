@@ -31,9 +31,7 @@ impl Start {
     pub fn new(schedule: Schedule) -> Self {
         Self { schedule, sum: vec![Complex64::ZERO; schedule.period()] }
     }
-}
 
-impl Start {
     /// Whether a break shortly after a sample is one of those between the parts of a chirp, one for each receiver.
     fn is_part(&self, place: usize) -> bool {
         let Schedule { rx, samples, .. } = self.schedule;

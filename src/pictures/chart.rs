@@ -20,7 +20,7 @@ pub struct Series {
 }
 
 /// Curves over one axis.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chart {
     pub title: String,
     /// What the axes show, with unit: "time (s)".
@@ -137,8 +137,7 @@ mod tests {
 
     fn chart(points: Vec<[f64; 2]>) -> Chart {
         let series = vec![Series { name: "training".into(), points }];
-        let [x_scale, y_scale] = [Scale::Linear; 2];
-        Chart { title: "loss".into(), x_label: "step".into(), y_label: "loss".into(), x_scale, y_scale, series }
+        Chart { title: "loss".into(), x_label: "step".into(), y_label: "loss".into(), series, ..Chart::default() }
     }
 
     #[test]

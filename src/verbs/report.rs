@@ -16,7 +16,7 @@ use crate::{
     evaluation::{self, Evaluation, FrameMaps, Simulation, measured_frame},
     metrics::MetricsConfig,
     pictures::{
-        self, Chart, Scale, Series,
+        self, Chart, Series,
         page::{self, html, picture},
     },
     text::shown,
@@ -109,12 +109,11 @@ impl RunReport<'_> {
             title: "Loss".into(),
             x_label: "epoch".into(),
             y_label: format!("loss ({})", self.config.training.loss.scale.unit()),
-            x_scale: Scale::Linear,
-            y_scale: Scale::Linear,
             series: vec![
                 series("training", &|metrics| Some(metrics.training_loss)),
                 series("held out", &|metrics| metrics.validation_loss),
             ],
+            ..Chart::default()
         };
         chart.save(&self.folder.join("loss.png"))
     }

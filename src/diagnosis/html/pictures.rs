@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::heatmap::{Axis, Map, range_axis, velocity_axis};
 use crate::metrics::DbWindow;
 use crate::pictures::page::{Markup, picture};
-use crate::pictures::{Captions, Chart, Scale, Series, comparison, window};
+use crate::pictures::{Captions, Chart, Series, comparison, window};
 use crate::radar::Radar;
 
 /// Titles or names, and what they are of.
@@ -94,8 +94,7 @@ fn along(before: &locate::Profile, after: Option<&locate::Profile>) -> Vec<Chart
         };
         let mut lines = vec![series("before", before)];
         lines.extend(after.map(|after| series("with the effects", after)));
-        let [x_scale, y_scale] = [Scale::Linear; 2];
-        Chart { title, x_label: x_label.clone(), y_label: y_label.into(), x_scale, y_scale, series: lines }
+        Chart { title, x_label: x_label.clone(), y_label: y_label.into(), series: lines, ..Chart::default() }
     };
     // A product of probabilities may be too small for a number.
     let significance = |profile: &locate::Profile| profile.p_value.iter().map(|p| -p.max(f64::MIN_POSITIVE).log10()).collect();
@@ -117,9 +116,8 @@ fn chart(curve: &Curve) -> Chart {
         title: curve.title.clone(),
         x_label: curve.x_label.clone(),
         y_label: curve.y_label.clone(),
-        x_scale: Scale::Linear,
-        y_scale: Scale::Linear,
         series: series.collect(),
+        ..Chart::default()
     }
 }
 

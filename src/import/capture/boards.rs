@@ -173,7 +173,8 @@ fn key(name: &str) -> String {
 }
 
 impl Board {
-    /// The board of a name as people write it, with A, I or x before it and BOOST or EVM behind it or not. A device alone stands for its board where it has only one.
+    /// The board of a name as people write it, with A, I or x before it and BOOST or EVM behind it or not. A device alone stands for its
+    /// board where it has only one.
     ///
     /// # Errors
     /// A name of no board, or of a device that is on several.

@@ -21,10 +21,12 @@ pub fn open(path: &Path, number: Stored, layout: &Layout, lengths: Lengths, note
     let mut shape = lengths.shape(layout)?;
     let block = shape.iter().try_fold(number.bytes as u64, |all, &length| all.checked_mul(length as u64)).unwrap_or(u64::MAX);
     let place = layout.place(Axis::Frame);
+    let refuse = |expected: String| {
+        Error::field(path, "samples", format!("{bytes} bytes"), expected)
+            .with_hint("the radar's settings or --layout belong to another capture, or the file is cut off")
+    };
     if bytes < block || place.is_none() && bytes != block {
-        let expected = format!("{block} bytes, one frame of {shape:?} numbers of type {}", number.name());
-        return Err(Error::field(path, "samples", format!("{bytes} bytes"), expected)
-            .with_hint("the radar's settings or --layout belong to another capture, or the file is cut off"));
+        return Err(refuse(format!("{block} bytes, one frame of {shape:?} numbers of type {}", number.name())));
     }
     let (frames, rest) = (bytes / block, bytes % block);
     if let Some(place) = place {
@@ -32,9 +34,7 @@ pub fn open(path: &Path, number: Stored, layout: &Layout, lengths: Lengths, note
     }
     if rest > 0 {
         if place != Some(0) {
-            let expected = format!("whole frames of {block} bytes, as frames are not outermost");
-            return Err(Error::field(path, "samples", format!("{bytes} bytes"), expected)
-                .with_hint("the radar's settings or --layout belong to another capture, or the file is cut off"));
+            return Err(refuse(format!("whole frames of {block} bytes, as frames are not outermost")));
         }
         notes.push(format!("{rest} bytes after the last whole frame are left out: {frames} frames of {block} bytes each"));
     }
