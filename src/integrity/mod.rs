@@ -15,6 +15,7 @@ mod devices;
 mod exchange;
 mod iq_order;
 mod lanes;
+mod mean_loop;
 mod numbers;
 mod period;
 mod runs;
