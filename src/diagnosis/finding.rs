@@ -193,6 +193,25 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// Something without a name, numbers or a correction; what more a detector knows stands before it: `Self { statement, ..Self::new(…) }`.
+    pub fn new(behaves_like: Behaviour, place: Place, p_value: f64, nats: f64) -> Self {
+        Self {
+            id: None,
+            behaves_like,
+            estimates: vec![],
+            choice: None,
+            place,
+            p_value,
+            nats,
+            errs_alike: false,
+            look_alikes: vec![],
+            statement: String::new(),
+            curve: None,
+            energy: 0.0,
+            correction: Correction::None,
+        }
+    }
+
     /// Without its name where all the numbers that it gives may as well be those at which the effect does nothing: something is
     /// there, but not surely this. For detectors whose p-value says that something is there, and not that these numbers are.
     pub fn named_if_sure(self) -> Self {
@@ -271,26 +290,6 @@ impl std::fmt::Debug for Candidate {
     }
 }
 
-/// Something without a name or numbers: for tests.
-#[cfg(test)]
-pub(crate) fn nameless(behaves_like: Behaviour) -> Candidate {
-    Candidate {
-        id: None,
-        behaves_like,
-        estimates: vec![],
-        choice: None,
-        place: Place::at(Stage::Receiver),
-        p_value: 0.0,
-        nats: 1.0,
-        errs_alike: false,
-        look_alikes: vec![],
-        statement: String::new(),
-        curve: None,
-        energy: 0.0,
-        correction: Correction::None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -298,18 +297,12 @@ mod tests {
     fn candidate(id: &'static str, estimates: Vec<Estimate>) -> Candidate {
         Candidate {
             id: Some(id),
-            behaves_like: Behaviour::AdditiveFastTime,
             estimates,
-            choice: None,
-            place: Place::at(Stage::Receiver),
-            p_value: 1e-9,
-            nats: 30.0,
             errs_alike: true,
             look_alikes: vec![effects::tx_leakage::ID],
             statement: "Something.".into(),
-            curve: None,
             energy: 1.0,
-            correction: Correction::None,
+            ..Candidate::new(Behaviour::AdditiveFastTime, Place::at(Stage::Receiver), 1e-9, 30.0)
         }
     }
 

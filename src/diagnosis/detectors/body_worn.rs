@@ -170,12 +170,7 @@ fn candidate(
     };
     Candidate {
         id: Some(effects::carried_reflector::ID),
-        behaves_like: Behaviour::ReturnOfOnePart,
         estimates: vec![Estimate::normal("amplitude", relative, LEVEL_ERROR * relative)],
-        choice: None,
-        place: Place { body_part: Some(name.into()), ..place },
-        p_value: 1.0,
-        nats: 0.0,
         errs_alike: true,
         look_alikes: vec![effects::part_reflectivity::ID],
         statement: format!(
@@ -184,10 +179,10 @@ fn candidate(
             name.replace('_', " "),
             found.over_skin_db
         ),
-        curve: None,
         energy: power * noise * evidence.cube.channels() as f64,
         // The parts' own weights have taken it in already.
         correction: Correction::None,
+        ..Candidate::new(Behaviour::ReturnOfOnePart, Place { body_part: Some(name.into()), ..place }, 1.0, 0.0)
     }
 }
 

@@ -108,29 +108,22 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let half = 0.5 * loops as f64;
     let region = Region { range: [first as f64 - 0.5, last as f64 + 0.5], doppler: [-half, half] };
     let training = evidence.split.training.clone();
+    let place = Place {
+        range_m: Some([(first as f64 - 0.5).max(0.0) * bin_m, (last as f64 + 0.5) * bin_m]),
+        velocity_mps: Some([-fastest, fastest]),
+        ..Place::at(Stage::Scene)
+    };
     Some(Candidate {
         id: Some(effects::moving_reflector::ID),
-        behaves_like: Behaviour::PathLike,
-        estimates: vec![],
-        choice: None,
-        place: Place {
-            range_m: Some([(first as f64 - 0.5).max(0.0) * bin_m, (last as f64 + 0.5) * bin_m]),
-            velocity_mps: Some([-fastest, fastest]),
-            ..Place::at(Stage::Scene)
-        },
-        p_value,
-        nats: gain,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "At {:.2} m something moves with all velocities at once, up to {fastest:.1} m/s and beyond, {:.0} dB above the noise, while \
              stronger static returns elsewhere do not: it turns or flutters, and nobody is tracked there.",
             bin as f64 * bin_m,
             10.0 * floor.level[bin].log10()
         ),
-        curve: None,
         energy,
         correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, 1, region))),
+        ..Candidate::new(Behaviour::PathLike, place, p_value, gain)
     })
 }
 

@@ -133,22 +133,13 @@ fn candidate(evidence: &Evidence, component: &Component, bit: usize, share: f64,
         (false, true) => " (imaginary component)",
         (false, false) => " (real component)",
     };
+    let place = Place { rx: Some(vec![rx]), ..Place::at(Stage::Receiver) };
     Candidate {
-        id: None,
-        behaves_like: Behaviour::Quantisation,
-        estimates: vec![],
-        choice: None,
-        place: Place { rx: Some(vec![rx]), ..Place::at(Stage::Receiver) },
-        p_value: p_value.max(f64::MIN_POSITIVE),
-        nats: gain,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "Bit {bit} (value {value:.0}) of the converter of receiver {rx}{part} {what}, while in the other receivers the same bit \
              is 1 half of the time, as it must be so far below the signal: the bit is {}.",
             if (share - 0.5).abs() > 0.499 { "stuck" } else { "biased" }
         ),
-        curve: None,
         energy: (share - 0.5).abs() * value * value * (frames * loops * samples) as f64,
         // What the bit was is lost but for its mean: without it, the offset of a stuck bit is no offset of the receiver.
         correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
@@ -158,6 +149,7 @@ fn candidate(evidence: &Evidence, component: &Component, bit: usize, share: f64,
                 }
             });
         })),
+        ..Candidate::new(Behaviour::Quantisation, place, p_value.max(f64::MIN_POSITIVE), gain)
     }
 }
 

@@ -127,20 +127,13 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, nat
     let change = series.change.clone();
     let decibel: Vec<f64> = change.iter().map(|v| DECIBEL * (1.0 + v).norm().max(1e-3).ln()).collect();
     let [low, high] = decibel.iter().fold([f64::MAX, f64::MIN], |[l, h], &v| [l.min(v), h.max(v)]);
+    let place = Place {
+        range_m: Some([range_m - 1.5 * bin_m, range_m + 1.5 * bin_m]),
+        velocity_mps: Some([0.0, 0.0]),
+        ..Place::at(Stage::Propagation)
+    };
     Candidate {
         id: Some(ID),
-        behaves_like: Behaviour::FadingBehindTheBody,
-        estimates: vec![],
-        choice: None,
-        place: Place {
-            range_m: Some([range_m - 1.5 * bin_m, range_m + 1.5 * bin_m]),
-            velocity_mps: Some([0.0, 0.0]),
-            ..Place::at(Stage::Propagation)
-        },
-        p_value: p_value.max(f64::MIN_POSITIVE),
-        nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "The static return {range_m:.2} m away changes from frame to frame by {:.0} % (over {:.1} dB) while the other static \
              returns stay, when the body's silhouette covers it: the body casts a shadow on the room.",
@@ -160,6 +153,7 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, nat
                 chirp.iter_mut().zip(echo).for_each(|(value, echo)| *value -= change[frame] * echo);
             });
         })),
+        ..Candidate::new(Behaviour::FadingBehindTheBody, place, p_value.max(f64::MIN_POSITIVE), nats)
     }
 }
 

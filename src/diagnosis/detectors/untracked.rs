@@ -177,28 +177,22 @@ impl<'a> Mover<'a> {
                 &[(across * c).abs().max(0.3 * bin_m), (across * s).abs().max(0.3 * bin_m), HEIGHT * range_m],
             )]
         });
+        let place = Place {
+            range_m: Some([(ranges[0] - 0.5).max(0.0) * bin_m, (ranges[1] + 0.5) * bin_m]),
+            velocity_mps: Some([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps]),
+            azimuth_deg: azimuth.map(|(a, d)| [a - 2.0 * d, a + 2.0 * d]),
+            ..Place::at(Stage::Scene)
+        };
         Candidate {
             id: Some(effects::moving_reflector::ID),
-            behaves_like: Behaviour::PathLike,
             estimates,
-            choice: None,
-            place: Place {
-                range_m: Some([(ranges[0] - 0.5).max(0.0) * bin_m, (ranges[1] + 0.5) * bin_m]),
-                velocity_mps: Some([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps]),
-                azimuth_deg: azimuth.map(|(a, d)| [a - 2.0 * d, a + 2.0 * d]),
-                ..Place::at(Stage::Scene)
-            },
-            p_value,
-            nats: gain,
-            errs_alike: false,
-            look_alikes: vec![],
             statement: format!(
                 "Something moves at {range_m:.2} m with {velocity_mps:+.2} m/s along the line of sight{direction}, {decibel:.0} dB \
                  above the noise, and nobody is tracked there."
             ),
-            curve: None,
             energy: self.energy(),
             correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, run, cut))),
+            ..Candidate::new(Behaviour::PathLike, place, p_value, gain)
         }
     }
 }

@@ -137,20 +137,12 @@ fn candidate(
     };
     let course: Vec<f64> = fluctuations.iter().map(shown).collect();
     let range_m = change.bin as f64 * bin_m;
+    let place = Place {
+        range_m: Some([near_m - 1.5 * bin_m, far_m + 1.5 * bin_m]),
+        velocity_mps: Some([0.0, 0.0]),
+        ..Place::at(Stage::Scene)
+    };
     Candidate {
-        id: None,
-        behaves_like: Behaviour::ChangingAtOneRange,
-        estimates: vec![],
-        choice: None,
-        place: Place {
-            range_m: Some([near_m - 1.5 * bin_m, far_m + 1.5 * bin_m]),
-            velocity_mps: Some([0.0, 0.0]),
-            ..Place::at(Stage::Scene)
-        },
-        p_value: change.p_value.max(f64::MIN_POSITIVE),
-        nats: gain,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "The static return {range_m:.2} m away changes from frame to frame while the other static returns stay{}: something moves \
              there, or passes in front of it.",
@@ -169,6 +161,7 @@ fn candidate(
                 chirp.iter_mut().zip(fluctuation).for_each(|(value, change)| *value -= change);
             });
         })),
+        ..Candidate::new(Behaviour::ChangingAtOneRange, place, change.p_value.max(f64::MIN_POSITIVE), gain)
     }
 }
 

@@ -194,15 +194,10 @@ fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, n
     let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
     Candidate {
         id: Some(effects::pose_offset::ID),
-        behaves_like: Behaviour::DirectionOffset,
         estimates: vec![
             Estimate::list("offset_m", &[offset, 0.0, 0.0], &[deviation, 0.05, 0.2]),
             Estimate::normal("yaw_deg", 0.0, 1.0),
         ],
-        choice: None,
-        place: Place::at(Stage::Scene),
-        p_value: bearing.p_value,
-        nats,
         errs_alike: true,
         // A phase in proportion to the receivers' places is a direction, whoever makes it.
         look_alikes: vec![effects::channel_mismatch::ID],
@@ -212,9 +207,9 @@ fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, n
             if bearing.sine > 0.0 { "right" } else { "left" },
             1e3 * offset.abs()
         ),
-        curve: None,
         energy: total * evidence.noise().iter().sum::<f64>() * (bearing.sine * PI).powi(2),
         correction: Correction::Body(Arc::new(move |body| moves.apply(body, change))),
+        ..Candidate::new(Behaviour::DirectionOffset, Place::at(Stage::Scene), bearing.p_value, nats)
     }
 }
 

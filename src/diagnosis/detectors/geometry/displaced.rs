@@ -284,18 +284,14 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
     let moves = Moves::new(evidence.radar.centre_m());
     Candidate {
         id,
-        behaves_like: behaves_like(stage),
         estimates,
         choice: place.boundary.clone(),
-        place,
-        p_value,
-        nats,
         errs_alike: true,
         look_alikes: if id.is_some() { look_alikes } else { vec![] },
         statement,
-        curve: None,
         energy: energy(evidence),
         correction: Correction::Body(Arc::new(move |body| moves.apply(body, change))),
+        ..Candidate::new(behaves_like(stage), place, p_value, nats)
     }
 }
 

@@ -13,7 +13,7 @@ use super::found::{Found, LOOKS};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::statistics::corrected;
-use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};
+use crate::diagnosis::{Candidate, Estimate, Evidence, Place};
 use crate::effects::{self, Stage};
 
 /// What errors of the prediction look like, radian per unit of the sine.
@@ -55,22 +55,16 @@ fn candidate(evidence: &Evidence, cells: &Cells, directions: &DMatrix<f64>, foun
     let list = offsets.iter().map(|offset| format!("{:.0}", 1e6 * offset)).collect::<Vec<_>>().join(", ");
     let growth = found.values.norm();
     let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
+    let place = Place::at(Stage::Antenna);
     Candidate {
         id: Some(effects::antenna_position::ID),
-        behaves_like: Behaviour::PhaseBetweenReceivers,
         estimates: vec![Estimate::list("offset_m", offsets.as_slice(), &deviations)],
-        choice: None,
-        place: Place::at(Stage::Antenna),
-        p_value: corrected(found.p_value, LOOKS),
-        nats: found.nats,
         errs_alike: true,
-        look_alikes: vec![],
         statement: format!(
             "The phases between neighbouring receivers grow with the direction of the body, and not alike: the receivers stand {list} µm \
              farther along x than declared (against the first, and but for a common stretch, which nothing here would show).",
         ),
-        curve: None,
         energy: total * evidence.noise().iter().sum::<f64>() * (growth * 0.2).powi(2),
-        correction: Correction::None,
+        ..Candidate::new(Behaviour::PhaseBetweenReceivers, place, corrected(found.p_value, LOOKS), found.nats)
     }
 }

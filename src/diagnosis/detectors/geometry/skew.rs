@@ -68,24 +68,17 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, nats: f64)
     let turns: Vec<f64> = places.iter().map(|x| -size * wave * x / beat_hz).collect();
     let farthest = turns.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
     let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
+    // The ratio of the walls' likelihoods, whose numbers the body gave, is one on average by chance: a p-value may be divided by it.
+    let p_value = (bearing.p_value * (-walls_gain).exp()).clamp(f64::MIN_POSITIVE, 1.0);
+    let place = Place { rx: Some((1..radar.rx_m.len()).collect()), ..Place::at(Stage::Receiver) };
     Some(Candidate {
-        id: None,
-        behaves_like: Behaviour::DelayProportionalPhaseByReceiver,
-        estimates: vec![],
-        choice: None,
-        place: Place { rx: Some((1..radar.rx_m.len()).collect()), ..Place::at(Stage::Receiver) },
-        // The ratio of the walls' likelihoods, whose numbers the body gave, is one on average by chance: a p-value may be divided by it.
-        p_value: (bearing.p_value * (-walls_gain).exp()).clamp(f64::MIN_POSITIVE, 1.0),
-        nats,
         errs_alike: true,
-        look_alikes: vec![],
         statement: format!(
             "Between the receivers everything is turned in proportion to its range, by {:.2} radian from the first to the last at \
              {mean_m:.1} m: as if the last one were sampled {:.1} ns later than the first.",
             farthest * beat_hz,
             1e9 * farthest / TAU
         ),
-        curve: None,
         energy: total * evidence.noise().iter().sum::<f64>() * (farthest * beat_hz).powi(2) / 3.0,
         correction: Correction::Inverse(
             Arc::new({
@@ -108,6 +101,7 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, nats: f64)
             }),
             Volume::KEPT,
         ),
+        ..Candidate::new(Behaviour::DelayProportionalPhaseByReceiver, place, p_value, nats)
     })
 }
 

@@ -3,9 +3,9 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use super::*;
-use crate::diagnosis::Correction;
 use crate::diagnosis::behaviour::Behaviour;
-use crate::effects;
+use crate::diagnosis::{Correction, Place};
+use crate::effects::{self, Stage};
 use crate::radar::Radar;
 
 const FRAMES: usize = 32;
@@ -41,7 +41,7 @@ fn turned(seed: u64, offset: Complex64) -> Evidence {
 }
 
 fn after(evidence: Evidence, correction: Correction) -> Evidence {
-    evidence.with(&Candidate { correction, ..crate::diagnosis::finding::nameless(Behaviour::SlowTimePhase) })
+    evidence.with(&Candidate { correction, ..Candidate::new(Behaviour::SlowTimePhase, Place::at(Stage::Receiver), 0.0, 1.0) })
 }
 
 fn sure(evidence: &Evidence) -> Vec<Candidate> {

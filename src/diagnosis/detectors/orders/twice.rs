@@ -83,19 +83,14 @@ fn candidate(
     let region = Region { range: window(best.bin), doppler: [-1.0, 1.0] };
     let training = evidence.split.training.clone();
     let power: f64 = amplitude.iter().map(|a| a.norm_sqr()).sum();
+    let place = Place { range_m: Some(window(best.bin).map(|bin| bin * bin_m)), ..Place::at(Stage::Propagation) };
     Candidate {
         id: Some(KINDS[best.kind].0),
-        behaves_like: Behaviour::PathLike,
         estimates: vec![if KINDS[best.kind].1 {
             Estimate::normal("level_db", DECIBEL * value.ln(), DECIBEL * deviation / value.max(1e-12))
         } else {
             Estimate::normal("coefficient", value, deviation)
         }],
-        choice: None,
-        place: Place { range_m: Some(window(best.bin).map(|bin| bin * bin_m)), ..Place::at(Stage::Propagation) },
-        p_value,
-        nats: gain,
-        errs_alike: false,
         look_alikes,
         statement: format!(
             "at {range_m:.2} m, twice the range of what moves at {:.2} m, something turns twice as far as it does, {level_db:.0} dB \
@@ -103,9 +98,9 @@ fn candidate(
             bin * bin_m,
             if best.kind == 0 { "its return goes out from the radar a second time" } else { "the receiver's second harmonic" },
         ),
-        curve: None,
         energy: best.factor.norm_sqr() * power * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
         correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, 1, region))),
+        ..Candidate::new(Behaviour::PathLike, place, p_value, gain)
     }
 }
 

@@ -102,22 +102,15 @@ impl Bounce {
         let step_m = scene.range_m(0.125);
         Candidate {
             id: Some(effects::body_multibounce::ID),
-            behaves_like: Behaviour::PathLike,
             estimates: vec![Estimate::normal("extra_m", extra_m, 0.4 * step_m)],
-            choice: None,
-            place: Place::at(Stage::Propagation),
-            p_value,
-            nats: self.fit.held_out,
-            errs_alike: false,
-            look_alikes: vec![],
             statement: format!(
                 "The body's return comes a second time, {extra_m:.2} m behind itself and {:.0} dB weaker, with the body's own \
                  Doppler: it bounced between parts of the body.",
                 -20.0 * factor.norm().max(1e-12).log10()
             ),
-            curve: None,
             energy: factor.norm_sqr() * energy(scene, body / 2.25),
             correction: Correction::Inverse(self.undo(scene), Volume::BY_SAMPLE),
+            ..Candidate::new(Behaviour::PathLike, Place::at(Stage::Propagation), p_value, self.fit.held_out)
         }
     }
 

@@ -53,18 +53,13 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
     let power: f64 = (ghost.templates.iter())
         .map(|template| ghost.weight * template.power.iter().map(|&power| f64::from(power)).sum::<f64>())
         .sum();
+    let place = Place { boundary: Some(name.into()), ..place };
     Candidate {
         id: Some(id),
-        behaves_like: Behaviour::PathLike,
         estimates: vec![coefficient],
         choice: Some(name.into()),
-        place: Place { boundary: Some(name.into()), ..place },
-        p_value: corrected(chi2_tail(2.0 * ghost.gain_all, 2.0), tried),
-        nats: ghost.gain,
-        errs_alike: false,
         look_alikes,
         statement,
-        curve: None,
         // The windows' cells hold every tone 2.25 times over.
         energy: energy(scene, power / 2.25),
         correction: Correction::Samples(Arc::new(move |cube| {
@@ -72,6 +67,7 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
                 empty_cells(cube, &clutter, frame, cells);
             }
         })),
+        ..Candidate::new(Behaviour::PathLike, place, corrected(chi2_tail(2.0 * ghost.gain_all, 2.0), tried), ghost.gain)
     }
 }
 

@@ -78,22 +78,16 @@ impl Mover {
         let is_reflector = self.id == Some(effects::moving_reflector::ID);
         Candidate {
             id: self.id,
-            behaves_like: Behaviour::PathLike,
             estimates: if is_reflector { self.estimates(&seen, &evidence.radar) } else { vec![] },
-            choice: None,
-            place: self.place(scene, &seen),
-            p_value: corrected(self.track.p_value, tried),
-            nats: self.gain,
-            errs_alike: false,
             look_alikes: self.look_alikes(scene),
             statement: self.statement(&seen),
-            curve: None,
             energy: energy(scene, sightings.iter().map(|s| s.power).sum()),
             correction: Correction::Samples(Arc::new(move |cube| {
                 for (frame, cells) in &cells {
                     empty_cells(cube, &clutter, *frame, cells);
                 }
             })),
+            ..Candidate::new(Behaviour::PathLike, self.place(scene, &seen), corrected(self.track.p_value, tried), self.gain)
         }
     }
 

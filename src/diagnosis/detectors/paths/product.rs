@@ -106,20 +106,15 @@ impl Product {
         };
         // The phase between receivers is observed; the library says whose it is.
         let id = scene.evidence.info(kind.id()).map(|info| info.id);
+        let behaves_like = if id.is_some() { behaves_like } else { Behaviour::Quadratic };
         Candidate {
             id,
-            behaves_like: if id.is_some() { behaves_like } else { Behaviour::Quadratic },
             estimates: id.map(|_| estimate).into_iter().collect(),
-            choice: None,
-            place: Place::at(stage),
-            p_value,
-            nats: self.fit.held_out,
-            errs_alike: false,
             look_alikes,
             statement,
-            curve: None,
             energy: self.energy,
             correction: Correction::Inverse(Arc::new(move |cube: &mut Cube| remove(cube, kind, factor)), volume),
+            ..Candidate::new(behaves_like, Place::at(stage), p_value, self.fit.held_out)
         }
     }
 

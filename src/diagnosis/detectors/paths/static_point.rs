@@ -274,18 +274,11 @@ fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, nats: f64) -> Candi
     let tone = Tone::of(evidence, peak);
     Candidate {
         id: Some(effects::static_reflector::ID),
-        behaves_like: Behaviour::PathLike,
         estimates: peak.position(radar).into_iter().chain(tone.relative(evidence, peak)).collect(),
-        choice: None,
-        place: peak.place(radar),
-        p_value,
-        nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: peak.statement(),
-        curve: None,
         energy: tone.power() * (frames * loops * samples) as f64,
         correction: Correction::Samples(Arc::new(move |cube| tone.remove(cube))),
+        ..Candidate::new(Behaviour::PathLike, peak.place(radar), p_value, nats)
     }
 }
 

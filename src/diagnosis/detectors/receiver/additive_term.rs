@@ -64,18 +64,11 @@ impl Chosen<'_> {
         let [frames, _, _, loops, _] = evidence.cube.dims;
         Some(Candidate {
             id,
-            behaves_like: Behaviour::AdditiveFastTime,
             estimates,
-            choice: None,
-            place,
-            p_value,
-            nats,
-            errs_alike: false,
-            look_alikes: vec![],
             statement,
-            curve: None,
             energy: term.chirps.iter().map(|chirp| energy(chirp)).sum::<f64>() * (frames * loops) as f64,
             correction: subtract(term.chirps),
+            ..Candidate::new(Behaviour::AdditiveFastTime, place, p_value, nats)
         })
     }
 

@@ -73,18 +73,12 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let volume = Volume { of_samples: Some(Arc::new(spread(evidence, &bursts, &powers))), ..Volume::KEPT };
     vec![Candidate {
         id,
-        behaves_like: Behaviour::SparseAdditive,
         estimates,
-        choice: None,
-        place,
-        p_value,
-        nats,
-        errs_alike: false,
         look_alikes,
         statement,
-        curve: None,
         energy: removed,
         correction: Correction::Inverse(Arc::new(move |cube: &mut Cube| repair_all(cube, &bursts)), volume),
+        ..Candidate::new(Behaviour::SparseAdditive, place, p_value, nats)
     }]
 }
 

@@ -6,7 +6,7 @@ use super::shares::Shares;
 use super::support::UNLIKELY;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
+use crate::diagnosis::finding::{Candidate, Curve, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale};
 use crate::effects::{self, Stage};
 
@@ -186,22 +186,13 @@ fn named(powers: &Powers, top: &Top, fit: &Fit, evident: Evident) -> Candidate {
 fn unnamed(powers: &Powers, fit: &Fit, Evident { p_value, gain, energy }: Evident) -> Candidate {
     let (low, high) = fit.shape.iter().fold((f64::INFINITY, 0.0f64), |(low, high), &s| (low.min(s), high.max(s)));
     Candidate {
-        id: None,
-        behaves_like: Behaviour::NoiseOverBeatFrequency,
-        estimates: vec![],
-        choice: None,
-        place: Place::at(Stage::Noise),
-        p_value,
-        nats: gain,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "the noise's power differs by {:.1} dB between bands of beat frequency, where thermal noise would be level",
             10.0 * (high / low.max(1e-300)).log10()
         ),
         curve: Some(powers.curve(fit)),
         energy,
-        correction: Correction::None,
+        ..Candidate::new(Behaviour::NoiseOverBeatFrequency, Place::at(Stage::Noise), p_value, gain)
     }
 }
 

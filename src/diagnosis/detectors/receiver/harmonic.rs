@@ -34,17 +34,7 @@ fn nameless(evidence: &Evidence, laws: Vec<Law>) -> Candidate {
     let (p_value, nats) = (laws.iter().map(|law| law.p_value).fold(1.0, f64::min), laws.iter().map(|law| law.gain).sum());
     let energy = evidence.cube.samples.iter().map(|&value| (value - without(&laws, value)).norm_sqr()).sum();
     Candidate {
-        id: None,
-        behaves_like: Behaviour::Quadratic,
-        estimates: vec![],
-        choice: None,
-        place: Place::at(Stage::Receiver),
-        p_value,
-        nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement,
-        curve: None,
         energy,
         correction: Correction::Inverse(
             Arc::new(move |cube: &mut Cube| {
@@ -54,5 +44,6 @@ fn nameless(evidence: &Evidence, laws: Vec<Law>) -> Candidate {
             }),
             Volume::BY_SAMPLE,
         ),
+        ..Candidate::new(Behaviour::Quadratic, Place::at(Stage::Receiver), p_value, nats)
     }
 }

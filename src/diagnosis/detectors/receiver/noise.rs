@@ -14,7 +14,7 @@ use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::folds;
 use crate::diagnosis::evidence::beat::{empty_bins, quiet_bins, ranges_m};
 use crate::diagnosis::evidence::{hann, transform_under};
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
+use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::effects::{self, Stage};
 
@@ -227,21 +227,13 @@ fn shared_noise(evidence: &Evidence, correlation: &Correlation, nats: f64) -> Ca
     let id = evidence.info(effects::correlated_noise::ID).map(|info| info.id);
     Candidate {
         id,
-        behaves_like: Behaviour::NoiseSharedByReceivers,
         estimates: id.map(|_| Estimate::normal("rho", rho, error)).into_iter().collect(),
-        choice: None,
-        place: Place::at(Stage::Noise),
-        p_value,
-        nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "the receivers' noise is not independent: where nothing is, they agree with a correlation of {rho:.3} ({over} \
              over pairs), like a target in one fixed direction in every cell"
         ),
-        curve: None,
         energy: rho * noise * evidence.cube.samples.len() as f64,
-        correction: Correction::None,
+        ..Candidate::new(Behaviour::NoiseSharedByReceivers, Place::at(Stage::Noise), p_value, nats)
     }
 }
 

@@ -151,20 +151,16 @@ impl<'a> Search<'a> {
             .map(|(found, clean)| found.iter().zip(clean).map(|(a, b)| (a - b).norm_sqr()).sum::<f64>())
             .sum::<f64>()
             * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
+        let place = Place::at(Stage::Receiver);
         Candidate {
             id: Some(shape.id()),
-            behaves_like: Behaviour::BeatFrequencyGain,
             estimates,
-            choice: None,
-            place: Place::at(Stage::Receiver),
-            p_value,
-            nats: self.log_likelihood_gain(shape, value),
-            errs_alike: false,
             look_alikes,
             statement,
             curve: Some(curve(&response, self.rate)),
             energy,
             correction: undo(&response, fitted, clutter),
+            ..Candidate::new(Behaviour::BeatFrequencyGain, place, p_value, self.log_likelihood_gain(shape, value))
         }
     }
 }

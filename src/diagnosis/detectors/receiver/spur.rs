@@ -152,17 +152,10 @@ fn candidate(evidence: &Evidence, tone: Tone) -> Candidate {
     let frequency_hz = wrapped * rate;
     Candidate {
         id: Some(effects::spur::ID),
-        behaves_like: Behaviour::Tone,
         estimates: vec![
             Estimate::normal("frequency_hz", frequency_hz, deviation_bins(gain) * rate / samples as f64),
             Estimate::normal("level_db", level_db, denoised::PEAK_DB),
         ],
-        choice: None,
-        place: Place::at(Stage::Receiver),
-        p_value,
-        nats: gain,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "a continuous tone at {:.4} MHz (or {:.4} MHz, as sampled), {level_db:.1} dB relative to the peak sample, runs through all frames \
              {how}; its phase advances by {:.3} turns per chirp",
@@ -170,9 +163,9 @@ fn candidate(evidence: &Evidence, tone: Tone) -> Candidate {
             (wrapped - wrapped.signum()) * rate * 1e-6,
             slow
         ),
-        curve: None,
         energy: strength * strength * (frames * evidence.cube.channels() * loops * samples) as f64,
         correction,
+        ..Candidate::new(Behaviour::Tone, Place::at(Stage::Receiver), p_value, gain)
     }
 }
 

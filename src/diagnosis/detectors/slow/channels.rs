@@ -310,20 +310,13 @@ impl Judged {
         let own: f64 =
             self.members.iter().flat_map(|&c| &evidence.clutter()[c * samples..][..samples]).map(|v| v.norm_sqr()).sum();
         let square: f64 = known.iter().map(|&f| self.series.value[f].norm_sqr()).sum();
+        let place = Place {
+            rx: matches!(self.unit, Axis::Receiver(_)).then(|| vec![index]),
+            tx: matches!(self.unit, Axis::Transmitter(_)).then(|| vec![index]),
+            ..Place::at(Stage::Receiver)
+        };
+        let p_value = statistics::corrected(self.p_value, tried).max(f64::MIN_POSITIVE);
         Candidate {
-            id: None,
-            behaves_like: Behaviour::SlowTimeGainOfOneChannel,
-            estimates: vec![],
-            choice: None,
-            place: Place {
-                rx: matches!(self.unit, Axis::Receiver(_)).then(|| vec![index]),
-                tx: matches!(self.unit, Axis::Transmitter(_)).then(|| vec![index]),
-                ..Place::at(Stage::Receiver)
-            },
-            p_value: statistics::corrected(self.p_value, tried).max(f64::MIN_POSITIVE),
-            nats: self.nats,
-            errs_alike: false,
-            look_alikes: vec![],
             statement: self.statement(&decibel),
             curve: Some(Curve {
                 title: format!("Static returns in {what} {index} relative to the other {others}"),
@@ -333,6 +326,7 @@ impl Judged {
             }),
             energy: own * square * loops as f64,
             correction: self.correction(evidence),
+            ..Candidate::new(Behaviour::SlowTimeGainOfOneChannel, place, p_value, self.nats)
         }
     }
 

@@ -218,21 +218,14 @@ fn candidate(evidence: &Evidence, own: &Channel, has: &[usize], bin: usize, undo
     );
     let number: Vec<f64> = (0..loops).map(|index| index as f64).collect();
     let series = |name: &str, part: fn(&Complex64) -> f64| (name.into(), number.clone(), values.iter().map(part).collect());
+    let behaves_like = if settles { Behaviour::SlowTimeSettlingOfOneReturn } else { Behaviour::SlowTimePatternOfOneReturn };
+    let place = Place {
+        range_m: Some(range),
+        tx: (transmitters.len() < tx).then_some(transmitters),
+        rx: (receivers.len() < rx).then_some(receivers),
+        ..Place::at(Stage::Receiver)
+    };
     Candidate {
-        id: None,
-        behaves_like: if settles { Behaviour::SlowTimeSettlingOfOneReturn } else { Behaviour::SlowTimePatternOfOneReturn },
-        estimates: vec![],
-        choice: None,
-        place: Place {
-            range_m: Some(range),
-            tx: (transmitters.len() < tx).then_some(transmitters),
-            rx: (receivers.len() < rx).then_some(receivers),
-            ..Place::at(Stage::Receiver)
-        },
-        p_value: 1.0,
-        nats: 0.0,
-        errs_alike: false,
-        look_alikes: vec![],
         statement,
         curve: Some(Curve {
             title: format!("Mean over the frames at {:.2} m", signed.max(0.0) * bin_m),
@@ -242,6 +235,7 @@ fn candidate(evidence: &Evidence, own: &Channel, has: &[usize], bin: usize, undo
         }),
         energy: values.iter().map(|value| value.norm_sqr()).sum::<f64>() * (frames * has.len()) as f64,
         correction: Correction::Samples(undo),
+        ..Candidate::new(behaves_like, place, 1.0, 0.0)
     }
 }
 

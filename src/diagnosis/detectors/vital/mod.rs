@@ -196,22 +196,18 @@ impl Motion<'_> {
         let energy: f64 = self.change.iter().map(|c| (c - 1.0).max(0.0)).sum::<f64>()
             * self.data.noise.iter().sum::<f64>()
             * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
+        let place = Place {
+            range_m: Some([ends[0] as f64 * bin_m, ends[1] as f64 * bin_m]),
+            ..Place::at(if self.named.is_some() { Stage::Body } else { Stage::Scene })
+        };
         Candidate {
             id: self.named.as_ref().map(|n| n.0),
-            behaves_like: Behaviour::PathLike,
             estimates: self.named.as_ref().map_or(vec![], |(_, r)| {
                 vec![
                     Estimate::normal("rate_hz", r.frequency_hz, r.frequency_deviation_hz),
                     Estimate::normal("amplitude_m", r.amplitude * metres, r.amplitude_deviation * metres),
                 ]
             }),
-            choice: None,
-            place: Place {
-                range_m: Some([ends[0] as f64 * bin_m, ends[1] as f64 * bin_m]),
-                ..Place::at(if self.named.is_some() { Stage::Body } else { Stage::Scene })
-            },
-            p_value,
-            nats: gain,
             errs_alike: true,
             // A curtain in the wind does the same; so does whatever oscillates there.
             look_alikes: if self.named.is_some() { vec![effects::moving_reflector::ID] } else { vec![] },
@@ -227,6 +223,7 @@ impl Motion<'_> {
                 Box::new(Correction::Samples(Arc::new(move |cube| remove(cube, &training, 1, region)))),
                 Arc::new(course),
             ),
+            ..Candidate::new(Behaviour::PathLike, place, p_value, gain)
         }
     }
 }

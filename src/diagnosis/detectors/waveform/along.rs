@@ -218,18 +218,11 @@ impl Chirps {
         let total: f64 = evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum();
         Candidate {
             id: Some(effects::chirp_droop::ID),
-            behaves_like: Behaviour::FastTimeGain,
             estimates: vec![Estimate::normal("db", db, deviation)],
-            choice: None,
-            place: Place::at(Stage::Receiver),
-            p_value: corrected(found.p_value, LOOKS),
-            nats: found.nats,
             errs_alike: true,
-            look_alikes: vec![],
             statement: format!(
                 "the power falls by {db:.2} dB from the first to the last sample of every chirp, whatever is seen",
             ),
-            curve: None,
             energy: total * (db / DECIBEL).powi(2) / 12.0,
             correction: Correction::Inverse(
                 Arc::new(move |cube: &mut Cube| {
@@ -241,6 +234,7 @@ impl Chirps {
                 }),
                 Volume::BY_SAMPLE,
             ),
+            ..Candidate::new(Behaviour::FastTimeGain, Place::at(Stage::Receiver), corrected(found.p_value, LOOKS), found.nats)
         }
     }
 
@@ -257,16 +251,11 @@ impl Chirps {
         let samples = evidence.radar.samples_per_chirp;
         let at: Vec<f64> = (0..samples).map(|n| place(n, samples)).collect();
         let range_m = 0.5 * self.delay_s * SPEED_OF_LIGHT;
+        let place = Place::at(Stage::Waveform);
         Candidate {
             id: named.then_some(effects::chirp_nonlinearity::ID),
-            behaves_like: Behaviour::DelayProportionalPhase,
             estimates: if named { vec![peak] } else { vec![] },
-            choice: None,
-            place: Place::at(Stage::Waveform),
-            p_value: corrected(found.p_value, LOOKS),
-            nats: found.nats,
             errs_alike: true,
-            look_alikes: vec![],
             statement: format!(
                 "The chirp's ramp is not straight: its frequency bends by {:.0} kHz along the chirp, which smears what is at \
                  {range_m:.1} m by {:.2} radian, and what is farther more.{}",
@@ -293,6 +282,7 @@ impl Chirps {
             }),
             energy: total * (bend * bend + trend * trend / 3.0) / 5.0,
             correction: self.straightened(&evidence.radar, at, bend, trend),
+            ..Candidate::new(Behaviour::DelayProportionalPhase, place, corrected(found.p_value, LOOKS), found.nats)
         }
     }
 

@@ -204,7 +204,6 @@ impl Pair {
         let (radar_copy, turned_hz) = (radar.clone(), ripple_hz);
         Candidate {
             id: named.then_some(effects::chirp_ripple::ID),
-            behaves_like: Behaviour::DelayProportionalPhase,
             estimates: if named {
                 vec![
                     Estimate::normal("deviation_hz", deviation_hz, error.max(0.03 * deviation_hz)),
@@ -213,12 +212,6 @@ impl Pair {
             } else {
                 vec![]
             },
-            choice: None,
-            place: Place::at(Stage::Waveform),
-            p_value,
-            nats,
-            errs_alike: false,
-            look_alikes: vec![],
             statement: format!(
                 "Every return has a pair of faint echoes {:.0} kHz ({:.2} m) before and behind it, higher the farther it is ({:.0} dB \
                  at 3 m): the chirp's frequency is modulated by {:.1} kHz, {:.0} thousand times a second.",
@@ -231,6 +224,7 @@ impl Pair {
             curve: Some(curve),
             energy: clutter_energy * chirps * 2.0 * (stated * stated),
             correction: Correction::Samples(Arc::new(move |cube| undo(cube, &radar_copy, alpha, turned_hz))),
+            ..Candidate::new(Behaviour::DelayProportionalPhase, Place::at(Stage::Waveform), p_value, nats)
         }
     }
 }

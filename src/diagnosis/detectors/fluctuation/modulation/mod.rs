@@ -81,22 +81,13 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, nats: f64) -> Option<Ca
     let energy = waves.iter().flat_map(Grid::values).map(|value| value.norm_sqr()).sum::<f64>() * 0.5 * chirp_count;
     let (starts_s, loop_s, frequency_hz) = (evidence.starts_s.clone(), evidence.radar.loop_period_s(), line.frequency_hz);
     let frame_rate_hz = 1.0 / evidence.radar.frame_period_s;
+    let place = Place { range_m: Some([near_m, far_m]), ..Place::at(Stage::Scene) };
     Some(Candidate {
-        id: None,
-        behaves_like: Behaviour::Modulated,
-        estimates: vec![],
-        choice: None,
-        place: Place { range_m: Some([near_m, far_m]), ..Place::at(Stage::Scene) },
-        p_value: p_value.max(f64::MIN_POSITIVE),
-        nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "The return {range_m:.2} m away is modulated at {frequency_hz:.1} Hz (or at that and a multiple of the \
              {frame_rate_hz:.1} frames per second), coherently from frame to frame, while the other ranges are constant: a lamp or \
              a machine is there."
         ),
-        curve: None,
         energy,
         correction: Correction::Samples(Arc::new(move |cube| {
             cube.each_chirp(|[frame, channel, index], chirp| {
@@ -107,6 +98,7 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, nats: f64) -> Option<Ca
                 }
             });
         })),
+        ..Candidate::new(Behaviour::Modulated, place, p_value.max(f64::MIN_POSITIVE), nats)
     })
 }
 

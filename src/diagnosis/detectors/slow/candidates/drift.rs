@@ -14,26 +14,21 @@ pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -
     let shape = drift.clone();
     let deviation: Deviation = Arc::new(move |[frame, _, _]| shape.value(frame));
     let Description { id, estimates, statement } = describe(evidence, field, part, drift);
+    let place = Place {
+        frames: match drift.shape {
+            Shape::Step(_, at) => Some((at..field.frames).collect()),
+            Shape::Smooth(_) => None,
+        },
+        ..place(part)
+    };
     Candidate {
         id,
-        behaves_like: behaves_like(part),
         estimates,
-        choice: None,
-        place: Place {
-            frames: match drift.shape {
-                Shape::Step(_, at) => Some((at..field.frames).collect()),
-                Shape::Smooth(_) => None,
-            },
-            ..place(part)
-        },
-        p_value: drift.p_value,
-        nats: drift.held_out_nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement,
         curve: Some(curve(evidence, field, part, drift)),
         energy: energy(evidence, field, part, &*deviation),
         correction: correction(evidence, part, deviation, 0.0),
+        ..Candidate::new(behaves_like(part), place, drift.p_value, drift.held_out_nats)
     }
 }
 

@@ -21,20 +21,14 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
         Part::Phase | Part::Boresight => (Stage::Scene, wave.vibration(evidence, field, part)),
         Part::Delay => (Stage::Waveform, wave.oscillator()),
     };
+    let p_value = statistics::corrected((-line.training_nats).exp(), line.tried);
     Candidate {
         id,
-        behaves_like: behaves_like(part),
         estimates,
-        choice: None,
-        place: Place::at(stage),
-        p_value: statistics::corrected((-line.training_nats).exp(), line.tried),
-        nats: line.held_out_nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement,
-        curve: None,
         energy: energy(evidence, field, part, &*deviation),
         correction: correction(evidence, part, deviation, 0.0),
+        ..Candidate::new(behaves_like(part), Place::at(stage), p_value, line.held_out_nats)
     }
 }
 

@@ -28,18 +28,12 @@ pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random
     };
     Candidate {
         id,
-        behaves_like: behaves_like(part),
         estimates,
-        choice: None,
-        place: place(part),
-        p_value: random.p_value,
-        nats: gain.min(random.nats_within),
-        errs_alike: false,
         look_alikes,
         statement,
-        curve: None,
         energy: energy(evidence, field, part, &*deviation),
         correction: correction(evidence, part, deviation, coding_cost),
+        ..Candidate::new(behaves_like(part), place(part), random.p_value, gain.min(random.nats_within))
     }
 }
 

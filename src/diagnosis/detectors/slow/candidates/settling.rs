@@ -25,19 +25,12 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
     let Description { id, estimates, statement } = if named { decay(settling, transmitters as f64) } else { pattern(settling) };
     let curve = curve(settling, transmitters, &deviation);
     let reach = (3.0 * settling.loops).ceil() as usize;
+    let place =
+        Place { chirps: named.then(|| (0..reach.min(field.loops) * transmitters).collect()), ..Place::at(Stage::Receiver) };
+    let nats = if named { settling.held_out_nats } else { free.held_out_nats };
     Candidate {
         id,
-        behaves_like: Behaviour::SlowTimeGain,
         estimates,
-        choice: None,
-        place: Place {
-            chirps: named.then(|| (0..reach.min(field.loops) * transmitters).collect()),
-            ..Place::at(Stage::Receiver)
-        },
-        p_value: if named { settling.p_value } else { free.p_value },
-        nats: if named { settling.held_out_nats } else { free.held_out_nats },
-        errs_alike: false,
-        look_alikes: vec![],
         statement,
         curve: Some(curve),
         energy,
@@ -45,6 +38,7 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
             Arc::new(move |cube| undo::gain(cube, |[_, _, index]| 1.0 + deviation(index))),
             Volume::BY_SAMPLE,
         ),
+        ..Candidate::new(Behaviour::SlowTimeGain, place, if named { settling.p_value } else { free.p_value }, nats)
     }
 }
 
