@@ -142,6 +142,14 @@ pub enum Correction {
 }
 
 impl Correction {
+    pub fn samples(undo: impl Fn(&mut Cube) + Send + Sync + 'static) -> Self {
+        Self::Samples(Arc::new(undo))
+    }
+
+    pub fn inverse(volume: Volume, undo: impl Fn(&mut Cube) + Send + Sync + 'static) -> Self {
+        Self::Inverse(Arc::new(undo), volume)
+    }
+
     /// What it changes in the samples.
     pub fn undo(&self) -> Option<&Undo> {
         match self {
@@ -160,6 +168,17 @@ pub struct Curve {
     pub y_label: String,
     /// Name, x, y.
     pub series: Vec<(String, Vec<f64>, Vec<f64>)>,
+}
+
+impl Curve {
+    pub fn new<'a>(
+        title: impl Into<String>,
+        [x_label, y_label]: [&str; 2],
+        series: impl IntoIterator<Item = (&'a str, Vec<f64>, Vec<f64>)>,
+    ) -> Self {
+        let series = series.into_iter().map(|(name, x, y)| (name.into(), x, y)).collect();
+        Self { title: title.into(), x_label: x_label.into(), y_label: y_label.into(), series }
+    }
 }
 
 /// Chance above which numbers may as well be neutral.

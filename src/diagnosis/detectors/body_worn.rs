@@ -150,7 +150,7 @@ fn candidate(
     skin: &[Vec<Template>],
 ) -> Candidate {
     let name = body.parts[found.part].as_str();
-    let noise = evidence.noise().iter().sum::<f64>() / evidence.noise().len().max(1) as f64;
+    let noise = evidence.mean_noise();
     let (samples, weight) = (model.size() as f64, found.weights[LOBES.len()]);
     let start_m = range_and_velocity(&evidence.radar, body.centres[0][found.part].position_m, [0.0; 3]).0.max(0.1);
     // From the peak after two Hann windows to a sample; the body's level is that of all its skin.

@@ -3,11 +3,8 @@
 //! Bits far below the signal's deviation are set half of the time, whatever the signal is (Widrow's theorem of
 //! quantisation). A bit that all channels share out unevenly belongs to the format of the codes and is no finding.
 
-use std::sync::Arc;
-
 use num_complex::Complex64;
 
-use crate::diagnosis::Cube;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::codes::{BITS, Component};
 use crate::diagnosis::evidence::Evidence;
@@ -142,13 +139,13 @@ fn candidate(evidence: &Evidence, component: &Component, bit: usize, share: f64,
         ),
         energy: (share - 0.5).abs() * value * value * (frames * loops * samples) as f64,
         // What the bit was is lost but for its mean: without it, the offset of a stuck bit is no offset of the receiver.
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+        correction: Correction::samples(move |cube| {
             cube.each_chirp(|[_, channel, _], chirp| {
                 if channel == stuck {
                     chirp.iter_mut().for_each(|value| *value -= offset);
                 }
             });
-        })),
+        }),
         ..Candidate::new(Behaviour::Quantisation, place, p_value.max(f64::MIN_POSITIVE), gain)
     }
 }

@@ -19,7 +19,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let words: Vec<String> =
         [along("at", "m", place.range_m), along("at", "m/s", place.velocity_mps), frames].into_iter().flatten().collect();
     let place_words = if words.is_empty() { "everywhere".to_string() } else { words.join(", ") };
-    let noise = evidence.noise().iter().sum::<f64>() / evidence.noise().len().max(1) as f64;
+    let noise = evidence.mean_noise();
     let place = Place { stage: Some(Stage::Propagation), ..place.clone() };
     vec![Candidate {
         statement: format!(

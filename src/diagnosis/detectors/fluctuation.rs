@@ -12,8 +12,6 @@ mod returns;
 mod silhouette;
 mod sinusoid;
 
-use std::sync::Arc;
-
 use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 
@@ -140,19 +138,18 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, nat
             100.0 * rms,
             high - low
         ),
-        curve: Some(Curve {
-            title: format!("Static return {range_m:.2} m away, relative to the others"),
-            x_label: "time, s".into(),
-            y_label: "level, dB".into(),
-            series: vec![("measured".into(), evidence.starts_s.clone(), decibel)],
-        }),
+        curve: Some(Curve::new(
+            format!("Static return {range_m:.2} m away, relative to the others"),
+            ["time, s", "level, dB"],
+            [("measured", evidence.starts_s.clone(), decibel)],
+        )),
         energy: own * square * loops as f64,
-        correction: Correction::Samples(Arc::new(move |cube| {
+        correction: Correction::samples(move |cube| {
             cube.each_chirp(|[frame, channel, _], chirp| {
                 let echo = &echo[channel * samples..][..samples];
                 chirp.iter_mut().zip(echo).for_each(|(value, echo)| *value -= change[frame] * echo);
             });
-        })),
+        }),
         ..Candidate::new(Behaviour::FadingBehindTheBody, place, p_value.max(f64::MIN_POSITIVE), nats)
     }
 }

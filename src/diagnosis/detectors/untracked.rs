@@ -5,16 +5,15 @@
 //! nothing else.
 
 use std::collections::HashSet;
-use std::sync::Arc;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::receiver::wandering;
-use super::region::{CLUTTER_BINS, Region, joined, mean_power, moves, power_gain, remove, run};
+use super::region::{CLUTTER_BINS, Region, joined, mean_power, moves, power_gain, removal, run};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::{Evidence, transform};
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
+use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics;
 use crate::effects::{self, Stage};
 
@@ -142,7 +141,7 @@ impl<'a> Mover<'a> {
     }
 
     fn energy(&self) -> f64 {
-        let noise: f64 = self.evidence.noise().iter().sum();
+        let noise = self.evidence.total_noise();
         self.region.iter().map(|&cell| (self.stretch.at(cell) - 1.0).max(0.0)).sum::<f64>()
             * noise
             * (self.evidence.cube.dims[0] / self.run) as f64
@@ -166,7 +165,6 @@ impl<'a> Mover<'a> {
         let range_m = centre * bin_m;
         let velocity_mps = (top[0] as f64 + stretch.summit(top, [1, 0])) * bin_mps;
         let azimuth = azimuth_deg(evidence, stretch, top);
-        let (cut, training) = (self.cut(), evidence.split.training.clone());
         let direction = azimuth.map_or(String::new(), |(a, _)| format!(", {a:+.0}° to the side"));
         let estimates = azimuth.map_or(vec![], |(a, deviation)| {
             let (s, c) = a.to_radians().sin_cos();
@@ -191,7 +189,7 @@ impl<'a> Mover<'a> {
                  above the noise, and nobody is tracked there."
             ),
             energy: self.energy(),
-            correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, run, cut))),
+            correction: removal(evidence, run, self.cut()),
             ..Candidate::new(Behaviour::PathLike, place, p_value, gain)
         }
     }
@@ -320,7 +318,7 @@ fn azimuth_deg(evidence: &Evidence, stretch: &Stretch, top: Cell) -> Option<(f64
     if power(sine(best)) < 0.5 * total {
         return None;
     }
-    let noise = evidence.noise().iter().sum::<f64>() / channels as f64;
+    let noise = evidence.total_noise() / channels as f64;
     let ratio = (total / channels as f64 / noise).max(1.0);
     let deviation = wavelength / (std::f64::consts::TAU * spread) / (2.0 * ratio).sqrt();
     let azimuth = sine(best).asin();

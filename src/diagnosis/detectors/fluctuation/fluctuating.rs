@@ -5,7 +5,6 @@
 //! judged by how well every frame is predicted by the others.
 
 use std::ops::RangeInclusive;
-use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -148,19 +147,18 @@ fn candidate(
              there, or passes in front of it.",
             if evidence.body.is_some() { ", and the body's silhouette alone does not explain it" } else { "" }
         ),
-        curve: Some(Curve {
-            title: format!("Change {range_m:.2} m away"),
-            x_label: "time, s".into(),
-            y_label: "share of its largest change".into(),
-            series: vec![("predicted by the training frames".into(), evidence.starts_s.clone(), course)],
-        }),
+        curve: Some(Curve::new(
+            format!("Change {range_m:.2} m away"),
+            ["time, s", "share of its largest change"],
+            [("predicted by the training frames", evidence.starts_s.clone(), course)],
+        )),
         energy: fluctuations.iter().map(power).sum::<f64>() * loops as f64,
-        correction: Correction::Samples(Arc::new(move |cube| {
+        correction: Correction::samples(move |cube| {
             cube.each_chirp(|[frame, channel, _], chirp| {
                 let fluctuation = &fluctuations[frame][channel * samples..][..samples];
                 chirp.iter_mut().zip(fluctuation).for_each(|(value, change)| *value -= change);
             });
-        })),
+        }),
         ..Candidate::new(Behaviour::ChangingAtOneRange, place, change.p_value.max(f64::MIN_POSITIVE), gain)
     }
 }

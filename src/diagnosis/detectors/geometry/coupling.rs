@@ -1,7 +1,5 @@
 //! Mutual coupling of neighbouring receivers: the inner ones have two neighbours, the outer ones one.
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
@@ -147,7 +145,7 @@ fn candidate(evidence: &Evidence, strength: Complex64, found: &Estimated) -> Can
 fn uncoupled(receivers: usize, coupling: Coupling) -> Correction {
     // Of the real and the imaginary part.
     let stretched = alone(receivers, coupling).map_or(0.0, |inverse| 2.0 * inverse.determinant().norm().ln() / receivers as f64);
-    Correction::Inverse(Arc::new(move |cube| undo(cube, coupling)), Volume { alike: stretched, ..Volume::KEPT })
+    Correction::inverse(Volume { alike: stretched, ..Volume::KEPT }, move |cube| undo(cube, coupling))
 }
 
 /// Solves for the signals without coupling.

@@ -5,8 +5,6 @@
 //! power model does not know shifts the body by up to 4 mm and 1.4 ms (practice recordings without any such effect, which also
 //! helped to choose the lobes and these floors): a change must exceed these floors, frame after frame.
 
-use std::sync::Arc;
-
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::change::{Change, Moves, frame_period_s};
@@ -15,8 +13,9 @@ use super::lost::{is_step, lost_frames, predicted, ratio_p_value, step_p_value};
 use super::replica;
 use super::trial::{Score, Trial};
 use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::detectors::clutter::energy_beyond_noise;
 use crate::diagnosis::detectors::description::Description;
-use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};
+use crate::diagnosis::{Candidate, Estimate, Place};
 use crate::effects::{Stage, clock_drift, clock_offset, frame_drop, pose_offset, range_bias, slope_error};
 
 /// Errors of the prediction that are no finding: metres of range, seconds.
@@ -289,16 +288,11 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
         errs_alike: true,
         look_alikes: if id.is_some() { look_alikes } else { vec![] },
         statement,
-        energy: energy(evidence),
-        correction: Correction::Body(Arc::new(move |body| moves.apply(body, change))),
+        // All that moves is misplaced.
+        energy: energy_beyond_noise(evidence),
+        correction: moves.correction(change),
         ..Candidate::new(behaves_like(stage), place, p_value, nats)
     }
-}
-
-/// Energy that is misplaced: all that moves.
-fn energy(evidence: &Evidence) -> f64 {
-    let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
-    total * evidence.noise().iter().sum::<f64>()
 }
 
 /// "3.0 mm nearer".

@@ -4,7 +4,6 @@
 //! difference of gain, cannot be.
 
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -117,14 +116,11 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
         estimates: if id.is_some() { estimates } else { vec![] },
         errs_alike: true,
         energy,
-        correction: Correction::Inverse(
-            Arc::new(move |cube| {
-                cube.each_chirp(|[_, channel, _], samples| {
-                    samples.iter_mut().for_each(|value| *value *= inverse[channel % receivers]);
-                });
-            }),
-            Volume::BY_SAMPLE,
-        ),
+        correction: Correction::inverse(Volume::BY_SAMPLE, move |cube| {
+            cube.each_chirp(|[_, channel, _], samples| {
+                samples.iter_mut().for_each(|value| *value *= inverse[channel % receivers]);
+            });
+        }),
         ..Candidate::new(Behaviour::ChannelGain, place, p_value, nats)
     }
 }

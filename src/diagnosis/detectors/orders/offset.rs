@@ -3,8 +3,6 @@
 //! A leakage over the board may not turn either. It has a delay, though, of the way between the nearest antennas at least: where the
 //! beat frequency of what does not turn is surely lower than that, it is a constant.
 
-use std::sync::Arc;
-
 use num_complex::Complex64;
 
 use super::fit::{Fit, against};
@@ -50,7 +48,7 @@ pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
             offsets.iter().map(|d| format!("{:.1}", d.norm())).collect::<Vec<_>>().join(", ")
         ),
         energy: offsets.iter().map(|d| d.norm_sqr()).sum::<f64>() * (frames * tx * loops * samples) as f64,
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| subtract(cube, &course.turned, &constant))),
+        correction: Correction::samples(move |cube| subtract(cube, &course.turned, &constant)),
         ..Candidate::new(Behaviour::AdditiveFastTime, place, p_value, nats)
     })
 }

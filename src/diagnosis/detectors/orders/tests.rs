@@ -30,13 +30,13 @@ fn turned(seed: u64, offset: Complex64) -> Evidence {
     let [_, tx, _, loops, _] = evidence.cube.dims;
     let turned: Vec<Complex64> = (0..FRAMES * tx * loops).map(|i| Complex64::cis(course(i / (tx * loops)))).collect();
     let known = turned.clone();
-    let undo = Correction::Samples(Arc::new(move |cube: &mut crate::diagnosis::Cube| {
+    let undo = Correction::samples(move |cube: &mut crate::diagnosis::Cube| {
         let [_, tx, rx, loops, _] = cube.dims;
         cube.each_chirp(|[frame, channel, index], chirp| {
             let back = known[frame * tx * loops + channel / rx * loops + index].conj();
             chirp.iter_mut().for_each(|value| *value *= back);
         });
-    }));
+    });
     after(evidence, Correction::Followed(Box::new(undo), Arc::new(Course { of: Of::All, turned })))
 }
 

@@ -2,8 +2,6 @@
 //! harmonic of a receiver, which doubles the phase of every receiver where the second trip has that of one arrival.
 //! Both lie at the sum of two ranges and two velocities; the measurement without its noise is the best template of either.
 
-use std::sync::Arc;
-
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -113,7 +111,7 @@ impl Product {
             look_alikes,
             statement,
             energy: self.energy,
-            correction: Correction::Inverse(Arc::new(move |cube: &mut Cube| remove(cube, kind, factor)), volume),
+            correction: Correction::inverse(volume, move |cube| remove(cube, kind, factor)),
             ..Candidate::new(behaves_like, Place::at(stage), p_value, self.fit.held_out)
         }
     }

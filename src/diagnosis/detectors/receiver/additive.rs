@@ -7,13 +7,12 @@
 
 use num_complex::Complex64;
 
-use super::additive_term::{Chosen, is_bent, subtract};
+use super::additive_term::{Chosen, added, is_bent};
 use super::elements::{Element, Images, choose, templates};
 use super::field::{Field, Fitted, add};
 use super::response;
 use super::support::{UNLIKELY, energy};
 use crate::diagnosis::Evidence;
-use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Place};
 use crate::diagnosis::statistics::chi2_tail;
 use crate::effects::Stage;
@@ -91,9 +90,7 @@ fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, nats: f64) -> O
              {power_db:.1} dB to all static clutter; no effect of the library explains its shape",
             field.support.low_m, field.support.high_m
         ),
-        energy: energy_of_chirp * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
-        correction: subtract(term),
-        ..Candidate::new(Behaviour::AdditiveFastTime, Place::at(Stage::Receiver), p_value, nats)
+        ..added(evidence, term, Place::at(Stage::Receiver), p_value, nats)
     })
 }
 

@@ -1,7 +1,6 @@
 //! An element of a static additive field as a candidate: what it adds to every chirp, its numbers, and what is said of it.
 
 use std::ops::Range;
-use std::sync::Arc;
 
 use num_complex::Complex64;
 
@@ -12,7 +11,7 @@ use super::zero_beat::shortest_m;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
-use crate::diagnosis::{Cube, Evidence, denoised};
+use crate::diagnosis::{Evidence, denoised};
 use crate::effects::{self, Stage};
 
 /// Half the size of a board.
@@ -61,15 +60,7 @@ impl Chosen<'_> {
             Element::Start(count) | Element::End(count) => term.edge(field, count, matches!(element, Element::End(_))),
             Element::Image | Element::Square => return None,
         };
-        let [frames, _, _, loops, _] = evidence.cube.dims;
-        Some(Candidate {
-            id,
-            estimates,
-            statement,
-            energy: term.chirps.iter().map(|chirp| energy(chirp)).sum::<f64>() * (frames * loops) as f64,
-            correction: subtract(term.chirps),
-            ..Candidate::new(Behaviour::AdditiveFastTime, place, p_value, nats)
-        })
+        Some(Candidate { id, estimates, statement, ..added(evidence, term.chirps, place, p_value, nats) })
     }
 
     /// The elements that are one with this one, and all others.
@@ -248,11 +239,17 @@ pub fn is_bent(evidence: &Evidence) -> bool {
     evidence.accepted.contains(&effects::adc_saturation::ID)
 }
 
-/// Subtracts a static term from every chirp of its channel.
-pub fn subtract(term: Vec<Vec<Complex64>>) -> Correction {
-    Correction::Samples(Arc::new(move |cube: &mut Cube| {
-        cube.each_chirp(|[_, channel, _], chirp| chirp.iter_mut().zip(&term[channel]).for_each(|(value, term)| *value -= term));
-    }))
+/// A static term that nobody has named yet: its energy, and that it is subtracted from every chirp of its channel.
+pub fn added(evidence: &Evidence, term: Vec<Vec<Complex64>>, place: Place, p_value: f64, nats: f64) -> Candidate {
+    Candidate {
+        energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * evidence.cube.chirps(),
+        correction: Correction::samples(move |cube| {
+            cube.each_chirp(|[_, channel, _], chirp| {
+                chirp.iter_mut().zip(&term[channel]).for_each(|(value, term)| *value -= term);
+            });
+        }),
+        ..Candidate::new(Behaviour::AdditiveFastTime, place, p_value, nats)
+    }
 }
 
 /// A number with three significant digits.

@@ -77,7 +77,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         look_alikes,
         statement,
         energy: removed,
-        correction: Correction::Inverse(Arc::new(move |cube: &mut Cube| repair_all(cube, &bursts)), volume),
+        correction: Correction::inverse(volume, move |cube| repair_all(cube, &bursts)),
         ..Candidate::new(Behaviour::SparseAdditive, place, p_value, nats)
     }]
 }

@@ -114,7 +114,7 @@ fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
         // That a sample lies beyond the clipping level is likelier than any one value there: the density of what is restored is a bound.
         Some(declip) => {
             let restore = move |cube: &mut Cube| cube.each_chirp(|_, chirp| declip.restore(chirp));
-            Correction::Inverse(Arc::new(restore), Volume::KEPT)
+            Correction::inverse(Volume::KEPT, restore)
         }
         None => Correction::None,
     };

@@ -84,15 +84,14 @@ impl Powers {
 
     fn curve(&self, fit: &Fit) -> Curve {
         let Self { hertz, found, .. } = self;
-        Curve {
-            title: "Noise over beat frequency".into(),
-            x_label: "beat frequency, Hz".into(),
-            y_label: "power over the median, dB".into(),
-            series: vec![
-                ("measured".into(), hertz.clone(), found.iter().map(|p| 10.0 * p.max(1e-12).log10()).collect()),
-                ("fitted".into(), hertz.clone(), fit.shape.iter().map(|s| 10.0 * (fit.level * s).log10()).collect()),
+        Curve::new(
+            "Noise over beat frequency",
+            ["beat frequency, Hz", "power over the median, dB"],
+            [
+                ("measured", hertz.clone(), found.iter().map(|p| 10.0 * p.max(1e-12).log10()).collect()),
+                ("fitted", hertz.clone(), fit.shape.iter().map(|s| 10.0 * (fit.level * s).log10()).collect()),
             ],
-        }
+        )
     }
 }
 
@@ -161,7 +160,7 @@ struct Evident {
 /// Beyond the noise's level.
 fn energy(evidence: &Evidence, powers: &Powers, fit: &Fit) -> f64 {
     let excess = powers.found.iter().sum::<f64>() / powers.found.len() as f64 / fit.level - 1.0;
-    let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
+    let noise = evidence.mean_noise();
     excess.max(0.0) * fit.level * noise * evidence.cube.samples.len() as f64
 }
 

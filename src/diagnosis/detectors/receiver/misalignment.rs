@@ -7,7 +7,6 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::Arc;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -80,9 +79,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             if most > 0 { "later" } else { "earlier" }
         ),
         energy: changed,
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-            cube.each_chirp(|[frame, ..], chirp| turn(chirp, late[frame]))
-        })),
+        correction: Correction::samples(move |cube| cube.each_chirp(|[frame, ..], chirp| turn(chirp, late[frame]))),
         ..Candidate::new(Behaviour::SlippedSamples, Place { frames: Some(slipped), ..Place::at(Stage::Receiver) }, p_value, nats)
     }]
 }

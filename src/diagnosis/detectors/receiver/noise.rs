@@ -222,7 +222,7 @@ fn shared_noise(evidence: &Evidence, correlation: &Correlation, nats: f64) -> Ca
     let &Correlation { alike, rho, p_value, products, .. } = correlation;
     let error = (2.0 * products).sqrt().recip() + 0.02 * rho;
     let over = if alike { "mean" } else { "root mean square" };
-    let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
+    let noise = evidence.mean_noise();
     // That receivers share something is observed; the library says what.
     let id = evidence.info(effects::correlated_noise::ID).map(|info| info.id);
     Candidate {

@@ -1,20 +1,17 @@
 //! Receiver fields of recordings whose room is unknown, or without quadrature: an offset, a leakage that dwarfs what is
 //! near, a transient that dwarfs the whole chirp. Without a room, only what stands out by its shape can be named.
 
-use std::sync::Arc;
-
 use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::additive_term::subtract;
-use super::support::{energy, range_m, ranges_m, tone};
+use super::additive_term::added;
+use super::support::{range_m, ranges_m, tone};
 use super::zero_beat::ZeroBeat;
-use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
-use crate::diagnosis::{Cube, Evidence, denoised};
+use crate::diagnosis::{Evidence, denoised};
 use crate::effects::{self, Stage};
 
 /// A leakage's cluster of returns ends here.
@@ -117,12 +114,11 @@ fn edge(evidence: &Evidence, clutter: &[Vec<Complex64>], at_end: bool) -> Option
             10.0 * (wildest / largest).log10(),
             if at_end { "end" } else { "beginning" },
         ),
-        energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
         // They change from chirp to chirp too and hold nothing that can be used.
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+        correction: Correction::samples(move |cube| {
             cube.each_chirp(|_, chirp| affected.iter().for_each(|&n| chirp[n] = Complex64::ZERO));
-        })),
-        ..Candidate::new(Behaviour::AdditiveFastTime, place, p_value, nats)
+        }),
+        ..added(evidence, term, place, p_value, nats)
     })
 }
 
@@ -163,9 +159,7 @@ fn offset(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Candidate> 
             values.iter().fold(0.0f64, |a, &b| a.max(b)) - values.iter().fold(f64::INFINITY, |a, &b| a.min(b)),
             smallest / swing.max(1e-300)
         ),
-        energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
-        correction: subtract(term),
-        ..Candidate::new(Behaviour::AdditiveFastTime, place, p_value, nats)
+        ..added(evidence, term, place, p_value, nats)
     })
 }
 
@@ -203,8 +197,7 @@ impl Near {
         let valley_end = (2.5 * NEAR_M / bin_m) as usize;
         let valley = (peak..valley_end.min(last)).min_by(|&a, &b| mean[a].total_cmp(&mean[b]))?;
         let far = best(valley..last)?;
-        let white =
-            evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64 / (loops * evidence.split.training.len()) as f64;
+        let white = evidence.mean_noise() / (loops * evidence.split.training.len()) as f64;
         let found = Self { spectra, mean, peak, valley, far, last, bin_m, white };
         let [at_peak, at_far] = [peak, far].map(|bin| found.mean[bin]);
         let weak = found.depth_db() < VALLEY_DB || at_peak < 0.1 * at_far || decibels(found.over_noise(peak)) < 20.0;
@@ -301,9 +294,7 @@ fn leakage(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Candidate>
             near.far as f64 * near.bin_m,
             if id.is_some() { ": the transmitters leak into the receivers" } else { "" },
         ),
-        energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * loops) as f64,
-        correction: subtract(term),
-        ..Candidate::new(Behaviour::AdditiveFastTime, place, p_value, nats)
+        ..added(evidence, term, place, p_value, nats)
     })
 }
 

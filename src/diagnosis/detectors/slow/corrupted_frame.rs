@@ -4,12 +4,9 @@
 //! range by range; so the odd one stands out from its frame's other channels, by more than any other does. A frame is
 //! all there is of it, so its even chirps propose and its odd chirps judge.
 
-use std::sync::Arc;
-
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::diagnosis::Cube;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::halves;
 use crate::diagnosis::evidence::{Evidence, spectrum};
@@ -156,11 +153,11 @@ impl Odd {
                 ratio
             ),
             energy,
-            correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+            correction: Correction::samples(move |cube| {
                 for chirp in cube.samples[start..start + size].chunks_exact_mut(change.len()) {
                     chirp.iter_mut().zip(&change).for_each(|(value, change)| *value -= change);
                 }
-            })),
+            }),
             ..Candidate::new(Behaviour::SingleFrame, place, p_value, self.gain(evidence))
         }
     }

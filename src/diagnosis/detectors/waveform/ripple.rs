@@ -5,7 +5,6 @@
 //! can be: nearer and farther than the room in the static Doppler cells, than the body in the others.
 
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
 
 use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
@@ -145,16 +144,15 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
         return None;
     }
     let bin_hz = radar.sample_rate_hz / samples as f64;
-    let curve = Curve {
-        title: "Paired echoes by their distance from the return".into(),
-        x_label: "beat frequency offset, kHz".into(),
-        y_label: "log-likelihood gained, nats".into(),
-        series: vec![(
-            "training frames".into(),
+    let curve = Curve::new(
+        "Paired echoes by their distance from the return",
+        ["beat frequency offset, kHz", "log-likelihood gained, nats"],
+        [(
+            "training frames",
             shifts.iter().map(|s| 1e-3 * *s as f64 * bin_hz / PADDING as f64).collect(),
             scores.iter().map(|s| s / scale).collect(),
         )],
-    };
+    );
     Some(pair.candidate(evidence, p_value, nats, curve))
 }
 
@@ -223,7 +221,7 @@ impl Pair {
             ),
             curve: Some(curve),
             energy: clutter_energy * chirps * 2.0 * (stated * stated),
-            correction: Correction::Samples(Arc::new(move |cube| undo(cube, &radar_copy, alpha, turned_hz))),
+            correction: Correction::samples(move |cube| undo(cube, &radar_copy, alpha, turned_hz)),
             ..Candidate::new(Behaviour::DelayProportionalPhase, Place::at(Stage::Waveform), p_value, nats)
         }
     }

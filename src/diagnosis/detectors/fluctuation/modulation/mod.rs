@@ -10,7 +10,6 @@ mod line;
 mod waves;
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -77,7 +76,7 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, nats: f64) -> Option<Ca
     let (patch, means) = (chirps.patch(&sinusoid, line), sinusoid.means);
     let waves = chirps.waves(&sinusoid, &patch);
     let [near_m, far_m] = [patch.start(), patch.end()].map(|bin| *bin as f64 * bin_m);
-    let chirp_count = (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
+    let chirp_count = evidence.cube.chirps();
     let energy = waves.iter().flat_map(Grid::values).map(|value| value.norm_sqr()).sum::<f64>() * 0.5 * chirp_count;
     let (starts_s, loop_s, frequency_hz) = (evidence.starts_s.clone(), evidence.radar.loop_period_s(), line.frequency_hz);
     let frame_rate_hz = 1.0 / evidence.radar.frame_period_s;
@@ -89,7 +88,7 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, nats: f64) -> Option<Ca
              a machine is there."
         ),
         energy,
-        correction: Correction::Samples(Arc::new(move |cube| {
+        correction: Correction::samples(move |cube| {
             cube.each_chirp(|[frame, channel, index], chirp| {
                 let (sine, cosine) = (TAU * frequency_hz * (starts_s[frame] + index as f64 * loop_s)).sin_cos();
                 let [with_cosine, with_sine] = [0, 1].map(|part| waves[part].below([channel]));
@@ -97,7 +96,7 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, nats: f64) -> Option<Ca
                     *value -= a * (cosine - means[0]) + b * (sine - means[1]);
                 }
             });
-        })),
+        }),
         ..Candidate::new(Behaviour::Modulated, place, p_value.max(f64::MIN_POSITIVE), nats)
     })
 }

@@ -77,10 +77,9 @@ fn curve(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -> Curve
         Part::Delay => ("phase at 3 m, rad", stated_delay_s()),
     };
     let frames: Vec<f64> = (0..field.frames).map(|f| evidence.starts_s[f]).collect();
-    Curve {
-        title: "Static returns from frame to frame".into(),
-        x_label: "time, s".into(),
-        y_label: unit.into(),
-        series: vec![("fitted".into(), frames, (0..field.frames).map(|f| factor * drift.value(f)).collect())],
-    }
+    Curve::new(
+        "Static returns from frame to frame",
+        ["time, s", unit],
+        [("fitted", frames, (0..field.frames).map(|f| factor * drift.value(f)).collect())],
+    )
 }

@@ -34,10 +34,7 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
         statement,
         curve: Some(curve),
         energy,
-        correction: Correction::Inverse(
-            Arc::new(move |cube| undo::gain(cube, |[_, _, index]| 1.0 + deviation(index))),
-            Volume::BY_SAMPLE,
-        ),
+        correction: Correction::inverse(Volume::BY_SAMPLE, move |cube| undo::gain(cube, |[_, _, index]| 1.0 + deviation(index))),
         ..Candidate::new(Behaviour::SlowTimeGain, place, if named { settling.p_value } else { free.p_value }, nats)
     }
 }
@@ -88,13 +85,12 @@ fn pattern(settling: &Settling) -> Description {
 fn curve(settling: &Settling, transmitters: usize, deviation: &OfLoop) -> Curve {
     let values = &settling.free.values;
     let x: Vec<f64> = (0..values.len()).map(|i| i as f64 * transmitters as f64).collect();
-    Curve {
-        title: "Gain of the static returns within a frame".into(),
-        x_label: "chirp".into(),
-        y_label: "gain relative to its mean".into(),
-        series: vec![
-            ("measured".into(), x.clone(), values.iter().map(|v| v.re).collect()),
-            ("fitted".into(), x, (0..values.len()).map(|i| deviation(i).re).collect()),
+    Curve::new(
+        "Gain of the static returns within a frame",
+        ["chirp", "gain relative to its mean"],
+        [
+            ("measured", x.clone(), values.iter().map(|v| v.re).collect()),
+            ("fitted", x, (0..values.len()).map(|i| deviation(i).re).collect()),
         ],
-    }
+    )
 }
