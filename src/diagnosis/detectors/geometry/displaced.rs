@@ -273,7 +273,7 @@ fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> Description {
 
 fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, nats: f64) -> Candidate {
     let (evidence, change) = (trial.evidence, fit.score.change);
-    let Description { id, estimates, statement } = described(trial, fit, deviation(trial, fit).hypot(SCENE * fit.floor));
+    let description = described(trial, fit, deviation(trial, fit).hypot(SCENE * fit.floor));
     let stage = stage(change);
     let place = match change {
         Change::Drop { at, .. } => Place { frames: Some((at..evidence.cube.dims[0]).collect()), ..Place::at(stage) },
@@ -282,16 +282,13 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
     };
     let moves = Moves::new(evidence.radar.centre_m());
     Candidate {
-        id,
-        estimates,
         choice: place.boundary.clone(),
         errs_alike: true,
-        look_alikes: if id.is_some() { look_alikes } else { vec![] },
-        statement,
+        look_alikes: if description.id.is_some() { look_alikes } else { vec![] },
         // All that moves is misplaced.
         energy: energy_beyond_noise(evidence),
         correction: moves.correction(change),
-        ..Candidate::new(behaves_like(stage), place, p_value, nats)
+        ..description.candidate(behaves_like(stage), place, p_value, nats)
     }
 }
 

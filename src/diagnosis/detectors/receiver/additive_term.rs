@@ -208,18 +208,14 @@ impl Term {
         let (channels, samples) = (self.chirps.len(), self.chirps[0].len());
         let scene = (field.clutter.iter().map(|chirp| energy(chirp)).sum::<f64>() / (channels * samples) as f64).sqrt();
         let level_deviation = denoised::PEAK_DB.hypot(8.7 * 0.7 * scene / (self.level * (channels as f64).sqrt()));
+        let (number, words) = counted(count, at_end);
         Claim {
             id: Some(effects::ramp_edge_transient::ID),
-            estimates: vec![
-                Estimate { name: "samples", values: vec![count as f64], ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]] },
-                Estimate::normal("level_db", self.level_db, level_deviation),
-            ],
+            estimates: vec![number, Estimate::normal("level_db", self.level_db, level_deviation)],
             place: Place { samples: Some(edge(samples, count, at_end).collect()), ..Place::at(Stage::Receiver) },
             statement: format!(
-                "the {} {} of every chirp hold{} a value that is added and never changes, up to {} codes \
+                "{words} of every chirp hold{} a value that is added and never changes, up to {} codes \
                  ({:.1} dB relative to the signal's peak sample): the ADC runs into the {} of the ramp",
-                if at_end { "last" } else { "first" },
-                if count == 1 { "sample".into() } else { format!("{count} samples") },
                 if count == 1 { "s" } else { "" },
                 digits(self.largest),
                 self.level_db,
@@ -230,8 +226,16 @@ impl Term {
 }
 
 /// Samples at the beginning or the end of a chirp.
-fn edge(samples: usize, count: usize, at_end: bool) -> Range<usize> {
+pub fn edge(samples: usize, count: usize, at_end: bool) -> Range<usize> {
     if at_end { samples - count..samples } else { 0..count }
+}
+
+/// How many these are, and which, in words.
+pub fn counted(count: usize, at_end: bool) -> (Estimate, String) {
+    let middle = count as f64;
+    let number = Estimate { name: "samples", values: vec![middle], ci90: vec![[middle - 0.5, middle + 0.5]] };
+    let samples = if count == 1 { "sample".into() } else { format!("{count} samples") };
+    (number, format!("the {} {samples}", if at_end { "last" } else { "first" }))
 }
 
 /// An ADC that clips distorts everything; the residual has no shape of its own, least of all a filter's.

@@ -69,16 +69,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if nats <= 0.0 {
         return vec![];
     }
-    let (Description { id, estimates, statement }, look_alikes, place) = claim(evidence, &bursts, hit, crossings.as_ref());
+    let (description, look_alikes, place) = claim(evidence, &bursts, hit, crossings.as_ref());
     let volume = Volume { of_samples: Some(Arc::new(spread(evidence, &bursts, &powers))), ..Volume::KEPT };
     vec![Candidate {
-        id,
-        estimates,
         look_alikes,
-        statement,
         energy: removed,
         correction: Correction::inverse(volume, move |cube| repair_all(cube, &bursts)),
-        ..Candidate::new(Behaviour::SparseAdditive, place, p_value, nats)
+        ..description.candidate(Behaviour::SparseAdditive, place, p_value, nats)
     }]
 }
 

@@ -5,7 +5,7 @@ use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::additive_term::added;
+use super::additive_term::{self, added, counted};
 use super::support::{range_m, ranges_m, tone};
 use super::zero_beat::ZeroBeat;
 use crate::diagnosis::evidence::hann;
@@ -86,29 +86,23 @@ fn edge(evidence: &Evidence, clutter: &[Vec<Complex64>], at_end: bool) -> Option
         return None;
     }
     let wildest = (0..count).map(|i| power[at(i)]).fold(0.0, f64::max);
-    let indices: Vec<usize> = if at_end { (samples - count..samples).collect() } else { (0..count).collect() };
+    let affected = additive_term::edge(samples, count, at_end);
     let term: Vec<Vec<Complex64>> = clutter
         .iter()
-        .map(|chirp| (0..samples).map(|n| if indices.contains(&n) { chirp[n] } else { Complex64::ZERO }).collect())
+        .map(|chirp| (0..samples).map(|n| if affected.contains(&n) { chirp[n] } else { Complex64::ZERO }).collect())
         .collect();
-    let inner = if at_end { samples - count..samples } else { 0..count };
-    let peak = denoised::peak_beside(evidence, |_, n| (!inner.contains(&n)).then_some(Complex64::ZERO));
+    let peak = denoised::peak_beside(evidence, |_, n| (!affected.contains(&n)).then_some(Complex64::ZERO));
     let level_db = 20.0 * (wildest.sqrt() / peak.max(1e-300)).log10();
-    let affected = indices.clone();
+    let (number, words) = counted(count, at_end);
     let p_value = corrected((-wildest / mean.max(1e-300)).exp(), samples as f64);
-    let place = Place { samples: Some(indices), ..Place::at(Stage::Receiver) };
+    let place = Place { samples: Some(affected.clone().collect()), ..Place::at(Stage::Receiver) };
     let nats = gain(evidence, &term);
     Some(Candidate {
         id: Some(effects::ramp_edge_transient::ID),
-        estimates: vec![
-            Estimate { name: "samples", values: vec![count as f64], ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]] },
-            Estimate::normal("level_db", level_db, 8.7 * (mean / wildest).sqrt() + 0.3),
-        ],
+        estimates: vec![number, Estimate::normal("level_db", level_db, 8.7 * (mean / wildest).sqrt() + 0.3)],
         statement: format!(
-            "the {} {} of every chirp jump{} to {:.0} codes, {:.0} dB above the strongest sample in between, \
+            "{words} of every chirp jump{} to {:.0} codes, {:.0} dB above the strongest sample in between, \
              in all channels: the ADC runs into the {} of the ramp",
-            if at_end { "last" } else { "first" },
-            if count == 1 { "sample".into() } else { format!("{count} samples") },
             if count == 1 { "s" } else { "" },
             wildest.sqrt(),
             10.0 * (wildest / largest).log10(),
@@ -116,7 +110,7 @@ fn edge(evidence: &Evidence, clutter: &[Vec<Complex64>], at_end: bool) -> Option
         ),
         // They change from chirp to chirp too and hold nothing that can be used.
         correction: Correction::samples(move |cube| {
-            cube.each_chirp(|_, chirp| affected.iter().for_each(|&n| chirp[n] = Complex64::ZERO));
+            cube.each_chirp(|_, chirp| chirp[affected.clone()].fill(Complex64::ZERO));
         }),
         ..added(evidence, term, place, p_value, nats)
     })

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::Cube;
+use crate::diagnosis::detectors::undo::delays_s;
 use crate::diagnosis::evidence::{Evidence, blackman_harris, hann};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
 use crate::diagnosis::statistics;
@@ -292,15 +293,12 @@ fn undo(cube: &mut Cube, radar: &Radar, alpha: Complex64, ripple_hz: f64) {
     let count = cube.dims[4];
     let mut planner = FftPlanner::new();
     let (forward, inverse) = (planner.plan_fft_forward(count), planner.plan_fft_inverse(count));
-    let delay_of_bin = radar.sample_rate_hz / (count as f64 * radar.slope_hz_per_s);
+    let delays_s: Vec<f64> = delays_s(radar, count).collect();
     let sample_s = 1.0 / radar.sample_rate_hz;
     cube.each_chirp(|_, samples| {
         let mut delayed = samples.to_vec();
         forward.process(&mut delayed);
-        for (bin, value) in delayed.iter_mut().enumerate() {
-            let delay = if bin >= count - count / 8 { bin as f64 - count as f64 } else { bin as f64 };
-            *value *= delay * delay_of_bin / count as f64;
-        }
+        delayed.iter_mut().zip(&delays_s).for_each(|(value, delay_s)| *value *= delay_s / count as f64);
         inverse.process(&mut delayed);
         for (n, (value, delayed)) in samples.iter_mut().zip(delayed).enumerate() {
             let turn = alpha * Complex64::cis(TAU * ripple_hz * sample_s * n as f64);

@@ -13,7 +13,7 @@ use crate::effects;
 pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -> Candidate {
     let shape = drift.clone();
     let deviation: Deviation = Arc::new(move |[frame, _, _]| shape.value(frame));
-    let Description { id, estimates, statement } = describe(evidence, field, part, drift);
+    let description = describe(evidence, field, part, drift);
     let place = Place {
         frames: match drift.shape {
             Shape::Step(_, at) => Some((at..field.frames).collect()),
@@ -22,13 +22,10 @@ pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -
         ..place(part)
     };
     Candidate {
-        id,
-        estimates,
-        statement,
         curve: Some(curve(evidence, field, part, drift)),
         energy: energy(evidence, field, part, &*deviation),
         correction: correction(evidence, part, deviation, 0.0),
-        ..Candidate::new(behaves_like(part), place, drift.p_value, drift.held_out_nats)
+        ..description.candidate(behaves_like(part), place, drift.p_value, drift.held_out_nats)
     }
 }
 

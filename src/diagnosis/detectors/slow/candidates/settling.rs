@@ -22,20 +22,17 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
     let deviation = deviation(settling, named);
     let square: f64 = (0..field.loops).map(|i| deviation(i).norm_sqr()).sum::<f64>() * field.frames as f64;
     let energy = square * evidence.clutter().iter().map(|v| v.norm_sqr()).sum::<f64>();
-    let Description { id, estimates, statement } = if named { decay(settling, transmitters as f64) } else { pattern(settling) };
+    let description = if named { decay(settling, transmitters as f64) } else { pattern(settling) };
     let curve = curve(settling, transmitters, &deviation);
     let reach = (3.0 * settling.loops).ceil() as usize;
     let place =
         Place { chirps: named.then(|| (0..reach.min(field.loops) * transmitters).collect()), ..Place::at(Stage::Receiver) };
     let nats = if named { settling.held_out_nats } else { free.held_out_nats };
     Candidate {
-        id,
-        estimates,
-        statement,
         curve: Some(curve),
         energy,
         correction: Correction::inverse(Volume::BY_SAMPLE, move |cube| undo::gain(cube, |[_, _, index]| 1.0 + deviation(index))),
-        ..Candidate::new(Behaviour::SlowTimeGain, place, if named { settling.p_value } else { free.p_value }, nats)
+        ..description.candidate(Behaviour::SlowTimeGain, place, if named { settling.p_value } else { free.p_value }, nats)
     }
 }
 
