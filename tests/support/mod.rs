@@ -12,6 +12,9 @@ use std::sync::{Mutex, PoisonError};
 
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{DType, Device, Tensor, TensorData};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 pub use gradients::*;
 
@@ -92,6 +95,12 @@ pub fn numbers(seed: u64, count: usize, low: f64, high: f64) -> Vec<f64> {
         next();
     }
     (0..count).map(|_| low + (high - low) * next()).collect()
+}
+
+/// Numbers of the standard normal distribution, the same in every run.
+pub fn normal(seed: u64) -> impl FnMut() -> f64 {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    move || StandardNormal.sample(&mut random)
 }
 
 /// splitmix64's uniform numbers in 0 .. 1, for what other programs draw too.

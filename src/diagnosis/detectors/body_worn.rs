@@ -260,7 +260,7 @@ mod tests {
             *value += Complex64::from_polar((-2.0 * (1.0 - between(0.0, 1.0)).ln()).sqrt(), between(0.0, TAU));
         }
         let parts = PARTS.iter().map(|part| part.0.into()).collect();
-        let body = BodyPrediction { parts, frames, centres, middle_s, tracks: vec![], beyond: vec![], echoes: vec![] };
+        let body = BodyPrediction { parts, frames, centres, middle_s, ..BodyPrediction::default() };
         Evidence::new(Loaded::of_samples(radar, values, [-1e3, 1e3]), None, Some(body))
     }
 

@@ -153,21 +153,18 @@ fn candidate(evidence: &Evidence, component: &Component, bit: usize, share: f64,
 #[cfg(test)]
 mod tests {
     use num_complex::Complex64;
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
     use crate::diagnosis::cube::Loaded;
     use crate::radar::Radar;
+    use crate::support;
 
     /// A static tone in noise as codes, changed by channel.
     fn evidence(change: impl Fn(usize, i64) -> i64) -> Evidence {
         let mut radar = Radar::small(8);
         (radar.loops_per_frame, radar.samples_per_chirp) = (16, 64);
         let dims = radar.dims();
-        let mut random = ChaCha8Rng::seed_from_u64(3);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let mut normal = support::normal(3);
         let block = 16 * 64;
         let samples = (0..dims.iter().product::<usize>())
             .map(|i| {

@@ -328,13 +328,10 @@ fn azimuth_deg(evidence: &Evidence, stretch: &Stretch, top: Cell) -> Option<(f64
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
     use crate::diagnosis::cube::{Cube, Loaded, Split};
     use crate::radar::Radar;
+    use crate::support;
 
     /// Four blocks of one long frame; movers as (range bin, Doppler bin of the long frame, sine of the azimuth, amplitude).
     fn evidence(movers: &[(f64, f64, f64, f64)]) -> Evidence {
@@ -345,8 +342,7 @@ mod tests {
         radar.frame_period_s = loops as f64 * radar.loop_period_s();
         let dims = radar.dims();
         let wavelength = radar.wavelength_m();
-        let mut random = ChaCha8Rng::seed_from_u64(3);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let mut normal = support::normal(3);
         let mut values = vec![];
         for (frame, tx, rx) in (0..blocks).flat_map(|f| (0..dims[1]).flat_map(move |t| (0..dims[2]).map(move |r| (f, t, r)))) {
             let across = radar.tx_m[tx][0] + radar.rx_m[rx][0];

@@ -143,13 +143,11 @@ mod tests {
             Track::new(time, nodes.to_vec(), nodes.iter().map(step).collect())
         };
         BodyPrediction {
-            beyond: vec![],
-            echoes: vec![],
-            centres: vec![],
             parts: vec!["body".into()],
             frames: middle_s.iter().map(|&time| vec![point(time)]).collect(),
             tracks: middle_s.iter().map(|&time| track(time)).collect(),
             middle_s,
+            ..BodyPrediction::default()
         }
     }
 

@@ -239,24 +239,19 @@ fn shared_noise(evidence: &Evidence, correlation: &Correlation, nats: f64) -> Ca
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
     use crate::diagnosis::cube::{Loaded, analytic};
     use crate::radar::{Radar, Sampling};
     use crate::room::Room;
+    use crate::support;
 
     /// Noise of four receivers; `shared`: amplitude of what is common to all of them, by frame and chirp.
     fn noise(shared: impl Fn(usize, usize) -> f64) -> Evidence {
         let mut radar = Radar::small(12);
         (radar.loops_per_frame, radar.samples_per_chirp) = (32, 64);
-        radar.tx_m = vec![[0.0; 3]];
         radar.rx_m = (0..4).map(|rx| [0.0019 * f64::from(rx), 0.0, 0.0]).collect();
-        let mut random = ChaCha8Rng::seed_from_u64(5);
-        let mut normal =
-            || -> Complex64 { Complex64::new(StandardNormal.sample(&mut random), StandardNormal.sample(&mut random)) };
+        let mut part = support::normal(5);
+        let mut normal = || Complex64::new(part(), part());
         let mut samples = vec![];
         for frame in 0..12 {
             let common: Vec<Complex64> = (0..32 * 64).map(|i| normal() * shared(frame, i / 64)).collect();
@@ -271,9 +266,9 @@ mod tests {
     fn real_noise(seed: u64) -> Evidence {
         let mut radar = Radar::small(12);
         (radar.loops_per_frame, radar.samples_per_chirp, radar.sampling) = (32, 128, Sampling::Real);
-        (radar.tx_m, radar.rx_m) = (vec![[0.0; 3]], vec![[0.0; 3], [0.0019, 0.0, 0.0]]);
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let parts: Vec<f32> = (0..12 * 2 * 32 * 128).map(|_| StandardNormal.sample(&mut random)).collect();
+        radar.rx_m = vec![[0.0; 3], [0.0019, 0.0, 0.0]];
+        let parts: Vec<f32> =
+            std::iter::repeat_with(support::normal(seed)).take(12 * 2 * 32 * 128).map(|part| part as f32).collect();
         let room = Room { left_m: Some(1.2), right_m: Some(1.2), front_m: Some(3.0), ..Room::default() };
         Evidence::new(Loaded::of_samples(radar, analytic(&parts, 128), [-1e3, 1e3]), Some(room), None)
     }
@@ -325,12 +320,11 @@ mod tests {
     fn shaped(power: impl Fn(f64) -> f64) -> Evidence {
         let mut radar = Radar::small(12);
         (radar.loops_per_frame, radar.samples_per_chirp) = (32, 64);
-        (radar.tx_m, radar.rx_m) = (vec![[0.0; 3]], vec![[0.0; 3], [0.0019, 0.0, 0.0]]);
-        let mut random = ChaCha8Rng::seed_from_u64(11);
+        radar.rx_m = vec![[0.0; 3], [0.0019, 0.0, 0.0]];
+        let mut normal = support::normal(11);
         let inverse = hybridsim_fft::FftPlanner::new().plan_fft_inverse(64);
         let mut samples = vec![];
         for _ in 0..12 * 2 * 32 {
-            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
             let mut chirp: Vec<Complex64> =
                 (0..64usize).map(|bin| Complex64::new(normal(), normal()) * power(bin.min(64 - bin) as f64).sqrt()).collect();
             inverse.process(&mut chirp);
