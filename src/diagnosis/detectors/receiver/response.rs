@@ -14,6 +14,7 @@ use super::filters::{Filter, SHAPES, Shape, decay};
 use super::support::{beat_hz, dot, tone};
 use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::detectors::climb::golden_section;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Volume};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
@@ -333,15 +334,9 @@ fn undo(response: &[Complex64], fitted: Vec<Vec<Complex64>>, clutter: Vec<Vec<Co
     })
 }
 
-/// Golden-section search between the grid's neighbours.
+/// The maximum between the grid's neighbours.
 fn refine(shape: Shape, at: f64, samples: usize, rate: f64, value: impl Fn(f64) -> f64) -> f64 {
-    const RATIO: f64 = 0.618_033_988_749_895;
     let grid = shape.grid(samples, rate);
     let index = grid.iter().position(|&point| point == at).unwrap_or(0);
-    let (mut low, mut high) = (grid[index.saturating_sub(1)], grid[(index + 1).min(grid.len() - 1)]);
-    for _ in 0..11 {
-        let (a, b) = (high - RATIO * (high - low), low + RATIO * (high - low));
-        if value(a) > value(b) { high = b } else { low = a }
-    }
-    0.5 * (low + high)
+    golden_section([grid[index.saturating_sub(1)], grid[(index + 1).min(grid.len() - 1)]], 11, value)
 }
