@@ -1,6 +1,8 @@
 //! All integration tests in one program, which is linked once and keeps every core busy: `cargo test --test suite NAME` for those of one
 //! file.
 
+use std::path::{Path, PathBuf};
+
 mod support;
 
 mod align;
@@ -26,14 +28,21 @@ mod robustness;
 mod rover;
 mod salt;
 
-/// A file that is not named above would never run.
+/// A file that is not named above, or by the file that its folder belongs to, would never run.
 #[test]
 fn every_file_of_tests_runs() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_stem().unwrap().to_str().unwrap();
-        let is_named = include_str!("suite.rs").lines().any(|line| line == format!("mod {name};"));
-        assert!(is_named || name == "suite" || path.extension().is_none_or(|end| end != "rs"), "{}", path.display());
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let files = |folder: &Path| -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(folder).into_iter().flatten();
+        entries.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|end| end == "rs")).collect()
+    };
+    let assert_named = |file: &Path, by: &Path| {
+        let wanted = format!("mod {};", file.file_stem().unwrap().to_str().unwrap());
+        assert!(std::fs::read_to_string(by).unwrap().lines().any(|line| line == wanted), "{}", file.display());
+    };
+    let suite = tests.join("suite.rs");
+    for file in files(&tests).into_iter().filter(|file| *file != suite) {
+        assert_named(&file, &suite);
+        files(&file.with_extension("")).iter().for_each(|part| assert_named(part, &file));
     }
 }

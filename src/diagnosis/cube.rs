@@ -69,6 +69,11 @@ impl Cube {
         self.dims[1] * self.dims[2]
     }
 
+    /// Chirps of one channel in all frames.
+    pub fn chirps(&self) -> f64 {
+        (self.dims[0] * self.dims[3]) as f64
+    }
+
     /// `[loop, sample]` of one frame and channel (tx · rx count + rx).
     pub fn channel(&self, frame: usize, channel: usize) -> &[Complex64] {
         let length = self.dims[3] * self.dims[4];

@@ -64,6 +64,12 @@ pub struct Evidence {
     pub extremes: [f64; 2],
     /// Of the raw samples; none where they are no whole numbers.
     pub codes: Option<Arc<Vec<Component>>>,
+    pub(super) once: Once,
+}
+
+/// What is computed at most once, when it is first asked for.
+#[derive(Clone, Default)]
+pub(super) struct Once {
     pub(super) noise: OnceLock<Vec<f64>>,
     clutter: OnceLock<Vec<Complex64>>,
     maps: OnceLock<Grid<f32, 3>>,
@@ -90,26 +96,13 @@ impl Evidence {
             courses: vec![],
             extremes,
             codes,
-            noise: OnceLock::new(),
-            clutter: OnceLock::new(),
-            maps: OnceLock::new(),
-            power: OnceLock::new(),
-            products: OnceLock::new(),
-            peak: OnceLock::new(),
+            once: Once::default(),
         }
     }
 
     /// The same after samples or prediction changed: nothing computed is kept.
     pub fn changed(self) -> Self {
-        Self {
-            noise: OnceLock::new(),
-            clutter: OnceLock::new(),
-            maps: OnceLock::new(),
-            power: OnceLock::new(),
-            products: OnceLock::new(),
-            peak: OnceLock::new(),
-            ..self
-        }
+        Self { once: Once::default(), ..self }
     }
 
     /// The effect of this id, of those that may be named.
@@ -147,13 +140,13 @@ impl Evidence {
 
     /// Mean over all chirps of the training frames, `[tx · rx, sample]`: static clutter.
     pub fn clutter(&self) -> &[Complex64] {
-        self.clutter.get_or_init(|| self.cube.clutter(&self.split.training))
+        self.once.clutter.get_or_init(|| self.cube.clutter(&self.split.training))
     }
 
     /// Variance of the noise in a complex sample, by channel (tx · rx); from the quieter cells of the range-Doppler
     /// maps, so that movers and lines do not count.
     pub fn noise(&self) -> &[f64] {
-        self.noise.get_or_init(|| {
+        self.once.noise.get_or_init(|| {
             let [_, _, _, loops, _] = self.cube.dims;
             (0..self.cube.channels())
                 .into_par_iter()
@@ -183,6 +176,15 @@ impl Evidence {
         })
     }
 
+    /// Of [`Self::noise`], over the channels.
+    pub fn mean_noise(&self) -> f64 {
+        self.total_noise() / self.noise().len().max(1) as f64
+    }
+
+    pub fn total_noise(&self) -> f64 {
+        self.noise().iter().sum()
+    }
+
     /// Power that moving things are expected to have in a frame's cells, over the noise's variance and with the noise,
     /// `[doppler, range]`.
     pub fn expected(&self, frame: usize) -> Cow<'_, [f32]> {
@@ -194,17 +196,17 @@ impl Evidence {
 
     /// The power model of the body, where there is one.
     pub fn power(&self) -> Option<&PowerModel> {
-        self.power.get_or_init(|| PowerModel::new(self).map(Arc::new)).as_deref()
+        self.once.power.get_or_init(|| PowerModel::new(self).map(Arc::new)).as_deref()
     }
 
     /// Products of the signal with itself where neither room nor body can be.
     pub fn products(&self) -> &Products {
-        self.products.get_or_init(|| Products::new(self))
+        self.once.products.get_or_init(|| Products::new(self))
     }
 
     /// Largest magnitude of the signal without most of its noise: what levels are relative to.
     pub fn peak(&self) -> f64 {
-        *self.peak.get_or_init(|| denoised::peak_beside(self, |_, _| Some(Complex64::ZERO)))
+        *self.once.peak.get_or_init(|| denoised::peak_beside(self, |_, _| Some(Complex64::ZERO)))
     }
 
     /// A channel of a frame without static clutter, `[loop · sample]`.
@@ -224,7 +226,7 @@ impl Evidence {
     /// Power of [`Self::range_doppler`] over the noise's variance, mean over the channels, `[frame, doppler, range]`.
     /// Noise that a filter (or undoing one) has shaped over the beat frequency is made flat.
     pub fn maps(&self) -> &Grid<f32, 3> {
-        self.maps.get_or_init(|| {
+        self.once.maps.get_or_init(|| {
             let mut maps = self.unshaped_maps();
             let samples = self.cube.dims[4];
             if let Some(shape) = self.noise_shape(&maps) {

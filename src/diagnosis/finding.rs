@@ -142,6 +142,14 @@ pub enum Correction {
 }
 
 impl Correction {
+    pub fn samples(undo: impl Fn(&mut Cube) + Send + Sync + 'static) -> Self {
+        Self::Samples(Arc::new(undo))
+    }
+
+    pub fn inverse(volume: Volume, undo: impl Fn(&mut Cube) + Send + Sync + 'static) -> Self {
+        Self::Inverse(Arc::new(undo), volume)
+    }
+
     /// What it changes in the samples.
     pub fn undo(&self) -> Option<&Undo> {
         match self {
@@ -160,6 +168,17 @@ pub struct Curve {
     pub y_label: String,
     /// Name, x, y.
     pub series: Vec<(String, Vec<f64>, Vec<f64>)>,
+}
+
+impl Curve {
+    pub fn new<'a>(
+        title: impl Into<String>,
+        [x_label, y_label]: [&str; 2],
+        series: impl IntoIterator<Item = (&'a str, Vec<f64>, Vec<f64>)>,
+    ) -> Self {
+        let series = series.into_iter().map(|(name, x, y)| (name.into(), x, y)).collect();
+        Self { title: title.into(), x_label: x_label.into(), y_label: y_label.into(), series }
+    }
 }
 
 /// Chance above which numbers may as well be neutral.
@@ -193,6 +212,25 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// Something without a name, numbers or a correction; what more a detector knows stands before it: `Self { statement, ..Self::new(…) }`.
+    pub fn new(behaves_like: Behaviour, place: Place, p_value: f64, nats: f64) -> Self {
+        Self {
+            id: None,
+            behaves_like,
+            estimates: vec![],
+            choice: None,
+            place,
+            p_value,
+            nats,
+            errs_alike: false,
+            look_alikes: vec![],
+            statement: String::new(),
+            curve: None,
+            energy: 0.0,
+            correction: Correction::None,
+        }
+    }
+
     /// Without its name where all the numbers that it gives may as well be those at which the effect does nothing: something is
     /// there, but not surely this. For detectors whose p-value says that something is there, and not that these numbers are.
     pub fn named_if_sure(self) -> Self {
@@ -271,26 +309,6 @@ impl std::fmt::Debug for Candidate {
     }
 }
 
-/// Something without a name or numbers: for tests.
-#[cfg(test)]
-pub(crate) fn nameless(behaves_like: Behaviour) -> Candidate {
-    Candidate {
-        id: None,
-        behaves_like,
-        estimates: vec![],
-        choice: None,
-        place: Place::at(Stage::Receiver),
-        p_value: 0.0,
-        nats: 1.0,
-        errs_alike: false,
-        look_alikes: vec![],
-        statement: String::new(),
-        curve: None,
-        energy: 0.0,
-        correction: Correction::None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -298,18 +316,12 @@ mod tests {
     fn candidate(id: &'static str, estimates: Vec<Estimate>) -> Candidate {
         Candidate {
             id: Some(id),
-            behaves_like: Behaviour::AdditiveFastTime,
             estimates,
-            choice: None,
-            place: Place::at(Stage::Receiver),
-            p_value: 1e-9,
-            nats: 30.0,
             errs_alike: true,
             look_alikes: vec![effects::tx_leakage::ID],
             statement: "Something.".into(),
-            curve: None,
             energy: 1.0,
-            correction: Correction::None,
+            ..Candidate::new(Behaviour::AdditiveFastTime, Place::at(Stage::Receiver), 1e-9, 30.0)
         }
     }
 

@@ -21,19 +21,8 @@ fn without(image: Complex64) -> Candidate {
         cube.each_chirp(|_, chirp| chirp.iter_mut().for_each(|value| *value = (*value - image * value.conj()) * scale));
     };
     Candidate {
-        id: None,
-        behaves_like: Behaviour::ConjugateImage,
-        estimates: vec![],
-        choice: None,
-        place: Place::at(Stage::Receiver),
-        p_value: 0.0,
-        nats: 0.0,
-        errs_alike: false,
-        look_alikes: vec![],
-        statement: String::new(),
-        curve: None,
-        energy: 0.0,
         correction: Correction::Inverse(Arc::new(undo), Volume::BY_SAMPLE),
+        ..Candidate::new(Behaviour::ConjugateImage, Place::at(Stage::Receiver), 0.0, 0.0)
     }
 }
 

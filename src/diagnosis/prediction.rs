@@ -43,7 +43,7 @@ pub struct Centre {
 }
 
 /// Visible points of every frame.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct BodyPrediction {
     /// SMPL joint names; one nameless part for a sequence of meshes.
     pub parts: Vec<String>,

@@ -208,7 +208,7 @@ pub fn moving_energy(evidence: &super::Evidence) -> f64 {
     let all: Vec<usize> = (0..cube.dims[0]).collect();
     let clutter_energy: f64 = cube.clutter(&all).iter().map(|value| value.norm_sqr()).sum();
     let total: f64 = cube.samples.iter().map(|value| value.norm_sqr()).sum();
-    total - clutter_energy * (cube.dims[0] * cube.dims[3]) as f64
+    total - clutter_energy * cube.chirps()
 }
 
 /// With a capital in front and a stop behind.

@@ -177,8 +177,7 @@ mod tests {
     use crate::diagnosis::Place;
 
     fn of(id: Option<&'static str>, behaves_like: Behaviour, gain: f64) -> Candidate {
-        let place = Place::at(Stage::Scene);
-        Candidate { id, nats: gain, place, ..crate::diagnosis::finding::nameless(behaves_like) }
+        Candidate { id, ..Candidate::new(behaves_like, Place::at(Stage::Scene), 0.0, gain) }
     }
 
     #[test]

@@ -356,7 +356,7 @@ impl Evidence {
         let mut next = self.clone().changed();
         if candidate.behaves_like.is_path() || candidate.behaves_like == Behaviour::ExcessPower {
             // Where paths were cut out there is not even noise left.
-            next.noise = self.noise.clone();
+            next.once.noise = self.once.noise.clone();
         }
         next.correct(&candidate.correction);
         match candidate.id {

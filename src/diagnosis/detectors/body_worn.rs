@@ -150,7 +150,7 @@ fn candidate(
     skin: &[Vec<Template>],
 ) -> Candidate {
     let name = body.parts[found.part].as_str();
-    let noise = evidence.noise().iter().sum::<f64>() / evidence.noise().len().max(1) as f64;
+    let noise = evidence.mean_noise();
     let (samples, weight) = (model.size() as f64, found.weights[LOBES.len()]);
     let start_m = range_and_velocity(&evidence.radar, body.centres[0][found.part].position_m, [0.0; 3]).0.max(0.1);
     // From the peak after two Hann windows to a sample; the body's level is that of all its skin.
@@ -170,12 +170,7 @@ fn candidate(
     };
     Candidate {
         id: Some(effects::carried_reflector::ID),
-        behaves_like: Behaviour::ReturnOfOnePart,
         estimates: vec![Estimate::normal("amplitude", relative, LEVEL_ERROR * relative)],
-        choice: None,
-        place: Place { body_part: Some(name.into()), ..place },
-        p_value: 1.0,
-        nats: 0.0,
         errs_alike: true,
         look_alikes: vec![effects::part_reflectivity::ID],
         statement: format!(
@@ -184,10 +179,10 @@ fn candidate(
             name.replace('_', " "),
             found.over_skin_db
         ),
-        curve: None,
         energy: power * noise * evidence.cube.channels() as f64,
         // The parts' own weights have taken it in already.
         correction: Correction::None,
+        ..Candidate::new(Behaviour::ReturnOfOnePart, Place { body_part: Some(name.into()), ..place }, 1.0, 0.0)
     }
 }
 
@@ -265,7 +260,7 @@ mod tests {
             *value += Complex64::from_polar((-2.0 * (1.0 - between(0.0, 1.0)).ln()).sqrt(), between(0.0, TAU));
         }
         let parts = PARTS.iter().map(|part| part.0.into()).collect();
-        let body = BodyPrediction { parts, frames, centres, middle_s, tracks: vec![], beyond: vec![], echoes: vec![] };
+        let body = BodyPrediction { parts, frames, centres, middle_s, ..BodyPrediction::default() };
         Evidence::new(Loaded::of_samples(radar, values, [-1e3, 1e3]), None, Some(body))
     }
 

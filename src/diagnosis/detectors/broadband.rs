@@ -5,14 +5,12 @@
 //! returns elsewhere that are strong enough must not show it. Noise of the receivers at low beat frequencies is not shared by them; a
 //! return is.
 
-use std::sync::Arc;
-
 use num_complex::Complex64;
 
-use super::region::{Region, mean_power, moves, power_gain, remove};
+use super::region::{Region, mean_power, moves, power_gain, removal};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::{Evidence, HANN_LOBE, spectrum};
-use crate::diagnosis::finding::{Candidate, Correction, Place};
+use crate::diagnosis::finding::{Candidate, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 use crate::effects::{self, Stage};
 
@@ -103,34 +101,26 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let gain: f64 = cells.map(of_cell).sum();
     let bin_m = evidence.radar.range_resolution_m();
     let fastest = 0.5 * evidence.radar.velocity_resolution_mps() * loops as f64;
-    let noise: f64 = evidence.noise().iter().sum();
+    let noise = evidence.total_noise();
     let energy = (first..=last).map(|bin| floor.level[bin] - 1.0).sum::<f64>() * noise * (frames * loops) as f64;
     let half = 0.5 * loops as f64;
     let region = Region { range: [first as f64 - 0.5, last as f64 + 0.5], doppler: [-half, half] };
-    let training = evidence.split.training.clone();
+    let place = Place {
+        range_m: Some([(first as f64 - 0.5).max(0.0) * bin_m, (last as f64 + 0.5) * bin_m]),
+        velocity_mps: Some([-fastest, fastest]),
+        ..Place::at(Stage::Scene)
+    };
     Some(Candidate {
         id: Some(effects::moving_reflector::ID),
-        behaves_like: Behaviour::PathLike,
-        estimates: vec![],
-        choice: None,
-        place: Place {
-            range_m: Some([(first as f64 - 0.5).max(0.0) * bin_m, (last as f64 + 0.5) * bin_m]),
-            velocity_mps: Some([-fastest, fastest]),
-            ..Place::at(Stage::Scene)
-        },
-        p_value,
-        nats: gain,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "At {:.2} m something moves with all velocities at once, up to {fastest:.1} m/s and beyond, {:.0} dB above the noise, while \
              stronger static returns elsewhere do not: it turns or flutters, and nobody is tracked there.",
             bin as f64 * bin_m,
             10.0 * floor.level[bin].log10()
         ),
-        curve: None,
         energy,
-        correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, 1, region))),
+        correction: removal(evidence, 1, region),
+        ..Candidate::new(Behaviour::PathLike, place, p_value, gain)
     })
 }
 

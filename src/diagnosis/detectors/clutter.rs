@@ -1,4 +1,4 @@
-//! Static clutter against the noise.
+//! Static clutter, and what moves, against the noise.
 
 use crate::diagnosis::evidence::{Evidence, transform};
 
@@ -15,4 +15,10 @@ pub fn clutter_power(evidence: &Evidence) -> Vec<f64> {
     }
     let gain = evidence.cube.dims[3] as f64 / 1.5;
     power.iter().map(|power| power * gain).collect()
+}
+
+/// Energy of what moves over all samples: what the maps' cells hold beyond the noise.
+pub fn energy_beyond_noise(evidence: &Evidence) -> f64 {
+    let beyond: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
+    beyond * evidence.total_noise()
 }

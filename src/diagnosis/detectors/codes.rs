@@ -3,11 +3,8 @@
 //! Bits far below the signal's deviation are set half of the time, whatever the signal is (Widrow's theorem of
 //! quantisation). A bit that all channels share out unevenly belongs to the format of the codes and is no finding.
 
-use std::sync::Arc;
-
 use num_complex::Complex64;
 
-use crate::diagnosis::Cube;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::codes::{BITS, Component};
 use crate::diagnosis::evidence::Evidence;
@@ -133,52 +130,41 @@ fn candidate(evidence: &Evidence, component: &Component, bit: usize, share: f64,
         (false, true) => " (imaginary component)",
         (false, false) => " (real component)",
     };
+    let place = Place { rx: Some(vec![rx]), ..Place::at(Stage::Receiver) };
     Candidate {
-        id: None,
-        behaves_like: Behaviour::Quantisation,
-        estimates: vec![],
-        choice: None,
-        place: Place { rx: Some(vec![rx]), ..Place::at(Stage::Receiver) },
-        p_value: p_value.max(f64::MIN_POSITIVE),
-        nats: gain,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "Bit {bit} (value {value:.0}) of the converter of receiver {rx}{part} {what}, while in the other receivers the same bit \
              is 1 half of the time, as it must be so far below the signal: the bit is {}.",
             if (share - 0.5).abs() > 0.499 { "stuck" } else { "biased" }
         ),
-        curve: None,
         energy: (share - 0.5).abs() * value * value * (frames * loops * samples) as f64,
         // What the bit was is lost but for its mean: without it, the offset of a stuck bit is no offset of the receiver.
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+        correction: Correction::samples(move |cube| {
             cube.each_chirp(|[_, channel, _], chirp| {
                 if channel == stuck {
                     chirp.iter_mut().for_each(|value| *value -= offset);
                 }
             });
-        })),
+        }),
+        ..Candidate::new(Behaviour::Quantisation, place, p_value.max(f64::MIN_POSITIVE), gain)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use num_complex::Complex64;
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
     use crate::diagnosis::cube::Loaded;
     use crate::radar::Radar;
+    use crate::support;
 
     /// A static tone in noise as codes, changed by channel.
     fn evidence(change: impl Fn(usize, i64) -> i64) -> Evidence {
         let mut radar = Radar::small(8);
         (radar.loops_per_frame, radar.samples_per_chirp) = (16, 64);
         let dims = radar.dims();
-        let mut random = ChaCha8Rng::seed_from_u64(3);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let mut normal = support::normal(3);
         let block = 16 * 64;
         let samples = (0..dims.iter().product::<usize>())
             .map(|i| {

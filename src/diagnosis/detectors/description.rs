@@ -1,7 +1,8 @@
 //! What is said of something found: its name where the library has one, its numbers, and both in words.
 
 use crate::diagnosis::Evidence;
-use crate::diagnosis::finding::Estimate;
+use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::finding::{Candidate, Estimate, Place};
 
 /// What it is called, how large it is, and both in words.
 pub struct Description {
@@ -11,6 +12,11 @@ pub struct Description {
 }
 
 impl Description {
+    pub fn candidate(self, behaves_like: Behaviour, place: Place, p_value: f64, nats: f64) -> Candidate {
+        let Self { id, estimates, statement } = self;
+        Candidate { id, estimates, statement, ..Candidate::new(behaves_like, place, p_value, nats) }
+    }
+
     pub fn unnamed(statement: String) -> Self {
         Self { id: None, estimates: vec![], statement }
     }

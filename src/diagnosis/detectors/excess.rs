@@ -2,7 +2,7 @@
 
 use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::finding::{Candidate, Correction, Place};
+use crate::diagnosis::finding::{Candidate, Place};
 use crate::diagnosis::locate::{Residual, strongest};
 use crate::effects::Stage;
 
@@ -19,23 +19,14 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let words: Vec<String> =
         [along("at", "m", place.range_m), along("at", "m/s", place.velocity_mps), frames].into_iter().flatten().collect();
     let place_words = if words.is_empty() { "everywhere".to_string() } else { words.join(", ") };
-    let noise = evidence.noise().iter().sum::<f64>() / evidence.noise().len().max(1) as f64;
+    let noise = evidence.mean_noise();
+    let place = Place { stage: Some(Stage::Propagation), ..place.clone() };
     vec![Candidate {
-        id: None,
-        behaves_like: Behaviour::ExcessPower,
-        estimates: vec![],
-        choice: None,
-        place: Place { stage: Some(Stage::Propagation), ..place.clone() },
-        p_value: found.p_value,
-        nats: found.gain,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "there is {:.1} dB more power than body, room and noise can have, {place_words}; no effect of the library explains it",
             found.region.excess_db
         ),
-        curve: None,
         energy: found.region.energy * noise,
-        correction: Correction::None,
+        ..Candidate::new(Behaviour::ExcessPower, place, found.p_value, found.gain)
     }]
 }

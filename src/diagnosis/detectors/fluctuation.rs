@@ -12,8 +12,6 @@ mod returns;
 mod silhouette;
 mod sinusoid;
 
-use std::sync::Arc;
-
 use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 
@@ -127,39 +125,32 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, nat
     let change = series.change.clone();
     let decibel: Vec<f64> = change.iter().map(|v| DECIBEL * (1.0 + v).norm().max(1e-3).ln()).collect();
     let [low, high] = decibel.iter().fold([f64::MAX, f64::MIN], |[l, h], &v| [l.min(v), h.max(v)]);
+    let place = Place {
+        range_m: Some([range_m - 1.5 * bin_m, range_m + 1.5 * bin_m]),
+        velocity_mps: Some([0.0, 0.0]),
+        ..Place::at(Stage::Propagation)
+    };
     Candidate {
         id: Some(ID),
-        behaves_like: Behaviour::FadingBehindTheBody,
-        estimates: vec![],
-        choice: None,
-        place: Place {
-            range_m: Some([range_m - 1.5 * bin_m, range_m + 1.5 * bin_m]),
-            velocity_mps: Some([0.0, 0.0]),
-            ..Place::at(Stage::Propagation)
-        },
-        p_value: p_value.max(f64::MIN_POSITIVE),
-        nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "The static return {range_m:.2} m away changes from frame to frame by {:.0} % (over {:.1} dB) while the other static \
              returns stay, when the body's silhouette covers it: the body casts a shadow on the room.",
             100.0 * rms,
             high - low
         ),
-        curve: Some(Curve {
-            title: format!("Static return {range_m:.2} m away, relative to the others"),
-            x_label: "time, s".into(),
-            y_label: "level, dB".into(),
-            series: vec![("measured".into(), evidence.starts_s.clone(), decibel)],
-        }),
+        curve: Some(Curve::new(
+            format!("Static return {range_m:.2} m away, relative to the others"),
+            ["time, s", "level, dB"],
+            [("measured", evidence.starts_s.clone(), decibel)],
+        )),
         energy: own * square * loops as f64,
-        correction: Correction::Samples(Arc::new(move |cube| {
+        correction: Correction::samples(move |cube| {
             cube.each_chirp(|[frame, channel, _], chirp| {
                 let echo = &echo[channel * samples..][..samples];
                 chirp.iter_mut().zip(echo).for_each(|(value, echo)| *value -= change[frame] * echo);
             });
-        })),
+        }),
+        ..Candidate::new(Behaviour::FadingBehindTheBody, place, p_value.max(f64::MIN_POSITIVE), nats)
     }
 }
 

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::diagnosis::Evidence;
 use crate::diagnosis::cube::Cube;
+use crate::diagnosis::finding::Correction;
 
 /// Bins (not whole numbers, ends included) that may be negative: an interval around the zero frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,9 +87,15 @@ pub fn joined(cube: &Cube, clutter: &[Complex64], frames: std::ops::Range<usize>
         .collect()
 }
 
+/// Takes a region out of the samples, as they are then.
+pub fn removal(evidence: &Evidence, run: usize, region: Region) -> Correction {
+    let training = evidence.split.training.clone();
+    Correction::samples(move |cube| remove(cube, &training, run, region))
+}
+
 /// Subtracts from every run of frames what deviates, within the region, from static clutter over the training frames.
 /// That is the mean of the cube at hand: other static returns may have been subtracted or may not.
-pub fn remove(cube: &mut Cube, training: &[usize], run: usize, region: Region) {
+fn remove(cube: &mut Cube, training: &[usize], run: usize, region: Region) {
     let [frames, _, _, loops, samples] = cube.dims;
     let channels = cube.channels();
     let clutter = cube.clutter(training);

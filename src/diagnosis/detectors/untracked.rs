@@ -5,16 +5,15 @@
 //! nothing else.
 
 use std::collections::HashSet;
-use std::sync::Arc;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::receiver::wandering;
-use super::region::{CLUTTER_BINS, Region, joined, mean_power, moves, power_gain, remove, run};
+use super::region::{CLUTTER_BINS, Region, joined, mean_power, moves, power_gain, removal, run};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::{Evidence, transform};
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
+use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics;
 use crate::effects::{self, Stage};
 
@@ -142,7 +141,7 @@ impl<'a> Mover<'a> {
     }
 
     fn energy(&self) -> f64 {
-        let noise: f64 = self.evidence.noise().iter().sum();
+        let noise = self.evidence.total_noise();
         self.region.iter().map(|&cell| (self.stretch.at(cell) - 1.0).max(0.0)).sum::<f64>()
             * noise
             * (self.evidence.cube.dims[0] / self.run) as f64
@@ -166,7 +165,6 @@ impl<'a> Mover<'a> {
         let range_m = centre * bin_m;
         let velocity_mps = (top[0] as f64 + stretch.summit(top, [1, 0])) * bin_mps;
         let azimuth = azimuth_deg(evidence, stretch, top);
-        let (cut, training) = (self.cut(), evidence.split.training.clone());
         let direction = azimuth.map_or(String::new(), |(a, _)| format!(", {a:+.0}° to the side"));
         let estimates = azimuth.map_or(vec![], |(a, deviation)| {
             let (s, c) = a.to_radians().sin_cos();
@@ -177,28 +175,22 @@ impl<'a> Mover<'a> {
                 &[(across * c).abs().max(0.3 * bin_m), (across * s).abs().max(0.3 * bin_m), HEIGHT * range_m],
             )]
         });
+        let place = Place {
+            range_m: Some([(ranges[0] - 0.5).max(0.0) * bin_m, (ranges[1] + 0.5) * bin_m]),
+            velocity_mps: Some([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps]),
+            azimuth_deg: azimuth.map(|(a, d)| [a - 2.0 * d, a + 2.0 * d]),
+            ..Place::at(Stage::Scene)
+        };
         Candidate {
             id: Some(effects::moving_reflector::ID),
-            behaves_like: Behaviour::PathLike,
             estimates,
-            choice: None,
-            place: Place {
-                range_m: Some([(ranges[0] - 0.5).max(0.0) * bin_m, (ranges[1] + 0.5) * bin_m]),
-                velocity_mps: Some([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps]),
-                azimuth_deg: azimuth.map(|(a, d)| [a - 2.0 * d, a + 2.0 * d]),
-                ..Place::at(Stage::Scene)
-            },
-            p_value,
-            nats: gain,
-            errs_alike: false,
-            look_alikes: vec![],
             statement: format!(
                 "Something moves at {range_m:.2} m with {velocity_mps:+.2} m/s along the line of sight{direction}, {decibel:.0} dB \
                  above the noise, and nobody is tracked there."
             ),
-            curve: None,
             energy: self.energy(),
-            correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, run, cut))),
+            correction: removal(evidence, run, self.cut()),
+            ..Candidate::new(Behaviour::PathLike, place, p_value, gain)
         }
     }
 }
@@ -326,7 +318,7 @@ fn azimuth_deg(evidence: &Evidence, stretch: &Stretch, top: Cell) -> Option<(f64
     if power(sine(best)) < 0.5 * total {
         return None;
     }
-    let noise = evidence.noise().iter().sum::<f64>() / channels as f64;
+    let noise = evidence.total_noise() / channels as f64;
     let ratio = (total / channels as f64 / noise).max(1.0);
     let deviation = wavelength / (std::f64::consts::TAU * spread) / (2.0 * ratio).sqrt();
     let azimuth = sine(best).asin();
@@ -336,13 +328,10 @@ fn azimuth_deg(evidence: &Evidence, stretch: &Stretch, top: Cell) -> Option<(f64
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
     use crate::diagnosis::cube::{Cube, Loaded, Split};
     use crate::radar::Radar;
+    use crate::support;
 
     /// Four blocks of one long frame; movers as (range bin, Doppler bin of the long frame, sine of the azimuth, amplitude).
     fn evidence(movers: &[(f64, f64, f64, f64)]) -> Evidence {
@@ -353,8 +342,7 @@ mod tests {
         radar.frame_period_s = loops as f64 * radar.loop_period_s();
         let dims = radar.dims();
         let wavelength = radar.wavelength_m();
-        let mut random = ChaCha8Rng::seed_from_u64(3);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let mut normal = support::normal(3);
         let mut values = vec![];
         for (frame, tx, rx) in (0..blocks).flat_map(|f| (0..dims[1]).flat_map(move |t| (0..dims[2]).map(move |r| (f, t, r)))) {
             let across = radar.tx_m[tx][0] + radar.rx_m[rx][0];

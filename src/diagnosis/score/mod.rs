@@ -115,18 +115,11 @@ fn candidate(evidence: &Evidence, info: &'static EffectInfo, fit: &Fit) -> Optio
     let energy = evidence.cube.samples.iter().zip(&before.samples).map(|(after, before)| (after - before).norm_sqr()).sum();
     Some(Candidate {
         id: Some(info.id),
-        behaves_like: behaviour(info),
         estimates,
-        choice: None,
-        place: Place::at(info.stage),
-        p_value: fit.p_value,
-        nats: fit.nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!("{} ({}). {}", info.title, numbers.join(", "), info.explanation),
-        curve: None,
         energy,
         correction: correction(evidence, drive, fit),
+        ..Candidate::new(behaviour(info), Place::at(info.stage), fit.p_value, fit.nats)
     })
 }
 

@@ -127,21 +127,22 @@ impl Frames<'_> {
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
+    use crate::support;
 
     #[test]
     fn what_is_slow_is_predicted_and_noise_is_not() {
         let times_s: Vec<f64> = (0..12).map(|frame| 0.1 * f64::from(frame)).collect();
         let (held_out, training): (Vec<usize>, Vec<usize>) = (0..12).partition(|frame| frame % 4 == 2);
         let frames = Frames { times_s: &times_s, training: &training, held_out: &held_out };
-        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut normal = support::normal(5);
         let mut series = |amplitude: f64| -> Vec<f64> {
-            let noise = |_| -> f64 { StandardNormal.sample(&mut random) };
-            times_s.iter().map(|time| 7.0 + amplitude * (4.0 * time).sin()).zip((0..12).map(noise)).map(|(a, b)| a + b).collect()
+            times_s
+                .iter()
+                .map(|time| 7.0 + amplitude * (4.0 * time).sin())
+                .zip((0..12).map(|_| normal()))
+                .map(|(a, b)| a + b)
+                .collect()
         };
         let mut gains = vec![];
         for amplitude in [0.0, 4.0] {

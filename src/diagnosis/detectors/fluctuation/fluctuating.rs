@@ -5,7 +5,6 @@
 //! judged by how well every frame is predicted by the others.
 
 use std::ops::RangeInclusive;
-use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -137,38 +136,30 @@ fn candidate(
     };
     let course: Vec<f64> = fluctuations.iter().map(shown).collect();
     let range_m = change.bin as f64 * bin_m;
+    let place = Place {
+        range_m: Some([near_m - 1.5 * bin_m, far_m + 1.5 * bin_m]),
+        velocity_mps: Some([0.0, 0.0]),
+        ..Place::at(Stage::Scene)
+    };
     Candidate {
-        id: None,
-        behaves_like: Behaviour::ChangingAtOneRange,
-        estimates: vec![],
-        choice: None,
-        place: Place {
-            range_m: Some([near_m - 1.5 * bin_m, far_m + 1.5 * bin_m]),
-            velocity_mps: Some([0.0, 0.0]),
-            ..Place::at(Stage::Scene)
-        },
-        p_value: change.p_value.max(f64::MIN_POSITIVE),
-        nats: gain,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "The static return {range_m:.2} m away changes from frame to frame while the other static returns stay{}: something moves \
              there, or passes in front of it.",
             if evidence.body.is_some() { ", and the body's silhouette alone does not explain it" } else { "" }
         ),
-        curve: Some(Curve {
-            title: format!("Change {range_m:.2} m away"),
-            x_label: "time, s".into(),
-            y_label: "share of its largest change".into(),
-            series: vec![("predicted by the training frames".into(), evidence.starts_s.clone(), course)],
-        }),
+        curve: Some(Curve::new(
+            format!("Change {range_m:.2} m away"),
+            ["time, s", "share of its largest change"],
+            [("predicted by the training frames", evidence.starts_s.clone(), course)],
+        )),
         energy: fluctuations.iter().map(power).sum::<f64>() * loops as f64,
-        correction: Correction::Samples(Arc::new(move |cube| {
+        correction: Correction::samples(move |cube| {
             cube.each_chirp(|[frame, channel, _], chirp| {
                 let fluctuation = &fluctuations[frame][channel * samples..][..samples];
                 chirp.iter_mut().zip(fluctuation).for_each(|(value, change)| *value -= change);
             });
-        })),
+        }),
+        ..Candidate::new(Behaviour::ChangingAtOneRange, place, change.p_value.max(f64::MIN_POSITIVE), gain)
     }
 }
 

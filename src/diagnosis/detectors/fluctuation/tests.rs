@@ -1,14 +1,11 @@
 use std::f64::consts::TAU;
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
-
 use super::*;
 use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::prediction::{BodyPrediction, Point};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::Room;
+use crate::support;
 
 const FRAMES: usize = 16;
 const FRONT_M: f64 = 5.0;
@@ -23,8 +20,7 @@ fn evidence(seed: u64, change: impl Fn(usize, usize) -> Complex64) -> Evidence {
     let mut radar = Radar::small(FRAMES);
     (radar.loops_per_frame, radar.samples_per_chirp) = (16, 128);
     let dims = radar.dims();
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let mut normal = support::normal(seed);
     let ranges = [1.2, 4.2, FRONT_M];
     let block = dims[3] * dims[4];
     let samples = (0..dims.iter().product::<usize>())
@@ -50,13 +46,10 @@ fn evidence(seed: u64, change: impl Fn(usize, usize) -> Complex64) -> Evidence {
         (0..20).flat_map(|i| (0..30).map(move |j| (i, j))).map(|(i, j)| at(i, j)).collect()
     };
     let body = BodyPrediction {
-        centres: vec![],
-        echoes: vec![],
         parts: vec!["body".into()],
         frames: (0..FRAMES).map(points).collect(),
         middle_s: starts_s,
-        tracks: vec![],
-        beyond: vec![],
+        ..BodyPrediction::default()
     };
     let room = Room { front_m: Some(FRONT_M), floor_m: Some(1.2), ..Room::default() };
     let loaded = Loaded::of_samples(radar, samples, [-100.0, 100.0]);

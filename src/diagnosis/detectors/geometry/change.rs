@@ -1,5 +1,8 @@
 //! Ways in which the body may be elsewhere, or at another time, than predicted.
 
+use std::sync::Arc;
+
+use crate::diagnosis::finding::Correction;
 use crate::diagnosis::prediction::{BodyPrediction, Centre, Echo, Point};
 
 /// One of the effects that move the body in the maps.
@@ -68,7 +71,11 @@ impl Moves {
     }
 
     /// The whole prediction after the change.
-    pub fn apply(&self, body: &mut BodyPrediction, change: Change) {
+    pub fn correction(self, change: Change) -> Correction {
+        Correction::Body(Arc::new(move |body| self.apply(body, change)))
+    }
+
+    fn apply(&self, body: &mut BodyPrediction, change: Change) {
         if let Change::Replica(echo) = change {
             body.echoes.push(echo);
             return;
@@ -136,13 +143,11 @@ mod tests {
             Track::new(time, nodes.to_vec(), nodes.iter().map(step).collect())
         };
         BodyPrediction {
-            beyond: vec![],
-            echoes: vec![],
-            centres: vec![],
             parts: vec!["body".into()],
             frames: middle_s.iter().map(|&time| vec![point(time)]).collect(),
             tracks: middle_s.iter().map(|&time| track(time)).collect(),
             middle_s,
+            ..BodyPrediction::default()
         }
     }
 

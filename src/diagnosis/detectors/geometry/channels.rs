@@ -5,7 +5,6 @@
 //! might as well be the body's.
 
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -17,9 +16,9 @@ use super::covariance::Array;
 use super::found::{AS_WELL, Found, UNEVEN};
 use super::{coupling, mismatch, places, skew};
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::detectors::clutter::clutter_power;
+use crate::diagnosis::detectors::clutter::{clutter_power, energy_beyond_noise};
 use crate::diagnosis::power::{PowerModel, part_templates};
-use crate::diagnosis::{BodyPrediction, Candidate, Correction, Estimate, Evidence, Place};
+use crate::diagnosis::{BodyPrediction, Candidate, Estimate, Evidence, Place};
 use crate::effects::{self, Stage};
 
 /// Expected power over the noise from which on a cell is used.
@@ -191,18 +190,12 @@ fn log_likelihood_gain(training: &[Sums], held_out: &[Sums], amplitudes: &[Compl
 fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, nats: f64) -> Candidate {
     let (offset, deviation) = (bearing.sine * range_m, bearing.deviation.hypot(0.5 * PHASE_FLOOR_RAD / PI) * range_m);
     let change = Change::Offset([offset, 0.0, 0.0]);
-    let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
     Candidate {
         id: Some(effects::pose_offset::ID),
-        behaves_like: Behaviour::DirectionOffset,
         estimates: vec![
             Estimate::list("offset_m", &[offset, 0.0, 0.0], &[deviation, 0.05, 0.2]),
             Estimate::normal("yaw_deg", 0.0, 1.0),
         ],
-        choice: None,
-        place: Place::at(Stage::Scene),
-        p_value: bearing.p_value,
-        nats,
         errs_alike: true,
         // A phase in proportion to the receivers' places is a direction, whoever makes it.
         look_alikes: vec![effects::channel_mismatch::ID],
@@ -212,9 +205,9 @@ fn aside_of(evidence: &Evidence, bearing: Bearing, range_m: f64, moves: Moves, n
             if bearing.sine > 0.0 { "right" } else { "left" },
             1e3 * offset.abs()
         ),
-        curve: None,
-        energy: total * evidence.noise().iter().sum::<f64>() * (bearing.sine * PI).powi(2),
-        correction: Correction::Body(Arc::new(move |body| moves.apply(body, change))),
+        energy: energy_beyond_noise(evidence) * (bearing.sine * PI).powi(2),
+        correction: moves.correction(change),
+        ..Candidate::new(Behaviour::DirectionOffset, Place::at(Stage::Scene), bearing.p_value, nats)
     }
 }
 

@@ -1,7 +1,5 @@
 //! Mutual coupling of neighbouring receivers: the inner ones have two neighbours, the outer ones one.
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
@@ -124,14 +122,10 @@ fn candidate(evidence: &Evidence, strength: Complex64, found: &Estimated) -> Can
     let level_db = 20.0 * strength.norm().log10();
     let samples = evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum::<f64>();
     let mean_neighbours = 2.0 * (receivers as f64 - 1.0) / receivers as f64;
+    let place = Place::at(Stage::Antenna);
     Candidate {
         id: Some(effects::mutual_coupling::ID),
-        behaves_like: Behaviour::ChannelGain,
         estimates: vec![Estimate::normal("level_db", level_db, statistics::DECIBEL * deviation / strength.norm())],
-        choice: None,
-        place: Place::at(Stage::Antenna),
-        p_value: statistics::corrected(found.p_value, LOOKS),
-        nats: found.nats,
         errs_alike: true,
         // Of three receivers only the middle one is odd.
         look_alikes: if receivers < 4 { vec![effects::channel_mismatch::ID] } else { vec![] },
@@ -142,16 +136,16 @@ fn candidate(evidence: &Evidence, strength: Complex64, found: &Estimated) -> Can
             -level_db,
             strength.arg().to_degrees()
         ),
-        curve: None,
         energy: samples * strength.norm_sqr() * mean_neighbours,
         correction: uncoupled(receivers, [strength; 2]),
+        ..Candidate::new(Behaviour::ChannelGain, place, statistics::corrected(found.p_value, LOOKS), found.nats)
     }
 }
 
 fn uncoupled(receivers: usize, coupling: Coupling) -> Correction {
     // Of the real and the imaginary part.
     let stretched = alone(receivers, coupling).map_or(0.0, |inverse| 2.0 * inverse.determinant().norm().ln() / receivers as f64);
-    Correction::Inverse(Arc::new(move |cube| undo(cube, coupling)), Volume { alike: stretched, ..Volume::KEPT })
+    Correction::inverse(Volume { alike: stretched, ..Volume::KEPT }, move |cube| undo(cube, coupling))
 }
 
 /// Solves for the signals without coupling.

@@ -5,8 +5,6 @@
 //! power model does not know shifts the body by up to 4 mm and 1.4 ms (practice recordings without any such effect, which also
 //! helped to choose the lobes and these floors): a change must exceed these floors, frame after frame.
 
-use std::sync::Arc;
-
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::change::{Change, Moves, frame_period_s};
@@ -15,8 +13,9 @@ use super::lost::{is_step, lost_frames, predicted, ratio_p_value, step_p_value};
 use super::replica;
 use super::trial::{Score, Trial};
 use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::detectors::clutter::energy_beyond_noise;
 use crate::diagnosis::detectors::description::Description;
-use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};
+use crate::diagnosis::{Candidate, Estimate, Place};
 use crate::effects::{Stage, clock_drift, clock_offset, frame_drop, pose_offset, range_bias, slope_error};
 
 /// Errors of the prediction that are no finding: metres of range, seconds.
@@ -274,7 +273,7 @@ fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> Description {
 
 fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_value: f64, nats: f64) -> Candidate {
     let (evidence, change) = (trial.evidence, fit.score.change);
-    let Description { id, estimates, statement } = described(trial, fit, deviation(trial, fit).hypot(SCENE * fit.floor));
+    let description = described(trial, fit, deviation(trial, fit).hypot(SCENE * fit.floor));
     let stage = stage(change);
     let place = match change {
         Change::Drop { at, .. } => Place { frames: Some((at..evidence.cube.dims[0]).collect()), ..Place::at(stage) },
@@ -283,26 +282,14 @@ fn candidate(trial: &Trial, fit: &Fitted, look_alikes: Vec<&'static str>, p_valu
     };
     let moves = Moves::new(evidence.radar.centre_m());
     Candidate {
-        id,
-        behaves_like: behaves_like(stage),
-        estimates,
         choice: place.boundary.clone(),
-        place,
-        p_value,
-        nats,
         errs_alike: true,
-        look_alikes: if id.is_some() { look_alikes } else { vec![] },
-        statement,
-        curve: None,
-        energy: energy(evidence),
-        correction: Correction::Body(Arc::new(move |body| moves.apply(body, change))),
+        look_alikes: if description.id.is_some() { look_alikes } else { vec![] },
+        // All that moves is misplaced.
+        energy: energy_beyond_noise(evidence),
+        correction: moves.correction(change),
+        ..description.candidate(behaves_like(stage), place, p_value, nats)
     }
-}
-
-/// Energy that is misplaced: all that moves.
-fn energy(evidence: &Evidence) -> f64 {
-    let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
-    total * evidence.noise().iter().sum::<f64>()
 }
 
 /// "3.0 mm nearer".

@@ -4,7 +4,6 @@
 //! difference of gain, cannot be.
 
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -105,9 +104,9 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
     let id = evidence.info(effects::channel_mismatch::ID).map(|info| info.id);
     let estimates =
         vec![Estimate::list("gain_db", &gains_db, &gain_deviations), Estimate::list("phase_deg", &phases_deg, &phase_deviations)];
+    let place = Place { rx: Some((1..receivers).collect()), ..Place::at(Stage::Antenna) };
     Candidate {
         id,
-        behaves_like: Behaviour::ChannelGain,
         statement: format!(
             "The receivers differ: against the first, {} {} dB of gain and {}° of phase, which no direction of the body explains.",
             if receivers == 2 { "the second has".to_string() } else { format!("receivers 1 to {} have", receivers - 1) },
@@ -115,22 +114,14 @@ fn candidate(evidence: &Evidence, gains: &[[f64; 2]], phases: &[[f64; 2]], p_val
             text(&phases_deg, 1),
         ),
         estimates: if id.is_some() { estimates } else { vec![] },
-        choice: None,
-        place: Place { rx: Some((1..receivers).collect()), ..Place::at(Stage::Antenna) },
-        p_value,
-        nats,
         errs_alike: true,
-        look_alikes: vec![],
-        curve: None,
         energy,
-        correction: Correction::Inverse(
-            Arc::new(move |cube| {
-                cube.each_chirp(|[_, channel, _], samples| {
-                    samples.iter_mut().for_each(|value| *value *= inverse[channel % receivers]);
-                });
-            }),
-            Volume::BY_SAMPLE,
-        ),
+        correction: Correction::inverse(Volume::BY_SAMPLE, move |cube| {
+            cube.each_chirp(|[_, channel, _], samples| {
+                samples.iter_mut().for_each(|value| *value *= inverse[channel % receivers]);
+            });
+        }),
+        ..Candidate::new(Behaviour::ChannelGain, place, p_value, nats)
     }
 }
 

@@ -11,9 +11,10 @@ use super::cells::Cells;
 use super::covariance::Array;
 use super::found::{Found, LOOKS};
 use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::detectors::clutter::energy_beyond_noise;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::statistics::corrected;
-use crate::diagnosis::{Candidate, Correction, Estimate, Evidence, Place};
+use crate::diagnosis::{Candidate, Estimate, Evidence, Place};
 use crate::effects::{self, Stage};
 
 /// What errors of the prediction look like, radian per unit of the sine.
@@ -54,23 +55,16 @@ fn candidate(evidence: &Evidence, cells: &Cells, directions: &DMatrix<f64>, foun
         .collect();
     let list = offsets.iter().map(|offset| format!("{:.0}", 1e6 * offset)).collect::<Vec<_>>().join(", ");
     let growth = found.values.norm();
-    let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
+    let place = Place::at(Stage::Antenna);
     Candidate {
         id: Some(effects::antenna_position::ID),
-        behaves_like: Behaviour::PhaseBetweenReceivers,
         estimates: vec![Estimate::list("offset_m", offsets.as_slice(), &deviations)],
-        choice: None,
-        place: Place::at(Stage::Antenna),
-        p_value: corrected(found.p_value, LOOKS),
-        nats: found.nats,
         errs_alike: true,
-        look_alikes: vec![],
         statement: format!(
             "The phases between neighbouring receivers grow with the direction of the body, and not alike: the receivers stand {list} µm \
              farther along x than declared (against the first, and but for a common stretch, which nothing here would show).",
         ),
-        curve: None,
-        energy: total * evidence.noise().iter().sum::<f64>() * (growth * 0.2).powi(2),
-        correction: Correction::None,
+        energy: energy_beyond_noise(evidence) * (growth * 0.2).powi(2),
+        ..Candidate::new(Behaviour::PhaseBetweenReceivers, place, corrected(found.p_value, LOOKS), found.nats)
     }
 }

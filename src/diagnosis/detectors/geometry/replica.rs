@@ -180,15 +180,7 @@ mod tests {
         }
         let starts = (0..frames).map(|frame| frame as f64 * radar.frame_period_s);
         let middle_s = starts.map(|start| start + 0.5 * radar.frame_duration_s()).collect();
-        let body = BodyPrediction {
-            parts: vec!["body".into()],
-            frames: bodies,
-            centres: vec![],
-            middle_s,
-            tracks: vec![],
-            beyond: vec![],
-            echoes: vec![],
-        };
+        let body = BodyPrediction { parts: vec!["body".into()], frames: bodies, middle_s, ..BodyPrediction::default() };
         let room = Room { right_m: Some(2.4), floor_m: Some(1.1), front_m: Some(4.0), ..Room::default() };
         Evidence::new(Loaded::of_samples(radar, samples, [-1e3, 1e3]), Some(room), Some(body))
     }

@@ -5,11 +5,11 @@
 //! are: the same phase, but it grows with the range. No id of docs/report.md names it.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use super::bearing::{Bearing, Sums, along};
 use super::wall_bearings::WallBearings;
 use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::detectors::clutter::energy_beyond_noise;
 use crate::diagnosis::detectors::undo;
 use crate::diagnosis::{Candidate, Correction, Cube, Evidence, Place, Volume};
 use crate::effects::Stage;
@@ -67,47 +67,37 @@ pub fn find(evidence: &Evidence, training: &[Sums], bearing: Bearing, nats: f64)
     let beat_hz = 2.0 * radar.slope_hz_per_s * mean_m / SPEED_OF_LIGHT;
     let turns: Vec<f64> = places.iter().map(|x| -size * wave * x / beat_hz).collect();
     let farthest = turns.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-    let total: f64 = evidence.maps().values().iter().map(|&power| f64::from(power - 1.0).max(0.0)).sum();
+    // The ratio of the walls' likelihoods, whose numbers the body gave, is one on average by chance: a p-value may be divided by it.
+    let p_value = (bearing.p_value * (-walls_gain).exp()).clamp(f64::MIN_POSITIVE, 1.0);
+    let place = Place { rx: Some((1..radar.rx_m.len()).collect()), ..Place::at(Stage::Receiver) };
     Some(Candidate {
-        id: None,
-        behaves_like: Behaviour::DelayProportionalPhaseByReceiver,
-        estimates: vec![],
-        choice: None,
-        place: Place { rx: Some((1..radar.rx_m.len()).collect()), ..Place::at(Stage::Receiver) },
-        // The ratio of the walls' likelihoods, whose numbers the body gave, is one on average by chance: a p-value may be divided by it.
-        p_value: (bearing.p_value * (-walls_gain).exp()).clamp(f64::MIN_POSITIVE, 1.0),
-        nats,
         errs_alike: true,
-        look_alikes: vec![],
         statement: format!(
             "Between the receivers everything is turned in proportion to its range, by {:.2} radian from the first to the last at \
              {mean_m:.1} m: as if the last one were sampled {:.1} ns later than the first.",
             farthest * beat_hz,
             1e9 * farthest / TAU
         ),
-        curve: None,
-        energy: total * evidence.noise().iter().sum::<f64>() * (farthest * beat_hz).powi(2) / 3.0,
-        correction: Correction::Inverse(
-            Arc::new({
-                let (radar, clutter): (Radar, _) = (radar.clone(), evidence.clutter().to_vec());
-                // Of what moves: static clutter would wrap around the chirps' ends, and how strong it is in every receiver is free.
-                let add_clutter = move |cube: &mut Cube, sign: f64| {
-                    let samples = cube.dims[4];
-                    cube.each_chirp(|[_, channel, _], chirp| {
-                        let clutter = &clutter[channel * samples..][..samples];
-                        chirp.iter_mut().zip(clutter).for_each(|(value, clutter)| *value += sign * clutter);
-                    });
-                };
-                move |cube: &mut Cube| {
-                    let receivers = cube.dims[2];
-                    let lever = |delay_s: f64| radar.slope_hz_per_s * delay_s;
-                    add_clutter(cube, -1.0);
-                    undo::delay_phase(cube, &radar, lever, |[_, channel, _]| turns[channel % receivers]);
-                    add_clutter(cube, 1.0);
-                }
-            }),
-            Volume::KEPT,
-        ),
+        energy: energy_beyond_noise(evidence) * (farthest * beat_hz).powi(2) / 3.0,
+        correction: Correction::inverse(Volume::KEPT, {
+            let (radar, clutter): (Radar, _) = (radar.clone(), evidence.clutter().to_vec());
+            // Of what moves: static clutter would wrap around the chirps' ends, and how strong it is in every receiver is free.
+            let add_clutter = move |cube: &mut Cube, sign: f64| {
+                let samples = cube.dims[4];
+                cube.each_chirp(|[_, channel, _], chirp| {
+                    let clutter = &clutter[channel * samples..][..samples];
+                    chirp.iter_mut().zip(clutter).for_each(|(value, clutter)| *value += sign * clutter);
+                });
+            };
+            move |cube: &mut Cube| {
+                let receivers = cube.dims[2];
+                let lever = |delay_s: f64| radar.slope_hz_per_s * delay_s;
+                add_clutter(cube, -1.0);
+                undo::delay_phase(cube, &radar, lever, |[_, channel, _]| turns[channel % receivers]);
+                add_clutter(cube, 1.0);
+            }
+        }),
+        ..Candidate::new(Behaviour::DelayProportionalPhaseByReceiver, place, p_value, nats)
     })
 }
 

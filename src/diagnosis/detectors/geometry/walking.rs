@@ -50,7 +50,6 @@ pub fn walking(seed: u64, turned: impl Fn(usize, f64) -> Complex64, array: &DMat
 
 pub fn four_receivers() -> Radar {
     let mut radar = Radar::small(12);
-    radar.tx_m = vec![[0.0; 3]];
     radar.rx_m = (0..4).map(|rx| [0.5 * f64::from(rx) * radar.wavelength_m(), 0.0, 0.0]).collect();
     radar
 }

@@ -66,7 +66,7 @@ impl WallBearings {
         });
         let sources: Vec<_> = rough.chain(smooth).collect();
         let spectra: Vec<Vec<Complex64>> = evidence.clutter().chunks_exact(samples).map(spectrum).collect();
-        let noise = evidence.noise().iter().sum::<f64>() / (spectra.len() * loops * evidence.split.training.len()).max(1) as f64;
+        let noise = evidence.total_noise() / (spectra.len() * loops * evidence.split.training.len()).max(1) as f64;
         let cell = |bin: usize| -> Option<Cell> {
             let mut expected = DMatrix::<Complex64>::zeros(receivers, receivers);
             for (at, power, phases) in sources.iter().filter(|source| (source.0 - bin as f64).abs() < REACH) {

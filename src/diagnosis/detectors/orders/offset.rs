@@ -3,8 +3,6 @@
 //! A leakage over the board may not turn either. It has a delay, though, of the way between the nearest antennas at least: where the
 //! beat frequency of what does not turn is surely lower than that, it is a constant.
 
-use std::sync::Arc;
-
 use num_complex::Complex64;
 
 use super::fit::{Fit, against};
@@ -40,23 +38,18 @@ pub fn find(evidence: &Evidence, fit: &Fit) -> Option<Candidate> {
     let deviations: Vec<f64> = (0..rx).map(deviation).collect();
     let course = fit.course.clone();
     let constant = offsets.clone();
+    let place = Place { range_m: Some([0.0, 0.0]), ..Place::at(Stage::Receiver) };
     Some(Candidate {
         id: Some(effects::dc_offset::ID),
-        behaves_like: Behaviour::AdditiveFastTime,
         estimates: vec![Estimate::list("i", &parts(|d| d.re), &deviations), Estimate::list("q", &parts(|d| d.im), &deviations)],
-        choice: None,
-        place: Place { range_m: Some([0.0, 0.0]), ..Place::at(Stage::Receiver) },
-        p_value,
-        nats,
-        errs_alike: false,
         look_alikes: if beat.may_be_leakage() { vec![effects::tx_leakage::ID] } else { vec![] },
         statement: format!(
             "a constant of {} codes is added to every sample of the {rx} receivers: it does not turn when all static returns do",
             offsets.iter().map(|d| format!("{:.1}", d.norm())).collect::<Vec<_>>().join(", ")
         ),
-        curve: None,
         energy: offsets.iter().map(|d| d.norm_sqr()).sum::<f64>() * (frames * tx * loops * samples) as f64,
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| subtract(cube, &course.turned, &constant))),
+        correction: Correction::samples(move |cube| subtract(cube, &course.turned, &constant)),
+        ..Candidate::new(Behaviour::AdditiveFastTime, place, p_value, nats)
     })
 }
 

@@ -3,9 +3,9 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use super::*;
-use crate::diagnosis::Correction;
 use crate::diagnosis::behaviour::Behaviour;
-use crate::effects;
+use crate::diagnosis::{Correction, Place};
+use crate::effects::{self, Stage};
 use crate::radar::Radar;
 
 const FRAMES: usize = 32;
@@ -30,18 +30,18 @@ fn turned(seed: u64, offset: Complex64) -> Evidence {
     let [_, tx, _, loops, _] = evidence.cube.dims;
     let turned: Vec<Complex64> = (0..FRAMES * tx * loops).map(|i| Complex64::cis(course(i / (tx * loops)))).collect();
     let known = turned.clone();
-    let undo = Correction::Samples(Arc::new(move |cube: &mut crate::diagnosis::Cube| {
+    let undo = Correction::samples(move |cube: &mut crate::diagnosis::Cube| {
         let [_, tx, rx, loops, _] = cube.dims;
         cube.each_chirp(|[frame, channel, index], chirp| {
             let back = known[frame * tx * loops + channel / rx * loops + index].conj();
             chirp.iter_mut().for_each(|value| *value *= back);
         });
-    }));
+    });
     after(evidence, Correction::Followed(Box::new(undo), Arc::new(Course { of: Of::All, turned })))
 }
 
 fn after(evidence: Evidence, correction: Correction) -> Evidence {
-    evidence.with(&Candidate { correction, ..crate::diagnosis::finding::nameless(Behaviour::SlowTimePhase) })
+    evidence.with(&Candidate { correction, ..Candidate::new(Behaviour::SlowTimePhase, Place::at(Stage::Receiver), 0.0, 1.0) })
 }
 
 fn sure(evidence: &Evidence) -> Vec<Candidate> {

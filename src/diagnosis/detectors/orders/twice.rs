@@ -4,18 +4,16 @@
 //! The second harmonic of a receiver has twice the beat frequency and twice the phase, too, but also twice the phase of every receiver
 //! against the others, where a second trip has that of one arrival.
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::course::{Course, powers};
 use crate::diagnosis::detectors::paths::product::CLOSE;
-use crate::diagnosis::detectors::region::{Region, remove};
+use crate::diagnosis::detectors::region::{Region, removal};
 use crate::diagnosis::detectors::vital::frames::{Frames, frames};
 use crate::diagnosis::evidence::{Evidence, hann};
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
+use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics::{DECIBEL, corrected, fisher_tail};
 use crate::effects::{self, Stage};
 
@@ -81,21 +79,15 @@ fn candidate(
     let (value, deviation) = (best.factor.norm() / mean * evidence.peak(), best.deviation / mean * evidence.peak());
     let window = |bin: usize| [bin as f64 - 1.5, bin as f64 + 1.5];
     let region = Region { range: window(best.bin), doppler: [-1.0, 1.0] };
-    let training = evidence.split.training.clone();
     let power: f64 = amplitude.iter().map(|a| a.norm_sqr()).sum();
+    let place = Place { range_m: Some(window(best.bin).map(|bin| bin * bin_m)), ..Place::at(Stage::Propagation) };
     Candidate {
         id: Some(KINDS[best.kind].0),
-        behaves_like: Behaviour::PathLike,
         estimates: vec![if KINDS[best.kind].1 {
             Estimate::normal("level_db", DECIBEL * value.ln(), DECIBEL * deviation / value.max(1e-12))
         } else {
             Estimate::normal("coefficient", value, deviation)
         }],
-        choice: None,
-        place: Place { range_m: Some(window(best.bin).map(|bin| bin * bin_m)), ..Place::at(Stage::Propagation) },
-        p_value,
-        nats: gain,
-        errs_alike: false,
         look_alikes,
         statement: format!(
             "at {range_m:.2} m, twice the range of what moves at {:.2} m, something turns twice as far as it does, {level_db:.0} dB \
@@ -103,9 +95,9 @@ fn candidate(
             bin * bin_m,
             if best.kind == 0 { "its return goes out from the radar a second time" } else { "the receiver's second harmonic" },
         ),
-        curve: None,
-        energy: best.factor.norm_sqr() * power * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
-        correction: Correction::Samples(Arc::new(move |cube| remove(cube, &training, 1, region))),
+        energy: best.factor.norm_sqr() * power * evidence.cube.chirps(),
+        correction: removal(evidence, 1, region),
+        ..Candidate::new(Behaviour::PathLike, place, p_value, gain)
     }
 }
 

@@ -1,8 +1,6 @@
 //! Echoes of the measured body itself, in cells where nothing else can be: a delayed copy of its return (`body_multibounce`). At
 //! high signal-to-noise the measurement is the best prediction of the signal, phases included.
 
-use std::sync::Arc;
-
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -11,9 +9,8 @@ use super::mover::energy;
 use super::scene::Scene;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::transform;
-use crate::diagnosis::finding::Undo;
 use crate::diagnosis::statistics::corrected;
-use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Volume};
+use crate::diagnosis::{Candidate, Correction, Estimate, Place, Volume};
 use crate::effects::{self, Stage};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
@@ -102,29 +99,22 @@ impl Bounce {
         let step_m = scene.range_m(0.125);
         Candidate {
             id: Some(effects::body_multibounce::ID),
-            behaves_like: Behaviour::PathLike,
             estimates: vec![Estimate::normal("extra_m", extra_m, 0.4 * step_m)],
-            choice: None,
-            place: Place::at(Stage::Propagation),
-            p_value,
-            nats: self.fit.held_out,
-            errs_alike: false,
-            look_alikes: vec![],
             statement: format!(
                 "The body's return comes a second time, {extra_m:.2} m behind itself and {:.0} dB weaker, with the body's own \
                  Doppler: it bounced between parts of the body.",
                 -20.0 * factor.norm().max(1e-12).log10()
             ),
-            curve: None,
             energy: factor.norm_sqr() * energy(scene, body / 2.25),
-            correction: Correction::Inverse(self.undo(scene), Volume::BY_SAMPLE),
+            correction: self.undo(scene),
+            ..Candidate::new(Behaviour::PathLike, Place::at(Stage::Propagation), p_value, self.fit.held_out)
         }
     }
 
-    fn undo(&self, scene: &Scene) -> Undo {
+    fn undo(&self, scene: &Scene) -> Correction {
         let (factor, rate, samples) = (self.fit.factor, rate(&scene.evidence.radar, self.extra_m), scene.samples);
         let clutter = scene.evidence.clutter().to_vec();
-        Arc::new(move |cube: &mut Cube| {
+        Correction::inverse(Volume::BY_SAMPLE, move |cube| {
             cube.each_chirp(|[_, channel, _], chirp| {
                 let clutter = &clutter[channel * samples..][..samples];
                 for (n, value) in chirp.iter_mut().enumerate() {

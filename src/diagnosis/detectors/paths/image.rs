@@ -1,15 +1,13 @@
 //! Candidate: the body's mirror image at a boundary.
 
-use std::sync::Arc;
-
 use super::ghost::Ghost;
 use super::mover::energy;
-use super::removal::{empty_cells, patch};
+use super::removal::{emptied, patch};
 use super::scene::Scene;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::prediction::{SIDE_SPREAD, mirror_id, mirrored_return};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
-use crate::diagnosis::{Candidate, Correction, Estimate, Place};
+use crate::diagnosis::{Candidate, Estimate, Place};
 use crate::effects::Stage;
 
 /// Log-likelihood within which two boundaries are not distinguishable.
@@ -40,38 +38,29 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
         values: vec![ghost.coefficient],
         ci90: vec![[ghost.coefficient * (-spread).exp(), ghost.coefficient * spread.exp()]],
     };
-    let cells: Vec<Vec<usize>> = (ghost.templates.iter().enumerate())
+    let cells = (ghost.templates.iter().enumerate())
         .map(|(frame, template)| {
             let mut expected = vec![0.0; scene.size()];
             for (&cell, &power) in template.cells.iter().zip(&template.power) {
                 expected[cell as usize] = ghost.weight as f32 * power;
             }
-            patch(&expected, scene.map(frame), scene.model.support(frame), scene.samples, 0.1)
+            (frame, patch(&expected, scene.map(frame), scene.model.support(frame), scene.samples, 0.1))
         })
         .collect();
-    let clutter = evidence.clutter().to_vec();
     let power: f64 = (ghost.templates.iter())
         .map(|template| ghost.weight * template.power.iter().map(|&power| f64::from(power)).sum::<f64>())
         .sum();
+    let place = Place { boundary: Some(name.into()), ..place };
     Candidate {
         id: Some(id),
-        behaves_like: Behaviour::PathLike,
         estimates: vec![coefficient],
         choice: Some(name.into()),
-        place: Place { boundary: Some(name.into()), ..place },
-        p_value: corrected(chi2_tail(2.0 * ghost.gain_all, 2.0), tried),
-        nats: ghost.gain,
-        errs_alike: false,
         look_alikes,
         statement,
-        curve: None,
         // The windows' cells hold every tone 2.25 times over.
         energy: energy(scene, power / 2.25),
-        correction: Correction::Samples(Arc::new(move |cube| {
-            for (frame, cells) in cells.iter().enumerate() {
-                empty_cells(cube, &clutter, frame, cells);
-            }
-        })),
+        correction: emptied(evidence, cells),
+        ..Candidate::new(Behaviour::PathLike, place, corrected(chi2_tail(2.0 * ghost.gain_all, 2.0), tried), ghost.gain)
     }
 }
 

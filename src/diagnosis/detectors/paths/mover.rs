@@ -1,16 +1,14 @@
 //! Candidate: something that moves, and not with the body (`moving_reflector`).
 
-use std::sync::Arc;
-
 use super::oscillation::Oscillation;
-use super::removal::{empty_cells, patch};
+use super::removal::{emptied, patch};
 use super::scene::Scene;
 use super::track::{Sighting, Track};
 use super::whereabouts::{Whereabouts, bounds};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::power::Template;
 use crate::diagnosis::statistics::{corrected, median};
-use crate::diagnosis::{Candidate, Correction, Estimate, Place};
+use crate::diagnosis::{Candidate, Estimate, Place};
 use crate::effects::{self, Stage};
 use crate::radar::Radar;
 
@@ -74,26 +72,15 @@ impl Mover {
     pub fn candidate(&self, scene: &Scene, tried: f64) -> Candidate {
         let (evidence, sightings) = (scene.evidence, &self.track.sightings);
         let seen = Whereabouts::new(scene, sightings, self.oscillation.as_ref(), self.sine_error);
-        let (cells, clutter) = (self.cells(scene), evidence.clutter().to_vec());
         let is_reflector = self.id == Some(effects::moving_reflector::ID);
         Candidate {
             id: self.id,
-            behaves_like: Behaviour::PathLike,
             estimates: if is_reflector { self.estimates(&seen, &evidence.radar) } else { vec![] },
-            choice: None,
-            place: self.place(scene, &seen),
-            p_value: corrected(self.track.p_value, tried),
-            nats: self.gain,
-            errs_alike: false,
             look_alikes: self.look_alikes(scene),
             statement: self.statement(&seen),
-            curve: None,
             energy: energy(scene, sightings.iter().map(|s| s.power).sum()),
-            correction: Correction::Samples(Arc::new(move |cube| {
-                for (frame, cells) in &cells {
-                    empty_cells(cube, &clutter, *frame, cells);
-                }
-            })),
+            correction: emptied(evidence, self.cells(scene)),
+            ..Candidate::new(Behaviour::PathLike, self.place(scene, &seen), corrected(self.track.p_value, tried), self.gain)
         }
     }
 
@@ -237,7 +224,7 @@ fn named(scene: &Scene, sightings: &[Sighting]) -> Option<&'static str> {
 /// Energy of all samples of tones whose peaks in the maps sum to this much over the noise.
 pub fn energy(scene: &Scene, power: f64) -> f64 {
     // The windows' coherent gains take 1.5 each off the peak.
-    2.25 * power * scene.evidence.noise().iter().sum::<f64>()
+    2.25 * power * scene.evidence.total_noise()
 }
 
 pub fn middle_s(scene: &Scene, frame: usize) -> f64 {

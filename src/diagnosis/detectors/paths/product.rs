@@ -2,8 +2,6 @@
 //! harmonic of a receiver, which doubles the phase of every receiver where the second trip has that of one arrival.
 //! Both lie at the sum of two ranges and two velocities; the measurement without its noise is the best template of either.
 
-use std::sync::Arc;
-
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -106,20 +104,15 @@ impl Product {
         };
         // The phase between receivers is observed; the library says whose it is.
         let id = scene.evidence.info(kind.id()).map(|info| info.id);
+        let behaves_like = if id.is_some() { behaves_like } else { Behaviour::Quadratic };
         Candidate {
             id,
-            behaves_like: if id.is_some() { behaves_like } else { Behaviour::Quadratic },
             estimates: id.map(|_| estimate).into_iter().collect(),
-            choice: None,
-            place: Place::at(stage),
-            p_value,
-            nats: self.fit.held_out,
-            errs_alike: false,
             look_alikes,
             statement,
-            curve: None,
             energy: self.energy,
-            correction: Correction::Inverse(Arc::new(move |cube: &mut Cube| remove(cube, kind, factor)), volume),
+            correction: Correction::inverse(volume, move |cube| remove(cube, kind, factor)),
+            ..Candidate::new(behaves_like, Place::at(stage), p_value, self.fit.held_out)
         }
     }
 

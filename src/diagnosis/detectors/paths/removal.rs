@@ -2,17 +2,23 @@
 
 use num_complex::Complex64;
 
-use crate::diagnosis::Cube;
 use crate::diagnosis::evidence::{hann, transform};
+use crate::diagnosis::{Correction, Cube, Evidence};
 
 /// Directions of the cells' subspace that hold less than this share of a cell's energy are left alone.
 const LEAST: f64 = 1e-3;
 /// Cells of a frame that are taken out at once; more make the system of equations slow.
 const MOST_CELLS: usize = 300;
 
+/// Empties cells of some frames.
+pub fn emptied(evidence: &Evidence, frames: Vec<(usize, Vec<usize>)>) -> Correction {
+    let clutter = evidence.clutter().to_vec();
+    Correction::samples(move |cube| frames.iter().for_each(|(frame, cells)| empty_cells(cube, &clutter, *frame, cells)))
+}
+
 /// Subtracts from a frame's moving part the smallest signal that empties the cells `[doppler · samples + range]`, in
 /// every channel. `clutter` is static clutter, `[channel, sample]`.
-pub fn empty_cells(cube: &mut Cube, clutter: &[Complex64], frame: usize, cells: &[usize]) {
+fn empty_cells(cube: &mut Cube, clutter: &[Complex64], frame: usize, cells: &[usize]) {
     let cells = &cells[..cells.len().min(MOST_CELLS)];
     if cells.is_empty() {
         return;

@@ -3,7 +3,6 @@
 //! judged by all frames.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use num_complex::Complex64;
 
@@ -53,7 +52,7 @@ struct Tone {
 impl Found {
     pub fn candidate(&self, scene: &Scene, tried: f64) -> Candidate {
         let tones = self.tones.clone();
-        let correction = Correction::Samples(Arc::new(move |cube| {
+        let correction = Correction::samples(move |cube| {
             let dims = cube.dims;
             let turns = |cells: f64, length: usize| -> Vec<Complex64> {
                 (0..length).map(|i| Complex64::cis(TAU * cells * i as f64 / length as f64)).collect()
@@ -67,7 +66,7 @@ impl Found {
                     }
                 }
             }
-        }));
+        });
         Candidate { correction, ..self.mover.candidate(scene, tried) }
     }
 }

@@ -2,8 +2,6 @@
 //! in every frame. What the clutter's own roughness may do is the null: its power in a cell is speckle about the mean of the
 //! ranges around it. Boundaries, edges and corners return more than their surroundings at known ranges, and are left out.
 
-use std::sync::Arc;
-
 use num_complex::Complex64;
 
 use crate::diagnosis::behaviour::Behaviour;
@@ -274,18 +272,11 @@ fn candidate(evidence: &Evidence, peak: &Peak, p_value: f64, nats: f64) -> Candi
     let tone = Tone::of(evidence, peak);
     Candidate {
         id: Some(effects::static_reflector::ID),
-        behaves_like: Behaviour::PathLike,
         estimates: peak.position(radar).into_iter().chain(tone.relative(evidence, peak)).collect(),
-        choice: None,
-        place: peak.place(radar),
-        p_value,
-        nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: peak.statement(),
-        curve: None,
         energy: tone.power() * (frames * loops * samples) as f64,
-        correction: Correction::Samples(Arc::new(move |cube| tone.remove(cube))),
+        correction: Correction::samples(move |cube| tone.remove(cube)),
+        ..Candidate::new(Behaviour::PathLike, peak.place(radar), p_value, nats)
     }
 }
 

@@ -102,15 +102,7 @@ fn in_a_room(radar: Radar, cube: Cube, points: Vec<Vec<Point>>) -> Evidence {
     let (held_out, training) = (0..FRAMES).partition(|frame| frame % 4 == 2);
     let split = Split { training, held_out, block_loops: None };
     let room = Room { left_m: Some(1.3), right_m: Some(RIGHT_M), front_m: Some(4.0), ..Room::default() };
-    let body = BodyPrediction {
-        parts: vec!["body".into()],
-        frames: points,
-        centres: vec![],
-        middle_s,
-        tracks: vec![],
-        beyond: vec![],
-        echoes: vec![],
-    };
+    let body = BodyPrediction { parts: vec!["body".into()], frames: points, middle_s, ..BodyPrediction::default() };
     Evidence::new(Loaded { cube, radar, split, starts_s, extremes: [-1.0, 1.0] }, Some(room), Some(body))
 }
 

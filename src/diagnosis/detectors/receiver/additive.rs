@@ -7,13 +7,12 @@
 
 use num_complex::Complex64;
 
-use super::additive_term::{Chosen, is_bent, subtract};
+use super::additive_term::{Chosen, added, is_bent};
 use super::elements::{Element, Images, choose, templates};
 use super::field::{Field, Fitted, add};
 use super::response;
 use super::support::{UNLIKELY, energy};
 use crate::diagnosis::Evidence;
-use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Place};
 use crate::diagnosis::statistics::chi2_tail;
 use crate::effects::Stage;
@@ -86,23 +85,12 @@ fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, nats: f64) -> O
     let energy_of_chirp = term.iter().map(|chirp| energy(chirp)).sum::<f64>();
     let power_db = 10.0 * (energy_of_chirp / field.clutter.iter().map(|chirp| energy(chirp)).sum::<f64>().max(1e-300)).log10();
     Some(Candidate {
-        id: None,
-        behaves_like: Behaviour::AdditiveFastTime,
-        estimates: vec![],
-        choice: None,
-        place: Place::at(Stage::Receiver),
-        p_value,
-        nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "every chirp holds something that never changes at beat frequencies where the room ({:.1} to {:.1} m) has nothing, \
              {power_db:.1} dB to all static clutter; no effect of the library explains its shape",
             field.support.low_m, field.support.high_m
         ),
-        curve: None,
-        energy: energy_of_chirp * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
-        correction: subtract(term),
+        ..added(evidence, term, Place::at(Stage::Receiver), p_value, nats)
     })
 }
 

@@ -1,7 +1,6 @@
 //! An element of a static additive field as a candidate: what it adds to every chirp, its numbers, and what is said of it.
 
 use std::ops::Range;
-use std::sync::Arc;
 
 use num_complex::Complex64;
 
@@ -12,7 +11,7 @@ use super::zero_beat::shortest_m;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
-use crate::diagnosis::{Cube, Evidence, denoised};
+use crate::diagnosis::{Evidence, denoised};
 use crate::effects::{self, Stage};
 
 /// Half the size of a board.
@@ -61,22 +60,7 @@ impl Chosen<'_> {
             Element::Start(count) | Element::End(count) => term.edge(field, count, matches!(element, Element::End(_))),
             Element::Image | Element::Square => return None,
         };
-        let [frames, _, _, loops, _] = evidence.cube.dims;
-        Some(Candidate {
-            id,
-            behaves_like: Behaviour::AdditiveFastTime,
-            estimates,
-            choice: None,
-            place,
-            p_value,
-            nats,
-            errs_alike: false,
-            look_alikes: vec![],
-            statement,
-            curve: None,
-            energy: term.chirps.iter().map(|chirp| energy(chirp)).sum::<f64>() * (frames * loops) as f64,
-            correction: subtract(term.chirps),
-        })
+        Some(Candidate { id, estimates, statement, ..added(evidence, term.chirps, place, p_value, nats) })
     }
 
     /// The elements that are one with this one, and all others.
@@ -224,18 +208,14 @@ impl Term {
         let (channels, samples) = (self.chirps.len(), self.chirps[0].len());
         let scene = (field.clutter.iter().map(|chirp| energy(chirp)).sum::<f64>() / (channels * samples) as f64).sqrt();
         let level_deviation = denoised::PEAK_DB.hypot(8.7 * 0.7 * scene / (self.level * (channels as f64).sqrt()));
+        let (number, words) = counted(count, at_end);
         Claim {
             id: Some(effects::ramp_edge_transient::ID),
-            estimates: vec![
-                Estimate { name: "samples", values: vec![count as f64], ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]] },
-                Estimate::normal("level_db", self.level_db, level_deviation),
-            ],
+            estimates: vec![number, Estimate::normal("level_db", self.level_db, level_deviation)],
             place: Place { samples: Some(edge(samples, count, at_end).collect()), ..Place::at(Stage::Receiver) },
             statement: format!(
-                "the {} {} of every chirp hold{} a value that is added and never changes, up to {} codes \
+                "{words} of every chirp hold{} a value that is added and never changes, up to {} codes \
                  ({:.1} dB relative to the signal's peak sample): the ADC runs into the {} of the ramp",
-                if at_end { "last" } else { "first" },
-                if count == 1 { "sample".into() } else { format!("{count} samples") },
                 if count == 1 { "s" } else { "" },
                 digits(self.largest),
                 self.level_db,
@@ -246,8 +226,16 @@ impl Term {
 }
 
 /// Samples at the beginning or the end of a chirp.
-fn edge(samples: usize, count: usize, at_end: bool) -> Range<usize> {
+pub fn edge(samples: usize, count: usize, at_end: bool) -> Range<usize> {
     if at_end { samples - count..samples } else { 0..count }
+}
+
+/// How many these are, and which, in words.
+pub fn counted(count: usize, at_end: bool) -> (Estimate, String) {
+    let middle = count as f64;
+    let number = Estimate { name: "samples", values: vec![middle], ci90: vec![[middle - 0.5, middle + 0.5]] };
+    let samples = if count == 1 { "sample".into() } else { format!("{count} samples") };
+    (number, format!("the {} {samples}", if at_end { "last" } else { "first" }))
 }
 
 /// An ADC that clips distorts everything; the residual has no shape of its own, least of all a filter's.
@@ -255,11 +243,17 @@ pub fn is_bent(evidence: &Evidence) -> bool {
     evidence.accepted.contains(&effects::adc_saturation::ID)
 }
 
-/// Subtracts a static term from every chirp of its channel.
-pub fn subtract(term: Vec<Vec<Complex64>>) -> Correction {
-    Correction::Samples(Arc::new(move |cube: &mut Cube| {
-        cube.each_chirp(|[_, channel, _], chirp| chirp.iter_mut().zip(&term[channel]).for_each(|(value, term)| *value -= term));
-    }))
+/// A static term that nobody has named yet: its energy, and that it is subtracted from every chirp of its channel.
+pub fn added(evidence: &Evidence, term: Vec<Vec<Complex64>>, place: Place, p_value: f64, nats: f64) -> Candidate {
+    Candidate {
+        energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * evidence.cube.chirps(),
+        correction: Correction::samples(move |cube| {
+            cube.each_chirp(|[_, channel, _], chirp| {
+                chirp.iter_mut().zip(&term[channel]).for_each(|(value, term)| *value -= term);
+            });
+        }),
+        ..Candidate::new(Behaviour::AdditiveFastTime, place, p_value, nats)
+    }
 }
 
 /// A number with three significant digits.

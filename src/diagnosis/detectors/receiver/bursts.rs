@@ -69,22 +69,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if nats <= 0.0 {
         return vec![];
     }
-    let (Description { id, estimates, statement }, look_alikes, place) = claim(evidence, &bursts, hit, crossings.as_ref());
+    let (description, look_alikes, place) = claim(evidence, &bursts, hit, crossings.as_ref());
     let volume = Volume { of_samples: Some(Arc::new(spread(evidence, &bursts, &powers))), ..Volume::KEPT };
     vec![Candidate {
-        id,
-        behaves_like: Behaviour::SparseAdditive,
-        estimates,
-        choice: None,
-        place,
-        p_value,
-        nats,
-        errs_alike: false,
         look_alikes,
-        statement,
-        curve: None,
         energy: removed,
-        correction: Correction::Inverse(Arc::new(move |cube: &mut Cube| repair_all(cube, &bursts)), volume),
+        correction: Correction::inverse(volume, move |cube| repair_all(cube, &bursts)),
+        ..description.candidate(Behaviour::SparseAdditive, place, p_value, nats)
     }]
 }
 

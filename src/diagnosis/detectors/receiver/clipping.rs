@@ -114,28 +114,22 @@ fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
         // That a sample lies beyond the clipping level is likelier than any one value there: the density of what is restored is a bound.
         Some(declip) => {
             let restore = move |cube: &mut Cube| cube.each_chirp(|_, chirp| declip.restore(chirp));
-            Correction::Inverse(Arc::new(restore), Volume::KEPT)
+            Correction::inverse(Volume::KEPT, restore)
         }
         None => Correction::None,
     };
+    let place = Place { frames: pile.frames(), ..Place::at(Stage::Receiver) };
     Candidate {
         id: Some(effects::adc_saturation::ID),
-        behaves_like: Behaviour::Amplitude,
         estimates: vec![Estimate { name: "level", values: vec![level], ci90: vec![ci90] }],
-        choice: None,
-        place: Place { frames: pile.frames(), ..Place::at(Stage::Receiver) },
-        p_value: corrected((-excess).exp(), 2.0),
-        nats: excess * held_share,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "{at} of the recorded components ({:.3} %) lie exactly at ±{largest:.0}, where {expected:.1} would by the values just \
              below: the converter is at its rail and cuts the signal",
             100.0 * share
         ),
-        curve: None,
         energy: at as f64 * (0.1 * largest).powi(2),
         correction,
+        ..Candidate::new(Behaviour::Amplitude, place, corrected((-excess).exp(), 2.0), excess * held_share)
     }
 }
 

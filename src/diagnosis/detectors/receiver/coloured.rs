@@ -6,7 +6,7 @@ use super::shares::Shares;
 use super::support::UNLIKELY;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
+use crate::diagnosis::finding::{Candidate, Curve, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected, exponential_scale};
 use crate::effects::{self, Stage};
 
@@ -84,15 +84,14 @@ impl Powers {
 
     fn curve(&self, fit: &Fit) -> Curve {
         let Self { hertz, found, .. } = self;
-        Curve {
-            title: "Noise over beat frequency".into(),
-            x_label: "beat frequency, Hz".into(),
-            y_label: "power over the median, dB".into(),
-            series: vec![
-                ("measured".into(), hertz.clone(), found.iter().map(|p| 10.0 * p.max(1e-12).log10()).collect()),
-                ("fitted".into(), hertz.clone(), fit.shape.iter().map(|s| 10.0 * (fit.level * s).log10()).collect()),
+        Curve::new(
+            "Noise over beat frequency",
+            ["beat frequency, Hz", "power over the median, dB"],
+            [
+                ("measured", hertz.clone(), found.iter().map(|p| 10.0 * p.max(1e-12).log10()).collect()),
+                ("fitted", hertz.clone(), fit.shape.iter().map(|s| 10.0 * (fit.level * s).log10()).collect()),
             ],
-        }
+        )
     }
 }
 
@@ -161,7 +160,7 @@ struct Evident {
 /// Beyond the noise's level.
 fn energy(evidence: &Evidence, powers: &Powers, fit: &Fit) -> f64 {
     let excess = powers.found.iter().sum::<f64>() / powers.found.len() as f64 / fit.level - 1.0;
-    let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
+    let noise = evidence.mean_noise();
     excess.max(0.0) * fit.level * noise * evidence.cube.samples.len() as f64
 }
 
@@ -186,22 +185,13 @@ fn named(powers: &Powers, top: &Top, fit: &Fit, evident: Evident) -> Candidate {
 fn unnamed(powers: &Powers, fit: &Fit, Evident { p_value, gain, energy }: Evident) -> Candidate {
     let (low, high) = fit.shape.iter().fold((f64::INFINITY, 0.0f64), |(low, high), &s| (low.min(s), high.max(s)));
     Candidate {
-        id: None,
-        behaves_like: Behaviour::NoiseOverBeatFrequency,
-        estimates: vec![],
-        choice: None,
-        place: Place::at(Stage::Noise),
-        p_value,
-        nats: gain,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "the noise's power differs by {:.1} dB between bands of beat frequency, where thermal noise would be level",
             10.0 * (high / low.max(1e-300)).log10()
         ),
         curve: Some(powers.curve(fit)),
         energy,
-        correction: Correction::None,
+        ..Candidate::new(Behaviour::NoiseOverBeatFrequency, Place::at(Stage::Noise), p_value, gain)
     }
 }
 

@@ -356,7 +356,6 @@ mod tests {
     fn evidence(seed: u64, added: impl Fn(usize, f64) -> Complex64) -> Evidence {
         let mut radar = Radar::small(12);
         (radar.loops_per_frame, radar.samples_per_chirp) = (32, 128);
-        radar.tx_m = vec![[0.0; 3]];
         radar.rx_m = (0..4).map(|rx| [0.5 * f64::from(rx) * radar.wavelength_m(), 0.0, 0.0]).collect();
         Evidence::in_noise(radar, seed, |[frame, rx, chirp, n]| {
             let moving = Complex64::cis(0.3 * chirp as f64 + 0.7 * n as f64 + 0.5 * rx as f64) * 3.0;

@@ -5,6 +5,7 @@ use num_complex::Complex64;
 use super::field::{Field, Fitted, Templates, orthonormal, remove};
 use super::support::{beat_hz, dot, tone};
 use crate::diagnosis::Evidence;
+use crate::diagnosis::detectors::climb::golden_section;
 use crate::effects;
 
 /// Leakage over the board is nearer than this.
@@ -216,13 +217,7 @@ fn improve(field: &Field, images: &Images, chosen: &mut [Element], step: f64) {
     }
 }
 
-/// Golden-section search of a maximum near a grid's best.
-pub fn refine(at: f64, step: f64, mut value: impl FnMut(f64) -> f64) -> f64 {
-    const RATIO: f64 = 0.618_033_988_749_895;
-    let (mut low, mut high) = (at - step, at + step);
-    for _ in 0..18 {
-        let (a, b) = (high - RATIO * (high - low), low + RATIO * (high - low));
-        if value(a) > value(b) { high = b } else { low = a }
-    }
-    0.5 * (low + high)
+/// A maximum near a grid's best.
+pub fn refine(at: f64, step: f64, value: impl FnMut(f64) -> f64) -> f64 {
+    golden_section([at - step, at + step], 18, value)
 }

@@ -104,18 +104,6 @@ impl Field {
         gain
     }
 
-    /// Of held-out frames outside the support, in units of the noise.
-    pub fn held_out_energy(&self) -> f64 {
-        let nothing = vec![vec![Complex64::ZERO; self.support.outside.len()]; self.channels()];
-        let mut sum = 0.0;
-        for &frame in &self.held_out {
-            for ((own, nothing), variance) in self.coordinates[frame].iter().zip(&nothing).zip(&self.variance) {
-                sum += distance(own, nothing) / variance;
-            }
-        }
-        sum
-    }
-
     /// Mean chirps of held-out frames are not kept: only their coordinates.
     pub fn held_out(&self) -> &[usize] {
         &self.held_out

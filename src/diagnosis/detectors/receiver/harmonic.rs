@@ -2,12 +2,10 @@
 //!
 //! What was measured is the best prediction of what drives them: see [`Products`](crate::diagnosis::products::Products).
 
-use std::sync::Arc;
-
+use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Correction, Place, Volume};
 use crate::diagnosis::products::{Law, Product, without};
-use crate::diagnosis::{Cube, Evidence};
 use crate::effects::{self, Stage};
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -34,25 +32,13 @@ fn nameless(evidence: &Evidence, laws: Vec<Law>) -> Candidate {
     let (p_value, nats) = (laws.iter().map(|law| law.p_value).fold(1.0, f64::min), laws.iter().map(|law| law.gain).sum());
     let energy = evidence.cube.samples.iter().map(|&value| (value - without(&laws, value)).norm_sqr()).sum();
     Candidate {
-        id: None,
-        behaves_like: Behaviour::Quadratic,
-        estimates: vec![],
-        choice: None,
-        place: Place::at(Stage::Receiver),
-        p_value,
-        nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement,
-        curve: None,
         energy,
-        correction: Correction::Inverse(
-            Arc::new(move |cube: &mut Cube| {
-                cube.each_chirp(|_, chirp| {
-                    chirp.iter_mut().for_each(|value| *value = without(&laws, *value));
-                });
-            }),
-            Volume::BY_SAMPLE,
-        ),
+        correction: Correction::inverse(Volume::BY_SAMPLE, move |cube| {
+            cube.each_chirp(|_, chirp| {
+                chirp.iter_mut().for_each(|value| *value = without(&laws, *value));
+            });
+        }),
+        ..Candidate::new(Behaviour::Quadratic, Place::at(Stage::Receiver), p_value, nats)
     }
 }

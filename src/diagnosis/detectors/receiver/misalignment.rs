@@ -7,7 +7,6 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::Arc;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -70,15 +69,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let most = slipped.iter().map(|&frame| late[frame]).max_by_key(|late| late.abs()).unwrap_or(0);
     let tried = (2 * reach * (frames - 1)) as f64;
     let changed = slipped.iter().map(|&frame| moved(&evidence.cube, frame, late[frame])).sum();
+    let p_value = corrected((-nats).exp(), tried).max(f64::MIN_POSITIVE);
     vec![Candidate {
-        id: None,
-        behaves_like: Behaviour::SlippedSamples,
-        estimates: vec![],
-        choice: None,
-        p_value: corrected((-nats).exp(), tried).max(f64::MIN_POSITIVE),
-        nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "Between frames {first} and {last} the samples of {} frames come up to {} {} than in the others, in all channels alike: \
              a buffer slipped, or the converter started at another time.",
@@ -86,12 +78,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             most.abs(),
             if most > 0 { "later" } else { "earlier" }
         ),
-        place: Place { frames: Some(slipped), ..Place::at(Stage::Receiver) },
-        curve: None,
         energy: changed,
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-            cube.each_chirp(|[frame, ..], chirp| turn(chirp, late[frame]))
-        })),
+        correction: Correction::samples(move |cube| cube.each_chirp(|[frame, ..], chirp| turn(chirp, late[frame]))),
+        ..Candidate::new(Behaviour::SlippedSamples, Place { frames: Some(slipped), ..Place::at(Stage::Receiver) }, p_value, nats)
     }]
 }
 

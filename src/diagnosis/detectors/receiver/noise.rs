@@ -14,7 +14,7 @@ use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::folds;
 use crate::diagnosis::evidence::beat::{empty_bins, quiet_bins, ranges_m};
 use crate::diagnosis::evidence::{hann, transform_under};
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
+use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::effects::{self, Stage};
 
@@ -222,49 +222,36 @@ fn shared_noise(evidence: &Evidence, correlation: &Correlation, nats: f64) -> Ca
     let &Correlation { alike, rho, p_value, products, .. } = correlation;
     let error = (2.0 * products).sqrt().recip() + 0.02 * rho;
     let over = if alike { "mean" } else { "root mean square" };
-    let noise: f64 = evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64;
+    let noise = evidence.mean_noise();
     // That receivers share something is observed; the library says what.
     let id = evidence.info(effects::correlated_noise::ID).map(|info| info.id);
     Candidate {
         id,
-        behaves_like: Behaviour::NoiseSharedByReceivers,
         estimates: id.map(|_| Estimate::normal("rho", rho, error)).into_iter().collect(),
-        choice: None,
-        place: Place::at(Stage::Noise),
-        p_value,
-        nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "the receivers' noise is not independent: where nothing is, they agree with a correlation of {rho:.3} ({over} \
              over pairs), like a target in one fixed direction in every cell"
         ),
-        curve: None,
         energy: rho * noise * evidence.cube.samples.len() as f64,
-        correction: Correction::None,
+        ..Candidate::new(Behaviour::NoiseSharedByReceivers, Place::at(Stage::Noise), p_value, nats)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
     use crate::diagnosis::cube::{Loaded, analytic};
     use crate::radar::{Radar, Sampling};
     use crate::room::Room;
+    use crate::support;
 
     /// Noise of four receivers; `shared`: amplitude of what is common to all of them, by frame and chirp.
     fn noise(shared: impl Fn(usize, usize) -> f64) -> Evidence {
         let mut radar = Radar::small(12);
         (radar.loops_per_frame, radar.samples_per_chirp) = (32, 64);
-        radar.tx_m = vec![[0.0; 3]];
         radar.rx_m = (0..4).map(|rx| [0.0019 * f64::from(rx), 0.0, 0.0]).collect();
-        let mut random = ChaCha8Rng::seed_from_u64(5);
-        let mut normal =
-            || -> Complex64 { Complex64::new(StandardNormal.sample(&mut random), StandardNormal.sample(&mut random)) };
+        let mut part = support::normal(5);
+        let mut normal = || Complex64::new(part(), part());
         let mut samples = vec![];
         for frame in 0..12 {
             let common: Vec<Complex64> = (0..32 * 64).map(|i| normal() * shared(frame, i / 64)).collect();
@@ -279,9 +266,9 @@ mod tests {
     fn real_noise(seed: u64) -> Evidence {
         let mut radar = Radar::small(12);
         (radar.loops_per_frame, radar.samples_per_chirp, radar.sampling) = (32, 128, Sampling::Real);
-        (radar.tx_m, radar.rx_m) = (vec![[0.0; 3]], vec![[0.0; 3], [0.0019, 0.0, 0.0]]);
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let parts: Vec<f32> = (0..12 * 2 * 32 * 128).map(|_| StandardNormal.sample(&mut random)).collect();
+        radar.rx_m = vec![[0.0; 3], [0.0019, 0.0, 0.0]];
+        let parts: Vec<f32> =
+            std::iter::repeat_with(support::normal(seed)).take(12 * 2 * 32 * 128).map(|part| part as f32).collect();
         let room = Room { left_m: Some(1.2), right_m: Some(1.2), front_m: Some(3.0), ..Room::default() };
         Evidence::new(Loaded::of_samples(radar, analytic(&parts, 128), [-1e3, 1e3]), Some(room), None)
     }
@@ -333,12 +320,11 @@ mod tests {
     fn shaped(power: impl Fn(f64) -> f64) -> Evidence {
         let mut radar = Radar::small(12);
         (radar.loops_per_frame, radar.samples_per_chirp) = (32, 64);
-        (radar.tx_m, radar.rx_m) = (vec![[0.0; 3]], vec![[0.0; 3], [0.0019, 0.0, 0.0]]);
-        let mut random = ChaCha8Rng::seed_from_u64(11);
+        radar.rx_m = vec![[0.0; 3], [0.0019, 0.0, 0.0]];
+        let mut normal = support::normal(11);
         let inverse = hybridsim_fft::FftPlanner::new().plan_fft_inverse(64);
         let mut samples = vec![];
         for _ in 0..12 * 2 * 32 {
-            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
             let mut chirp: Vec<Complex64> =
                 (0..64usize).map(|bin| Complex64::new(normal(), normal()) * power(bin.min(64 - bin) as f64).sqrt()).collect();
             inverse.process(&mut chirp);

@@ -1,20 +1,17 @@
 //! Receiver fields of recordings whose room is unknown, or without quadrature: an offset, a leakage that dwarfs what is
 //! near, a transient that dwarfs the whole chirp. Without a room, only what stands out by its shape can be named.
 
-use std::sync::Arc;
-
 use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::additive_term::subtract;
-use super::support::{energy, range_m, ranges_m, tone};
+use super::additive_term::{self, added, counted};
+use super::support::{range_m, ranges_m, tone};
 use super::zero_beat::ZeroBeat;
-use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
-use crate::diagnosis::{Cube, Evidence, denoised};
+use crate::diagnosis::{Evidence, denoised};
 use crate::effects::{self, Stage};
 
 /// A leakage's cluster of returns ends here.
@@ -89,44 +86,33 @@ fn edge(evidence: &Evidence, clutter: &[Vec<Complex64>], at_end: bool) -> Option
         return None;
     }
     let wildest = (0..count).map(|i| power[at(i)]).fold(0.0, f64::max);
-    let indices: Vec<usize> = if at_end { (samples - count..samples).collect() } else { (0..count).collect() };
+    let affected = additive_term::edge(samples, count, at_end);
     let term: Vec<Vec<Complex64>> = clutter
         .iter()
-        .map(|chirp| (0..samples).map(|n| if indices.contains(&n) { chirp[n] } else { Complex64::ZERO }).collect())
+        .map(|chirp| (0..samples).map(|n| if affected.contains(&n) { chirp[n] } else { Complex64::ZERO }).collect())
         .collect();
-    let inner = if at_end { samples - count..samples } else { 0..count };
-    let peak = denoised::peak_beside(evidence, |_, n| (!inner.contains(&n)).then_some(Complex64::ZERO));
+    let peak = denoised::peak_beside(evidence, |_, n| (!affected.contains(&n)).then_some(Complex64::ZERO));
     let level_db = 20.0 * (wildest.sqrt() / peak.max(1e-300)).log10();
-    let affected = indices.clone();
+    let (number, words) = counted(count, at_end);
+    let p_value = corrected((-wildest / mean.max(1e-300)).exp(), samples as f64);
+    let place = Place { samples: Some(affected.clone().collect()), ..Place::at(Stage::Receiver) };
+    let nats = gain(evidence, &term);
     Some(Candidate {
         id: Some(effects::ramp_edge_transient::ID),
-        behaves_like: Behaviour::AdditiveFastTime,
-        estimates: vec![
-            Estimate { name: "samples", values: vec![count as f64], ci90: vec![[count as f64 - 0.5, count as f64 + 0.5]] },
-            Estimate::normal("level_db", level_db, 8.7 * (mean / wildest).sqrt() + 0.3),
-        ],
-        choice: None,
-        place: Place { samples: Some(indices), ..Place::at(Stage::Receiver) },
-        p_value: corrected((-wildest / mean.max(1e-300)).exp(), samples as f64),
-        nats: gain(evidence, &term),
-        errs_alike: false,
-        look_alikes: vec![],
+        estimates: vec![number, Estimate::normal("level_db", level_db, 8.7 * (mean / wildest).sqrt() + 0.3)],
         statement: format!(
-            "the {} {} of every chirp jump{} to {:.0} codes, {:.0} dB above the strongest sample in between, \
+            "{words} of every chirp jump{} to {:.0} codes, {:.0} dB above the strongest sample in between, \
              in all channels: the ADC runs into the {} of the ramp",
-            if at_end { "last" } else { "first" },
-            if count == 1 { "sample".into() } else { format!("{count} samples") },
             if count == 1 { "s" } else { "" },
             wildest.sqrt(),
             10.0 * (wildest / largest).log10(),
             if at_end { "end" } else { "beginning" },
         ),
-        curve: None,
-        energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
         // They change from chirp to chirp too and hold nothing that can be used.
-        correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
-            cube.each_chirp(|_, chirp| affected.iter().for_each(|&n| chirp[n] = Complex64::ZERO));
-        })),
+        correction: Correction::samples(move |cube| {
+            cube.each_chirp(|_, chirp| chirp[affected.clone()].fill(Complex64::ZERO));
+        }),
+        ..added(evidence, term, place, p_value, nats)
     })
 }
 
@@ -154,16 +140,12 @@ fn offset(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Candidate> 
     }
     let term: Vec<Vec<Complex64>> = (0..tx * rx).map(|c| vec![Complex64::from(values[c % rx]); samples]).collect();
     let deviation: Vec<f64> = (0..rx).map(|receiver| rest[receiver]).collect();
+    let p_value = corrected((-0.5 * (smallest / swing.max(1e-300)).powi(2) * samples as f64).exp(), 1.0);
+    let place = Place { range_m: Some([0.0, 0.0]), ..Place::at(Stage::Receiver) };
+    let nats = gain(evidence, &term);
     Some(Candidate {
         id: Some(effects::dc_offset::ID),
-        behaves_like: Behaviour::AdditiveFastTime,
         estimates: vec![Estimate::list("i", &values, &deviation), Estimate::list("q", &vec![0.0; rx], &vec![0.0; rx])],
-        choice: None,
-        place: Place { range_m: Some([0.0, 0.0]), ..Place::at(Stage::Receiver) },
-        p_value: corrected((-0.5 * (smallest / swing.max(1e-300)).powi(2) * samples as f64).exp(), 1.0),
-        nats: gain(evidence, &term),
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "every sample has a constant of about {:.0} codes added (all receivers within {:.0}), {:.0} times what else stands \
              still: the codes' zero is not the signal's",
@@ -171,9 +153,7 @@ fn offset(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Candidate> 
             values.iter().fold(0.0f64, |a, &b| a.max(b)) - values.iter().fold(f64::INFINITY, |a, &b| a.min(b)),
             smallest / swing.max(1e-300)
         ),
-        curve: None,
-        energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64,
-        correction: subtract(term),
+        ..added(evidence, term, place, p_value, nats)
     })
 }
 
@@ -211,8 +191,7 @@ impl Near {
         let valley_end = (2.5 * NEAR_M / bin_m) as usize;
         let valley = (peak..valley_end.min(last)).min_by(|&a, &b| mean[a].total_cmp(&mean[b]))?;
         let far = best(valley..last)?;
-        let white =
-            evidence.noise().iter().sum::<f64>() / evidence.noise().len() as f64 / (loops * evidence.split.training.len()) as f64;
+        let white = evidence.mean_noise() / (loops * evidence.split.training.len()) as f64;
         let found = Self { spectra, mean, peak, valley, far, last, bin_m, white };
         let [at_peak, at_far] = [peak, far].map(|bin| found.mean[bin]);
         let weak = found.depth_db() < VALLEY_DB || at_peak < 0.1 * at_far || decibels(found.over_noise(peak)) < 20.0;
@@ -291,15 +270,12 @@ fn leakage(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Candidate>
     let constant = !evidence.is_real() && beat.may_be_constant() && !beat.may_be_leakage();
     let id = (!constant || evidence.may_name(effects::dc_offset::ID)).then_some(effects::tx_leakage::ID);
     let estimates = vec![Estimate::normal("range_m", range, 0.3 * resolution), Estimate::normal("level_db", level_db, 1.0)];
+    let p_value = chi2_tail(2.0 * near.over_noise(near.peak) * channels as f64, 2.0 * channels as f64);
+    let place = Place { range_m: Some([0.0, near.valley as f64 * near.bin_m]), ..Place::at(Stage::Receiver) };
+    let nats = gain(evidence, &term);
     Some(Candidate {
         id,
-        behaves_like: Behaviour::AdditiveFastTime,
         estimates: if id.is_some() { estimates } else { vec![] },
-        choice: None,
-        place: Place { range_m: Some([0.0, near.valley as f64 * near.bin_m]), ..Place::at(Stage::Receiver) },
-        p_value: chi2_tail(2.0 * near.over_noise(near.peak) * channels as f64, 2.0 * channels as f64),
-        nats: gain(evidence, &term),
-        errs_alike: false,
         look_alikes: [(near.as_reflectors() > SIGNIFICANCE, effects::static_reflector::ID), (constant, effects::dc_offset::ID)]
             .into_iter()
             .filter_map(|(holds, id)| holds.then_some(id))
@@ -312,9 +288,7 @@ fn leakage(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Candidate>
             near.far as f64 * near.bin_m,
             if id.is_some() { ": the transmitters leak into the receivers" } else { "" },
         ),
-        curve: None,
-        energy: term.iter().map(|chirp| energy(chirp)).sum::<f64>() * (evidence.cube.dims[0] * loops) as f64,
-        correction: subtract(term),
+        ..added(evidence, term, place, p_value, nats)
     })
 }
 

@@ -4,8 +4,6 @@
 //! room's delays: what is measured must lie in H · U, with U the space of the room's tones. No knowledge of the scene
 //! inside is needed. A filter that starts from rest leaves a decaying transient at the chirp's beginning instead.
 
-use std::sync::Arc;
-
 use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -14,11 +12,12 @@ use rayon::prelude::*;
 use super::field::{Field, add, orthonormal};
 use super::filters::{Filter, SHAPES, Shape, decay};
 use super::support::{beat_hz, dot, tone};
+use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::detectors::climb::golden_section;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Volume};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
-use crate::diagnosis::{Cube, Evidence};
 use crate::effects::Stage;
 
 /// Hypotheses within this many nats of the best are indistinguishable from it.
@@ -150,21 +149,17 @@ impl<'a> Search<'a> {
             .zip(&clutter)
             .map(|(found, clean)| found.iter().zip(clean).map(|(a, b)| (a - b).norm_sqr()).sum::<f64>())
             .sum::<f64>()
-            * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
+            * evidence.cube.chirps();
+        let place = Place::at(Stage::Receiver);
         Candidate {
             id: Some(shape.id()),
-            behaves_like: Behaviour::BeatFrequencyGain,
             estimates,
-            choice: None,
-            place: Place::at(Stage::Receiver),
-            p_value,
-            nats: self.log_likelihood_gain(shape, value),
-            errs_alike: false,
             look_alikes,
             statement,
             curve: Some(curve(&response, self.rate)),
             energy,
             correction: undo(&response, fitted, clutter),
+            ..Candidate::new(Behaviour::BeatFrequencyGain, place, p_value, self.log_likelihood_gain(shape, value))
         }
     }
 }
@@ -173,12 +168,7 @@ fn curve(response: &[Complex64], rate: f64) -> Curve {
     let (samples, half) = (response.len(), response.len() / 2);
     let hertz: Vec<f64> = (0..half).map(|bin| bin as f64 * rate / samples as f64).collect();
     let decibels = (0..half).map(|bin| 20.0 * response[bin].norm().max(1e-6).log10()).collect();
-    Curve {
-        title: "Response of the intermediate frequency".into(),
-        x_label: "beat frequency, Hz".into(),
-        y_label: "gain, dB".into(),
-        series: vec![("fitted".into(), hertz, decibels)],
-    }
+    Curve::new("Response of the intermediate frequency", ["beat frequency, Hz", "gain, dB"], [("fitted", hertz, decibels)])
 }
 
 /// The static scene as a Gaussian process: tones over the room's delays with the density that is measured.
@@ -335,27 +325,18 @@ fn undo(response: &[Complex64], fitted: Vec<Vec<Complex64>>, clutter: Vec<Vec<Co
     let inverse: Vec<Complex64> = response.iter().map(|h| h.conj() / h.norm_sqr().max(LEAST_POWER)).collect();
     let filter = Filter::new(&inverse);
     let stretched = inverse.iter().map(|h| h.norm_sqr().max(f64::MIN_POSITIVE).ln()).sum::<f64>() / inverse.len().max(1) as f64;
-    Correction::Inverse(
-        Arc::new(move |cube: &mut Cube| {
-            cube.each_chirp(|[_, channel, _], chirp| {
-                chirp.iter_mut().zip(&fitted[channel]).for_each(|(value, fitted)| *value -= fitted);
-                filter.apply(chirp);
-                chirp.iter_mut().zip(&clutter[channel]).for_each(|(value, clutter)| *value += clutter);
-            });
-        }),
-        Volume { alike: stretched, ..Volume::KEPT },
-    )
+    Correction::inverse(Volume { alike: stretched, ..Volume::KEPT }, move |cube| {
+        cube.each_chirp(|[_, channel, _], chirp| {
+            chirp.iter_mut().zip(&fitted[channel]).for_each(|(value, fitted)| *value -= fitted);
+            filter.apply(chirp);
+            chirp.iter_mut().zip(&clutter[channel]).for_each(|(value, clutter)| *value += clutter);
+        });
+    })
 }
 
-/// Golden-section search between the grid's neighbours.
+/// The maximum between the grid's neighbours.
 fn refine(shape: Shape, at: f64, samples: usize, rate: f64, value: impl Fn(f64) -> f64) -> f64 {
-    const RATIO: f64 = 0.618_033_988_749_895;
     let grid = shape.grid(samples, rate);
     let index = grid.iter().position(|&point| point == at).unwrap_or(0);
-    let (mut low, mut high) = (grid[index.saturating_sub(1)], grid[(index + 1).min(grid.len() - 1)]);
-    for _ in 0..11 {
-        let (a, b) = (high - RATIO * (high - low), low + RATIO * (high - low));
-        if value(a) > value(b) { high = b } else { low = a }
-    }
-    0.5 * (low + high)
+    golden_section([grid[index.saturating_sub(1)], grid[(index + 1).min(grid.len() - 1)]], 11, value)
 }

@@ -2,7 +2,6 @@
 //! frames alike.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -76,13 +75,13 @@ fn aside(evidence: &Evidence) -> Option<Candidate> {
             of_frame.iter().zip(noise).map(|(a, noise)| a.norm_sqr() * count / noise.max(1e-300) - 1.0).sum::<f64>()
         })
         .sum();
-    let correction = Correction::Samples(Arc::new(move |cube: &mut Cube| {
+    let correction = Correction::samples(move |cube| {
         let amplitudes = amplitudes_of(cube, slow, fast);
         cube.each_chirp(|[frame, channel, chirp], values| {
             let amplitude = amplitudes[[frame, channel]];
             values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(slow, fast, chirp, n));
         });
-    }));
+    });
     let how = "where nothing of the room or the body can stay";
     let amplitudes = amplitudes.into_values();
     Some(candidate(evidence, Tone { slow, fast, amplitudes, p_value, gain, how, correction }))
@@ -95,13 +94,13 @@ fn among_the_slow(evidence: &Evidence) -> Option<Candidate> {
     if p_value > UNLIKELY || is_sideband(evidence, slow, fast) {
         return None;
     }
-    let correction = Correction::Samples(Arc::new(move |cube: &mut Cube| {
+    let correction = Correction::samples(move |cube| {
         let amplitudes = slow_spur::amplitudes(cube, &starts, turns, fast);
         cube.each_chirp(|[frame, channel, chirp], values| {
             let start = Complex64::cis(TAU * turns.per_frame * starts[frame]) * amplitudes[channel];
             values.iter_mut().enumerate().for_each(|(n, value)| *value -= start * tone(slow, fast, chirp, n));
         });
-    }));
+    });
     let how =
         "in step from frame to frame, at one beat frequency, where whatever turns like that and moves would have left its range";
     Some(candidate(evidence, Tone { slow, fast, amplitudes, p_value, gain, how, correction }))
@@ -114,13 +113,13 @@ fn wanders(evidence: &Evidence) -> Option<Candidate> {
         return None;
     }
     let turns = slow.clone();
-    let correction = Correction::Samples(Arc::new(move |cube: &mut Cube| {
+    let correction = Correction::samples(move |cube| {
         let amplitudes = wandering::amplitudes(cube, &turns, fast);
         cube.each_chirp(|[frame, channel, chirp], values| {
             let amplitude = amplitudes[[frame, channel]];
             values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(turns[frame], fast, chirp, n));
         });
-    }));
+    });
     let how = "at one beat frequency, where whatever turns like that and moves would have left its range";
     let mean = slow.iter().sum::<f64>() / slow.len() as f64;
     let amplitudes = amplitudes.into_values();
@@ -152,17 +151,10 @@ fn candidate(evidence: &Evidence, tone: Tone) -> Candidate {
     let frequency_hz = wrapped * rate;
     Candidate {
         id: Some(effects::spur::ID),
-        behaves_like: Behaviour::Tone,
         estimates: vec![
             Estimate::normal("frequency_hz", frequency_hz, deviation_bins(gain) * rate / samples as f64),
             Estimate::normal("level_db", level_db, denoised::PEAK_DB),
         ],
-        choice: None,
-        place: Place::at(Stage::Receiver),
-        p_value,
-        nats: gain,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "a continuous tone at {:.4} MHz (or {:.4} MHz, as sampled), {level_db:.1} dB relative to the peak sample, runs through all frames \
              {how}; its phase advances by {:.3} turns per chirp",
@@ -170,9 +162,9 @@ fn candidate(evidence: &Evidence, tone: Tone) -> Candidate {
             (wrapped - wrapped.signum()) * rate * 1e-6,
             slow
         ),
-        curve: None,
         energy: strength * strength * (frames * evidence.cube.channels() * loops * samples) as f64,
         correction,
+        ..Candidate::new(Behaviour::Tone, Place::at(Stage::Receiver), p_value, gain)
     }
 }
 

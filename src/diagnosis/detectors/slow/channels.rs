@@ -5,7 +5,6 @@
 //! is the same at all ranges: each of two halves of all observations must show what the other one shows.
 
 use std::iter::repeat;
-use std::sync::Arc;
 
 use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -310,29 +309,22 @@ impl Judged {
         let own: f64 =
             self.members.iter().flat_map(|&c| &evidence.clutter()[c * samples..][..samples]).map(|v| v.norm_sqr()).sum();
         let square: f64 = known.iter().map(|&f| self.series.value[f].norm_sqr()).sum();
+        let place = Place {
+            rx: matches!(self.unit, Axis::Receiver(_)).then(|| vec![index]),
+            tx: matches!(self.unit, Axis::Transmitter(_)).then(|| vec![index]),
+            ..Place::at(Stage::Receiver)
+        };
+        let p_value = statistics::corrected(self.p_value, tried).max(f64::MIN_POSITIVE);
         Candidate {
-            id: None,
-            behaves_like: Behaviour::SlowTimeGainOfOneChannel,
-            estimates: vec![],
-            choice: None,
-            place: Place {
-                rx: matches!(self.unit, Axis::Receiver(_)).then(|| vec![index]),
-                tx: matches!(self.unit, Axis::Transmitter(_)).then(|| vec![index]),
-                ..Place::at(Stage::Receiver)
-            },
-            p_value: statistics::corrected(self.p_value, tried).max(f64::MIN_POSITIVE),
-            nats: self.nats,
-            errs_alike: false,
-            look_alikes: vec![],
             statement: self.statement(&decibel),
-            curve: Some(Curve {
-                title: format!("Static returns in {what} {index} relative to the other {others}"),
-                x_label: "time, s".into(),
-                y_label: "gain, dB".into(),
-                series: vec![("measured".into(), known.iter().map(|&f| evidence.starts_s[f]).collect(), decibel)],
-            }),
+            curve: Some(Curve::new(
+                format!("Static returns in {what} {index} relative to the other {others}"),
+                ["time, s", "gain, dB"],
+                [("measured", known.iter().map(|&f| evidence.starts_s[f]).collect(), decibel)],
+            )),
             energy: own * square * loops as f64,
             correction: self.correction(evidence),
+            ..Candidate::new(Behaviour::SlowTimeGainOfOneChannel, place, p_value, self.nats)
         }
     }
 
@@ -371,16 +363,13 @@ impl Judged {
         let known = self.known();
         let coding_cost = 2.0 * statistics::learned(known.iter().map(|&f| self.variance * self.series.weight[f]));
         let size = loops * samples * evidence.cube.channels();
-        Correction::Inverse(
-            Arc::new(move |cube| {
-                cube.each_chirp(|[frame, channel, _], chirp| {
-                    if let Some(gain) = gains[frame].filter(|_| members.contains(&channel)) {
-                        chirp.iter_mut().for_each(|value| *value /= gain);
-                    }
-                });
-            }),
-            Volume::BY_SAMPLE.with_coding_cost(coding_cost, size),
-        )
+        Correction::inverse(Volume::BY_SAMPLE.with_coding_cost(coding_cost, size), move |cube| {
+            cube.each_chirp(|[frame, channel, _], chirp| {
+                if let Some(gain) = gains[frame].filter(|_| members.contains(&channel)) {
+                    chirp.iter_mut().for_each(|value| *value /= gain);
+                }
+            });
+        })
     }
 }
 

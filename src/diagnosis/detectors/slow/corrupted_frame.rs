@@ -4,12 +4,9 @@
 //! range by range; so the odd one stands out from its frame's other channels, by more than any other does. A frame is
 //! all there is of it, so its even chirps propose and its odd chirps judge.
 
-use std::sync::Arc;
-
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::diagnosis::Cube;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::halves;
 use crate::diagnosis::evidence::{Evidence, spectrum};
@@ -140,35 +137,28 @@ impl Odd {
         let energy = change.iter().map(|value| value.norm_sqr()).sum::<f64>() * loops as f64;
         let size = loops * samples;
         let start = (frame * evidence.cube.channels() + channel) * size;
+        let place = Place {
+            frames: Some(vec![frame]),
+            rx: Some(vec![channel % receivers]),
+            tx: (transmitters > 1).then(|| vec![channel / receivers]),
+            ..Place::at(Stage::Receiver)
+        };
+        // Scores of residuals of movers have a longer tail than a normal law's.
+        let p_value = corrected((-self.score).exp(), self.deviations.values().len() as f64).max(f64::MIN_POSITIVE);
         Candidate {
-            id: None,
-            behaves_like: Behaviour::SingleFrame,
-            estimates: vec![],
-            choice: None,
-            place: Place {
-                frames: Some(vec![frame]),
-                rx: Some(vec![channel % receivers]),
-                tx: (transmitters > 1).then(|| vec![channel / receivers]),
-                ..Place::at(Stage::Receiver)
-            },
-            // Scores of residuals of movers have a longer tail than a normal law's.
-            p_value: corrected((-self.score).exp(), self.deviations.values().len() as f64).max(f64::MIN_POSITIVE),
-            nats: self.gain(evidence),
-            errs_alike: false,
-            look_alikes: vec![],
             statement: format!(
                 "In frame {frame} receiver {} sees the room otherwise than in all other frames, with {:.1} times the power of \
                  the usual deviation, and no other receiver does at those ranges: that frame of that receiver was corrupted or shifted.",
                 channel % receivers,
                 ratio
             ),
-            curve: None,
             energy,
-            correction: Correction::Samples(Arc::new(move |cube: &mut Cube| {
+            correction: Correction::samples(move |cube| {
                 for chirp in cube.samples[start..start + size].chunks_exact_mut(change.len()) {
                     chirp.iter_mut().zip(&change).for_each(|(value, change)| *value -= change);
                 }
-            })),
+            }),
+            ..Candidate::new(Behaviour::SingleFrame, place, p_value, self.gain(evidence))
         }
     }
 }

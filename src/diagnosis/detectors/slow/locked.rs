@@ -5,17 +5,15 @@
 //! shows what their mean may be by chance, movers included: of a complex normal law, `F |mean|² / scatter` of F frames exceeds x
 //! with a probability of `(1 + x)^{−(F−1)}`, and logarithms of independent probabilities add (Fisher's method).
 
-use std::sync::Arc;
-
 use hybridsim_fft::{FftDirection, FftPlanner};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::settling::{Decay, ENOUGH};
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::cube::{Cube, mean_chirp};
+use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::evidence::{Evidence, HANN_LOBE, hann, transform_under};
-use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Undo};
+use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 use crate::effects::Stage;
 
@@ -146,8 +144,8 @@ fn strongest(evidence: &Evidence, channels: &[Channel]) -> Option<Candidate> {
     let gain: f64 = has.iter().map(|&c| held_out_gain(evidence, &channels[c], c, bin)).sum();
     let of_channel = |&c: &usize| (0..bins).filter(|&bin| chance(c, bin) < SURE).collect();
     let cells: Vec<Vec<usize>> = has.iter().map(of_channel).collect();
-    let undo = undo(evidence, has.clone(), cells);
-    let candidate = candidate(evidence, &channels[channel], &has, bin, undo);
+    let correction = correction(evidence, has.clone(), cells);
+    let candidate = candidate(evidence, &channels[channel], &has, bin, correction);
     Some(Candidate { p_value, nats: gain, ..candidate })
 }
 
@@ -186,7 +184,7 @@ fn decay(pattern: &[Complex64]) -> (f64, f64) {
     lengths.map(|length| (length, share(length))).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((1.0, 0.0))
 }
 
-fn candidate(evidence: &Evidence, own: &Channel, has: &[usize], bin: usize, undo: Undo) -> Candidate {
+fn candidate(evidence: &Evidence, own: &Channel, has: &[usize], bin: usize, correction: Correction) -> Candidate {
     let [frames, tx, rx, loops, samples] = evidence.cube.dims;
     let values = pattern(own, bin);
     let (length, share) = decay(&values);
@@ -217,40 +215,33 @@ fn candidate(evidence: &Evidence, own: &Channel, has: &[usize], bin: usize, undo
         tx * rx,
     );
     let number: Vec<f64> = (0..loops).map(|index| index as f64).collect();
-    let series = |name: &str, part: fn(&Complex64) -> f64| (name.into(), number.clone(), values.iter().map(part).collect());
+    let series = |name: &'static str, part: fn(&Complex64) -> f64| (name, number.clone(), values.iter().map(part).collect());
+    let behaves_like = if settles { Behaviour::SlowTimeSettlingOfOneReturn } else { Behaviour::SlowTimePatternOfOneReturn };
+    let place = Place {
+        range_m: Some(range),
+        tx: (transmitters.len() < tx).then_some(transmitters),
+        rx: (receivers.len() < rx).then_some(receivers),
+        ..Place::at(Stage::Receiver)
+    };
     Candidate {
-        id: None,
-        behaves_like: if settles { Behaviour::SlowTimeSettlingOfOneReturn } else { Behaviour::SlowTimePatternOfOneReturn },
-        estimates: vec![],
-        choice: None,
-        place: Place {
-            range_m: Some(range),
-            tx: (transmitters.len() < tx).then_some(transmitters),
-            rx: (receivers.len() < rx).then_some(receivers),
-            ..Place::at(Stage::Receiver)
-        },
-        p_value: 1.0,
-        nats: 0.0,
-        errs_alike: false,
-        look_alikes: vec![],
         statement,
-        curve: Some(Curve {
-            title: format!("Mean over the frames at {:.2} m", signed.max(0.0) * bin_m),
-            x_label: "chirp of the frame".into(),
-            y_label: "deviation, recording's unit".into(),
-            series: vec![series("real part", |value| value.re), series("imaginary part", |value| value.im)],
-        }),
+        curve: Some(Curve::new(
+            format!("Mean over the frames at {:.2} m", signed.max(0.0) * bin_m),
+            ["chirp of the frame", "deviation, recording's unit"],
+            [series("real part", |value| value.re), series("imaginary part", |value| value.im)],
+        )),
         energy: values.iter().map(|value| value.norm_sqr()).sum::<f64>() * (frames * has.len()) as f64,
-        correction: Correction::Samples(undo),
+        correction,
+        ..Candidate::new(behaves_like, place, 1.0, 0.0)
     }
 }
 
 /// Subtracts the training frames' mean deviation of every chirp of a frame from the frame's mean, at the cells of each channel and as
 /// far around them as the window spreads.
-fn undo(evidence: &Evidence, channels: Vec<usize>, cells: Vec<Vec<usize>>) -> Undo {
+fn correction(evidence: &Evidence, channels: Vec<usize>, cells: Vec<Vec<usize>>) -> Correction {
     let training = evidence.split.training.clone();
     let real = evidence.is_real();
-    Arc::new(move |cube: &mut Cube| {
+    Correction::samples(move |cube| {
         let [_, _, _, loops, samples] = cube.dims;
         let mut planner = FftPlanner::new();
         let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));

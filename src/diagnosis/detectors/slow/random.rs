@@ -199,16 +199,12 @@ fn two_valued(series: &Series, training: &[usize], held_out: &[usize], deviation
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
+    use crate::support;
 
     #[test]
     fn what_is_random_from_chirp_to_chirp_keeps_its_power_beside_a_line_and_what_fluctuates_slowly_does_not() {
-        let mut random = ChaCha8Rng::seed_from_u64(3);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let mut normal = support::normal(3);
         let mut left = |amplitude: f64, noise: f64| {
             let chirp = |i: usize| (0.03 * i as f64).sin() * amplitude + noise * normal();
             let series = Series { value: (0..64 * 32).map(chirp).collect(), weight: vec![1.0; 64], loops: 32 };

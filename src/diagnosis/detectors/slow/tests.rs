@@ -1,9 +1,6 @@
 //! Static returns in white noise, with and without something that all of them share.
 
 use num_complex::Complex64;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
 use super::field::ahead;
 use super::find;
@@ -14,6 +11,7 @@ use crate::diagnosis::finding::{Candidate, NINETY};
 use crate::effects;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::Room;
+use crate::support;
 
 /// Frames of 32 loops and 64 samples, four channels, returns all over the ranges about 30 dB above the noise.
 fn evidence(seed: u64, change: impl Fn(f64, usize, usize, f64) -> Complex64) -> Evidence {
@@ -21,11 +19,9 @@ fn evidence(seed: u64, change: impl Fn(f64, usize, usize, f64) -> Complex64) -> 
     radar.loops_per_frame = 32;
     radar.samples_per_chirp = 64;
     radar.frame_period_s = 0.1;
-    radar.tx_m = vec![[0.0; 3]];
     radar.rx_m = (0..4).map(|i| [0.0019 * f64::from(i), 0.0, 0.0]).collect();
     let dims = radar.dims();
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let mut normal = support::normal(seed);
     let returns: Vec<(f64, Vec<Complex64>)> =
         (0..40).map(|i| (5.0 + f64::from(i) * 1.1, (0..4).map(|_| 3.0 * Complex64::new(normal(), normal())).collect())).collect();
     let delay_of_bin = radar.sample_rate_hz / (64.0 * radar.slope_hz_per_s);
@@ -190,8 +186,7 @@ fn the_first_chirps_of_a_frame_settle() {
 
 #[test]
 fn random_chirps_are_phase_noise_or_jitter() {
-    let mut random = ChaCha8Rng::seed_from_u64(9);
-    let bell: Vec<f64> = (0..12 * 32).map(|_| StandardNormal.sample(&mut random)).collect();
+    let bell: Vec<f64> = std::iter::repeat_with(support::normal(9)).take(12 * 32).collect();
     let at_stated = 2.0 * 3.0 / crate::radar::SPEED_OF_LIGHT;
     let noisy = |scale: f64, values: Vec<f64>| {
         move |_: f64, frame: usize, index: usize, delay: f64| Complex64::cis(scale * delay * values[frame * 32 + index])

@@ -16,7 +16,7 @@ use frames::{Frames, frames};
 use num_complex::Complex64;
 use rhythm::{BREATHING_HZ, HEART_HZ, Rhythm, rhythm};
 
-use super::region::{Region, remove};
+use super::region::{Region, removal};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::course::{Course, Of};
 use crate::diagnosis::evidence::Evidence;
@@ -192,41 +192,33 @@ impl Motion<'_> {
         let region = Region { range: [ends[0].saturating_sub(1) as f64, (ends[1] + 1) as f64], doppler: [-1.0, 1.0] };
         let turned = self.circle.phase.iter().map(|&phase| Complex64::cis(phase)).collect();
         let course = Course { of: Of::Mover { bin: self.circle.bin as f64, amplitude: self.circle.amplitude }, turned };
-        let training = evidence.split.training.clone();
         let energy: f64 = self.change.iter().map(|c| (c - 1.0).max(0.0)).sum::<f64>()
             * self.data.noise.iter().sum::<f64>()
-            * (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
+            * evidence.cube.chirps();
+        let place = Place {
+            range_m: Some([ends[0] as f64 * bin_m, ends[1] as f64 * bin_m]),
+            ..Place::at(if self.named.is_some() { Stage::Body } else { Stage::Scene })
+        };
         Candidate {
             id: self.named.as_ref().map(|n| n.0),
-            behaves_like: Behaviour::PathLike,
             estimates: self.named.as_ref().map_or(vec![], |(_, r)| {
                 vec![
                     Estimate::normal("rate_hz", r.frequency_hz, r.frequency_deviation_hz),
                     Estimate::normal("amplitude_m", r.amplitude * metres, r.amplitude_deviation * metres),
                 ]
             }),
-            choice: None,
-            place: Place {
-                range_m: Some([ends[0] as f64 * bin_m, ends[1] as f64 * bin_m]),
-                ..Place::at(if self.named.is_some() { Stage::Body } else { Stage::Scene })
-            },
-            p_value,
-            nats: gain,
             errs_alike: true,
             // A curtain in the wind does the same; so does whatever oscillates there.
             look_alikes: if self.named.is_some() { vec![effects::moving_reflector::ID] } else { vec![] },
             statement,
-            curve: Some(Curve {
-                title: format!("Displacement at {range_m:.2} m"),
-                x_label: "time, s".into(),
-                y_label: "displacement, mm".into(),
-                series: vec![("measured".into(), evidence.starts_s.clone(), displacement)],
-            }),
+            curve: Some(Curve::new(
+                format!("Displacement at {range_m:.2} m"),
+                ["time, s", "displacement, mm"],
+                [("measured", evidence.starts_s.clone(), displacement)],
+            )),
             energy,
-            correction: Correction::Followed(
-                Box::new(Correction::Samples(Arc::new(move |cube| remove(cube, &training, 1, region)))),
-                Arc::new(course),
-            ),
+            correction: Correction::Followed(Box::new(removal(evidence, 1, region)), Arc::new(course)),
+            ..Candidate::new(Behaviour::PathLike, place, p_value, gain)
         }
     }
 }

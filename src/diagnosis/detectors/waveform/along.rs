@@ -11,7 +11,6 @@
 //! asked for.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -24,7 +23,7 @@ use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, 
 use crate::diagnosis::power::PowerModel;
 use crate::diagnosis::speckle::{Look, groups};
 use crate::diagnosis::statistics::{DECIBEL, corrected};
-use crate::diagnosis::{BodyPrediction, Cube, Evidence};
+use crate::diagnosis::{BodyPrediction, Evidence};
 use crate::effects::{self, Stage, legendre};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
@@ -218,29 +217,20 @@ impl Chirps {
         let total: f64 = evidence.cube.samples.iter().map(|value| value.norm_sqr()).sum();
         Candidate {
             id: Some(effects::chirp_droop::ID),
-            behaves_like: Behaviour::FastTimeGain,
             estimates: vec![Estimate::normal("db", db, deviation)],
-            choice: None,
-            place: Place::at(Stage::Receiver),
-            p_value: corrected(found.p_value, LOOKS),
-            nats: found.nats,
             errs_alike: true,
-            look_alikes: vec![],
             statement: format!(
                 "the power falls by {db:.2} dB from the first to the last sample of every chirp, whatever is seen",
             ),
-            curve: None,
             energy: total * (db / DECIBEL).powi(2) / 12.0,
-            correction: Correction::Inverse(
-                Arc::new(move |cube: &mut Cube| {
-                    cube.each_chirp(|_, chirp| {
-                        chirp.iter_mut().enumerate().for_each(|(n, value)| {
-                            *value *= 10f64.powf(db * (n as f64 / samples - 0.5) / 20.0);
-                        });
+            correction: Correction::inverse(Volume::BY_SAMPLE, move |cube| {
+                cube.each_chirp(|_, chirp| {
+                    chirp.iter_mut().enumerate().for_each(|(n, value)| {
+                        *value *= 10f64.powf(db * (n as f64 / samples - 0.5) / 20.0);
                     });
-                }),
-                Volume::BY_SAMPLE,
-            ),
+                });
+            }),
+            ..Candidate::new(Behaviour::FastTimeGain, Place::at(Stage::Receiver), corrected(found.p_value, LOOKS), found.nats)
         }
     }
 
@@ -257,16 +247,11 @@ impl Chirps {
         let samples = evidence.radar.samples_per_chirp;
         let at: Vec<f64> = (0..samples).map(|n| place(n, samples)).collect();
         let range_m = 0.5 * self.delay_s * SPEED_OF_LIGHT;
+        let place = Place::at(Stage::Waveform);
         Candidate {
             id: named.then_some(effects::chirp_nonlinearity::ID),
-            behaves_like: Behaviour::DelayProportionalPhase,
             estimates: if named { vec![peak] } else { vec![] },
-            choice: None,
-            place: Place::at(Stage::Waveform),
-            p_value: corrected(found.p_value, LOOKS),
-            nats: found.nats,
             errs_alike: true,
-            look_alikes: vec![],
             statement: format!(
                 "The chirp's ramp is not straight: its frequency bends by {:.0} kHz along the chirp, which smears what is at \
                  {range_m:.1} m by {:.2} radian, and what is farther more.{}",
@@ -281,18 +266,18 @@ impl Chirps {
                     }
                 }
             ),
-            curve: Some(Curve {
-                title: "Deviation of the frequency from a straight ramp".into(),
-                x_label: "sample".into(),
-                y_label: "kHz".into(),
-                series: vec![(
-                    "fitted".into(),
+            curve: Some(Curve::new(
+                "Deviation of the frequency from a straight ramp",
+                ["sample", "kHz"],
+                [(
+                    "fitted",
                     (0..at.len()).map(|n| n as f64).collect(),
                     at.iter().map(|&x| 1e-3 * second_hz * legendre(2, x)).collect(),
                 )],
-            }),
+            )),
             energy: total * (bend * bend + trend * trend / 3.0) / 5.0,
             correction: self.straightened(&evidence.radar, at, bend, trend),
+            ..Candidate::new(Behaviour::DelayProportionalPhase, place, corrected(found.p_value, LOOKS), found.nats)
         }
     }
 
@@ -309,13 +294,13 @@ impl Chirps {
         let of_frequency = 1.0 / (TAU * self.delay_s);
         let samples_per_hz = radar.sample_rate_hz / radar.slope_hz_per_s;
         let by_frame: Vec<f64> = (0..self.frames.len()).map(|frame| bend + trend * self.during(frame)).collect();
-        Correction::Samples(Arc::new(move |cube: &mut Cube| {
+        Correction::samples(move |cube| {
             let shifts: Vec<Vec<f64>> = by_frame
                 .iter()
                 .map(|bend| at.iter().map(|&x| bend * of_frequency * samples_per_hz * legendre(2, x)).collect())
                 .collect();
             cube.each_chirp(|[frame, ..], chirp| straighten(chirp, &shifts[frame]));
-        }))
+        })
     }
 }
 

@@ -1,16 +1,13 @@
 //! Bends and tilts of bodies in noise, and a warped tone.
 
-use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
-
 use super::*;
+use crate::support;
 
 const PARTS: usize = 16;
 
 /// A body of points over ranges of a few bins, in twelve frames, and what becomes of it on the way.
 fn chirps(seed: u64, changed: impl Fn(usize, f64) -> Complex64) -> Chirps {
-    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let mut normal = support::normal(seed);
     let mut chirps = Chirps { frames: vec![], parts: PARTS, delay_s: 2e-8 };
     for frame in 0..12 {
         let mut cell = || {

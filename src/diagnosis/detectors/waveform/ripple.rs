@@ -5,7 +5,6 @@
 //! can be: nearer and farther than the room in the static Doppler cells, than the body in the others.
 
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
 
 use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
@@ -13,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::Cube;
+use crate::diagnosis::detectors::undo::delays_s;
 use crate::diagnosis::evidence::{Evidence, blackman_harris, hann};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
 use crate::diagnosis::statistics;
@@ -145,16 +145,15 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
         return None;
     }
     let bin_hz = radar.sample_rate_hz / samples as f64;
-    let curve = Curve {
-        title: "Paired echoes by their distance from the return".into(),
-        x_label: "beat frequency offset, kHz".into(),
-        y_label: "log-likelihood gained, nats".into(),
-        series: vec![(
-            "training frames".into(),
+    let curve = Curve::new(
+        "Paired echoes by their distance from the return",
+        ["beat frequency offset, kHz", "log-likelihood gained, nats"],
+        [(
+            "training frames",
             shifts.iter().map(|s| 1e-3 * *s as f64 * bin_hz / PADDING as f64).collect(),
             scores.iter().map(|s| s / scale).collect(),
         )],
-    };
+    );
     Some(pair.candidate(evidence, p_value, nats, curve))
 }
 
@@ -204,7 +203,6 @@ impl Pair {
         let (radar_copy, turned_hz) = (radar.clone(), ripple_hz);
         Candidate {
             id: named.then_some(effects::chirp_ripple::ID),
-            behaves_like: Behaviour::DelayProportionalPhase,
             estimates: if named {
                 vec![
                     Estimate::normal("deviation_hz", deviation_hz, error.max(0.03 * deviation_hz)),
@@ -213,12 +211,6 @@ impl Pair {
             } else {
                 vec![]
             },
-            choice: None,
-            place: Place::at(Stage::Waveform),
-            p_value,
-            nats,
-            errs_alike: false,
-            look_alikes: vec![],
             statement: format!(
                 "Every return has a pair of faint echoes {:.0} kHz ({:.2} m) before and behind it, higher the farther it is ({:.0} dB \
                  at 3 m): the chirp's frequency is modulated by {:.1} kHz, {:.0} thousand times a second.",
@@ -230,7 +222,8 @@ impl Pair {
             ),
             curve: Some(curve),
             energy: clutter_energy * chirps * 2.0 * (stated * stated),
-            correction: Correction::Samples(Arc::new(move |cube| undo(cube, &radar_copy, alpha, turned_hz))),
+            correction: Correction::samples(move |cube| undo(cube, &radar_copy, alpha, turned_hz)),
+            ..Candidate::new(Behaviour::DelayProportionalPhase, Place::at(Stage::Waveform), p_value, nats)
         }
     }
 }
@@ -300,15 +293,12 @@ fn undo(cube: &mut Cube, radar: &Radar, alpha: Complex64, ripple_hz: f64) {
     let count = cube.dims[4];
     let mut planner = FftPlanner::new();
     let (forward, inverse) = (planner.plan_fft_forward(count), planner.plan_fft_inverse(count));
-    let delay_of_bin = radar.sample_rate_hz / (count as f64 * radar.slope_hz_per_s);
+    let delays_s: Vec<f64> = delays_s(radar, count).collect();
     let sample_s = 1.0 / radar.sample_rate_hz;
     cube.each_chirp(|_, samples| {
         let mut delayed = samples.to_vec();
         forward.process(&mut delayed);
-        for (bin, value) in delayed.iter_mut().enumerate() {
-            let delay = if bin >= count - count / 8 { bin as f64 - count as f64 } else { bin as f64 };
-            *value *= delay * delay_of_bin / count as f64;
-        }
+        delayed.iter_mut().zip(&delays_s).for_each(|(value, delay_s)| *value *= delay_s / count as f64);
         inverse.process(&mut delayed);
         for (n, (value, delayed)) in samples.iter_mut().zip(delayed).enumerate() {
             let turn = alpha * Complex64::cis(TAU * ripple_hz * sample_s * n as f64);

@@ -94,7 +94,7 @@ impl Chirps<'_> {
     pub fn independent(&self, width: usize, variance: f64) -> f64 {
         let channels = self.evidence.cube.channels();
         // The taper's energy is one.
-        let noise = self.evidence.noise().iter().sum::<f64>() / (channels * self.loops_s.len()) as f64;
+        let noise = self.evidence.total_noise() / (channels * self.loops_s.len()) as f64;
         let all = channels as f64 * (1.0 + (width - 1) as f64 / OF_ONE);
         1.0 + (all - 1.0) * (noise / variance.max(f64::MIN_POSITIVE)).min(1.0)
     }

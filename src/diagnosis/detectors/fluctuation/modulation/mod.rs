@@ -10,7 +10,6 @@ mod line;
 mod waves;
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -77,28 +76,19 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, nats: f64) -> Option<Ca
     let (patch, means) = (chirps.patch(&sinusoid, line), sinusoid.means);
     let waves = chirps.waves(&sinusoid, &patch);
     let [near_m, far_m] = [patch.start(), patch.end()].map(|bin| *bin as f64 * bin_m);
-    let chirp_count = (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
+    let chirp_count = evidence.cube.chirps();
     let energy = waves.iter().flat_map(Grid::values).map(|value| value.norm_sqr()).sum::<f64>() * 0.5 * chirp_count;
     let (starts_s, loop_s, frequency_hz) = (evidence.starts_s.clone(), evidence.radar.loop_period_s(), line.frequency_hz);
     let frame_rate_hz = 1.0 / evidence.radar.frame_period_s;
+    let place = Place { range_m: Some([near_m, far_m]), ..Place::at(Stage::Scene) };
     Some(Candidate {
-        id: None,
-        behaves_like: Behaviour::Modulated,
-        estimates: vec![],
-        choice: None,
-        place: Place { range_m: Some([near_m, far_m]), ..Place::at(Stage::Scene) },
-        p_value: p_value.max(f64::MIN_POSITIVE),
-        nats,
-        errs_alike: false,
-        look_alikes: vec![],
         statement: format!(
             "The return {range_m:.2} m away is modulated at {frequency_hz:.1} Hz (or at that and a multiple of the \
              {frame_rate_hz:.1} frames per second), coherently from frame to frame, while the other ranges are constant: a lamp or \
              a machine is there."
         ),
-        curve: None,
         energy,
-        correction: Correction::Samples(Arc::new(move |cube| {
+        correction: Correction::samples(move |cube| {
             cube.each_chirp(|[frame, channel, index], chirp| {
                 let (sine, cosine) = (TAU * frequency_hz * (starts_s[frame] + index as f64 * loop_s)).sin_cos();
                 let [with_cosine, with_sine] = [0, 1].map(|part| waves[part].below([channel]));
@@ -106,7 +96,8 @@ fn candidate(chirps: &Chirps, line: &Line, p_value: f64, nats: f64) -> Option<Ca
                     *value -= a * (cosine - means[0]) + b * (sine - means[1]);
                 }
             });
-        })),
+        }),
+        ..Candidate::new(Behaviour::Modulated, place, p_value.max(f64::MIN_POSITIVE), nats)
     })
 }
 

@@ -13,27 +13,19 @@ use crate::effects;
 pub fn of_drift(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -> Candidate {
     let shape = drift.clone();
     let deviation: Deviation = Arc::new(move |[frame, _, _]| shape.value(frame));
-    let Description { id, estimates, statement } = describe(evidence, field, part, drift);
-    Candidate {
-        id,
-        behaves_like: behaves_like(part),
-        estimates,
-        choice: None,
-        place: Place {
-            frames: match drift.shape {
-                Shape::Step(_, at) => Some((at..field.frames).collect()),
-                Shape::Smooth(_) => None,
-            },
-            ..place(part)
+    let description = describe(evidence, field, part, drift);
+    let place = Place {
+        frames: match drift.shape {
+            Shape::Step(_, at) => Some((at..field.frames).collect()),
+            Shape::Smooth(_) => None,
         },
-        p_value: drift.p_value,
-        nats: drift.held_out_nats,
-        errs_alike: false,
-        look_alikes: vec![],
-        statement,
+        ..place(part)
+    };
+    Candidate {
         curve: Some(curve(evidence, field, part, drift)),
         energy: energy(evidence, field, part, &*deviation),
         correction: correction(evidence, part, deviation, 0.0),
+        ..description.candidate(behaves_like(part), place, drift.p_value, drift.held_out_nats)
     }
 }
 
@@ -82,10 +74,9 @@ fn curve(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -> Curve
         Part::Delay => ("phase at 3 m, rad", stated_delay_s()),
     };
     let frames: Vec<f64> = (0..field.frames).map(|f| evidence.starts_s[f]).collect();
-    Curve {
-        title: "Static returns from frame to frame".into(),
-        x_label: "time, s".into(),
-        y_label: unit.into(),
-        series: vec![("fitted".into(), frames, (0..field.frames).map(|f| factor * drift.value(f)).collect())],
-    }
+    Curve::new(
+        "Static returns from frame to frame",
+        ["time, s", unit],
+        [("fitted", frames, (0..field.frames).map(|f| factor * drift.value(f)).collect())],
+    )
 }

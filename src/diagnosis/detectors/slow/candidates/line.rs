@@ -16,25 +16,16 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> C
     let scale = if part == Part::Gain { 1.0 / (1.0 + line.constant) } else { 1.0 };
     let deviation = deviation(evidence, line, scale);
     let wave = Wave { line, amplitude: scale * line.amplitude(), hertz: hertz(line) };
-    let (stage, Description { id, estimates, statement }) = match part {
+    let (stage, description) = match part {
         Part::Gain => (Stage::Receiver, wave.ripple()),
         Part::Phase | Part::Boresight => (Stage::Scene, wave.vibration(evidence, field, part)),
         Part::Delay => (Stage::Waveform, wave.oscillator()),
     };
+    let p_value = statistics::corrected((-line.training_nats).exp(), line.tried);
     Candidate {
-        id,
-        behaves_like: behaves_like(part),
-        estimates,
-        choice: None,
-        place: Place::at(stage),
-        p_value: statistics::corrected((-line.training_nats).exp(), line.tried),
-        nats: line.held_out_nats,
-        errs_alike: false,
-        look_alikes: vec![],
-        statement,
-        curve: None,
         energy: energy(evidence, field, part, &*deviation),
         correction: correction(evidence, part, deviation, 0.0),
+        ..description.candidate(behaves_like(part), Place::at(stage), p_value, line.held_out_nats)
     }
 }
 

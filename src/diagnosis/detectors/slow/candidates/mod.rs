@@ -59,7 +59,7 @@ pub(super) fn correction(evidence: &Evidence, part: Part, deviation: Deviation, 
     let [frames, tx, _, loops, _] = evidence.cube.dims;
     let phase = |i: usize| Complex64::cis(deviation([i / (tx * loops), i / loops % tx, i % loops]));
     let course = (part == Part::Phase).then(|| Course { of: Of::All, turned: (0..frames * tx * loops).map(phase).collect() });
-    let correction = Correction::Inverse(Arc::new(undo), volume.with_coding_cost(coding_cost, samples));
+    let correction = Correction::inverse(volume.with_coding_cost(coding_cost, samples), undo);
     match course {
         Some(course) => Correction::Followed(Box::new(correction), Arc::new(course)),
         None => correction,

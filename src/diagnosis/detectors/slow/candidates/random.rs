@@ -15,7 +15,7 @@ use crate::effects;
 pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random) -> Candidate {
     let (deviation, coding_cost) = most_probable(field, part, random);
     let one = random.held_out_nats;
-    let (Description { id, estimates, statement }, look_alikes, gain) = match (part, &random.two) {
+    let (description, look_alikes, gain) = match (part, &random.two) {
         (Part::Delay, Some(two)) if two.held_out_nats > one => {
             let rivals = if two.held_out_nats < one + UNDECIDED { vec![effects::phase_noise::ID] } else { vec![] };
             (start_jitter(evidence, two), rivals, two.held_out_nats)
@@ -27,19 +27,10 @@ pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random
         (part, _) => (common(part, random), vec![], one),
     };
     Candidate {
-        id,
-        behaves_like: behaves_like(part),
-        estimates,
-        choice: None,
-        place: place(part),
-        p_value: random.p_value,
-        nats: gain.min(random.nats_within),
-        errs_alike: false,
         look_alikes,
-        statement,
-        curve: None,
         energy: energy(evidence, field, part, &*deviation),
         correction: correction(evidence, part, deviation, coding_cost),
+        ..description.candidate(behaves_like(part), place(part), random.p_value, gain.min(random.nats_within))
     }
 }
 

@@ -22,29 +22,17 @@ pub fn of_settling(evidence: &Evidence, field: &Field, settling: &Settling) -> C
     let deviation = deviation(settling, named);
     let square: f64 = (0..field.loops).map(|i| deviation(i).norm_sqr()).sum::<f64>() * field.frames as f64;
     let energy = square * evidence.clutter().iter().map(|v| v.norm_sqr()).sum::<f64>();
-    let Description { id, estimates, statement } = if named { decay(settling, transmitters as f64) } else { pattern(settling) };
+    let description = if named { decay(settling, transmitters as f64) } else { pattern(settling) };
     let curve = curve(settling, transmitters, &deviation);
     let reach = (3.0 * settling.loops).ceil() as usize;
+    let place =
+        Place { chirps: named.then(|| (0..reach.min(field.loops) * transmitters).collect()), ..Place::at(Stage::Receiver) };
+    let nats = if named { settling.held_out_nats } else { free.held_out_nats };
     Candidate {
-        id,
-        behaves_like: Behaviour::SlowTimeGain,
-        estimates,
-        choice: None,
-        place: Place {
-            chirps: named.then(|| (0..reach.min(field.loops) * transmitters).collect()),
-            ..Place::at(Stage::Receiver)
-        },
-        p_value: if named { settling.p_value } else { free.p_value },
-        nats: if named { settling.held_out_nats } else { free.held_out_nats },
-        errs_alike: false,
-        look_alikes: vec![],
-        statement,
         curve: Some(curve),
         energy,
-        correction: Correction::Inverse(
-            Arc::new(move |cube| undo::gain(cube, |[_, _, index]| 1.0 + deviation(index))),
-            Volume::BY_SAMPLE,
-        ),
+        correction: Correction::inverse(Volume::BY_SAMPLE, move |cube| undo::gain(cube, |[_, _, index]| 1.0 + deviation(index))),
+        ..description.candidate(Behaviour::SlowTimeGain, place, if named { settling.p_value } else { free.p_value }, nats)
     }
 }
 
@@ -94,13 +82,12 @@ fn pattern(settling: &Settling) -> Description {
 fn curve(settling: &Settling, transmitters: usize, deviation: &OfLoop) -> Curve {
     let values = &settling.free.values;
     let x: Vec<f64> = (0..values.len()).map(|i| i as f64 * transmitters as f64).collect();
-    Curve {
-        title: "Gain of the static returns within a frame".into(),
-        x_label: "chirp".into(),
-        y_label: "gain relative to its mean".into(),
-        series: vec![
-            ("measured".into(), x.clone(), values.iter().map(|v| v.re).collect()),
-            ("fitted".into(), x, (0..values.len()).map(|i| deviation(i).re).collect()),
+    Curve::new(
+        "Gain of the static returns within a frame",
+        ["chirp", "gain relative to its mean"],
+        [
+            ("measured", x.clone(), values.iter().map(|v| v.re).collect()),
+            ("fitted", x, (0..values.len()).map(|i| deviation(i).re).collect()),
         ],
-    }
+    )
 }

@@ -92,17 +92,10 @@ impl Measured {
     fn candidate(&self, (correction, energy): (Correction, f64)) -> Candidate {
         Candidate {
             id: Some(effects::radar_vibration::ID),
-            behaves_like: Behaviour::SlowTimePhase,
             estimates: vec![
                 Estimate::normal("amplitude_m", self.amplitude_m, self.amplitude_deviation_m),
                 Estimate::normal("frequency_hz", self.frequency_hz, self.frequency_deviation_hz),
             ],
-            choice: None,
-            place: Place::at(Stage::Scene),
-            p_value: self.p_value,
-            nats: self.gain,
-            errs_alike: false,
-            look_alikes: vec![],
             statement: format!(
                 "The phases of all static returns oscillate at {:.2} ± {:.2} Hz, in phase with one another but each with a \
                  strength of its own, as returns from several directions do: the radar itself vibrates, by about {:.1} µm along its \
@@ -111,9 +104,9 @@ impl Measured {
                 NINETY * self.frequency_deviation_hz,
                 1e6 * self.amplitude_m
             ),
-            curve: None,
             energy,
             correction,
+            ..Candidate::new(Behaviour::SlowTimePhase, Place::at(Stage::Scene), self.p_value, self.gain)
         }
     }
 }

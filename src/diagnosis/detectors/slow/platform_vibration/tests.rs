@@ -3,25 +3,21 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
 use super::find;
 use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::evidence::Evidence;
 use crate::effects;
 use crate::radar::Radar;
+use crate::support;
 
 /// Returns from all directions before the radar, some at every range, and what each of them does at some time: given
 /// are the time, the cosine to the boresight and the bin.
 fn evidence(seed: u64, change: impl Fn(f64, f64, f64) -> Complex64) -> Evidence {
     let mut radar = Radar::small(12);
     (radar.loops_per_frame, radar.samples_per_chirp, radar.frame_period_s) = (32, 64, 0.1);
-    radar.tx_m = vec![[0.0; 3]];
     radar.rx_m = (0..4).map(|i| [0.0019 * f64::from(i), 0.0, 0.0]).collect();
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let mut normal = support::normal(seed);
     let returns: Vec<(f64, f64, Complex64)> = (0..300)
         .map(|i| (5.0 + f64::from(i) * 0.15, (0.6 * normal()).clamp(-1.4, 1.4).sin(), 2.0 * Complex64::new(normal(), normal())))
         .collect();

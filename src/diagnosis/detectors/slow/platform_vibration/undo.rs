@@ -1,7 +1,6 @@
 //! Taking a vibration out of the samples: its own pattern with its harmonics', and its phase out of what moves.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -24,7 +23,7 @@ pub fn undo(evidence: &Evidence, cells: &Cells, vibration: &Vibration, radians: 
         TAU * frequency * (starts[frame] + index as f64 * loop_s + (channel / rx) as f64 * chirp_s) + phase
     };
     let patterns = patterns(evidence, &turn);
-    let chirps = (evidence.cube.dims[0] * evidence.cube.dims[3]) as f64;
+    let chirps = evidence.cube.chirps();
     let energy = 0.5 * chirps * patterns.below([1]).iter().map(Complex64::norm_sqr).sum::<f64>();
     let undo = move |cube: &mut Cube| {
         cube.each_chirp(|[frame, channel, index], chirp| {
@@ -39,7 +38,7 @@ pub fn undo(evidence: &Evidence, cells: &Cells, vibration: &Vibration, radians: 
             }
         });
     };
-    (Correction::Inverse(Arc::new(undo), Volume::KEPT), energy)
+    (Correction::inverse(Volume::KEPT, undo), energy)
 }
 
 /// What is constant, and what oscillates with the sinusoid and its harmonics, in the training frames: least squares,

@@ -29,22 +29,13 @@ struct Phase {
 
 pub fn candidate(evidence: &Evidence, course: &Course, deviations: &[Deviation], shared: &Shared) -> Candidate {
     let phase = Phase::new(course, &spectra(deviations, course, shared.part), &shared.members);
-    let Description { id, estimates, statement } =
+    let description =
         if shared.part == Part::Delay { phase.of_delay(shared) } else { phase.of_vibration(evidence, course, shared) };
     let Phase { course: phases, rms, coding_cost, .. } = phase;
     let loops = course.loops;
+    let place = if description.id.is_some() { Place::at(Stage::Scene) } else { candidates::place(shared.part) };
+    let (behaves_like, p_value) = (candidates::behaves_like(shared.part), (-shared.log_bets).exp().min(1.0));
     Candidate {
-        id,
-        behaves_like: candidates::behaves_like(shared.part),
-        estimates,
-        choice: None,
-        place: if id.is_some() { Place::at(Stage::Scene) } else { candidates::place(shared.part) },
-        p_value: (-shared.log_bets).exp().min(1.0),
-        nats: shared.log_bets,
-        errs_alike: false,
-        look_alikes: vec![],
-        statement,
-        curve: None,
         energy: rms * rms * course.frames as f64 * loops as f64 * evidence.clutter().iter().map(|v| v.norm_sqr()).sum::<f64>(),
         correction: candidates::correction(
             evidence,
@@ -52,6 +43,7 @@ pub fn candidate(evidence: &Evidence, course: &Course, deviations: &[Deviation],
             Arc::new(move |[frame, _, index]| phases[frame * loops + index]),
             coding_cost,
         ),
+        ..description.candidate(behaves_like, place, p_value, shared.log_bets)
     }
 }
 

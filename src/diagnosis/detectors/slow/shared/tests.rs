@@ -3,9 +3,6 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
 use super::bets::log_bessel_0;
 use super::course::{Course, without_slow};
@@ -13,6 +10,7 @@ use super::find;
 use crate::diagnosis::evidence::Evidence;
 use crate::effects;
 use crate::radar::Radar;
+use crate::support;
 
 #[test]
 fn bessel_function_of_order_zero() {
@@ -45,8 +43,7 @@ fn noise_keeps_its_variance_under_the_taper_and_a_line_is_left_of_it() {
     for gap_s in [0.0, 0.02] {
         let course = Course::of(&evidence(gap_s, 1, |_| 0.0, |_, _| 0.0));
         assert_eq!(course.even, gap_s == 0.0);
-        let mut random = ChaCha8Rng::seed_from_u64(7);
-        let white: Vec<f64> = (0..24 * 16).map(|_| StandardNormal.sample(&mut random)).collect();
+        let white: Vec<f64> = std::iter::repeat_with(support::normal(7)).take(24 * 16).collect();
         let values = course.spectrum(&white);
         assert_eq!(values.len(), course.frequencies_hz().len());
         let power = values.iter().map(Complex64::norm_sqr).sum::<f64>() / values.len() as f64;
