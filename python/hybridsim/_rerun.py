@@ -44,13 +44,21 @@ class Scenes:
         self.recordings = {recording.resolve().name: recording for recording in recordings}
         if len(self.recordings) < len(recordings):
             raise Error("two recordings of one name", "rename one of the folders, or export them one by one")
-        if out.is_symlink() or out.exists() and (not out.is_dir() or any(out.iterdir())):
-            raise Error(f"{out}: exists already and is not an empty folder", "choose another folder")
+        # As the library's own folders: a link counts as what it leads to, hidden names as nothing.
+        if out.is_symlink():
+            if not out.exists():
+                raise Error(f"{out}: is a link that leads nowhere", "make the folder that it leads to, or choose another one")
+            self._out = out = out.resolve()
+        if out.exists() and (not out.is_dir() or any(not path.name.startswith(".") for path in out.iterdir())):
+            raise Error(f"{out}: exists already and is not an empty folder", "choose another folder, or remove this one first")
 
     def __enter__(self) -> Scenes:
+        # A folder that is there is filled and stays what it is: a mount point cannot be replaced.
+        self._fills = self._out.is_dir()
+        above = self._out if self._fills else self._out.parent
         try:
-            self._out.parent.mkdir(parents=True, exist_ok=True)
-            self._work = tempfile.TemporaryDirectory(prefix=f".{self._out.name}.", dir=self._out.parent)
+            above.mkdir(parents=True, exist_ok=True)
+            self._work = tempfile.TemporaryDirectory(prefix=f".{self._out.name}.", dir=above)
         except OSError as error:
             raise self._unwritable(error) from error
         self._made = Path(self._work.name) / "made"
@@ -60,11 +68,24 @@ class Scenes:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
             if kind is None:
-                self._made.replace(self._out)
+                self._publish()
         except OSError as error:
             raise self._unwritable(error) from error
         finally:
             self._work.cleanup()
+
+    def _publish(self) -> None:
+        if not self._fills:
+            self._made.replace(self._out)
+            return
+        moved: list[Path] = []
+        try:
+            for path in sorted(self._made.iterdir()):
+                moved.append(path.replace(self._out / path.name))
+        except OSError:
+            for path in moved:
+                path.unlink()
+            raise
 
     def _unwritable(self, error: OSError) -> FileError:
         return FileError(f"{self._out}: cannot be written: {error}", None, str(self._out), error.errno)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import hybridsim
+from hybridsim import _rerun
 
 pytestmark = pytest.mark.filterwarnings("ignore::hybridsim.Note")
 Exported = Callable[..., Path]
@@ -129,6 +130,38 @@ def test_every_recording_has_a_scene(site: Path, tmp_path: Path) -> None:
     with pytest.raises(hybridsim.Error, match="unknown key `maps.scales`"):
         hybridsim.export(first, "rerun", tmp_path / "none", set={"maps.scales": "db"}, progress=False)
     assert [path.name for path in tmp_path.iterdir()] == ["out"], "all or nothing"
+
+
+def test_scenes_are_put_where_the_library_puts_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_rerun, "library", lambda: None)
+    real, link, file = tmp_path / "real", tmp_path / "link", tmp_path / "file"
+    real.mkdir()
+    (real / ".keep").write_text("")
+    link.symlink_to("real")
+    file.write_text("")
+    number = real.stat().st_ino
+
+    def put(out: Path, fails: bool = False) -> None:
+        with _rerun.Scenes([], out) as scenes:
+            (scenes._made / "a.rrd").write_text("scene")
+            if fails:
+                raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        put(link, fails=True)
+    assert [path.name for path in real.iterdir()] == [".keep"]
+    put(link)
+    assert sorted(path.name for path in real.iterdir()) == [".keep", "a.rrd"]
+    assert link.is_symlink() and real.stat().st_ino == number, "filled where it is"
+    put(tmp_path / "new" / "below")
+    assert [path.name for path in (tmp_path / "new").rglob("*")] == ["below", "a.rrd"]
+    for full in (link, file):
+        with pytest.raises(hybridsim.Error, match=f"{full.resolve().name}: exists already and is not an empty folder\n") as caught:
+            put(full)
+        assert caught.value.hint == "choose another folder, or remove this one first"
+    (tmp_path / "nowhere").symlink_to("nothing")
+    with pytest.raises(hybridsim.Error, match="nowhere: is a link that leads nowhere\n"):
+        put(tmp_path / "nowhere")
 
 
 def test_a_scene_is_refused_where_it_cannot_be(

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +26,45 @@ def test_an_array_becomes_a_recording(recording: hybridsim.Recording, tmp_path: 
     )
     assert made.labels == {"action": "walk"} and made.radar == recording.radar
     assert np.array_equal(made.samples(), recording.samples())
+
+
+CFG = """
+channelCfg 15 1 0
+adcCfg 2 1
+adcbufCfg -1 0 0 1 1
+profileCfg 0 77 48 6 60 0 0 60.012 1 128 4400 0 0 30
+profileCfg 1 77.05 48 6 60 0 0 60.012 1 128 4400 0 0 30
+chirpCfg 0 0 0 0 0 0 0 1
+chirpCfg 1 1 1 0 0 0 0 1
+frameCfg 0 1 8 2 100 1 0
+sensorStart
+"""
+"""Two profiles in turn."""
+
+
+@pytest.mark.filterwarnings("ignore::hybridsim.Note")
+def test_a_frame_of_several_profiles_is_split(tmp_path: Path) -> None:
+    words = np.random.default_rng(3).integers(-999, 999, 2 * 8 * 2 * 4 * 128 * 2)  # [frame, loop, profile, rx, sample, iq]
+    words.astype("<i2").tofile(tmp_path / "adc_data.bin")
+    (tmp_path / "radar.cfg").write_text(CFG)
+
+    def made(out: str, profile: Any) -> Any:
+        return hybridsim.import_(tmp_path / "adc_data.bin", tmp_path / out, profile=profile, as_stated=True, progress=False)
+
+    split = made("out", "all")
+    assert [recording.folder.name for recording in split] == ["profile0", "profile1"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["profile0", "profile1"]
+    for profile, recording in enumerate(split):
+        alone = made(f"alone{profile}", profile)
+        assert recording.radar == alone.radar and recording.notes == alone.notes
+        assert np.array_equal(recording.raw(), alone.raw())
+    assert [recording.radar.start_frequency_hz for recording in split] == [77e9, 77.05e9]
+    with pytest.raises(hybridsim.Error, match="^`profile` is both, expected the number of a profile, or all$"):
+        made("none", "both")
+    np.save(tmp_path / "capture.npy", np.zeros((2, 8, 4, 128)))
+    with pytest.raises(hybridsim.Error, match="no description with chirp profiles"):
+        hybridsim.import_(tmp_path / "capture.npy", tmp_path / "none", profile="all", progress=False)
+    assert not (tmp_path / "none").exists()
 
 
 def test_what_is_odd_is_a_warning_where_the_verb_was_called(config: Path, tmp_path: Path) -> None:

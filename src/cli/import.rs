@@ -1,10 +1,6 @@
 //! `hybridsim import`.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-    str::FromStr,
-};
+use std::{collections::BTreeMap, path::PathBuf};
 
 use clap::Args;
 
@@ -13,13 +9,12 @@ use super::{
     progress::{Progress, notes},
 };
 use crate::{
-    data::atomic::AtomicFolder,
     error::{Error, Result},
-    import::capture::{self, Layout, Preset, Stated},
+    import::capture::{Layout, Preset, Stated},
     integrity::Against,
     verbs::{
         Notice, Notify,
-        import::{Import, Seen, import},
+        import::{Import, Profiles, Seen, import, import_profiles},
     },
 };
 
@@ -47,7 +42,7 @@ pub(crate) struct Arguments {
     preset: Option<String>,
     /// Which chirp profile, where a frame has several; all: a recording of each, DIR/profile0 and so on
     #[arg(long, value_name = "ID|all")]
-    profile: Option<Profile>,
+    profile: Option<Profiles>,
     /// Which subframe of an advanced frame
     #[arg(long, value_name = "INDEX")]
     subframe: Option<usize>,
@@ -62,24 +57,6 @@ pub(crate) struct Arguments {
     out: PathBuf,
 }
 
-/// Which profiles of a frame.
-#[derive(Clone, Copy)]
-enum Profile {
-    One(usize),
-    All,
-}
-
-impl FromStr for Profile {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        match text {
-            "all" => Ok(Self::All),
-            _ => text.parse().map(Self::One).map_err(|_| "expected the number of a profile, or all".into()),
-        }
-    }
-}
-
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let stated = Stated {
         configs: arguments.config.clone(),
@@ -87,10 +64,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         layout: arguments.layout.clone(),
         variable: arguments.variable.clone(),
         preset: arguments.preset.as_deref().map(Preset::named).transpose()?,
-        profile: match arguments.profile {
-            Some(Profile::One(id)) => Some(id),
-            Some(Profile::All) | None => None,
-        },
+        profile: arguments.profile.and_then(Profiles::one),
         subframe: arguments.subframe,
         tx: arguments.tx,
         sets: common.set.clone(),
@@ -103,39 +77,26 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         Ok((name.trim().to_string(), text.trim().to_string()))
     });
     let labels = labels.collect::<Result<BTreeMap<_, _>>>()?;
-    if !matches!(arguments.profile, Some(Profile::All)) {
-        one(&arguments.sources, &stated, labels, &arguments.out, common)?;
-        say!("imported: {}", arguments.out.display());
-        return Ok(());
-    }
-    // All appear together: one that is refused leaves nothing of the others.
-    let folder = AtomicFolder::create(&arguments.out)?;
-    let profiles = capture::profiles(&arguments.sources, &stated)?;
-    let name = |id: usize| format!("profile{id}");
-    for &id in &profiles {
-        let stated = Stated { profile: Some(id), ..stated.clone() };
-        say!("profile {id}:");
-        one(&arguments.sources, &stated, labels.clone(), &folder.path().join(name(id)), common)?;
-    }
-    folder.finish()?;
-    profiles.iter().for_each(|&id| say!("imported: {}", arguments.out.join(name(id)).display()));
-    Ok(())
-}
-
-/// One recording.
-fn one(sources: &[PathBuf], stated: &Stated, labels: BTreeMap<String, String>, out: &Path, common: &Common) -> Result<()> {
-    let what = Import { sources, stated, labels, as_stated: common.as_stated, out };
+    let what = Import { sources: &arguments.sources, stated: &stated, labels, as_stated: common.as_stated, out: &arguments.out };
     let against = if common.as_stated { Against::Kept } else { Against::Refused };
     let mut show = |seen: Seen<'_>, _: &mut Notify<'_>| match seen {
         Seen::Written(recording) => check::describe(recording),
         Seen::Looked(recording, findings) => conventions::show(&recording.radar, findings, against),
     };
     let (mut bar, mut length) = (None, 0);
-    import(what, &mut show, &mut |notice| match notice {
+    let mut notify = |notice: Notice<'_>| match notice {
         Notice::Begun { what, steps } => (bar, length) = (Some(Progress::new(what, steps, common.quiet)), steps),
         Notice::Done(steps) if steps == length => bar.take().into_iter().for_each(Progress::finish),
         Notice::Done(steps) => bar.iter().for_each(|bar| bar.set(steps)),
+        Notice::Line(text) => say!("{text}"),
         notice => notes(notice),
-    })?;
+    };
+    let made = match arguments.profile {
+        Some(Profiles::All) => {
+            import_profiles(&what, &mut show, &mut notify)?.into_iter().map(|(name, _)| arguments.out.join(name)).collect()
+        }
+        _ => import(what, &mut show, &mut notify).map(|_| vec![arguments.out.clone()])?,
+    };
+    made.iter().for_each(|folder| say!("imported: {}", folder.display()));
     Ok(())
 }

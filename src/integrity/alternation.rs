@@ -26,11 +26,14 @@ const FRAMES: usize = 4;
 /// Kinds of loops that are tried, and transmitters and receivers that are named, at most: those of four chips (AWR2243 cascade: twelve
 /// and sixteen).
 const MOST: usize = 16;
+/// Channels of the first loops that are kept, at most: all channels show the same turns.
+const CHANNELS: usize = 16;
 
 pub(super) struct Alternation {
     schedule: Schedule,
     loops: Sequence,
-    /// Kinds of loops that the loops of one frame do not show, and spectra of the first loops of frames that follow one another.
+    /// Kinds of loops that the loops of one frame do not show, and spectra of the first loops of frames that follow one another, of some
+    /// of their channels.
     others: Vec<usize>,
     firsts: Vec<Complex64>,
     next: usize,
@@ -48,12 +51,18 @@ impl Alternation {
         kinds / gcd(kinds, self.schedule.loops)
     }
 
+    /// What is kept of a first loop: channels evenly spread over all.
+    fn kept(&self) -> Schedule {
+        Schedule { tx: 1, rx: self.schedule.channels().min(CHANNELS), ..self.schedule }
+    }
+
     /// The first loops in a row, with the kinds that the loops of one frame do not show.
     fn frames(&self) -> Sequence {
         let mut kinds: Vec<usize> = self.others.iter().map(|&kinds| self.of_frames(kinds)).filter(|kinds| *kinds > 1).collect();
         kinds.sort_unstable();
         kinds.dedup();
-        let mut frames = Sequence::new(self.schedule, self.firsts.len() / self.schedule.period(), kinds.into_iter());
+        let kept = self.kept();
+        let mut frames = Sequence::new(kept, self.firsts.len() / kept.period(), kinds.into_iter());
         if !frames.is_empty() {
             frames.add(&self.firsts);
         }
@@ -100,7 +109,8 @@ impl Inspector for Alternation {
     fn see(&mut self, stream: &Stream) {
         let period = self.schedule.period();
         let needs_all = self.loops.rows < FRAMES && !self.loops.is_empty();
-        let needs_first = !self.others.is_empty() && self.firsts.len() < FRAMES * MOST * period;
+        let kept = self.kept();
+        let needs_first = !self.others.is_empty() && self.firsts.len() < FRAMES * MOST * kept.period();
         if !needs_all && !needs_first {
             return;
         }
@@ -117,7 +127,8 @@ impl Inspector for Alternation {
                 self.firsts.clear();
             }
             self.next = stream.frame + 1;
-            self.firsts.extend(&spectra[..period]);
+            let channels: Vec<&[Complex64]> = spectra[..period].chunks_exact(kept.samples).collect();
+            (0..kept.rx).for_each(|channel| self.firsts.extend(channels[channel * channels.len() / kept.rx]));
         }
     }
 
@@ -178,9 +189,15 @@ mod tests {
     }
 
     /// The same in other units, and with a second receiver that sends one code.
-    fn seen_by([frames, loops]: [usize; 2], turn: Turn, noise: f64, scale: f64, is_dead: bool) -> Finding {
-        let schedule = Schedule { tx: 1, rx: RX, loops, samples: SAMPLES, is_real: false, is_falling: false, farthest_bin: None };
-        let length = RX * loops * SAMPLES;
+    fn seen_by(shape: [usize; 2], turn: Turn, noise: f64, scale: f64, is_dead: bool) -> Finding {
+        inspector(RX, shape, turn, noise, scale, is_dead).conclude().unwrap()
+    }
+
+    /// By so many receivers.
+    fn inspector(rxs: usize, [frames, loops]: [usize; 2], turn: Turn, noise: f64, scale: f64, is_dead: bool) -> Box<Alternation> {
+        let schedule =
+            Schedule { tx: 1, rx: rxs, loops, samples: SAMPLES, is_real: false, is_falling: false, farthest_bin: None };
+        let length = rxs * loops * SAMPLES;
         let (phases, drawn) = (numbers(3, 16, 0.0, std::f64::consts::TAU), numbers(4, 2 * frames * length, -noise, noise));
         let value = |rx: usize, index: usize, sample: usize| {
             let tone =
@@ -197,7 +214,7 @@ mod tests {
         let mut inspector = Box::new(Alternation::new(schedule));
         for frame in 0..frames {
             let (mut re, mut im) = (vec![], vec![]);
-            for (rx, index) in (0..RX).flat_map(|rx| (0..loops).map(move |index| (rx, index))) {
+            for (rx, index) in (0..rxs).flat_map(|rx| (0..loops).map(move |index| (rx, index))) {
                 for sample in 0..SAMPLES {
                     let value = value(rx, frame * loops + index, sample);
                     let place = 2 * (frame * length + (rx * loops + index) * SAMPLES + sample);
@@ -207,9 +224,9 @@ mod tests {
                     im.push(q);
                 }
             }
-            inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, RX, loops, SAMPLES], re, Some(im))));
+            inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, rxs, loops, SAMPLES], re, Some(im))));
         }
-        inspector.conclude().unwrap()
+        inspector
     }
 
     /// As transmitters two wavelengths apart see it.
@@ -256,6 +273,16 @@ mod tests {
                 assert!(found.ok, "{shape:?}: {found:?}");
             }
         }
+    }
+
+    /// However many channels and frames there are, and they still show the turns.
+    #[test]
+    fn of_many_channels_some_are_kept() {
+        let seen = inspector(40, [70, 2], TURNS[1].1, 0.1, 1.0, false);
+        assert_eq!(seen.firsts.len(), FRAMES * MOST * CHANNELS * SAMPLES);
+        let found = seen.conclude().unwrap();
+        assert!(found.ok && !found.decided && found.found.contains("frames of 3 kinds"), "{found:?}");
+        assert_eq!(inspector(3, [5, 2], TURNS[1].1, 0.1, 1.0, false).firsts.len(), 5 * 3 * SAMPLES);
     }
 
     /// Equal loops differ by rounding alone, and a dead receiver by nothing: neither tells kinds of them.

@@ -3,10 +3,13 @@
 //! Between frames more time passes than between loops, so what moves changes more. Within frames as stated, a step between loops is the
 //! largest of its frame as often as any other one: that the same step is so in many frames has a binomial law, Bonferroni over the
 //! steps. What begins with a frame (a receiver that settles) makes one step the largest, too, but changes as much from frame to frame;
-//! so the step must also exceed that between frames, which a boundary that is as stated does not: a sign test over frames.
+//! so the step must also exceed that between frames, which a boundary that is as stated does not: a sign test over frames. A step is what
+//! lasts: a burst of somebody else's radar in one loop, which may come as evenly as frames do, is none. Where frames begin at another
+//! loop of each stated frame, they are of another length (`frame_length`), and the same sign test holds.
 
 use num_complex::Complex32;
 
+use super::frame_length::{OtherLength, other_length};
 use super::stream::{Schedule, Stream};
 use super::tails::{log_binomial_tail, log_same_place, most_frequent};
 use super::{ALARM, Finding, Inspector, Kind};
@@ -16,21 +19,55 @@ const EXPECTED: &str = "the first loop of a frame first";
 /// Fewest loops of a frame whose steps can be compared.
 const FEWEST_LOOPS: usize = 4;
 
+/// The largest step of a frame.
+struct Step {
+    frame: usize,
+    /// The loop before it.
+    place: usize,
+    size: f64,
+    /// The step to the next frame where that was seen.
+    next: Option<f64>,
+}
+
 pub(super) struct Boundary {
     schedule: Schedule,
-    /// The largest step of each frame, how large it is, and the step to the next frame where that was seen.
-    steps: Vec<(usize, f64, Option<f64>)>,
-    last: Option<(usize, Vec<Complex32>)>,
+    steps: Vec<Step>,
+    /// Number and last two loops of the last frame.
+    last: Option<(usize, [Vec<Complex32>; 2])>,
 }
 
 impl Boundary {
     pub fn new(schedule: Schedule) -> Self {
         Self { schedule, steps: vec![], last: None }
     }
+
+    /// Frames of another length, where the steps say so.
+    fn of_another_length(&self) -> Option<Finding> {
+        let steps: Vec<(usize, usize)> = self.steps.iter().map(|step| (step.frame, step.place)).collect();
+        let OtherLength { loops, at, of, log_p } = other_length(self.schedule.loops, &steps)?;
+        let (larger, compared) = larger(at.iter().map(|&index| &self.steps[index]));
+        let log_p = log_p.max(log_binomial_tail(larger, compared, 0.5));
+        let found = format!(
+            "in {} of {of} frames the scene changes most where frames of {loops} loops begin, in {larger} of {compared} more than to the \
+             next frame: the number of loops is another",
+            at.len()
+        );
+        (log_p < ALARM.ln()).then(|| Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p))
+    }
 }
 
-fn step(before: &[Complex32], after: &[Complex32]) -> f64 {
-    before.iter().zip(after).map(|(before, after)| f64::from((after - before).norm_sqr())).sum()
+/// How many steps are larger than those to the next frame, of how many.
+fn larger<'a>(steps: impl Iterator<Item = &'a Step>) -> (usize, usize) {
+    let against: Vec<bool> = steps.filter_map(|step| step.next.map(|next| step.size > next)).collect();
+    (against.iter().filter(|larger| **larger).count(), against.len())
+}
+
+/// What lasts of a step: two loops before it and two after it, all in order.
+fn step(loops: [&[Complex32]; 4]) -> f64 {
+    let between = |before: &[Complex32], after: &[Complex32]| -> f64 {
+        before.iter().zip(after).map(|(before, after)| f64::from((after - before).norm_sqr())).sum()
+    };
+    between(loops[1], loops[2]).min(between(loops[0], loops[3]))
 }
 
 impl Inspector for Boundary {
@@ -39,16 +76,18 @@ impl Inspector for Boundary {
             return;
         }
         let loops: Vec<&[Complex32]> = stream.loops().collect();
-        if let (Some((frame, last)), Some((_, _, next))) = (&self.last, self.steps.last_mut())
+        if let (Some((frame, last)), Some(before)) = (&self.last, self.steps.last_mut())
             && frame + 1 == stream.frame
         {
-            *next = Some(step(last, loops[0]));
+            before.next = Some(step([&last[0], &last[1], loops[0], loops[1]]));
         }
-        let sizes = loops.windows(2).map(|pair| step(pair[0], pair[1])).enumerate();
+        let end = loops.len() - 1;
+        let around = |place: usize| [place.saturating_sub(1), place, place + 1, (place + 2).min(end)].map(|index| loops[index]);
+        let sizes = (0..end).map(|place| step(around(place))).enumerate();
         if let Some((place, size)) = sizes.max_by(|a, b| a.1.total_cmp(&b.1)) {
-            self.steps.push((place, size, None));
+            self.steps.push(Step { frame: stream.frame, place, size, next: None });
         }
-        self.last = Some((stream.frame, loops[loops.len() - 1].to_vec()));
+        self.last = Some((stream.frame, [end - 1, end].map(|index| loops[index].to_vec())));
     }
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
@@ -57,24 +96,23 @@ impl Inspector for Boundary {
             let why = if is_short { "frames of so few loops show no boundary" } else { "one frame alone shows no boundary" };
             return Some(Finding::undecided(CHECK, EXPECTED, why));
         }
-        let places: Vec<usize> = self.steps.iter().map(|(place, ..)| *place).collect();
+        let places: Vec<usize> = self.steps.iter().map(|step| step.place).collect();
         let (place, count) = most_frequent(&places)?;
-        let at_place = self.steps.iter().filter(|(own, ..)| *own == place);
-        let against: Vec<bool> = at_place.filter_map(|(_, size, next)| next.map(|next| *size > next)).collect();
-        let larger = against.iter().filter(|larger| **larger).count();
-        let log_p =
-            log_same_place(count, places.len(), self.schedule.loops - 1).max(log_binomial_tail(larger, against.len(), 0.5));
+        let (larger, compared) = larger(self.steps.iter().filter(|step| step.place == place));
+        let log_p = log_same_place(count, places.len(), self.schedule.loops - 1).max(log_binomial_tail(larger, compared, 0.5));
         if log_p < ALARM.ln() {
             let found = format!(
-                "in {count} of {} frames the scene changes most between the loops {place} and {}, in {larger} of {} more than to the next \
-                 frame: frames begin there, or the number of loops is another",
+                "in {count} of {} frames the scene changes most between the loops {place} and {}, in {larger} of {compared} more than to \
+                 the next frame: frames begin there, or the number of loops is another",
                 places.len(),
-                place + 1,
-                against.len()
+                place + 1
             );
             return Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p));
         }
-        let after: Vec<bool> = self.steps.iter().filter_map(|(_, size, next)| next.map(|next| next > *size)).collect();
+        if let Some(found) = self.of_another_length() {
+            return Some(found);
+        }
+        let after: Vec<bool> = self.steps.iter().filter_map(|step| step.next.map(|next| next > step.size)).collect();
         let between = after.iter().filter(|larger| **larger).count();
         let found = format!("the scene changes more to the next frame than within it in {between} of {} frames", after.len());
         if log_binomial_tail(between, after.len(), 0.5) < ALARM.ln() {
@@ -95,20 +133,57 @@ mod tests {
     /// Something that moves a little from loop to loop and more from frame to frame; the stream begins so many loops late. `settling`:
     /// how much the first loop of a frame differs.
     fn seen(late: usize, settling: f64) -> Finding {
-        let schedule = Schedule { tx: 1, rx: 1, loops: LOOPS, samples: 16, is_real: true, is_falling: false, farthest_bin: None };
+        seen_as(LOOPS, late, settling)
+    }
+
+    /// The same, cut into frames of so many loops.
+    fn seen_as(stated: usize, late: usize, settling: f64) -> Finding {
+        let schedule =
+            Schedule { tx: 1, rx: 1, loops: stated, samples: 16, is_real: true, is_falling: false, farthest_bin: None };
         let drawn = numbers(8, 40 * LOOPS * 16, -0.05, 0.05);
         let mut inspector = Box::new(Boundary::new(schedule));
-        for frame in 0..24 {
+        for frame in 0..24 * LOOPS / stated {
             let value = |i: usize| {
-                let (index, sample) = (frame * LOOPS + i / 16 + late, i % 16);
+                let (index, sample) = (frame * stated + i / 16 + late, i % 16);
                 let time = index as f64 * 0.01 + (index / LOOPS) as f64 * 0.37;
                 let first = if index % LOOPS == 0 { settling } else { 0.0 };
-                ((0.4 * sample as f64 + 6.0 * time).sin() + first + drawn[frame * LOOPS * 16 + i]) as f32
+                ((0.4 * sample as f64 + 6.0 * time).sin() + first + drawn[frame * stated * 16 + i]) as f32
             };
-            let re = (0..LOOPS * 16).map(value).collect();
-            inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, 1, LOOPS, 16], re, None)));
+            let re = (0..stated * 16).map(value).collect();
+            inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, 1, stated, 16], re, None)));
         }
         inspector.conclude().unwrap()
+    }
+
+    /// Boundaries at another loop of each frame, and none that comes most often.
+    #[test]
+    fn another_number_of_loops_is_found_and_named() {
+        for stated in [LOOPS - 1, LOOPS + 1] {
+            let found = seen_as(stated, 0, 0.0);
+            assert!(found.is_refusal() && found.found.contains("where frames of 8 loops begin"), "{stated}: {found:?}");
+        }
+    }
+
+    /// Bursts in one loop of each frame, a loop later in each, come as evenly as frames of another length begin. What stays so until the
+    /// next of these loops is a boundary.
+    #[test]
+    fn bursts_of_another_radar_are_no_boundary() {
+        let schedule = Schedule { tx: 1, rx: 1, loops: 40, samples: 16, is_real: true, is_falling: false, farthest_bin: None };
+        let seen = |lasts: bool| {
+            let drawn = numbers(9, 30 * 40 * 16, -0.05, 0.05);
+            let mut inspector = Box::new(Boundary::new(schedule));
+            for frame in 0..30 {
+                let value = |i: usize| {
+                    let (index, at) = (i / 16, frame + 5);
+                    let is_other = if lasts { (frame + usize::from(index >= at)) % 2 == 1 } else { index == at };
+                    drawn[frame * 640 + i] as f32 + if is_other { (0.7 * (i % 16) as f32).cos() } else { 0.0 }
+                };
+                inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, 1, 40, 16], (0..640).map(value).collect(), None)));
+            }
+            inspector.conclude().unwrap()
+        };
+        assert!(!seen(false).is_refusal(), "{:?}", seen(false));
+        assert!(seen(true).is_refusal(), "{:?}", seen(true));
     }
 
     #[test]

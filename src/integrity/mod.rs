@@ -13,6 +13,7 @@ mod chirp_length;
 mod copies;
 mod devices;
 mod exchange;
+mod frame_length;
 mod iq_order;
 mod lanes;
 mod mean_loop;

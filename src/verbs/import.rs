@@ -3,6 +3,7 @@
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
+    str::FromStr,
 };
 
 use super::{Notice, Notify, plausible};
@@ -12,6 +13,36 @@ use crate::{
     import::capture::{self, Stated},
     integrity::Finding,
 };
+
+/// Which chirp profiles of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Profiles {
+    One(usize),
+    All,
+}
+
+impl Profiles {
+    pub const EXPECTED: &str = "the number of a profile, or all";
+
+    /// The one; none where all are taken.
+    pub fn one(self) -> Option<usize> {
+        match self {
+            Self::One(id) => Some(id),
+            Self::All => None,
+        }
+    }
+}
+
+impl FromStr for Profiles {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "all" => Ok(Self::All),
+            _ => text.parse().map(Self::One).map_err(|_| format!("expected {}", Self::EXPECTED)),
+        }
+    }
+}
 
 /// What is imported, and how.
 pub struct Import<'a> {
@@ -50,4 +81,43 @@ pub fn import(what: Import<'_>, seen: &mut dyn FnMut(Seen<'_>, &mut Notify<'_>),
     let recording = draft.publish(what.as_stated)?;
     recording.notes.iter().filter(|note| !known.contains(note)).for_each(|note| notify(Notice::Note(note)));
     Ok(recording)
+}
+
+/// A recording of every chirp profile of a frame: `profile0` and so on in the folder that `what` names. All appear together: one that is
+/// refused leaves nothing of the others. The names, and the notes of each.
+///
+/// # Errors
+/// As [`import`]; a capture whose description has no profiles.
+pub fn import_profiles(
+    what: &Import<'_>,
+    seen: &mut dyn FnMut(Seen<'_>, &mut Notify<'_>),
+    notify: &mut Notify<'_>,
+) -> Result<Vec<(String, Vec<String>)>> {
+    let folder = AtomicFolder::create(what.out)?;
+    let mut made = vec![];
+    for id in capture::profiles(what.sources, what.stated)? {
+        let name = format!("profile{id}");
+        notify(Notice::Line(&format!("profile {id}:")));
+        let stated = Stated { profile: Some(id), ..what.stated.clone() };
+        let own = Import { stated: &stated, labels: what.labels.clone(), out: &folder.path().join(&name), ..*what };
+        made.push((name, import(own, seen, notify)?.notes));
+    }
+    folder.finish()?;
+    Ok(made)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Profiles;
+
+    #[test]
+    fn profiles_are_one_or_all() {
+        for (text, wanted) in [("all", Profiles::All), ("0", Profiles::One(0)), ("12", Profiles::One(12))] {
+            assert_eq!(text.parse(), Ok(wanted));
+        }
+        for text in ["both", "", "-1", "All", "None"] {
+            assert_eq!(text.parse::<Profiles>(), Err("expected the number of a profile, or all".into()), "{text}");
+        }
+        assert_eq!([Profiles::All, Profiles::One(3)].map(Profiles::one), [None, Some(3)]);
+    }
 }

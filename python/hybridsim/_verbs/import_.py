@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Literal, overload
 
 from .. import _hybridsim
 from .._progress import Notifier, Watcher
@@ -9,6 +11,7 @@ from .._recording import Recording
 from .._types import Settings, StrPath, paths, sets
 
 
+@overload
 def import_(
     sources: StrPath | Iterable[StrPath],
     out: StrPath,
@@ -25,7 +28,46 @@ def import_(
     set: Settings = (),
     as_stated: bool = False,
     progress: Watcher = True,
-) -> Recording:
+) -> Recording: ...
+
+
+@overload
+def import_(
+    sources: StrPath | Iterable[StrPath],
+    out: StrPath,
+    *,
+    config: StrPath | Iterable[StrPath] = (),
+    board: str | None = None,
+    layout: str | None = None,
+    variable: str | None = None,
+    preset: str | None = None,
+    profile: Literal["all"],
+    subframe: int | None = None,
+    tx: int | None = None,
+    labels: Mapping[str, str] | None = None,
+    set: Settings = (),
+    as_stated: bool = False,
+    progress: Watcher = True,
+) -> list[Recording]: ...
+
+
+def import_(
+    sources: StrPath | Iterable[StrPath],
+    out: StrPath,
+    *,
+    config: StrPath | Iterable[StrPath] = (),
+    board: str | None = None,
+    layout: str | None = None,
+    variable: str | None = None,
+    preset: str | None = None,
+    profile: int | Literal["all"] | None = None,
+    subframe: int | None = None,
+    tx: int | None = None,
+    labels: Mapping[str, str] | None = None,
+    set: Settings = (),
+    as_stated: bool = False,
+    progress: Watcher = True,
+) -> Recording | list[Recording]:
     """Turns a capture of a radar board into a recording.
 
     Args:
@@ -38,7 +80,8 @@ def import_(
             ``"frame loop rx sample"``.
         variable: which array of a container (``.npz``, ``.mat``, HDF5), or ``"RE,IM"`` for two of real numbers.
         preset: a public data set by its name, whose layout and radar are then known.
-        profile: which chirp profile, where a frame has several.
+        profile: which chirp profile, where a frame has several; ``"all"``: a recording of each, ``out/profile0`` and so on, all or
+            none.
         subframe: which subframe of an advanced frame.
         tx: keep the chirps of one transmitter alone.
         labels: such as ``{"action": "walk"}``.
@@ -47,13 +90,14 @@ def import_(
         progress: ``True``, ``False``, or a function of :class:`hybridsim.Progress`.
 
     Returns:
-        The recording; what was assumed comes first in its notes, and as warnings of the class :class:`hybridsim.Note`.
+        The recording; what was assumed comes first in its notes, and as warnings of the class :class:`hybridsim.Note`. Of
+        ``profile="all"`` a list, in the order of the profiles.
 
     Raises:
         hybridsim.Error: a source of no known kind, a description that is missing or does not fit the samples.
     """
     with Notifier(progress) as notify:
-        notes = _hybridsim.import_(
+        made = _hybridsim.import_(
             paths(sources),
             os.fspath(out),
             paths(config),
@@ -61,7 +105,7 @@ def import_(
             layout,
             variable,
             preset,
-            profile,
+            None if profile is None else str(profile),
             subframe,
             tx,
             dict(labels or {}),
@@ -69,7 +113,8 @@ def import_(
             as_stated,
             notify,
         )
-    recording = Recording(out)
-    recording.notes = notes
-    return recording
-
+    recordings = []
+    for name, notes in made:
+        recordings.append(Recording(Path(out) / name))
+        recordings[-1].notes = notes
+    return recordings if profile == "all" else recordings[0]

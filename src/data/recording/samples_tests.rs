@@ -22,6 +22,18 @@ fn samples_come_back_in_every_layout() {
 }
 
 #[test]
+#[should_panic(expected = "a quadrature part for Real")]
+fn a_quadrature_part_is_not_dropped_where_the_layout_has_none() {
+    let radar = small_radar(Sampling::Real);
+    let folder = tempfile::tempdir().unwrap();
+    let frame = &mut |index| {
+        let frame = frame_of(&radar, index);
+        Ok(IfFrame { im: Some(frame.re.clone()), ..frame })
+    };
+    let _ = write_recording(folder.path().join("x"), &contents(&radar, IfLayout::Real), frame);
+}
+
+#[test]
 fn samples_in_fortran_order_come_back_too() {
     let radar = small_radar(Sampling::Complex);
     let (_parent, folder) = written(&contents(&radar, IfLayout::Codes));

@@ -196,9 +196,8 @@ pub(super) fn write_samples(
 
 /// The numbers of a frame in the order of the file.
 fn interleaved(frame: &IfFrame, layout: IfLayout) -> Vec<f32> {
-    let quadrature = frame.im.as_ref().filter(|_| matches!(layout, IfLayout::Codes | IfLayout::Complex));
-    assert_eq!(quadrature.is_some(), layout.sampling() == crate::radar::Sampling::Complex, "a quadrature part for {layout:?}");
-    match quadrature {
+    assert_eq!(frame.im.is_some(), layout.sampling() == crate::radar::Sampling::Complex, "a quadrature part for {layout:?}");
+    match &frame.im {
         Some(im) => frame.re.iter().zip(im).flat_map(|(&re, &im)| [re, im]).collect(),
         None => frame.re.clone(),
     }

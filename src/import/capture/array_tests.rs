@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use num_complex::Complex32;
+
 use super::tests::*;
 use super::{Capture, Layout, Stated, import, open};
 use crate::data::arrays::{Values, write_npy};
@@ -179,6 +181,40 @@ fn fractions_of_full_scale_are_kept_and_codes_are_codes() {
     assert!(capture.notes.iter().any(|note| note.starts_with("samples are floats up to 0.")), "{:?}", capture.notes);
     let recording = import_all(capture, &folder.path().join("recording"));
     assert_eq!(recording.frame(1).unwrap().re, noise[32..64].iter().map(|value| *value as f32).collect::<Vec<_>>());
+}
+
+/// Its devices have no Q, and none of it is left out in silence; as an array such a file is read whole.
+#[test]
+fn complex_numbers_in_a_folder_of_the_infineon_sdk_are_refused_and_read_by_a_layout() {
+    let folder = infineon(3, |place| place as f64);
+    let device = folder.path().join("RadarIfxAvian_00");
+    let samples = device.join("radar.npy");
+    let values: Vec<Complex32> = (0..3 * 32).map(|place| Complex32::new(place as f32, 0.5 - place as f32)).collect();
+    write_npy(&samples, &[3, 2, 2, 8], Values::Complex64(&values)).unwrap();
+    let set_complex = Stated { sets: vec!["radar.sampling=\"complex\"".into()], ..Stated::default() };
+    for (source, stated) in [(folder.path(), &Stated::default()), (&samples, &Stated::default()), (&device, &set_complex)] {
+        let error = open(&[source.into()], stated).err().unwrap();
+        let said = "`radar` is complex64 [3, 2, 2, 8], expected real numbers: a receiver that config.json describes has no Q";
+        assert_eq!(error.to_string(), format!("{}: {said}", samples.display()));
+        assert!(error.hint().unwrap().contains("--layout \"frame rx loop sample\""), "{error}");
+    }
+    let settings = "start_frequency_hz=58e9 slope_hz_per_s=1e14 sample_rate_hz=2e6 chirp_period_s=5e-4 frame_period_s=0.05 \
+                    tx_m=[[0.0,0.0,0.0]] rx_m=[[0.0,0.0,0.0],[0.0025,0.0,0.0]]";
+    let mut stated = Stated {
+        layout: Some(Layout::parse("frame rx loop sample").unwrap()),
+        sets: settings.split_whitespace().map(|set| format!("radar.{set}")).collect(),
+        ..Stated::default()
+    };
+    for source in [&device, &samples] {
+        let mut capture = open(std::slice::from_ref(source), &stated).unwrap();
+        assert_eq!((capture.radar.sampling, capture.layout), (Sampling::Complex, IfLayout::Complex));
+        assert_eq!((capture.frame)(2).unwrap().sample(0, 1, 1, 7), values[95]);
+    }
+    stated.sets.push("radar.sampling=\"real\"".into());
+    let error = open(std::slice::from_ref(&samples), &stated).err().unwrap();
+    let said = "`radar` is complex64 [3, 2, 2, 8], expected real numbers, as radar.sampling states";
+    assert_eq!(error.to_string(), format!("{}: {said}", samples.display()));
+    assert!(error.hint().unwrap().starts_with("leave radar.sampling out"), "{error}");
 }
 
 #[test]

@@ -41,7 +41,7 @@ const IWR6843: &str = "TI data sheet IWR6843, SWRS219, section Features, page 1"
 const AVIAN: &str = "Infineon Radar SDK, lib_avian, ifxAvian_DeviceTraits.cpp: allowed_rf_range";
 
 /// Four AWR2243 that share their clocks.
-pub const CASCADE: &str = "MMWCASRFEVM";
+pub const CASCADE: &str = "MMWCAS-RF-EVM";
 
 const fn at_77(source: &'static str) -> Band {
     Band { low_hz: 76.0e9, high_hz: 81.0e9, source }
@@ -147,56 +147,12 @@ pub const BOARDS: &[Board] = &[
     },
 ];
 
-/// Other names of the same boards, as [`key`] writes them. The MMWCAS-DSP-EVM is the capture card of the MMWCAS-RF-EVM.
-const ALIASES: &[(&str, &str)] =
-    &[("WR6843ISKODS", "WR6843ODS"), ("BGT60UTR11AIP", "BGT60UTR11"), ("MMWCAS", "MMWCASRF"), ("MMWCASDSP", "MMWCASRF")];
-
-/// The shortest name that can stand for the only board of its device.
-const DEVICE: usize = "WR1843".len();
-
 const fn raised(name: &'static str, source: &'static str, design_frequency_hz: f64, band: Band) -> Board {
     let (tx_half_wavelengths, rx_half_wavelengths) = (TX_RAISED, RX_LINE);
     Board { name, source, design_frequency_hz, band, tx_half_wavelengths, rx_half_wavelengths, inverted_rx: &[] }
 }
 
-/// What boards of one array share: letters and digits of a name alone, without the A, I or x of TI's device names and without the words
-/// for a board.
-fn key(name: &str) -> String {
-    let mut plain: String = name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_uppercase();
-    if plain.get(1..).is_some_and(|rest| rest.starts_with("WR")) && plain.starts_with(['A', 'I', 'X']) {
-        plain.remove(0);
-    }
-    while let Some(shorter) = ["EVM", "BOOST"].iter().find_map(|end| plain.strip_suffix(end)) {
-        plain.truncate(shorter.len());
-    }
-    plain
-}
-
 impl Board {
-    /// The board of a name as people write it, with A, I or x before it and BOOST or EVM behind it or not. A device alone stands for its
-    /// board where it has only one.
-    ///
-    /// # Errors
-    /// A name of no board, or of a device that is on several.
-    pub fn named(name: &str) -> Result<&'static Self> {
-        let plain = key(name);
-        let plain = ALIASES.iter().find(|(alias, _)| *alias == plain).map_or(plain.as_str(), |(_, board)| board);
-        if let Some(exact) = BOARDS.iter().find(|board| key(board.name) == plain) {
-            return Ok(exact);
-        }
-        let is_of_device = |board: &&Self| plain.len() >= DEVICE && key(board.name).starts_with(plain);
-        let names = |boards: &[&Self]| boards.iter().map(|board| board.name).collect::<Vec<_>>().join(", ");
-        let (message, known) = match BOARDS.iter().filter(is_of_device).collect::<Vec<_>>()[..] {
-            [only] => return Ok(only),
-            [] => (format!("no board `{name}`"), names(&BOARDS.iter().collect::<Vec<_>>())),
-            ref several => (format!("no board `{name}`: the device is on {} boards", several.len()), names(several)),
-        };
-        Err(Error::Usage {
-            message,
-            hint: Some(format!("known are {known}; give other antennas with --set radar.tx_m=[…] and --set radar.rx_m=[…]")),
-        })
-    }
-
     /// Refuses a chirp that starts or ends outside of the device's band. Frequencies count in kilohertz, as Infineon's driver holds them;
     /// the steps of TI's registers (53.6 Hz at 77 GHz) round to them.
     pub fn hold_band(&self, radar: &Radar, source: &Path) -> Result<()> {
@@ -262,46 +218,6 @@ mod tests {
     }
 
     #[test]
-    fn boards_are_found_as_people_write_them() {
-        for (written, name) in [
-            ("iwr6843isk", "IWR6843ISK"),
-            ("IWR6843-AOP", "IWR6843AOP"),
-            ("awr1642 boost", "IWR1642BOOST"),
-            ("AWR1843", "AWR1843BOOST"),
-            ("IWR6843ISK-ODS", "IWR6843ODS"),
-            ("BGT60UTR11AIP", "BGT60UTR11"),
-            ("MMWCAS-DSP-EVM", CASCADE),
-        ] {
-            assert_eq!(Board::named(written).unwrap().name, name);
-        }
-        // The chip alone has three boards: nobody chooses for the user.
-        for written in ["IWR6843", "awr6843"] {
-            let error = Board::named(written).unwrap_err();
-            assert!(error.to_string().contains(&format!("no board `{written}`")), "{error}");
-            assert!(error.hint().unwrap().starts_with("known are IWR6843ISK, IWR6843AOP, IWR6843ODS;"), "{error}");
-        }
-        // Boards of other arrays.
-        for written in ["AWR1843AOP", "AWR1642BOOST-ODS", "BGT60", "WR", ""] {
-            assert!(Board::named(written).is_err(), "{written}");
-        }
-    }
-
-    /// Every name, of every maker's line, with and without the word for a board.
-    #[test]
-    fn a_board_of_ti_is_found_by_every_prefix_and_suffix() {
-        for board in BOARDS {
-            let plain = key(board.name);
-            let prefixes: &[&str] = if plain.starts_with("WR") { &["A", "I", "x", "X"] } else { &[""] };
-            for (prefix, suffix) in prefixes.iter().flat_map(|prefix| ["", "BOOST", "EVM", "-EVM"].map(|suffix| (prefix, suffix)))
-            {
-                let written = format!("{prefix}{plain}{suffix}");
-                assert_eq!(Board::named(&written).unwrap().name, board.name, "{written}");
-                assert_eq!(Board::named(&written.to_lowercase()).unwrap().name, board.name, "{written}");
-            }
-        }
-    }
-
-    #[test]
     fn a_chirp_outside_of_the_band_of_its_device_is_refused_to_the_kilohertz() {
         let file = Path::new("adc_data.bin");
         for board in BOARDS {
@@ -362,6 +278,7 @@ mod tests {
             assert_eq!(places.len(), count, "{}", board.name);
         }
     }
+
     /// Nine transmitters and sixteen receivers in a row make 86 places in a row, of which 144 − 86 are there twice.
     #[test]
     fn the_cascade_has_eighty_six_places_in_a_row() {

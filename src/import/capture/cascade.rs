@@ -23,7 +23,7 @@ use super::{Capture, Stated, radar_table, ti_json};
 use crate::data::entries::entries;
 use crate::data::{IfFrame, IfLayout};
 use crate::error::{Error, Result};
-use crate::radar::Radar;
+use crate::radar::{Radar, Sampling};
 
 const DEVICES: [&str; CASCADED] = ["master", "slave1", "slave2", "slave3"];
 const END: &str = "_data.bin";
@@ -60,6 +60,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     }
     let config = &config;
     let board = stated.board.as_deref().map(Board::named).transpose()?;
+    board.into_iter().try_for_each(of_four)?;
     if config.extension().is_some_and(|extension| extension == "toml") {
         let (mut radar, asked) = radar_of(config, &stated, &mut notes)?;
         let words_per_frame = (radar.samples_per_chirp * radar.tx_m.len() * radar.loops_per_frame * RECEIVERS * 2) as u64;
@@ -81,6 +82,17 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     let shaped = radar_table::apply(found, &stated.sets)?;
     let capture = capture(parts, streams, shaped, words_per_frame, starts, radar.lanes.q_first, notes);
     Ok(placed(grid, Capture { board, ..capture }))
+}
+
+/// Refuses the board of one device.
+fn of_four(board: &Board) -> Result<()> {
+    match board.rx_half_wavelengths.len() {
+        count if count >= RECEIVERS * CASCADED => Ok(()),
+        count => Err(Error::Usage {
+            message: format!("--board {}: {count} receivers, expected {}, four a device", board.name, RECEIVERS * CASCADED),
+            hint: Some(format!("the board of four cascaded AWR2243 is the {CASCADE}: name it, or leave --board out")),
+        }),
+    }
 }
 
 /// The profiles of the chirps in a frame.
@@ -221,6 +233,9 @@ fn radar_of(config: &Path, stated: &Stated, notes: &mut Vec<String>) -> Result<(
         radar.insert("full_scale_codes".into(), Value::Float(f64::from(i16::MAX)));
     }
     let radar = radar_table::finished(table, config, notes)?;
+    if radar.sampling != Sampling::Complex {
+        return Err(Error::setting("radar.sampling", "real", "complex, as cascades are captured").in_file(config));
+    }
     if radar.rx_m.len() != RECEIVERS * CASCADED {
         return Err(Error::setting("radar.rx_m", format!("{} receivers", radar.rx_m.len()), "16, four a device"));
     }

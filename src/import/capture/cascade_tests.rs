@@ -148,6 +148,13 @@ fn the_radar_is_that_of_the_description_or_of_a_file_of_settings() {
         open(&[folder.path().into()], &Stated { sets, ..stated.clone() }).map(|capture| capture.radar.frames)
     };
     assert_eq!(asked(2).unwrap(), 2);
+    let refused = |stated: Stated| open(&[folder.path().into()], &stated).err().unwrap();
+    let sets = vec!["radar.sampling=\"real\"".to_string()];
+    let error = refused(Stated { sets, ..stated.clone() }).to_string();
+    assert!(error.ends_with("radar.toml: `radar.sampling` is real, expected complex, as cascades are captured"), "{error}");
+    let error = refused(Stated { board: Some("AWR2243".into()), ..stated.clone() });
+    assert_eq!(error.to_string(), "--board AWR2243BOOST: 4 receivers, expected 16, four a device");
+    assert!(error.hint().unwrap().contains("is the MMWCAS-RF-EVM"), "{error}");
     let error = asked(4).unwrap_err().to_string();
     assert!(
         error.starts_with("`radar.frames` is 4, expected at most 3, as many as ") && error.contains("master_0000"),

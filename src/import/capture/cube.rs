@@ -151,9 +151,10 @@ impl Cube {
                 .with_hint("the radar's settings or --layout do not belong to this array"));
         }
         if radar.sampling != self.sampling() {
-            let found = format!("{:?}", radar.sampling).to_lowercase();
-            let expected = format!("{:?}, as the array is", self.sampling()).to_lowercase();
-            return Err(Error::setting("radar.sampling", found, expected));
+            let numbers = if radar.sampling == Sampling::Real { "real numbers" } else { "complex numbers, or an axis `iq`" };
+            return Err(self
+                .wrong(self.describe(), format!("{numbers}, as radar.sampling states"))
+                .with_hint("leave radar.sampling out where the array is right: whether it has imaginary parts says the same"));
         }
         self.transmitters.set(tx);
         Ok(())

@@ -32,6 +32,7 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
     let board = board(stated, description(&folder)?.as_deref(), &mut notes)?;
     let source = folder.join(SAMPLES);
     let cube = Cube::open(&source, None, Layout::parse("frame rx loop sample")?)?;
+    hold_real(&cube)?;
     let radar = radar(&config, &shape, tx, board, cube.frames(), &mut notes)?;
     let (layout, radar) = stored_as(&cube, radar, &mut notes)?;
     let radar = apply(radar, &stated.sets)?;
@@ -106,6 +107,19 @@ fn times(stamps: &Path, frames: usize, samples: &Path) -> Result<Vec<f64>> {
             .with_hint("a file is cut off or of another capture: copy the whole folder again"));
     }
     Ok(times)
+}
+
+/// Refuses numbers with imaginary parts: the devices have one mixer for each receiver, and nothing in `config.json` states I and Q.
+fn hold_real(cube: &Cube) -> Result<()> {
+    match cube.sampling() {
+        Sampling::Real => Ok(()),
+        Sampling::Complex => Err(cube
+            .wrong(cube.describe(), "real numbers: a receiver that config.json describes has no Q".into())
+            .with_hint(
+                "take the radar.npy that the SDK wrote: range spectra and analytic signals are no samples; I and Q of another radar are read \
+                 with --layout \"frame rx loop sample\" and the radar's settings",
+            )),
+    }
 }
 
 /// Floats stay floats. Those that are no whole numbers are not codes, so that the converter's largest code says nothing of them.

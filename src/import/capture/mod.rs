@@ -6,6 +6,7 @@
 //! `arrays` (arrays of any order of axes, in any file of `container`, as words alone or as `numbers` of a stated type).
 
 mod arrays;
+mod board_names;
 pub mod boards;
 mod cascade;
 mod cascade_index;
@@ -128,7 +129,9 @@ fn kind(sources: &[PathBuf], stated: &Stated) -> Result<Kind> {
         Some("bin") if is_laid_out => Kind::Array,
         Some("bin") => Kind::Dca1000(parts::in_order(sources)?),
         Some("json") => Kind::Setup(one(sources)?.into()),
-        Some("npy") if infineon::is_samples(first) => Kind::Infineon(first.parent().unwrap_or(Path::new("")).into()),
+        Some("npy") if !is_laid_out && infineon::is_samples(first) => {
+            Kind::Infineon(first.parent().unwrap_or(Path::new("")).into())
+        }
         Some(kind) if container::EXTENSIONS.contains(&kind) => Kind::Array,
         other => {
             return Err(Error::Usage {

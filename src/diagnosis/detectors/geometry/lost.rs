@@ -91,3 +91,51 @@ pub fn step_p_value(gain: f64, frames: usize) -> f64 {
 pub fn ratio_p_value(gain: f64, inflation: f64, tried: f64) -> f64 {
     corrected((-gain / inflation).exp().min(1.0), tried)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::receding;
+    use super::*;
+    use crate::diagnosis::Evidence;
+    use crate::diagnosis::prediction::Track;
+
+    const COUNT: usize = 4;
+
+    /// Frames that are shown `COUNT` frames later than predicted from frame `lost_at` on.
+    fn evidence(lost_at: usize) -> Evidence {
+        let mut evidence = receding::evidence(None);
+        let body = evidence.body.as_mut().unwrap();
+        let shown = body.frames.clone();
+        let of = |frame: usize| if frame < lost_at { frame } else { lost_at.max(frame.saturating_sub(COUNT)) };
+        body.frames = (0..shown.len()).map(|frame| shown[of(frame)].clone()).collect();
+        // What is shown so much later is known where a frame was seen then.
+        let still = |points: usize| vec![vec![[0.0; 3]; points]; 3];
+        let track = |(points, time): (usize, &f64)| Track::new(*time, vec![-0.01, 0.0, 0.01], still(points));
+        body.tracks = body.frames.iter().map(Vec::len).zip(&body.middle_s).map(track).collect();
+        evidence.changed()
+    }
+
+    /// Whether lost frames from frame `at` on are a step.
+    fn says_step(evidence: &Evidence, change: Change) -> bool {
+        let trial = Trial::new(evidence, evidence.power().unwrap(), evidence.body.as_ref().unwrap());
+        let every: Vec<usize> = (0..evidence.cube.dims[0]).collect();
+        let score = trial.score(change, &every, true);
+        let fit =
+            Fitted { id: frame_drop::ID, value: COUNT as f64, deviation: 0.0, floor: 0.0, inflation: STEP_INFLATION, score };
+        is_step(&trial, &fit)
+    }
+
+    #[test]
+    fn lost_frames_are_a_step_where_frames_before_them_are_not_late_too() {
+        let drop = |at: usize| Change::Drop { at, count: COUNT };
+        // Lost within the recording.
+        assert!(says_step(&evidence(8), drop(8)));
+        // Lost before its first frame: all is late, and a step within it, or after its first frame, says less or as much.
+        let late = evidence(0);
+        for at in [1, 8] {
+            assert!(!says_step(&late, drop(at)), "{at}");
+        }
+        // What is no step is not asked.
+        assert!(says_step(&late, Change::Range(0.0)));
+    }
+}

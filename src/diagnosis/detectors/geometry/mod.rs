@@ -18,6 +18,8 @@ mod skew;
 mod wall_bearings;
 mod trial;
 #[cfg(test)]
+mod receding;
+#[cfg(test)]
 mod walking;
 
 use change::Moves;
