@@ -6,7 +6,7 @@ use burn::tensor::{DType, Device, Tensor, TensorData};
 use hybridsim::{
     body::{PoseCorrection, PoseTensors},
     config::Config,
-    data::Recording,
+    data::{Recording, write_motion},
     heatmap::{HeatmapConfig, RangeDoppler, power_db},
     person::{
         Person, Placement,
@@ -16,7 +16,7 @@ use hybridsim::{
     radar::Radar,
     recorder,
     simulator::{Mode, Scene},
-    training::{checkpoint, load_recordings, refine},
+    training::{RefinedPose, checkpoint, load_recordings, refine},
 };
 
 const KNOTS: usize = 2;
@@ -101,21 +101,20 @@ fn wgpu_gives_the_same_gradients_to_the_pose_as_flex() {
 }
 
 /// A person who walks to and fro at an angle to the radar's axis, in cells of 8.6 cm and 0.28 m/s.
-fn settings(recordings: &[PathBuf]) -> Config {
+fn settings(frames: usize, recordings: &[PathBuf]) -> Config {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/test.toml");
-    let sets: Vec<String> = [
-        "record.frames=16",
+    let mut sets: Vec<String> = [
         "record.radar.samples_per_chirp=64",
         "record.radar.loops_per_frame=32",
         "record.mesh_error_m=0.002",
         "training.epochs=1",
         "training.refine_pose=true",
-        "training.refine.frames=8",
         "training.refine.steps=25",
         "training.refine.points=200",
     ]
     .map(String::from)
     .to_vec();
+    sets.push(format!("record.frames={frames}"));
     let mut config = Config::read(&path, &sets).unwrap();
     config.data.recordings = recordings.to_vec();
     config
@@ -135,25 +134,48 @@ fn turned(placement: &Placement, angle: f64, pivot_m: [f64; 3]) -> Placement {
     }
 }
 
-/// Records a walk, then gives the recording a motion that is 30 ms late, turned by 3 degrees and shifted by 3 cm.
-fn planted(parent: &Path) -> (PathBuf, PathBuf) {
+/// Where the walk begins.
+const ORIGIN_M: [f64; 3] = [0.5, 2.6, -1.0];
+
+/// Records a walk.
+fn recorded(parent: &Path, frames: usize, seed: u64) -> PathBuf {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/test.toml");
-    let mut record = settings(&[]).record(&path).unwrap().clone();
-    let origin_m = [0.5, 2.6, -1.0];
-    let straight = Placement { start_s: -0.5, origin_m, ..Default::default() };
-    let truth = turned(&straight, 40f64.to_radians(), origin_m);
-    record.person.placement = Some(truth.clone());
-    let (right, wrong) = (parent.join("right"), parent.join("wrong"));
-    recorder::record_to(&record, parent, &right, &mut |_, _| {}).unwrap();
-    copy(&right, &wrong);
-    let mut off = turned(&truth, 3f64.to_radians(), [0.5, 2.6, 0.0]);
-    off.start_s += 0.03;
-    off.origin_m = [off.origin_m[0] + 0.01, off.origin_m[1] + 0.028, off.origin_m[2]];
+    let mut record = settings(frames, &[]).record(&path).unwrap().clone();
+    let straight = Placement { start_s: -0.5, origin_m: ORIGIN_M, ..Default::default() };
+    record.person.placement = Some(turned(&straight, 40f64.to_radians(), ORIGIN_M));
+    record.seed = seed;
+    let folder = parent.join("right");
+    recorder::record_to(&record, parent, &folder, &mut |_, _| {}).unwrap();
+    folder
+}
+
+/// A copy of a recording whose motion is late, turned and shifted.
+fn misplaced(right: &Path, late_s: f64, turn_deg: f64, [x, y]: [f64; 2]) -> PathBuf {
+    let wrong = right.with_file_name("wrong");
+    copy(right, &wrong);
     let file = wrong.join("recording.toml");
     let mut table: toml::Table = std::fs::read_to_string(&file).unwrap().parse().unwrap();
+    let truth: Placement = table["motion"].clone().try_into().unwrap();
+    let mut off = turned(&truth, turn_deg.to_radians(), [ORIGIN_M[0], ORIGIN_M[1], 0.0]);
+    off.start_s += late_s;
+    off.origin_m = [off.origin_m[0] + x, off.origin_m[1] + y, off.origin_m[2]];
     table.insert("motion".into(), toml::Value::try_from(&off).unwrap());
     std::fs::write(&file, toml::to_string(&table).unwrap()).unwrap();
-    (right, wrong)
+    wrong
+}
+
+/// A copy of a recording whose motion wanders to and fro along the radar's axis: a sine of this amplitude and period.
+fn wandering(right: &Path, amplitude_m: f64, period_s: f64) -> PathBuf {
+    let wrong = right.with_file_name("wandering");
+    copy(right, &wrong);
+    let truth = Recording::open(right).unwrap();
+    let person = truth.person().unwrap();
+    let knots_s: Vec<f64> = person.pose_times_s().iter().map(|time| time - person.pose_times_s()[0]).collect();
+    let shift = |time: &f64| [0.0, amplitude_m * (std::f64::consts::TAU * time / period_s).sin(), 0.0];
+    let wander = PoseCorrection { shifts_m: knots_s.iter().map(shift).collect(), knots_s, ..Default::default() };
+    let Person::Skinned { motion, .. } = wander.apply(person) else { panic!("the recorder's person is skinned") };
+    write_motion(wrong.join("motion.npz"), &motion).unwrap();
+    wrong
 }
 
 fn copy(from: &Path, to: &Path) {
@@ -188,11 +210,79 @@ fn apart(a: &Scene, b: &Scene) -> [f64; 2] {
     sums.map(|sum| f64::sqrt(sum / count))
 }
 
+/// How far off a recording's motion is before and after its refinement, as [`apart`] says, and what was refined.
+fn refined(right: &Path, wrong: &Path, per_frame: bool) -> ([f64; 2], [f64; 2], RefinedPose) {
+    let frames = Recording::open(wrong).unwrap().radar.frames;
+    let mut config = settings(frames, &[wrong.to_path_buf()]);
+    config.training.refine.per_frame = per_frame;
+    let mut recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
+    let started = std::time::Instant::now();
+    let all: Vec<usize> = (0..frames).collect();
+    let pose = refine::refine(&recordings[0], &all, &config.training.refine, &config.training.heatmap, &Device::flex()).unwrap();
+    let took_s = started.elapsed().as_secs_f64();
+    let truth = Recording::open(right).unwrap();
+    let truth = Scene::new(&truth.radar, truth.room.as_ref(), truth.person(), &config.simulator).unwrap();
+    let before = apart(&recordings[0].scene, &truth);
+    let (moved, _) = refine::refined(recordings.remove(0), std::slice::from_ref(&pose)).unwrap();
+    let after = apart(&moved.scene, &truth);
+    println!(
+        "{}\nrange {:.1} mm -> {:.1} mm, speed {:.3} m/s -> {:.3} m/s, in {took_s:.1} s",
+        pose.line(),
+        1e3 * before[0],
+        1e3 * after[0],
+        before[1],
+        after[1]
+    );
+    (before, after, pose)
+}
+
+#[test]
+fn experiment() {
+    let number = |name: &str, usual: f64| std::env::var(name).map_or(usual, |value| value.parse().unwrap());
+    let parent = tempfile::tempdir().unwrap();
+    let started = std::time::Instant::now();
+    let right = recorded(parent.path(), number("X_FRAMES", 32.0) as usize, number("X_SEED", 5.0) as u64);
+    println!("recorded in {:.1} s", started.elapsed().as_secs_f64());
+    let wander = number("X_WANDER_MM", 0.0);
+    let wrong = if wander > 0.0 {
+        wandering(&right, 1e-3 * wander, number("X_PERIOD", 2.5))
+    } else {
+        misplaced(
+            &right,
+            1e-3 * number("X_LATE_MS", 0.0),
+            number("X_TURN", 0.0),
+            [number("X_X", 0.0) * 1e-3, number("X_Y", 0.0) * 1e-3],
+        )
+    };
+    refined(&right, &wrong, number("X_PER_FRAME", 0.0) > 0.0);
+}
+
+#[test]
+fn a_motion_that_is_right_to_millimetres_stays_at_least_as_right() {
+    let parent = tempfile::tempdir().unwrap();
+    let right = recorded(parent.path(), 40, 5);
+    let wrong = wandering(&right, 0.0085, 2.5);
+    let (before, after, pose) = refined(&right, &wrong, true);
+    assert!((0.004..0.008).contains(&before[0]), "the plant is {before:?}");
+    assert!(after[0] <= before[0] && after[1] <= before[1], "{before:?} became {after:?}: {}", pose.line());
+}
+
+#[test]
+fn single_frames_undo_a_slow_wander() {
+    let parent = tempfile::tempdir().unwrap();
+    let right = recorded(parent.path(), 40, 5);
+    let wrong = wandering(&right, 0.085, 2.5);
+    let (before, after, pose) = refined(&right, &wrong, true);
+    assert!(!pose.correction.shifts_m.is_empty(), "{}", pose.line());
+    assert!(after[0] < 0.6 * before[0], "{before:?} became {after:?}: {}", pose.line());
+}
+
 #[test]
 fn a_planted_pose_and_clock_error_is_undone_from_the_recording_alone() {
     let parent = tempfile::tempdir().unwrap();
-    let (right, wrong) = planted(parent.path());
-    let config = settings(std::slice::from_ref(&wrong));
+    let right = recorded(parent.path(), 40, 5);
+    let wrong = misplaced(&right, 0.03, 3.0, [0.01, 0.028]);
+    let config = settings(40, std::slice::from_ref(&wrong));
     let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
     let run = parent.path().join("run");
     std::fs::create_dir_all(&run).unwrap();

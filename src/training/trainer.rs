@@ -110,8 +110,7 @@ impl Trainer<'_> {
         let split = self.split();
         let one = |(index, recording): (usize, &LoadedRecording)| -> Result<RefinedPose> {
             let frames: Vec<usize> = split.training.iter().filter(|id| id.recording == index).map(|id| id.frame).collect();
-            let correction = refine::refine(recording, &frames, &self.config.refine, &self.config.heatmap, self.device())?;
-            let pose = RefinedPose { recording: recording.folder.clone(), correction };
+            let pose = refine::refine(recording, &frames, &self.config.refine, &self.config.heatmap, self.device())?;
             emit(Event::Refined(pose.clone()));
             Ok(pose)
         };

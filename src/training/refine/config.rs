@@ -14,15 +14,15 @@ pub struct RefineConfig {
     pub heading_deg: f64,
     /// Of the clock, seconds.
     pub clock_s: f64,
-    /// Whether single frames are corrected, too. On the planted error of `tests/pose.rs` this left more in range and velocity
-    /// than the whole recording's correction alone, so it is off.
+    /// Whether single frames are corrected, too, where held-out frames prefer it.
     pub per_frame: bool,
     /// Of a frame's place, metres: joints that cameras and inertial sensors track are 26 mm off on average (von Marcard
     /// et al., ECCV 2018).
     pub frame_shift_m: f64,
     /// Of a frame's joint rotations, degrees: those 26 mm at the end of a limb of half a metre.
     pub frame_turn_deg: f64,
-    /// Errors of frames this far apart are correlated by 1/e: about a step of walking, seconds.
+    /// Errors of frames this far apart are correlated by 1/e: about a step of walking, seconds. Held-out frames within as long
+    /// count as one observation.
     pub smooth_s: f64,
     /// From coarse to fine: the maps are blurred by Gaussians of these many cells.
     pub blur_cells: Vec<f64>,
@@ -30,7 +30,7 @@ pub struct RefineConfig {
     pub steps: usize,
     /// Step of a parameter, in standard deviations of its prior; falls to a tenth along half a cosine.
     pub learning_rate: f64,
-    /// Training frames that a step looks at, evenly spaced.
+    /// Training frames that a step looks at, evenly spaced; as many between them are held out.
     pub frames: usize,
     /// Points of the body that stand for all of its visible ones.
     pub points: usize,

@@ -6,10 +6,30 @@ use super::RefineConfig;
 use crate::body::{PoseCorrection, PoseTensors};
 
 /// Prior of the logarithmic gain of a part of the body, nepers of power: a factor of 4.5 either way.
-const GAIN: f64 = 1.5;
+pub const GAIN: f64 = 1.5;
+
+/// Parts of a whole recording's correction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Parts {
+    pub clock: bool,
+    /// Place and heading.
+    pub place: bool,
+}
+
+impl Parts {
+    pub fn name(self) -> &'static str {
+        match (self.clock, self.place) {
+            (false, false) => "the motion as given",
+            (true, false) => "a clock",
+            (false, true) => "a place and heading",
+            (true, true) => "a clock, place and heading",
+        }
+    }
+}
 
 /// Kinds of numbers, in their order in the list.
 pub struct Layout {
+    parts: Parts,
     clock_s: f64,
     heading_rad: f64,
     shift_m: f64,
@@ -24,10 +44,11 @@ pub struct Layout {
 const WHOLE: usize = 5;
 
 impl Layout {
-    /// `knots_s`: empty where single frames are not corrected.
-    pub fn new(config: &RefineConfig, knots_s: &[f64], joints: usize, gains: usize) -> Self {
+    /// `parts`: of the whole recording, those that are corrected; `knots_s`: empty where single frames are not.
+    pub fn new(config: &RefineConfig, parts: Parts, knots_s: &[f64], joints: usize, gains: usize) -> Self {
         let before = std::iter::once(f64::NEG_INFINITY).chain(knots_s.iter().copied());
         Self {
+            parts,
             clock_s: config.clock_s,
             heading_rad: config.heading_deg.to_radians(),
             shift_m: config.shift_m,
@@ -46,6 +67,20 @@ impl Layout {
     /// Numbers of one knot: turns, then shift.
     fn knot_width(&self) -> usize {
         3 * self.joints + 3
+    }
+
+    /// Whether a number changes; the others stay as they are.
+    pub fn moves(&self, at: usize) -> bool {
+        match at {
+            0 => self.parts.clock,
+            1..WHOLE => self.parts.place,
+            _ => true,
+        }
+    }
+
+    /// Where the gains are in the list.
+    pub fn gains(&self) -> std::ops::Range<usize> {
+        WHOLE..WHOLE + self.gains
     }
 
     pub fn len(&self) -> usize {
@@ -135,7 +170,7 @@ mod tests {
     #[test]
     fn numbers_become_the_correction_in_its_units() {
         let config = RefineConfig { shift_m: 0.1, clock_s: 0.2, frame_shift_m: 0.03, ..Default::default() };
-        let layout = Layout::new(&config, &[0.0, 0.5], 2, 4);
+        let layout = Layout::new(&config, Parts::default(), &[0.0, 0.5], 2, 4);
         let mut values = vec![0.0; layout.len()];
         (values[0], values[1], values[4]) = (0.5, -1.0, 2.0);
         let knot = WHOLE + 4 + 9;
@@ -148,7 +183,7 @@ mod tests {
 
     #[test]
     fn the_prior_s_gradient_agrees_with_central_differences() {
-        let layout = Layout::new(&RefineConfig::default(), &[0.0, 0.1, 0.5], 1, 2);
+        let layout = Layout::new(&RefineConfig::default(), Parts::default(), &[0.0, 0.1, 0.5], 1, 2);
         let value = |values: &[f64]| -> f64 {
             let knots = WHOLE + 2;
             let whole: f64 = values[..knots].iter().map(|x| 0.5 * x * x).sum();

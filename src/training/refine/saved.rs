@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::Judgement;
 use crate::{
     body::PoseCorrection,
     data::{atomic, settings::read_toml},
@@ -22,21 +23,36 @@ pub struct RefinedPose {
     /// The recording's folder.
     pub recording: PathBuf,
     pub correction: PoseCorrection,
+    /// Why it is this one, in the order in which corrections were compared.
+    #[serde(default)]
+    pub judgements: Vec<Judgement>,
 }
 
 impl RefinedPose {
-    /// One line for people.
+    /// One line for people: what was found, and why no more and no less.
     pub fn line(&self) -> String {
+        let why: Vec<String> = self.judgements.iter().map(Judgement::clause).collect();
+        let why = if why.is_empty() { String::new() } else { format!(" ({})", why.join("; ")) };
+        format!("{}: {}{why}", self.recording.display(), self.found())
+    }
+
+    fn found(&self) -> String {
         let PoseCorrection { clock_s, heading_rad, shift_m: [x, y, z], turns_rad, shifts_m, .. } = &self.correction;
+        if [*clock_s, *heading_rad, *x, *y, *z] == [0.0; 5] && shifts_m.is_empty() {
+            return "the motion stays as it was given".into();
+        }
         let mean = |squares: f64, count: usize| (squares / count.max(1) as f64).sqrt();
         let length = |vector: &[f64; 3]| vector.iter().map(|value| value * value).sum::<f64>();
         let turns: Vec<&[f64; 3]> = turns_rad.iter().flatten().collect();
         let turn = mean(turns.iter().map(|turn| length(turn)).sum(), turns.len()).to_degrees();
         let shift = mean(shifts_m.iter().map(length).sum(), shifts_m.len()) * 1e3;
+        let single = if shifts_m.is_empty() {
+            String::new()
+        } else {
+            format!("; single frames by {shift:.1} mm and their joints by {turn:.2} degrees, root mean square")
+        };
         format!(
-            "{}: the motion was refined: later by {:.1} ms, turned by {:.2} degrees, shifted by ({:.1}, {:.1}, {:.1}) mm; single \
-             frames by {shift:.1} mm and their joints by {turn:.2} degrees, root mean square",
-            self.recording.display(),
+            "the motion was refined: later by {:.1} ms, turned by {:.2} degrees, shifted by ({:.1}, {:.1}, {:.1}) mm{single}",
             1e3 * clock_s,
             heading_rad.to_degrees(),
             1e3 * x,
