@@ -101,9 +101,10 @@ fn wgpu_gives_the_same_gradients_to_the_pose_as_flex() {
 }
 
 /// A person who walks to and fro at an angle to the radar's axis, in cells of 8.6 cm and 0.28 m/s.
-fn settings(frames: usize, recordings: &[PathBuf]) -> Config {
+fn settings(recordings: &[PathBuf]) -> Config {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/test.toml");
-    let mut sets: Vec<String> = [
+    let sets: Vec<String> = [
+        "record.frames=40",
         "record.radar.samples_per_chirp=64",
         "record.radar.loops_per_frame=32",
         "record.mesh_error_m=0.002",
@@ -114,7 +115,6 @@ fn settings(frames: usize, recordings: &[PathBuf]) -> Config {
     ]
     .map(String::from)
     .to_vec();
-    sets.push(format!("record.frames={frames}"));
     let mut config = Config::read(&path, &sets).unwrap();
     config.data.recordings = recordings.to_vec();
     config
@@ -138,12 +138,11 @@ fn turned(placement: &Placement, angle: f64, pivot_m: [f64; 3]) -> Placement {
 const ORIGIN_M: [f64; 3] = [0.5, 2.6, -1.0];
 
 /// Records a walk.
-fn recorded(parent: &Path, frames: usize, seed: u64) -> PathBuf {
+fn recorded(parent: &Path) -> PathBuf {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/test.toml");
-    let mut record = settings(frames, &[]).record(&path).unwrap().clone();
+    let mut record = settings(&[]).record(&path).unwrap().clone();
     let straight = Placement { start_s: -0.5, origin_m: ORIGIN_M, ..Default::default() };
     record.person.placement = Some(turned(&straight, 40f64.to_radians(), ORIGIN_M));
-    record.seed = seed;
     let folder = parent.join("right");
     recorder::record_to(&record, parent, &folder, &mut |_, _| {}).unwrap();
     folder
@@ -213,7 +212,7 @@ fn apart(a: &Scene, b: &Scene) -> [f64; 2] {
 /// How far off a recording's motion is before and after its refinement, as [`apart`] says, and what was refined.
 fn refined(right: &Path, wrong: &Path, per_frame: bool) -> ([f64; 2], [f64; 2], RefinedPose) {
     let frames = Recording::open(wrong).unwrap().radar.frames;
-    let mut config = settings(frames, &[wrong.to_path_buf()]);
+    let mut config = settings(&[wrong.to_path_buf()]);
     config.training.refine.per_frame = per_frame;
     let mut recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
     let started = std::time::Instant::now();
@@ -237,30 +236,9 @@ fn refined(right: &Path, wrong: &Path, per_frame: bool) -> ([f64; 2], [f64; 2], 
 }
 
 #[test]
-fn experiment() {
-    let number = |name: &str, usual: f64| std::env::var(name).map_or(usual, |value| value.parse().unwrap());
-    let parent = tempfile::tempdir().unwrap();
-    let started = std::time::Instant::now();
-    let right = recorded(parent.path(), number("X_FRAMES", 32.0) as usize, number("X_SEED", 5.0) as u64);
-    println!("recorded in {:.1} s", started.elapsed().as_secs_f64());
-    let wander = number("X_WANDER_MM", 0.0);
-    let wrong = if wander > 0.0 {
-        wandering(&right, 1e-3 * wander, number("X_PERIOD", 2.5))
-    } else {
-        misplaced(
-            &right,
-            1e-3 * number("X_LATE_MS", 0.0),
-            number("X_TURN", 0.0),
-            [number("X_X", 0.0) * 1e-3, number("X_Y", 0.0) * 1e-3],
-        )
-    };
-    refined(&right, &wrong, number("X_PER_FRAME", 0.0) > 0.0);
-}
-
-#[test]
 fn a_motion_that_is_right_to_millimetres_stays_at_least_as_right() {
     let parent = tempfile::tempdir().unwrap();
-    let right = recorded(parent.path(), 40, 5);
+    let right = recorded(parent.path());
     let wrong = wandering(&right, 0.0085, 2.5);
     let (before, after, pose) = refined(&right, &wrong, true);
     assert!((0.004..0.008).contains(&before[0]), "the plant is {before:?}");
@@ -270,7 +248,7 @@ fn a_motion_that_is_right_to_millimetres_stays_at_least_as_right() {
 #[test]
 fn single_frames_undo_a_slow_wander() {
     let parent = tempfile::tempdir().unwrap();
-    let right = recorded(parent.path(), 40, 5);
+    let right = recorded(parent.path());
     let wrong = wandering(&right, 0.085, 2.5);
     let (before, after, pose) = refined(&right, &wrong, true);
     assert!(!pose.correction.shifts_m.is_empty(), "{}", pose.line());
@@ -280,9 +258,9 @@ fn single_frames_undo_a_slow_wander() {
 #[test]
 fn a_planted_pose_and_clock_error_is_undone_from_the_recording_alone() {
     let parent = tempfile::tempdir().unwrap();
-    let right = recorded(parent.path(), 40, 5);
+    let right = recorded(parent.path());
     let wrong = misplaced(&right, 0.03, 3.0, [0.01, 0.028]);
-    let config = settings(40, std::slice::from_ref(&wrong));
+    let config = settings(std::slice::from_ref(&wrong));
     let recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
     let run = parent.path().join("run");
     std::fs::create_dir_all(&run).unwrap();

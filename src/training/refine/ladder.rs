@@ -110,11 +110,7 @@ impl<'a> Ladder<'a> {
         let mut correction = PoseCorrection { pivot_m: self.kept.correction.pivot_m, ..Default::default() };
         for &blur in &self.refiner.config.blur_cells {
             let scene = self.refiner.scene(&mut correction)?;
-            let gains = if std::env::var("HS_COLD").is_ok() {
-                values[layout.gains()].to_vec()
-            } else {
-                self.refiner.gains(&scene, blur, &values[layout.gains()])?
-            };
+            let gains = self.refiner.gains(&scene, blur, &values[layout.gains()])?;
             values[layout.gains()].copy_from_slice(&gains);
             correction = self.refiner.descend(&layout, &mut values, correction, blur)?;
         }
@@ -148,7 +144,7 @@ impl<'a> Ladder<'a> {
 
     /// Whether the finer one is preferred.
     fn note(&mut self, judgement: Judgement) -> bool {
-        let kept = judgement.kept || (std::env::var("HS_FORCE").is_ok() && !judgement.over.starts_with("a "));
+        let kept = judgement.kept;
         self.judgements.push(judgement);
         kept
     }

@@ -50,10 +50,7 @@ impl<'a> Refiner<'a> {
         let radar = &recording.scene.radar;
         let mut refiner = Self {
             transform: RangeDoppler::new(radar.loops_per_frame, radar.samples_per_chirp, radar.sampling, heatmap, device),
-            noise: Noise {
-                floor: 0.0,
-                cells_a_look: if std::env::var("HS_LOOK").is_ok() { 1.0 } else { expected::cells_a_look(radar, heatmap) },
-            },
+            noise: Noise { floor: 0.0, cells_a_look: expected::cells_a_look(radar, heatmap) },
             joints: motion.poses[0].len(),
             part: recording.scene.body.as_ref().map(|body| body.joints()).unwrap_or_default(),
             level: 0.0,

@@ -36,9 +36,15 @@ impl RefinedPose {
         format!("{}: {}{why}", self.recording.display(), self.found())
     }
 
+    /// Whether anything of the motion is corrected.
+    fn moves(&self) -> bool {
+        let PoseCorrection { clock_s, heading_rad, shift_m: [x, y, z], betas, turns_rad, shifts_m, .. } = &self.correction;
+        [*clock_s, *heading_rad, *x, *y, *z] != [0.0; 5] || !(betas.is_empty() && turns_rad.is_empty() && shifts_m.is_empty())
+    }
+
     fn found(&self) -> String {
         let PoseCorrection { clock_s, heading_rad, shift_m: [x, y, z], turns_rad, shifts_m, .. } = &self.correction;
-        if [*clock_s, *heading_rad, *x, *y, *z] == [0.0; 5] && shifts_m.is_empty() {
+        if !self.moves() {
             return "the motion stays as it was given".into();
         }
         let mean = |squares: f64, count: usize| (squares / count.max(1) as f64).sqrt();
@@ -121,7 +127,7 @@ pub fn read(folder: &Path) -> Result<Vec<RefinedPose>> {
     Ok(refined)
 }
 
-/// A recording with its person as refined, where its folder is one of those that were refined; else as it is. Also whether.
+/// A recording with its person as refined, where its folder is one of those whose motion was; else as it is. Also whether.
 ///
 /// # Errors
 /// A correction that does not belong to the recording's motion.
@@ -136,6 +142,9 @@ pub fn refined(recording: LoadedRecording, poses: &[RefinedPose]) -> Result<(Loa
         && let Some(first) = motion.poses.first()
     {
         pose.check(&recording.folder, first.len())?;
+    }
+    if !pose.moves() {
+        return Ok((recording, false));
     }
     let scene = recording.scene.corrected(person, pose.correction.clone())?;
     Ok((LoadedRecording { scene, ..recording }, true))
