@@ -95,6 +95,19 @@ pub fn uniform_chance(values: &[f64]) -> f64 {
     (1..=20).map(term).sum::<f64>().clamp(0.0, 1.0)
 }
 
+/// Chance that a white series has such a periodogram (powers in the order of their frequencies, independent of one another): Bartlett's
+/// test, whose cumulated shares of the whole power are ordered uniform numbers under it (An Introduction to Stochastic Processes,
+/// 1955). 1 of fewer than two.
+pub fn white_chance(powers: &[f64]) -> f64 {
+    let all: f64 = powers.iter().sum();
+    let mut sum = 0.0;
+    let shares = powers.iter().take(powers.len().saturating_sub(1)).map(|power| {
+        sum += power;
+        sum / all.max(f64::MIN_POSITIVE)
+    });
+    uniform_chance(&shares.collect::<Vec<f64>>())
+}
+
 /// Share of a measured number that is kept where its prior has so many times the variance of its noise.
 pub fn kept(prior: f64) -> f64 {
     prior / (1.0 + prior)
@@ -137,6 +150,8 @@ mod tests {
         assert!((poisson_tail(1, 0.1) - (1.0 - (-0.1f64).exp())).abs() < 1e-9);
         assert!((poisson_tail(2, 0.1) - (1.0 - 1.1 * (-0.1f64).exp())).abs() < 1e-9);
         assert!((corrected(1e-12, 10.0) - 1e-11).abs() < 1e-16);
+        let line: Vec<f64> = (0..40).map(|k| if k == 7 { 50.0 } else { 1.0 }).collect();
+        assert!(white_chance(&[1.0; 40]) > 0.9 && white_chance(&line) < 1e-3 && white_chance(&[]) == 1.0);
         // Critical distances of Stephens' table for ten numbers: 0.409 at 5 %, 0.489 at 1 %.
         let shifted = |distance: f64| (0..10).map(|i| f64::from(i) / 10.0 + distance).collect::<Vec<f64>>();
         assert!((uniform_chance(&shifted(0.409)) - 0.05).abs() < 3e-3 && (uniform_chance(&shifted(0.489)) - 0.01).abs() < 1e-3);

@@ -17,6 +17,9 @@ pub struct RefineConfig {
     /// Whether single frames are corrected, too, where held-out frames prefer it. Off: it has not been shown to bring a pose nearer to
     /// the truth.
     pub per_frame: bool,
+    /// Least change in range that is kept, metres: joints that cameras and inertial sensors track are 26 mm off on average (von
+    /// Marcard et al., ECCV 2018), so that a motion which needs less is as right as motions are.
+    pub least_m: f64,
     /// Of a frame's place, metres: joints that cameras and inertial sensors track are 26 mm off on average (von Marcard
     /// et al., ECCV 2018).
     pub frame_shift_m: f64,
@@ -44,6 +47,7 @@ impl Default for RefineConfig {
             heading_deg: 10.0,
             clock_s: 0.1,
             per_frame: false,
+            least_m: 0.026,
             frame_shift_m: 0.026,
             frame_turn_deg: 3.0,
             smooth_s: 0.5,
@@ -70,6 +74,9 @@ impl RefineConfig {
         ];
         if let Some((name, value)) = positive.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
             return Err(Error::setting(format!("{key}.{name}"), value, "a positive number"));
+        }
+        if !(self.least_m.is_finite() && self.least_m >= 0.0) {
+            return Err(Error::setting(format!("{key}.least_m"), self.least_m, "metres, 0 or more"));
         }
         let counts = [("steps", self.steps), ("frames", self.frames), ("points", self.points)];
         if let Some((name, _)) = counts.into_iter().find(|(_, value)| *value == 0) {

@@ -19,6 +19,8 @@ pub struct Judgement {
     pub gain_nats: f64,
     /// One-sided, of the gain; 1 where it cannot be estimated.
     pub p_value: f64,
+    /// How far the body lies apart by both in range, root mean square over its points and the held-out frames.
+    pub apart_m: f64,
     pub frames: usize,
     /// Stretches of frames that count as independent.
     pub blocks: usize,
@@ -45,17 +47,27 @@ impl Judgement {
         let p_value = chance(&means);
         let [correction, over] = names.map(String::from);
         let (frames, blocks) = (gains.len(), means.len());
-        Self { correction, over, kept: p_value < LEVEL, gain_nats: gains.iter().sum(), p_value, frames, blocks }
+        let gain_nats = gains.iter().sum();
+        Self { correction, over, kept: p_value < LEVEL, gain_nats, p_value, apart_m: 0.0, frames, blocks }
+    }
+
+    /// Kept only where it moves the body by so much: held-out frames share the errors of the law of power that are the same in all
+    /// frames, and prefer what makes up for them (smallest effect of interest; Lakens et al., Adv. Methods Pract. Psychol. Sci. 1, 2018).
+    pub fn of_least(self, least_m: f64) -> Self {
+        Self { kept: self.kept && self.apart_m >= least_m, ..self }
     }
 
     /// A clause for people.
     pub fn clause(&self) -> String {
-        let Self { correction, over, gain_nats, p_value, frames, blocks, .. } = self;
+        let Self { correction, over, gain_nats, p_value, apart_m, frames, blocks, .. } = self;
         if *blocks < 2 {
             return format!("{correction} over {over}: not judged, the held-out frames ({frames}) are too few");
         }
         let verdict = if self.kept { "kept" } else { "not kept" };
-        format!("{correction} over {over}: {verdict}, {gain_nats:+.1} nats in {frames} held-out frames (p = {p_value:.2})")
+        format!(
+            "{correction} over {over}: {verdict}, {gain_nats:+.1} nats in {frames} held-out frames (p = {p_value:.1e}), {:.0} mm apart in range",
+            1e3 * apart_m
+        )
     }
 }
 
@@ -101,6 +113,14 @@ mod tests {
         // Mean 2, standard error 1: t = 2 with one degree of freedom (Cauchy).
         assert!((found.p_value - 0.147_58).abs() < 1e-4);
         assert!(!found.kept);
+    }
+
+    #[test]
+    fn what_is_preferred_and_moves_nothing_is_not_kept() {
+        let found = judged(&[3.0, 3.1, 2.9, 3.0, 3.1, 2.9, 3.0, 3.1, 2.9, 3.0]);
+        assert!(found.kept);
+        let of = |apart_m: f64, judged: &Judgement| Judgement { apart_m, ..judged.clone() }.of_least(0.02).kept;
+        assert!(!of(0.01, &found) && of(0.03, &found) && !of(0.03, &judged(&[0.0; 10])));
     }
 
     #[test]

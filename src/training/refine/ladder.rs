@@ -51,24 +51,23 @@ impl<'a> Ladder<'a> {
         self.refiner.config.blur_cells.last().copied().unwrap_or(1.0)
     }
 
-    /// Corrects clock, place and heading. Where the frames prefer that, but not over the clock alone, or the place alone, the smaller
-    /// correction is kept.
+    /// Corrects clock, place and heading, or where held-out frames lose less by it the clock alone, or the place alone.
     pub fn climb_whole(&mut self) -> Result<()> {
-        let whole = self.whole(WHOLE)?;
-        let judgement = self.judge(&whole, &self.kept);
+        let mut best = self.whole(WHOLE)?;
+        let judgement = self.judge(&best, &self.kept)?.of_least(self.refiner.config.least_m);
         if !self.note(judgement) {
             return Ok(());
         }
-        let mut enough: Option<Rung> = None;
         for parts in [Parts { clock: true, place: false }, Parts { clock: false, place: true }] {
             let smaller = self.whole(parts)?;
-            let [over_given, over_smaller] = [self.judge(&smaller, &self.kept), self.judge(&whole, &smaller)];
-            if self.note(over_given) && !self.note(over_smaller) {
-                let lost = |rung: &Rung| rung.lost.iter().sum::<f64>();
-                enough = Some(enough.filter(|other| lost(other) <= lost(&smaller)).unwrap_or(smaller));
+            let judgement = self.judge(&smaller, &best)?;
+            let lost = |rung: &Rung| rung.lost.iter().sum::<f64>();
+            self.judgements.push(Judgement { kept: lost(&smaller) < lost(&best), ..judgement });
+            if lost(&smaller) < lost(&best) {
+                best = smaller;
             }
         }
-        self.kept = enough.unwrap_or(whole);
+        self.kept = best;
         Ok(())
     }
 
@@ -95,7 +94,7 @@ impl<'a> Ladder<'a> {
             values,
             lost: vec![],
         })?;
-        let judgement = self.judge(&single, &self.kept);
+        let judgement = self.judge(&single, &self.kept)?.of_least(self.refiner.config.least_m);
         if self.note(judgement) {
             self.kept = single;
         }
@@ -134,12 +133,30 @@ impl<'a> Ladder<'a> {
         Ok(rung)
     }
 
-    fn judge(&self, finer: &Rung, coarser: &Rung) -> Judgement {
+    fn judge(&self, finer: &Rung, coarser: &Rung) -> Result<Judgement> {
         let radar = &self.refiner.recording.scene.radar;
         let times_s: Vec<f64> =
             self.held_out.iter().map(|&frame| radar.chirp_time_s(frame, 0, radar.loops_per_frame / 2)).collect();
         let names = [finer.name, coarser.name];
-        Judgement::new(names, &finer.lost, &coarser.lost, &times_s, self.refiner.config.smooth_s)
+        let judgement = Judgement::new(names, &finer.lost, &coarser.lost, &times_s, self.refiner.config.smooth_s);
+        Ok(Judgement { apart_m: self.apart_m(finer, coarser)?, ..judgement })
+    }
+
+    /// How far two rungs' bodies lie apart in range in the held-out frames, root mean square.
+    fn apart_m(&self, a: &Rung, b: &Rung) -> Result<f64> {
+        let [a, b] = [a, b].map(|rung| self.refiner.scene(&mut rung.correction.clone()));
+        let (a, b) = (a?, b?);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for &frame in &self.held_out {
+            let views = [a.view(frame)?, b.view(frame)?];
+            let [a, b] = views.each_ref().map(|view| &view.body.as_ref().expect("it has a person").vertices_m);
+            for (p, q) in a.iter().zip(b) {
+                let range = |place: &[f64; 3]| place.iter().map(|x| x * x).sum::<f64>().sqrt();
+                sum += (range(p) - range(q)).powi(2);
+                count += 1.0;
+            }
+        }
+        Ok((sum / f64::max(count, 1.0)).sqrt())
     }
 
     /// Whether the finer one is preferred.

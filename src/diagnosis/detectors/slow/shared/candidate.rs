@@ -11,9 +11,12 @@ use super::deviations::Deviation;
 use crate::diagnosis::detectors::slow::candidates::{self, Description};
 use crate::diagnosis::detectors::slow::field::{PATTERN, Part};
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Estimate, Place};
+use crate::diagnosis::finding::{Candidate, Estimate, NINETY, Place};
 use crate::diagnosis::statistics;
 use crate::effects::{self, Stage};
+
+/// Level of the test for white noise: the reports' default false-alarm rate.
+const WHITE: f64 = 0.01;
 
 /// The phase that the ranges share.
 struct Phase {
@@ -25,6 +28,8 @@ struct Phase {
     frequency_hz: f64,
     /// Half of the band that holds half of its power.
     width_hz: f64,
+    /// Whether it may be independent from chirp to chirp.
+    is_white: bool,
 }
 
 pub fn candidate(evidence: &Evidence, course: &Course, deviations: &[Deviation], shared: &Shared) -> Candidate {
@@ -53,7 +58,9 @@ impl Phase {
         let information: f64 = members.iter().map(|member| member.variance.recip()).sum();
         let count = course.frames * course.loops;
         let mean = |i: usize| members.iter().map(|member| member.course[i] / member.variance).sum::<f64>() / information;
-        let phases = course.denoised(&(0..count).map(mean).collect::<Vec<f64>>(), information.recip());
+        let measured: Vec<f64> = (0..count).map(mean).collect();
+        let is_white = course.white_chance(&measured) > WHITE;
+        let phases = course.denoised(&measured, information.recip());
         let values = course.spectrum(&phases);
         // A spectrum has one of two sides.
         let rms = (2.0 * values.iter().map(Complex64::norm_sqr).sum::<f64>() / count as f64).sqrt();
@@ -61,7 +68,7 @@ impl Phase {
         let coding_cost = statistics::learned(ratios.collect::<Vec<f64>>().into_iter()) * values.len() as f64 / count as f64;
         let [low_hz, frequency_hz, high_hz] = quartiles(&course.frequencies_hz(), &values);
         let width_hz = (0.5 * (high_hz - low_hz)).max(0.5 / course.duration_s());
-        Self { course: phases, rms, coding_cost, frequency_hz, width_hz }
+        Self { course: phases, rms, coding_cost, frequency_hz, width_hz, is_white }
     }
 
     fn of_delay(&self, shared: &Shared) -> Description {
@@ -72,15 +79,24 @@ impl Phase {
         ))
     }
 
+    /// A vibration has a frequency: one that is not resolved, or is all of them, is no more than a phase that fluctuates.
     fn of_vibration(&self, evidence: &Evidence, course: &Course, shared: &Shared) -> Description {
-        let Self { rms, frequency_hz, width_hz, .. } = *self;
-        let metres = evidence.radar.wavelength_m() / (4.0 * PI);
-        let amplitude_m = SQRT_2 * rms * metres;
+        let Self { rms, frequency_hz, width_hz, is_white, .. } = *self;
+        let observed = format!("The phases of all static returns fluctuate together, by {rms:.4} rad (standard deviation)");
+        if is_white {
+            return Description::unnamed(format!("{observed}, perhaps independently from chirp to chirp; {}.", ranges(shared)));
+        }
         let alias = if course.even {
             String::new()
         } else {
             format!(" (or that beside a multiple of {:.2} Hz, the rate of the frames)", course.frame_s.recip())
         };
+        let observed = format!("{observed} at {frequency_hz:.2} ± {width_hz:.2} Hz{alias}; {}", ranges(shared));
+        if frequency_hz <= NINETY * width_hz {
+            return Description::unnamed(format!("{observed}: a band down to where drifts are."));
+        }
+        let metres = evidence.radar.wavelength_m() / (4.0 * PI);
+        let amplitude_m = SQRT_2 * rms * metres;
         Description {
             id: Some(effects::radar_vibration::ID),
             estimates: vec![
@@ -88,9 +104,7 @@ impl Phase {
                 Estimate::normal("frequency_hz", frequency_hz, width_hz),
             ],
             statement: format!(
-                "The phases of all static returns fluctuate together, by {rms:.4} rad (standard deviation) at {frequency_hz:.2} ± \
-                 {width_hz:.2} Hz{alias}; {}: the radar itself vibrates, by {:.1} µm along its boresight (standard deviation).",
-                ranges(shared),
+                "{observed}: the radar itself vibrates, by {:.1} µm along its boresight (standard deviation).",
                 1e6 * rms * metres
             ),
         }

@@ -60,6 +60,19 @@ impl Course {
         self.stretches(course).into_iter().flat_map(of_stretch).collect()
     }
 
+    /// Chance that a white course looks so: of both halves of its frequencies, each of which is independent under the taper, the
+    /// smaller one (Bonferroni).
+    pub fn white_chance(&self, course: &[f64]) -> f64 {
+        let powers = self.spectrum(course).into_iter().map(|value| value.norm_sqr());
+        let mut by_frequency: Vec<(usize, (f64, f64))> = self.frequencies_hz().into_iter().zip(powers).enumerate().collect();
+        by_frequency.sort_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let half = |parity: usize| {
+            let of_half = by_frequency.iter().filter(|(index, _)| index % 2 == parity).map(|(_, (_, power))| *power);
+            statistics::white_chance(&of_half.collect::<Vec<f64>>())
+        };
+        (2.0 * half(0).min(half(1))).min(1.0)
+    }
+
     /// What of a course in white noise of a variance is no noise, by Wiener's filter.
     pub fn denoised(&self, course: &[f64], variance: f64) -> Vec<f64> {
         let mut stretches = self.stretches(course);

@@ -82,6 +82,23 @@ fn a_phase_that_most_ranges_share_is_found_beside_what_moves_by_itself() {
     assert!(find(&evidence(0.0, 2, drifts, |_, _| 0.0)).is_none_or(|found| found.p_value > 1e-3));
 }
 
+/// A phase that is drawn anew for each chirp, as of a trigger that jitters, is no vibration.
+#[test]
+fn what_the_ranges_share_at_all_frequencies_has_no_name() {
+    let drawn: Vec<f64> = std::iter::repeat_with(support::normal(9)).take(24 * 16).collect();
+    for gap_s in [0.0, 0.02] {
+        let clock = evidence(gap_s, 1, |_| 0.0, own).radar;
+        let index = |time_s: f64| {
+            let frame = (time_s / clock.frame_period_s).floor();
+            let within = ((time_s - frame * clock.frame_period_s) / clock.loop_period_s()).floor() as usize;
+            frame as usize * 16 + within.min(15)
+        };
+        let found = find(&evidence(gap_s, 2, |time_s| 0.1 * drawn[index(time_s + 1e-9)], own)).expect("a shared phase");
+        assert_eq!(found.id, None, "{}", found.statement);
+        assert!(found.p_value < 1e-6, "{}", found.p_value);
+    }
+}
+
 #[test]
 fn ranges_that_vary_each_for_itself_share_nothing() {
     for seed in 0..12 {
