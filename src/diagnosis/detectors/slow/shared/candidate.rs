@@ -11,7 +11,7 @@ use super::deviations::Deviation;
 use crate::diagnosis::detectors::slow::candidates::{self, Description};
 use crate::diagnosis::detectors::slow::field::{PATTERN, Part};
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, Estimate, NINETY, Place};
+use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics;
 use crate::effects::{self, Stage};
 
@@ -79,7 +79,7 @@ impl Phase {
         ))
     }
 
-    /// A vibration has a frequency: one that is not resolved, or is all of them, is no more than a phase that fluctuates.
+    /// A vibration has a frequency: what has all of them alike is no more than a phase that fluctuates.
     fn of_vibration(&self, evidence: &Evidence, course: &Course, shared: &Shared) -> Description {
         let Self { rms, frequency_hz, width_hz, is_white, .. } = *self;
         let observed = format!("The phases of all static returns fluctuate together, by {rms:.4} rad (standard deviation)");
@@ -92,9 +92,6 @@ impl Phase {
             format!(" (or that beside a multiple of {:.2} Hz, the rate of the frames)", course.frame_s.recip())
         };
         let observed = format!("{observed} at {frequency_hz:.2} ± {width_hz:.2} Hz{alias}; {}", ranges(shared));
-        if frequency_hz <= NINETY * width_hz {
-            return Description::unnamed(format!("{observed}: a band down to where drifts are."));
-        }
         let metres = evidence.radar.wavelength_m() / (4.0 * PI);
         let amplitude_m = SQRT_2 * rms * metres;
         Description {
