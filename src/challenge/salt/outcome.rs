@@ -24,7 +24,7 @@ pub struct Outcome {
     pub exact: bool,
     /// Not named, but detected: something of its family that the background lacks.
     pub nameless: bool,
-    /// Names that neither it nor the background has.
+    /// Names that neither it nor the background has, or that are claimed more often than there, of what is elsewhere.
     pub wrong: Vec<String>,
     /// What else has no name and is not in the background.
     pub other_nameless: Vec<String>,
@@ -67,7 +67,7 @@ pub fn outcome(planted: &Planted, report: &Result<Report, String>, background: &
                 outcome.exact |= effect.id == planted.effect;
                 outcome.gain = larger(outcome.gain, effect.evidence.held_out_loglik_gain);
             }
-        } else if !is_known(&effect.id, background) {
+        } else if !is_known(&effect.id, background) || is_one_more(effect, report, background) {
             outcome.wrong.push(effect.id.clone());
         }
     }
@@ -108,6 +108,12 @@ fn is_new(effect: &Effect, background: &Report) -> bool {
         [] => !is_known(&effect.id, background),
         _ => same_name.iter().all(|known| differ(effect, known) || apart(&effect.place, &known.place)),
     }
+}
+
+/// Whether a name is claimed more often than in the background, and this one is not what was claimed there.
+fn is_one_more(effect: &Effect, report: &Report, background: &Report) -> bool {
+    let count = |report: &Report| report.effects.iter().filter(|other| other.id == effect.id).count();
+    count(report) > count(background) && is_new(effect, background)
 }
 
 /// Whether a parameter's 90 % intervals do not meet: of independent normal errors of one size that is 2.3 deviations of their difference
@@ -190,6 +196,10 @@ mod tests {
             json!([]),
         );
         assert_eq!(judged("dc_offset", both, &background).wrong, ["spur"]);
+        // A second one of a name, elsewhere; not the same with other numbers.
+        let one = of(json!([spur(1.0, 2.0)]), json!([]));
+        assert_eq!(judged("dc_offset", of(json!([spur(1.0, 2.0), spur(7.0, 8.0)]), json!([])), &one).wrong, ["spur"]);
+        assert!(judged("dc_offset", of(json!([spur(7.0, 8.0)]), json!([])), &one).wrong.is_empty());
         let mut damaged = of(json!([]), json!([]));
         damaged.verdict = "damaged".into();
         assert_eq!(judged("dc_offset", damaged.clone(), &background).wrong, ["damaged"]);
