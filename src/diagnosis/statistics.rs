@@ -95,17 +95,24 @@ pub fn uniform_chance(values: &[f64]) -> f64 {
     (1..=20).map(term).sum::<f64>().clamp(0.0, 1.0)
 }
 
-/// Chance that a white series has such a periodogram (powers in the order of their frequencies, independent of one another): Bartlett's
-/// test, whose cumulated shares of the whole power are ordered uniform numbers under it (An Introduction to Stochastic Processes,
-/// 1955). 1 of fewer than two.
+/// Chance that a white series has such a periodogram (powers in the order of their frequencies, independent of one another): the smaller
+/// one of two tests (Bonferroni). Bartlett's asks for a broad band: the cumulated shares of the whole power are ordered uniform numbers
+/// (An Introduction to Stochastic Processes, 1955). Fisher's asks for one line: the largest share g has a chance of at most n (1 − g)ⁿ⁻¹
+/// (Proceedings of the Royal Society A 125, 1929). 1 of fewer than two.
 pub fn white_chance(powers: &[f64]) -> f64 {
-    let all: f64 = powers.iter().sum();
+    let (count, all) = (powers.len(), powers.iter().sum::<f64>().max(f64::MIN_POSITIVE));
+    if count < 2 {
+        return 1.0;
+    }
     let mut sum = 0.0;
-    let shares = powers.iter().take(powers.len().saturating_sub(1)).map(|power| {
+    let shares = powers[..count - 1].iter().map(|power| {
         sum += power;
-        sum / all.max(f64::MIN_POSITIVE)
+        sum / all
     });
-    uniform_chance(&shares.collect::<Vec<f64>>())
+    let band = uniform_chance(&shares.collect::<Vec<f64>>());
+    let largest = powers.iter().fold(0.0, |largest: f64, power| largest.max(power / all));
+    let line = count as f64 * (1.0 - largest).powi(count as i32 - 1);
+    (2.0 * band.min(line)).min(1.0)
 }
 
 /// Share of a measured number that is kept where its prior has so many times the variance of its noise.

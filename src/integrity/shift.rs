@@ -1,5 +1,5 @@
-//! A stream that moved: a packet was lost, and what came after it closed the gap; or the trigger slipped, and every chirp moved in
-//! itself.
+//! A stream that moved: a packet was lost, and what came after it closed the gap; or a buffer was read from
+//! another place, and every chirp is turned in itself.
 //!
 //! Static clutter repeats itself from loop to loop, so the stream of one loop equals that of the loops before it but for noise and
 //! what moves; after a loss it equals them turned by the length of the gap: as a whole, or each chirp by itself. Both are held against
@@ -36,6 +36,8 @@ struct Run {
     /// Frame and loop of the first.
     since: [usize; 2],
     loops: usize,
+    /// Since the last that was counted, loops that fit the turn best and leave more.
+    skipped: usize,
     /// Whether all was in its place a few loops before.
     is_sudden: bool,
     /// Sums over them: logarithm of the likelihood ratio, and correlation of each with the one before.
@@ -57,7 +59,7 @@ impl Run {
         }
         self.of_frame = [self.of_frame[0] + ratio, self.of_frame[1] + 1.0];
         self.ratio += ratio;
-        self.loops += 1;
+        (self.loops, self.skipped) = (self.loops + 1, 0);
     }
 
     /// Logarithm of the likelihood ratio of what is independent, of two loops or more; `alike`: of loops in their places.
@@ -115,9 +117,11 @@ impl Movement {
         let fit = self.mean.fit(&spectrum);
         let is_turned = self.mean.averaged >= LEARNED && fit.turn != 0;
         if !is_turned || fit.left[1] > self.usual {
-            // Amid such loops, one that holds something else as well says nothing for or against.
-            if !is_turned || self.run.turn != fit.turn {
+            // Amid such loops, one that holds something else as well says nothing for or against; many are what the scene is like.
+            if !is_turned || self.run.turn != fit.turn || self.run.skipped >= LEARNED {
                 self.learn(at, &spectrum, &fit);
+            } else {
+                self.run.skipped += 1;
             }
             return;
         }
@@ -163,8 +167,8 @@ impl Movement {
             );
         }
         format!(
-            "{from}, the samples of every chirp come {earlier} places earlier in it than before (or {later} later; modulo its {piece} \
-             samples): the trigger of the converter slipped"
+            "{from}, the samples of every chirp are turned in it by {earlier} places towards its beginning (or {later} towards its end; \
+             modulo its {piece} samples): its buffer was read from another place"
         )
     }
 }
@@ -201,8 +205,11 @@ impl Inspector for Shift {
         let Some(likeliest) = self.losses().map(|(_, loss)| loss.log_p).reduce(f64::min) else {
             return Some(Finding::as_stated(CHECK, EXPECTED, "they are"));
         };
-        let said: Vec<String> = self.losses().map(|(movement, loss)| movement.said(loss)).collect();
-        let frames = self.losses().map(|(_, loss)| loss.frame).collect();
+        let mut losses: Vec<(&Movement, &Loss)> = self.losses().collect();
+        losses.sort_by_key(|(_, loss)| [loss.frame, loss.index]);
+        let said: Vec<String> = losses.iter().map(|(movement, loss)| movement.said(loss)).collect();
+        let mut frames: Vec<usize> = losses.iter().map(|(_, loss)| loss.frame).collect();
+        frames.dedup();
         Some(Finding { frames, ..Finding::wrong(Kind::Misread, CHECK, EXPECTED, said.join("; "), likeliest) })
     }
 }

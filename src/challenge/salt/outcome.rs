@@ -24,7 +24,7 @@ pub struct Outcome {
     pub exact: bool,
     /// Not named, but detected: something of its family that the background lacks.
     pub nameless: bool,
-    /// Names that neither it nor the background has, or that are claimed more often than there, of what is elsewhere.
+    /// Names that neither it nor the background has, or that are claimed more often than there, elsewhere or with clearly other numbers.
     pub wrong: Vec<String>,
     /// What else has no name and is not in the background.
     pub other_nameless: Vec<String>,

@@ -60,10 +60,11 @@ impl<'a> Ladder<'a> {
         }
         for parts in [Parts { clock: true, place: false }, Parts { clock: false, place: true }] {
             let smaller = self.whole(parts)?;
-            let judgement = self.judge(&smaller, &best)?;
+            let judgement = self.judge(&smaller, &self.kept)?.of_least(self.refiner.config.least_m);
             let lost = |rung: &Rung| rung.lost.iter().sum::<f64>();
-            self.judgements.push(Judgement { kept: lost(&smaller) < lost(&best), ..judgement });
-            if lost(&smaller) < lost(&best) {
+            let is_better = judgement.kept && lost(&smaller) < lost(&best);
+            self.judgements.push(Judgement { kept: is_better, ..judgement });
+            if is_better {
                 best = smaller;
             }
         }

@@ -53,6 +53,15 @@ pub fn refine(
         return Err(Error::setting("simulator.surface.posing", "host", "tensor with training.refine_pose = true")
             .with_hint("gradients reach a pose only through tensor operations"));
     }
+    if frames.is_empty() {
+        return Err(Error::field(
+            recording.folder.join("recording.toml"),
+            "radar.frames",
+            "no whole training frame",
+            "at least one",
+        )
+        .with_hint("frames with lost chirps train nothing; leave this recording out"));
+    }
     let [fitted, held_out] = alternating(&spaced(frames, 2 * config.frames));
     let mut ladder = Ladder::new(Refiner::new(recording, (person, motion), fitted, config, heatmap, device)?, held_out)?;
     ladder.climb_whole()?;

@@ -73,25 +73,26 @@ impl<'a> Refiner<'a> {
         Ok(comparison.measured(self.recording.target(frame, &self.device)?))
     }
 
-    /// Gains of the fitted frames where the body is as the scene has it, in standard deviations of their prior.
+    /// Gains of the fitted frames, or of as many of them as the config has, where the body is as the scene has it, in standard deviations of their prior.
     pub fn gains(&self, scene: &Scene, blur_cells: f64, start: &[f64]) -> Result<Vec<f64>> {
-        Ok(gains::fit(&self.linear(scene, &self.frames, blur_cells)?, start))
+        let every = self.frames.len().div_ceil(self.config.frames).max(1);
+        let frames: Vec<usize> = self.frames.iter().copied().step_by(every).collect();
+        let comparison = self.comparison(blur_cells);
+        let linear: Vec<Linear> = frames.iter().map(|&frame| self.linear(scene, frame, &comparison)).collect::<Result<_>>()?;
+        Ok(gains::fit(&linear, start))
     }
 
     /// Nats lost in each of other frames.
     pub fn lost(&self, scene: &Scene, frames: &[usize], blur_cells: f64, gains: &[f64]) -> Result<Vec<f64>> {
-        Ok(self.linear(scene, frames, blur_cells)?.iter().map(|frame| frame.nats(gains)).collect())
+        let comparison = self.comparison(blur_cells);
+        frames.iter().map(|&frame| Ok(self.linear(scene, frame, &comparison)?.nats(gains))).collect()
     }
 
-    fn linear(&self, scene: &Scene, frames: &[usize], blur_cells: f64) -> Result<Vec<Linear>> {
-        let comparison = self.comparison(blur_cells);
-        let one = |&frame: &usize| -> Result<Linear> {
-            let view = scene.view(frame)?;
-            let sampled = Sampled::new(&view, &self.part, self.config.points);
-            let basis = expected::basis(scene, &view, &sampled, self.joints, &self.transform, &self.device);
-            Ok(Linear::new(&comparison, basis, self.level, self.measured(&comparison, frame)?))
-        };
-        frames.iter().map(one).collect()
+    fn linear(&self, scene: &Scene, frame: usize, comparison: &Comparison<'_>) -> Result<Linear> {
+        let view = scene.view(frame)?;
+        let sampled = Sampled::new(&view, &self.part, self.config.points);
+        let basis = expected::basis(scene, &view, &sampled, self.joints, &self.transform, &self.device);
+        Ok(Linear::new(comparison, basis, self.level, self.measured(comparison, frame)?))
     }
 
     /// Noise floor and level, from the frames that are looked at.
