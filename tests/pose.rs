@@ -209,17 +209,21 @@ fn apart(a: &Scene, b: &Scene) -> [f64; 2] {
     sums.map(|sum| f64::sqrt(sum / count))
 }
 
-/// How far off a recording's motion is before and after its refinement, as [`apart`] says, and what was refined.
-fn refined(right: &Path, wrong: &Path, per_frame: bool) -> ([f64; 2], [f64; 2], RefinedPose) {
-    let frames = Recording::open(wrong).unwrap().radar.frames;
-    let mut config = settings(&[wrong.to_path_buf()]);
-    config.training.refine.per_frame = per_frame;
+/// How far off a walk that wanders slowly by an amplitude is before and after its frames were refined, as [`apart`] says, and what was
+/// refined.
+fn refined(amplitude_m: f64) -> ([f64; 2], [f64; 2], RefinedPose) {
+    let parent = tempfile::tempdir().unwrap();
+    let right = recorded(parent.path());
+    let wrong = wandering(&right, amplitude_m, 2.5);
+    let frames = Recording::open(&wrong).unwrap().radar.frames;
+    let mut config = settings(std::slice::from_ref(&wrong));
+    config.training.refine.per_frame = true;
     let mut recordings = load_recordings(&config.data.recordings, &config.simulator).unwrap();
     let started = std::time::Instant::now();
     let all: Vec<usize> = (0..frames).collect();
     let pose = refine::refine(&recordings[0], &all, &config.training.refine, &config.training.heatmap, &Device::flex()).unwrap();
     let took_s = started.elapsed().as_secs_f64();
-    let truth = Recording::open(right).unwrap();
+    let truth = Recording::open(&right).unwrap();
     let truth = Scene::new(&truth.radar, truth.room.as_ref(), truth.person(), &config.simulator).unwrap();
     let before = apart(&recordings[0].scene, &truth);
     let (moved, _) = refine::refined(recordings.remove(0), std::slice::from_ref(&pose)).unwrap();
@@ -237,20 +241,14 @@ fn refined(right: &Path, wrong: &Path, per_frame: bool) -> ([f64; 2], [f64; 2], 
 
 #[test]
 fn a_motion_that_is_right_to_millimetres_stays_at_least_as_right() {
-    let parent = tempfile::tempdir().unwrap();
-    let right = recorded(parent.path());
-    let wrong = wandering(&right, 0.0085, 2.5);
-    let (before, after, pose) = refined(&right, &wrong, true);
+    let (before, after, pose) = refined(0.0085);
     assert!((0.004..0.008).contains(&before[0]), "the plant is {before:?}");
     assert!(after[0] <= before[0] && after[1] <= before[1], "{before:?} became {after:?}: {}", pose.line());
 }
 
 #[test]
 fn single_frames_undo_a_slow_wander() {
-    let parent = tempfile::tempdir().unwrap();
-    let right = recorded(parent.path());
-    let wrong = wandering(&right, 0.085, 2.5);
-    let (before, after, pose) = refined(&right, &wrong, true);
+    let (before, after, pose) = refined(0.085);
     assert!(!pose.correction.shifts_m.is_empty(), "{}", pose.line());
     // Far more than the prior of single frames allows: what is undone is a part of it.
     assert!(after[0] < 0.75 * before[0] && after[1] < before[1], "{before:?} became {after:?}: {}", pose.line());

@@ -134,6 +134,17 @@ mod tests {
 
     const LOOPS: usize = 8;
 
+    /// Of so many frames of real samples of one channel, `value` by frame and by sample of all loops.
+    fn judged([frames, loops, samples]: [usize; 3], value: impl Fn(usize, usize) -> f64) -> Finding {
+        let schedule = Schedule { tx: 1, rx: 1, loops, samples, is_real: true, is_falling: false, farthest_bin: None };
+        let mut inspector = Box::new(Boundary::new(schedule));
+        for frame in 0..frames {
+            let re = (0..loops * samples).map(|i| value(frame, i) as f32).collect();
+            inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, 1, loops, samples], re, None)));
+        }
+        inspector.conclude().unwrap()
+    }
+
     /// Something that moves a little from loop to loop and more from frame to frame; the stream begins so many loops late. `settling`:
     /// how much the first loop of a frame differs.
     fn seen(late: usize, settling: f64) -> Finding {
@@ -142,21 +153,13 @@ mod tests {
 
     /// The same, cut into frames of so many loops.
     fn seen_as(stated: usize, late: usize, settling: f64) -> Finding {
-        let schedule =
-            Schedule { tx: 1, rx: 1, loops: stated, samples: 16, is_real: true, is_falling: false, farthest_bin: None };
         let drawn = numbers(8, 60 * LOOPS * 16, -0.05, 0.05);
-        let mut inspector = Box::new(Boundary::new(schedule));
-        for frame in 0..48 * LOOPS / stated {
-            let value = |i: usize| {
-                let (index, sample) = (frame * stated + i / 16 + late, i % 16);
-                let time = index as f64 * 0.01 + (index / LOOPS) as f64 * 0.37;
-                let first = if index % LOOPS == 0 { settling } else { 0.0 };
-                ((0.4 * sample as f64 + 6.0 * time).sin() + first + drawn[frame * stated * 16 + i]) as f32
-            };
-            let re = (0..stated * 16).map(value).collect();
-            inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, 1, stated, 16], re, None)));
-        }
-        inspector.conclude().unwrap()
+        judged([48 * LOOPS / stated, stated, 16], |frame, i| {
+            let (index, sample) = (frame * stated + i / 16 + late, i % 16);
+            let time = index as f64 * 0.01 + (index / LOOPS) as f64 * 0.37;
+            let first = if index % LOOPS == 0 { settling } else { 0.0 };
+            (0.4 * sample as f64 + 6.0 * time).sin() + first + drawn[frame * stated * 16 + i]
+        })
     }
 
     /// Boundaries at another loop of each frame, and none that comes most often.
@@ -172,19 +175,13 @@ mod tests {
     /// next of these loops is a boundary.
     #[test]
     fn bursts_of_another_radar_are_no_boundary() {
-        let schedule = Schedule { tx: 1, rx: 1, loops: 40, samples: 16, is_real: true, is_falling: false, farthest_bin: None };
         let seen = |lasts: bool| {
             let drawn = numbers(9, 30 * 40 * 16, -0.05, 0.05);
-            let mut inspector = Box::new(Boundary::new(schedule));
-            for frame in 0..30 {
-                let value = |i: usize| {
-                    let (index, at) = (i / 16, frame + 5);
-                    let is_other = if lasts { (frame + usize::from(index >= at)) % 2 == 1 } else { index == at };
-                    drawn[frame * 640 + i] as f32 + if is_other { (0.7 * (i % 16) as f32).cos() } else { 0.0 }
-                };
-                inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, 1, 40, 16], (0..640).map(value).collect(), None)));
-            }
-            inspector.conclude().unwrap()
+            judged([30, 40, 16], |frame, i| {
+                let (index, at) = (i / 16, frame + 5);
+                let is_other = if lasts { (frame + usize::from(index >= at)) % 2 == 1 } else { index == at };
+                drawn[frame * 640 + i] + if is_other { (0.7 * (i % 16) as f64).cos() } else { 0.0 }
+            })
         };
         assert!(!seen(false).is_refusal(), "{:?}", seen(false));
         assert!(seen(true).is_refusal(), "{:?}", seen(true));
@@ -193,29 +190,17 @@ mod tests {
     /// However many frames: all steps of noise are alike.
     #[test]
     fn noise_alone_has_no_boundary() {
-        let schedule = Schedule { tx: 1, rx: 1, loops: 16, samples: 8, is_real: true, is_falling: false, farthest_bin: None };
         for seed in 0..4 {
             let drawn = numbers(seed, 2400 * 128, -1.0, 1.0);
-            let mut inspector = Box::new(Boundary::new(schedule));
-            for frame in 0..2400 {
-                let re = drawn[frame * 128..][..128].iter().map(|value| *value as f32).collect();
-                inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, 1, 16, 8], re, None)));
-            }
-            let found = inspector.conclude().unwrap();
+            let found = judged([2400, 16, 8], |frame, i| drawn[frame * 128 + i]);
             assert!(!found.is_refusal(), "{seed}: {found:?}");
         }
     }
 
     #[test]
     fn one_frame_decides_nothing() {
-        let schedule = Schedule { tx: 1, rx: 1, loops: LOOPS, samples: 16, is_real: true, is_falling: false, farthest_bin: None };
-        let mut inspector = Box::new(Boundary::new(schedule));
-        inspector.see(&Stream::of(
-            schedule,
-            0,
-            &IfFrame::new([1, 1, LOOPS, 16], numbers(8, LOOPS * 16, -1.0, 1.0).iter().map(|value| *value as f32).collect(), None),
-        ));
-        assert!(!inspector.conclude().unwrap().decided);
+        let drawn = numbers(8, LOOPS * 16, -1.0, 1.0);
+        assert!(!judged([1, LOOPS, 16], |_, i| drawn[i]).decided);
     }
 
     #[test]

@@ -30,7 +30,7 @@ use crate::{
     person::Person,
 };
 use ladder::Ladder;
-use refiner::Refiner;
+use refiner::{Refiner, spaced};
 
 /// The correction of a recording's motion that explains where its power lies, as far as frames that were not fitted prefer it.
 ///
@@ -71,12 +71,6 @@ pub fn refine(
     }
     let (correction, judgements) = ladder.found();
     Ok(RefinedPose { recording: recording.folder.clone(), correction, judgements })
-}
-
-/// At most so many, evenly spaced.
-fn spaced(frames: &[usize], most: usize) -> Vec<usize> {
-    let count = frames.len().min(most);
-    (0..count).map(|part| frames[(2 * part + 1) * frames.len() / (2 * count)]).collect()
 }
 
 /// The first, third, … and the others.

@@ -34,6 +34,12 @@ pub struct Refiner<'a> {
     pub threads: usize,
 }
 
+/// At most so many, evenly spaced.
+pub fn spaced(frames: &[usize], most: usize) -> Vec<usize> {
+    let count = frames.len().min(most);
+    (0..count).map(|part| frames[(2 * part + 1) * frames.len() / (2 * count)]).collect()
+}
+
 impl<'a> Refiner<'a> {
     /// `frames`: those that are fitted.
     ///
@@ -73,12 +79,12 @@ impl<'a> Refiner<'a> {
         Ok(comparison.measured(self.recording.target(frame, &self.device)?))
     }
 
-    /// Gains of the fitted frames, or of as many of them as the config has, where the body is as the scene has it, in standard deviations of their prior.
+    /// Gains of the fitted frames, or of as many of them as the config has, where the body is as the scene has it; in standard deviations
+    /// of their prior.
     pub fn gains(&self, scene: &Scene, blur_cells: f64, start: &[f64]) -> Result<Vec<f64>> {
-        let every = self.frames.len().div_ceil(self.config.frames).max(1);
-        let frames: Vec<usize> = self.frames.iter().copied().step_by(every).collect();
         let comparison = self.comparison(blur_cells);
-        let linear: Vec<Linear> = frames.iter().map(|&frame| self.linear(scene, frame, &comparison)).collect::<Result<_>>()?;
+        let frames = spaced(&self.frames, self.config.frames).into_iter();
+        let linear: Vec<Linear> = frames.map(|frame| self.linear(scene, frame, &comparison)).collect::<Result<_>>()?;
         Ok(gains::fit(&linear, start))
     }
 

@@ -60,25 +60,16 @@ impl Course {
         self.stretches(course).into_iter().flat_map(of_stretch).collect()
     }
 
-    /// Which values of a spectrum are the first of their stretches: what is slow was taken out of them, too, in part.
-    fn firsts(&self) -> Vec<bool> {
-        let half = |count: usize| (FIRST..count.div_ceil(2)).map(|k| k == FIRST);
-        if self.even {
-            return half(self.frames * self.loops).collect();
-        }
-        half(self.frames).chain((0..self.frames).flat_map(|_| half(self.loops))).collect()
-    }
-
     /// Chance that a white course looks so: of both halves of its frequencies, each of which is independent under the taper, the
     /// smaller one (Bonferroni).
     pub fn white_chance(&self, course: &[f64]) -> f64 {
         let powers = self.spectrum(course).into_iter().map(|value| value.norm_sqr());
-        let all = self.frequencies_hz().into_iter().zip(powers).zip(self.firsts()).enumerate();
-        let mut by_frequency: Vec<(usize, (f64, f64))> =
-            all.filter(|(_, (_, is_first))| !is_first).map(|(index, (value, _))| (index, value)).collect();
-        by_frequency.sort_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        // What is slow was taken out of the first of each stretch, too, in part.
+        let all = self.bins().into_iter().zip(powers).enumerate().filter(|(_, ((turns, _), _))| *turns > FIRST);
+        let mut by_frequency: Vec<(usize, f64, f64)> = all.map(|(index, ((_, hz), power))| (index, hz, power)).collect();
+        by_frequency.sort_by(|a, b| a.1.total_cmp(&b.1));
         let half = |parity: usize| {
-            let of_half = by_frequency.iter().filter(|(index, _)| index % 2 == parity).map(|(_, (_, power))| *power);
+            let of_half = by_frequency.iter().filter(|(index, ..)| index % 2 == parity).map(|(.., power)| *power);
             statistics::white_chance(&of_half.collect::<Vec<f64>>())
         };
         (2.0 * half(0).min(half(1))).min(1.0)
@@ -109,7 +100,13 @@ impl Course {
 
     /// Frequency (Hz) of each value of a spectrum.
     pub fn frequencies_hz(&self) -> Vec<f64> {
-        let half = |count: usize, period_s: f64| (FIRST..count.div_ceil(2)).map(move |k| k as f64 / (count as f64 * period_s));
+        self.bins().into_iter().map(|(_, hz)| hz).collect()
+    }
+
+    /// Of each value of a spectrum, turns in its stretch and frequency (Hz).
+    fn bins(&self) -> Vec<(usize, f64)> {
+        let half =
+            |count: usize, period_s: f64| (FIRST..count.div_ceil(2)).map(move |k| (k, k as f64 / (count as f64 * period_s)));
         if self.even {
             return half(self.frames * self.loops, self.loop_s).collect();
         }
@@ -144,7 +141,6 @@ mod tests {
     fn white_courses_are_called_otherwise_as_rarely_as_stated_and_a_weak_line_is() {
         for (frames, loops, even) in [(24, 16, true), (24, 16, false), (400, 16, false)] {
             let course = Course { frames, loops, even, frame_s: 0.1, loop_s: 1e-3 };
-            assert_eq!(course.firsts().len(), course.frequencies_hz().len());
             let mut draw = support::normal(frames as u64);
             let mut is_coloured = |line: f64| {
                 let value = |i: usize| line * (2.0 * PI * 0.19 * i as f64).sin() + draw();
