@@ -6,8 +6,13 @@
 //! all of its samples show one scene. Lengths near whole numbers of chirps are not tried: the receivers of one chirp share its phase, and
 //! neighbouring chirps what moves. But another length must explain more than those up to twice as long do, too: chirps that take turns
 //! make a loop of whole chirps (`transmitter_count`), and other lengths are the better the nearer they are to it.
+//!
+//! A tone beside the chirps repeats itself, too, after lengths of its own. Static clutter then still repeats after a stated loop T: what
+//! repeats after T' and what repeats after T sum to y(t) = y(t − T') + y(t − T) − y(t − T' − T), and the stream is better predicted from
+//! these three than from one, two and three times T' ago, which of a loop of that length would be three looks at the same.
 
 use hybridsim_fft::FftPlanner;
+use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 
 use super::stream::{Schedule, Stream};
@@ -19,27 +24,41 @@ const EXPECTED: &str = "a loop of samples x rx x tx";
 const FRAMES: usize = 4;
 /// Fewest loops of a frame in which another length can repeat itself.
 const FEWEST_LOOPS: usize = 4;
+/// A stream that repeats itself exactly leaves nothing: less than this share is not told apart.
+const LEAST_LEFT: f64 = 1e-6;
 /// Lengths that are not tried, as a share of a chirp at either side of whole chirps.
 const GUARD: usize = 8;
 
 pub(super) struct Period {
     schedule: Schedule,
-    /// Correlation by shift, summed over frames, and how many.
+    /// Correlation by shift, summed over frames.
     squares: Vec<f64>,
-    frames: usize,
+    /// Values of the frames without their mean.
+    frames: Vec<Vec<Complex64>>,
 }
 
 impl Period {
     pub fn new(schedule: Schedule) -> Self {
-        Self { schedule, squares: vec![], frames: 0 }
+        Self { schedule, squares: vec![], frames: vec![] }
+    }
+
+    /// Whether static clutter repeats itself after a stated loop beside what does so after another length.
+    fn still_repeats(&self, other: usize) -> bool {
+        let (loops, period) = (self.schedule.loops as f64, self.schedule.period());
+        let first = (period + other).max(3 * other);
+        let of_frame = |values: &Vec<Complex64>| {
+            let shifts = [[other, period, other + period], [other, 2 * other, 3 * other]];
+            let [with_stated, other_alone] = shifts.map(|shifts| left(values, first, shifts).max(LEAST_LEFT));
+            loops * (1.0 - first as f64 / values.len() as f64) * (other_alone / with_stated).ln()
+        };
+        self.frames.iter().map(of_frame).sum::<f64>() > -ALARM.ln()
     }
 }
 
-/// Squared correlation of a stream with itself, by shift, up to half of its length.
-fn correlations(stream: &Stream) -> Vec<f64> {
-    let length = stream.values.len();
+/// Squared correlation of a stream with itself, by shift, up to a quarter of its length.
+fn correlations(mut values: Vec<Complex64>) -> Vec<f64> {
+    let length = values.len();
     let padded = (2 * length).next_power_of_two();
-    let mut values = stream.centred();
     let mut energy = vec![0.0];
     values.iter().for_each(|value| energy.push(energy[energy.len() - 1] + value.norm_sqr()));
     values.resize(padded, Complex64::ZERO);
@@ -52,40 +71,57 @@ fn correlations(stream: &Stream) -> Vec<f64> {
         let both = energy[length - shift] * (whole - energy[shift]);
         if both > 0.0 { (values[shift] / padded as f64).norm_sqr() / both } else { 0.0 }
     };
-    (0..=length / 2).map(|shift| square(shift).min(1.0)).collect()
+    (0..=length / 4).map(|shift| square(shift).min(1.0)).collect()
+}
+
+/// Share of the energy of a stream from a sample on that is left when it is predicted from itself three shifts ago (least squares).
+fn left(values: &[Complex64], first: usize, shifts: [usize; 3]) -> f64 {
+    let before = |i: usize, k: usize| values[i - shifts[k]];
+    let (mut own, mut with, mut energy) = (Matrix3::<Complex64>::zeros(), Vector3::<Complex64>::zeros(), 0.0);
+    for (i, value) in values.iter().enumerate().skip(first) {
+        energy += value.norm_sqr();
+        for k in 0..3 {
+            with[k] += before(i, k).conj() * value;
+            (0..3).for_each(|other| own[(k, other)] += before(i, k).conj() * before(i, other));
+        }
+    }
+    // Shifts that show the same are one.
+    let solved = own.svd(true, true).solve(&with, 1e-9 * own.norm()).unwrap_or_default();
+    if energy > 0.0 { (1.0 - solved.dotc(&with).re / energy).max(0.0) } else { 1.0 }
 }
 
 /// Log-likelihood of a stream that repeats itself with the second of two squared correlations against the first.
 pub(super) fn repeating(looks: f64, [stated, other]: [f64; 2]) -> f64 {
-    // A stream that repeats itself exactly leaves nothing: less than a millionth is not told apart.
-    let left = |square: f64| (1.0 - square).max(1e-6);
+    let left = |square: f64| (1.0 - square).max(LEAST_LEFT);
     looks * (left(stated) / left(other)).ln()
 }
 
 impl Inspector for Period {
     fn see(&mut self, stream: &Stream) {
-        if self.frames == FRAMES || self.schedule.loops < FEWEST_LOOPS {
+        if self.frames.len() == FRAMES || self.schedule.loops < FEWEST_LOOPS {
             return;
         }
-        self.frames += 1;
-        self.squares.resize(stream.values.len() / 2 + 1, 0.0);
-        self.squares.iter_mut().zip(correlations(stream)).for_each(|(sum, square)| *sum += square);
+        let values = stream.centred();
+        let squares = correlations(values.clone());
+        self.squares.resize(squares.len(), 0.0);
+        self.squares.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square);
+        self.frames.push(values);
     }
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
-        if self.frames == 0 {
+        if self.frames.is_empty() {
             return Some(Finding::undecided(CHECK, EXPECTED, "too few loops"));
         }
         let Schedule { samples, rx, loops, .. } = self.schedule;
         let period = self.schedule.period();
-        let square = |shift: usize| self.squares[shift] / self.frames as f64;
+        let square = |shift: usize| self.squares[shift] / self.frames.len() as f64;
         let guard = samples.div_ceil(GUARD);
         let is_tried = |shift: &usize| (guard..=samples - guard).contains(&(shift % samples));
         let shifts: Vec<usize> = (rx * samples..self.squares.len()).filter(is_tried).collect();
         let Some(&best) = shifts.iter().max_by(|a, b| square(**a).total_cmp(&square(**b))) else {
             return Some(Finding::undecided(CHECK, EXPECTED, "a chirp is too short"));
         };
-        let looks = (loops * self.frames) as f64;
+        let looks = (loops * self.frames.len()) as f64;
         let tried = (shifts.len() as f64).ln();
         // Twice a length is as good as the length itself: the shortest peak is reported that is no worse than the best one.
         let is_peak = |shift: usize| square(shift) >= square(shift - 1).max(square((shift + 1).min(self.squares.len() - 1)));
@@ -99,6 +135,10 @@ impl Inspector for Period {
             "shifted by the {period} samples of a loop, the stream correlates to {:.2} with itself",
             square(period).sqrt()
         );
+        if log_p < ALARM.ln() && self.still_repeats(best) {
+            let found = format!("{found}, beside something else that repeats itself after {best} samples");
+            return Some(Finding::as_stated(CHECK, EXPECTED, found));
+        }
         if log_p < ALARM.ln() {
             let found = format!(
                 "{found}, shifted by {best} samples to {:.2}: the number of samples, receivers or transmitters is another capture's",
@@ -143,6 +183,18 @@ mod tests {
         let other = seen(140, 0.3);
         assert!(other.is_refusal() && other.found.contains("shifted by 140 samples"), "{other:?}");
         assert!(seen(140, 30.0).ok);
+    }
+
+    /// A tone that turns on beside the chirps, stronger than static clutter that repeats itself.
+    #[test]
+    fn a_tone_beside_the_chirps_is_no_other_loop() {
+        let (still, drawn) = (numbers(4, 128, -1.0, 1.0), numbers(5, 16 * 128, -1.0, 1.0));
+        for amplitude in [3.0, 10.0] {
+            let found = of(|i| still[i % 128] + amplitude * (0.213 * i as f64).sin() + 0.1 * drawn[i]);
+            assert!(found.ok && found.found.contains("beside something else"), "{found:?}");
+            let other = of(|i| still[i % 112] + 0.3 * (0.213 * i as f64).sin() + 0.1 * drawn[i]);
+            assert!(!other.ok, "{other:?}");
+        }
     }
 
     /// Tones that are slow against a chirp, in loops that take turns: a shift by a little more than a chirp is better than the stated loop,
