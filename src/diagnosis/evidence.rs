@@ -4,6 +4,7 @@ pub mod beat;
 pub mod denoised;
 pub mod power;
 pub mod products;
+mod shape;
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -18,7 +19,7 @@ use super::course::Course;
 #[cfg(test)]
 use super::cube;
 use super::cube::{Cube, Loaded, Split};
-use super::finding::{Undo, Volume};
+use super::finding::{Emptied, Undo, Volume};
 use super::prediction::BodyPrediction;
 use super::statistics;
 use crate::diagnosis::behaviour::Behaviour;
@@ -28,11 +29,6 @@ use crate::radar::{Radar, Sampling};
 use crate::room::Room;
 use power::PowerModel;
 use products::Products;
-
-/// Neighbouring range bins over which the noise's shape is taken together.
-const SHAPE_BINS: usize = 5;
-/// Ratio to the mean from which on the noise counts as shaped.
-const SHAPED: f32 = 1.3;
 
 /// Share of the strongest cell below which there is not even noise.
 const EMPTIED: f64 = 1e-20;
@@ -59,6 +55,8 @@ pub struct Evidence {
     pub accepted_unnamed: Vec<Behaviour>,
     /// What of it undid a fixed law of the samples, oldest first.
     pub(super) inverses: Vec<(Undo, Volume)>,
+    /// Cells of the maps that were taken out of the samples.
+    pub(super) emptied: Vec<Arc<Emptied>>,
     /// Phases over time of what was accepted, oldest first.
     pub courses: Vec<Arc<Course>>,
     pub extremes: [f64; 2],
@@ -93,6 +91,7 @@ impl Evidence {
             accepted: vec![],
             accepted_unnamed: vec![],
             inverses: vec![],
+            emptied: vec![],
             courses: vec![],
             extremes,
             codes,
@@ -122,6 +121,11 @@ impl Evidence {
     /// Range of the farthest echo.
     pub fn farthest_m(&self) -> f64 {
         self.room.as_ref().and_then(|room| room.farthest_m()).unwrap_or(FARTHEST_M)
+    }
+
+    /// Whether a cell was taken out of the samples: it says nothing of the noise.
+    pub fn is_emptied(&self, doppler: usize, range: usize) -> bool {
+        self.emptied.iter().any(|emptied| emptied.holds(doppler, range))
     }
 
     /// Beat frequencies that mean something: all, or the positive half.
@@ -162,8 +166,9 @@ impl Evidence {
                             // Neighbours of the zero Doppler hold what the mean could not remove.
                             (0..loops)
                                 .filter(move |&doppler| doppler.min(loops - doppler) > 2 || loops < 8)
-                                .flat_map(move |doppler| bins.clone().map(move |range| doppler * samples + range))
-                                .map(move |cell| map[cell].norm_sqr())
+                                .flat_map(move |doppler| bins.clone().map(move |range| (doppler, range)))
+                                .filter(|&(doppler, range)| !self.is_emptied(doppler, range))
+                                .map(move |(doppler, range)| map[doppler * samples + range].norm_sqr())
                                 .collect::<Vec<_>>()
                         })
                         .collect();
@@ -229,41 +234,13 @@ impl Evidence {
         self.once.maps.get_or_init(|| {
             let mut maps = self.unshaped_maps();
             let samples = self.cube.dims[4];
-            if let Some(shape) = self.noise_shape(&maps) {
+            if let Some(shape) = shape::noise_shape(self, &maps) {
                 maps.values_mut().par_chunks_exact_mut(samples).for_each(|row| {
                     row.iter_mut().zip(&shape).for_each(|(value, shape)| *value /= *shape);
                 });
             }
             maps
         })
-    }
-
-    /// The noise's variance in each range bin over its mean; `None` where it is flat.
-    fn noise_shape(&self, maps: &Grid<f32, 3>) -> Option<Vec<f32>> {
-        let [_, loops, samples] = maps.shape();
-        let rows: Vec<&[f32]> = self
-            .split
-            .training
-            .iter()
-            .flat_map(|&frame| (0..loops).map(move |doppler| [frame, doppler]))
-            .filter(|&[_, doppler]| doppler.min(loops - doppler) > 2 || loops < 8)
-            .map(|row| maps.below(row))
-            .collect();
-        let level = |range: usize| {
-            let mut values: Vec<f64> = rows.iter().map(|row| f64::from(row[range])).collect();
-            let index = ((values.len().max(1) - 1) as f64 * 0.35) as usize;
-            if values.is_empty() { 1.0 } else { *values.select_nth_unstable_by(index, f64::total_cmp).1 }
-        };
-        let levels: Vec<f64> = (0..samples).into_par_iter().map(level).collect();
-        let middle = statistics::median(&mut levels[..self.range_bins()].to_vec()).max(f64::MIN_POSITIVE);
-        let smooth: Vec<f32> = (0..samples)
-            .map(|range| {
-                let mut near: Vec<f64> =
-                    (0..SHAPE_BINS).map(|i| levels[(range + samples + i - SHAPE_BINS / 2) % samples]).collect();
-                (statistics::median(&mut near) / middle).max(1e-6) as f32
-            })
-            .collect();
-        smooth[..self.range_bins()].iter().any(|shape| !(1.0 / SHAPED..SHAPED).contains(shape)).then_some(smooth)
     }
 
     fn unshaped_maps(&self) -> Grid<f32, 3> {

@@ -133,6 +133,8 @@ pub enum Correction {
     /// Undone in the samples by a law with numbers that the training frames gave, or with a prior for those that they did not: what is
     /// held out is predicted by it as it is.
     Inverse(Undo, Volume),
+    /// Takes cells of the range-Doppler maps out of the samples: there is not even noise left of them.
+    Emptied(Undo, Arc<Emptied>),
     /// Another correction, after which the phase over time of what it concerned is known.
     Followed(Box<Correction>, Arc<Course>),
     /// Changes what is predicted of the body.
@@ -153,10 +155,27 @@ impl Correction {
     /// What it changes in the samples.
     pub fn undo(&self) -> Option<&Undo> {
         match self {
-            Self::Samples(undo) | Self::Inverse(undo, _) => Some(undo),
+            Self::Samples(undo) | Self::Inverse(undo, _) | Self::Emptied(undo, _) => Some(undo),
             Self::Followed(correction, _) => correction.undo(),
             Self::Body(_) | Self::None => None,
         }
+    }
+}
+
+/// Shares of the noise that were taken out of a frame's bins of Doppler and of range; of a cell their product.
+#[derive(Clone, Debug)]
+pub struct Emptied {
+    pub doppler: Vec<f64>,
+    pub range: Vec<f64>,
+}
+
+/// Share of its noise without which a cell says nothing of it: 1 dB.
+const LOST: f64 = 0.2;
+
+impl Emptied {
+    /// Whether a cell says nothing of the noise any more.
+    pub fn holds(&self, doppler: usize, range: usize) -> bool {
+        self.doppler[doppler] * self.range[range] > LOST
     }
 }
 

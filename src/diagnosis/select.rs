@@ -17,9 +17,9 @@ use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
 use super::residual::{
-    ROUGHLY, is_by_chirp, is_left_by, is_of_noise, is_of_receivers, is_of_residual, is_product, is_rough, is_same,
+    ROUGHLY, has_shape_of, is_by_chirp, is_left_by, is_of_noise, is_of_receivers, is_of_residual, is_product, is_rough, is_same,
 };
-use precedence::{is_displaced, is_echo, upstream};
+use precedence::{is_added, is_course_of_all, is_displaced, is_echo, upstream};
 use said::{candidates, said_by};
 
 impl DiagnosisConfig {
@@ -335,8 +335,10 @@ fn refit(
 ) -> Option<Candidate> {
     let effect = &accepted[index];
     // An image or a product of what the antennas do otherwise is that of the signal with it: what is in the receiver is undone first.
+    // What never changes has the course of all that is received, until that is undone: subtracted before, it would leave it.
     let before = |other: &Accepted| {
         effect.candidate.place.stage == Some(Stage::Receiver) && other.candidate.place.stage == Some(Stage::Antenna)
+            || is_course_of_all(&effect.candidate) && is_added(&other.candidate)
     };
     let stands = |(other, accepted): &(usize, &Accepted)| *other != index && !without.contains(other) && !before(accepted);
     let others = accepted.iter().enumerate().filter(stands);
@@ -344,6 +346,7 @@ fn refit(
     let same = |candidate: &Candidate| {
         candidate.id == effect.candidate.id
             && candidate.choice == effect.candidate.choice
+            && has_shape_of(&effect.candidate, candidate)
             && thresholds.passes(effect.detector, candidate, true)
     };
     let found = said_by(effect.detector, &evidence).into_iter().filter(same);
@@ -372,6 +375,10 @@ impl Evidence {
             Correction::Inverse(undo, volume) => {
                 undo(&mut self.cube);
                 self.inverses.push((undo.clone(), volume.clone()));
+            }
+            Correction::Emptied(undo, cells) => {
+                undo(&mut self.cube);
+                self.emptied.push(cells.clone());
             }
             Correction::Followed(correction, course) => {
                 self.correct(correction);

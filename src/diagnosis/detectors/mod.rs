@@ -1,7 +1,9 @@
 //! Detectors: one file per family of effects, each of which tests the evidence and returns its candidates.
 
+mod azimuth;
 pub mod broadband;
 pub mod body_worn;
+mod cfar;
 pub mod climb;
 pub mod clutter;
 pub mod codes;

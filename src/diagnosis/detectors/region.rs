@@ -1,11 +1,14 @@
 //! A region of ranges and Doppler frequencies, and what moves in it taken out of the samples.
 
+use std::sync::Arc;
+
 use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::diagnosis::Evidence;
 use crate::diagnosis::cube::Cube;
-use crate::diagnosis::finding::Correction;
+use crate::diagnosis::evidence::hann;
+use crate::diagnosis::finding::{Correction, Emptied};
 
 /// Bins (not whole numbers, ends included) that may be negative: an interval around the zero frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,7 +93,25 @@ pub fn joined(cube: &Cube, clutter: &[Complex64], frames: std::ops::Range<usize>
 /// Takes a region out of the samples, as they are then.
 pub fn removal(evidence: &Evidence, run: usize, region: Region) -> Correction {
     let training = evidence.split.training.clone();
-    Correction::samples(move |cube| remove(cube, &training, run, region))
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let (fast, slow) = (tones(samples, region.range), tones(run * loops, region.doppler));
+    // Over the frames that are transformed as one.
+    let of_frame = |frame: usize| shares(&slow, frame * loops, loops);
+    let mean = |sum: Vec<f64>, own: Vec<f64>| sum.iter().zip(own).map(|(sum, own)| sum + own / run as f64).collect();
+    let doppler = (0..run).map(of_frame).fold(vec![0.0; loops], mean);
+    let emptied = Emptied { doppler, range: shares(&fast, 0, samples) };
+    Correction::Emptied(Arc::new(move |cube| remove(cube, &training, run, region)), Arc::new(emptied))
+}
+
+/// Share of each bin under a Hann window, of some samples in a row, that lies in a basis.
+fn shares(basis: &[Vec<Complex64>], first: usize, length: usize) -> Vec<f64> {
+    let window = hann(length);
+    let of_bin = |bin: usize| {
+        let tone = |n: usize| Complex64::cis(std::f64::consts::TAU * (bin * n % length) as f64 / length as f64) * window[n];
+        let within = |vector: &Vec<Complex64>| (0..length).map(|n| vector[first + n].conj() * tone(n)).sum::<Complex64>();
+        basis.iter().map(|vector| within(vector).norm_sqr()).sum()
+    };
+    (0..length).map(of_bin).collect()
 }
 
 /// Subtracts from every run of frames what deviates, within the region, from static clutter over the training frames.
@@ -165,6 +186,22 @@ mod tests {
         // The basis holds tones between bins, whose side lobes reach far.
         assert!(left(30.0, -3.0) > 0.97, "{}", left(30.0, -3.0));
         assert!(left(10.0, 5.0) > 0.9, "{}", left(10.0, 5.0));
+    }
+
+    #[test]
+    fn cells_that_are_taken_out_have_lost_their_noise_and_others_have_not() {
+        let of_run = |run: usize| {
+            let (loops, samples) = (16, 64);
+            let tones = tones(run * loops, [3.0 * run as f64, 6.0 * run as f64]);
+            let mean = (0..run).map(|frame| shares(&tones, frame * loops, loops));
+            let slow = mean.fold(vec![0.0; loops], |sum, own| sum.iter().zip(own).map(|(a, b)| a + b / run as f64).collect());
+            (slow, shares(&super::tones(samples, [10.0, 13.0]), 0, samples))
+        };
+        for run in [1, 4] {
+            let (slow, fast) = of_run(run);
+            assert!(slow[4] > 0.99 && slow[5] > 0.99 && fast[11] > 0.99, "{run}: {slow:?}");
+            assert!(slow[12] < 0.05 && fast[30] < 0.05, "{run}: {slow:?}");
+        }
     }
 
     #[test]

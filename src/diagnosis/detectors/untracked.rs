@@ -9,6 +9,8 @@ use std::collections::HashSet;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::azimuth::{Azimuth, azimuth};
+use super::cfar;
 use super::receiver::wandering;
 use super::region::{CLUTTER_BINS, Region, joined, mean_power, moves, power_gain, removal, run};
 use crate::diagnosis::behaviour::Behaviour;
@@ -21,18 +23,18 @@ use crate::effects::{self, Stage};
 const HEIGHT: f64 = 0.3;
 /// Nearer ones belong to leakage, offsets and low-frequency noise.
 const NEAREST_BIN: usize = 3;
-/// Factor by which a mover's cell must exceed the median over velocities.
+/// Factor by which a mover's cell must exceed the median over velocities: a floor is no more even than that.
 const ABOVE_FLOOR: f64 = 4.0;
+/// Chance, over all cells, at which a cell of the floor stands out of it as much.
+const OF_FLOOR: f64 = 0.01;
 /// Power over the noise of a mover beside one that was found already: what its removal leaves is less.
 const BESIDE_ANOTHER: f64 = 100.0;
-/// A mover's cells are those above this, over the noise.
+/// A mover's cells are those above this, over their range's floor.
 const FAINTEST: f64 = 6.3;
 /// A body's echoes and their first detours end here, m.
 const REACH_M: f64 = 1.2;
 /// Range bins between them that may be empty.
 const LARGEST_GAP: usize = 3;
-/// Directions that are tried, in sines of the azimuth.
-const DIRECTIONS: usize = 181;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.body.is_some() {
@@ -76,23 +78,28 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
 fn peak(evidence: &Evidence, mean: &[f64]) -> Option<usize> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let bins = evidence.range_bins();
-    let moving = |doppler: usize| moves(doppler, loops);
-    let mut column: Vec<f64> = vec![];
+    let moving: Vec<usize> = (0..loops).filter(|&doppler| moves(doppler, loops)).collect();
     // A floor over all velocities is the modulation of something strong, no mover.
-    let floor: Vec<f64> = (0..bins)
-        .map(|r| {
-            column.clear();
-            column.extend((0..loops).filter(|&d| moving(d)).map(|d| mean[d * samples + r]));
-            statistics::median(&mut column)
-        })
-        .collect();
-    let candidates: Vec<usize> = (0..loops)
-        .filter(|&d| moving(d))
-        .flat_map(|d| (NEAREST_BIN..bins).map(move |r| (d, r)))
-        .filter(|&(d, r)| mean[d * samples + r] > ABOVE_FLOOR * floor[r])
+    let floor: Vec<f64> = (0..bins).map(|r| floor(evidence, mean, r, 1)).collect();
+    let (frames, channels) = (evidence.split.training.len() as f64, evidence.cube.channels() as f64);
+    let law = cfar::Cells { frames, channels, values: (moving.len() as f64 / cfar::BINS_PER_VALUE).max(1.0) };
+    let tried = (bins * moving.len()) as f64;
+    let stands_out =
+        |power: f64, floor: f64| power > ABOVE_FLOOR * floor && statistics::corrected(law.tail(power, floor), tried) < OF_FLOOR;
+    let candidates: Vec<usize> = (moving.iter())
+        .flat_map(|&d| (NEAREST_BIN..bins).map(move |r| (d, r)))
+        .filter(|&(d, r)| stands_out(mean[d * samples + r], floor[r]))
         .map(|(d, r)| d * samples + r)
         .collect();
     candidates.iter().copied().max_by(|&a, &b| mean[a].total_cmp(&mean[b]))
+}
+
+/// Median of a map, `doppler · samples + range`, of so many frames as one, over what moves at a range and is there still.
+fn floor(evidence: &Evidence, map: &[f64], range: usize, run: usize) -> f64 {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    let is_there = |doppler: &usize| moves(*doppler, run * loops) && !evidence.is_emptied(doppler / run, range);
+    let there = (0..run * loops).filter(is_there);
+    statistics::median(&mut there.map(|doppler| map[doppler * samples + range]).collect::<Vec<f64>>())
 }
 
 /// A mover in the longest stretch without a gap.
@@ -164,10 +171,24 @@ impl<'a> Mover<'a> {
         let centre = top[1] as f64 + stretch.summit(top, [0, 1]);
         let range_m = centre * bin_m;
         let velocity_mps = (top[0] as f64 + stretch.summit(top, [1, 0])) * bin_mps;
-        let azimuth = azimuth_deg(evidence, stretch, top);
-        let direction = azimuth.map_or(String::new(), |(a, _)| format!(", {a:+.0}° to the side"));
-        let estimates = azimuth.map_or(vec![], |(a, deviation)| {
-            let (s, c) = a.to_radians().sin_cos();
+        let place = Place {
+            range_m: Some([(ranges[0] - 0.5).max(0.0) * bin_m, (ranges[1] + 0.5) * bin_m]),
+            velocity_mps: Some([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps]),
+            ..Place::at(Stage::Scene)
+        };
+        // On the flank of what is slower, nothing says how slow.
+        let slower = (dopplers[0].abs().max(dopplers[1].abs()) + 0.5) * bin_mps;
+        let (place, motion) = if stretch.is_flank(top) {
+            (Place { velocity_mps: Some([-slower, slower]), ..place }, format!("more slowly than {slower:.2} m/s"))
+        } else {
+            (place, format!("with {velocity_mps:+.2} m/s"))
+        };
+        let snapshots: Vec<Vec<Complex64>> =
+            stretch.maps.iter().map(|channels| channels.iter().map(|map| map[stretch.index(top)]).collect()).collect();
+        let azimuth = azimuth(evidence, &snapshots, top[0] as f64 / stretch.loops as f64);
+        let direction = azimuth.map_or(String::new(), |azimuth| format!(", {:+.0}° to the side", azimuth.degrees));
+        let estimates = azimuth.map_or(vec![], |Azimuth { degrees, deviation }| {
+            let (s, c) = degrees.to_radians().sin_cos();
             let across = range_m * deviation.to_radians();
             vec![Estimate::list(
                 "position_m",
@@ -176,17 +197,14 @@ impl<'a> Mover<'a> {
             )]
         });
         let place = Place {
-            range_m: Some([(ranges[0] - 0.5).max(0.0) * bin_m, (ranges[1] + 0.5) * bin_m]),
-            velocity_mps: Some([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps]),
-            azimuth_deg: azimuth.map(|(a, d)| [a - 2.0 * d, a + 2.0 * d]),
-            ..Place::at(Stage::Scene)
+            azimuth_deg: azimuth.map(|Azimuth { degrees, deviation }| [degrees - 2.0 * deviation, degrees + 2.0 * deviation]),
+            ..place
         };
         Candidate {
             id: Some(effects::moving_reflector::ID),
             estimates,
             statement: format!(
-                "Something moves at {range_m:.2} m with {velocity_mps:+.2} m/s along the line of sight{direction}, {decibel:.0} dB \
-                 above the noise, and nobody is tracked there."
+                "Something moves at {range_m:.2} m {motion} along the line of sight{direction}, {decibel:.0} dB above the noise, and nobody is tracked there."
             ),
             energy: self.energy(),
             correction: removal(evidence, run, self.cut()),
@@ -203,6 +221,8 @@ struct Stretch {
     maps: Vec<Vec<Vec<Complex64>>>,
     /// Mean over runs and channels, over the noise.
     power: Vec<f64>,
+    /// Median over velocities by range, and no less than the noise.
+    floor: Vec<f64>,
 }
 
 type Cell = [i64; 2];
@@ -227,7 +247,10 @@ impl Stretch {
                 power.iter_mut().zip(map).for_each(|(sum, value)| *sum += weight * value.norm_sqr());
             }
         }
-        Self { loops: run * loops, samples, maps, power }
+        let loops = run * loops;
+        let floor = |r: usize| floor(evidence, &power, r, run).max(1.0);
+        let floor = (0..samples).map(floor).collect();
+        Self { loops, samples, maps, power, floor }
     }
 
     fn index(&self, [doppler, range]: Cell) -> usize {
@@ -253,6 +276,17 @@ impl Stretch {
             .unwrap_or([doppler, range])
     }
 
+    /// Whether the power at the edge of static clutter rises towards it.
+    fn is_flank(&self, [doppler, range]: Cell) -> bool {
+        let nearer = [doppler - doppler.signum(), range];
+        !self.moves(nearer[0], doppler.signum()) && self.at(nearer) > self.at([doppler, range])
+    }
+
+    /// By how many times it exceeds its range's floor.
+    fn above(&self, cell: Cell) -> f64 {
+        self.at(cell) / self.floor[cell[1].rem_euclid(self.samples as i64) as usize]
+    }
+
     /// Cells that hang together with the peak, nearly, and move the same way.
     fn around(&self, top: Cell, sign: i64, reach: i64, bins: usize) -> Vec<Cell> {
         let mut region = vec![top];
@@ -264,7 +298,7 @@ impl Stretch {
             next += 1;
             for cell in (-1..=1).flat_map(|i| (-gap..=gap).map(move |j| [d + i, r + j])) {
                 let near = (cell[1] - top[1]).abs() <= reach && cell[1] >= NEAREST_BIN as i64 && cell[1] < bins as i64;
-                if near && self.moves(cell[0], sign) && self.at(cell) > FAINTEST && known.insert(cell) {
+                if near && self.moves(cell[0], sign) && self.above(cell) > FAINTEST && known.insert(cell) {
                     region.push(cell);
                 }
             }
@@ -281,51 +315,6 @@ impl Stretch {
     }
 }
 
-/// Azimuth and the deviation of its error; none where the array has no width, or is not one line across.
-fn azimuth_deg(evidence: &Evidence, stretch: &Stretch, top: Cell) -> Option<(f64, f64)> {
-    let receivers = evidence.cube.dims[2];
-    let radar = &evidence.radar;
-    let channels = evidence.cube.channels();
-    let wavelength = radar.wavelength_m();
-    // Distance across of each virtual antenna, and how far the mover has gone when its transmitter's turn comes.
-    let across: Vec<f64> = (0..channels).map(|c| radar.tx_m[c / receivers][0] + radar.rx_m[c % receivers][0]).collect();
-    let turn = |c: usize| top[0] as f64 / stretch.loops as f64 * (c / receivers) as f64 / radar.tx_m.len() as f64;
-    let mean = across.iter().sum::<f64>() / channels as f64;
-    let spread = (across.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / channels as f64).sqrt();
-    if spread < 0.1 * wavelength {
-        return None;
-    }
-    let cell = stretch.index(top);
-    let values: Vec<Vec<Complex64>> =
-        stretch.maps.iter().map(|channels| channels.iter().map(|map| map[cell]).collect()).collect();
-    let power = |sine: f64| -> f64 {
-        values
-            .iter()
-            .map(|channel| {
-                channel
-                    .iter()
-                    .enumerate()
-                    .map(|(c, v)| v * Complex64::cis(std::f64::consts::TAU * (across[c] * sine / wavelength - turn(c))))
-                    .sum::<Complex64>()
-                    .norm_sqr()
-            })
-            .sum()
-    };
-    let sine = |i: usize| -0.95 + 1.9 * i as f64 / (DIRECTIONS - 1) as f64;
-    let best = (0..DIRECTIONS).max_by(|&a, &b| power(sine(a)).total_cmp(&power(sine(b))))?;
-    let total: f64 = values.iter().flatten().map(|v| v.norm_sqr()).sum::<f64>() * channels as f64;
-    // Not one direction: several movers, or an array that is not calibrated.
-    if power(sine(best)) < 0.5 * total {
-        return None;
-    }
-    let noise = evidence.total_noise() / channels as f64;
-    let ratio = (total / channels as f64 / noise).max(1.0);
-    let deviation = wavelength / (std::f64::consts::TAU * spread) / (2.0 * ratio).sqrt();
-    let azimuth = sine(best).asin();
-    // An uncalibrated array errs by degrees.
-    Some((azimuth.to_degrees(), (deviation / azimuth.cos()).to_degrees().max(2.0)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -335,6 +324,11 @@ mod tests {
 
     /// Four blocks of one long frame; movers as (range bin, Doppler bin of the long frame, sine of the azimuth, amplitude).
     fn evidence(movers: &[(f64, f64, f64, f64)]) -> Evidence {
+        shaken(movers, 3, 0.0)
+    }
+
+    /// The same where the phase of all that is received is drawn anew for every chirp, with this standard deviation.
+    fn shaken(movers: &[(f64, f64, f64, f64)], seed: u64, deviation: f64) -> Evidence {
         let (blocks, loops, samples) = (4, 16, 64);
         let mut radar = Radar::small(blocks);
         radar.loops_per_frame = loops;
@@ -342,19 +336,21 @@ mod tests {
         radar.frame_period_s = loops as f64 * radar.loop_period_s();
         let dims = radar.dims();
         let wavelength = radar.wavelength_m();
-        let mut normal = support::normal(3);
+        let mut normal = support::normal(seed);
+        let phases: Vec<f64> = (0..blocks * loops * dims[1]).map(|_| deviation * normal()).collect();
         let mut values = vec![];
         for (frame, tx, rx) in (0..blocks).flat_map(|f| (0..dims[1]).flat_map(move |t| (0..dims[2]).map(move |r| (f, t, r)))) {
             let across = radar.tx_m[tx][0] + radar.rx_m[rx][0];
             for (l, n) in (0..loops).flat_map(|l| (0..samples).map(move |n| (l, n))) {
                 let turn = tx as f64 / dims[1] as f64 + (frame * loops + l) as f64;
-                let mut value = Complex64::new(normal(), normal()) * 0.5f64.sqrt() + Complex64::from_polar(50.0, 0.4 * n as f64);
+                let mut value = Complex64::from_polar(50.0, 0.4 * n as f64);
                 for &(range, doppler, sine, amplitude) in movers {
                     let turns =
                         range * n as f64 / samples as f64 + doppler * turn / (blocks * loops) as f64 - across * sine / wavelength;
                     value += Complex64::from_polar(amplitude, std::f64::consts::TAU * turns);
                 }
-                values.push(value);
+                let noise = Complex64::new(normal(), normal()) * 0.5f64.sqrt();
+                values.push(value * Complex64::cis(phases[(frame * loops + l) * dims[1] + tx]) + noise);
             }
         }
         let starts_s = (0..blocks).map(|block| block as f64 * radar.frame_period_s).collect();
@@ -382,5 +378,16 @@ mod tests {
     fn nobody_is_seen_in_a_static_room() {
         let found = find(&evidence(&[]));
         assert!(found.iter().all(|candidate| candidate.p_value > 5e-4), "{found:?}");
+    }
+
+    /// Its Doppler sidelobes are static clutter's, as those of a few chirps are uneven.
+    #[test]
+    fn nobody_is_seen_where_phases_are_random_from_chirp_to_chirp() {
+        for seed in 0..20 {
+            let found = find(&shaken(&[], seed, 0.2));
+            assert!(found.is_empty(), "{seed}: {found:?}");
+        }
+        let found = find(&shaken(&[(20.3, 5.0, -0.1, 60.0)], 3, 0.05));
+        assert_eq!(found.len(), 1);
     }
 }

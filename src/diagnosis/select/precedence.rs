@@ -2,7 +2,7 @@
 
 use super::NEARLY;
 use super::said::said_by;
-use crate::diagnosis::course::Of;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction};
 use crate::diagnosis::misfit::Misfit;
@@ -11,6 +11,9 @@ use crate::effects::{self, Stage};
 
 /// What never changes and may be a return or added behind the mixer: what turns all returns distinguishes the two, and goes first.
 const ADDED: [&str; 3] = [effects::tx_leakage::ID, effects::dc_offset::ID, effects::static_reflector::ID];
+
+/// What all that is received does over time.
+const COURSES: [Behaviour; 3] = [Behaviour::SlowTimeGain, Behaviour::SlowTimePhase, Behaviour::DelayProportionalPhase];
 
 /// Stages of the signal's chain at which everything that is received is changed.
 const UPSTREAM: [Stage; 2] = [Stage::Waveform, Stage::Receiver];
@@ -29,6 +32,16 @@ fn is_on_all(candidate: &Candidate, evidence: &Evidence) -> bool {
             || candidate.place.stage.is_some_and(|stage| UPSTREAM.contains(&stage)))
 }
 
+/// Whether it is a gain or a phase over time of all that is received.
+pub(super) fn is_course_of_all(candidate: &Candidate) -> bool {
+    COURSES.contains(&candidate.behaves_like) && candidate.place.range_m.is_none()
+}
+
+/// Whether it is one of what never changes.
+pub(super) fn is_added(candidate: &Candidate) -> bool {
+    candidate.id.is_some_and(|id| ADDED.contains(&id))
+}
+
 /// Whether it may be something else's echoes of the body.
 pub(super) fn is_echo(candidate: &Candidate) -> bool {
     candidate.behaves_like.is_path() || is_rough(candidate)
@@ -42,9 +55,9 @@ pub(super) fn upstream<'a>(
     best: &'a (usize, Candidate),
     passing: &[&'a (usize, Candidate)],
 ) -> &'a (usize, Candidate) {
-    let turns_all = |(_, candidate): &&&(usize, Candidate)| matches!(&candidate.correction, Correction::Followed(_, course) if course.of == Of::All);
-    if ADDED.iter().any(|id| best.1.id == Some(id))
-        && let Some(course) = passing.iter().filter(turns_all).max_by(|a, b| a.1.nats.total_cmp(&b.1.nats))
+    if is_added(&best.1)
+        && let Some(course) =
+            passing.iter().filter(|(_, other)| is_course_of_all(other)).max_by(|a, b| a.1.nats.total_cmp(&b.1.nats))
     {
         return course;
     }

@@ -11,20 +11,24 @@ use rayon::prelude::*;
 
 use super::burst::Burst;
 use super::crossings::{self, Crossings};
+use super::levels::Levels;
 use super::support::energy;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::detectors::description::Description;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, OfSample, Place};
-use crate::diagnosis::statistics::{corrected, median};
+use crate::diagnosis::statistics::{corrected, fisher_tail, median, poisson_tail};
 use crate::diagnosis::{Cube, Evidence, Volume};
 use crate::effects::{Stage, adc_saturation, impulsive_noise, interference};
 
-/// A sample's power over that of its surroundings, beyond which it is a burst's: e^−25 for noise.
+/// A sample's power over that of its surroundings, beyond which it is a burst's: e^−25 for noise of a known power.
 const HIGH: f64 = 25.0;
 /// Chance above which crossings that no single sample shows are none.
 const LEAST_LIKELY: f64 = 1e-3;
 /// For each crossing that hardly stands out there may be so many that do not.
 const UNSEEN: f64 = 5.0;
+/// Degrees of freedom of a median of powers, for each chirp: 2 ln² 2 for one that is independent, and those of differences to the mean of
+/// both neighbours have correlations of 4/9 and 1/36.
+const MEDIAN_FREEDOM: f64 = 0.494;
 /// Samples next to it that count once it is known to be hit.
 const NEXT: f64 = 6.0;
 
@@ -36,11 +40,10 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         return vec![];
     }
     let channels = evidence.cube.channels();
-    let mut bursts: Vec<Burst> = (0..frames * channels)
+    let (mut bursts, chances): (Vec<Burst>, Vec<f64>) = (0..frames * channels)
         .into_par_iter()
         .flat_map_iter(|index| of_channel(evidence, index / channels, index % channels))
-        .collect();
-    let strong = bursts.len();
+        .unzip();
     let crossings = crossings::find(evidence).filter(|crossings| crossings.p_value < LEAST_LIKELY);
     if let Some(crossings) = &crossings {
         // What one channel shows on its own has its extent from there.
@@ -53,7 +56,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if bursts.is_empty() || hit as f64 > 0.05 * total {
         return vec![];
     }
-    let alone = corrected((-HIGH * strong as f64).exp(), total);
+    let alone = chance_of_all(chances, total);
     let p_value = crossings.as_ref().map_or(alone, |crossings| alone.min(crossings.p_value));
     let powers: Vec<Vec<f64>> = bursts.iter().map(|burst| powers(&evidence.cube, burst)).collect();
     let (mut nats, mut removed) = (0.0, 0.0);
@@ -196,7 +199,17 @@ fn difference(signal: &[Complex64], chirp: usize, loops: usize, samples: usize) 
         .collect()
 }
 
-fn of_channel(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Burst> {
+/// Chance that some of `total` samples without bursts stand out as much, from the chance of each that does: that as many of them or more do
+/// as much or more as the k-th, over all k (Poisson's law; Bonferroni).
+fn chance_of_all(mut chances: Vec<f64>, total: f64) -> f64 {
+    chances.sort_by(f64::total_cmp);
+    let of_first = |(index, chance): (usize, &f64)| poisson_tail(index + 1, total * chance);
+    let least = chances.iter().enumerate().map(of_first).fold(1.0, f64::min);
+    corrected(least, chances.len() as f64)
+}
+
+/// With the chance of each that noise stands out as much.
+fn of_channel(evidence: &Evidence, frame: usize, channel: usize) -> Vec<(Burst, f64)> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let signal = evidence.cube.channel(frame, channel);
     let differences: Vec<Vec<Complex64>> = (0..loops).map(|chirp| difference(signal, chirp, loops, samples)).collect();
@@ -208,6 +221,7 @@ fn of_channel(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Burst> {
             median(&mut powers) / std::f64::consts::LN_2
         })
         .collect();
+    let Levels { values: usual, freedom } = Levels::of(&usual, MEDIAN_FREEDOM * loops as f64);
     let mut bursts = vec![];
     for chirp in 0..loops {
         let ends = if chirp == 0 || chirp + 1 == loops { 4.0 } else { 1.0 };
@@ -229,7 +243,8 @@ fn of_channel(evidence: &Evidence, frame: usize, channel: usize) -> Vec<Burst> {
                 let here = energy(&differences[chirp][first..=last]);
                 let strongest = [a, b].iter().all(|&other| here >= energy(&differences[other][first..=last]));
                 if strongest {
-                    bursts.push(Burst { frame, channel, chirp, first, last });
+                    let highest = powers[first..=last].iter().copied().fold(0.0, f64::max);
+                    bursts.push((Burst { frame, channel, chirp, first, last }, fisher_tail(highest, 2.0, freedom)));
                 }
                 n = last;
             }
@@ -297,6 +312,16 @@ mod tests {
         // them through three times.
         let price = clean - after;
         assert!((price - 0.135).abs() < 0.02, "{price}");
+    }
+
+    #[test]
+    fn one_sample_of_many_that_stands_out_a_little_is_no_burst() {
+        let total = 3e5;
+        assert!(chance_of_all(vec![fisher_tail(30.0, 2.0, 20.0)], total) > 0.1);
+        assert!(chance_of_all(vec![fisher_tail(30.0, 2.0, 1e4)], total) < 1e-6);
+        // Where others stand out as much it is the less likely.
+        let [one, many] = [1, 40].map(|count| chance_of_all(vec![fisher_tail(30.0, 2.0, 30.0); count], total));
+        assert!(one > 1e-3 && many < 1e-12, "{one} {many}");
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod elements;
 pub mod field;
 mod filters;
 pub mod harmonic;
+mod levels;
 mod line;
 pub mod noise;
 pub mod open;

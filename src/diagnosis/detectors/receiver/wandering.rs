@@ -17,7 +17,7 @@ use crate::grid::Grid;
 
 /// Fewest loops and training frames that show a Doppler frequency and a way.
 const FEWEST_LOOPS: usize = 8;
-const FEWEST_FRAMES: usize = 4;
+const FEWEST_FRAMES: usize = 3;
 /// Chance at which what lies at the opposite Doppler frequency is no noise.
 const OPPOSITE: f64 = 1e-3;
 /// Share of the power at its range that a tone may leave: as in `spur`.

@@ -1,0 +1,37 @@
+//! How the noise is shaped over the beat frequency.
+
+use rayon::prelude::*;
+
+use super::Evidence;
+use crate::diagnosis::statistics;
+use crate::grid::Grid;
+
+/// Neighbouring range bins over which the noise's shape is taken together.
+const SHAPE_BINS: usize = 5;
+/// Ratio to the mean from which on the noise counts as shaped.
+const SHAPED: f32 = 1.3;
+
+/// The noise's variance in each range bin over its mean; `None` where it is flat.
+pub(super) fn noise_shape(evidence: &Evidence, maps: &Grid<f32, 3>) -> Option<Vec<f32>> {
+    let [_, loops, samples] = maps.shape();
+    let rows: Vec<usize> = (0..loops).filter(|&doppler| doppler.min(loops - doppler) > 2 || loops < 8).collect();
+    let level = |range: usize| {
+        let left = || rows.iter().filter(|&&doppler| !evidence.is_emptied(doppler, range));
+        let of_frame = |&frame: &usize| left().map(move |&doppler| f64::from(maps[[frame, doppler, range]]));
+        let mut values: Vec<f64> = evidence.split.training.iter().flat_map(of_frame).collect();
+        let index = ((values.len().max(1) - 1) as f64 * 0.35) as usize;
+        (!values.is_empty()).then(|| *values.select_nth_unstable_by(index, f64::total_cmp).1)
+    };
+    let levels: Vec<Option<f64>> = (0..samples).into_par_iter().map(level).collect();
+    let known = |levels: &[Option<f64>]| levels.iter().flatten().copied().collect::<Vec<f64>>();
+    let middle = statistics::median(&mut known(&levels[..evidence.range_bins()])).max(f64::MIN_POSITIVE);
+    let smooth: Vec<f32> = (0..samples)
+        .map(|range| {
+            let near = (0..SHAPE_BINS).map(|i| levels[(range + samples + i - SHAPE_BINS / 2) % samples]);
+            let mut near = known(&near.collect::<Vec<_>>());
+            // Where nothing is left nothing is known.
+            if near.is_empty() { 1.0 } else { (statistics::median(&mut near) / middle).max(1e-6) as f32 }
+        })
+        .collect();
+    smooth[..evidence.range_bins()].iter().any(|shape| !(1.0 / SHAPED..SHAPED).contains(shape)).then_some(smooth)
+}
