@@ -19,7 +19,7 @@ use super::course::Course;
 #[cfg(test)]
 use super::cube;
 use super::cube::{Cube, Loaded, Split};
-use super::finding::{Emptied, Undo, Volume};
+use super::finding::{Cells, Undo, Volume};
 use super::prediction::BodyPrediction;
 use super::statistics;
 use crate::diagnosis::behaviour::Behaviour;
@@ -56,7 +56,7 @@ pub struct Evidence {
     /// What of it undid a fixed law of the samples, oldest first.
     pub(super) inverses: Vec<(Undo, Volume)>,
     /// Cells of the maps that were taken out of the samples.
-    pub(super) emptied: Vec<Arc<Emptied>>,
+    pub(super) emptied: Vec<Cells>,
     /// Phases over time of what was accepted, oldest first.
     pub courses: Vec<Arc<Course>>,
     pub extremes: [f64; 2],
@@ -125,7 +125,14 @@ impl Evidence {
 
     /// Whether a cell was taken out of the samples: it says nothing of the noise.
     pub fn is_emptied(&self, doppler: usize, range: usize) -> bool {
-        self.emptied.iter().any(|emptied| emptied.holds(doppler, range))
+        self.emptied.iter().any(|emptied| emptied(doppler, range))
+    }
+
+    /// Doppler bins that say how much noise a range has: beside those that hold what the clutter's mean could not remove.
+    fn of_noise(&self, range: usize) -> impl Iterator<Item = usize> + '_ {
+        let loops = self.cube.dims[3];
+        let beside = move |doppler: &usize| (*doppler).min(loops - doppler) > 2 || loops < 8;
+        (0..loops).filter(beside).filter(move |&doppler| !self.is_emptied(doppler, range))
     }
 
     /// Beat frequencies that mean something: all, or the positive half.
@@ -151,7 +158,7 @@ impl Evidence {
     /// maps, so that movers and lines do not count.
     pub fn noise(&self) -> &[f64] {
         self.once.noise.get_or_init(|| {
-            let [_, _, _, loops, _] = self.cube.dims;
+            let samples = self.cube.dims[4];
             (0..self.cube.channels())
                 .into_par_iter()
                 .map(|channel| {
@@ -161,15 +168,9 @@ impl Evidence {
                         .iter()
                         .flat_map(|&frame| {
                             let map = self.range_doppler(frame, channel);
-                            let bins = self.noise_bins();
-                            let samples = self.cube.dims[4];
-                            // Neighbours of the zero Doppler hold what the mean could not remove.
-                            (0..loops)
-                                .filter(move |&doppler| doppler.min(loops - doppler) > 2 || loops < 8)
-                                .flat_map(move |doppler| bins.clone().map(move |range| (doppler, range)))
-                                .filter(|&(doppler, range)| !self.is_emptied(doppler, range))
-                                .map(move |(doppler, range)| map[doppler * samples + range].norm_sqr())
-                                .collect::<Vec<_>>()
+                            let cells =
+                                self.noise_bins().flat_map(|range| self.of_noise(range).map(move |doppler| (doppler, range)));
+                            cells.map(|(doppler, range)| map[doppler * samples + range].norm_sqr()).collect::<Vec<_>>()
                         })
                         .collect();
                     // Frames without a signal say nothing of the noise.

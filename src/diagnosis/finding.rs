@@ -37,6 +37,13 @@ impl Estimate {
         let ci90 = values.iter().zip(deviations).map(|(value, sigma)| [value - NINETY * sigma, value + NINETY * sigma]).collect();
         Self { name, values: values.to_vec(), ci90 }
     }
+
+    /// Whether another one is the same within twice both 90 % intervals.
+    pub fn agrees(&self, other: &Self) -> bool {
+        let width = |[low, high]: &[f64; 2]| high - low;
+        let apart = self.values.iter().zip(&other.values).map(|(own, other)| (own - other).abs());
+        apart.zip(self.ci90.iter().zip(&other.ci90)).all(|(apart, (own, other))| apart <= width(own) + width(other))
+    }
 }
 
 /// `where` of a report; what is absent was not localised along that axis: the effect acts everywhere on it.
@@ -125,6 +132,9 @@ impl Volume {
     }
 }
 
+/// Whether a cell, Doppler and range, of a frame's maps is one of some.
+pub type Cells = Arc<dyn Fn(usize, usize) -> bool + Send + Sync>;
+
 /// How an accepted effect is taken into account.
 #[derive(Clone)]
 pub enum Correction {
@@ -134,7 +144,7 @@ pub enum Correction {
     /// held out is predicted by it as it is.
     Inverse(Undo, Volume),
     /// Takes cells of the range-Doppler maps out of the samples: there is not even noise left of them.
-    Emptied(Undo, Arc<Emptied>),
+    Emptied(Undo, Cells),
     /// Another correction, after which the phase over time of what it concerned is known.
     Followed(Box<Correction>, Arc<Course>),
     /// Changes what is predicted of the body.
@@ -159,23 +169,6 @@ impl Correction {
             Self::Followed(correction, _) => correction.undo(),
             Self::Body(_) | Self::None => None,
         }
-    }
-}
-
-/// Shares of the noise that were taken out of a frame's bins of Doppler and of range; of a cell their product.
-#[derive(Clone, Debug)]
-pub struct Emptied {
-    pub doppler: Vec<f64>,
-    pub range: Vec<f64>,
-}
-
-/// Share of its noise without which a cell says nothing of it: 1 dB.
-const LOST: f64 = 0.2;
-
-impl Emptied {
-    /// Whether a cell says nothing of the noise any more.
-    pub fn holds(&self, doppler: usize, range: usize) -> bool {
-        self.doppler[doppler] * self.range[range] > LOST
     }
 }
 

@@ -58,20 +58,14 @@ pub fn is_same(accepted: &Candidate, candidate: &Candidate) -> bool {
         })
 }
 
-/// Whether what shapes an effect, such as a frequency, is the same within twice both 90 % intervals: another fit of it, and not another thing
-/// of its name.
+/// Whether what shapes an effect, such as a frequency, is the same: another fit of it, and not another thing of its name.
 pub fn has_shape_of(accepted: &Candidate, candidate: &Candidate) -> bool {
-    let Some(info) = accepted.id.and_then(effects::info) else { return true };
-    let of_name = |of: &Candidate, name: &str| of.estimates.iter().find(|estimate| estimate.name == name).cloned();
-    let shapes = info.parameters.iter().filter(|parameter| parameter.role == effects::Role::Shape);
-    shapes.filter_map(|parameter| Some((of_name(accepted, parameter.name)?, of_name(candidate, parameter.name)?))).all(
-        |(old, new)| {
-            old.values.iter().zip(&old.ci90).zip(new.values.iter().zip(&new.ci90)).all(|((old, before), (new, after))| {
-                let within = |bounds: &[f64; 2]| bounds[1] - bounds[0];
-                (old - new).abs() <= within(before) + within(after)
-            })
-        },
-    )
+    let parameters = accepted.id.and_then(effects::info).map_or(&[][..], |info| info.parameters);
+    let shapes = parameters.iter().filter(|parameter| parameter.role == effects::Role::Shape);
+    let of = |candidate: &Candidate, name: &str| candidate.estimates.iter().position(|estimate| estimate.name == name);
+    shapes
+        .filter_map(|shape| of(accepted, shape.name).zip(of(candidate, shape.name)))
+        .all(|(old, new)| accepted.estimates[old].agrees(&candidate.estimates[new]))
 }
 
 pub fn is_rough(candidate: &Candidate) -> bool {

@@ -14,9 +14,9 @@ use crate::diagnosis::evidence::Evidence;
 /// Directions that are tried, in sines of the azimuth, up to this at either side.
 const DIRECTIONS: usize = 181;
 const WIDEST: f64 = 0.95;
-/// Draws of random phases, and the share of them that may fit a direction as well.
+/// Draws of random phases, and how many of them may not fit a direction as well: one in a hundred.
 const DRAWS: usize = 400;
-const BY_CHANCE: f64 = 0.01;
+const BY_CHANCE: usize = 4;
 /// Share of the power that one direction must have: less is of several movers.
 const MOST: f64 = 0.5;
 /// Of phases of a calibrated array's channels: its direction errs by degrees.
@@ -29,9 +29,11 @@ pub struct Azimuth {
     pub deviation: f64,
 }
 
-/// Powers of all directions, `[direction][channel]` their phases and `[channel, channel]` the covariance.
+/// Powers of all directions.
 struct Beams {
+    /// `[direction][channel]`
     steering: Vec<Vec<Complex64>>,
+    /// `[channel][channel]`
     covariance: Vec<Vec<Complex64>>,
 }
 
@@ -90,7 +92,7 @@ pub fn azimuth(evidence: &Evidence, snapshots: &[Vec<Complex64>], turns_per_loop
     let mut random = ChaCha8Rng::seed_from_u64(channels as u64);
     let mut fits =
         || beams.best(&(0..channels).map(|_| Complex64::cis(TAU * random.random::<f64>())).collect::<Vec<_>>()).1 >= share;
-    if (0..DRAWS).filter(|_| fits()).count() as f64 >= BY_CHANCE * DRAWS as f64 {
+    if (0..DRAWS).filter(|_| fits()).nth(BY_CHANCE - 1).is_some() {
         return None;
     }
     let power: f64 = snapshots.iter().flatten().map(Complex64::norm_sqr).sum();

@@ -1,14 +1,14 @@
 //! A region of ranges and Doppler frequencies, and what moves in it taken out of the samples.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::diagnosis::Evidence;
 use crate::diagnosis::cube::Cube;
-use crate::diagnosis::evidence::hann;
-use crate::diagnosis::finding::{Correction, Emptied};
+use crate::diagnosis::evidence::spectrum;
+use crate::diagnosis::finding::Correction;
 
 /// Bins (not whole numbers, ends included) that may be negative: an interval around the zero frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +37,8 @@ pub fn power_gain(evidence: &Evidence, frame: usize, cell: usize, expected: f64)
     evidence.cube.channels() as f64 * (power * (1.0 - 1.0 / expected) - expected.ln())
 }
 
+/// Share of its noise without which a cell says nothing of it: 1 dB.
+const LOST: f64 = 0.2;
 /// Bins beyond an interval's ends that its tones may leak into.
 const MARGIN: f64 = 0.5;
 
@@ -94,39 +96,52 @@ pub fn joined(cube: &Cube, clutter: &[Complex64], frames: std::ops::Range<usize>
 pub fn removal(evidence: &Evidence, run: usize, region: Region) -> Correction {
     let training = evidence.split.training.clone();
     let [_, _, _, loops, samples] = evidence.cube.dims;
-    let (fast, slow) = (tones(samples, region.range), tones(run * loops, region.doppler));
-    // Over the frames that are transformed as one.
-    let of_frame = |frame: usize| shares(&slow, frame * loops, loops);
-    let mean = |sum: Vec<f64>, own: Vec<f64>| sum.iter().zip(own).map(|(sum, own)| sum + own / run as f64).collect();
-    let doppler = (0..run).map(of_frame).fold(vec![0.0; loops], mean);
-    let emptied = Emptied { doppler, range: shares(&fast, 0, samples) };
-    Correction::Emptied(Arc::new(move |cube| remove(cube, &training, run, region)), Arc::new(emptied))
+    // Not before it is accepted, and then once.
+    let tones = Arc::new(LazyLock::new(move || Tones::new([loops, samples], run, region)));
+    let emptied = tones.clone();
+    let holds = move |doppler: usize, range: usize| emptied.doppler[doppler] * emptied.range[range] > LOST;
+    Correction::Emptied(Arc::new(move |cube| remove(cube, &training, run, &tones)), Arc::new(holds))
 }
 
-/// Share of each bin under a Hann window, of some samples in a row, that lies in a basis.
-fn shares(basis: &[Vec<Complex64>], first: usize, length: usize) -> Vec<f64> {
-    let window = hann(length);
-    let of_bin = |bin: usize| {
-        let tone = |n: usize| Complex64::cis(std::f64::consts::TAU * (bin * n % length) as f64 / length as f64) * window[n];
-        let within = |vector: &Vec<Complex64>| (0..length).map(|n| vector[first + n].conj() * tone(n)).sum::<Complex64>();
-        basis.iter().map(|vector| within(vector).norm_sqr()).sum()
-    };
-    (0..length).map(of_bin).collect()
+/// Orthonormal bases of a region's tones along both axes, `[vector][sample]`, and what they hold of each bin of a frame's maps.
+struct Tones {
+    fast: Vec<Vec<Complex64>>,
+    slow: Vec<Vec<Complex64>>,
+    /// Share of the noise.
+    doppler: Vec<f64>,
+    range: Vec<f64>,
+}
+
+impl Tones {
+    fn new([loops, samples]: [usize; 2], run: usize, region: Region) -> Self {
+        let (fast, slow) = (tones(samples, region.range), tones(run * loops, region.doppler));
+        let range = shares(&fast, samples);
+        let doppler = shares(&slow, loops).into_iter().map(|sum| sum / run as f64).collect();
+        Self { fast, slow, doppler, range }
+    }
+}
+
+/// Of each bin under a Hann window over some samples, the share that lies in a basis; the sum over all stretches of so many.
+fn shares(basis: &[Vec<Complex64>], length: usize) -> Vec<f64> {
+    let mut sum = vec![0.0; length];
+    for stretch in basis.iter().flat_map(|vector| vector.chunks_exact(length)) {
+        sum.iter_mut().zip(spectrum(stretch)).for_each(|(sum, value)| *sum += value.norm_sqr());
+    }
+    sum
 }
 
 /// Subtracts from every run of frames what deviates, within the region, from static clutter over the training frames.
 /// That is the mean of the cube at hand: other static returns may have been subtracted or may not.
-fn remove(cube: &mut Cube, training: &[usize], run: usize, region: Region) {
+fn remove(cube: &mut Cube, training: &[usize], run: usize, tones: &Tones) {
     let [frames, _, _, loops, samples] = cube.dims;
     let channels = cube.channels();
     let clutter = cube.clutter(training);
-    let (fast, slow) = (tones(samples, region.range), tones(run * loops, region.doppler));
     let parts: Vec<(usize, usize)> = (0..frames / run).flat_map(|part| (0..channels).map(move |c| (part, c))).collect();
     let found: Vec<Vec<Complex64>> = parts
         .par_iter()
         .map(|&(part, channel)| {
             let moving = joined(cube, &clutter, part * run..(part + 1) * run, channel);
-            within(&moving, samples, &fast, &slow)
+            within(&moving, samples, &tones.fast, &tones.slow)
         })
         .collect();
     cube.each_chirp(|[frame, channel, index], chirp| {
@@ -179,7 +194,7 @@ mod tests {
             values.extend(vec![Complex64::ZERO; loops * samples]);
             // The second frame alone is for training: there is no static clutter.
             let mut cube = Cube::new([2, 1, 1, loops, samples], values);
-            remove(&mut cube, &[1], 1, region);
+            remove(&mut cube, &[1], 1, &Tones::new([loops, samples], 1, region));
             cube.samples.iter().map(|v| v.norm_sqr()).sum::<f64>() / (loops * samples) as f64
         };
         assert!(left(10.37, -2.81) < 1e-4, "{}", left(10.37, -2.81));
@@ -190,15 +205,9 @@ mod tests {
 
     #[test]
     fn cells_that_are_taken_out_have_lost_their_noise_and_others_have_not() {
-        let of_run = |run: usize| {
-            let (loops, samples) = (16, 64);
-            let tones = tones(run * loops, [3.0 * run as f64, 6.0 * run as f64]);
-            let mean = (0..run).map(|frame| shares(&tones, frame * loops, loops));
-            let slow = mean.fold(vec![0.0; loops], |sum, own| sum.iter().zip(own).map(|(a, b)| a + b / run as f64).collect());
-            (slow, shares(&super::tones(samples, [10.0, 13.0]), 0, samples))
-        };
         for run in [1, 4] {
-            let (slow, fast) = of_run(run);
+            let region = Region { range: [10.0, 13.0], doppler: [3.0 * run as f64, 6.0 * run as f64] };
+            let Tones { doppler: slow, range: fast, .. } = Tones::new([16, 64], run, region);
             assert!(slow[4] > 0.99 && slow[5] > 0.99 && fast[11] > 0.99, "{run}: {slow:?}");
             assert!(slow[12] < 0.05 && fast[30] < 0.05, "{run}: {slow:?}");
         }
@@ -213,7 +222,8 @@ mod tests {
         let values: Vec<Complex64> = (0..4 * loops * samples).map(|i| clutter(i) + clutter(i) * 0.01 * slow(i)).collect();
         let mut cube = Cube::new([4, 1, 1, loops, samples], values);
         // The same mean over training frames as over all, because whole periods fit.
-        remove(&mut cube, &[0, 1], 2, Region { range: [3.0, 6.0], doppler: [2.0, 4.0] });
+        let region = Region { range: [3.0, 6.0], doppler: [2.0, 4.0] };
+        remove(&mut cube, &[0, 1], 2, &Tones::new([loops, samples], 2, region));
         let worst = cube.samples.iter().enumerate().map(|(i, v)| (v - clutter(i)).norm()).fold(0.0, f64::max);
         assert!(worst < 0.5, "{worst} of a mover of 10 is left, or static returns of 1000 are gone");
     }

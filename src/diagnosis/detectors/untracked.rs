@@ -171,17 +171,12 @@ impl<'a> Mover<'a> {
         let centre = top[1] as f64 + stretch.summit(top, [0, 1]);
         let range_m = centre * bin_m;
         let velocity_mps = (top[0] as f64 + stretch.summit(top, [1, 0])) * bin_mps;
-        let place = Place {
-            range_m: Some([(ranges[0] - 0.5).max(0.0) * bin_m, (ranges[1] + 0.5) * bin_m]),
-            velocity_mps: Some([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps]),
-            ..Place::at(Stage::Scene)
-        };
         // On the flank of what is slower, nothing says how slow.
         let slower = (dopplers[0].abs().max(dopplers[1].abs()) + 0.5) * bin_mps;
-        let (place, motion) = if stretch.is_flank(top) {
-            (Place { velocity_mps: Some([-slower, slower]), ..place }, format!("more slowly than {slower:.2} m/s"))
+        let (velocities, motion) = if stretch.is_flank(top) {
+            ([-slower, slower], format!("more slowly than {slower:.2} m/s"))
         } else {
-            (place, format!("with {velocity_mps:+.2} m/s"))
+            ([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps], format!("with {velocity_mps:+.2} m/s"))
         };
         let snapshots: Vec<Vec<Complex64>> =
             stretch.maps.iter().map(|channels| channels.iter().map(|map| map[stretch.index(top)]).collect()).collect();
@@ -197,8 +192,10 @@ impl<'a> Mover<'a> {
             )]
         });
         let place = Place {
+            range_m: Some([(ranges[0] - 0.5).max(0.0) * bin_m, (ranges[1] + 0.5) * bin_m]),
+            velocity_mps: Some(velocities),
             azimuth_deg: azimuth.map(|Azimuth { degrees, deviation }| [degrees - 2.0 * deviation, degrees + 2.0 * deviation]),
-            ..place
+            ..Place::at(Stage::Scene)
         };
         Candidate {
             id: Some(effects::moving_reflector::ID),

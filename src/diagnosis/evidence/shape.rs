@@ -13,11 +13,9 @@ const SHAPED: f32 = 1.3;
 
 /// The noise's variance in each range bin over its mean; `None` where it is flat.
 pub(super) fn noise_shape(evidence: &Evidence, maps: &Grid<f32, 3>) -> Option<Vec<f32>> {
-    let [_, loops, samples] = maps.shape();
-    let rows: Vec<usize> = (0..loops).filter(|&doppler| doppler.min(loops - doppler) > 2 || loops < 8).collect();
+    let [_, _, samples] = maps.shape();
     let level = |range: usize| {
-        let left = || rows.iter().filter(|&&doppler| !evidence.is_emptied(doppler, range));
-        let of_frame = |&frame: &usize| left().map(move |&doppler| f64::from(maps[[frame, doppler, range]]));
+        let of_frame = |&frame: &usize| evidence.of_noise(range).map(move |doppler| f64::from(maps[[frame, doppler, range]]));
         let mut values: Vec<f64> = evidence.split.training.iter().flat_map(of_frame).collect();
         let index = ((values.len().max(1) - 1) as f64 * 0.35) as usize;
         (!values.is_empty()).then(|| *values.select_nth_unstable_by(index, f64::total_cmp).1)
