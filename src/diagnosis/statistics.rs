@@ -28,7 +28,14 @@ pub fn mean_power_tail(mean: f64, count: f64) -> f64 {
 
 /// Probability that a ratio of variances of so many degrees of freedom each exceeds this.
 pub fn fisher_tail(ratio: f64, above: f64, below: f64) -> f64 {
-    if ratio <= 0.0 { 1.0 } else { FisherSnedecor::new(above, below).map_or(1.0, |law| law.sf(ratio)) }
+    if ratio <= 0.0 {
+        return 1.0;
+    }
+    // Whose ratio to itself the law would take.
+    if (ratio * above).is_infinite() {
+        return 0.0;
+    }
+    FisherSnedecor::new(above, below).map_or(1.0, |law| law.sf(ratio))
 }
 
 /// Probability that a standard normal deviates by more than this, both ways.
@@ -153,6 +160,7 @@ mod tests {
     fn known_values() {
         assert!((chi2_tail(3.841, 1.0) - 0.05).abs() < 1e-4);
         assert!((normal_tails(1.96) - 0.05).abs() < 1e-4);
+        assert!([f64::INFINITY, f64::MAX].map(|ratio| fisher_tail(ratio, 6.0, 20.0)) == [0.0; 2]);
         assert!((mean_power_tail(2.0, 1.0) - (-2.0f64).exp()).abs() < 1e-9);
         assert!((poisson_tail(1, 0.1) - (1.0 - (-0.1f64).exp())).abs() < 1e-9);
         assert!((poisson_tail(2, 0.1) - (1.0 - 1.1 * (-0.1f64).exp())).abs() < 1e-9);

@@ -80,7 +80,7 @@ fn peak(evidence: &Evidence, mean: &[f64]) -> Option<usize> {
     let bins = evidence.range_bins();
     let moving: Vec<usize> = (0..loops).filter(|&doppler| moves(doppler, loops)).collect();
     // A floor over all velocities is the modulation of something strong, no mover.
-    let floor: Vec<f64> = (0..bins).map(|r| floor(evidence, mean, r, 1)).collect();
+    let floor: Vec<Option<f64>> = (0..bins).map(|r| floor(evidence, mean, r, 1)).collect();
     let (frames, channels) = (evidence.split.training.len() as f64, evidence.cube.channels() as f64);
     let law = cfar::Cells { frames, channels, values: (moving.len() as f64 / cfar::BINS_PER_VALUE).max(1.0) };
     let tried = (bins * moving.len()) as f64;
@@ -88,18 +88,19 @@ fn peak(evidence: &Evidence, mean: &[f64]) -> Option<usize> {
         |power: f64, floor: f64| power > ABOVE_FLOOR * floor && statistics::corrected(law.tail(power, floor), tried) < OF_FLOOR;
     let candidates: Vec<usize> = (moving.iter())
         .flat_map(|&d| (NEAREST_BIN..bins).map(move |r| (d, r)))
-        .filter(|&(d, r)| stands_out(mean[d * samples + r], floor[r]))
+        .filter(|&(d, r)| floor[r].is_some_and(|floor| stands_out(mean[d * samples + r], floor)))
         .map(|(d, r)| d * samples + r)
         .collect();
     candidates.iter().copied().max_by(|&a, &b| mean[a].total_cmp(&mean[b]))
 }
 
-/// Median of a map, `doppler · samples + range`, of so many frames as one, over what moves at a range and is there still.
-fn floor(evidence: &Evidence, map: &[f64], range: usize, run: usize) -> f64 {
+/// Median of a map, `doppler · samples + range`, of so many frames as one, over what moves at a range and was not taken out, if anything.
+fn floor(evidence: &Evidence, map: &[f64], range: usize, run: usize) -> Option<f64> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let is_there = |doppler: &usize| moves(*doppler, run * loops) && !evidence.is_emptied(doppler / run, range);
     let there = (0..run * loops).filter(is_there);
-    statistics::median(&mut there.map(|doppler| map[doppler * samples + range]).collect::<Vec<f64>>())
+    let mut there: Vec<f64> = there.map(|doppler| map[doppler * samples + range]).collect();
+    (!there.is_empty()).then(|| statistics::median(&mut there))
 }
 
 /// A mover in the longest stretch without a gap.
@@ -245,7 +246,7 @@ impl Stretch {
             }
         }
         let loops = run * loops;
-        let floor = |r: usize| floor(evidence, &power, r, run).max(1.0);
+        let floor = |r: usize| floor(evidence, &power, r, run).map_or(1.0, |floor| floor.max(1.0));
         let floor = (0..samples).map(floor).collect();
         Self { loops, samples, maps, power, floor }
     }
@@ -374,6 +375,15 @@ mod tests {
     #[test]
     fn nobody_is_seen_in_a_static_room() {
         let found = find(&evidence(&[]));
+        assert!(found.iter().all(|candidate| candidate.p_value > 5e-4), "{found:?}");
+    }
+
+    /// What is left there, of which no floor is known, is nobody.
+    #[test]
+    fn nobody_is_seen_where_all_was_taken_out() {
+        let mut evidence = evidence(&[(20.3, 8.4, -0.1, 5.0)]);
+        evidence.emptied.push(std::sync::Arc::new(|_, range| (15..26).contains(&range)));
+        let found = find(&evidence);
         assert!(found.iter().all(|candidate| candidate.p_value > 5e-4), "{found:?}");
     }
 
