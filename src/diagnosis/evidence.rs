@@ -5,6 +5,7 @@ pub mod denoised;
 pub mod power;
 pub mod products;
 mod shape;
+mod still;
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -29,6 +30,7 @@ use crate::radar::{Radar, Sampling};
 use crate::room::Room;
 use power::PowerModel;
 use products::Products;
+pub use still::REACH_M;
 
 /// Share of the strongest cell below which there is not even noise.
 const EMPTIED: f64 = 1e-20;
@@ -57,6 +59,8 @@ pub struct Evidence {
     pub(super) inverses: Vec<(Undo, Volume)>,
     /// Cells of the maps that were taken out of the samples.
     pub(super) emptied: Vec<Cells>,
+    /// Static returns that were subtracted, `[tx · rx, sample]`, if any.
+    pub(super) subtracted: Option<Arc<[Complex64]>>,
     /// Phases over time of what was accepted, oldest first.
     pub courses: Vec<Arc<Course>>,
     pub extremes: [f64; 2],
@@ -74,6 +78,7 @@ pub(super) struct Once {
     power: OnceLock<Option<Arc<PowerModel>>>,
     products: OnceLock<Products>,
     peak: OnceLock<f64>,
+    may_move: OnceLock<bool>,
 }
 
 impl Evidence {
@@ -92,6 +97,7 @@ impl Evidence {
             accepted_unnamed: vec![],
             inverses: vec![],
             emptied: vec![],
+            subtracted: None,
             courses: vec![],
             extremes,
             codes,

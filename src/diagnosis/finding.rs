@@ -162,6 +162,15 @@ impl Correction {
         Self::Inverse(Arc::new(undo), volume)
     }
 
+    /// Whether it takes cells out of the samples, and nothing elsewhere.
+    pub fn empties(&self) -> bool {
+        match self {
+            Self::Emptied(..) => true,
+            Self::Followed(correction, _) => correction.empties(),
+            _ => false,
+        }
+    }
+
     /// What it changes in the samples.
     pub fn undo(&self) -> Option<&Undo> {
         match self {

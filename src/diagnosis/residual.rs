@@ -29,6 +29,9 @@ const FAINT: [&str; 4] =
 /// Products of the signal with itself, of which either is hardly taken out in full: one that was never there makes the other.
 const PRODUCTS: [&str; 2] = [effects::object_radar_object::ID, effects::second_harmonic::ID];
 
+/// What never changes and may be a return or added behind the mixer: what turns all returns distinguishes the two, and goes first.
+const ADDED: [&str; 3] = [effects::tx_leakage::ID, effects::dc_offset::ID, effects::static_reflector::ID];
+
 /// What explains a little of anything that moves near the body: the residual of a strong path that was subtracted.
 const OF_RESIDUAL: [&str; 2] = [effects::body_multibounce::ID, effects::carried_reflector::ID];
 
@@ -86,6 +89,16 @@ pub fn is_of_noise(candidate: &Candidate) -> bool {
     matches!(candidate.behaves_like, Behaviour::NoiseOverBeatFrequency | Behaviour::NoiseSharedByReceivers)
 }
 
+/// Whether it is one of what never changes.
+pub fn is_added(candidate: &Candidate) -> bool {
+    candidate.id.is_some_and(|id| ADDED.contains(&id))
+}
+
+/// Whether it is a return that stands still.
+pub fn stands_still(candidate: &Candidate) -> bool {
+    is_one_of(candidate, &[effects::tx_leakage::ID, effects::static_reflector::ID])
+}
+
 /// Whether it explains a little of whatever is near the body.
 pub fn is_of_residual(candidate: &Candidate) -> bool {
     is_one_of(candidate, &OF_RESIDUAL)
@@ -129,7 +142,10 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let slow_path = is_path(candidate) && candidate.id.is_none();
     let of_drift = drifts && candidate.behaves_like == accepted.behaves_like;
     let alone = drifts && slow_path;
-    let roughly = is_rough(accepted) || candidate.behaves_like == Behaviour::ExcessPower || beside || of_drift;
+    // What was taken out of some ranges leaves nothing at others, and what never changes nothing that moves.
+    let elsewhere = accepted.correction.empties() && apart(accepted.place.range_m, candidate.place.range_m);
+    let excess = candidate.behaves_like == Behaviour::ExcessPower && !elsewhere && !is_added(accepted);
+    let roughly = is_rough(accepted) || excess || beside || of_drift;
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it
     // and among its images, and what a part may carry, the last resort, is never sure there.
     let timed = accepted.place.stage == Some(Stage::Timing);
@@ -140,13 +156,13 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // Bursts are cut out where they are plain: what they leave below the noise of single samples is in all receivers at once.
     let shared = candidate.behaves_like == Behaviour::NoiseSharedByReceivers;
     let bursts = accepted.behaves_like == Behaviour::SparseAdditive && shared;
-    let path_like = accepted.behaves_like.is_path();
+    let path_like = accepted.behaves_like.is_path() && !elsewhere;
     let faint = path_like && (is_one_of(candidate, &FAINT) || shared || is_path(candidate));
     // What has no name is modelled roughly.
     let bent = accepted.id.is_none() && !is_of_noise(accepted) && is_of_noise(candidate);
     // What moves as no single reflector does was taken out along one track: what else of it moves with the body is left, and a line
     // where it stays longest.
-    let no_single = is_path(accepted) && accepted.id.is_none();
+    let no_single = is_path(accepted) && accepted.id.is_none() && !elsewhere;
     let line = no_single && candidate.id == Some(effects::spur::ID);
     let rest = no_single && is_path(candidate);
     let smeared = vibrates || timed || is_by_chirp(accepted) || path_like;

@@ -6,6 +6,7 @@
 
 mod precedence;
 mod said;
+mod taken;
 
 use crate::diagnosis::behaviour::Behaviour;
 use crate::effects::{self, Stage};
@@ -17,9 +18,10 @@ use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
 use super::residual::{
-    ROUGHLY, has_shape_of, is_by_chirp, is_left_by, is_of_noise, is_of_receivers, is_of_residual, is_product, is_rough, is_same,
+    ROUGHLY, has_shape_of, is_added, is_by_chirp, is_left_by, is_of_noise, is_of_receivers, is_of_residual, is_product, is_rough,
+    is_same,
 };
-use precedence::{is_added, is_course_of_all, is_displaced, is_echo, upstream};
+use precedence::{is_course_of_all, is_displaced, is_echo, upstream};
 use said::{candidates, said_by};
 
 impl DiagnosisConfig {
@@ -351,45 +353,4 @@ fn refit(
     };
     let found = said_by(effect.detector, &evidence).into_iter().filter(same);
     found.max_by(|a, b| a.nats.total_cmp(&b.nats))
-}
-
-impl Evidence {
-    /// The same with one more effect taken into account.
-    pub fn with(&self, candidate: &Candidate) -> Self {
-        let mut next = self.clone().changed();
-        if candidate.behaves_like.is_path() || candidate.behaves_like == Behaviour::ExcessPower {
-            // Where paths were cut out there is not even noise left.
-            next.once.noise = self.once.noise.clone();
-        }
-        next.correct(&candidate.correction);
-        match candidate.id {
-            Some(id) => next.accepted.push(id),
-            None => next.accepted_unnamed.push(candidate.behaves_like),
-        }
-        next
-    }
-
-    fn correct(&mut self, correction: &Correction) {
-        match correction {
-            Correction::Samples(undo) => undo(&mut self.cube),
-            Correction::Inverse(undo, volume) => {
-                undo(&mut self.cube);
-                self.inverses.push((undo.clone(), volume.clone()));
-            }
-            Correction::Emptied(undo, cells) => {
-                undo(&mut self.cube);
-                self.emptied.push(cells.clone());
-            }
-            Correction::Followed(correction, course) => {
-                self.correct(correction);
-                self.courses.push(course.clone());
-            }
-            Correction::Body(change) => {
-                if let Some(body) = &mut self.body {
-                    change(body);
-                }
-            }
-            Correction::None => {}
-        }
-    }
 }

@@ -16,7 +16,7 @@ pub struct Support {
 }
 
 /// Nearest that a thing of an unknown room is expected: closer returns are the radar's own.
-const UNKNOWN_NEAR_M: f64 = 0.45;
+pub const UNKNOWN_NEAR_M: f64 = 0.45;
 /// Of the eigenvalue of a tone that a direction must hold to count.
 const NEGLIGIBLE: f64 = 1e-7;
 /// A wall's cell or antenna spread beyond the geometry.

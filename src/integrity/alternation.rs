@@ -5,7 +5,8 @@
 //! within them has an F distribution where loops differ at random (analysis of variance); how many returns exceed its 5 % by chance is
 //! binomial, Bonferroni over m. What moves, or vibrates at a harmonic of the loops' rate, does so at its range alone: most returns must
 //! take turns. Loops of another gain or phase share one factor at all returns, as a receiver or a synthesiser that takes turns has; they
-//! must take turns beyond the best such factor, too.
+//! must take turns beyond the best such factor, too. Turns are those of all frames that were looked at: what moves, a burst or a rail that
+//! cuts differs from frame to frame, and that scatter is what turns must exceed.
 //!
 //! The loops of a frame are counted from its first one, as many whole rounds of the m kinds as it has. What frames are too short for, the
 //! frames themselves show where they split the rounds: the first loops of frames of n loops are of m / gcd(m, n) kinds. From frame to
@@ -26,7 +27,7 @@ const FRAMES: usize = 4;
 /// Kinds of loops that are tried, and transmitters and receivers that are named, at most: those of four chips (AWR2243 cascade: twelve
 /// and sixteen).
 const MOST: usize = 16;
-/// Channels of the first loops that are kept, at most: all channels show the same turns.
+/// Channels that are kept, at most: all channels show the same turns.
 const CHANNELS: usize = 16;
 
 pub(super) struct Alternation {
@@ -41,7 +42,7 @@ pub(super) struct Alternation {
 
 impl Alternation {
     pub fn new(schedule: Schedule) -> Self {
-        let loops = Sequence::new(schedule, schedule.loops, 2..=MOST);
+        let loops = Sequence::new(kept(schedule), schedule.loops, 2..=MOST);
         let others = (2..=MOST).filter(|kinds| !loops.has(*kinds)).collect();
         Self { schedule, loops, others, firsts: vec![], next: 0 }
     }
@@ -51,20 +52,15 @@ impl Alternation {
         kinds / gcd(kinds, self.schedule.loops)
     }
 
-    /// What is kept of a first loop: channels evenly spread over all.
-    fn kept(&self) -> Schedule {
-        Schedule { tx: 1, rx: self.schedule.channels().min(CHANNELS), ..self.schedule }
-    }
-
     /// The first loops in a row, with the kinds that the loops of one frame do not show.
     fn frames(&self) -> Sequence {
         let mut kinds: Vec<usize> = self.others.iter().map(|&kinds| self.of_frames(kinds)).filter(|kinds| *kinds > 1).collect();
         kinds.sort_unstable();
         kinds.dedup();
-        let kept = self.kept();
+        let kept = kept(self.schedule);
         let mut frames = Sequence::new(kept, self.firsts.len() / kept.period(), kinds.into_iter());
         if !frames.is_empty() {
-            frames.add(&self.firsts);
+            frames.add(&self.firsts, 0);
         }
         frames
     }
@@ -79,6 +75,11 @@ impl Alternation {
         let listed = listed.map(|(counts, what, stated)| format!("{} {what}, not {stated}", either(counts)));
         listed.chain([format!("{kinds} kinds of chirps")]).collect::<Vec<_>>().join("; or ")
     }
+}
+
+/// What is kept of a loop: channels evenly spread over all.
+fn kept(schedule: Schedule) -> Schedule {
+    Schedule { tx: 1, rx: schedule.channels().min(CHANNELS), ..schedule }
 }
 
 fn gcd(a: usize, b: usize) -> usize {
@@ -109,7 +110,7 @@ impl Inspector for Alternation {
     fn see(&mut self, stream: &Stream) {
         let period = self.schedule.period();
         let needs_all = self.loops.rows < FRAMES && !self.loops.is_empty();
-        let kept = self.kept();
+        let kept = kept(self.schedule);
         let needs_first = !self.others.is_empty() && self.firsts.len() < FRAMES * MOST * kept.period();
         if !needs_all && !needs_first {
             return;
@@ -118,17 +119,20 @@ impl Inspector for Alternation {
         if !needs_all {
             loops.truncate(period);
         }
-        let spectra = spectra(loops, self.schedule.samples);
+        let of_loop = |values: &[Complex64]| -> Vec<Complex64> {
+            let channels: Vec<&[Complex64]> = values.chunks_exact(kept.samples).collect();
+            (0..kept.rx).flat_map(|channel| channels[channel * channels.len() / kept.rx]).copied().collect()
+        };
+        let spectra = spectra(loops.chunks_exact(period).flat_map(of_loop).collect(), self.schedule.samples);
         if needs_all {
-            self.loops.add(&spectra);
+            self.loops.add(&spectra, stream.frame * self.schedule.loops);
         }
         if needs_first {
             if stream.frame != self.next {
                 self.firsts.clear();
             }
             self.next = stream.frame + 1;
-            let channels: Vec<&[Complex64]> = spectra[..period].chunks_exact(kept.samples).collect();
-            (0..kept.rx).for_each(|channel| self.firsts.extend(channels[channel * channels.len() / kept.rx]));
+            self.firsts.extend(&spectra[..kept.period()]);
         }
     }
 

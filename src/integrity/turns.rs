@@ -17,15 +17,25 @@ const LEVEL: f64 = 0.05;
 /// Least noise of a cell against the energy of a chirp: samples are held as f32, which rounds each by so much.
 const ROUNDING: f64 = (f32::EPSILON as f64) * (f32::EPSILON as f64);
 
-/// What is summed over rows for items of so many kinds; by range bin, over channels.
+/// What is summed over rows for items of so many kinds.
 struct Turns {
     kinds: usize,
     /// Items of a row: whole rounds.
     items: usize,
-    /// Energy of the kinds' means around their mean, that beyond a factor common to all returns, and that of items around their kind's.
+    /// Means of the kinds `[kind, cell]`: counted from each row's first item, and through all rows where that is not the same.
+    means: Vec<DMatrix<Complex64>>,
+    /// By cell: energy of each row's means around their mean, and that of items around their kind's.
+    between: Vec<f64>,
+    within: Vec<f64>,
+}
+
+/// What takes turns alike in all rows, by range bin, over channels.
+struct Alike {
+    /// Energy of the kinds' means around their mean, and that beyond a factor common to all returns.
     between: Vec<f64>,
     beyond: Vec<f64>,
-    within: Vec<f64>,
+    /// Of one mean's deviation without turns: within kinds, or between rows where that is more.
+    noise: Vec<f64>,
 }
 
 /// Chances of the turns that each static return takes: of any, and of those beyond a common factor.
@@ -51,10 +61,15 @@ pub(super) struct Sequence {
 impl Sequence {
     /// Rows of so many items, of each of `kinds` for which that is enough.
     pub fn new(schedule: Schedule, items: usize, kinds: impl Iterator<Item = usize>) -> Self {
-        let zeros = || vec![0.0; schedule.samples];
-        let of = |kinds| Turns { kinds, items: items - items % kinds, between: zeros(), beyond: zeros(), within: zeros() };
+        let cells = schedule.channels() * schedule.samples;
+        let of = |kinds| {
+            let zeros = || vec![0.0; cells];
+            let ways = if items.is_multiple_of(kinds) { 1 } else { 2 };
+            let means = vec![DMatrix::zeros(kinds, cells); ways];
+            Turns { kinds, items: items - items % kinds, means, between: zeros(), within: zeros() }
+        };
         let turns = kinds.filter(|kinds| items / kinds >= FEWEST).map(of).collect();
-        Self { schedule, turns, clutter: zeros(), rows: 0 }
+        Self { schedule, turns, clutter: vec![0.0; schedule.samples], rows: 0 }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -66,8 +81,8 @@ impl Sequence {
         self.turns.iter().any(|turns| turns.kinds == kinds)
     }
 
-    /// Adds a row of spectra, `[item][cell]`.
-    pub fn add(&mut self, spectra: &[Complex64]) {
+    /// Adds a row of spectra, `[item][cell]`, of which the first is the `start`-th of all.
+    pub fn add(&mut self, spectra: &[Complex64], start: usize) {
         self.rows += 1;
         let samples = self.schedule.samples;
         let cells = self.schedule.channels() * samples;
@@ -83,79 +98,113 @@ impl Sequence {
             }
             let each = (turns.items / turns.kinds) as f64;
             let means = means(own, cells, turns.kinds);
-            let of_kinds: Vec<f64> = means.column_iter().map(|cell| cell.norm_squared()).collect();
             // The strongest channel's: a dead one has next to no samples, and no less noise.
             let strongest = energy.chunks_exact(samples).map(|chirp| chirp.iter().sum::<f64>()).fold(0.0, f64::max);
             let floor = ROUNDING * strongest / samples as f64;
-            let within: Vec<f64> = energy.iter().zip(&of_kinds).map(|(all, kinds)| (all - each * kinds).max(floor)).collect();
-            let of_means = (turns.kinds - 1) as f64 / each / (turns.items - turns.kinds) as f64;
-            let noise: Vec<f64> = within.iter().map(|within| of_means * within).collect();
-            let factor = common(&means, &of_kinds, &noise);
             for (cell, values) in means.column_iter().enumerate() {
-                let (bin, mean) = (cell % samples, values.sum() / turns.kinds as f64);
-                turns.between[bin] += (each * of_kinds[cell] - turns.items as f64 * mean.norm_sqr()).max(0.0);
-                turns.beyond[bin] += each * (of_kinds[cell] - factor.dotc(&values).norm_sqr()).max(0.0);
-                turns.within[bin] += within[cell];
+                let all = each * values.norm_squared();
+                turns.between[cell] += (all - each * values.sum().norm_sqr() / turns.kinds as f64).max(0.0);
+                turns.within[cell] += (energy[cell] - all).max(floor);
+            }
+            for (sum, first) in turns.means.iter_mut().zip([0, start % turns.kinds]) {
+                for (kind, row) in means.row_iter().enumerate() {
+                    sum.row_mut((first + kind) % turns.kinds).iter_mut().zip(row.iter()).for_each(|(sum, value)| *sum += value);
+                }
             }
         }
     }
 
-    /// Chance that energy in so many more means exceeds that within kinds as much.
-    fn chance(&self, means: usize, energy: f64, turns: &Turns, bin: usize) -> f64 {
-        let (above, below) = (means * self.rows, (turns.items - turns.kinds) * self.rows);
-        let within = turns.within[bin] / below as f64;
-        if within <= 0.0 {
+    /// Chance that energy in so many means exceeds the noise as much: from one row, the F law of what scatters within kinds; from more,
+    /// that of what scatters between rows, as only what is alike in all of them is turns.
+    fn chance(&self, means: usize, energy: f64, turns: &Turns, noise: f64) -> f64 {
+        if noise <= 0.0 {
             return if energy > 0.0 { 0.0 } else { 1.0 };
         }
+        let below = if self.rows > 1 { (self.rows - 1) * (turns.kinds - 1) } else { turns.items - turns.kinds };
         // Complex values: two degrees each. Channels share what they see and count once.
-        let law = FisherSnedecor::new(2.0 * above as f64, 2.0 * below as f64).expect("degrees of freedom");
-        law.sf(energy / above as f64 / within)
+        let law = FisherSnedecor::new(2.0 * means as f64, 2.0 * below as f64).expect("degrees of freedom");
+        law.sf(energy / means as f64 / noise)
+    }
+
+    /// What takes turns alike in all rows, counted one way.
+    fn alike(&self, turns: &Turns, way: usize) -> Alike {
+        let (samples, rows) = (self.schedule.samples, self.rows as f64);
+        // Items of a kind in all rows.
+        let all = rows * (turns.items / turns.kinds) as f64;
+        let means = &turns.means[way] / Complex64::from(rows);
+        let energies: Vec<f64> = means.column_iter().map(|cell| cell.norm_squared()).collect();
+        let degrees = (turns.items - turns.kinds) as f64 * rows;
+        let within: Vec<f64> = turns.within.iter().map(|within| within / degrees).collect();
+        let of_means: Vec<f64> = within.iter().map(|within| within * (turns.kinds - 1) as f64 / all).collect();
+        let factor = common(&means, &energies, &of_means);
+        let zeros = || vec![0.0; samples];
+        let mut alike = Alike { between: zeros(), beyond: zeros(), noise: zeros() };
+        for (cell, values) in means.column_iter().enumerate() {
+            let bin = cell % samples;
+            let between = all * (energies[cell] - values.sum().norm_sqr() / turns.kinds as f64).max(0.0);
+            alike.between[bin] += between;
+            alike.beyond[bin] += all * (energies[cell] - factor.dotc(&values).norm_sqr()).max(0.0);
+            let rest = (turns.between[cell] - between).max(0.0) / ((rows - 1.0) * (turns.kinds - 1) as f64);
+            alike.noise[bin] += if self.rows > 1 { within[cell].max(rest) } else { within[cell] };
+        }
+        alike
+    }
+
+    /// Of what items scatter within kinds in a range bin, over channels.
+    fn scatter(&self, turns: &Turns, bin: usize) -> f64 {
+        turns.within.iter().skip(bin).step_by(self.schedule.samples).sum()
     }
 
     /// Range bins of the returns of the static scene, above the noise.
     fn returns(&self, turns: &Turns) -> Vec<usize> {
         let bins = self.schedule.samples;
         let is_peak = |bin: usize| [bin + bins - 1, bin + 1].iter().all(|other| self.clutter[bin] > self.clutter[other % bins]);
-        let noise = |bin: usize| turns.within[bin] / (turns.items - turns.kinds) as f64;
+        let noise = |bin: usize| self.scatter(turns, bin) / (turns.items - turns.kinds) as f64;
         // A real signal has each return twice.
         let different = if self.schedule.is_real { bins / 2 } else { bins };
         (0..different).filter(|&bin| is_peak(bin) && self.clutter[bin] > -ALARM.ln() * noise(bin)).collect()
     }
 
     /// Of each static return, by chance alone, turns beyond those of fewer kinds.
-    fn chances(&self, fewer: Option<&Turns>, turns: &Turns) -> Chances {
-        let means = turns.kinds - fewer.map_or(1, |fewer| fewer.kinds);
-        let explained = |bin: usize| fewer.map_or(0.0, |fewer| fewer.between[bin]);
+    fn chances(&self, fewer: Option<(&Turns, &Alike)>, turns: &Turns, alike: &Alike) -> Chances {
+        let means = turns.kinds - fewer.map_or(1, |(fewer, _)| fewer.kinds);
         let of = |bin: usize| {
-            let any = self.chance(means, turns.between[bin] - explained(bin), turns, bin);
-            [any, self.chance(turns.kinds - 1, turns.beyond[bin], turns, bin)]
+            let explained = fewer.map_or(0.0, |(_, fewer)| fewer.between[bin]);
+            let any = self.chance(means, alike.between[bin] - explained, turns, alike.noise[bin]);
+            [any, self.chance(turns.kinds - 1, alike.beyond[bin], turns, alike.noise[bin])]
         };
         self.returns(turns).into_iter().map(of).collect()
     }
 
+    /// Kinds and ways to count them.
+    fn ways(&self) -> impl Iterator<Item = (&Turns, usize)> {
+        self.turns.iter().flat_map(|turns| (0..turns.means.len()).map(move |way| (turns, way)))
+    }
+
     /// Returns without which [`each_by_itself`] finds nothing, whatever they do.
     pub fn fewest_returns(&self) -> usize {
-        ((ALARM.ln() - (self.turns.len() as f64).ln()) / LEVEL.ln()).ceil() as usize
+        ((ALARM.ln() - (self.ways().count() as f64).ln()) / LEVEL.ln()).ceil() as usize
     }
 
     /// The most kinds that most returns show, with the chance of it by `law`; and at how many returns was looked.
     pub fn found(&self, law: fn(&Chances) -> f64) -> (Option<TakenTurns>, usize) {
-        let mut found: Option<(&Turns, String, f64)> = None;
+        let mut found: Option<(&Turns, Alike, String, f64)> = None;
         let mut most = 0;
-        for turns in &self.turns {
-            let fewer = found.as_ref().map(|(fewer, ..)| *fewer).filter(|fewer| turns.kinds % fewer.kinds == 0);
+        for (turns, way) in self.ways() {
+            let fewer = found.as_ref().filter(|fewer| turns.kinds > fewer.0.kinds && turns.kinds % fewer.0.kinds == 0);
             if found.is_some() && fewer.is_none() {
                 continue;
             }
-            let chances = self.chances(fewer, turns);
+            let alike = self.alike(turns, way);
+            let chances = self.chances(fewer.map(|(fewer, alike, ..)| (*fewer, alike)), turns, &alike);
             most = most.max(chances.len());
             let any = chances.iter().filter(|[any, _]| *any < LEVEL).count();
-            let log_p = (self.turns.len() as f64).ln() + law(&chances);
+            let log_p = (self.ways().count() as f64).ln() + law(&chances);
             if 2 * any > chances.len() && log_p < ALARM.ln() {
-                found = Some((turns, format!("at {any} of {} static returns", chances.len()), log_p));
+                found = Some((turns, alike, format!("at {any} of {} static returns", chances.len()), log_p));
             }
         }
-        (found.map(|(turns, places, log_p)| TakenTurns { kinds: turns.kinds, places, log_p }), most)
+        (found.map(|(turns, _, places, log_p)| TakenTurns { kinds: turns.kinds, places, log_p }), most)
     }
 }
 

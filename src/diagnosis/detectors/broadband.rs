@@ -21,6 +21,12 @@ const INFORMATIVE: f64 = 3.0;
 const FEWEST_DENIALS: usize = 2;
 /// p-value below which receivers share it.
 const SURE: f64 = 1e-3;
+/// Parts of the velocities, and of the recording, in each of which it must be: people who pass one another fill many velocities for a
+/// while.
+const SECTORS: usize = 8;
+const PARTS: usize = 2;
+/// Largest side lobe of a Hann window over its summit, 31.5 dB below (Harris 1978): what is fainter may be that.
+const SIDE_LOBE: f64 = 7.1e-4;
 
 /// Powers over the noise by range bin.
 struct Floor {
@@ -41,15 +47,21 @@ fn moving(loops: usize) -> impl Iterator<Item = usize> {
     (0..loops).filter(move |&doppler| moves(doppler, loops))
 }
 
+/// Of these, what was not taken out at a range.
+fn left(evidence: &Evidence, bin: usize) -> impl Iterator<Item = usize> + '_ {
+    moving(evidence.cube.dims[3]).filter(move |&doppler| !evidence.is_emptied(doppler, bin))
+}
+
 impl Floor {
     fn of(evidence: &Evidence) -> Self {
-        let [_, _, _, loops, samples] = evidence.cube.dims;
+        let samples = evidence.cube.dims[4];
         let (bins, channels) = (evidence.range_bins(), evidence.cube.channels());
         let mean = |doppler: usize, bin: usize| mean_power(evidence, &evidence.split.training, doppler * samples + bin);
+        let of_bin = |bin: usize| left(evidence, bin).map(|doppler| mean(doppler, bin)).collect::<Vec<_>>();
         let level =
-            (0..bins).map(|bin| median(&mut moving(loops).map(|doppler| mean(doppler, bin)).collect::<Vec<_>>())).collect();
+            (0..bins).map(|bin| if left(evidence, bin).next().is_some() { median(&mut of_bin(bin)) } else { 0.0 }).collect();
         let mut clutter = vec![0.0; bins];
-        for (channel, chirp) in evidence.clutter().chunks_exact(samples).enumerate() {
+        for (channel, chirp) in evidence.standing().chunks_exact(samples).enumerate() {
             let weight = (evidence.noise()[channel].max(f64::MIN_POSITIVE) * channels as f64).recip();
             clutter.iter_mut().zip(spectrum(chirp)).for_each(|(sum, value)| *sum += weight * value.norm_sqr());
         }
@@ -90,12 +102,16 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let above = |bin: usize| mean_power_tail(floor.level[bin], count) < SURE / bins as f64;
     let first = (0..=bin).rev().take_while(|&bin| above(bin)).last()?;
     let last = (bin..bins).take_while(|&bin| above(bin)).last()?;
-    if p_value > SURE || !floor.is_alone(bin, [first, last]) || chance_of_independent_receivers(evidence, bin) > SURE {
+    if p_value > SURE
+        || !fills(evidence, bin)
+        || !floor.is_alone(bin, [first, last])
+        || chance_of_independent_receivers(evidence, bin) > SURE
+    {
         return None;
     }
     let held_out = evidence.split.held_out.iter();
-    let cells =
-        held_out.flat_map(|&frame| moving(loops).flat_map(move |doppler| (first..=last).map(move |bin| (frame, doppler, bin))));
+    let cells = held_out
+        .flat_map(|&frame| (first..=last).flat_map(move |bin| left(evidence, bin).map(move |doppler| (frame, doppler, bin))));
     let of_cell =
         |(frame, doppler, bin): (usize, usize, usize)| power_gain(evidence, frame, doppler * samples + bin, floor.level[bin]);
     let gain: f64 = cells.map(of_cell).sum();
@@ -121,6 +137,26 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
         energy,
         correction: removal(evidence, 1, region),
         ..Candidate::new(Behaviour::PathLike, place, p_value, gain)
+    })
+}
+
+/// Whether what is at a range has all velocities all the time.
+fn fills(evidence: &Evidence, bin: usize) -> bool {
+    let samples = evidence.cube.dims[4];
+    let (training, channels) = (&evidence.split.training, evidence.cube.channels() as f64);
+    // In the FFT's order they hang together past the fastest.
+    let velocities: Vec<usize> = left(evidence, bin).collect();
+    let parts = velocities.len().div_ceil(SECTORS).max(1);
+    training.chunks(training.len().div_ceil(PARTS)).all(|frames| {
+        let power: Vec<f64> = velocities.iter().map(|doppler| mean_power(evidence, frames, doppler * samples + bin)).collect();
+        let largest = power.iter().copied().fold(0.0, f64::max);
+        !power.is_empty()
+            && power.chunks(parts).all(|sector| {
+                let mean = sector.iter().sum::<f64>() / sector.len() as f64;
+                // Neighbouring cells of a windowed transform share their noise.
+                let count = frames.len() as f64 * channels * sector.len().div_ceil(HANN_LOBE + 1) as f64;
+                mean > SIDE_LOBE * largest && mean_power_tail(mean, count) < SURE
+            })
     })
 }
 
@@ -198,5 +234,19 @@ mod tests {
             let found = find(&evidence(false, common, noise));
             assert!(found.is_empty(), "{common} {noise}: {found:?}");
         }
+    }
+
+    /// Two who cross one range, one after the other, fast and slow.
+    #[test]
+    fn people_who_pass_one_another_are_no_fan() {
+        let radar = Radar { samples_per_chirp: SAMPLES, loops_per_frame: 32, ..Radar::small(8) };
+        let evidence = Evidence::in_noise(radar, 7, |[frame, _, index, n]| {
+            let tone = |bin: f64, level: f64| Complex64::from_polar(level, TAU * bin * n as f64 / SAMPLES as f64);
+            let limb = |doppler: f64| tone(9.0, 30.0) * Complex64::cis(TAU * doppler * index as f64 / 32.0);
+            let passes: [f64; 6] =
+                if frame < 4 { [3.0, 4.5, 6.0, 7.5, 9.0, 11.0] } else { [-3.0, -5.0, -7.0, -9.0, -11.0, -13.0] };
+            passes.into_iter().map(limb).sum::<Complex64>() + tone(14.0, 40.0) + tone(22.0, 30.0) + tone(28.0, 25.0)
+        });
+        assert!(find(&evidence).is_empty(), "{:?}", find(&evidence));
     }
 }

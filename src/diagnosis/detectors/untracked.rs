@@ -4,37 +4,30 @@
 //! a gap, because blocks of a long frame resolve velocities poorly; two people who pass one another at one range differ in
 //! nothing else.
 
-use std::collections::HashSet;
+mod stretch;
 
 use num_complex::Complex64;
-use rayon::prelude::*;
+
+use stretch::{Cell, NEAREST_BIN, Stretch, floor};
 
 use super::azimuth::{Azimuth, azimuth};
 use super::cfar;
 use super::receiver::wandering;
-use super::region::{CLUTTER_BINS, Region, joined, mean_power, moves, power_gain, removal, run};
+use super::region::{Region, mean_power, moves, power_gain, removal, run};
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::evidence::{Evidence, transform};
+use crate::diagnosis::evidence::{Evidence, REACH_M};
 use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics;
 use crate::effects::{self, Stage};
 
 /// Standard deviation of how high something stands, which receivers in a row do not show, over its range.
 const HEIGHT: f64 = 0.3;
-/// Nearer ones belong to leakage, offsets and low-frequency noise.
-const NEAREST_BIN: usize = 3;
 /// Factor by which a mover's cell must exceed the median over velocities: a floor is no more even than that.
 const ABOVE_FLOOR: f64 = 4.0;
 /// Chance, over all cells, at which a cell of the floor stands out of it as much.
 const OF_FLOOR: f64 = 0.01;
 /// Power over the noise of a mover beside one that was found already: what its removal leaves is less.
 const BESIDE_ANOTHER: f64 = 100.0;
-/// A mover's cells are those above this, over their range's floor.
-const FAINTEST: f64 = 6.3;
-/// A body's echoes and their first detours end here, m.
-const REACH_M: f64 = 1.2;
-/// Range bins between them that may be empty.
-const LARGEST_GAP: usize = 3;
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.body.is_some() {
@@ -62,6 +55,9 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
     if tone.is_some() {
         return None;
     }
+    if evidence.may_move() && evidence.accepted_unnamed.contains(&Behaviour::PathLike) {
+        return None;
+    }
     let mover = Mover::new(evidence, [doppler, range]);
     let gain: f64 = (0..cells)
         .filter(|&cell| cell == peak || moves(cell / samples, loops) && mover.holds(cell / samples, cell % samples))
@@ -71,7 +67,15 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
     if gain < 3.0 {
         return None;
     }
-    Some(mover.candidate(10.0 * mean[peak].log10(), p_value, gain))
+    let found = mover.candidate(10.0 * mean[peak].log10(), p_value, gain);
+    Some(if evidence.may_move() { relative(found) } else { found })
+}
+
+/// The same where nothing says that the radar stands still.
+fn relative(found: Candidate) -> Candidate {
+    let statement =
+        format!("{} Most returns beyond the transmitters' leakage move: it may be the radar that does.", found.statement);
+    Candidate { id: None, estimates: vec![], statement, ..found }
 }
 
 /// The strongest cell that moves and stands out of its range's floor, `doppler · samples + range`.
@@ -92,15 +96,6 @@ fn peak(evidence: &Evidence, mean: &[f64]) -> Option<usize> {
         .map(|(d, r)| d * samples + r)
         .collect();
     candidates.iter().copied().max_by(|&a, &b| mean[a].total_cmp(&mean[b]))
-}
-
-/// Median of a map, `doppler · samples + range`, of so many frames as one, over what moves at a range and was not taken out, if anything.
-fn floor(evidence: &Evidence, map: &[f64], range: usize, run: usize) -> Option<f64> {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let is_there = |doppler: &usize| moves(*doppler, run * loops) && !evidence.is_emptied(doppler / run, range);
-    let there = (0..run * loops).filter(is_there);
-    let mut there: Vec<f64> = there.map(|doppler| map[doppler * samples + range]).collect();
-    (!there.is_empty()).then(|| statistics::median(&mut there))
 }
 
 /// A mover in the longest stretch without a gap.
@@ -208,108 +203,6 @@ impl<'a> Mover<'a> {
             correction: removal(evidence, run, self.cut()),
             ..Candidate::new(Behaviour::PathLike, place, p_value, gain)
         }
-    }
-}
-
-/// Runs of frames transformed as one, static clutter removed; cells are signed Doppler bins and range bins.
-struct Stretch {
-    loops: usize,
-    samples: usize,
-    /// `[run][channel]`, each `[doppler, range]`.
-    maps: Vec<Vec<Vec<Complex64>>>,
-    /// Mean over runs and channels, over the noise.
-    power: Vec<f64>,
-    /// Median over velocities by range, and no less than the noise.
-    floor: Vec<f64>,
-}
-
-type Cell = [i64; 2];
-
-impl Stretch {
-    fn new(evidence: &Evidence, run: usize) -> Self {
-        let [frames, _, _, loops, samples] = evidence.cube.dims;
-        let channels = evidence.cube.channels();
-        let maps: Vec<Vec<Vec<Complex64>>> = (0..frames / run)
-            .into_par_iter()
-            .filter(|part| run > 1 || evidence.split.training.contains(part))
-            .map(|part| {
-                let frames = part * run..(part + 1) * run;
-                let map = |c| transform(&joined(&evidence.cube, evidence.clutter(), frames.clone(), c), samples);
-                (0..channels).map(map).collect()
-            })
-            .collect();
-        let mut power = vec![0.0; run * loops * samples];
-        for part in &maps {
-            for (map, noise) in part.iter().zip(evidence.noise()) {
-                let weight = 1.0 / (noise.max(f64::MIN_POSITIVE) * (channels * maps.len()) as f64);
-                power.iter_mut().zip(map).for_each(|(sum, value)| *sum += weight * value.norm_sqr());
-            }
-        }
-        let loops = run * loops;
-        let floor = |r: usize| floor(evidence, &power, r, run).map_or(1.0, |floor| floor.max(1.0));
-        let floor = (0..samples).map(floor).collect();
-        Self { loops, samples, maps, power, floor }
-    }
-
-    fn index(&self, [doppler, range]: Cell) -> usize {
-        doppler.rem_euclid(self.loops as i64) as usize * self.samples + range.rem_euclid(self.samples as i64) as usize
-    }
-
-    fn at(&self, cell: Cell) -> f64 {
-        self.power[self.index(cell)]
-    }
-
-    /// Whether a cell moves in a direction (+1 or −1).
-    fn moves(&self, doppler: i64, sign: i64) -> bool {
-        doppler * sign > CLUTTER_BINS as i64 && 2 * doppler.abs() <= self.loops as i64
-    }
-
-    /// Strongest cell near another that moves the same way.
-    fn peak(&self, [doppler, range]: Cell, reach: i64, sign: i64) -> Cell {
-        (doppler - reach..=doppler + reach)
-            .filter(|&d| self.moves(d, sign))
-            .flat_map(|d| (range - 2..=range + 2).map(move |r| [d, r]))
-            .filter(|cell| cell[1] >= NEAREST_BIN as i64 && cell[1] < self.samples as i64)
-            .max_by(|&a, &b| self.at(a).total_cmp(&self.at(b)))
-            .unwrap_or([doppler, range])
-    }
-
-    /// Whether the power at the edge of static clutter rises towards it.
-    fn is_flank(&self, [doppler, range]: Cell) -> bool {
-        let nearer = [doppler - doppler.signum(), range];
-        !self.moves(nearer[0], doppler.signum()) && self.at(nearer) > self.at([doppler, range])
-    }
-
-    /// By how many times it exceeds its range's floor.
-    fn above(&self, cell: Cell) -> f64 {
-        self.at(cell) / self.floor[cell[1].rem_euclid(self.samples as i64) as usize]
-    }
-
-    /// Cells that hang together with the peak, nearly, and move the same way.
-    fn around(&self, top: Cell, sign: i64, reach: i64, bins: usize) -> Vec<Cell> {
-        let mut region = vec![top];
-        let mut known = HashSet::from([top]);
-        let gap = LARGEST_GAP as i64;
-        let mut next = 0;
-        while next < region.len() {
-            let [d, r] = region[next];
-            next += 1;
-            for cell in (-1..=1).flat_map(|i| (-gap..=gap).map(move |j| [d + i, r + j])) {
-                let near = (cell[1] - top[1]).abs() <= reach && cell[1] >= NEAREST_BIN as i64 && cell[1] < bins as i64;
-                if near && self.moves(cell[0], sign) && self.above(cell) > FAINTEST && known.insert(cell) {
-                    region.push(cell);
-                }
-            }
-        }
-        region
-    }
-
-    /// Top of the parabola through a peak's logarithms along an axis, in bins from it.
-    fn summit(&self, top: Cell, step: Cell) -> f64 {
-        let at = |k: i64| self.at([top[0] + k * step[0], top[1] + k * step[1]]).max(1e-9).ln();
-        let (left, middle, right) = (at(-1), at(0), at(1));
-        let bend = left - 2.0 * middle + right;
-        if bend < 0.0 { (0.5 * (left - right) / bend).clamp(-0.5, 0.5) } else { 0.0 }
     }
 }
 

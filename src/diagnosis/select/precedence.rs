@@ -6,11 +6,8 @@ use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction};
 use crate::diagnosis::misfit::Misfit;
-use crate::diagnosis::residual::{is_rough, is_same};
+use crate::diagnosis::residual::{is_added, is_rough, is_same};
 use crate::effects::{self, Stage};
-
-/// What never changes and may be a return or added behind the mixer: what turns all returns distinguishes the two, and goes first.
-const ADDED: [&str; 3] = [effects::tx_leakage::ID, effects::dc_offset::ID, effects::static_reflector::ID];
 
 /// What all that is received does over time.
 const COURSES: [Behaviour; 3] = [Behaviour::SlowTimeGain, Behaviour::SlowTimePhase, Behaviour::DelayProportionalPhase];
@@ -35,11 +32,6 @@ fn is_on_all(candidate: &Candidate, evidence: &Evidence) -> bool {
 /// Whether it is a gain or a phase over time of all that is received.
 pub(super) fn is_course_of_all(candidate: &Candidate) -> bool {
     COURSES.contains(&candidate.behaves_like) && candidate.place.range_m.is_none()
-}
-
-/// Whether it is one of what never changes.
-pub(super) fn is_added(candidate: &Candidate) -> bool {
-    candidate.id.is_some_and(|id| ADDED.contains(&id))
 }
 
 /// Whether it may be something else's echoes of the body.

@@ -33,12 +33,15 @@ pub struct Returns {
     pub channels: usize,
     /// `[frame, channel, bin]`
     spectra: Vec<Complex64>,
-    /// `[channel, bin]`: mean over the training frames.
+    /// `[channel, bin]`: mean over the training frames, and with what was subtracted of it.
     clutter: Vec<Complex64>,
+    standing: Vec<Complex64>,
     /// Variance `[frame, channel, bin]`.
     variance: Vec<f64>,
     /// `[bin]`: of what changes within a frame, over the noise.
     unrest: Vec<f64>,
+    /// `[bin]`: something was taken out there.
+    touched: Vec<bool>,
 }
 
 impl Returns {
@@ -76,11 +79,17 @@ impl Returns {
             clutter.iter_mut().zip(&spectra[frame * channels * bins..]).for_each(|(sum, value)| *sum += value);
         }
         clutter.iter_mut().for_each(|value| *value /= evidence.split.training.len() as f64);
-        Some(Self { bins, channels, spectra, clutter, variance, unrest })
+        let mut standing = clutter.clone();
+        if let Some(subtracted) = &evidence.subtracted {
+            let gone = fast.spectra(subtracted, 1.0);
+            let of_bins = gone.chunks_exact(samples).flat_map(|chirp| &chirp[..bins]);
+            standing.iter_mut().zip(of_bins).for_each(|(value, gone)| *value += gone);
+        }
+        Some(Self { bins, channels, spectra, clutter, standing, variance, unrest, touched: evidence.touched() })
     }
 
     pub fn power(&self, bin: usize) -> f64 {
-        (0..self.channels).map(|channel| self.clutter[channel * self.bins + bin].norm_sqr()).sum()
+        (0..self.channels).map(|channel| self.standing[channel * self.bins + bin].norm_sqr()).sum()
     }
 
     /// Mean over the channels: they hardly differ.
@@ -89,9 +98,9 @@ impl Returns {
         (0..self.channels).map(of).sum::<f64>() / self.channels as f64
     }
 
-    /// Ranges where nothing moves within a frame.
+    /// Ranges where nothing moves within a frame, or was taken out.
     pub fn quiet(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.bins.saturating_sub(6)).filter(|&bin| self.unrest[bin] < QUIET)
+        (0..self.bins.saturating_sub(6)).filter(|&bin| self.unrest[bin] < QUIET && !self.touched[bin])
     }
 
     /// Power over what the noise is worth in a frame.
@@ -118,7 +127,7 @@ impl Returns {
 
     fn change(&self, frame: usize, bin: usize) -> Complex64 {
         let sum: Complex64 = (0..self.channels)
-            .map(|channel| self.clutter[channel * self.bins + bin].conj() * self.deviation(frame, channel, bin))
+            .map(|channel| self.standing[channel * self.bins + bin].conj() * self.deviation(frame, channel, bin))
             .sum();
         sum / self.power(bin).max(f64::MIN_POSITIVE)
     }
@@ -126,8 +135,8 @@ impl Returns {
     /// The part of a deviation that does not look across the channels as the return does.
     pub fn beside(&self, frame: usize, bin: usize) -> Vec<Complex64> {
         let change = self.change(frame, bin);
-        let clutter = |channel: usize| self.clutter[channel * self.bins + bin];
-        (0..self.channels).map(|channel| self.deviation(frame, channel, bin) - change * clutter(channel)).collect()
+        let standing = |channel: usize| self.standing[channel * self.bins + bin];
+        (0..self.channels).map(|channel| self.deviation(frame, channel, bin) - change * standing(channel)).collect()
     }
 
     /// A return's change beyond what those of some that are not beside it predict: a gain, a phase, and a phase in proportion to the
@@ -174,8 +183,8 @@ impl Returns {
             let variance = self.variance(frame, bin);
             let common = self.change(frame, bin) - series.change[frame];
             for channel in 0..self.channels {
-                let clutter = self.clutter[channel * self.bins + bin];
-                all += (self.deviation(frame, channel, bin) - common * clutter).norm_sqr() / variance - 1.0;
+                let standing = self.standing[channel * self.bins + bin];
+                all += (self.deviation(frame, channel, bin) - common * standing).norm_sqr() / variance - 1.0;
             }
             own += series.change[frame].norm_sqr() * self.power(bin) / variance - 1.0;
         }

@@ -29,6 +29,8 @@ const UNSEEN: f64 = 5.0;
 /// Degrees of freedom of a median of powers, for each chirp: 2 ln² 2 for one that is independent, and those of differences to the mean of
 /// both neighbours have correlations of 4/9 and 1/36.
 const MEDIAN_FREEDOM: f64 = 0.494;
+/// Part of a chirp, at either end.
+const EDGES: usize = 16;
 /// Samples next to it that count once it is known to be hit.
 const NEXT: f64 = 6.0;
 
@@ -40,11 +42,16 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         return vec![];
     }
     let channels = evidence.cube.channels();
+    // What was taken out of ranges is fitted by tones over the whole chirp, and errs at its ends.
+    let edge = if evidence.emptied.is_empty() { 0 } else { samples.div_ceil(EDGES) };
+    let is_inside = |burst: &Burst| burst.last >= edge && burst.first + edge < samples;
     let (mut bursts, chances): (Vec<Burst>, Vec<f64>) = (0..frames * channels)
         .into_par_iter()
         .flat_map_iter(|index| of_channel(evidence, index / channels, index % channels))
+        .filter(|(burst, _)| is_inside(burst))
         .unzip();
-    let crossings = crossings::find(evidence).filter(|crossings| crossings.p_value < LEAST_LIKELY);
+    let are_there = |crossings: &Crossings| crossings.p_value < LEAST_LIKELY && crossings.bursts.iter().any(is_inside);
+    let crossings = crossings::find(evidence).filter(are_there);
     if let Some(crossings) = &crossings {
         // What one channel shows on its own has its extent from there.
         let weak = crossings.bursts.iter().filter(|weak| bursts.iter().all(|burst| !burst.overlaps(weak)));

@@ -20,39 +20,60 @@ const FEWEST: usize = 8;
 const BOARD_BINS: usize = 8;
 const LEAKING: f64 = 0.01;
 
-fn parts(value: &Complex64) -> [f64; 2] {
-    [value.re, value.im]
+/// What was sampled: without quadrature the real part alone.
+fn parts(value: &Complex64, is_real: bool) -> impl Iterator<Item = f64> {
+    [value.re, value.im].into_iter().take(if is_real { 1 } else { 2 })
 }
 
-/// Components at the largest value, and just below it.
+/// Components at the converter's ends, and just within them.
 struct Pile {
-    largest: f64,
+    /// Those at which components pile up, signed.
+    ends: Vec<f64>,
+    /// The nearer one to zero.
+    least: f64,
     tolerance: f64,
     at: usize,
     held_at: usize,
-    /// So many would be there by the values just below.
+    /// So many would be there by the values just within.
     expected: f64,
-    /// Of each frame, at the largest value.
+    /// Of each frame, at the ends.
     by_frame: Vec<usize>,
 }
 
 impl Pile {
-    fn new(evidence: &Evidence, largest: f64) -> Self {
-        // Within half a code, or a hair of the largest for samples that are no codes.
-        let tolerance = 1e-6 * largest;
-        let slab = 0.02 * largest;
+    /// None where components pile up at neither end.
+    fn find(evidence: &Evidence) -> Option<Self> {
+        let piles = evidence.extremes.into_iter().filter_map(|end| Self::at(evidence, end));
+        piles.reduce(|low, high| Self {
+            ends: [low.ends, high.ends].concat(),
+            least: low.least.min(high.least),
+            tolerance: low.tolerance.max(high.tolerance),
+            at: low.at + high.at,
+            held_at: low.held_at + high.held_at,
+            expected: low.expected + high.expected,
+            by_frame: low.by_frame.iter().zip(high.by_frame).map(|(low, high)| low + high).collect(),
+        })
+    }
+
+    fn at(evidence: &Evidence, end: f64) -> Option<Self> {
+        let [low, high] = evidence.extremes;
+        let half = 0.5 * (high - low);
+        let inward = if end == low { 1.0 } else { -1.0 };
+        // Within half a code, or a hair of the range for samples that are no codes.
+        let tolerance = 1e-6 * half;
+        let slab = 0.02 * half;
         let (mut at, mut below, mut held_at) = (0usize, 0usize, 0usize);
         let [_, _, _, loops, samples] = evidence.cube.dims;
         let per_frame = evidence.cube.channels() * loops * samples;
         let mut by_frame = vec![0usize; evidence.cube.dims[0]];
         for (index, value) in evidence.cube.samples.iter().enumerate() {
-            for part in parts(value) {
-                let magnitude = part.abs();
-                if magnitude >= largest - tolerance {
+            for part in parts(value, evidence.is_real()) {
+                let within = inward * (part - end);
+                if within <= tolerance {
                     at += 1;
                     by_frame[index / per_frame] += 1;
                     held_at += usize::from(evidence.split.held_out.contains(&(index / per_frame)));
-                } else if magnitude >= largest - slab {
+                } else if within <= slab {
                     below += 1;
                 }
             }
@@ -60,7 +81,21 @@ impl Pile {
         // A density that falls towards its end has fewer values in the last code than in any code of the slab before it.
         let codes = slab.max(1.0);
         let expected = (below as f64 / codes).max(0.2);
-        Self { largest, tolerance, at, held_at, expected, by_frame }
+        let piles_up = half > 0.0 && at >= FEWEST && at as f64 >= 5.0 * expected;
+        piles_up.then(|| Self { ends: vec![end], least: end.abs(), tolerance, at, held_at, expected, by_frame })
+    }
+
+    /// Whether all that lies as far from zero as the ends was cut.
+    fn holds_all(&self, extremes: [f64; 2]) -> bool {
+        extremes.iter().all(|end| self.ends.contains(end) || end.abs() < self.least)
+    }
+
+    /// The ends in words.
+    fn place(&self) -> String {
+        match self.ends[..] {
+            [low, high] if low == -high => format!("±{high:.0}"),
+            _ => self.ends.iter().map(|end| format!("{end:.0}")).collect::<Vec<_>>().join(" and "),
+        }
     }
 
     /// How far the signal would have gone, over the clipping level, with its interval: from what the empty beat frequencies say of it,
@@ -68,14 +103,17 @@ impl Pile {
     fn level(&self, evidence: &Evidence, declip: Option<&Declip>) -> (f64, [f64; 2]) {
         if let Some(declip) = declip {
             // The strongest of many restored values is one of the worse restored ones, and the noise is restored with it.
-            let beyond = strongest(evidence, declip, &self.by_frame) / self.largest - 1.0;
+            let beyond = strongest(evidence, declip, &self.by_frame) / self.least - 1.0;
             // What is below the clipping level without noise was there for moments, which say nothing of how far they went.
             let ci90 = if beyond > 0.0 { [1.0 + 0.5 * beyond, 1.0 + 1.25 * beyond + 0.05] } else { [1.0, FARTHEST] };
             return (1.0 + beyond.max(0.0), ci90);
         }
-        let power = evidence.cube.samples.iter().map(Complex64::norm_sqr).sum::<f64>();
-        let rms = (power / (2 * evidence.cube.samples.len()) as f64).sqrt();
-        let level = (rms * (2.0 * (2.0 * evidence.cube.samples.len() as f64).ln()).sqrt() / self.largest).max(1.0);
+        let values = || evidence.cube.samples.iter().flat_map(|value| parts(value, evidence.is_real()));
+        let count = values().count() as f64;
+        let mean = values().sum::<f64>() / count;
+        let rms = (values().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
+        let nearest = self.ends.iter().map(|end| (end - mean).abs()).fold(f64::INFINITY, f64::min);
+        let level = (rms * (2.0 * count.ln()).sqrt() / nearest).max(1.0);
         (level, [0.6 * level, 1.8 * level])
     }
 
@@ -89,26 +127,20 @@ impl Pile {
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // It is looked for once, in the samples as they were recorded.
     let untouched = evidence.accepted.is_empty() && evidence.accepted_unnamed.is_empty();
-    if !untouched || evidence.is_real() {
+    if !untouched {
         return vec![];
     }
-    let largest = evidence.extremes[1].max(-evidence.extremes[0]);
-    if largest <= 0.0 {
-        return vec![];
-    }
-    let pile = Pile::new(evidence, largest);
-    if pile.at < FEWEST || (pile.at as f64) < 5.0 * pile.expected {
-        return vec![];
-    }
-    vec![candidate(evidence, &pile)]
+    Pile::find(evidence).map(|pile| candidate(evidence, &pile)).into_iter().collect()
 }
 
 fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
-    let &Pile { largest, at, expected, .. } = pile;
+    let &Pile { least, at, expected, .. } = pile;
     let excess = at as f64 * (at as f64 / expected).ln() - (at as f64 - expected);
     let held_share = pile.held_at as f64 / at as f64;
-    let share = at as f64 / (2 * evidence.cube.samples.len()) as f64;
-    let declip = Declip::new(&silent_bins(evidence), largest, pile.tolerance).map(Arc::new);
+    let sampled = if evidence.is_real() { 1 } else { 2 } * evidence.cube.samples.len();
+    // What was not sampled is made of what was cut.
+    let can_restore = !evidence.is_real() && pile.holds_all(evidence.extremes);
+    let declip = can_restore.then(|| Declip::new(&silent_bins(evidence), least, pile.tolerance)).flatten().map(Arc::new);
     let (level, ci90) = pile.level(evidence, declip.as_deref());
     let correction = match declip {
         // That a sample lies beyond the clipping level is likelier than any one value there: the density of what is restored is a bound.
@@ -123,11 +155,12 @@ fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
         id: Some(effects::adc_saturation::ID),
         estimates: vec![Estimate { name: "level", values: vec![level], ci90: vec![ci90] }],
         statement: format!(
-            "{at} of the recorded components ({:.3} %) lie exactly at ±{largest:.0}, where {expected:.1} would by the values just \
-             below: the converter is at its rail and cuts the signal",
-            100.0 * share
+            "{at} of the recorded components ({:.3} %) lie exactly at {}, where {expected:.1} would by the values just \
+             within: the converter is at its rail and cuts the signal",
+            100.0 * at as f64 / sampled as f64,
+            pile.place()
         ),
-        energy: at as f64 * (0.1 * largest).powi(2),
+        energy: at as f64 * (0.1 * least).powi(2),
         correction,
         ..Candidate::new(Behaviour::Amplitude, place, corrected((-excess).exp(), 2.0), excess * held_share)
     }
@@ -153,7 +186,7 @@ fn strongest(evidence: &Evidence, declip: &Declip, hits: &[usize]) -> f64 {
     let channels = whole.cube.channels();
     let of = |index: usize| {
         let clean = denoised::channel(&whole, index / channels, index % channels);
-        clean.iter().flat_map(parts).map(f64::abs).fold(0.0, f64::max)
+        clean.iter().flat_map(|value| parts(value, false)).map(f64::abs).fold(0.0, f64::max)
     };
     (0..hits.len() * channels).into_par_iter().filter(|index| hits[index / channels] > 0).map(of).reduce(|| 0.0, f64::max)
 }

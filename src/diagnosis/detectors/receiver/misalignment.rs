@@ -37,7 +37,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [frames, _, _, loops, samples] = evidence.cube.dims;
     let channels = evidence.cube.channels();
     let enough = [frames, loops, samples].iter().zip(FEWEST).all(|(count, fewest)| *count >= fewest);
-    if !enough || evidence.accepted_unnamed.contains(&Behaviour::SlippedSamples) {
+    // Where the radar moves, all returns come later or earlier by the way that it went.
+    let known = evidence.accepted_unnamed.contains(&Behaviour::SlippedSamples);
+    if !enough || known || evidence.may_move_in_a_frame() {
         return vec![];
     }
     let means: Vec<Vec<[Vec<Complex64>; 2]>> = (0..frames)

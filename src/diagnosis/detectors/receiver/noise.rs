@@ -77,8 +77,11 @@ fn cells(evidence: &Evidence, frame: usize, bins: &[usize]) -> Cells {
     cells
 }
 
-/// Whether most Doppler rows, most beat frequencies and most frames share a correlation between the receivers.
-fn is_everywhere(evidence: &Evidence, bins: &[usize], found: &DMatrix<Complex64>) -> bool {
+/// Level of the test for a correlation that is the same in all frames; customary (Fisher 1925).
+const SIGNIFICANCE: f64 = 0.05;
+
+/// What every Doppler row, beat frequency and frame has of a correlation between the receivers.
+fn shares(evidence: &Evidence, bins: &[usize], found: &DMatrix<Complex64>) -> Shares<3> {
     let [frames, _, rx, loops, samples] = evidence.cube.dims;
     let pairs: Vec<(usize, usize)> = pairs_of(rx).collect();
     let whole: f64 = pairs.iter().map(|&pair| found[pair].norm_sqr()).sum();
@@ -91,7 +94,26 @@ fn is_everywhere(evidence: &Evidence, bins: &[usize], found: &DMatrix<Complex64>
             shares.add([bin, row, frame], along, whole);
         }
     }
-    shares.are_everywhere()
+    shares
+}
+
+/// Squared coherence, over pairs of receivers, of a correlation with that of static clutter: phase noise turns all returns, so that its
+/// products are theirs.
+fn of_clutter(evidence: &Evidence, found: &DMatrix<Complex64>) -> f64 {
+    let [_, tx, rx, _, samples] = evidence.cube.dims;
+    let clutter = evidence.standing();
+    let chirp = |tx: usize, rx_index: usize| &clutter[(tx * rx + rx_index) * samples..][..samples];
+    let product = |(a, b): (usize, usize)| -> Complex64 {
+        (0..tx).flat_map(|tx| chirp(tx, a).iter().zip(chirp(tx, b))).map(|(a, b)| a * b.conj()).sum()
+    };
+    let (mut shared, mut own, mut theirs) = (Complex64::ZERO, 0.0, 0.0);
+    for pair in pairs_of(rx) {
+        let clutter = product(pair);
+        shared += found[pair] * clutter.conj();
+        own += found[pair].norm_sqr();
+        theirs += clutter.norm_sqr();
+    }
+    shared.norm_sqr() / (own * theirs).max(f64::MIN_POSITIVE)
 }
 
 /// What receivers share, summed over cells.
@@ -205,9 +227,12 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
         return None;
     }
     let correlation = Correlation::of(&training, rx)?;
-    if !is_everywhere(evidence, bins, &correlation.expected()) {
+    let shares = shares(evidence, bins, &correlation.expected());
+    if !shares.are_everywhere() {
         return None;
     }
+    // Bursts differ from frame to frame. A product of noise that is correlated has twice the variance of one that is not, at most.
+    let is_steady = shares.chance_of_level(2, PER_PRODUCT) > SIGNIFICANCE;
     // Few held-out frames say little of so many numbers: every frame is predicted by those of the other folds.
     let nats: f64 = folds(of_frames.len())
         .map(|parts| {
@@ -215,22 +240,25 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
             rest.gain(&fold, correlation.alike).unwrap_or(f64::NEG_INFINITY)
         })
         .sum();
-    Some(shared_noise(evidence, &correlation, nats))
+    Some(shared_noise(evidence, &correlation, nats, is_steady))
 }
 
-fn shared_noise(evidence: &Evidence, correlation: &Correlation, nats: f64) -> Candidate {
+fn shared_noise(evidence: &Evidence, correlation: &Correlation, nats: f64, is_steady: bool) -> Candidate {
     let &Correlation { alike, rho, p_value, products, .. } = correlation;
     let error = (2.0 * products).sqrt().recip() + 0.02 * rho;
     let over = if alike { "mean" } else { "root mean square" };
     let noise = evidence.mean_noise();
     // That receivers share something is observed; the library says what.
-    let id = evidence.info(effects::correlated_noise::ID).map(|info| info.id);
+    let id = evidence.info(effects::correlated_noise::ID).map(|info| info.id).filter(|_| is_steady);
+    let turns = id.is_some() && of_clutter(evidence, &correlation.found) > 0.5;
     Candidate {
         id,
         estimates: id.map(|_| Estimate::normal("rho", rho, error)).into_iter().collect(),
+        look_alikes: turns.then_some(effects::phase_noise::ID).into_iter().collect(),
         statement: format!(
             "the receivers' noise is not independent: where nothing is, they agree with a correlation of {rho:.3} ({over} \
-             over pairs), like a target in one fixed direction in every cell"
+             over pairs), like a target in one fixed direction in every cell{}",
+            if is_steady { "" } else { "; more in some frames than in others, as noise does not" }
         ),
         energy: rho * noise * evidence.cube.samples.len() as f64,
         ..Candidate::new(Behaviour::NoiseSharedByReceivers, Place::at(Stage::Noise), p_value, nats)

@@ -71,11 +71,12 @@ fn edge(evidence: &Evidence, clutter: &[Vec<Complex64>], at_end: bool) -> Option
     let samples = evidence.cube.dims[4];
     let power: Vec<f64> = (0..samples)
         .map(|n| {
-            // Without quadrature a constant is no transient.
+            // Without quadrature a constant is no transient, and what was not sampled says nothing of the edges.
             let centre = |chirp: &Vec<Complex64>| {
                 if evidence.is_real() { chirp.iter().sum::<Complex64>() / samples as f64 } else { Complex64::ZERO }
             };
-            clutter.iter().map(|chirp| (chirp[n] - centre(chirp)).norm_sqr()).sum::<f64>() / clutter.len() as f64
+            let part = |value: Complex64| if evidence.is_real() { value.re.into() } else { value };
+            clutter.iter().map(|chirp| part(chirp[n] - centre(chirp)).norm_sqr()).sum::<f64>() / clutter.len() as f64
         })
         .collect();
     let between = &power[samples / 8..samples - samples / 8];
@@ -268,6 +269,8 @@ fn leakage(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Candidate>
     let (near_spread, far_spread) = (near.spread(near.peak), near.spread(near.far));
     // What has less delay than the way between the nearest antennas is a constant, which the library may lack.
     let constant = !evidence.is_real() && beat.may_be_constant() && !beat.may_be_leakage();
+    // Without quadrature nothing tells a constant from what turns by less than half a bin.
+    let unresolved = evidence.is_real() && 2 * near.peak < ZERO_PADDING;
     let id = (!constant || evidence.may_name(effects::dc_offset::ID)).then_some(effects::tx_leakage::ID);
     let estimates = vec![Estimate::normal("range_m", range, 0.3 * resolution), Estimate::normal("level_db", level_db, 1.0)];
     let p_value = chi2_tail(2.0 * near.over_noise(near.peak) * channels as f64, 2.0 * channels as f64);
@@ -276,17 +279,24 @@ fn leakage(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Candidate>
     Some(Candidate {
         id,
         estimates: if id.is_some() { estimates } else { vec![] },
-        look_alikes: [(near.as_reflectors() > SIGNIFICANCE, effects::static_reflector::ID), (constant, effects::dc_offset::ID)]
-            .into_iter()
-            .filter_map(|(holds, id)| holds.then_some(id))
-            .collect(),
+        look_alikes: [
+            (near.as_reflectors() > SIGNIFICANCE, effects::static_reflector::ID),
+            (constant || unresolved, effects::dc_offset::ID),
+        ]
+        .into_iter()
+        .filter_map(|(holds, id)| holds.then_some(id))
+        .collect(),
         statement: format!(
             "a strong return {range:.2} m away that never changes, {:.0} dB above the range sidelobes behind it; it differs by \
              {near_spread:.0} dB between the {channels} channels, while the strongest far return ({:.1} m) differs by \
              {far_spread:.0} dB{}",
             near.depth_db(),
             near.far as f64 * near.bin_m,
-            if id.is_some() { ": the transmitters leak into the receivers" } else { "" },
+            match id {
+                Some(_) if unresolved => ": the transmitters leak into the receivers, or the codes' zero is not the signal's",
+                Some(_) => ": the transmitters leak into the receivers",
+                None => "",
+            },
         ),
         ..added(evidence, term, place, p_value, nats)
     })

@@ -9,6 +9,7 @@ use std::iter::repeat;
 use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::field::{INFORMATIVE_GAIN, most_have};
 use super::frame_clutter::FrameClutter;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::folds;
@@ -38,8 +39,9 @@ struct Relative {
     value: Vec<Complex64>,
     weight: Vec<f64>,
     groups: usize,
-    /// Degrees of freedom of the groups' scatter, by which they are weighed.
+    /// Degrees of freedom of the groups' scatter, by which they are weighed, and that scatter over the noise.
     freedom: f64,
+    excess: f64,
 }
 
 /// One gain per frame, from some groups.
@@ -112,7 +114,7 @@ fn judged(evidence: &Evidence, clutter: &FrameClutter, of_body: Option<&[Vec<Vec
         })
         .collect();
     let halves = [relative.series(training, |g| near[g])?, relative.series(training, |g| !near[g])?];
-    if correlation(&halves, training) < SAME {
+    if correlation(&halves, training) < SAME || !relative.is_of_most(training) {
         return None;
     }
     // What but one half has, such as slow parts of the body, the other one has by chance.
@@ -197,8 +199,9 @@ impl Relative {
         let width = (clutter.bins / 16).max(4 + GAP);
         let groups = clutter.bins / width;
         let power = |bin: usize| (0..clutter.channels).map(|c| clutter.mean[c * clutter.bins + bin].norm_sqr()).sum::<f64>();
-        // What is lost in the noise teaches nothing.
-        let strong: Vec<bool> = (0..clutter.bins).map(|bin| power(bin) > 3.0 * clutter.channels as f64).collect();
+        // What is lost in the noise teaches nothing, nor does what was changed.
+        let is_strong = |bin: usize| power(bin) > 3.0 * clutter.channels as f64 && !clutter.touched[bin];
+        let strong: Vec<bool> = (0..clutter.bins).map(is_strong).collect();
         let (mut value, mut weight) = (vec![], vec![]);
         for frame in 0..clutter.frames {
             for group in 0..groups {
@@ -221,7 +224,7 @@ impl Relative {
                 weight.push(if known { 1.0 / (NEIGHBOURS * (1.0 / my_own + 1.0 / their_own)) } else { 0.0 });
             }
         }
-        Self { members, value, weight, groups, freedom: 0.0 }.weighed(training)
+        Self { members, value, weight, groups, freedom: 0.0, excess: 1.0 }.weighed(training)
     }
 
     /// Adds groups of what is observed of the body, `[frame][group]`: logarithmic gains, which may all be off by the same, with
@@ -230,7 +233,7 @@ impl Relative {
         let groups = of_body.iter().map(Vec::len).max().unwrap_or(0);
         let of_frame = |gains: &Vec<[f64; 2]>| gains.iter().copied().chain(repeat([0.0; 2])).take(groups).collect::<Vec<_>>();
         let (value, weight) = of_body.iter().flat_map(of_frame).map(|[gain, weight]| (Complex64::from(gain), weight)).unzip();
-        let body = Self { members: vec![], value, weight, groups, freedom: 0.0 }.weighed(training);
+        let body = Self { members: vec![], value, weight, groups, freedom: 0.0, excess: 1.0 }.weighed(training);
         // Real numbers have half of the freedom of complex ones, and their whole variance in half of it.
         let freedom = 0.5 * body.freedom;
         if freedom < FEWEST_FRAMES as f64 {
@@ -249,6 +252,20 @@ impl Relative {
         }
         (self.value, self.weight, self.groups) = (value, weight, self.groups + groups);
         self.freedom += freedom;
+    }
+
+    /// Whether most of the groups that would show the gains of the others have them: two strong things that move alike are no receiver.
+    fn is_of_most(&self, training: &[usize]) -> bool {
+        let gains = (0..self.groups).filter_map(|group| {
+            let pattern = self.series(training, |other| other != group)?.likely(training);
+            let [gain, most] = training.iter().fold([0.0; 2], |[gain, most], &frame| {
+                let (value, weight) = (self.value[frame * self.groups + group], self.weight[frame * self.groups + group]);
+                let along = 2.0 * (value * pattern[frame].conj()).re - pattern[frame].norm_sqr();
+                [gain + weight * along, most + weight * pattern[frame].norm_sqr()]
+            });
+            (most * self.excess > INFORMATIVE_GAIN).then_some([gain, most])
+        });
+        most_have(&gains.collect::<Vec<_>>(), 0.5)
     }
 
     /// None where too few frames or groups are known.
@@ -285,7 +302,7 @@ impl Relative {
         }
         let excess = (within / f64::max(freedom, 1.0)).max(1.0);
         self.weight.iter_mut().for_each(|weight| *weight /= excess);
-        self.freedom = 2.0 * freedom;
+        (self.freedom, self.excess) = (2.0 * freedom, excess);
         self
     }
 }

@@ -42,6 +42,7 @@ fn the_body_says_of_a_receivers_gain_what_the_static_ranges_say_and_groups_that_
         weight: vec![100.0; 6],
         groups: 1,
         freedom: 10.0,
+        excess: 1.0,
     };
     let (training, hops) = ([0, 1, 2, 3, 4, 5], [0.1, -0.1, 0.1, -0.1, 0.1, -0.1]);
     // Off by the same in all frames; groups of a frame scatter as they must, and ten times as much.

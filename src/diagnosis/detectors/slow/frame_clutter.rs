@@ -18,6 +18,8 @@ pub struct FrameClutter {
     scatter: Vec<f64>,
     /// Scatter up to which nothing moves within a frame.
     limit: f64,
+    /// `[bin]`: something was taken out there.
+    pub touched: Vec<bool>,
 }
 
 /// Scatter over the noise that a cell without a mover may have; its law is narrower than this.
@@ -54,7 +56,7 @@ impl FrameClutter {
         let deviation = per_frame.iter().flat_map(|(means, _)| means.iter().zip(&mean).map(|(m, s)| m - s)).collect();
         let scatter = per_frame.into_iter().flat_map(|(_, scatter)| scatter).collect();
         let limit = CLEAN.max(1.0 + 5.0 / ((channels * loops) as f64).sqrt());
-        Some(Self { frames, channels, bins, mean, deviation, scatter, limit })
+        Some(Self { frames, channels, bins, mean, deviation, scatter, limit, touched: evidence.touched() })
     }
 
     pub fn deviation(&self, frame: usize, channel: usize, bin: usize) -> Complex64 {

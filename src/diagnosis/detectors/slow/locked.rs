@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::settling::{Decay, ENOUGH};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::mean_chirp;
-use crate::diagnosis::evidence::{Evidence, HANN_LOBE, hann, transform_under};
+use crate::diagnosis::evidence::{Evidence, HANN_LOBE, hann, spectrum, transform_under};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 use crate::effects::Stage;
@@ -38,7 +38,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let training = evidence.split.training.len();
     // Blocks of a long frame are no frames.
-    if evidence.body.is_some() || evidence.split.block_loops.is_some() || loops < 2 || training < FEWEST_FRAMES || samples < 8 {
+    if evidence.body.is_some()
+        || evidence.may_move()
+        || evidence.split.block_loops.is_some()
+        || loops < 2
+        || training < FEWEST_FRAMES
+        || samples < 8
+    {
         return vec![];
     }
     let mut channels: Vec<Channel> =
@@ -88,7 +94,12 @@ fn of_channel(evidence: &Evidence, channel: usize) -> Channel {
         scatter.push((0..bins).map(of_bin).map(|sum: f64| sum.max(least)).collect());
         mean.push(means);
     }
-    let clutter = (0..bins).map(|bin| frames.iter().map(|frame| frame[bin]).sum::<Complex64>() / (root * count as f64)).collect();
+    let mut clutter: Vec<Complex64> =
+        (0..bins).map(|bin| frames.iter().map(|frame| frame[bin]).sum::<Complex64>() / (root * count as f64)).collect();
+    if let Some(subtracted) = &evidence.subtracted {
+        let gone = spectrum(&subtracted[channel * samples..][..samples]);
+        clutter.iter_mut().zip(gone).for_each(|(value, gone)| *value += gone);
+    }
     let noise = evidence.noise()[channel] / (loops * count) as f64;
     Channel { mean, scatter, clutter, noise }
 }
@@ -133,7 +144,9 @@ fn strongest(evidence: &Evidence, channels: &[Channel]) -> Option<Candidate> {
     let chance = |channel: usize, bin: usize| {
         corrected(mean_power_tail(unlikely(&channels[channel], bin, frames) / harmonics, harmonics), cells)
     };
+    let touched = evidence.touched();
     let all = (0..channels.len()).flat_map(|channel| (0..bins).map(move |bin| (channel, bin)));
+    let all = all.filter(|place| !touched[place.1]);
     let (channel, bin) =
         all.max_by(|&(a, i), &(b, j)| unlikely(&channels[a], i, frames).total_cmp(&unlikely(&channels[b], j, frames)))?;
     let p_value = chance(channel, bin);

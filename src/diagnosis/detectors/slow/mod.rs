@@ -70,7 +70,7 @@ fn looks(evidence: &Evidence, field: &Field) -> (Vec<Found>, Vec<Found>) {
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     let (mut found, mut free): (Vec<Found>, Vec<Found>) = (vec![], vec![]);
     for part in PARTS {
-        if part == Part::Boresight && evidence.room.is_none() {
+        if part == Part::Boresight && field.groups.iter().all(|group| group.ahead == field.groups[0].ahead) {
             continue;
         }
         let series = field.series(part, |_| true);
@@ -117,7 +117,8 @@ fn line(evidence: &Evidence, field: &Field, part: Part, series: &Series) -> Opti
     }
     let p_value = |freedom| (-lines::unsure(line.training_nats, freedom)).exp();
     let unsure = |freedom| (freedom, statistics::corrected(p_value(freedom), line.tried * LOOKS));
-    let candidate = candidates::of_line(evidence, field, part, &line);
+    let of_leakage = field.is_of_leakage(|frame, index, group| part.deviation(value(frame, index), group));
+    let candidate = candidates::of_line(evidence, field, part, &line, part == Part::Phase && of_leakage == Some(true));
     let unsure = line.freedom.map(unsure);
     let within_frames = line.frequency_hz * evidence.radar.frame_duration_s() > DISTINCT_TURNS;
     let over_noise = line.background * candidate.nats;

@@ -40,7 +40,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.body.is_some() || evidence.cube.dims[0] < FEWEST_FRAMES || evidence.split.block_loops.is_some() {
         return vec![];
     }
-    if evidence.accepted.iter().any(|id| [effects::breathing::ID, effects::heartbeat::ID].contains(id)) {
+    if evidence.may_move() && evidence.accepted_unnamed.contains(&Behaviour::PathLike) {
         return vec![];
     }
     one(evidence).into_iter().collect()
@@ -64,7 +64,8 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let metres = evidence.radar.wavelength_m() / (4.0 * PI);
     let named = rhythm(&evidence.starts_s, &best.phase, training, held_out)
         .filter(|r| r.share > RHYTHMIC && r.p_value < 1e-3)
-        .and_then(|r| Some((name(&r, metres)?, r)));
+        .and_then(|r| Some((name(&r, metres)?, r)))
+        .filter(|_| !evidence.may_move());
     let gain = held_out_gain(evidence, &data, &mean, &best);
     if gain <= 3.0 {
         return None;
@@ -167,9 +168,13 @@ impl Motion<'_> {
                 if *id == effects::breathing::ID { "a breathing chest" } else { "a beating heart" }
             ),
             None => format!(
-                "At {range_m:.2} m something moves slowly, over {:.1} mm during the recording, without a rhythm that would show \
-                 within its length.",
-                extent[1] - extent[0]
+                "At {range_m:.2} m something moves slowly, over {:.1} mm during the recording{}.",
+                extent[1] - extent[0],
+                if self.evidence.may_move() {
+                    ". Most returns beyond the transmitters' leakage move: it may be the radar that does"
+                } else {
+                    ", without a rhythm that would show within its length"
+                }
             ),
         }
     }

@@ -48,7 +48,7 @@ impl<'a> Chirps<'a> {
             return None;
         }
         let tapered = Tapered::new(samples);
-        let clutter = tapered.spectra(evidence.clutter(), 1.0);
+        let clutter = tapered.spectra(&evidence.standing(), 1.0);
         let of_frame = |frame: usize| {
             let mut spectra = Grid::filled(["loop", "channel", "bin"], [loops, channels, bins], Complex64::ZERO);
             for channel in 0..channels {
@@ -68,7 +68,7 @@ impl<'a> Chirps<'a> {
         let clutter = Grid::from_fn(["channel", "bin"], [channels, bins], |[channel, bin]| clutter[channel * samples + bin]);
         Some(Self {
             evidence,
-            windows: windows(&clutter),
+            windows: windows(&clutter, &evidence.touched()),
             spectra: (0..frames).into_par_iter().map(of_frame).collect(),
             clutter,
             loops_s: (0..loops).map(|index| (index as f64 - middle) * loop_s).collect(),
@@ -127,8 +127,9 @@ pub fn reached(first: usize, last: usize) -> RangeInclusive<usize> {
     first.saturating_sub(REACH)..=last + REACH
 }
 
-/// First and last of ranges to look at together, beside which there are static returns. `clutter`: `[channel, bin]`.
-fn windows(clutter: &Grid<Complex64, 2>) -> Vec<[usize; 2]> {
+/// First and last of ranges to look at together, beside which there are static returns, and where nothing was taken out. `clutter`:
+/// `[channel, bin]`.
+fn windows(clutter: &Grid<Complex64, 2>, touched: &[bool]) -> Vec<[usize; 2]> {
     let [channels, bins] = clutter.shape();
     let mut powers = vec![0.0; bins];
     for channel in 0..channels {
@@ -143,5 +144,10 @@ fn windows(clutter: &Grid<Complex64, 2>) -> Vec<[usize; 2]> {
         let elsewhere: f64 = (0..bins).filter(|bin| !reached.contains(bin)).map(|bin| powers[bin]).sum();
         elsewhere >= ELSEWHERE * all
     };
-    TOGETHER.into_iter().flat_map(of_width).filter(beside).collect()
+    TOGETHER
+        .into_iter()
+        .flat_map(of_width)
+        .filter(|[first, last]| !touched[*first..=*last].contains(&true))
+        .filter(beside)
+        .collect()
 }

@@ -11,13 +11,15 @@ use crate::diagnosis::finding::{Candidate, Estimate, NINETY, Place};
 use crate::diagnosis::statistics;
 use crate::effects::{self, Stage};
 
-pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line) -> Candidate {
+/// `of_leakage`: the radar's own leakage has it, too.
+pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line, of_leakage: bool) -> Candidate {
     // The fitted deviation is relative to the mean of the training frames, that of the finding to the undisturbed radar.
     let scale = if part == Part::Gain { 1.0 / (1.0 + line.constant) } else { 1.0 };
     let deviation = deviation(evidence, line, scale);
     let wave = Wave { line, amplitude: scale * line.amplitude(), hertz: hertz(line) };
     let (stage, description) = match part {
         Part::Gain => (Stage::Receiver, wave.ripple()),
+        Part::Phase if of_leakage => (Stage::Receiver, wave.turn()),
         Part::Phase | Part::Boresight => (Stage::Scene, wave.vibration(evidence, field, part)),
         Part::Delay => (Stage::Waveform, wave.oscillator()),
     };
@@ -64,12 +66,25 @@ impl Wave<'_> {
         ))
     }
 
+    /// Of all that is received. A radar that moves takes its leakage with it.
+    fn turn(&self) -> Description {
+        Description::unnamed(format!(
+            "The phase of all that is received oscillates by {:.3} rad at {}, the same at all ranges, and that of the transmitters' \
+             leakage as well, which a radar that moves takes with it.",
+            self.amplitude, self.hertz
+        ))
+    }
+
     /// Of the radar itself. What moves along the boresight turns the returns by its cosine, whether or not the ranges tell it apart.
     fn vibration(&self, evidence: &Evidence, field: &Field, part: Part) -> Description {
         let along = if part == Part::Phase { field.mean_ahead() } else { 1.0 };
         let metres = evidence.radar.wavelength_m() / (4.0 * PI * along);
         let deviation = self.line.amplitude_deviation.hypot(PATTERN * self.amplitude);
-        let where_ = if part == Part::Phase { "the same at all ranges" } else { "the more the farther ahead they are" };
+        let where_ = match part {
+            Part::Boresight if evidence.room.is_some() => "the more the farther ahead they are",
+            Part::Boresight => "the same at all ranges but those of the transmitters' leakage",
+            _ => "the same at all ranges",
+        };
         let estimates = vec![
             Estimate::normal("amplitude_m", self.amplitude * metres, deviation * metres),
             Estimate::normal("frequency_hz", self.line.frequency_hz, self.line.frequency_deviation_hz),

@@ -29,6 +29,8 @@ pub struct ClutterSpectra<'a> {
     mean: Grid<Complex64, 2>,
     /// `[bin]`, sum over the channels.
     power: Vec<f64>,
+    /// `[bin]`: something was taken out there.
+    touched: Vec<bool>,
 }
 
 /// Of a frame: deviations relative to the static returns, `[loop, group]`, and their inverse variances, `[group]`; zero where nothing
@@ -55,7 +57,7 @@ impl<'a> ClutterSpectra<'a> {
         }
         let mean = Grid::new(["channel", "bin"], [channels, samples], mean);
         let power = (0..evidence.range_bins()).map(|bin| (0..channels).map(|c| mean[[c, bin]].norm_sqr()).sum::<f64>()).collect();
-        Some(Self { evidence, taper, fft, mean, power })
+        Some(Self { evidence, taper, fft, mean, power, touched: evidence.touched() })
     }
 
     fn channels(&self) -> usize {
@@ -77,9 +79,9 @@ impl<'a> ClutterSpectra<'a> {
             let strong = || range.clone().filter(|&bin| self.is_strong(bin));
             let sum: f64 = strong().map(|bin| self.power[bin]).sum();
             let mean = strong().map(|bin| self.power[bin] * bin as f64).sum::<f64>() / sum;
-            let delay_s = mean * delay_of_bin;
-            let ahead = ahead(self.evidence.room.as_ref(), 0.5 * SPEED_OF_LIGHT * delay_s);
-            (sum > 0.0).then_some(Group { delay_s, ahead, bins: range })
+            let ahead_at = |bin: usize| ahead(self.evidence.room.as_ref(), 0.5 * SPEED_OF_LIGHT * bin as f64 * delay_of_bin);
+            let ahead = strong().map(|bin| self.power[bin] * ahead_at(bin)).sum::<f64>() / sum;
+            (sum > 0.0).then_some(Group { delay_s: mean * delay_of_bin, ahead, bins: range })
         };
         (0..bins / width).filter_map(group).collect()
     }
@@ -130,26 +132,28 @@ impl<'a> ClutterSpectra<'a> {
         // The law of a mean of so many powers, five deviations wide.
         let freedom = (loops * (channels - 1).max(1)) as f64;
         let limit = CLEAN.max(1.0 + 5.0 / freedom.sqrt());
-        let quiet = |bin: usize| aside[bin] < limit;
+        let quiet = |bin: usize| aside[bin] < limit && !self.touched[bin];
         (0..bins).map(|bin| self.is_strong(bin) && (bin.saturating_sub(1)..(bin + 2).min(bins)).all(quiet)).collect()
     }
 
     /// Power over the noise of what does not come from where the static return comes from: a mover does not, and what is left across
-    /// the channels shows it; a gain that all share does.
+    /// the channels shows it; a gain that all share does. Of one channel, what changes within the frame.
     fn aside(&self, moving: &Grid<Complex64, 3>, bin: usize) -> f64 {
         let [channels, loops, _] = moving.shape();
-        let (mut all, mut along) = (0.0, 0.0);
+        let (mut all, mut along, mut sum) = (0.0, 0.0, Complex64::ZERO);
         for index in 0..loops {
             let mut dot = Complex64::ZERO;
             for channel in 0..channels {
                 let value = moving[[channel, index, bin]];
                 all += value.norm_sqr();
+                sum += value;
                 dot += self.mean[[channel, bin]].conj() * value;
             }
             along += dot.norm_sqr() / self.power[bin].max(f64::MIN_POSITIVE);
         }
-        match channels {
-            1 => all / loops as f64,
+        match (channels, loops) {
+            (1, 1) => all,
+            (1, _) => (all - sum.norm_sqr() / loops as f64) / (loops - 1) as f64,
             _ if all - along < ASIDE * all => 0.0,
             _ => (all - along) / ((channels - 1) * loops) as f64,
         }

@@ -17,6 +17,7 @@ use clutter_spectra::{ClutterSpectra, OfFrame};
 pub use part::{Group, PATTERN, Part, ahead};
 use scale::FARTHEST;
 pub use series::Series;
+pub use sharing::{INFORMATIVE_GAIN, most_have};
 
 /// Deviation of the gain of the static returns from one, group by group of ranges.
 pub struct Field {

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
+use crate::diagnosis::support::UNKNOWN_NEAR_M;
 use crate::room::Room;
 
 /// Range cells whose gain is estimated together.
@@ -11,7 +12,8 @@ use crate::room::Room;
 pub struct Group {
     /// Mean delay of its static returns, weighted by their power.
     pub delay_s: f64,
-    /// Cosine to the boresight, mean over what the room has at that range; one where the room is not known.
+    /// Cosine to the boresight, mean over what the room has at that range; one where the room is not known, and zero for what moves
+    /// with the radar.
     pub ahead: f64,
     /// Its beat-frequency bins.
     pub bins: std::ops::Range<usize>,
@@ -32,6 +34,16 @@ pub enum Part {
 
 /// Share that is uncertain of an amplitude along the boresight: how much returns from where is not known.
 pub const PATTERN: f64 = 0.2;
+
+/// Mean cosine of a group below which most of it moves with the radar.
+const OWN: f64 = 0.5;
+
+impl Group {
+    /// Whether it is the radar's own leakage, for the most part.
+    pub fn is_own(&self) -> bool {
+        self.ahead < OWN
+    }
+}
 
 impl Part {
     /// What a value of one means at some ranges.
@@ -56,9 +68,13 @@ impl Part {
 }
 
 /// Mean cosine to the boresight of what the room's surfaces before the radar return from a range: of the ring that each of them
-/// has there, as rough surfaces return by the sine of grazing (constant γ), seen by antennas of one gain in all directions.
+/// has there, as rough surfaces return by the sine of grazing (constant γ), seen by antennas of one gain in all directions. Zero for what is
+/// nearer than anything: the radar's own leakage moves with it.
 pub fn ahead(room: Option<&Room>, range_m: f64) -> f64 {
     const DIRECTIONS: usize = 48;
+    if range_m < UNKNOWN_NEAR_M {
+        return 0.0;
+    }
     let Some(room) = room else { return 1.0 };
     let (low, high) = room.extent_m(range_m);
     let (mut sum, mut all) = (0.0, 0.0);

@@ -6,11 +6,11 @@ use super::Field;
 use super::part::Group;
 
 /// What a range would gain (nats) by a deviation that it shares, for its absence to be informative.
-const INFORMATIVE_GAIN: f64 = 10.0;
+pub const INFORMATIVE_GAIN: f64 = 10.0;
 
-/// Whether most ranges, as [`Field::log_likelihood_gains`] has them, gain more than a share of what they could; nothing
+/// Whether most ranges, of which each gains and could gain so much (nats), gain more than a share of that; nothing
 /// contradicts where none is informative.
-fn most_have(gains: &[[f64; 2]], share: f64) -> bool {
+pub fn most_have(gains: &[[f64; 2]], share: f64) -> bool {
     2 * gains.iter().filter(|[gain, most]| *gain > share * most).count() > gains.len() || gains.is_empty()
 }
 
@@ -29,6 +29,12 @@ impl Field {
         let strongest = gains.iter().enumerate().max_by(|(_, a), (_, b)| a[1].total_cmp(&b[1])).map(|(index, _)| index);
         strongest.map(|index| gains.swap_remove(index));
         !gains.is_empty() && most_have(&gains, 0.5)
+    }
+
+    /// Whether the radar's own leakage has a deviation, too; none where nothing of it is informative.
+    pub fn is_of_leakage(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> Option<bool> {
+        let gains = self.log_likelihood_gains(predicted, |[_, group]| self.groups[group].is_own());
+        (!gains.is_empty()).then(|| most_have(&gains, 0.5))
     }
 
     /// What ranges gain by a deviation, and what they would if all of it were theirs (nats): the informative ones. `wanted`:

@@ -20,6 +20,8 @@ const SETS: f64 = 2.0;
 pub struct Spectrum {
     pub course: Vec<f64>,
     values: Vec<Complex64>,
+    /// What a value of one means there, rad.
+    lever: f64,
     /// Of the noise in each of them.
     pub variance: f64,
 }
@@ -43,7 +45,7 @@ pub fn spectra(deviations: &[Deviation], course: &Course, part: Part) -> Vec<Spe
         let phases: Vec<f64> = values.iter().map(|value| value.im / lever).collect();
         // Half of a complex variance is in the phase; both parts of a phase's spectrum have half of that each.
         let variance = 0.5 * variance / (lever * lever);
-        Spectrum { values: course.spectrum(&phases), course: phases, variance }
+        Spectrum { values: course.spectrum(&phases), course: phases, lever, variance }
     };
     let mut spectra: Vec<Spectrum> = deviations.par_iter().map(of_group).collect();
     spectra.sort_by(|a, b| a.variance.total_cmp(&b.variance));
@@ -58,6 +60,12 @@ struct Reference {
 }
 
 impl Reference {
+    fn of(spectra: &[Spectrum], members: impl Iterator<Item = usize>) -> Self {
+        let mut reference = Self { sum: vec![Complex64::ZERO; spectra[0].values.len()], information: f64::MIN_POSITIVE };
+        members.for_each(|member| reference.add(&spectra[member]));
+        reference
+    }
+
     fn add(&mut self, spectrum: &Spectrum) {
         self.sum.iter_mut().zip(&spectrum.values).for_each(|(sum, value)| *sum += value / spectrum.variance);
         self.information += spectrum.variance.recip();
@@ -95,6 +103,25 @@ pub fn shared(spectra: &[Spectrum], part: Part) -> Option<Shared> {
     let log_bets = log_sum(all.iter().map(|shared| shared.log_bets)) - (count as f64).ln();
     let best = all.into_iter().max_by(|a, b| a.log_bets.total_cmp(&b.log_bets))?;
     Some(Shared { log_bets, ..best })
+}
+
+/// Whether a spectrum has what some others do, where it would show.
+pub fn shares(spectrum: &Spectrum, spectra: &[Spectrum], members: &[usize]) -> bool {
+    let (won, most) = bet(&Reference::of(spectra, members.iter().copied()), spectrum);
+    most > INFORMATIVE_GAIN && won > 0.0
+}
+
+/// Logarithm of the likelihood of all groups' phases, but for a constant: each group has what the members beside it have, and scatters
+/// by a variance of its own, which is at its maximum.
+pub fn log_likelihood(spectra: &[Spectrum], members: &[usize]) -> f64 {
+    let of_group = |index: usize| {
+        let spectrum = &spectra[index];
+        let reference = Reference::of(spectra, members.iter().copied().filter(|member| *member != index));
+        let rest: f64 =
+            spectrum.values.iter().zip(&reference.sum).map(|(v, sum)| (v - sum / reference.information).norm_sqr()).sum();
+        -(spectrum.values.len() as f64) / SETS * (rest * spectrum.lever * spectrum.lever).max(f64::MIN_POSITIVE).ln()
+    };
+    (0..spectra.len()).map(of_group).sum()
 }
 
 /// Logarithm of what a bet on a group's phases returns, and of what it would return if the group had what is predicted.

@@ -32,10 +32,11 @@ struct Phase {
     is_white: bool,
 }
 
-pub fn candidate(evidence: &Evidence, course: &Course, deviations: &[Deviation], shared: &Shared) -> Candidate {
+/// `of_radar`: nothing else but the radar's motion does so.
+pub fn candidate(evidence: &Evidence, course: &Course, deviations: &[Deviation], shared: &Shared, of_radar: bool) -> Candidate {
     let phase = Phase::new(course, &spectra(deviations, course, shared.part), &shared.members);
     let description =
-        if shared.part == Part::Delay { phase.of_delay(shared) } else { phase.of_vibration(evidence, course, shared) };
+        if shared.part == Part::Delay { phase.of_delay(shared) } else { phase.of_vibration(evidence, course, shared, of_radar) };
     let Phase { course: phases, rms, coding_cost, .. } = phase;
     let loops = course.loops;
     let place = if description.id.is_some() { Place::at(Stage::Scene) } else { candidates::place(shared.part) };
@@ -80,7 +81,7 @@ impl Phase {
     }
 
     /// A vibration has a frequency: what has all of them alike is no more than a phase that fluctuates.
-    fn of_vibration(&self, evidence: &Evidence, course: &Course, shared: &Shared) -> Description {
+    fn of_vibration(&self, evidence: &Evidence, course: &Course, shared: &Shared, of_radar: bool) -> Description {
         let Self { rms, frequency_hz, width_hz, is_white, .. } = *self;
         let observed = format!("The phases of all static returns fluctuate together, by {rms:.4} rad (standard deviation)");
         if is_white {
@@ -92,6 +93,11 @@ impl Phase {
             format!(" (or that beside a multiple of {:.2} Hz, the rate of the frames)", course.frame_s.recip())
         };
         let observed = format!("{observed} at {frequency_hz:.2} ± {width_hz:.2} Hz{alias}; {}", ranges(shared));
+        if !of_radar {
+            return Description::unnamed(format!(
+                "{observed}: the radar moves, or its oscillator changes, which the ranges and the transmitters' leakage do not decide."
+            ));
+        }
         let metres = evidence.radar.wavelength_m() / (4.0 * PI);
         let amplitude_m = SQRT_2 * rms * metres;
         Description {

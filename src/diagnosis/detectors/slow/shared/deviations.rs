@@ -30,13 +30,15 @@ struct Chirps {
     clutter: Grid<Complex64, 2>,
 }
 
-/// None where the noise is unknown, or too few ranges have static returns.
-pub fn deviations(evidence: &Evidence) -> Option<Vec<Deviation>> {
+/// Of what is around the radar, and of what moves with it. None where the noise is unknown, or too few ranges have static returns.
+pub fn deviations(evidence: &Evidence) -> Option<[Vec<Deviation>; 2]> {
     let chirps = Chirps::new(evidence)?;
     let width = (evidence.range_bins() / 16).max(4 + GAP);
-    let of_group = |g: usize| chirps.deviation(evidence, g * width..(g + 1) * width - GAP);
+    let touched = evidence.touched();
+    let of_group = |g: usize| chirps.deviation(evidence, g * width..(g + 1) * width - GAP, &touched);
     let deviations: Vec<Deviation> = (0..evidence.range_bins() / width).into_par_iter().filter_map(of_group).collect();
-    (deviations.len() > 2).then_some(deviations)
+    let (own, around): (Vec<Deviation>, Vec<Deviation>) = deviations.into_iter().partition(|deviation| deviation.group.is_own());
+    (around.len() > 2).then_some([around, own])
 }
 
 impl Chirps {
@@ -70,17 +72,18 @@ impl Chirps {
     }
 
     /// None where there is no static clutter.
-    fn deviation(&self, evidence: &Evidence, range: std::ops::Range<usize>) -> Option<Deviation> {
+    fn deviation(&self, evidence: &Evidence, range: std::ops::Range<usize>, touched: &[bool]) -> Option<Deviation> {
         let [frames, channels, loops, samples] = self.spectra.shape();
-        // As in `field`: static returns that are lost in the noise of a chirp teach nothing.
-        let own: Vec<usize> = range.clone().filter(|&bin| self.power(bin) > 3.0 * channels as f64).collect();
+        // As in `field`: static returns that are lost in the noise of a chirp teach nothing, nor do those that were changed.
+        let own: Vec<usize> = range.clone().filter(|&bin| self.power(bin) > 3.0 * channels as f64 && !touched[bin]).collect();
         let sum: f64 = own.iter().map(|&bin| self.power(bin)).sum();
         if sum <= 0.0 {
             return None;
         }
         let delay_of_bin = evidence.radar.sample_rate_hz / (samples as f64 * evidence.radar.slope_hz_per_s);
         let delay_s = own.iter().map(|&bin| self.power(bin) * bin as f64).sum::<f64>() / sum * delay_of_bin;
-        let ahead = ahead(evidence.room.as_ref(), 0.5 * SPEED_OF_LIGHT * delay_s);
+        let ahead_at = |bin: usize| ahead(evidence.room.as_ref(), 0.5 * SPEED_OF_LIGHT * bin as f64 * delay_of_bin);
+        let ahead = own.iter().map(|&bin| self.power(bin) * ahead_at(bin)).sum::<f64>() / sum;
         let value = |[frame, index]: [usize; 2]| -> Complex64 {
             let along = |channel: usize| {
                 let (values, mean) = (self.spectra.below([frame, channel, index]), self.clutter.below([channel]));

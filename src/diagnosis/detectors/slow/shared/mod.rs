@@ -22,24 +22,30 @@ use super::selection::UNDECIDED;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::Candidate;
 
-use bets::{shared, spectra};
+use bets::{log_likelihood, shared, shares, spectra};
 use candidate::candidate;
 use course::Course;
 use deviations::deviations;
 
 pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let course = Course::of(evidence);
-    let deviations = deviations(evidence)?;
-    let part = |part: Part| shared(&spectra(&deviations, &course, part), part);
-    let (phase, delay) = (part(Part::Phase), part(Part::Delay));
-    // Where ranges do not distinguish the two, what moves the radar goes before what moves its oscillator: it needs no second
-    // cause.
-    let best = [Some(phase?), delay]
-        .into_iter()
-        .flatten()
-        .reduce(|phase, delay| if delay.log_bets > phase.log_bets + UNDECIDED { delay } else { phase })?;
+    let [around, own] = deviations(evidence)?;
+    let of_part = |part: Part| {
+        let spectra = spectra(&around, &course, part);
+        let shared = shared(&spectra, part)?;
+        let log_likelihood = log_likelihood(&spectra, &shared.members);
+        Some((shared, spectra, log_likelihood))
+    };
+    let (phase, delay) = (of_part(Part::Phase)?, of_part(Part::Delay)?);
+    // By how much more likely ranges have a phase in proportion to the delay.
+    let more = delay.2 - phase.2;
+    let (best, spectra, _) = if more > UNDECIDED { delay } else { phase };
+    // A radar that moves takes its leakage with it.
+    let turns_leakage = || bets::spectra(&own, &course, best.part).iter().any(|own| shares(own, &spectra, &best.members));
+    let of_radar = best.part == Part::Phase && more < -UNDECIDED && !turns_leakage();
     // A bet is won by two ranges that hang together; all returns are concerned where most that are informative have it.
-    (2 * best.sharing > best.informative && best.log_bets > 0.0).then(|| candidate(evidence, &course, &deviations, &best))
+    let is_shared = 2 * best.sharing > best.informative && best.log_bets > 0.0;
+    is_shared.then(|| candidate(evidence, &course, &around, &best, of_radar))
 }
 
 #[cfg(test)]

@@ -1,0 +1,51 @@
+//! A recording with what was accepted taken into account.
+
+use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::finding::{Candidate, Correction};
+use crate::diagnosis::residual::stands_still;
+
+impl Evidence {
+    /// The same with one more effect taken into account.
+    pub fn with(&self, candidate: &Candidate) -> Self {
+        let mut next = self.clone().changed();
+        if candidate.behaves_like.is_path() || candidate.behaves_like == Behaviour::ExcessPower {
+            // Where paths were cut out there is not even noise left.
+            next.once.noise = self.once.noise.clone();
+        }
+        next.correct(&candidate.correction);
+        if stands_still(candidate) {
+            let gone = self.standing().iter().zip(next.clutter()).map(|(before, after)| before - after).collect();
+            next.subtracted = Some(gone);
+        }
+        match candidate.id {
+            Some(id) => next.accepted.push(id),
+            None => next.accepted_unnamed.push(candidate.behaves_like),
+        }
+        next
+    }
+
+    fn correct(&mut self, correction: &Correction) {
+        match correction {
+            Correction::Samples(undo) => undo(&mut self.cube),
+            Correction::Inverse(undo, volume) => {
+                undo(&mut self.cube);
+                self.inverses.push((undo.clone(), volume.clone()));
+            }
+            Correction::Emptied(undo, cells) => {
+                undo(&mut self.cube);
+                self.emptied.push(cells.clone());
+            }
+            Correction::Followed(correction, course) => {
+                self.correct(correction);
+                self.courses.push(course.clone());
+            }
+            Correction::Body(change) => {
+                if let Some(body) = &mut self.body {
+                    change(body);
+                }
+            }
+            Correction::None => {}
+        }
+    }
+}
