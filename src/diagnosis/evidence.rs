@@ -78,7 +78,7 @@ pub(super) struct Once {
     power: OnceLock<Option<Arc<PowerModel>>>,
     products: OnceLock<Products>,
     peak: OnceLock<f64>,
-    may_move: OnceLock<bool>,
+    pub(super) may_move: OnceLock<bool>,
 }
 
 impl Evidence {

@@ -199,6 +199,8 @@ fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use crate::diagnosis::Place;
 
@@ -224,5 +226,20 @@ mod tests {
         assert!(is_left_by(&mover, &ghost(90.0)) && !is_left_by(&mover, &ghost(110.0)));
         let no_law = Candidate { id: None, ..mover };
         assert!(is_left_by(&no_law, &ghost(4e3)) && !is_left_by(&no_law, &ghost(6e3)));
+    }
+
+    #[test]
+    fn what_was_taken_out_of_some_ranges_leaves_no_power_at_others() {
+        let at = |range_m: [f64; 2], behaves_like: Behaviour, gain: f64| {
+            let mut candidate = of(None, behaves_like, gain);
+            candidate.place.range_m = Some(range_m);
+            candidate
+        };
+        let mover = at([1.0, 2.0], Behaviour::PathLike, 1e4);
+        let taken = Candidate { correction: Correction::Emptied(Arc::new(|_| ()), Arc::new(|_, _| false)), ..mover.clone() };
+        let excess = |range_m: [f64; 2]| at(range_m, Behaviour::ExcessPower, 100.0);
+        assert!(is_left_by(&taken, &excess([1.5, 2.5])) && !is_left_by(&taken, &excess([2.5, 3.5])));
+        // As a track that was subtracted does.
+        assert!(is_left_by(&mover, &excess([2.5, 3.5])));
     }
 }

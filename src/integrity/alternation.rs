@@ -279,6 +279,21 @@ mod tests {
         }
     }
 
+    /// Other turns in every frame, as what moves or a burst has them.
+    #[test]
+    fn loops_that_differ_otherwise_in_every_frame_accuse_nobody() {
+        let turn: Turn = |index, direction| {
+            let (frame, kind) = ((index / 24) as f64, (index % 4) as f64);
+            Complex64::from_polar(1.0, 2.0 * direction * (17.0 * frame + 5.0 * kind * (1.0 + frame)).sin())
+        };
+        for noise in [0.05, 0.5] {
+            let found = seen([4, 24], turn, noise);
+            assert!(found.ok, "{noise}: {found:?}");
+            // In one frame alone nothing tells them.
+            assert!(seen([1, 24], turn, 0.05).is_refusal());
+        }
+    }
+
     /// However many channels and frames there are, and they still show the turns.
     #[test]
     fn of_many_channels_some_are_kept() {

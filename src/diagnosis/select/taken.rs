@@ -14,6 +14,10 @@ impl Evidence {
             next.once.noise = self.once.noise.clone();
         }
         next.correct(&candidate.correction);
+        if candidate.correction.empties() {
+            // The radar moves no less where some of what seems to was taken out.
+            next.once.may_move = self.may_move().into();
+        }
         if stands_still(candidate) {
             let gone = self.standing().iter().zip(next.clutter()).map(|(before, after)| before - after).collect();
             next.subtracted = Some(gone);

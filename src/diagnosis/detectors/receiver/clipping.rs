@@ -190,3 +190,38 @@ fn strongest(evidence: &Evidence, declip: &Declip, hits: &[usize]) -> f64 {
     };
     (0..hits.len() * channels).into_par_iter().filter(|index| hits[index / channels] > 0).map(of).reduce(|| 0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::diagnosis::cube::{Loaded, analytic};
+    use crate::radar::{Radar, Sampling};
+    use crate::support;
+
+    /// Codes of a receiver without quadrature: a strong tone about an offset, cut at two ends.
+    fn evidence(offset: f32, ends: [f32; 2]) -> Evidence {
+        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 16, sampling: Sampling::Real, ..Radar::small(8) };
+        let mut normal = support::normal(3);
+        let count = radar.dims().iter().product::<usize>();
+        let wave = |i: usize| 200.0 * (TAU * 5.3 * (i % 64) as f64 / 64.0).sin();
+        let codes: Vec<f32> =
+            (0..count).map(|i| (offset + (wave(i) + 3.0 * normal()) as f32).round().clamp(ends[0], ends[1])).collect();
+        let extremes = [f32::min, f32::max].map(|pick| f64::from(codes.iter().copied().reduce(pick).unwrap()));
+        Evidence::new(Loaded::of_samples(radar, analytic(&codes, 64), extremes), None, None)
+    }
+
+    #[test]
+    fn codes_pile_up_at_either_end_whatever_their_middle_and_in_no_other_case() {
+        let said = |offset: f32, ends: [f32; 2]| find(&evidence(offset, ends)).pop().map(|found| found.statement);
+        for offset in [0.0, 2048.0] {
+            let end = offset + 150.0;
+            let found = said(offset, [-1e4, end]).expect("a pile");
+            assert!(found.contains(&format!("exactly at {end:.0},")), "{found}");
+            assert!(said(offset, [offset - 150.0, end]).expect("two piles").contains("exactly at "));
+            assert!(said(offset, [-1e4, 1e4]).is_none());
+        }
+        assert!(said(0.0, [-150.0, 150.0]).expect("two piles").contains("exactly at ±150,"));
+    }
+}

@@ -342,7 +342,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     use super::*;
-    use crate::radar::Radar;
+    use crate::radar::{Radar, Sampling};
 
     /// What is said of a return at a range, beside a far one, in all channels.
     fn said(near_m: f64) -> Vec<Candidate> {
@@ -361,5 +361,17 @@ mod tests {
         assert_eq!(found.iter().filter_map(|found| found.id).collect::<Vec<_>>(), [effects::tx_leakage::ID]);
         assert!(found[0].nats > 100.0 && found[0].estimates[0].values[0] < 0.2, "{found:?}");
         assert!(said(NEAR_M + 0.1).is_empty(), "{:?}", said(NEAR_M + 0.1));
+    }
+
+    /// Without quadrature, what was not sampled rises at the ends of a chirp that begins and ends otherwise.
+    #[test]
+    fn a_leakage_that_hardly_turns_has_no_edges() {
+        let radar = Radar { samples_per_chirp: 128, sampling: Sampling::Real, ..Radar::small(8) };
+        let evidence = Evidence::in_noise(radar, 4, |[_, channel, _, n]| {
+            let tone = |bin: f64, level: f64| Complex64::from_polar(level, TAU * bin * n as f64 / 128.0);
+            tone(0.3, 200.0 * (1.0 + channel as f64)) + tone(30.0, 10.0)
+        });
+        let found = find(&evidence);
+        assert!(found.iter().all(|found| found.id != Some(effects::ramp_edge_transient::ID)), "{found:?}");
     }
 }

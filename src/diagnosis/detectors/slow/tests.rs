@@ -223,3 +223,66 @@ fn one_receiver_that_hops_is_distinguished_from_all_that_drift() {
     let drifting = evidence(12, |_, frame, _, _| (1.0 + 0.01 * frame as f64).into());
     assert!(super::channels::find(&drifting).iter().all(|c| c.p_value > 5e-4));
 }
+
+/// A radar that moves takes its leakage with it.
+#[test]
+fn a_vibration_is_measured_beside_a_leakage_that_stays_and_is_none_where_that_turns_as_well() {
+    let shake = |t: f64| Complex64::cis(0.1 * (std::f64::consts::TAU * 83.0 * t).sin());
+    let leaking = |with_leakage: bool| {
+        let mut evidence = evidence(31, |t, _, _, _| shake(t));
+        let radar = evidence.radar.clone();
+        let bin = 0.1 / radar.range_resolution_m();
+        evidence.cube.each_chirp(|[frame, _, index], chirp| {
+            let turn = if with_leakage { shake(radar.chirp_time_s(frame, 0, index)) } else { Complex64::ONE };
+            let tone = |n: usize| Complex64::cis(std::f64::consts::TAU * bin * n as f64 / 64.0) * 300.0;
+            chirp.iter_mut().enumerate().for_each(|(n, value)| *value += tone(n) * turn);
+        });
+        best(&evidence.changed()).expect("nothing found")
+    };
+    let stays = leaking(false);
+    assert_eq!(stays.id, Some(effects::radar_vibration::ID), "{}", stays.statement);
+    let truth = 0.1 * Radar::small(1).wavelength_m() / (2.0 * std::f64::consts::TAU);
+    assert!((stays.estimates[0].values[0] / truth - 1.0).abs() < 0.1, "{stays:?}");
+    let turns = leaking(true);
+    assert_eq!((turns.id, turns.behaves_like), (None, Behaviour::SlowTimePhase), "{}", turns.statement);
+}
+
+/// Where something was taken out, what all returns do went with it.
+#[test]
+fn a_step_is_seen_at_the_ranges_where_nothing_was_taken_out() {
+    let radar = Radar::small(1);
+    let delay_of_bin = radar.sample_rate_hz / (64.0 * radar.slope_hz_per_s);
+    let taken = |range: usize| (13..47).contains(&range);
+    let step = |frame: usize, delay_s: f64| {
+        let stays = taken((delay_s / delay_of_bin).round() as usize);
+        if frame >= 7 && !stays { 1.1 } else { 1.0 }
+    };
+    let mut evidence = evidence(5, |_, frame, _, delay_s| step(frame, delay_s).into());
+    let is_step = |evidence: &Evidence| best(evidence).is_some_and(|found| found.id == Some(effects::gain_drift::ID));
+    assert!(!is_step(&evidence));
+    evidence.emptied.push(std::sync::Arc::new(move |_, range| taken(range)));
+    assert!(is_step(&evidence.changed()));
+}
+
+#[test]
+fn a_single_receiver_shows_a_step() {
+    let radar = Radar { samples_per_chirp: 64, loops_per_frame: 32, rx_m: vec![[0.0; 3]], ..Radar::small(12) };
+    let evidence = Evidence::in_noise(radar, 4, |[frame, _, _, n]| {
+        let tone = |bin: f64| Complex64::cis(std::f64::consts::TAU * bin * n as f64 / 64.0 + bin) * 30.0;
+        let gain = if frame >= 7 { 0.8 } else { 1.0 };
+        [7.0, 15.0, 23.0, 31.0, 45.0].into_iter().map(tone).sum::<Complex64>() * gain
+    });
+    within(&found_once(evidence), "db", 20.0 * 0.8f64.log10());
+}
+
+#[test]
+fn two_strong_things_that_move_alike_are_no_receiver() {
+    let mut evidence = evidence(14, |_, _, _, _| Complex64::ONE);
+    evidence.cube.each_chirp(|[frame, channel, _], chirp| {
+        let level = if channel == 2 { 100.0 * (1.3 * frame as f64).sin() } else { 0.0 };
+        let tone = |n: usize, bin: f64| Complex64::cis(std::f64::consts::TAU * bin * n as f64 / 64.0) * level;
+        chirp.iter_mut().enumerate().for_each(|(n, value)| *value += tone(n, 9.0) + tone(n, 40.0));
+    });
+    let found = super::channels::find(&evidence.changed());
+    assert!(found.iter().all(|found| found.p_value > 5e-4), "{found:?}");
+}

@@ -50,8 +50,8 @@ fn describe(evidence: &Evidence, field: &Field, part: Part, drift: &Drift) -> De
             Description::unnamed(format!("The phase of all static returns {how}, by {change:+.4} rad, the same at all ranges."))
         }
         Part::Delay => Description::unnamed(format!(
-            "The phase of the static returns {how} in proportion to the delay, by {:+.4} rad at {STATED_AT_M} m: the carrier \
-             changes by {:+.0} Hz.",
+            "The phase of the static returns {how} in proportion to the delay, by {:+.4} rad at {STATED_AT_M} m, as if the \
+             carrier changed by {:+.0} Hz.",
             change * stated_delay_s(),
             change / (2.0 * PI)
         )),

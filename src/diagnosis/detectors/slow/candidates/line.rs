@@ -101,7 +101,7 @@ impl Wave<'_> {
     fn oscillator(&self) -> Description {
         Description::unnamed(format!(
             "The phase of every return oscillates at {} in proportion to its delay, by {:.4} rad at \
-             {STATED_AT_M} m: the local oscillator's frequency is modulated by {:.0} Hz.",
+             {STATED_AT_M} m, as if the local oscillator's frequency were modulated by {:.0} Hz.",
             self.hertz,
             self.amplitude * stated_delay_s(),
             self.amplitude / (2.0 * PI)

@@ -7,6 +7,7 @@ use num_complex::Complex64;
 use super::bets::log_bessel_0;
 use super::course::{Course, without_slow};
 use super::find;
+use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::Evidence;
 use crate::effects;
 use crate::radar::Radar;
@@ -112,5 +113,16 @@ fn ranges_that_vary_each_for_itself_share_nothing() {
             };
             assert!(p_value(&evidence(gap_s, seed, |_| 0.0, away)) > 1e-3, "{seed}");
         }
+    }
+}
+
+/// An oscillator's error, of no line either, turns far returns more than near ones.
+#[test]
+fn a_phase_in_proportion_to_the_delay_is_no_vibration() {
+    let wanders = |time_s: f64| [31.0, 37.7, 44.1].iter().map(|f| (TAU * f * time_s).sin()).sum::<f64>();
+    let bins = [3.0, 11.0, 20.0, 27.0, 34.0, 43.0, 52.0];
+    for gap_s in [0.0, 0.02] {
+        let found = find(&evidence(gap_s, 3, |_| 0.0, |time_s, i| 0.004 * bins[i] * wanders(time_s))).expect("a shared phase");
+        assert_eq!((found.id, found.behaves_like), (None, Behaviour::DelayProportionalPhase), "{}", found.statement);
     }
 }
