@@ -172,8 +172,8 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // Up to which share of what was gained.
     [
         (roughly || fades || image || unlike, ROUGHLY),
-        (bursts || behind || line, 1.0),
-        (hardly || uneven || bent || is_mixed_or_cut(accepted, candidate) || products || alone, f64::INFINITY),
+        (bursts || behind || line || is_of_cut(accepted, candidate), 1.0),
+        (hardly || uneven || bent || is_mixed(accepted, candidate) || products || alone, f64::INFINITY),
         (shaken || rest, SHAKEN),
         (by_chirp || faint, SLIGHTLY),
     ]
@@ -181,16 +181,19 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     .any(|(holds, share)| holds && candidate.nats < share * accepted.nats)
 }
 
-/// Whether it is in the noise as an accepted correction mixes it, or in the products of a signal that is cut.
-fn is_mixed_or_cut(accepted: &Candidate, candidate: &Candidate) -> bool {
-    // To undo a coupling of receivers mixes their noise, and chirps read between their samples have less of it.
-    let mixed = is_of_receivers(accepted) && candidate.behaves_like == Behaviour::NoiseSharedByReceivers
-        || accepted.id == Some(effects::chirp_nonlinearity::ID) && candidate.behaves_like == Behaviour::NoiseOverBeatFrequency;
-    // A signal that is cut and cannot be restored has products of all returns along every chirp, and other ones in every receiver.
-    let cut = accepted.id == Some(effects::adc_saturation::ID)
+/// Whether it is in the noise as an accepted correction mixes it: to undo a coupling of receivers mixes their noise, and chirps read
+/// between their samples have less of it.
+fn is_mixed(accepted: &Candidate, candidate: &Candidate) -> bool {
+    is_of_receivers(accepted) && candidate.behaves_like == Behaviour::NoiseSharedByReceivers
+        || accepted.id == Some(effects::chirp_nonlinearity::ID) && candidate.behaves_like == Behaviour::NoiseOverBeatFrequency
+}
+
+/// Whether it is in the products of a signal that was cut and cannot be restored: of all returns along every chirp, and other ones in
+/// every receiver.
+fn is_of_cut(accepted: &Candidate, candidate: &Candidate) -> bool {
+    accepted.id == Some(effects::adc_saturation::ID)
         && matches!(accepted.correction, Correction::None)
-        && (is_of_receivers(candidate) || candidate.place.stage == Some(Stage::Waveform));
-    mixed || cut
+        && (is_of_receivers(candidate) || candidate.place.stage == Some(Stage::Waveform))
 }
 
 fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> bool {

@@ -294,6 +294,14 @@ mod tests {
         }
     }
 
+    /// The oscillator's phase may drift from frame to frame.
+    #[test]
+    fn turns_are_seen_whatever_the_phase_of_a_frame() {
+        let turn: Turn = |index, direction| by_transmitter(2, index, direction) * Complex64::cis(1.7 * (index / 24) as f64);
+        let found = seen([4, 24], turn, 0.05);
+        assert!(found.is_refusal() && found.found.contains("loops of 2 kinds"), "{found:?}");
+    }
+
     /// However many channels and frames there are, and they still show the turns.
     #[test]
     fn of_many_channels_some_are_kept() {

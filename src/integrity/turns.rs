@@ -107,9 +107,7 @@ impl Sequence {
                 turns.within[cell] += (energy[cell] - all).max(floor);
             }
             for (sum, first) in turns.means.iter_mut().zip([0, start % turns.kinds]) {
-                for (kind, row) in means.row_iter().enumerate() {
-                    sum.row_mut((first + kind) % turns.kinds).iter_mut().zip(row.iter()).for_each(|(sum, value)| *sum += value);
-                }
+                add_turned(sum, &means, first, samples);
             }
         }
     }
@@ -245,6 +243,23 @@ fn common(means: &DMatrix<Complex64>, energies: &[f64], noise: &[f64]) -> DVecto
         left = energies.iter().zip(along).map(|(energy, along)| (energy - along).max(0.0)).collect();
     }
     factor
+}
+
+/// Adds a row's means `[kind, cell]`, of which the first is of the kind `first`, each range bin turned to the phase that it had: a phase
+/// that all returns share from row to row is no turn.
+fn add_turned(sum: &mut DMatrix<Complex64>, means: &DMatrix<Complex64>, first: usize, samples: usize) {
+    let kinds = means.nrows();
+    let mut along = vec![Complex64::ZERO; samples];
+    for (cell, values) in means.column_iter().enumerate() {
+        let known = sum.column(cell);
+        along[cell % samples] += (0..kinds).map(|kind| values[kind].conj() * known[(first + kind) % kinds]).sum::<Complex64>();
+    }
+    for (cell, values) in means.column_iter().enumerate() {
+        let turn = along[cell % samples];
+        let turn = if turn.norm() > 0.0 { turn / turn.norm() } else { Complex64::ONE };
+        let mut known = sum.column_mut(cell);
+        (0..kinds).for_each(|kind| known[(first + kind) % kinds] += values[kind] * turn);
+    }
 }
 
 /// Means of the items of each kind, `[kind, cell]`, from spectra `[item][cell]`.

@@ -25,8 +25,6 @@ const SURE: f64 = 1e-3;
 /// while.
 const SECTORS: usize = 8;
 const PARTS: usize = 2;
-/// Largest side lobe of a Hann window over its summit, 31.5 dB below (Harris 1978): what is fainter may be that.
-const SIDE_LOBE: f64 = 7.1e-4;
 
 /// Powers over the noise by range bin.
 struct Floor {
@@ -78,7 +76,7 @@ impl Floor {
             let nearer = ((other as f64 + 1.0) / (bin as f64 + 1.0)).min(1.0).powi(2);
             let expected = ratio * self.clutter[other] * nearer;
             let aside = other + HANN_LOBE < ends[0] || other > ends[1] + HANN_LOBE;
-            if !aside || expected < INFORMATIVE {
+            if !aside || expected < INFORMATIVE || self.level[other] == 0.0 {
                 other += 1;
                 continue;
             }
@@ -140,24 +138,31 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     })
 }
 
+/// Power of a Hann window's side lobes so many bins from its summit, over that (Harris 1978); none within the main lobe.
+fn side_lobe(bins: usize) -> f64 {
+    let bins = bins as f64;
+    if bins < HANN_LOBE as f64 { 0.0 } else { (std::f64::consts::PI * bins * (bins * bins - 1.0)).powi(-2) }
+}
+
 /// Whether what is at a range has all velocities all the time.
 fn fills(evidence: &Evidence, bin: usize) -> bool {
-    let samples = evidence.cube.dims[4];
+    let [_, _, _, loops, samples] = evidence.cube.dims;
     let (training, channels) = (&evidence.split.training, evidence.cube.channels() as f64);
     // In the FFT's order they hang together past the fastest.
     let velocities: Vec<usize> = left(evidence, bin).collect();
-    let parts = velocities.len().div_ceil(SECTORS).max(1);
-    training.chunks(training.len().div_ceil(PARTS)).all(|frames| {
-        let power: Vec<f64> = velocities.iter().map(|doppler| mean_power(evidence, frames, doppler * samples + bin)).collect();
-        let largest = power.iter().copied().fold(0.0, f64::max);
-        !power.is_empty()
-            && power.chunks(parts).all(|sector| {
-                let mean = sector.iter().sum::<f64>() / sector.len() as f64;
-                // Neighbouring cells of a windowed transform share their noise.
-                let count = frames.len() as f64 * channels * sector.len().div_ceil(HANN_LOBE + 1) as f64;
-                mean > SIDE_LOBE * largest && mean_power_tail(mean, count) < SURE
-            })
-    })
+    let in_frames = |frames: &[usize]| {
+        let power = |doppler: usize| mean_power(evidence, frames, doppler * samples + bin);
+        let Some(strongest) = velocities.iter().copied().max_by(|&a, &b| power(a).total_cmp(&power(b))) else { return false };
+        let apart = |doppler: &usize| doppler.abs_diff(strongest).min(loops - doppler.abs_diff(strongest));
+        velocities.chunks(velocities.len().div_ceil(SECTORS)).all(|sector| {
+            let mean = sector.iter().map(|&doppler| power(doppler)).sum::<f64>() / sector.len() as f64;
+            let leaks = power(strongest) * side_lobe(sector.iter().map(apart).min().unwrap_or(0));
+            // Neighbouring cells of a windowed transform share their noise.
+            let count = frames.len() as f64 * channels * sector.len().div_ceil(HANN_LOBE + 1) as f64;
+            mean > leaks && mean_power_tail(mean, count) < SURE
+        })
+    };
+    training.chunks(training.len().div_ceil(PARTS)).all(in_frames)
 }
 
 /// Chance of what the receivers share at a range if each had noise of its own: of the best pair of channels, whose squared coherence

@@ -4,8 +4,10 @@
 //! Blackman–Harris window keeps the leakage's side lobes, 92 dB down (Harris 1978), below what lies beyond its main lobe.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 
 use num_complex::Complex64;
+use rayon::prelude::*;
 
 use super::{Evidence, Tapered};
 
@@ -13,6 +15,8 @@ use super::{Evidence, Tapered};
 const LEAKAGE_BINS: usize = 6;
 /// Mean power over the noise of a chirp from which on there is a return.
 const RETURN: f64 = 10.0;
+/// Share of a range's velocities.
+const TOUCHED: f64 = 0.25;
 /// Share of a return's power that stands.
 const STANDS: f64 = 0.5;
 /// A body's echoes and their first detours end here, m: what moves within is one thing.
@@ -33,10 +37,15 @@ impl Evidence {
         }
     }
 
-    /// Ranges of which cells were taken out of the samples: what is left there at other velocities is not as it was, either.
+    /// Ranges of which cells were taken out of the samples around zero velocity, or so many that what is left is not as it was, either.
     pub fn touched(&self) -> Vec<bool> {
-        let [_, _, _, loops, _] = self.cube.dims;
-        (0..self.range_bins()).map(|range| (0..loops).any(|doppler| self.is_emptied(doppler, range))).collect()
+        let loops = self.cube.dims[3];
+        let is_slow = |doppler: usize| doppler.min(loops - doppler) <= 1;
+        let of_range = |range: usize| {
+            let emptied: Vec<usize> = (0..loops).filter(|&doppler| self.is_emptied(doppler, range)).collect();
+            emptied.iter().any(|&doppler| is_slow(doppler)) || emptied.len() as f64 > TOUCHED * loops as f64
+        };
+        (0..self.range_bins()).map(of_range).collect()
     }
 
     /// Whether it may be the radar that moves: most returns beyond the leakage do, at more places than one thing has, and no body is tracked
@@ -48,16 +57,18 @@ impl Evidence {
     /// The same within a frame.
     pub fn may_move_in_a_frame(&self) -> bool {
         let frames: Vec<Vec<usize>> = self.split.training.iter().map(|&frame| vec![frame]).collect();
-        self.do_most_move(&frames)
+        self.body.is_none() && self.do_most_move(&frames)
     }
 
-    /// Whether most returns do not stand in stretches of frames.
+    /// Whether nothing stands in stretches of frames at most places as large as one thing's echoes.
     fn do_most_move(&self, stretches: &[Vec<usize>]) -> bool {
         let profile = Profile::of(self, stretches);
-        let (standing, moving): (Vec<usize>, Vec<usize>) = profile.returns().partition(|&bin| profile.stands(bin));
         let reach = (REACH_M / self.radar.range_resolution_m()).max(2.0) as usize;
+        let (standing, moving): (Vec<usize>, Vec<usize>) = profile.returns().partition(|&bin| profile.stands(bin));
+        let places = |bins: &[usize]| bins.iter().map(|bin| bin / reach).collect::<BTreeSet<usize>>();
+        let (stand, all) = (places(&standing), places(&moving));
         let apart = moving.first().zip(moving.last()).is_some_and(|(first, last)| last - first > reach);
-        standing.len() < moving.len() && apart
+        all.difference(&stand).count() > stand.len() && apart
     }
 }
 
@@ -65,23 +76,32 @@ impl Profile {
     fn of(evidence: &Evidence, stretches: &[Vec<usize>]) -> Self {
         let [_, _, _, loops, samples] = evidence.cube.dims;
         let (bins, channels, tapered) = (evidence.range_bins(), evidence.cube.channels(), Tapered::new(samples));
-        let (mut standing, mut power) = (vec![0.0; bins], vec![0.0; bins]);
-        for (stretch, (channel, noise)) in stretches.iter().flat_map(|s| evidence.noise().iter().enumerate().map(move |c| (s, c)))
-        {
-            let weight = (noise.max(f64::MIN_POSITIVE) * (channels * stretches.len()) as f64).recip();
+        let noise = evidence.noise();
+        let all: Vec<(&Vec<usize>, usize)> =
+            stretches.iter().flat_map(|s| (0..channels).map(move |channel| (s, channel))).collect();
+        let of = |(stretch, channel): (&Vec<usize>, usize)| {
+            let weight = (noise[channel].max(f64::MIN_POSITIVE) * (channels * stretches.len()) as f64).recip();
             let chirps = (stretch.len() * loops) as f64;
-            let mut mean = vec![Complex64::ZERO; bins];
+            let gone = evidence.subtracted.as_ref().map(|gone| tapered.spectra(&gone[channel * samples..][..samples], 1.0));
+            let (mut mean, mut power) = (vec![Complex64::ZERO; bins], vec![0.0; bins]);
             for &frame in stretch {
                 for chirp in tapered.spectra(evidence.cube.channel(frame, channel), 1.0).chunks_exact(samples) {
-                    for (bin, value) in chirp[..bins].iter().enumerate() {
+                    for bin in 0..bins {
+                        let value = chirp[bin] + gone.as_ref().map_or(Complex64::ZERO, |gone| gone[bin]);
                         mean[bin] += value / chirps;
                         power[bin] += value.norm_sqr() * weight / chirps;
                     }
                 }
             }
-            standing.iter_mut().zip(mean).for_each(|(sum, mean)| *sum += mean.norm_sqr() * weight);
-        }
-        Self { standing, power }
+            let standing = mean.into_iter().map(|mean| mean.norm_sqr() * weight).collect();
+            Self { standing, power }
+        };
+        let none = || Self { standing: vec![0.0; bins], power: vec![0.0; bins] };
+        all.into_par_iter().map(of).reduce(none, |mut sum, own| {
+            sum.standing.iter_mut().zip(own.standing).for_each(|(sum, own)| *sum += own);
+            sum.power.iter_mut().zip(own.power).for_each(|(sum, own)| *sum += own);
+            sum
+        })
     }
 
     /// Ranges of returns beyond the leakage, in order.

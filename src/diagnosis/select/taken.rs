@@ -14,7 +14,7 @@ impl Evidence {
             next.once.noise = self.once.noise.clone();
         }
         next.correct(&candidate.correction);
-        if candidate.correction.empties() {
+        if candidate.correction.empties() || !self.emptied.is_empty() {
             // The radar moves no less where some of what seems to was taken out.
             next.once.may_move = self.may_move().into();
         }

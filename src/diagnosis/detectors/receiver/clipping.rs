@@ -85,9 +85,12 @@ impl Pile {
         piles_up.then(|| Self { ends: vec![end], least: end.abs(), tolerance, at, held_at, expected, by_frame })
     }
 
-    /// Whether all that lies as far from zero as the ends was cut.
+    /// Whether all that lies as far from zero as the ends was cut: two's complement has one code more below than above.
     fn holds_all(&self, extremes: [f64; 2]) -> bool {
-        extremes.iter().all(|end| self.ends.contains(end) || end.abs() < self.least)
+        let [low, high] = self.ends[..] else {
+            return extremes.iter().all(|end| self.ends.contains(end) || end.abs() < self.least);
+        };
+        (low + high).abs() <= 1.0
     }
 
     /// The ends in words.
@@ -160,7 +163,7 @@ fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
             100.0 * at as f64 / sampled as f64,
             pile.place()
         ),
-        energy: at as f64 * (0.1 * least).powi(2),
+        energy: at as f64 * (0.05 * (evidence.extremes[1] - evidence.extremes[0])).powi(2),
         correction,
         ..Candidate::new(Behaviour::Amplitude, place, corrected((-excess).exp(), 2.0), excess * held_share)
     }

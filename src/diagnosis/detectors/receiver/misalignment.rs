@@ -37,9 +37,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [frames, _, _, loops, samples] = evidence.cube.dims;
     let channels = evidence.cube.channels();
     let enough = [frames, loops, samples].iter().zip(FEWEST).all(|(count, fewest)| *count >= fewest);
-    // Where the radar moves, all returns come later or earlier by the way that it went.
-    let known = evidence.accepted_unnamed.contains(&Behaviour::SlippedSamples);
-    if !enough || known || evidence.may_move_in_a_frame() {
+    if !enough || evidence.accepted_unnamed.contains(&Behaviour::SlippedSamples) {
         return vec![];
     }
     let means: Vec<Vec<[Vec<Complex64>; 2]>> = (0..frames)
@@ -68,6 +66,10 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let late: Vec<i64> = offsets.iter().map(|offset| usual - offset).collect();
     let slipped: Vec<usize> = (0..frames).filter(|&frame| late[frame] != 0).collect();
     let (Some(&first), Some(&last)) = (slipped.first(), slipped.last()) else { return vec![] };
+    // Where the radar moves, all returns come later or earlier by the way that it went.
+    if evidence.may_move_in_a_frame() {
+        return vec![];
+    }
     let most = slipped.iter().map(|&frame| late[frame]).max_by_key(|late| late.abs()).unwrap_or(0);
     let tried = (2 * reach * (frames - 1)) as f64;
     let changed = slipped.iter().map(|&frame| moved(&evidence.cube, frame, late[frame])).sum();

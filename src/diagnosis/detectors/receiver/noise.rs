@@ -101,12 +101,13 @@ fn shares(evidence: &Evidence, bins: &[usize], found: &DMatrix<Complex64>) -> Sh
 /// Squared coherence, over pairs of receivers, of a correlation with that of static clutter: phase noise turns all returns, so that its
 /// products are theirs.
 fn of_clutter(evidence: &Evidence, found: &DMatrix<Complex64>) -> f64 {
-    let [_, tx, rx, _, samples] = evidence.cube.dims;
-    let clutter = evidence.standing();
-    let chirp = |tx: usize, rx_index: usize| &clutter[(tx * rx + rx_index) * samples..][..samples];
-    let product = |(a, b): (usize, usize)| -> Complex64 {
-        (0..tx).flat_map(|tx| chirp(tx, a).iter().zip(chirp(tx, b))).map(|(a, b)| a * b.conj()).sum()
-    };
+    let [_, _, rx, _, samples] = evidence.cube.dims;
+    // One pair has the phase of anything.
+    if rx < 3 {
+        return 0.0;
+    }
+    let chirp = |channel: usize| evidence.clutter()[channel * samples..][..samples].iter();
+    let product = |(a, b): (usize, usize)| -> Complex64 { chirp(a).zip(chirp(b)).map(|(a, b)| a * b.conj()).sum() };
     let (mut shared, mut own, mut theirs) = (Complex64::ZERO, 0.0, 0.0);
     for pair in pairs_of(rx) {
         let clutter = product(pair);
@@ -114,7 +115,7 @@ fn of_clutter(evidence: &Evidence, found: &DMatrix<Complex64>) -> f64 {
         own += found[pair].norm_sqr();
         theirs += clutter.norm_sqr();
     }
-    shared.norm_sqr() / (own * theirs).max(f64::MIN_POSITIVE)
+    shared.re.max(0.0).powi(2) / (own * theirs).max(f64::MIN_POSITIVE)
 }
 
 /// What receivers share, summed over cells.
@@ -232,7 +233,7 @@ fn correlated(evidence: &Evidence, bins: &[usize]) -> Option<Candidate> {
     if !shares.are_everywhere() {
         return None;
     }
-    // Bursts differ from frame to frame. A product of noise that is correlated has twice the variance of one that is not, at most.
+    // Bursts differ from frame to frame.
     let is_steady = shares.chance_of_level(2, PER_PRODUCT) > SIGNIFICANCE;
     // Few held-out frames say little of so many numbers: every frame is predicted by those of the other folds.
     let nats: f64 = folds(of_frames.len())

@@ -21,7 +21,7 @@ pub mod frame_clutter;
 #[cfg(test)]
 mod tests;
 
-use field::{Field, Part, Series};
+use field::{Field, Group, Part, Series};
 use num_complex::Complex64;
 use selection::Found;
 
@@ -118,7 +118,9 @@ fn line(evidence: &Evidence, field: &Field, part: Part, series: &Series) -> Opti
     let p_value = |freedom| (-lines::unsure(line.training_nats, freedom)).exp();
     let unsure = |freedom| (freedom, statistics::corrected(p_value(freedom), line.tried * LOOKS));
     let of_leakage = field.is_of_leakage(|frame, index, group| part.deviation(value(frame, index), group));
-    let candidate = candidates::of_line(evidence, field, part, &line, part == Part::Phase && of_leakage == Some(true));
+    // Nothing beside it shows the radar's motion.
+    let is_of_all = part == Part::Phase && (of_leakage == Some(true) || field.groups.iter().all(Group::is_own));
+    let candidate = candidates::of_line(evidence, field, part, &line, is_of_all);
     let unsure = line.freedom.map(unsure);
     let within_frames = line.frequency_hz * evidence.radar.frame_duration_s() > DISTINCT_TURNS;
     let over_noise = line.background * candidate.nats;
