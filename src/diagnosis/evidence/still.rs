@@ -5,6 +5,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -46,6 +47,11 @@ impl Evidence {
             emptied.iter().any(|&doppler| is_slow(doppler)) || emptied.len() as f64 > TOUCHED * loops as f64
         };
         (0..self.range_bins()).map(of_range).collect()
+    }
+
+    /// Whether nothing was taken out of some ranges.
+    pub fn are_whole(&self, mut ranges: Range<usize>) -> bool {
+        ranges.all(|range| (0..self.cube.dims[3]).all(|doppler| !self.is_emptied(doppler, range)))
     }
 
     /// Whether it may be the radar that moves: most returns beyond the leakage do, at more places than one thing has, and no body is tracked

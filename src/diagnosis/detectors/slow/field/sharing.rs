@@ -4,6 +4,7 @@ use num_complex::Complex64;
 
 use super::Field;
 use super::part::Group;
+use crate::diagnosis::evidence::Evidence;
 
 /// What a range would gain (nats) by a deviation that it shares, for its absence to be informative.
 pub const INFORMATIVE_GAIN: f64 = 10.0;
@@ -31,9 +32,11 @@ impl Field {
         !gains.is_empty() && most_have(&gains, 0.5)
     }
 
-    /// Whether the radar's own leakage has a deviation, too; none where nothing of it is informative.
-    pub fn is_of_leakage(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> Option<bool> {
-        let gains = self.log_likelihood_gains(predicted, |[_, group]| self.groups[group].is_own());
+    /// Whether the radar's own leakage has a deviation, too; none where nothing of it is informative, or something that moves is as near.
+    pub fn is_of_leakage(&self, evidence: &Evidence, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> Option<bool> {
+        let is_leakage = |group: &Group| group.is_own() && evidence.are_whole(group.bins.clone());
+        let leakage: Vec<bool> = self.groups.iter().map(is_leakage).collect();
+        let gains = self.log_likelihood_gains(predicted, |[_, group]| leakage[group]);
         (!gains.is_empty()).then(|| most_have(&gains, 0.5))
     }
 

@@ -22,9 +22,8 @@ const SETS: f64 = 2.0;
 pub struct Spectrum {
     pub course: Vec<f64>,
     values: Vec<Complex64>,
-    /// What a value of one means there, rad, and its group's place among the deviations.
+    /// What a value of one means there, rad.
     lever: f64,
-    place: usize,
     /// Of the noise in each of them.
     pub variance: f64,
 }
@@ -43,14 +42,14 @@ pub struct Shared {
 
 /// Of all groups, surest first; of a phase in proportion to the delay per second of it.
 pub fn spectra(deviations: &[Deviation], course: &Course, part: Part) -> Vec<Spectrum> {
-    let of_group = |(place, Deviation { group, values, variance }): (usize, &Deviation)| {
+    let of_group = |Deviation { group, values, variance }: &Deviation| {
         let lever = part.lever(group);
         let phases: Vec<f64> = values.iter().map(|value| value.im / lever).collect();
         // Half of a complex variance is in the phase; both parts of a phase's spectrum have half of that each.
         let variance = 0.5 * variance / (lever * lever);
-        Spectrum { values: course.spectrum(&phases), course: phases, lever, place, variance }
+        Spectrum { values: course.spectrum(&phases), course: phases, lever, variance }
     };
-    let mut spectra: Vec<Spectrum> = deviations.par_iter().enumerate().map(of_group).collect();
+    let mut spectra: Vec<Spectrum> = deviations.par_iter().map(of_group).collect();
     spectra.sort_by(|a, b| a.variance.total_cmp(&b.variance));
     spectra
 }
@@ -72,6 +71,12 @@ impl Reference {
     fn add(&mut self, spectrum: &Spectrum) {
         self.sum.iter_mut().zip(&spectrum.values).for_each(|(sum, value)| *sum += value / spectrum.variance);
         self.information += spectrum.variance.recip();
+    }
+
+    /// A value without what is probably noise of it.
+    fn predicted(&self, index: usize) -> Complex64 {
+        let (value, ratio) = self.value(index);
+        value * statistics::kept(ratio)
     }
 
     /// A value, and how much more than noise it is.
@@ -113,26 +118,23 @@ pub fn shares(spectrum: &Spectrum, spectra: &[Spectrum], members: &[usize]) -> b
     let reference = Reference::of(spectra, members.iter().copied());
     let (won, most) = bet(&reference, spectrum);
     let [along, square] = spectrum.values.iter().enumerate().fold([0.0; 2], |[along, square], (index, value)| {
-        let (known, ratio) = reference.value(index);
-        let predicted = known * statistics::kept(ratio);
+        let predicted = reference.predicted(index);
         [along + (value * predicted.conj()).re, square + predicted.norm_sqr()]
     });
     most > INFORMATIVE_GAIN && won > 0.0 && along > MOST * square
 }
 
-/// Logarithms of the likelihood of the groups' phases, but for a constant, in the order of the deviations: each group has what the members
-/// beside it have, and scatters by a variance of its own, which is at its maximum.
-pub fn log_likelihoods(spectra: &[Spectrum], members: &[usize]) -> Vec<f64> {
+/// Logarithm of the likelihood of all groups' phases, but for a constant: each group has what the members beside it have, and scatters
+/// by a variance of its own, which is at its maximum.
+pub fn log_likelihood(spectra: &[Spectrum], members: &[usize]) -> f64 {
     let of_group = |index: usize| {
         let spectrum = &spectra[index];
         let reference = Reference::of(spectra, members.iter().copied().filter(|member| *member != index));
         let rest: f64 =
-            spectrum.values.iter().zip(&reference.sum).map(|(v, sum)| (v - sum / reference.information).norm_sqr()).sum();
+            spectrum.values.iter().enumerate().map(|(index, value)| (value - reference.predicted(index)).norm_sqr()).sum();
         -(spectrum.values.len() as f64) / SETS * (rest * spectrum.lever * spectrum.lever).max(f64::MIN_POSITIVE).ln()
     };
-    let mut all: Vec<(usize, f64)> = (0..spectra.len()).map(|index| (spectra[index].place, of_group(index))).collect();
-    all.sort_by_key(|(place, _)| *place);
-    all.into_iter().map(|(_, log_likelihood)| log_likelihood).collect()
+    (0..spectra.len()).map(of_group).sum()
 }
 
 /// Logarithm of what a bet on a group's phases returns, and of what it would return if the group had what is predicted.

@@ -20,9 +20,9 @@ mod deviations;
 use super::field::Part;
 use super::selection::UNDECIDED;
 use crate::diagnosis::evidence::Evidence;
-use crate::diagnosis::finding::{Candidate, NINETY};
+use crate::diagnosis::finding::Candidate;
 
-use bets::{Shared, log_likelihoods, shared, shares, spectra};
+use bets::{Shared, log_likelihood, shared, shares, spectra};
 use candidate::candidate;
 use course::Course;
 use deviations::deviations;
@@ -33,25 +33,24 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let of_part = |part: Part| {
         let spectra = spectra(&around, &course, part);
         let shared = shared(&spectra, part)?;
-        let log_likelihoods = log_likelihoods(&spectra, &shared.members);
-        Some((shared, spectra, log_likelihoods))
+        let log_likelihood = log_likelihood(&spectra, &shared.members);
+        Some((shared, spectra, log_likelihood))
     };
     let (phase, delay) = (of_part(Part::Phase)?, of_part(Part::Delay)?);
-    // By how much more likely each range has a phase in proportion to the delay; one alone decides nothing.
-    let more: Vec<f64> = delay.2.iter().zip(&phase.2).map(|(delay, phase)| delay - phase).collect();
-    let scatter = more.iter().map(|more| more * more).sum::<f64>().sqrt();
-    let (more, unsure) = (more.iter().sum::<f64>(), UNDECIDED.max(NINETY * scatter));
+    // By how much more likely a phase in proportion to the delay is.
+    let more = delay.2 - phase.2;
     // A bet is won by two ranges that hang together; all returns are concerned where most that are informative have it.
     let is_shared = |shared: &Shared| 2 * shared.sharing > shared.informative && shared.log_bets > 0.0;
     let (best, spectra, _) = match (is_shared(&phase.0), is_shared(&delay.0)) {
-        (true, true) if more > unsure => delay,
+        (true, true) if more > UNDECIDED => delay,
         (false, true) => delay,
         (true, _) => phase,
         (false, false) => return None,
     };
-    // A radar that moves takes its leakage with it.
-    let turns_leakage = || bets::spectra(&own, &course, best.part).iter().any(|own| shares(own, &spectra, &best.members));
-    let of_radar = best.part == Part::Phase && more < -unsure && !turns_leakage();
+    // A radar that moves takes its leakage with it, unless something that moves is as near.
+    let leakage: Vec<_> = own.into_iter().filter(|own| evidence.are_whole(own.group.bins.clone())).collect();
+    let turns_leakage = || bets::spectra(&leakage, &course, best.part).iter().any(|own| shares(own, &spectra, &best.members));
+    let of_radar = best.part == Part::Phase && more < -UNDECIDED && !turns_leakage();
     Some(candidate(evidence, &course, &around, &best, of_radar))
 }
 
