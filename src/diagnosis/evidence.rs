@@ -30,7 +30,7 @@ use crate::radar::{Radar, Sampling};
 use crate::room::Room;
 use power::PowerModel;
 use products::Products;
-pub use still::REACH_M;
+pub use still::{MAY_MOVE, REACH_M};
 
 /// Share of the strongest cell below which there is not even noise.
 const EMPTIED: f64 = 1e-20;

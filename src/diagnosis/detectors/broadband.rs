@@ -7,11 +7,11 @@
 
 use num_complex::Complex64;
 
-use super::region::{Region, mean_power, moves, power_gain, removal};
+use super::region::{Region, floor, left, mean_map, mean_power, moves, power_gain, removal};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::{Evidence, HANN_LOBE, spectrum};
 use crate::diagnosis::finding::{Candidate, Place};
-use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
+use crate::diagnosis::statistics::{corrected, mean_power_tail};
 use crate::effects::{self, Stage};
 
 const FEWEST_LOOPS: usize = 16;
@@ -28,7 +28,7 @@ const PARTS: usize = 2;
 
 /// Powers over the noise by range bin.
 struct Floor {
-    /// Median over velocities, of the training frames.
+    /// Median over velocities, of the training frames; zero where all was taken out.
     level: Vec<f64>,
     clutter: Vec<f64>,
 }
@@ -45,19 +45,12 @@ fn moving(loops: usize) -> impl Iterator<Item = usize> {
     (0..loops).filter(move |&doppler| moves(doppler, loops))
 }
 
-/// Of these, what was not taken out at a range.
-fn left(evidence: &Evidence, bin: usize) -> impl Iterator<Item = usize> + '_ {
-    moving(evidence.cube.dims[3]).filter(move |&doppler| !evidence.is_emptied(doppler, bin))
-}
-
 impl Floor {
     fn of(evidence: &Evidence) -> Self {
         let samples = evidence.cube.dims[4];
         let (bins, channels) = (evidence.range_bins(), evidence.cube.channels());
-        let mean = |doppler: usize, bin: usize| mean_power(evidence, &evidence.split.training, doppler * samples + bin);
-        let of_bin = |bin: usize| left(evidence, bin).map(|doppler| mean(doppler, bin)).collect::<Vec<_>>();
-        let level =
-            (0..bins).map(|bin| if left(evidence, bin).next().is_some() { median(&mut of_bin(bin)) } else { 0.0 }).collect();
+        let mean = mean_map(evidence, &evidence.split.training);
+        let level = (0..bins).map(|bin| floor(evidence, &mean, bin, 1).unwrap_or(0.0)).collect();
         let mut clutter = vec![0.0; bins];
         for (channel, chirp) in evidence.standing().chunks_exact(samples).enumerate() {
             let weight = (evidence.noise()[channel].max(f64::MIN_POSITIVE) * channels as f64).recip();
@@ -109,7 +102,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     }
     let held_out = evidence.split.held_out.iter();
     let cells = held_out
-        .flat_map(|&frame| (first..=last).flat_map(move |bin| left(evidence, bin).map(move |doppler| (frame, doppler, bin))));
+        .flat_map(|&frame| (first..=last).flat_map(move |bin| left(evidence, bin, 1).map(move |doppler| (frame, doppler, bin))));
     let of_cell =
         |(frame, doppler, bin): (usize, usize, usize)| power_gain(evidence, frame, doppler * samples + bin, floor.level[bin]);
     let gain: f64 = cells.map(of_cell).sum();
@@ -149,7 +142,7 @@ fn fills(evidence: &Evidence, bin: usize) -> bool {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let (training, channels) = (&evidence.split.training, evidence.cube.channels() as f64);
     // In the FFT's order they hang together past the fastest.
-    let velocities: Vec<usize> = left(evidence, bin).collect();
+    let velocities: Vec<usize> = left(evidence, bin, 1).collect();
     let in_frames = |frames: &[usize]| {
         let power = |doppler: usize| mean_power(evidence, frames, doppler * samples + bin);
         let Some(strongest) = velocities.iter().copied().max_by(|&a, &b| power(a).total_cmp(&power(b))) else { return false };

@@ -81,9 +81,9 @@ fn reach(body: &BodyPrediction, centre_m: [f64; 3]) -> Option<[f64; 2]> {
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let known = evidence.may_move()
-        || evidence.accepted.contains(&ID)
-        || evidence.accepted_unnamed.contains(&Behaviour::ChangingAtOneRange);
+    let known = evidence.accepted.contains(&ID)
+        || evidence.accepted_unnamed.contains(&Behaviour::ChangingAtOneRange)
+        || evidence.may_move();
     let by_frame = if known {
         None
     } else {

@@ -9,6 +9,7 @@ use crate::diagnosis::Evidence;
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::evidence::spectrum;
 use crate::diagnosis::finding::Correction;
+use crate::diagnosis::statistics::median;
 
 /// Bins (not whole numbers, ends included) that may be negative: an interval around the zero frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +30,25 @@ pub fn moves(doppler: usize, loops: usize) -> bool {
 pub fn mean_power(evidence: &Evidence, frames: &[usize], cell: usize) -> f64 {
     let maps = evidence.maps();
     frames.iter().map(|&frame| f64::from(maps.below([frame])[cell])).sum::<f64>() / frames.len().max(1) as f64
+}
+
+/// The same of all cells.
+pub fn mean_map(evidence: &Evidence, frames: &[usize]) -> Vec<f64> {
+    let [_, _, _, loops, samples] = evidence.cube.dims;
+    (0..loops * samples).map(|cell| mean_power(evidence, frames, cell)).collect()
+}
+
+/// Doppler bins, of so many frames as one, that move at a range and were not taken out.
+pub fn left(evidence: &Evidence, range: usize, run: usize) -> impl Iterator<Item = usize> + '_ {
+    let loops = run * evidence.cube.dims[3];
+    (0..loops).filter(move |&doppler| moves(doppler, loops) && !evidence.is_emptied(doppler / run, range))
+}
+
+/// Median of a map, `doppler · samples + range`, of so many frames as one, over what moves at a range and was not taken out, if anything.
+pub fn floor(evidence: &Evidence, map: &[f64], range: usize, run: usize) -> Option<f64> {
+    let samples = evidence.cube.dims[4];
+    let mut left: Vec<f64> = left(evidence, range, run).map(|doppler| map[doppler * samples + range]).collect();
+    (!left.is_empty()).then(|| median(&mut left))
 }
 
 /// Log-likelihood that a cell's power in a frame, a mean over the channels of exponential laws, gains by an expected mean over noise alone.

@@ -8,14 +8,14 @@ mod stretch;
 
 use num_complex::Complex64;
 
-use stretch::{Cell, NEAREST_BIN, Stretch, floor};
+use stretch::{Cell, NEAREST_BIN, Stretch};
 
 use super::azimuth::{Azimuth, azimuth};
 use super::cfar;
 use super::receiver::wandering;
-use super::region::{Region, mean_power, moves, power_gain, removal, run};
+use super::region::{Region, floor, mean_map, moves, power_gain, removal, run};
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::evidence::{Evidence, REACH_M};
+use crate::diagnosis::evidence::{Evidence, MAY_MOVE, REACH_M};
 use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics;
 use crate::effects::{self, Stage};
@@ -41,7 +41,7 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);
     let cells = loops * samples;
-    let mean: Vec<f64> = (0..cells).map(|cell| mean_power(evidence, training, cell)).collect();
+    let mean = mean_map(evidence, training);
     let peak = peak(evidence, &mean)?;
     let (doppler, range) = (peak / samples, peak % samples);
     let count = training.len() as f64 * evidence.cube.channels() as f64;
@@ -55,7 +55,7 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
     if tone.is_some() {
         return None;
     }
-    if evidence.may_move() && evidence.accepted_unnamed.contains(&Behaviour::PathLike) {
+    if evidence.is_said_to_move() {
         return None;
     }
     let mover = Mover::new(evidence, [doppler, range]);
@@ -73,8 +73,7 @@ fn strongest(evidence: &Evidence) -> Option<Candidate> {
 
 /// The same where nothing says that the radar stands still.
 fn relative(found: Candidate) -> Candidate {
-    let statement =
-        format!("{} Most returns beyond the transmitters' leakage move: it may be the radar that does.", found.statement);
+    let statement = format!("{} {MAY_MOVE}.", found.statement);
     Candidate { id: None, estimates: vec![], statement, ..found }
 }
 

@@ -11,6 +11,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::{Evidence, Tapered};
+use crate::diagnosis::behaviour::Behaviour;
 
 /// A leakage's delay and half the main lobe of that window end here, bins.
 const LEAKAGE_BINS: usize = 6;
@@ -22,6 +23,9 @@ const TOUCHED: f64 = 0.25;
 const STANDS: f64 = 0.5;
 /// A body's echoes and their first detours end here, m: what moves within is one thing.
 pub const REACH_M: f64 = 1.2;
+
+/// What is said where [`Evidence::may_move`].
+pub const MAY_MOVE: &str = "Most returns beyond the transmitters' leakage move: it may be the radar that does";
 
 /// Power of a stretch's mean chirp and mean power of all chirps over the noise of a chirp, mean over stretches of frames, by range.
 struct Profile {
@@ -60,7 +64,12 @@ impl Evidence {
         *self.once.may_move.get_or_init(|| self.body.is_none() && self.do_most_move(std::slice::from_ref(&self.split.training)))
     }
 
-    /// The same within a frame.
+    /// Whether that was said: what else moves is no more than that.
+    pub fn is_said_to_move(&self) -> bool {
+        self.accepted_unnamed.contains(&Behaviour::PathLike) && self.may_move()
+    }
+
+    /// Whether it may be the radar that moves within a frame.
     pub fn may_move_in_a_frame(&self) -> bool {
         let frames: Vec<Vec<usize>> = self.split.training.iter().map(|&frame| vec![frame]).collect();
         self.body.is_none() && self.do_most_move(&frames)

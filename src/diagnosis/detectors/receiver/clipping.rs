@@ -32,8 +32,6 @@ struct Pile {
     /// The nearer one to zero.
     least: f64,
     tolerance: f64,
-    at: usize,
-    held_at: usize,
     /// So many would be there by the values just within.
     expected: f64,
     /// Of each frame, at the ends.
@@ -47,9 +45,7 @@ impl Pile {
         piles.reduce(|low, high| Self {
             ends: [low.ends, high.ends].concat(),
             least: low.least.min(high.least),
-            tolerance: low.tolerance.max(high.tolerance),
-            at: low.at + high.at,
-            held_at: low.held_at + high.held_at,
+            tolerance: low.tolerance,
             expected: low.expected + high.expected,
             by_frame: low.by_frame.iter().zip(high.by_frame).map(|(low, high)| low + high).collect(),
         })
@@ -62,27 +58,26 @@ impl Pile {
         // Within half a code, or a hair of the range for samples that are no codes.
         let tolerance = 1e-6 * half;
         let slab = 0.02 * half;
-        let (mut at, mut below, mut held_at) = (0usize, 0usize, 0usize);
         let [_, _, _, loops, samples] = evidence.cube.dims;
-        let per_frame = evidence.cube.channels() * loops * samples;
-        let mut by_frame = vec![0usize; evidence.cube.dims[0]];
-        for (index, value) in evidence.cube.samples.iter().enumerate() {
-            for part in parts(value, evidence.is_real()) {
-                let within = inward * (part - end);
-                if within <= tolerance {
-                    at += 1;
-                    by_frame[index / per_frame] += 1;
-                    held_at += usize::from(evidence.split.held_out.contains(&(index / per_frame)));
-                } else if within <= slab {
-                    below += 1;
-                }
-            }
-        }
+        // At the end and just within it.
+        let of_frame = |values: &[Complex64]| {
+            let within = values.iter().flat_map(|value| parts(value, evidence.is_real())).map(|part| inward * (part - end));
+            within.fold([0usize; 2], |[at, below], within| {
+                [at + usize::from(within <= tolerance), below + usize::from(within > tolerance && within <= slab)]
+            })
+        };
+        let frames = evidence.cube.samples.par_chunks_exact(evidence.cube.channels() * loops * samples);
+        let (by_frame, below): (Vec<usize>, Vec<usize>) = frames.map(of_frame).map(|[at, below]| (at, below)).unzip();
         // A density that falls towards its end has fewer values in the last code than in any code of the slab before it.
         let codes = slab.max(1.0);
-        let expected = (below as f64 / codes).max(0.2);
-        let piles_up = half > 0.0 && at >= FEWEST && at as f64 >= 5.0 * expected;
-        piles_up.then(|| Self { ends: vec![end], least: end.abs(), tolerance, at, held_at, expected, by_frame })
+        let expected = (below.iter().sum::<usize>() as f64 / codes).max(0.2);
+        let pile = Self { ends: vec![end], least: end.abs(), tolerance, expected, by_frame };
+        (half > 0.0 && pile.count() >= FEWEST && pile.count() as f64 >= 5.0 * expected).then_some(pile)
+    }
+
+    /// Components at the ends.
+    fn count(&self) -> usize {
+        self.by_frame.iter().sum()
     }
 
     /// Whether all that lies as far from zero as the ends was cut: two's complement has one code more below than above.
@@ -137,9 +132,10 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
 }
 
 fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
-    let &Pile { least, at, expected, .. } = pile;
+    let &Pile { least, expected, .. } = pile;
+    let at = pile.count();
     let excess = at as f64 * (at as f64 / expected).ln() - (at as f64 - expected);
-    let held_share = pile.held_at as f64 / at as f64;
+    let held_at: usize = evidence.split.held_out.iter().map(|&frame| pile.by_frame[frame]).sum();
     let sampled = if evidence.is_real() { 1 } else { 2 } * evidence.cube.samples.len();
     // What was not sampled is made of what was cut.
     let can_restore = !evidence.is_real() && pile.holds_all(evidence.extremes);
@@ -165,7 +161,7 @@ fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
         ),
         energy: at as f64 * (0.05 * (evidence.extremes[1] - evidence.extremes[0])).powi(2),
         correction,
-        ..Candidate::new(Behaviour::Amplitude, place, corrected((-excess).exp(), 2.0), excess * held_share)
+        ..Candidate::new(Behaviour::Amplitude, place, corrected((-excess).exp(), 2.0), excess * (held_at as f64 / at as f64))
     }
 }
 

@@ -39,11 +39,11 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let training = evidence.split.training.len();
     // Blocks of a long frame are no frames.
     if evidence.body.is_some()
-        || evidence.may_move()
         || evidence.split.block_loops.is_some()
         || loops < 2
         || training < FEWEST_FRAMES
         || samples < 8
+        || evidence.may_move()
     {
         return vec![];
     }

@@ -117,9 +117,9 @@ fn line(evidence: &Evidence, field: &Field, part: Part, series: &Series) -> Opti
     }
     let p_value = |freedom| (-lines::unsure(line.training_nats, freedom)).exp();
     let unsure = |freedom| (freedom, statistics::corrected(p_value(freedom), line.tried * LOOKS));
-    let of_leakage = field.is_of_leakage(evidence, |frame, index, group| part.deviation(value(frame, index), group));
+    let of_leakage = || field.is_of_leakage(evidence, |frame, index, group| part.deviation(value(frame, index), group));
     // Nothing beside it shows the radar's motion.
-    let is_of_all = part == Part::Phase && (of_leakage == Some(true) || field.groups.iter().all(Group::is_own));
+    let is_of_all = part == Part::Phase && (of_leakage() == Some(true) || field.groups.iter().all(Group::is_own));
     let candidate = candidates::of_line(evidence, field, part, &line, is_of_all);
     let unsure = line.freedom.map(unsure);
     let within_frames = line.frequency_hz * evidence.radar.frame_duration_s() > DISTINCT_TURNS;

@@ -5,9 +5,8 @@ use std::collections::HashSet;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::diagnosis::detectors::region::{CLUTTER_BINS, joined, moves};
+use crate::diagnosis::detectors::region::{CLUTTER_BINS, floor, joined};
 use crate::diagnosis::evidence::{Evidence, transform};
-use crate::diagnosis::statistics;
 
 /// Nearer ones belong to leakage, offsets and low-frequency noise.
 pub const NEAREST_BIN: usize = 3;
@@ -15,15 +14,6 @@ pub const NEAREST_BIN: usize = 3;
 const FAINTEST: f64 = 6.3;
 /// Range bins between them that may be empty.
 const LARGEST_GAP: usize = 3;
-
-/// Median of a map, `doppler · samples + range`, of so many frames as one, over what moves at a range and was not taken out, if anything.
-pub fn floor(evidence: &Evidence, map: &[f64], range: usize, run: usize) -> Option<f64> {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let is_there = |doppler: &usize| moves(*doppler, run * loops) && !evidence.is_emptied(doppler / run, range);
-    let there = (0..run * loops).filter(is_there);
-    let mut there: Vec<f64> = there.map(|doppler| map[doppler * samples + range]).collect();
-    (!there.is_empty()).then(|| statistics::median(&mut there))
-}
 
 /// Runs of frames transformed as one, static clutter removed; cells are signed Doppler bins and range bins.
 pub struct Stretch {
@@ -95,7 +85,7 @@ impl Stretch {
     }
 
     /// By how many times it exceeds its range's floor.
-    pub fn above(&self, cell: Cell) -> f64 {
+    fn above(&self, cell: Cell) -> f64 {
         self.at(cell) / self.floor[cell[1].rem_euclid(self.samples as i64) as usize]
     }
 

@@ -19,7 +19,7 @@ use rhythm::{BREATHING_HZ, HEART_HZ, Rhythm, rhythm};
 use super::region::{Region, removal};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::course::{Course, Of};
-use crate::diagnosis::evidence::Evidence;
+use crate::diagnosis::evidence::{Evidence, MAY_MOVE};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
 use crate::diagnosis::statistics;
 use crate::effects::{self, Stage};
@@ -40,7 +40,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.body.is_some() || evidence.cube.dims[0] < FEWEST_FRAMES || evidence.split.block_loops.is_some() {
         return vec![];
     }
-    if evidence.may_move() && evidence.accepted_unnamed.contains(&Behaviour::PathLike) {
+    if evidence.is_said_to_move() {
         return vec![];
     }
     one(evidence).into_iter().collect()
@@ -167,15 +167,17 @@ impl Motion<'_> {
                 100.0 * r.share,
                 if *id == effects::breathing::ID { "a breathing chest" } else { "a beating heart" }
             ),
-            None => format!(
-                "At {range_m:.2} m something moves slowly, over {:.1} mm during the recording{}.",
-                extent[1] - extent[0],
+            None => {
+                let moves = format!(
+                    "At {range_m:.2} m something moves slowly, over {:.1} mm during the recording",
+                    extent[1] - extent[0]
+                );
                 if self.evidence.may_move() {
-                    ". Most returns beyond the transmitters' leakage move: it may be the radar that does"
+                    format!("{moves}. {MAY_MOVE}.")
                 } else {
-                    ", without a rhythm that would show within its length"
+                    format!("{moves}, without a rhythm that would show within its length.")
                 }
-            ),
+            }
         }
     }
 

@@ -5,10 +5,9 @@ use std::sync::Arc;
 use hybridsim_fft::{Fft, FftPlanner};
 use num_complex::Complex64;
 
-use super::part::{Group, ahead};
+use super::part::Group;
 use crate::diagnosis::evidence::{Evidence, blackman_harris};
 use crate::grid::Grid;
-use crate::radar::SPEED_OF_LIGHT;
 
 /// Bins between two groups, across which windowed noise is hardly correlated.
 const GAP: usize = 2;
@@ -71,17 +70,12 @@ impl<'a> ClutterSpectra<'a> {
 
     /// Groups of ranges with static returns.
     pub fn groups(&self) -> Vec<Group> {
-        let (bins, radar) = (self.power.len(), &self.evidence.radar);
+        let bins = self.power.len();
         let width = (bins / 16).max(4 + GAP);
-        let delay_of_bin = radar.sample_rate_hz / (self.mean.shape()[1] as f64 * radar.slope_hz_per_s);
         let group = |g: usize| {
             let range = g * width..(g + 1) * width - GAP;
-            let strong = || range.clone().filter(|&bin| self.is_strong(bin));
-            let sum: f64 = strong().map(|bin| self.power[bin]).sum();
-            let mean = strong().map(|bin| self.power[bin] * bin as f64).sum::<f64>() / sum;
-            let ahead_at = |bin: usize| ahead(self.evidence.room.as_ref(), 0.5 * SPEED_OF_LIGHT * bin as f64 * delay_of_bin);
-            let ahead = strong().map(|bin| self.power[bin] * ahead_at(bin)).sum::<f64>() / sum;
-            (sum > 0.0).then_some(Group { delay_s: mean * delay_of_bin, ahead, bins: range })
+            let strong: Vec<usize> = range.clone().filter(|&bin| self.is_strong(bin)).collect();
+            Group::of(self.evidence, range, &strong, |bin| self.power[bin])
         };
         (0..bins / width).filter_map(group).collect()
     }

@@ -1,10 +1,13 @@
 //! Groups of ranges, and what a deviation means at them.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use num_complex::Complex64;
 
+use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::support::UNKNOWN_NEAR_M;
+use crate::radar::SPEED_OF_LIGHT;
 use crate::room::Room;
 
 /// Range cells whose gain is estimated together.
@@ -16,7 +19,7 @@ pub struct Group {
     /// with the radar.
     pub ahead: f64,
     /// Its beat-frequency bins.
-    pub bins: std::ops::Range<usize>,
+    pub bins: Range<usize>,
 }
 
 /// Which part of the deviation is looked at.
@@ -39,6 +42,16 @@ pub const PATTERN: f64 = 0.2;
 const OWN: f64 = 0.5;
 
 impl Group {
+    /// Of some bins, of which `strong` hold static returns of a power each. None where nothing does.
+    pub fn of(evidence: &Evidence, bins: Range<usize>, strong: &[usize], power: impl Fn(usize) -> f64) -> Option<Self> {
+        let radar = &evidence.radar;
+        let delay_of_bin = radar.sample_rate_hz / (evidence.cube.dims[4] as f64 * radar.slope_hz_per_s);
+        let sum: f64 = strong.iter().map(|&bin| power(bin)).sum();
+        let mean = |of: &dyn Fn(usize) -> f64| strong.iter().map(|&bin| power(bin) * of(bin)).sum::<f64>() / sum;
+        let ahead_at = |bin: usize| ahead(evidence.room.as_ref(), 0.5 * SPEED_OF_LIGHT * bin as f64 * delay_of_bin);
+        (sum > 0.0).then(|| Self { delay_s: mean(&|bin| bin as f64) * delay_of_bin, ahead: mean(&ahead_at), bins })
+    }
+
     /// Whether it is the radar's own leakage, for the most part.
     pub fn is_own(&self) -> bool {
         self.ahead < OWN

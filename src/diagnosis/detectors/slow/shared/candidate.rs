@@ -5,9 +5,8 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::bets::{Shared, Spectrum, spectra};
+use super::bets::{Shared, Spectrum};
 use super::course::Course;
-use super::deviations::Deviation;
 use crate::diagnosis::detectors::slow::candidates::{self, Description};
 use crate::diagnosis::detectors::slow::field::{PATTERN, Part};
 use crate::diagnosis::evidence::Evidence;
@@ -33,8 +32,8 @@ struct Phase {
 }
 
 /// `of_radar`: nothing else but the radar's motion does so.
-pub fn candidate(evidence: &Evidence, course: &Course, deviations: &[Deviation], shared: &Shared, of_radar: bool) -> Candidate {
-    let phase = Phase::new(course, &spectra(deviations, course, shared.part), &shared.members);
+pub fn candidate(evidence: &Evidence, course: &Course, spectra: &[Spectrum], shared: &Shared, of_radar: bool) -> Candidate {
+    let phase = Phase::new(course, spectra, &shared.members);
     let description =
         if shared.part == Part::Delay { phase.of_delay(shared) } else { phase.of_vibration(evidence, course, shared, of_radar) };
     let Phase { course: phases, rms, coding_cost, .. } = phase;

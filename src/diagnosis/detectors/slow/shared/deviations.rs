@@ -3,10 +3,9 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::diagnosis::detectors::slow::field::{Group, ahead};
+use crate::diagnosis::detectors::slow::field::Group;
 use crate::diagnosis::evidence::{Evidence, Tapered};
 use crate::grid::Grid;
-use crate::radar::SPEED_OF_LIGHT;
 
 /// Bins between two groups, across which windowed noise is hardly correlated.
 const GAP: usize = 2;
@@ -73,17 +72,11 @@ impl Chirps {
 
     /// None where there is no static clutter.
     fn deviation(&self, evidence: &Evidence, range: std::ops::Range<usize>, touched: &[bool]) -> Option<Deviation> {
-        let [frames, channels, loops, samples] = self.spectra.shape();
+        let [frames, channels, loops, _] = self.spectra.shape();
         // As in `field`: static returns that are lost in the noise of a chirp teach nothing, nor do those that were changed.
         let own: Vec<usize> = range.clone().filter(|&bin| self.power(bin) > 3.0 * channels as f64 && !touched[bin]).collect();
+        let group = Group::of(evidence, range, &own, |bin| self.power(bin))?;
         let sum: f64 = own.iter().map(|&bin| self.power(bin)).sum();
-        if sum <= 0.0 {
-            return None;
-        }
-        let delay_of_bin = evidence.radar.sample_rate_hz / (samples as f64 * evidence.radar.slope_hz_per_s);
-        let delay_s = own.iter().map(|&bin| self.power(bin) * bin as f64).sum::<f64>() / sum * delay_of_bin;
-        let ahead_at = |bin: usize| ahead(evidence.room.as_ref(), 0.5 * SPEED_OF_LIGHT * bin as f64 * delay_of_bin);
-        let ahead = own.iter().map(|&bin| self.power(bin) * ahead_at(bin)).sum::<f64>() / sum;
         let value = |[frame, index]: [usize; 2]| -> Complex64 {
             let along = |channel: usize| {
                 let (values, mean) = (self.spectra.below([frame, channel, index]), self.clutter.below([channel]));
@@ -92,6 +85,6 @@ impl Chirps {
             (0..channels).map(along).sum::<Complex64>() / sum
         };
         let values = (0..frames).flat_map(|frame| (0..loops).map(move |index| [frame, index])).map(value).collect();
-        Some(Deviation { group: Group { delay_s, ahead, bins: range }, values, variance: BINS_PER_VALUE / sum })
+        Some(Deviation { group, values, variance: BINS_PER_VALUE / sum })
     }
 }

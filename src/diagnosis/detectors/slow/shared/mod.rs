@@ -51,7 +51,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let leakage: Vec<_> = own.into_iter().filter(|own| evidence.are_whole(own.group.bins.clone())).collect();
     let turns_leakage = || bets::spectra(&leakage, &course, best.part).iter().any(|own| shares(own, &spectra, &best.members));
     let of_radar = best.part == Part::Phase && more < -UNDECIDED && !turns_leakage();
-    Some(candidate(evidence, &course, &around, &best, of_radar))
+    Some(candidate(evidence, &course, &spectra, &best, of_radar))
 }
 
 #[cfg(test)]
