@@ -131,6 +131,12 @@ def test_heatmaps_of_a_recording_are_those_of_its_samples(recording: hybridsim.R
     of_array = hybridsim.heatmaps(recording.samples([1, 2]), recording.radar, db=False)
     for name, found in hybridsim.heatmaps(recording, frames=[1, 2], db=False).items():
         assert np.array_equal(found.values, of_array[name].values)
+    of_folder = hybridsim.heatmaps(recording.folder, frames=[1, 2], db=False)
+    assert set(of_folder) == set(of_array)
+    assert all(np.array_equal(of_folder[name].values, of_array[name].values) for name in of_array)
+    assert set(hybridsim.heatmaps(str(recording.folder))) == set(of_array)
+    with pytest.raises(hybridsim.Error, match="nowhere"):
+        hybridsim.heatmaps("nowhere")
     with pytest.raises(ValueError, match="expected frame x tx x rx x loop x sample"):
         hybridsim.heatmaps(recording.samples()[0], recording.radar)
     with pytest.raises(hybridsim.Error, match="unknown variant `flat`"):

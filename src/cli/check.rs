@@ -40,6 +40,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     if !path.is_dir() && describe::knows(path) {
         return describe::run(path, &arguments.reading, common);
     }
+    if describe::is_pickle(path) {
+        return Err(Error::field(path, "type", "a Python pickle", "a body as .npz, or a config (.toml)")
+            .with_hint("convert a body model of SMPL, SMPL-H or SMPL-X with python scripts/smpl_to_npz.py MODEL.pkl BODY.npz"));
+    }
     arguments.reading.refused(READING_HINT)?;
     if path.join("checkpoint.toml").is_file() {
         let (simulator, state) = checkpoint::open(path, &Device::flex())?;

@@ -28,6 +28,11 @@ pub(super) fn knows(path: &Path) -> bool {
     ["npz", "bvh", "npy", "obj"].contains(&ending(path).as_str())
 }
 
+/// Whether a file is a pickle of Python's, by its name, as body models are published.
+pub(super) fn is_pickle(path: &Path) -> bool {
+    path.is_file() && ["pkl", "pickle"].contains(&ending(path).as_str())
+}
+
 /// Describes a body, a motion or a mesh.
 ///
 /// # Errors

@@ -24,7 +24,8 @@ pub(crate) struct Arguments {
     /// arrays (.npy, .npz, .mat, .h5, .bin; several or a folder: a frame each)
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,
-    /// What describes the radar: .mmwave.json, .setup.json or .cfg of TI, TOML with [radar], or ColoRadar's .txt; may be repeated
+    /// What describes the radar: .mmwave.json, .setup.json or .cfg of TI for .bin files without --layout; TOML with [radar], or
+    /// ColoRadar's .txt, for arrays with --layout; may be repeated
     #[arg(long, value_name = "FILE")]
     config: Vec<PathBuf>,
     /// The board, whose antenna positions are then known, such as IWR6843ISK

@@ -1,63 +1,104 @@
 //! What an exchange of words or samples does to the halves of the band, of which the near one holds the stronger returns.
 //!
-//! An exchange turns a tone into several, in both halves: those frequencies are a group. So exchanging what was right leaves in the far
-//! half of a group more than was there, or more than half of its energy; if it leaves less in nearly all groups, what was read had been
-//! exchanged: a sign test at an even chance over the groups of the still chirps' mean spectrum.
+//! An exchange turns a tone into several, in both halves: those frequencies are a group. Of what was right it leaves in the far half of a
+//! group a sum |a + b e^jφ|², a of the far half and b of the near one, whose phase φ is any: its logarithm is that of the larger one of
+//! a² and b² in the mean (Jensen's formula), at least that of half of what was there or of half of the group's energy. If it leaves less,
+//! what was read had been exchanged: a Student test of these logarithms over the groups of the still chirps' mean spectrum.
+//!
+//! One return is in the main lobe of the window and in its side lobes. So only groups count in which something stands out of the noise
+//! and of the side lobes of stronger returns (`side_lobes.rs`), and one or two returns decide nothing. Nothing need be near, as in an open
+//! scene: but of a tone in one half alone the exchange makes images, and of one that was exchanged it takes them away. So what was read
+//! had been exchanged only if the weaker halves of the groups lose energy by the exchange, and had not been only if they gain.
 
 use std::ops::Range;
 
 use num_complex::Complex64;
 
-use super::still::{Sum, spectrum};
-use super::tails::log_binomial_tail;
+use super::side_lobes::standing_out;
+use super::still::{Still, spectrum};
+use super::tails::{log_binomial_tail, student_tail};
 
 /// Bins beside 0 and a quarter of the sampling rate where the window makes the tones of a group one.
 const GUARD: usize = 3;
+/// A group counts above this many times the noise: of noise alone, e⁻²⁰ in one channel.
+const RETURN: f64 = 20.0;
+/// Two returns stand out in three bins of a Hann window each: fewer groups than these and one more decide nothing.
+const FEWEST: usize = 2 * 3 + 1;
 
 /// Of each group of frequencies, one bin: the others lie as far from the ends of the halves.
 pub(super) fn bins(samples: usize) -> Range<usize> {
     GUARD..(samples / 4).saturating_sub(GUARD - 1)
 }
 
-/// The far halves of all groups before and after the exchange.
+/// The far halves of the groups that stand out, before and after the exchange.
 pub(super) struct Halves {
+    /// Of each group that was given, whether it stands out of the noise and of the side lobes of stronger returns.
+    pub stand_out: Vec<bool>,
+    /// How many do, and in how many of them the exchange leaves less than was there.
     pub groups: usize,
-    /// Groups in which what was read looks exchanged, and those in which the exchanged does.
-    pub as_they_are: usize,
-    pub as_exchanged: usize,
-    /// Shares of the energy in the far half, before and after.
+    pub less: usize,
+    /// By how much the exchange leaves less than was right before, and more than is right after it: logarithms.
+    losses: Vec<f64>,
+    gains: Vec<f64>,
+    /// Shares of the energy in the far half, of all groups, before and after.
     shares: [f64; 2],
+    /// Energy in the weaker half of each group, before and after.
+    weaker: [f64; 2],
 }
 
 impl Halves {
-    /// `groups`: bins of the near half and of the far one.
+    /// `groups`: bins of the near half and of the far one. `is_mirrored`: whether a group holds the frequencies of either sign.
     pub fn of<const K: usize>(
-        still: &Sum,
+        still: &Still,
         exchanged: &[Vec<Complex64>],
         samples: usize,
+        is_mirrored: bool,
         groups: impl Iterator<Item = [[usize; K]; 2]>,
     ) -> Self {
-        let before = spectrum(still.chirps(), samples);
+        let before = spectrum(still.sum.chirps(), samples);
         let after = spectrum(exchanged.iter().map(Vec::as_slice), samples);
-        let mut halves = Self { groups: 0, as_they_are: 0, as_exchanged: 0, shares: [0.0; 2] };
+        let least = if still.shows_noise() { RETURN * still.noise_of_bin() } else { 0.0 };
+        let stands_out = standing_out(&before, is_mirrored);
+        let (losses, gains, shares, weaker) = (vec![], vec![], [0.0; 2], [0.0; 2]);
+        let mut halves = Self { stand_out: vec![], groups: 0, less: 0, losses, gains, shares, weaker };
         let mut all = 0.0;
         for [near, away] in groups {
             let sum = |power: &[f64], bins: [usize; K]| bins.into_iter().map(|bin| power[bin]).sum::<f64>();
-            let (far, far_after) = (sum(&before, away), sum(&after, away));
-            let whole = far + sum(&before, near);
-            halves.groups += 1;
-            halves.as_they_are += usize::from(far_after < far.min(0.5 * whole));
-            halves.as_exchanged += usize::from(far < far_after.min(0.5 * whole));
+            let [far, far_after] = [&before, &after].map(|power| sum(power, away));
+            let [close, close_after] = [&before, &after].map(|power| sum(power, near));
             halves.shares = [halves.shares[0] + far, halves.shares[1] + far_after];
-            all += whole;
+            all += far + close;
+            let counts = near.iter().chain(&away).any(|&bin| stands_out[bin] && before[bin] >= least);
+            halves.stand_out.push(counts);
+            if counts {
+                // What is right leaves at least half of this, in the mean of the logarithms.
+                let half = 0.5 * (far + close);
+                let loss =
+                    |before: f64, after: f64| (0.5 * before.min(half).max(f64::MIN_POSITIVE) / after.max(f64::MIN_POSITIVE)).ln();
+                halves.losses.push(loss(far, far_after));
+                halves.gains.push(loss(far_after, far));
+                halves.groups += 1;
+                halves.less += usize::from(far_after < far.min(half));
+                halves.weaker = [halves.weaker[0] + far.min(close), halves.weaker[1] + far_after.min(close_after)];
+            }
         }
         halves.shares = halves.shares.map(|energy| energy / f64::max(all, f64::MIN_POSITIVE));
         halves
     }
 
-    /// Logarithm of the chance of so many groups that look exchanged.
-    pub fn log_p(&self, count: usize) -> f64 {
+    /// Logarithm of the chance of so many groups of one kind where either kind is as likely.
+    pub fn log_p_of(&self, count: usize) -> f64 {
         log_binomial_tail(count, self.groups, 0.5)
+    }
+
+    /// Logarithm of the chance that what was read looks exchanged so much where it was not.
+    pub fn log_p_as_they_are(&self) -> f64 {
+        log_p(&self.losses, self.weaker[1] < self.weaker[0])
+    }
+
+    /// The same of the exchanged.
+    pub fn log_p_as_exchanged(&self) -> f64 {
+        log_p(&self.gains, self.weaker[0] < self.weaker[1])
     }
 
     /// `what` was exchanged.
@@ -65,6 +106,11 @@ impl Halves {
         let [far, far_after] = self.shares.map(|share| 100.0 * share);
         format!("the far half of the spectrum holds {far:.1} % of the static energy, and {far_after:.1} % with {what} exchanged")
     }
+}
+
+/// Of logarithms that are at most zero in the mean; `has_images`: whether what looks exchanged has the images of what is.
+fn log_p(logarithms: &[f64], has_images: bool) -> f64 {
+    if has_images && logarithms.len() >= FEWEST { student_tail(logarithms).ln() } else { 0.0 }
 }
 
 /// A frame for tests of what exchanges.
@@ -81,6 +127,14 @@ pub(super) mod scene {
     pub const SAMPLES: usize = 128;
     pub const SCHEDULE: Schedule =
         Schedule { tx: 1, rx: RX, loops: LOOPS, samples: SAMPLES, is_real: false, is_falling: false, farthest_bin: None };
+
+    /// A chirp and tones of a frequency in bins and of an amplitude, through a receiver.
+    pub fn with_tones(chirp: &[Complex64], tones: &[[f64; 2]], receiver: impl Fn(Complex64) -> Complex64) -> Vec<Complex64> {
+        let turn = std::f64::consts::TAU / SAMPLES as f64;
+        let tone = |sample: usize, [bin, amplitude]: [f64; 2]| Complex64::from_polar(amplitude, turn * bin * sample as f64);
+        let value = |sample: usize| receiver(tones.iter().map(|own| tone(sample, *own)).sum());
+        chirp.iter().enumerate().map(|(sample, own)| own + value(sample)).collect()
+    }
 
     /// Static returns of an amplitude at each bin, of other phases in every channel, through a receiver under noise; `sent` orders the
     /// samples of a chirp.

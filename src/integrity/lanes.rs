@@ -1,13 +1,13 @@
 //! Two lanes exchanged: every second sample before its neighbour.
 //!
 //! Exchanged neighbours turn a tone of ω rad a sample into two, at ω and at ω + π (of real samples: at π − ω), and the share sin²ω of
-//! its energy goes to the other one, which is in the other half of the band: the sign test of `exchange.rs` over these groups. Where
+//! its energy goes to the other one, which is in the other half of the band: the test of `exchange.rs` over these groups. Where
 //! neither the samples as read nor the exchanged ones look exchanged, as where returns fill the whole band alike, nothing can be decided.
 
 use num_complex::Complex64;
 
 use super::exchange::{Halves, bins};
-use super::still::Sum;
+use super::still::Still;
 use super::stream::{Schedule, Stream};
 use super::{ALARM, Finding, Inspector, Kind};
 
@@ -16,12 +16,12 @@ const EXPECTED: &str = "samples in the order in which they were taken";
 
 pub(super) struct Lanes {
     schedule: Schedule,
-    sum: Sum,
+    still: Still,
 }
 
 impl Lanes {
     pub fn new(schedule: Schedule) -> Self {
-        Self { schedule, sum: Sum::new(schedule) }
+        Self { schedule, still: Still::new(schedule) }
     }
 
     /// Bins of each group: in the half where near returns are, and in the other one.
@@ -42,7 +42,7 @@ fn exchanged(chirp: &[Complex64]) -> Vec<Complex64> {
 
 impl Inspector for Lanes {
     fn see(&mut self, stream: &Stream) {
-        stream.loops().for_each(|samples| self.sum.add(samples));
+        self.still.see(stream);
     }
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
@@ -51,18 +51,16 @@ impl Inspector for Lanes {
         if !samples.is_multiple_of(2) {
             return Some(Finding::undecided(CHECK, EXPECTED, "a chirp of an odd number of samples"));
         }
-        let chirps: Vec<Vec<Complex64>> = self.sum.chirps().map(exchanged).collect();
-        let halves = Halves::of(&self.sum, &chirps, samples, self.groups().into_iter());
+        let chirps: Vec<Vec<Complex64>> = self.still.sum.chirps().map(exchanged).collect();
+        let halves = Halves::of(&self.still, &chirps, samples, self.schedule.is_real, self.groups().into_iter());
         let shares = halves.text("neighbouring samples");
-        let log_p = halves.log_p(halves.as_they_are);
+        let log_p = halves.log_p_as_they_are();
         if log_p < ALARM.ln() {
-            let found = format!(
-                "{shares}, in {} of {} groups of frequencies less: two lanes were exchanged",
-                halves.as_they_are, halves.groups
-            );
+            let found =
+                format!("{shares}, in {} of {} groups of frequencies less: two lanes were exchanged", halves.less, halves.groups);
             return Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p));
         }
-        if halves.log_p(halves.as_exchanged) < ALARM.ln() {
+        if halves.log_p_as_exchanged() < ALARM.ln() {
             return Some(Finding::as_stated(CHECK, EXPECTED, shares));
         }
         Some(Finding::undecided(CHECK, EXPECTED, shares))
@@ -72,7 +70,7 @@ impl Inspector for Lanes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrity::exchange::scene::{SAMPLES, SCHEDULE, stream};
+    use crate::integrity::exchange::scene::{SAMPLES, SCHEDULE, stream, with_tones};
 
     /// Static returns of an amplitude at each bin; neighbours exchanged or not.
     fn seen(amplitude: impl Fn(usize) -> f64, is_real: bool, are_exchanged: bool) -> Finding {
@@ -96,6 +94,31 @@ mod tests {
             let wrong = seen(room, is_real, true);
             assert!(wrong.is_refusal(), "{is_real}: {wrong:?}");
         }
+    }
+
+    /// A wall behind an open yard, with and without leakage between the antennas: its side lobes, far above the noise, are no returns.
+    #[test]
+    fn one_or_two_strong_returns_decide_nothing_and_are_not_accused() {
+        for tones in [&[[90.4, 15000.0]][..], &[[90.4, 15000.0], [2.3, 100.0]], &[[99.4, 15000.0]]] {
+            for are_exchanged in [false, true] {
+                let sent = |chirp: &[Complex64]| {
+                    let right = with_tones(chirp, tones, |value| value);
+                    if are_exchanged { exchanged(&right) } else { right }
+                };
+                let mut inspector = Box::new(Lanes::new(SCHEDULE));
+                inspector.see(&stream(SCHEDULE, |_| 0.0, |value| value, sent));
+                let finding = inspector.conclude().unwrap();
+                assert!(finding.ok && !finding.decided, "{tones:?}, {are_exchanged}: {finding:?}");
+            }
+        }
+    }
+
+    /// Returns at all ranges from five eighths to seven eighths of the band, of which the exchange takes more than half to the near half:
+    /// but the images that exchanged lanes would have made of them are not there.
+    #[test]
+    fn an_open_scene_with_far_returns_alone_is_not_accused() {
+        let far = seen(|bin| if (80..112).contains(&bin) { 1000.0 } else { 0.0 }, false, false);
+        assert!(far.ok && !far.decided, "{far:?}");
     }
 
     /// Noise alone; returns over the whole band alike; I and Q exchanged, so that near returns are in the far half.

@@ -21,6 +21,7 @@ mod numbers;
 mod period;
 mod runs;
 mod shift;
+mod side_lobes;
 mod start;
 mod still;
 mod stream;

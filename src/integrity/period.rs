@@ -5,7 +5,8 @@
 //! of a likelihood ratio of another length r'; it must exceed the number of lengths that were tried (Bonferroni). A loop counts once, as
 //! all of its samples show one scene. Lengths near whole numbers of chirps are not tried: the receivers of one chirp share its phase, and
 //! neighbouring chirps what moves. But another length must explain more than those up to twice as long do, too: chirps that take turns
-//! make a loop of whole chirps (`transmitter_count`), and other lengths are the better the nearer they are to it.
+//! make a loop of whole chirps (`transmitter_count`), and other lengths are the better the nearer they are to it. Where the stream does
+//! not repeat itself after the stated loop either, as of noise and of what moves alone, nothing is decided.
 //!
 //! A tone beside the chirps repeats itself, too, after lengths of its own. Static clutter then still repeats after a stated loop T: what
 //! repeats after T' and what repeats after T sum to y(t) = y(t − T') + y(t − T) − y(t − T' − T), and the stream is better predicted from
@@ -146,6 +147,10 @@ impl Inspector for Period {
             );
             return Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p));
         }
+        // The same likelihood ratio against a stream that does not repeat itself at all.
+        if -repeating(looks, [0.0, square(period)]) >= ALARM.ln() {
+            return Some(Finding::undecided(CHECK, EXPECTED, found));
+        }
         Some(Finding::as_stated(CHECK, EXPECTED, found))
     }
 }
@@ -183,6 +188,14 @@ mod tests {
         let other = seen(140, 0.3);
         assert!(other.is_refusal() && other.found.contains("shifted by 140 samples"), "{other:?}");
         assert!(seen(140, 30.0).ok);
+    }
+
+    /// A correlation that noise alone has, too, says nothing of the stated loop.
+    #[test]
+    fn a_stream_that_does_not_repeat_itself_decides_nothing() {
+        let noise = seen(128, 30.0);
+        assert!(noise.ok && !noise.decided && noise.found.contains("correlates to 0."), "{noise:?}");
+        assert!(seen(128, 0.1).decided);
     }
 
     /// A tone that turns on beside the chirps, stronger than static clutter that repeats itself.

@@ -6,6 +6,9 @@
 //! in several channels has a binomial law, Bonferroni over the samples. Errors across the stated beginning compete, and a
 //! break within a few samples of it is taken for a transient. Where receivers lie one after the other and are read as interleaved, each
 //! stated chirp holds a part of every receiver's: breaks lie at whole parts of a chirp, one for each receiver.
+//!
+//! What moves leaves a rest in the mean, the same one in all channels, which may break anywhere. But it breaks elsewhere in other frames,
+//! and chirps begin where they do in all: so the same law must hold of even and of odd frames alone, for the place that was found.
 
 use num_complex::Complex64;
 
@@ -23,13 +26,46 @@ const TRANSIENT: usize = 32;
 
 pub(super) struct Start {
     schedule: Schedule,
-    /// Sum of all chirps, `[tx, rx, sample]`.
-    sum: Vec<Complex64>,
+    /// Sums of the chirps of even and of odd frames, `[tx, rx, sample]`, none where there was no such frame.
+    sums: [Option<Vec<Complex64>>; 2],
 }
 
 impl Start {
     pub fn new(schedule: Schedule) -> Self {
-        Self { schedule, sum: vec![Complex64::ZERO; schedule.period()] }
+        Self { schedule, sums: [None, None] }
+    }
+
+    /// Where each channel of some chirps breaks most.
+    fn breaks(&self, sum: &[Complex64]) -> Vec<usize> {
+        let samples = self.schedule.samples;
+        // The still stream goes on from channel to channel, and after the last one with the first.
+        let at = |place: usize| sum[place % sum.len()];
+        let first = |channel: usize| {
+            let filter = prediction(&sum[channel * samples..][..samples]);
+            let error = |place: usize| -> f64 {
+                let place = sum.len() + channel * samples + place;
+                filter.iter().enumerate().map(|(back, factor)| factor * at(place - back)).sum::<Complex64>().norm_sqr()
+            };
+            (0..samples).map(|sample| (sample, error(sample))).max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(sample, _)| sample)
+        };
+        (0..self.schedule.channels()).map(first).collect()
+    }
+
+    /// How many breaks are at a place or shortly after it.
+    fn near(&self, breaks: &[usize], place: usize) -> usize {
+        let samples = self.schedule.samples;
+        breaks.iter().filter(|other| (*other + samples - place) % samples < ORDER).count()
+    }
+
+    /// Logarithm of the chance of so many at one place.
+    fn log_p(&self, count: usize) -> f64 {
+        log_binomial_tail(count, self.schedule.channels(), ORDER as f64 / self.schedule.samples as f64)
+    }
+
+    /// Whether even and odd frames break there, too, each alone.
+    fn lasts(&self, place: usize) -> bool {
+        let breaks_there = |sum: &Vec<Complex64>| self.log_p(self.near(&self.breaks(sum), place)) < ALARM.ln();
+        self.sums.iter().flatten().all(breaks_there)
     }
 
     /// Whether a break shortly after a sample is one of those between the parts of a chirp, one for each receiver.
@@ -62,8 +98,9 @@ fn prediction(chirp: &[Complex64]) -> Vec<Complex64> {
 
 impl Inspector for Start {
     fn see(&mut self, stream: &Stream) {
+        let sum = self.sums[stream.frame % 2].get_or_insert_with(|| vec![Complex64::ZERO; self.schedule.period()]);
         for samples in stream.loops() {
-            self.sum.iter_mut().zip(samples).for_each(|(sum, v)| *sum += Complex64::new(v.re.into(), v.im.into()));
+            sum.iter_mut().zip(samples).for_each(|(sum, v)| *sum += Complex64::new(v.re.into(), v.im.into()));
         }
     }
 
@@ -72,22 +109,14 @@ impl Inspector for Start {
         if samples < 4 * ORDER {
             return Some(Finding::undecided(CHECK, EXPECTED, "a chirp is too short"));
         }
-        // The still stream goes on from channel to channel, and after the last one with the first.
-        let at = |place: usize| self.sum[place % self.sum.len()];
-        let first = |channel: usize| {
-            let filter = prediction(&self.sum[channel * samples..][..samples]);
-            let error = |place: usize| -> f64 {
-                let place = self.sum.len() + channel * samples + place;
-                filter.iter().enumerate().map(|(back, factor)| factor * at(place - back)).sum::<Complex64>().norm_sqr()
-            };
-            (0..samples).map(|sample| (sample, error(sample))).max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(sample, _)| sample)
-        };
-        let breaks: Vec<usize> = (0..self.schedule.channels()).map(first).collect();
-        let near = |place: usize| breaks.iter().filter(|other| (*other + samples - place) % samples < ORDER).count();
+        let parts: Vec<&Vec<Complex64>> = self.sums.iter().flatten().collect();
+        let sum: Vec<Complex64> = (0..self.schedule.period()).map(|place| parts.iter().map(|part| part[place]).sum()).collect();
+        let breaks = self.breaks(&sum);
+        let near = |place: usize| self.near(&breaks, place);
         // The stated beginning first: `max_by_key` takes the last of equals.
         let place = (0..samples).rev().max_by_key(|place| near(*place))?;
         let count = near(place);
-        let log_p = (samples as f64).ln() + log_binomial_tail(count, breaks.len(), ORDER as f64 / samples as f64);
+        let log_p = (samples as f64).ln() + self.log_p(count);
         let found =
             format!("the signal breaks most at sample {place} or shortly after it in {count} of {} channels", breaks.len());
         if log_p >= ALARM.ln() {
@@ -96,6 +125,9 @@ impl Inspector for Start {
         let beside = (samples / TRANSIENT).max(2 * ORDER);
         if place < beside || place + beside >= samples {
             return Some(Finding::as_stated(CHECK, EXPECTED, found));
+        }
+        if !self.lasts(place) {
+            return Some(Finding::undecided(CHECK, EXPECTED, format!("{found}, but not in even and in odd frames alone")));
         }
         let causes = if self.is_part(place) {
             "the receivers' samples lie one after the other and are not interleaved as stated, or a header lies before the first sample, or \
@@ -137,6 +169,27 @@ mod tests {
         let mut inspector = Box::new(Start::new(schedule));
         inspector.see(&Stream::of(schedule, 0, &IfFrame::new([channels / 2, 2, loops, samples], re, Some(im))));
         inspector.conclude().unwrap()
+    }
+
+    /// The rest of what moves: the same break in all channels, at another sample in every frame, and most of it in one.
+    #[test]
+    fn what_breaks_in_some_frames_alone_is_no_beginning() {
+        let schedule = Schedule { tx: 1, rx: 4, loops: 2, samples: 64, is_real: true, is_falling: false, farthest_bin: None };
+        let judged = |is_everywhere: bool| {
+            let mut inspector = Box::new(Start::new(schedule));
+            for frame in 0..4 {
+                let drawn = numbers(11 + frame as u64, 4 * 2 * 64, -0.01, 0.01);
+                let at = if is_everywhere { 38 } else { [38, 21, 45, 28][frame] };
+                let strength = if frame == 0 { 9.0 } else { 3.0 };
+                let value = |place: usize| drawn[place] + if place % 64 == at { strength } else { 0.0 };
+                let re = (0..4 * 2 * 64).map(|place| value(place) as f32).collect();
+                inspector.see(&Stream::of(schedule, frame, &IfFrame::new([1, 4, 2, 64], re, None)));
+            }
+            inspector.conclude().unwrap()
+        };
+        let moving = judged(false);
+        assert!(moving.ok && !moving.decided && moving.found.contains("even and in odd frames"), "{moving:?}");
+        assert!(judged(true).is_refusal(), "{:?}", judged(true));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import os
 from typing import Any
 
 import numpy as np
@@ -8,11 +9,11 @@ from numpy.typing import NDArray
 
 from .. import _hybridsim
 from .._recording import Frames, Recording, array
-from .._types import Axis, Heatmap, Radar
+from .._types import Axis, Heatmap, Radar, StrPath
 
 
 def heatmaps(
-    source: Recording | NDArray[Any],
+    source: Recording | StrPath | NDArray[Any],
     radar: Radar | None = None,
     *,
     frames: Frames = slice(None),
@@ -24,7 +25,7 @@ def heatmaps(
     """Range-Doppler, range-azimuth and their courses over time.
 
     Args:
-        source: a recording, or samples ``[frame, tx, rx, loop, sample]``, complex64 or float32.
+        source: a recording or its folder, or samples ``[frame, tx, rx, loop, sample]``, complex64 or float32.
         radar: that the samples are of; of a recording it is known.
         frames: which frames of the source; all by default.
         range_window, doppler_window: ``"hann"``, ``"hamming"`` or ``"rectangular"``.
@@ -38,8 +39,11 @@ def heatmaps(
         all chirps, the others have a column a frame. Those over time need two frames, those over azimuth two antenna pairs.
 
     Raises:
-        hybridsim.Error: samples that are not whole frames of the radar.
+        hybridsim.Error: a recording that cannot be read; settings that are none.
+        ValueError: samples that are not whole frames of the radar.
     """
+    if isinstance(source, (str, os.PathLike)):
+        source = Recording(source)
     if isinstance(source, Recording):
         samples, radar = source.samples(frames), source.radar
     elif radar is None:

@@ -9,6 +9,9 @@ use super::{Axes, Checked, Kind, Problem, Stored};
 /// NumPy itself refuses headers beyond 10 kB.
 const LONGEST_HEADER: u64 = 1 << 16;
 
+/// How an array of arrays becomes one of numbers.
+const OBJECT: &str = "save its numbers as an array: numpy.save(FILE, numpy.stack(list(ARRAY)))";
+
 /// What a `.npy` file says about itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
@@ -131,7 +134,7 @@ fn stored(dtype: &DType) -> Checked<Stored> {
         TypeChar::Float => Kind::Float,
         TypeChar::Complex => Kind::Complex,
         TypeChar::UnicodeStr | TypeChar::ByteStr => return unsupported("text", ""),
-        TypeChar::Object => return unsupported("a Python object", "convert the original with scripts/smpl_to_npz.py"),
+        TypeChar::Object => return unsupported("a Python object", OBJECT),
         _ => return unsupported("not numbers", ""),
     };
     Ok(Stored { kind, bytes: plain.size_field() as usize, big_endian: plain.endianness() == Endianness::Big })

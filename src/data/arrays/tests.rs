@@ -170,7 +170,7 @@ fn another_kind_of_number_is_named() {
     assert_eq!(message, "`trans` is complex64 [1, 3], expected real numbers [pose, xyz = 3]");
     let (message, hint) = refused::<f64>(&npy(&header("|O", "(1, 3)"), &[0; 24]), POSE);
     assert_eq!(message, "`trans` is a Python object (dtype '|O'), expected an array of plain numbers");
-    assert_eq!(hint, "convert the original with scripts/smpl_to_npz.py");
+    assert_eq!(hint, "save its numbers as an array: numpy.save(FILE, numpy.stack(list(ARRAY)))");
     let (message, _) = refused::<f64>(&npy(&header("<U4", "()"), &[0; 16]), POSE);
     assert_eq!(message, "`trans` is text (dtype '<U4'), expected an array of plain numbers");
 }

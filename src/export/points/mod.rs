@@ -211,6 +211,9 @@ pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
             notes.push(format!("the antennas do not resolve {what}: it is taken to be 0"));
         }
     }
+    if radar.loops_per_frame == 1 {
+        notes.push("frames of one loop measure no velocity: it is taken to be 0".into());
+    }
     Ok(notes)
 }
 

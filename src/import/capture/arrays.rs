@@ -8,7 +8,7 @@ use super::boards::Board;
 use super::container;
 use super::cube::{Cube, half_scale_note};
 use super::layout::{Axis, Layout};
-use super::radar_table::{finished, missing, place_antennas, radar_table, table_of};
+use super::radar_table::{finished, missing, place_antennas, radar_table, refuse_unknown, table_of};
 use super::words::{Lengths, WordArray};
 use super::{Capture, Stated, coloradar, numbers};
 use crate::data::arrays::Kind;
@@ -161,6 +161,12 @@ impl Settings {
     fn of(stated: &Stated, layout: &Layout, notes: &mut Vec<String>) -> Result<Self> {
         let preset = stated.preset.as_ref();
         let (others, configs): (Vec<_>, Vec<_>) = stated.configs.iter().partition(|path| extension(path) == "txt");
+        if let Some(of_stream) = configs.iter().find(|path| ["cfg", "json"].contains(&extension(path).as_str())) {
+            return Err(Error::field(of_stream, "type", format!("`.{}`", extension(of_stream)), "TOML with [radar], for arrays")
+                .with_hint(
+                    "TI's .cfg and .mmwave.json describe the .bin files of a capture card: leave --layout out for these; of an array state                      the radar in TOML, or with --board and --set radar.KEY=VALUE",
+                ));
+        }
         let mut table = table_of(configs.first().map(|path| path.as_path()), &stated.sets)?;
         let radar = radar_table(&mut table)?;
         for path in others {
@@ -269,11 +275,13 @@ impl Settings {
 
     /// Refuses a radar of which something is not stated, all of it at once. `later`: what the file itself will say.
     fn refuse_missing(&mut self, later: &[&str]) -> Result<()> {
+        let name = self.name.clone();
         let mut open = missing(self.radar());
         open.retain(|key| !later.contains(key));
         if open.is_empty() {
             return Ok(());
         }
+        refuse_unknown(self.radar(), &name)?;
         let why = match &self.page {
             Some(page) => format!("{page} leaves this open"),
             None => "the file does not say this".into(),

@@ -129,11 +129,12 @@ pub const BOARDS: &[Board] = &[
     },
     Board {
         name: "BGT60TR13C",
-        source: "Infineon data sheet BGT60TR13C: one transmitter, receivers 1 and 3 side by side, 2 and 3 one above the other",
+        source: "Infineon data sheet BGT60TR13C: one transmitter, receivers 1 and 3 side by side, 2 and 3 one above the other; seen from \
+                 the front; left/right and up/down to be checked with a target",
         design_frequency_hz: 60.75e9,
         band: Band { low_hz: 58.0e9, high_hz: 63.5e9, source: AVIAN },
         tx_half_wavelengths: &[[0.0, 0.0]],
-        rx_half_wavelengths: &[[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]],
+        rx_half_wavelengths: &[[0.0, 1.0], [1.0, 0.0], [1.0, 1.0]],
         inverted_rx: &[],
     },
     Board {
@@ -262,6 +263,17 @@ mod tests {
         rows.sort_unstable();
         let wanted: Vec<_> = (0..8).map(|x| (0, x)).chain((2..6).map(|x| (1, x))).collect();
         assert_eq!(rows, wanted);
+    }
+
+    /// Receivers 1 and 3 tell azimuth, as Infineon's example of range and angle takes them (`rx_mask` 5), and 2 and 3 elevation.
+    #[test]
+    fn the_pairs_of_the_bgt60tr13c_are_those_of_its_sheet() {
+        let board = Board::named("BGT60TR13C").unwrap();
+        let apart = |a: usize, b: usize| {
+            let [a, b] = [a, b].map(|number| board.rx_half_wavelengths[number - 1]);
+            [(a[0] - b[0]).abs(), (a[1] - b[1]).abs()]
+        };
+        assert_eq!((apart(1, 3), apart(2, 3)), ([1.0, 0.0], [0.0, 1.0]));
     }
 
     #[test]

@@ -50,14 +50,17 @@ impl Shape {
 
 fn of_single(shape: &Json) -> Result<Shape> {
     let number = |key: &str| shape.get(key)?.number();
+    // Earlier releases of the SDK wrote the ends of the band; their chirps rise.
+    let either =
+        |key: &str, earlier: &str| number(if shape.find(key).is_none() && shape.find(earlier).is_some() { earlier } else { key });
     let antennas = |key: &str| shape.get(key)?.items()?.iter().map(antenna).collect::<Result<Vec<usize>>>();
     let tx = if is_tdm(shape)? { vec![1, 2] } else { antennas("tx_antennas")? };
     if tx.len() > 1 && !is_tdm(shape)? {
         return Err(shape.get("tx_antennas")?.wrong("one transmitter, or mimo_mode \"tdm\""));
     }
     Ok(Shape {
-        start_hz: number("start_frequency_Hz")?,
-        end_hz: number("end_frequency_Hz")?,
+        start_hz: either("start_frequency_Hz", "lower_frequency_Hz")?,
+        end_hz: either("end_frequency_Hz", "upper_frequency_Hz")?,
         rate_hz: number("sample_rate_Hz")?,
         samples: shape.get("num_samples_per_chirp")?.count()?,
         chirps: shape.get("num_chirps_per_frame")?.count()?,
@@ -188,6 +191,15 @@ mod tests {
         assert_eq!(two, Shape { tx: vec![1, 2], ..shape });
         assert_eq!(read(&sequence(&[chirp("62e9", 1), chirp("62e9", 2)].join(","))).unwrap(), two);
         assert_eq!(read(&single(r#""tx_antennas": [1, 2], "mimo_mode": 1"#)).unwrap(), two);
+    }
+
+    #[test]
+    fn the_band_of_an_earlier_release_is_that_of_its_chirps() {
+        let now = single(r#""tx_antennas": [1]"#);
+        let earlier = now.replace("start_frequency_Hz", "lower_frequency_Hz").replace("end_frequency_Hz", "upper_frequency_Hz");
+        assert_eq!(read(&earlier).unwrap(), read(&now).unwrap());
+        let error = read(&now.replace("start_frequency_Hz", "first_frequency_Hz")).unwrap_err().to_string();
+        assert!(error.contains("start_frequency_Hz` is missing"), "{error}");
     }
 
     #[test]

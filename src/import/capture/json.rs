@@ -39,7 +39,11 @@ impl Json {
 
     /// A field that must be there.
     pub fn get(&self, name: &str) -> Result<Self> {
-        self.find(name).ok_or_else(|| Error::field(&self.file, self.step(name, &Value::Null).path, "missing", "a value"))
+        self.find(name).ok_or_else(|| {
+            Error::field(&self.file, self.step(name, &Value::Null).path, "missing", "a value").with_hint(
+                "nothing else says this: take the whole file as the radar's own program wrote it, or add the field to it",
+            )
+        })
     }
 
     pub fn items(&self) -> Result<Vec<Self>> {
@@ -62,6 +66,12 @@ impl Json {
             _ => None,
         };
         number.filter(|number: &f64| number.is_finite()).ok_or_else(|| self.wrong("a number"))
+    }
+
+    /// A number of at least zero, such as a time.
+    pub fn amount(&self) -> Result<f64> {
+        let number = self.number()?;
+        if number >= 0.0 { Ok(number) } else { Err(self.wrong("a number of at least 0")) }
     }
 
     /// A whole number of at least zero.

@@ -22,6 +22,7 @@ mod json;
 pub mod lanes;
 mod layout;
 mod numbers;
+mod packets;
 mod parts;
 mod presets;
 mod radar_table;
@@ -296,5 +297,7 @@ fn one(sources: &[PathBuf]) -> Result<&Path> {
 mod array_tests;
 #[cfg(test)]
 mod board_tests;
+#[cfg(test)]
+mod description_tests;
 #[cfg(test)]
 mod tests;

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use super::boards::Board;
 use crate::data::read_toml;
-use crate::data::settings::{apply_sets, settings_from_table};
+use crate::data::settings::{apply_sets, nearest, settings_from_table};
 use crate::error::{Error, Result};
 use crate::radar::Radar;
 
@@ -60,6 +60,14 @@ pub fn missing(radar: &Table) -> Vec<&'static str> {
     ];
     keys.retain(|key| !radar.contains_key(*key));
     keys
+}
+
+/// Refuses a key that no radar has, before another is missed because of it.
+pub fn refuse_unknown(radar: &Table, name: &Path) -> Result<()> {
+    let mut known = missing(&Table::new());
+    known.extend(["sampling", "adc_start_s", "position_m", "full_scale_codes"]);
+    let Some(key) = radar.keys().find(|key| !known.contains(&key.as_str())) else { return Ok(()) };
+    Err(Error::UnknownKey { path: name.into(), key: format!("radar.{key}"), nearest: nearest(key, known).map(str::to_string) })
 }
 
 /// The radar of a table that says all but perhaps when the ADC starts.
@@ -130,6 +138,18 @@ fn keeps_its_shape(read: &Radar, set: &Radar) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_misspelt_key_is_named_with_the_nearest_one() {
+        let whole = Radar { full_scale_codes: Some(2047.0), ..Radar::small(1) };
+        let mut table = Table::try_from(whole).unwrap();
+        refuse_unknown(&table, Path::new("radar.toml")).unwrap();
+        let slope = table.remove("slope_hz_per_s").unwrap();
+        table.insert("slope_mhz_us".into(), slope);
+        let error = refuse_unknown(&table, Path::new("radar.toml")).unwrap_err();
+        let wanted = "radar.toml: unknown key `radar.slope_mhz_us`, the nearest known one is `slope_hz_per_s`";
+        assert_eq!(error.to_string(), wanted);
+    }
 
     #[test]
     fn what_shapes_the_samples_cannot_be_set_but_fewer_frames_and_loops_can() {

@@ -11,6 +11,12 @@ use super::{Stated, stream::Words};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
 
+/// What to do where transmitters send with phases that are switched between 0 and a half turn (BPM), or shifted by others.
+pub const SWITCHED: &str =
+    "separate the transmitters (sums and differences of the two chirps) and import the array with --layout";
+pub const SHIFTED: &str = "turn the samples of each chirp back by its phase and import the array with --layout; of a description whose phase \
+                           shifters were off, set the field to 0";
+
 /// A chirp's shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {

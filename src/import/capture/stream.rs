@@ -3,7 +3,7 @@
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use super::word_kind;
+use super::{packets, word_kind};
 use crate::data::files;
 use crate::error::{Error, Result};
 
@@ -16,7 +16,7 @@ impl Words {
     /// Holds every file's length.
     ///
     /// # Errors
-    /// A file with half a word at its end, or of wider numbers.
+    /// A file with half a word at its end, of wider numbers, or of packets with their headers.
     pub fn open(paths: &[PathBuf]) -> Result<Self> {
         let files = paths.iter().map(|path| {
             let metadata = std::fs::metadata(path).map_err(|source| Error::read(path, source))?;
@@ -32,6 +32,7 @@ impl Words {
             }
         });
         let words = Self { files: files.collect::<Result<_>>()? };
+        packets::refuse(words.first())?;
         words.refuse_wider()?;
         Ok(words)
     }

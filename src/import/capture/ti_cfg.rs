@@ -4,10 +4,11 @@
 //! adcbufCfg, profileCfg, chirpCfg, frameCfg, advFrameCfg, subFrameCfg and lvdsStreamCfg; other lines say nothing of
 //! the samples.
 
+use std::io::ErrorKind;
 use std::path::Path;
 
 use super::lanes::Lanes;
-use super::schedule::{Burst, Chirp, Profile, TiRadar, check_ramp, sampling_of};
+use super::schedule::{Burst, Chirp, Profile, SHIFTED, SWITCHED, TiRadar, check_ramp, sampling_of};
 use crate::data::files;
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
@@ -36,6 +37,16 @@ impl Line<'_> {
             .ok_or_else(|| self.wrong(format!("`{text}` at place {}", index + 1), "a number"))
     }
 
+    /// A time or a period.
+    fn amount_at(&self, index: usize) -> Result<f64> {
+        let number = self.number_at(index)?;
+        if number >= 0.0 {
+            Ok(number)
+        } else {
+            Err(self.wrong(format!("{number} at place {}", index + 1), "a number of at least 0"))
+        }
+    }
+
     fn count_at(&self, index: usize) -> Result<usize> {
         let number = self.number_at(index)?;
         if number >= 0.0 && number.fract() == 0.0 && number < 1e9 {
@@ -47,7 +58,7 @@ impl Line<'_> {
 
 /// Reads the radar. A later line of the same command and number takes the earlier one's place, as on the radar.
 pub fn read_radar(file: &Path) -> Result<TiRadar> {
-    let text = files::read_text(file)?;
+    let text = read_text(file)?;
     let lines: Vec<Line> = text
         .lines()
         .enumerate()
@@ -77,9 +88,9 @@ pub fn read_radar(file: &Path) -> Result<TiRadar> {
     // bpmCfg <subframe> <enabled> <first chirp> <second chirp>
     for line in all("bpmCfg") {
         if line.count_at(1)? != 0 {
-            return Err(line.wrong("transmitters that send together with switched phases", "0: time division").with_hint(
-                "separate the transmitters (sums and differences of the two chirps) and import the array with --layout",
-            ));
+            return Err(line
+                .wrong("transmitters that send together with switched phases", "0: time division")
+                .with_hint(SWITCHED));
         }
     }
     let mut notes: Vec<String> = profiles.iter().filter_map(|profile| check_ramp(file, profile)).collect();
@@ -103,6 +114,22 @@ pub fn read_radar(file: &Path) -> Result<TiRadar> {
         notes,
     };
     radar.checked()
+}
+
+/// The text of a file whose commands are ASCII: comments may be of another encoding.
+fn read_text(file: &Path) -> Result<String> {
+    let text = match files::read_text(file) {
+        Err(Error::Read { source, .. }) if source.kind() == ErrorKind::InvalidData => {
+            let bytes = files::read(file)?;
+            if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+                return Err(Error::field(file, "encoding", "UTF-16", "ASCII or UTF-8")
+                    .with_hint("save it as UTF-8; PowerShell: Get-Content OLD.cfg | Set-Content -Encoding ascii NEW.cfg"));
+            }
+            String::from_utf8_lossy(&bytes).into_owned()
+        }
+        text => text?,
+    };
+    Ok(text.trim_start_matches('\u{feff}').to_string())
 }
 
 /// lvdsStreamCfg <subframe> <header> <format> <software>
@@ -149,12 +176,16 @@ fn of_subframes<'a>(lines: &[&'a Line<'a>], subframes: usize, is_named: impl Fn(
 
 /// profileCfg id start_GHz idle_us adc_start_us ramp_end_us power phase slope_MHz/us tx_start samples rate_ksps …
 fn profile(line: &Line) -> Result<Profile> {
+    if line.number_at(6)? != 0.0 {
+        let found = format!("phase shifters of {} at place 7", line.arguments[6]);
+        return Err(line.wrong(found, "0: transmitters in phase").with_hint(SHIFTED));
+    }
     Ok(Profile {
         id: line.count_at(0)?,
         start_frequency_hz: line.number_at(1)? * 1e9,
-        idle_s: line.number_at(2)? * 1e-6,
-        adc_start_s: line.number_at(3)? * 1e-6,
-        ramp_end_s: line.number_at(4)? * 1e-6,
+        idle_s: line.amount_at(2)? * 1e-6,
+        adc_start_s: line.amount_at(3)? * 1e-6,
+        ramp_end_s: line.amount_at(4)? * 1e-6,
         slope_hz_per_s: line.number_at(7)? * 1e12,
         samples: line.count_at(9)?,
         sample_rate_hz: line.number_at(10)? * 1e3,
@@ -170,7 +201,7 @@ fn chirps(lines: &[&Line]) -> Result<Vec<(usize, Chirp)>> {
                 return Err(line.wrong(what, "the profile's: chirps that differ from their profile are not read"));
             }
         }
-        let chirp = Chirp { profile: line.count_at(2)?, tx_mask: line.count_at(7)?, extra_idle_s: line.number_at(5)? * 1e-6 };
+        let chirp = Chirp { profile: line.count_at(2)?, tx_mask: line.count_at(7)?, extra_idle_s: line.amount_at(5)? * 1e-6 };
         for index in line.count_at(0)?..=line.count_at(1)?.min(511) {
             all.retain(|(other, _)| *other != index);
             all.push((index, chirp.clone()));
@@ -192,7 +223,7 @@ fn frame(line: &Line, chirps: &[(usize, Chirp)]) -> Result<(Vec<Burst>, f64, Opt
     let count =
         (last + 1).checked_sub(first).ok_or_else(|| line.wrong(format!("chirps {first} to {last}"), "an ascending range"))?;
     let frames = line.count_at(3)?;
-    Ok((vec![burst(line, chirps, first, count, line.count_at(2)?)?], line.number_at(4)? * 1e-3, (frames > 0).then_some(frames)))
+    Ok((vec![burst(line, chirps, first, count, line.count_at(2)?)?], line.amount_at(4)? * 1e-3, (frames > 0).then_some(frames)))
 }
 
 /// advFrameCfg subframes profile frames …; subFrameCfg index profile first chirps loops burst_ms offset bursts burst_loops period_ms
@@ -210,7 +241,7 @@ fn advanced_frame(line: &Line, subframes: &[&Line], chirps: &[(usize, Chirp)]) -
         }
         let loops = subframe.count_at(4)? * subframe.count_at(8)?.max(1);
         bursts.push(burst(subframe, chirps, subframe.count_at(2)?, subframe.count_at(3)?, loops)?);
-        period_s += subframe.number_at(9)? * 1e-3;
+        period_s += subframe.amount_at(9)? * 1e-3;
     }
     let frames = line.count_at(2)?;
     Ok((bursts, period_s, (frames > 0).then_some(frames)))

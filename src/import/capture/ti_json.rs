@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::json::Json;
 use super::lanes::Lanes;
-use super::schedule::{Burst, Chirp, Profile, TiRadar, check_ramp, sampling_of};
+use super::schedule::{Burst, Chirp, Profile, SHIFTED, SWITCHED, TiRadar, check_ramp, sampling_of};
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
 
@@ -51,6 +51,7 @@ pub fn read_radar(path: &Path) -> Result<TiRadar> {
             .with_hint("the files of a cascade are master_0000_data.bin, slave1_0000_data.bin, …: name their folder"));
     };
     let rf = device.get("rfConfig")?;
+    in_phase(&rf)?;
     let profiles = profiles(&rf)?;
     let (bursts, frame_period_s, frames) = frame(&rf)?;
     let raw = device.get("rawDataCaptureConfig")?;
@@ -99,6 +100,7 @@ pub fn read_cascade(path: &Path) -> Result<TiRadar> {
 /// One device of a cascade, its transmitters numbered after those of the devices before it.
 fn of_cascade(path: &Path, device: &Json, id: usize) -> Result<TiRadar> {
     let rf = device.get("rfConfig")?;
+    in_phase(&rf)?;
     let profiles = profiles(&rf)?;
     let (mut bursts, frame_period_s, frames) = frame(&rf)?;
     for chirp in bursts.iter_mut().flat_map(|burst| &mut burst.chirps) {
@@ -145,10 +147,32 @@ fn joined(whole: &mut TiRadar, own: &TiRadar, at: &Json, id: usize) -> Result<()
     Ok(())
 }
 
+/// Refuses transmitters whose phases are switched or shifted: by a profile, or from chirp to chirp.
+fn in_phase(rf: &Json) -> Result<()> {
+    let refuse_other_than_zero = |value: Option<Json>, hint: &str| match value {
+        Some(value) if value.number()? != 0.0 => Err(value.wrong("0: transmitters in phase").with_hint(hint)),
+        _ => Ok(()),
+    };
+    let listed = |list: &str| rf.find(list).map(|list| list.items()).transpose().map(Option::unwrap_or_default);
+    for profile in listed("rlProfiles")?.iter().filter_map(|entry| entry.find("rlProfileCfg_t")) {
+        refuse_other_than_zero(profile.find("txPhaseShifter"), SHIFTED)?;
+    }
+    for chirp in listed("rlRfPhaseShiftCfgs")?.iter().filter_map(|entry| entry.find("rlRfPhaseShiftCfg_t")) {
+        for key in ["tx0PhaseShift", "tx1PhaseShift", "tx2PhaseShift"] {
+            refuse_other_than_zero(chirp.find(key), SHIFTED)?;
+        }
+    }
+    for chirp in listed("rlBpmChirps")?.iter().filter_map(|entry| entry.find("rlBpmChirpCfg_t")) {
+        refuse_other_than_zero(chirp.find("constBpmVal"), SWITCHED)?;
+    }
+    Ok(())
+}
+
 fn profiles(rf: &Json) -> Result<Vec<Profile>> {
     let read = |profile: &Json| {
         let profile = profile.get("rlProfileCfg_t")?;
         let scaled = |key: &str, scale: f64| Ok::<_, Error>(profile.get(key)?.number()? * scale);
+        let time = |key: &str| Ok::<_, Error>(profile.get(key)?.amount()? * 1e-6);
         Ok(Profile {
             id: profile.get("profileId")?.count()?,
             // The tool stores what its register holds: 60 GHz comes out as 60.0000000044704.
@@ -156,9 +180,9 @@ fn profiles(rf: &Json) -> Result<Vec<Profile>> {
             slope_hz_per_s: (scaled("freqSlopeConst_MHz_usec", 1e12)? / 1e6).round() * 1e6,
             sample_rate_hz: scaled("digOutSampleRate", 1e3)?,
             samples: profile.get("numAdcSamples")?.count()?,
-            idle_s: scaled("idleTimeConst_usec", 1e-6)?,
-            adc_start_s: scaled("adcStartTimeConst_usec", 1e-6)?,
-            ramp_end_s: scaled("rampEndTime_usec", 1e-6)?,
+            idle_s: time("idleTimeConst_usec")?,
+            adc_start_s: time("adcStartTimeConst_usec")?,
+            ramp_end_s: time("rampEndTime_usec")?,
         })
     };
     rf.get("rlProfiles")?.items()?.iter().map(read).collect()
@@ -176,7 +200,7 @@ fn chirps(rf: &Json) -> Result<Vec<(usize, Chirp)>> {
                 return Err(change.wrong("0: chirps that differ from their profile are not read"));
             }
         }
-        let extra_idle_s = chirp.find("idleTimeVar_usec").map(|extra| extra.number()).transpose()?.unwrap_or(0.0) * 1e-6;
+        let extra_idle_s = chirp.find("idleTimeVar_usec").map(|extra| extra.amount()).transpose()?.unwrap_or(0.0) * 1e-6;
         let content = Chirp { profile: chirp.get("profileId")?.count()?, tx_mask: chirp.get("txEnable")?.count()?, extra_idle_s };
         for index in chirp.get("chirpStartIdx")?.count()?..=chirp.get("chirpEndIdx")?.count()?.min(511) {
             all.push((index, content.clone()));
@@ -202,7 +226,7 @@ fn frame(rf: &Json) -> Result<(Vec<Burst>, f64, Option<usize>)> {
     let count = |key: &str| frame.get(key)?.count();
     let bursts = vec![burst(&all, count("chirpStartIdx")?, count("chirpEndIdx")?, count("numLoops")?, &frame)?];
     let frames = count("numFrames")?;
-    Ok((bursts, frame.get("framePeriodicity_msec")?.number()? * 1e-3, (frames > 0).then_some(frames)))
+    Ok((bursts, frame.get("framePeriodicity_msec")?.amount()? * 1e-3, (frames > 0).then_some(frames)))
 }
 
 fn advanced_frame(rf: &Json, all: &[(usize, Chirp)]) -> Result<(Vec<Burst>, f64, Option<usize>)> {
@@ -219,7 +243,7 @@ fn advanced_frame(rf: &Json, all: &[(usize, Chirp)]) -> Result<(Vec<Burst>, f64,
         }
         let last = (first + count("numOfChirps")?).checked_sub(1).ok_or_else(|| subframe.wrong("at least one chirp"))?;
         bursts.push(burst(all, first, last, count("numLoops")? * of_one("numOfBurstLoops")?, &subframe)?);
-        period_s += subframe.get("subFramePeriodicity_msec")?.number()? * 1e-3;
+        period_s += subframe.get("subFramePeriodicity_msec")?.amount()? * 1e-3;
     }
     let frames = sequence.get("numFrames")?.count()?;
     Ok((bursts, period_s, (frames > 0).then_some(frames)))
