@@ -38,7 +38,7 @@ pub struct Loaded {
     pub extremes: [f64; 2],
 }
 
-/// Most frames that are looked at: memory and time stay bounded.
+/// Most frames that are looked at: memory and time stay bounded. Frames of fewer chirps than a block count as so much less.
 const MOST_FRAMES: usize = 256;
 /// Most samples in memory (16 bytes each).
 const MOST_SAMPLES: usize = 40_000_000;
@@ -56,7 +56,8 @@ const FEWEST_LOOPS: usize = 8;
 /// How many frames of a radar's recordings are looked at, at most.
 pub fn most_frames(radar: &Radar) -> usize {
     let per_frame: usize = radar.dims()[1..].iter().product();
-    MOST_FRAMES.min((MOST_SAMPLES / per_frame.max(1)).max(1))
+    let of_few = FEWEST_LOOPS * MOST_FRAMES / radar.loops_per_frame.max(1);
+    MOST_FRAMES.max(of_few).min((MOST_SAMPLES / per_frame.max(1)).max(1))
 }
 
 impl Cube {

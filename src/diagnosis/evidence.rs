@@ -61,6 +61,8 @@ pub struct Evidence {
     pub(super) emptied: Vec<Cells>,
     /// Static returns that were subtracted, `[tx · rx, sample]`, if any.
     pub(super) subtracted: Option<Arc<[Complex64]>>,
+    /// Ranges, m, between which something else than the body moves by no law that would take all of it out.
+    pub(super) others_m: Vec<[f64; 2]>,
     /// Phases over time of what was accepted, oldest first.
     pub courses: Vec<Arc<Course>>,
     pub extremes: [f64; 2],
@@ -98,6 +100,7 @@ impl Evidence {
             inverses: vec![],
             emptied: vec![],
             subtracted: None,
+            others_m: vec![],
             courses: vec![],
             extremes,
             codes,

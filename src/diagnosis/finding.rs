@@ -215,6 +215,8 @@ pub struct Candidate {
     /// A boundary or a part of the body.
     pub choice: Option<String>,
     pub place: Place,
+    /// Interval of the frequency of what oscillates over slow time, Hz.
+    pub line_hz: Option<[f64; 2]>,
     /// Under the null, corrected for everything that this detector looked at.
     pub p_value: f64,
     /// Log-likelihood that held-out frames gain, nats.
@@ -241,6 +243,7 @@ impl Candidate {
             estimates: vec![],
             choice: None,
             place,
+            line_hz: None,
             p_value,
             nats,
             errs_alike: false,
@@ -250,6 +253,11 @@ impl Candidate {
             energy: 0.0,
             correction: Correction::None,
         }
+    }
+
+    /// Whether both oscillate at one frequency.
+    pub fn is_at_the_line_of(&self, other: &Self) -> bool {
+        matches!((self.line_hz, other.line_hz), (Some(a), Some(b)) if a[0] <= b[1] && b[0] <= a[1])
     }
 
     /// Without its name where all the numbers that it gives may as well be those at which the effect does nothing: something is

@@ -8,6 +8,7 @@ use super::config::DiagnosisConfig;
 use super::cube::{Loaded, most_frames};
 use super::detectors::paths::body_rms;
 use super::evidence::Evidence;
+use super::finding::Correction;
 use super::limits::limits;
 use super::misfit::Misfit;
 use super::null::Null;
@@ -16,7 +17,8 @@ use super::report::{
     Effect, FORMAT, Findings, Fit, HeldOut, Location, NotDetectable, Report, Verdict, moving_energy, never_detectable,
     probability_of_nothing,
 };
-use super::select::{Explanation, explain};
+use super::residual::is_added;
+use super::select::{Accepted, Explanation, explain};
 use crate::data::Recording;
 use crate::effects::EffectSetting;
 use crate::error::{Error, Result};
@@ -196,17 +198,35 @@ fn conclude(
         report.p_value = Some(calibrated.p_value());
         report.calibration = Some(calibrated);
     }
-    if let (Verdict::NoMismatch, Some(p_value)) = (report.verdict, report.p_value.filter(|p_value| *p_value < config.alarm)) {
-        report.reason = format!(
-            "a recording like this is improbable where nothing is missing (p = {p_value:.1e}): something may be that no detector locates"
-        );
-    }
+    doubt(report, explanation, config);
     let nothing = probability_of_nothing(report.p_value.unwrap_or(1.0));
     report.probability_nothing_missing = match report.verdict {
         Verdict::NoMismatch => 1.0 - 0.5 * (1.0 - nothing),
         _ => nothing,
     };
     report.fit = Fit { before: explanation.before, after: explanation.after };
+}
+
+/// What the verdict leaves out where the rounds found nothing more, and the recording, or what is left of it, is improbable all the same.
+fn doubt(report: &mut Report, explanation: &Explanation, config: &DiagnosisConfig) {
+    if let (Verdict::NoMismatch, Some(p_value)) = (report.verdict, report.p_value.filter(|p_value| *p_value < config.alarm)) {
+        report.reason = format!(
+            "a recording like this is improbable where nothing is missing (p = {p_value:.1e}): something may be that no detector locates"
+        );
+    }
+    // Of a mover limbs are left, and a law of the noise is no part of what is taken out.
+    let leaves_nothing =
+        |effect: &Accepted| is_added(&effect.candidate) || matches!(effect.candidate.correction, Correction::Inverse(..));
+    if report.verdict == Verdict::Explained && explanation.accepted.iter().all(leaves_nothing) {
+        let left = Null::of(&explanation.evidence, config.seed).p_value();
+        if let Some(p_value) = left.filter(|p_value| *p_value < config.alarm) {
+            report.verdict = Verdict::PartlyExplained;
+            report.reason = format!(
+                "what was found has names, but what they leave is improbable where nothing else is missing (p = {p_value:.1e}): something may \
+                 be that no detector locates"
+            );
+        }
+    }
 }
 
 /// A body that is not observed may be masked by what needs no body to be found (a phase noise spreads the static clutter over all

@@ -139,6 +139,8 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // A course from frame to frame that has no name is modelled roughly: what is left of it turns all returns, too; where the strongest
     // seems to move slowly, no other is strong enough to deny it.
     let drifts = accepted.id.is_none() && TURNS[..2].contains(&accepted.behaves_like);
+    // At its own frequency, what else all returns do is another part of it: a line that has no name is undone roughly.
+    let of_line = accepted.id.is_none() && candidate.is_at_the_line_of(accepted);
     let slow_path = is_path(candidate) && candidate.id.is_none();
     let of_drift = drifts && candidate.behaves_like == accepted.behaves_like;
     let alone = drifts && slow_path;
@@ -173,7 +175,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     [
         (roughly || fades || image || unlike, ROUGHLY),
         (bursts || behind || line || is_of_cut(accepted, candidate), 1.0),
-        (hardly || uneven || bent || is_mixed(accepted, candidate) || products || alone, f64::INFINITY),
+        (hardly || uneven || bent || is_mixed(accepted, candidate) || products || alone || of_line, f64::INFINITY),
         (shaken || rest, SHAKEN),
         (by_chirp || faint, SLIGHTLY),
     ]

@@ -63,7 +63,7 @@ const LOST: f64 = 0.2;
 const MARGIN: f64 = 0.5;
 
 /// Orthonormal basis, `[vector][sample]`, of all tones whose frequency lies in an interval of bins.
-fn tones(length: usize, [low, high]: [f64; 2]) -> Vec<Vec<Complex64>> {
+pub fn tones(length: usize, [low, high]: [f64; 2]) -> Vec<Vec<Complex64>> {
     let (low, high) = (low - MARGIN, high + MARGIN);
     let count = (((high - low) / 0.5).ceil() as usize + 1).min(2 * length);
     let mut basis: Vec<Vec<Complex64>> = vec![];

@@ -4,6 +4,7 @@
 //! a gap, because blocks of a long frame resolve velocities poorly; two people who pass one another at one range differ in
 //! nothing else.
 
+mod moving_radar;
 mod stretch;
 
 use num_complex::Complex64;
@@ -33,7 +34,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.body.is_some() {
         return vec![];
     }
-    strongest(evidence).into_iter().collect()
+    strongest(evidence).or_else(|| moving_radar::find(evidence)).into_iter().collect()
 }
 
 /// The strongest mover, if any.
@@ -168,10 +169,11 @@ impl<'a> Mover<'a> {
         let velocity_mps = (top[0] as f64 + stretch.summit(top, [1, 0])) * bin_mps;
         // On the flank of what is slower, nothing says how slow.
         let slower = (dopplers[0].abs().max(dopplers[1].abs()) + 0.5) * bin_mps;
+        let modulo = format!("(modulo {:.2} m/s)", 2.0 * radar.max_velocity_mps());
         let (velocities, motion) = if stretch.is_flank(top) {
-            ([-slower, slower], format!("more slowly than {slower:.2} m/s"))
+            ([-slower, slower], format!("more slowly than {slower:.2} m/s {modulo}"))
         } else {
-            ([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps], format!("with {velocity_mps:+.2} m/s"))
+            ([(dopplers[0] - 0.5) * bin_mps, (dopplers[1] + 0.5) * bin_mps], format!("with {velocity_mps:+.2} m/s {modulo}"))
         };
         let snapshots: Vec<Vec<Complex64>> =
             stretch.maps.iter().map(|channels| channels.iter().map(|map| map[stretch.index(top)]).collect()).collect();

@@ -69,6 +69,13 @@ impl Evidence {
         self.accepted_unnamed.contains(&Behaviour::PathLike) && self.may_move()
     }
 
+    /// Ranges of returns beyond the leakage that do not stand, with the power of a chirp that does not, over the noise.
+    pub fn moving_returns(&self) -> Vec<(usize, f64)> {
+        let profile = Profile::of(self, std::slice::from_ref(&self.split.training));
+        let moving = profile.returns().filter(|&bin| !profile.stands(bin));
+        moving.map(|bin| (bin, profile.power[bin] - profile.standing[bin])).collect()
+    }
+
     /// Whether it may be the radar that moves within a frame.
     pub fn may_move_in_a_frame(&self) -> bool {
         let frames: Vec<Vec<usize>> = self.split.training.iter().map(|&frame| vec![frame]).collect();

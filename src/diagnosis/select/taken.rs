@@ -4,6 +4,15 @@ use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction};
 use crate::diagnosis::residual::stands_still;
+use crate::effects::Stage;
+
+/// Whether it is a person or a vehicle beside the body, of which limbs are left: what oscillates is taken out whole.
+fn moves_by_no_law(candidate: &Candidate) -> bool {
+    candidate.behaves_like == Behaviour::PathLike
+        && candidate.place.stage == Some(Stage::Scene)
+        && candidate.place.velocity_mps.is_some()
+        && candidate.estimates.iter().all(|estimate| estimate.name != "swing_m")
+}
 
 impl Evidence {
     /// The same with one more effect taken into account.
@@ -21,6 +30,9 @@ impl Evidence {
         if stands_still(candidate) {
             let gone = self.standing().iter().zip(next.clutter()).map(|(before, after)| before - after).collect();
             next.subtracted = Some(gone);
+        }
+        if moves_by_no_law(candidate) {
+            next.others_m.extend(candidate.place.range_m);
         }
         match candidate.id {
             Some(id) => next.accepted.push(id),

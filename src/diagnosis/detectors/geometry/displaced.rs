@@ -255,7 +255,11 @@ fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> Description {
         ),
         Change::Drift(_) => (
             normal("relative"),
-            format!("The motion runs {:.2} % faster than stated", 1e2 * fit.value),
+            format!(
+                "The motion runs {:.2} % {} than stated",
+                1e2 * fit.value.abs(),
+                if fit.value > 0.0 { "faster" } else { "slower" }
+            ),
             "its clock does, against the radar's".into(),
         ),
         Change::Replica(echo) => {

@@ -167,4 +167,18 @@ mod tests {
         assert_eq!(unknown.behaves_like, Behaviour::RangeOffset);
         assert!(unknown.statement.contains("nearer"), "{}", unknown.statement);
     }
+    #[test]
+    fn a_body_is_not_said_to_be_elsewhere_by_frames_in_which_something_else_is_beside_it() {
+        let beside = |others_m: [f64; 2]| {
+            let mut evidence = evidence(None);
+            let body = evidence.body.as_mut().unwrap();
+            body.frames.iter_mut().flatten().for_each(|point| point.position_m[1] += 0.15);
+            evidence.others_m.push(others_m);
+            found(&evidence.changed())
+        };
+        let alone = beside([20.0, 21.0]).expect("nothing is near");
+        assert_eq!(alone.id, Some(effects::range_bias::ID));
+        let crossed = beside([0.0, 20.0]);
+        assert!(crossed.is_none(), "{crossed:?}");
+    }
 }

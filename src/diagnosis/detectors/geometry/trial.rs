@@ -3,7 +3,9 @@
 use rayon::prelude::*;
 
 use super::change::{Change, Moves};
+use crate::diagnosis::evidence::REACH_M;
 use crate::diagnosis::power::{PowerModel, Reach, improve, part_templates};
+use crate::diagnosis::prediction::{Point, range_and_velocity};
 use crate::diagnosis::{BodyPrediction, Evidence};
 
 /// Degrees of freedom of the heavy tail: the expected power itself is uncertain.
@@ -19,6 +21,8 @@ pub struct Trial<'a> {
     pub model: &'a PowerModel,
     pub body: &'a BodyPrediction,
     pub moves: Moves,
+    /// Whether nothing else moves near the body, by frame.
+    is_alone: Vec<bool>,
     /// Log-likelihood of every frame without a body.
     empty: Vec<f64>,
 }
@@ -56,7 +60,8 @@ impl<'a> Trial<'a> {
                 usable.map(|(&power, _)| heavy_tailed(power, 1.0)).sum()
             })
             .collect();
-        Self { evidence, model, body, moves: Moves::new(evidence.radar.centre_m()), empty }
+        let is_alone = body.frames.iter().map(|points| is_alone(evidence, points)).collect();
+        Self { evidence, model, body, moves: Moves::new(evidence.radar.centre_m()), is_alone, empty }
     }
 
     /// `among`: frames to look at; others stay zero and outside. `refit`: the weights, else those of the unchanged body
@@ -67,6 +72,7 @@ impl<'a> Trial<'a> {
             .par_iter()
             .map(|&frame| {
                 let (points, inside) = self.moves.points(self.body, frame, change);
+                let inside = inside && self.is_alone[frame];
                 let replica = if let Change::Replica(echo) = change { Some(echo) } else { None };
                 let points = self.body.with_echoes(&self.evidence.radar, points, replica);
                 let templates = part_templates(&self.evidence.radar, &self.model.cells, &points, self.body.parts.len());
@@ -90,10 +96,18 @@ impl<'a> Trial<'a> {
             score.by_frame[frame] = self.empty[frame] + change.sum::<f64>();
             score.known[frame] = inside;
             // A step is so long that a body carried straight on shows it all the same, and shows none where there is none.
-            score.inside[frame] = inside || matches!(score.change, Change::Drop { .. });
+            score.inside[frame] = inside || matches!(score.change, Change::Drop { .. }) && self.is_alone[frame];
         }
         score
     }
+}
+
+/// Whether what moves beside the body stays farther from it than the echoes of one of them reach: what is left of it there looks like a body
+/// that is elsewhere.
+fn is_alone(evidence: &Evidence, points: &[Point]) -> bool {
+    let ranges = points.iter().map(|point| range_and_velocity(&evidence.radar, point.position_m, point.velocity_mps).0);
+    let [near, far] = ranges.fold([f64::INFINITY, f64::NEG_INFINITY], |[near, far], range| [near.min(range), far.max(range)]);
+    evidence.others_m.iter().all(|[low, high]| near - REACH_M > *high || far + REACH_M < *low)
 }
 
 /// Logarithm of the density of a power that is exponential about a mean which is itself uncertain (Lomax law): what the

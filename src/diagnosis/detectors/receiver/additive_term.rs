@@ -243,6 +243,21 @@ pub fn is_bent(evidence: &Evidence) -> bool {
     evidence.accepted.contains(&effects::adc_saturation::ID)
 }
 
+/// Held-out log-likelihood gained by subtracting a static term, samples outside `range` untouched.
+pub fn gain(evidence: &Evidence, term: &[Vec<Complex64>]) -> f64 {
+    let [.., loops, samples] = evidence.cube.dims;
+    let mut gain = 0.0;
+    for &frame in &evidence.split.held_out {
+        let found = evidence.cube.clutter(&[frame]);
+        for (channel, term) in term.iter().enumerate() {
+            let found = &found[channel * samples..][..samples];
+            let better: f64 = found.iter().zip(term).map(|(value, term)| value.norm_sqr() - (value - term).norm_sqr()).sum();
+            gain += better * loops as f64 / evidence.noise()[channel].max(1e-300);
+        }
+    }
+    gain
+}
+
 /// A static term that nobody has named yet: its energy, and that it is subtracted from every chirp of its channel.
 pub fn added(evidence: &Evidence, term: Vec<Vec<Complex64>>, place: Place, p_value: f64, nats: f64) -> Candidate {
     Candidate {
@@ -257,6 +272,7 @@ pub fn added(evidence: &Evidence, term: Vec<Vec<Complex64>>, place: Place, p_val
 }
 
 /// A number with three significant digits.
-fn digits(value: f64) -> String {
-    if value >= 100.0 { format!("{value:.0}") } else { format!("{value:.2}") }
+pub fn digits(value: f64) -> String {
+    let decimals = 2.0 - value.abs().max(1e-9).log10().floor();
+    format!("{value:.*}", decimals.clamp(0.0, 9.0) as usize)
 }

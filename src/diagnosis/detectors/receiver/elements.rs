@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use super::field::{Field, Fitted, Templates, orthonormal, remove};
-use super::support::{beat_hz, dot, tone};
+use super::support::{beat_hz, dot, energy, tone};
 use crate::diagnosis::Evidence;
 use crate::diagnosis::detectors::climb::golden_section;
 use crate::effects;
@@ -13,6 +13,8 @@ const NEAR_M: f64 = 0.5;
 /// Longest transient at an edge, samples.
 const LONGEST_EDGE: usize = 16;
 const MOST_ELEMENTS: usize = 8;
+/// Variance inflation factor from which on an amplitude is not estimable (Kutner, Nachtsheim & Neter 2004, section 10.5).
+const MOST_INFLATED: f64 = 10.0;
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Element {
@@ -102,13 +104,36 @@ pub fn unknowns(element: &Element, channels: usize) -> f64 {
         Element::Image | Element::Square => 1.0,
     }
 }
-/// The elements that a recording holds.
+
+/// The elements that a recording holds. A constant only where the others leave it estimable.
 pub fn choose(evidence: &Evidence, field: &Field, images: &Images) -> Vec<Element> {
+    let chosen = chosen(evidence, field, images, |element| evidence.info(element.id()).is_some());
+    if inflation(field, &chosen, &Element::Offset) < MOST_INFLATED {
+        return chosen;
+    }
+    self::chosen(evidence, field, images, |element| *element != Element::Offset && evidence.info(element.id()).is_some())
+}
+
+/// Factor by which the others raise the variance of an element's amplitude; one where it is not among them.
+fn inflation(field: &Field, elements: &[Element], of: &Element) -> f64 {
+    let samples = field.clutter[0].len();
+    let project = |element: &Element| columns(element, samples).iter().map(|column| field.project(column)).collect::<Vec<_>>();
+    let Some(mut alone) = elements.contains(of).then(|| project(of)).and_then(|columns| columns.into_iter().next()) else {
+        return 1.0;
+    };
+    let others: Vec<Vec<Complex64>> = elements.iter().filter(|element| *element != of).flat_map(project).collect();
+    let whole = energy(&alone);
+    remove(&mut alone, &orthonormal(&others));
+    whole / energy(&alone).max(f64::MIN_POSITIVE)
+}
+
+/// One after the other, of those that may be.
+fn chosen(evidence: &Evidence, field: &Field, images: &Images, may_be: impl Fn(&Element) -> bool) -> Vec<Element> {
     let near = leakages(evidence);
     let mut chosen: Vec<Element> = vec![];
     while chosen.len() < MOST_ELEMENTS {
         let mut options = Next::new(field, images, &chosen).options(&near);
-        options.retain(|(_, element)| evidence.info(element.id()).is_some());
+        options.retain(|(_, element)| may_be(element));
         let best = options.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
         match best {
             Some((score, element)) if score > 0.0 => chosen.push(element),

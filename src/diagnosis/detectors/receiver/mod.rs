@@ -22,5 +22,6 @@ pub mod misalignment;
 mod slow_spur;
 pub mod spur;
 pub mod support;
+mod transient;
 pub mod wandering;
 pub mod zero_beat;

@@ -1,28 +1,22 @@
 //! Receiver fields of recordings whose room is unknown, or without quadrature: an offset, a leakage that dwarfs what is
-//! near, a transient that dwarfs the whole chirp. Without a room, only what stands out by its shape can be named.
+//! near. Without a room, only what stands out by its shape can be named.
 
 use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::additive_term::{self, added, counted};
+use super::additive_term::{added, digits, gain};
 use super::support::{range_m, ranges_m, tone};
+use super::transient::{self, NEAR_M};
 use super::zero_beat::ZeroBeat;
 use crate::diagnosis::evidence::hann;
-use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
+use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics::{chi2_tail, corrected};
 use crate::diagnosis::{Evidence, denoised};
 use crate::effects::{self, Stage};
 
-/// A leakage's cluster of returns ends here.
-const NEAR_M: f64 = 0.3;
 /// Depth of the valley behind it.
 const VALLEY_DB: f64 = 10.0;
-/// Power of a transient over the strongest sample between the edges.
-const WILD: f64 = 4.0;
-/// And over its neighbour's, where a leakage was taken away: the fit of that is poor at the edges, but what it leaves there
-/// rises slowly.
-const ABRUPT: f64 = 10.0;
 const ZERO_PADDING: usize = 4;
 /// Noise, over the signal, that keeps a covariance well conditioned where a recording has none.
 const LEAST_NOISE: f64 = 1e-9;
@@ -37,7 +31,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let samples = evidence.cube.dims[4];
     let clutter: Vec<Vec<Complex64>> = evidence.clutter().chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
     if evidence.may_name(effects::ramp_edge_transient::ID) {
-        let edge: Vec<Candidate> = [false, true].into_iter().filter_map(|at_end| edge(evidence, &clutter, at_end)).collect();
+        let edge: Vec<Candidate> =
+            [false, true].into_iter().filter_map(|at_end| transient::edge(evidence, &clutter, at_end)).collect();
         let edge: Vec<Candidate> = edge.into_iter().filter(|edge| edge.p_value < 1e-6).collect();
         if !edge.is_empty() {
             return edge;
@@ -50,71 +45,6 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         }
     }
     if evidence.may_name(effects::tx_leakage::ID) { leakage(evidence, &clutter).into_iter().collect() } else { vec![] }
-}
-
-/// Held-out log-likelihood gained by subtracting a static term, samples outside `range` untouched.
-fn gain(evidence: &Evidence, term: &[Vec<Complex64>]) -> f64 {
-    let [.., loops, samples] = evidence.cube.dims;
-    let mut gain = 0.0;
-    for &frame in &evidence.split.held_out {
-        let found = evidence.cube.clutter(&[frame]);
-        for (channel, term) in term.iter().enumerate() {
-            let found = &found[channel * samples..][..samples];
-            let better: f64 = found.iter().zip(term).map(|(value, term)| value.norm_sqr() - (value - term).norm_sqr()).sum();
-            gain += better * loops as f64 / evidence.noise()[channel].max(1e-300);
-        }
-    }
-    gain
-}
-
-fn edge(evidence: &Evidence, clutter: &[Vec<Complex64>], at_end: bool) -> Option<Candidate> {
-    let samples = evidence.cube.dims[4];
-    let power: Vec<f64> = (0..samples)
-        .map(|n| {
-            // Without quadrature a constant is no transient, and what was not sampled says nothing of the edges.
-            let centre = |chirp: &Vec<Complex64>| {
-                if evidence.is_real() { chirp.iter().sum::<Complex64>() / samples as f64 } else { Complex64::ZERO }
-            };
-            let part = |value: Complex64| if evidence.is_real() { value.re.into() } else { value };
-            clutter.iter().map(|chirp| part(chirp[n] - centre(chirp)).norm_sqr()).sum::<f64>() / clutter.len() as f64
-        })
-        .collect();
-    let between = &power[samples / 8..samples - samples / 8];
-    let (largest, mean) = (between.iter().fold(0.0f64, |a, &b| a.max(b)), between.iter().sum::<f64>() / between.len() as f64);
-    let at = |i: usize| if at_end { samples - 1 - i } else { i };
-    let count = (0..samples / 8).rev().find(|&i| power[at(i)] > WILD * largest)? + 1;
-    if evidence.accepted.contains(&effects::tx_leakage::ID) && power[at(count - 1)] < ABRUPT * power[at(count)] {
-        return None;
-    }
-    let wildest = (0..count).map(|i| power[at(i)]).fold(0.0, f64::max);
-    let affected = additive_term::edge(samples, count, at_end);
-    let term: Vec<Vec<Complex64>> = clutter
-        .iter()
-        .map(|chirp| (0..samples).map(|n| if affected.contains(&n) { chirp[n] } else { Complex64::ZERO }).collect())
-        .collect();
-    let peak = denoised::peak_beside(evidence, |_, n| (!affected.contains(&n)).then_some(Complex64::ZERO));
-    let level_db = 20.0 * (wildest.sqrt() / peak.max(1e-300)).log10();
-    let (number, words) = counted(count, at_end);
-    let p_value = corrected((-wildest / mean.max(1e-300)).exp(), samples as f64);
-    let place = Place { samples: Some(affected.clone().collect()), ..Place::at(Stage::Receiver) };
-    let nats = gain(evidence, &term);
-    Some(Candidate {
-        id: Some(effects::ramp_edge_transient::ID),
-        estimates: vec![number, Estimate::normal("level_db", level_db, 8.7 * (mean / wildest).sqrt() + 0.3)],
-        statement: format!(
-            "{words} of every chirp jump{} to {:.0} codes, {:.0} dB above the strongest sample in between, \
-             in all channels: the ADC runs into the {} of the ramp",
-            if count == 1 { "s" } else { "" },
-            wildest.sqrt(),
-            10.0 * (wildest / largest).log10(),
-            if at_end { "end" } else { "beginning" },
-        ),
-        // They change from chirp to chirp too and hold nothing that can be used.
-        correction: Correction::samples(move |cube| {
-            cube.each_chirp(|_, chirp| chirp[affected.clone()].fill(Complex64::ZERO));
-        }),
-        ..added(evidence, term, place, p_value, nats)
-    })
 }
 
 /// The constant of a converter without quadrature.
@@ -148,10 +78,10 @@ fn offset(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Candidate> 
         id: Some(effects::dc_offset::ID),
         estimates: vec![Estimate::list("i", &values, &deviation), Estimate::list("q", &vec![0.0; rx], &vec![0.0; rx])],
         statement: format!(
-            "every sample has a constant of about {:.0} codes added (all receivers within {:.0}), {:.0} times what else stands \
+            "every sample has a constant of about {} codes added (all receivers within {}), {:.0} times what else stands \
              still: the codes' zero is not the signal's",
-            values.iter().sum::<f64>() / rx as f64,
-            values.iter().fold(0.0f64, |a, &b| a.max(b)) - values.iter().fold(f64::INFINITY, |a, &b| a.min(b)),
+            digits(values.iter().sum::<f64>() / rx as f64),
+            digits(values.iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b)) - values.iter().fold(f64::INFINITY, |a, &b| a.min(b))),
             smallest / swing.max(1e-300)
         ),
         ..added(evidence, term, place, p_value, nats)

@@ -49,8 +49,8 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let mut channels: Vec<Channel> =
         (0..evidence.cube.channels()).into_par_iter().map(|channel| of_channel(evidence, channel)).collect();
-    take_common(&mut channels, evidence.range_bins());
-    strongest(evidence, &channels).into_iter().collect()
+    let common = take_common(&mut channels, evidence.range_bins());
+    strongest(evidence, &channels, common.as_deref()).into_iter().collect()
 }
 
 /// Harmonics over the loops of a frame's spectra, `[harmonic, bin]` with all bins of the transform.
@@ -104,8 +104,8 @@ fn of_channel(evidence: &Evidence, channel: usize) -> Channel {
     Channel { mean, scatter, clutter, noise }
 }
 
-/// Takes what all static returns do alike out of the means.
-fn take_common(channels: &mut [Channel], bins: usize) {
+/// Takes what all static returns do alike out of the means: their deviation over themselves, by harmonic. None where too few say it.
+fn take_common(channels: &mut [Channel], bins: usize) -> Option<Vec<Complex64>> {
     let strong: Vec<(usize, usize)> = (0..channels.len())
         .flat_map(|channel| (0..bins).map(move |bin| (channel, bin)))
         .filter(|&(channel, bin)| channels[channel].clutter[bin].norm_sqr() > STRONG * channels[channel].noise)
@@ -115,9 +115,10 @@ fn take_common(channels: &mut [Channel], bins: usize) {
     ranges.dedup();
     let returns = 1 + ranges.windows(2).filter(|pair| pair[1] - pair[0] > HANN_LOBE).count();
     if ranges.is_empty() || returns < FEWEST_RETURNS {
-        return;
+        return None;
     }
-    for harmonic in 0..channels[0].mean.len() {
+    let harmonics = channels[0].mean.len();
+    let take = |harmonic: usize| {
         let ratios = strong.iter().map(|&(channel, bin)| channels[channel].mean[harmonic][bin] / channels[channel].clutter[bin]);
         let (mut real, mut imaginary): (Vec<f64>, Vec<f64>) = ratios.map(|ratio| (ratio.re, ratio.im)).unzip();
         let common = Complex64::new(median(&mut real), median(&mut imaginary));
@@ -125,7 +126,9 @@ fn take_common(channels: &mut [Channel], bins: usize) {
             let own = channel.mean[harmonic].iter_mut().zip(&channel.clutter);
             own.for_each(|(mean, clutter)| *mean -= common * clutter);
         }
-    }
+        common
+    };
+    Some((0..harmonics).map(take).collect())
 }
 
 /// Minus the logarithm of the chance of a cell's means, a sum over harmonics.
@@ -137,7 +140,8 @@ fn unlikely(channel: &Channel, bin: usize, frames: f64) -> f64 {
     channel.mean.iter().zip(&channel.scatter).map(of).sum()
 }
 
-fn strongest(evidence: &Evidence, channels: &[Channel]) -> Option<Candidate> {
+/// `common`: what all static returns do, over themselves.
+fn strongest(evidence: &Evidence, channels: &[Channel], common: Option<&[Complex64]>) -> Option<Candidate> {
     let (bins, frames) = (evidence.range_bins(), evidence.split.training.len() as f64);
     let harmonics = channels[0].mean.len() as f64;
     let cells = (channels.len() * bins) as f64;
@@ -158,8 +162,21 @@ fn strongest(evidence: &Evidence, channels: &[Channel]) -> Option<Candidate> {
     let of_channel = |&c: &usize| (0..bins).filter(|&bin| chance(c, bin) < SURE).collect();
     let cells: Vec<Vec<usize>> = has.iter().map(of_channel).collect();
     let correction = correction(evidence, has.clone(), cells);
-    let candidate = candidate(evidence, &channels[channel], &has, bin, correction);
+    let others = others(&channels[channel], bin, common);
+    let candidate = candidate(evidence, &channels[channel], &has, bin, others, correction);
     Some(Candidate { p_value, nats: gain, ..candidate })
+}
+
+/// What is known of the other static returns, beside that which does more.
+fn others(own: &Channel, bin: usize, common: Option<&[Complex64]>) -> &'static str {
+    let Some(common) = common else { return "too few static returns say whether the others do" };
+    let shared: f64 = common.iter().map(|value| (value * own.clutter[bin]).norm_sqr()).sum();
+    let alone: f64 = own.mean.iter().map(|mean| mean[bin].norm_sqr()).sum();
+    if shared > alone {
+        "that is beside what all static returns do alike, which is more"
+    } else {
+        "the other static returns do not"
+    }
 }
 
 /// Log-likelihood that held-out frames gain at a cell, by harmonic in the scatter of the training frames.
@@ -197,7 +214,7 @@ fn decay(pattern: &[Complex64]) -> (f64, f64) {
     lengths.map(|length| (length, share(length))).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((1.0, 0.0))
 }
 
-fn candidate(evidence: &Evidence, own: &Channel, has: &[usize], bin: usize, correction: Correction) -> Candidate {
+fn candidate(evidence: &Evidence, own: &Channel, has: &[usize], bin: usize, others: &str, correction: Correction) -> Candidate {
     let [frames, tx, rx, loops, samples] = evidence.cube.dims;
     let values = pattern(own, bin);
     let (length, share) = decay(&values);
@@ -222,7 +239,7 @@ fn candidate(evidence: &Evidence, own: &Channel, has: &[usize], bin: usize, corr
     let amplitude = largest / hann(samples).iter().sum::<f64>();
     let statement = format!(
         "The return at {:.2} m {course}, by up to {amplitude:.2} codes (or units of the recording), alike in all frames, in {} of {} \
-         channels; the other static returns do not.",
+         channels; {others}.",
         signed.max(0.0) * bin_m,
         has.len(),
         tx * rx,

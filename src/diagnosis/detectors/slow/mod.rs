@@ -61,7 +61,14 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     let of_phase = [Part::Phase, Part::Delay].map(candidates::behaves_like);
     let holds = |found: &Found| of_phase.contains(&found.candidate.behaves_like) && found.is_sure();
-    let shared = if found.iter().chain(&free).any(holds) { None } else { shared() };
+    let all = || found.iter().chain(&free);
+    // A gain of any course is none where a law explains nearly as much of it.
+    let is_its_law = |shared: &Candidate, found: &Found| {
+        let of_gain = [shared, &found.candidate].iter().all(|of| of.behaves_like == candidates::behaves_like(Part::Gain));
+        of_gain && found.explained > selection::NEARLY * shared.nats
+    };
+    let shared = if all().any(holds) { None } else { shared() };
+    let shared = shared.filter(|shared| !all().any(|found| is_its_law(shared, found)));
     selection::selected(found, free).into_iter().map(selection::judged).chain(shared).collect()
 }
 

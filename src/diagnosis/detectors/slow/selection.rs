@@ -4,7 +4,7 @@ use super::lines;
 use crate::diagnosis::{behaviour::Behaviour, finding::Candidate};
 
 /// Share of the log-likelihood gain that what is simpler, or has a name, needs.
-const NEARLY: f64 = 0.8;
+pub(super) const NEARLY: f64 = 0.8;
 /// The same for what a sure name explains over the noise, where what has no name leaves more than noise itself.
 const HALF: f64 = 0.5;
 /// Difference of log-likelihood gains (nats) that decides nothing.
@@ -56,10 +56,33 @@ pub(super) fn selected(mut found: Vec<Found>, mut free: Vec<Found>) -> Vec<Found
     if found.is_empty() || most(&found) < NEARLY * most(&free) {
         found.append(&mut free);
     }
+    found = unnamed_if_undecided(found);
     keep_names(&mut found);
     found.sort_by(|a, b| b.candidate.nats.total_cmp(&a.candidate.nats));
     name_rivals(&mut found);
     found
+}
+
+/// A radar that vibrates turns all ranges alike, an oscillator whose frequency is modulated turns them in proportion to their delay: where
+/// the ranges hardly tell the two apart, neither is named.
+fn unnamed_if_undecided(found: Vec<Found>) -> Vec<Found> {
+    let in_proportion = |found: &&Found| found.candidate.behaves_like == Behaviour::DelayProportionalPhase;
+    let rivals: Vec<(Candidate, f64)> =
+        found.iter().filter(in_proportion).map(|found| (found.candidate.clone(), found.over_noise)).collect();
+    let judge = |found: Found| {
+        let as_likely =
+            |(rival, gain): &(Candidate, f64)| found.candidate.is_at_the_line_of(rival) && *gain > found.over_noise - UNDECIDED;
+        let undecided = found.candidate.behaves_like == Behaviour::SlowTimePhase && rivals.iter().any(as_likely);
+        if !found.is_named() || !undecided {
+            return found;
+        }
+        let statement = format!(
+            "{} Or the phases are in proportion to the delay, as an oscillator's frequency modulation makes them: the ranges do not decide.",
+            found.candidate.statement
+        );
+        Found { candidate: Candidate { id: None, estimates: vec![], look_alikes: vec![], statement, ..found.candidate }, ..found }
+    };
+    found.into_iter().map(judge).collect()
 }
 
 /// What has no name is left out where a name explains as much.

@@ -32,6 +32,8 @@ const FEWEST_FRAMES: usize = 24;
 const NEAREST_BIN: usize = 3;
 /// Ranges on each side that may belong to the same reflector.
 const NEIGHBOURS: usize = 1;
+/// Chance at which a line in the complex plane looks like an arc.
+const UNCURVED: f64 = 1e-3;
 /// Share of the phase's variance that a rhythm must hold.
 const RHYTHMIC: f64 = 0.5;
 
@@ -87,6 +89,10 @@ fn change(data: &Frames, mean: &[Complex64], training: &[usize]) -> Vec<f64> {
             sum / (channels * (training.len() - 1)) as f64
         })
         .collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// What moves in a rhythm by its rate and its size; `metres`: of a radian.
@@ -167,6 +173,10 @@ impl Motion<'_> {
                 100.0 * r.share,
                 if *id == effects::breathing::ID { "a breathing chest" } else { "a beating heart" }
             ),
+            None if !self.is_curved() => format!(
+                "The return at {range_m:.2} m changes slowly from frame to frame along one line in the complex plane: something moves there \
+                 by far less than a wavelength, or passes in front of it, or its gain changes."
+            ),
             None => {
                 let moves = format!(
                     "At {range_m:.2} m something moves slowly, over {:.1} mm during the recording",
@@ -179,6 +189,25 @@ impl Motion<'_> {
                 }
             }
         }
+    }
+
+    /// Whether it turns by so much that its path is seen to be an arc: only then is its size known. The sagitta is that of the course's
+    /// second order, `a ψ² / 2`, less its mean and what of it is linear in ψ.
+    fn is_curved(&self) -> bool {
+        let training = &self.evidence.split.training;
+        let phase: Vec<f64> = training.iter().map(|&frame| self.circle.phase[frame]).collect();
+        let centred = |values: &[f64]| -> Vec<f64> {
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            values.iter().map(|value| value - mean).collect()
+        };
+        let phase = centred(&phase);
+        let bent = centred(&phase.iter().map(|phase| 0.5 * phase * phase).collect::<Vec<f64>>());
+        let slope = dot(&bent, &phase) / dot(&phase, &phase).max(f64::MIN_POSITIVE);
+        let sagitta: f64 = bent.iter().zip(&phase).map(|(bent, phase)| (bent - slope * phase).powi(2)).sum();
+        let of_cell = |(amplitude, variance): (&Complex64, &f64)| amplitude.norm_sqr() / variance.max(f64::MIN_POSITIVE);
+        let snr: f64 = self.circle.amplitude.iter().zip(&self.circle.variance).map(of_cell).sum();
+        // Twice the log-likelihood that the arc gains on the line.
+        statistics::chi2_tail(2.0 * sagitta * snr, 1.0) < UNCURVED
     }
 
     /// Of the change alone; a rhythm has its own.

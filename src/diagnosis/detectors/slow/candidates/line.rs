@@ -24,7 +24,9 @@ pub fn of_line(evidence: &Evidence, field: &Field, part: Part, line: &Line, of_l
         Part::Delay => (Stage::Waveform, wave.oscillator()),
     };
     let p_value = statistics::corrected((-line.training_nats).exp(), line.tried);
+    let interval = NINETY * line.frequency_deviation_hz;
     Candidate {
+        line_hz: Some([line.frequency_hz - interval, line.frequency_hz + interval]),
         energy: energy(evidence, field, part, &*deviation),
         correction: correction(evidence, part, deviation, 0.0),
         ..description.candidate(behaves_like(part), Place::at(stage), p_value, line.held_out_nats)

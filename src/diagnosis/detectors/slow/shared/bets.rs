@@ -44,7 +44,8 @@ pub struct Shared {
 pub fn spectra(deviations: &[Deviation], course: &Course, part: Part) -> Vec<Spectrum> {
     let of_group = |Deviation { group, values, variance }: &Deviation| {
         let lever = part.lever(group);
-        let phases: Vec<f64> = values.iter().map(|value| value.im / lever).collect();
+        let component = |value: &Complex64| if part == Part::Gain { value.re } else { value.im };
+        let phases: Vec<f64> = values.iter().map(|value| component(value) / lever).collect();
         // Half of a complex variance is in the phase; both parts of a phase's spectrum have half of that each.
         let variance = 0.5 * variance / (lever * lever);
         Spectrum { values: course.spectrum(&phases), course: phases, lever, variance }

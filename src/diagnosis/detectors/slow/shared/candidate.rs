@@ -17,7 +17,7 @@ use crate::effects::{self, Stage};
 /// Level of the test for white noise: the reports' default false-alarm rate.
 const WHITE: f64 = 0.01;
 
-/// The phase that the ranges share.
+/// The phase, or the gain less one, that the ranges share.
 struct Phase {
     /// `[frame · loops + loop]`
     course: Vec<f64>,
@@ -34,8 +34,11 @@ struct Phase {
 /// `of_radar`: nothing else but the radar's motion does so.
 pub fn candidate(evidence: &Evidence, course: &Course, spectra: &[Spectrum], shared: &Shared, of_radar: bool) -> Candidate {
     let phase = Phase::new(course, spectra, &shared.members);
-    let description =
-        if shared.part == Part::Delay { phase.of_delay(shared) } else { phase.of_vibration(evidence, course, shared, of_radar) };
+    let description = match shared.part {
+        Part::Gain => phase.of_gain(shared),
+        Part::Delay => phase.of_delay(shared),
+        _ => phase.of_vibration(evidence, course, shared, of_radar),
+    };
     let Phase { course: phases, rms, coding_cost, .. } = phase;
     let loops = course.loops;
     let place = if description.id.is_some() { Place::at(Stage::Scene) } else { candidates::place(shared.part) };
@@ -69,6 +72,14 @@ impl Phase {
         let [low_hz, frequency_hz, high_hz] = quartiles(&course.frequencies_hz(), &values);
         let width_hz = (0.5 * (high_hz - low_hz)).max(0.5 / course.duration_s());
         Self { course: phases, rms, coding_cost, frequency_hz, width_hz, is_white }
+    }
+
+    fn of_gain(&self, shared: &Shared) -> Description {
+        let decibel = 20.0 * self.rms.ln_1p() / std::f64::consts::LN_10;
+        Description::unnamed(format!(
+            "The gain of all static returns varies alike, by {decibel:.2} dB (standard deviation); {}.",
+            ranges(shared)
+        ))
     }
 
     fn of_delay(&self, shared: &Shared) -> Description {

@@ -1,4 +1,4 @@
-//! A phase of any course in time that the static returns of most ranges share, where nobody is tracked.
+//! A phase, or else a gain, of any course in time that the static returns of most ranges share, where nobody is tracked.
 //!
 //! Without a body whose returns could be set aside, a mover may be stronger than all static clutter. So no
 //! mean over the ranges is taken: each range is predicted by the others, frequency by frequency of slow time, and a range that does
@@ -41,6 +41,13 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let more = delay.2 - phase.2;
     // A bet is won by two ranges that hang together; all returns are concerned where most that are informative have it.
     let is_shared = |shared: &Shared| 2 * shared.sharing > shared.informative && shared.log_bets > 0.0;
+    let decides = |shared: &Shared| is_shared(shared) && shared.log_bets > UNDECIDED;
+    if !decides(&phase.0)
+        && !decides(&delay.0)
+        && let Some((gain, spectra, _)) = of_part(Part::Gain).filter(|gain| decides(&gain.0))
+    {
+        return Some(candidate(evidence, &course, &spectra, &gain, false));
+    }
     let (best, spectra, _) = match (is_shared(&phase.0), is_shared(&delay.0)) {
         (true, true) if more > UNDECIDED => delay,
         (false, true) => delay,

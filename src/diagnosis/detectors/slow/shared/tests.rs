@@ -126,3 +126,16 @@ fn a_phase_in_proportion_to_the_delay_is_no_vibration() {
         assert_eq!((found.id, found.behaves_like), (None, Behaviour::DelayProportionalPhase), "{}", found.statement);
     }
 }
+
+/// As of an amplifier that is set anew for every frame.
+#[test]
+fn a_gain_of_any_course_is_found() {
+    let mut draw = support::normal(5);
+    let gains: Vec<f64> = (0..24).map(|_| 1.0 + 0.2 * draw()).collect();
+    let mut amplified = evidence(0.02, 2, |_| 0.0, own);
+    amplified.cube.each_chirp(|[frame, ..], chirp| chirp.iter_mut().for_each(|value| *value *= gains[frame]));
+    let amplified = amplified.changed();
+    let found = find(&amplified).expect("a shared gain");
+    assert_eq!((found.id, found.behaves_like), (None, Behaviour::SlowTimeGain), "{}", found.statement);
+    assert!(found.p_value < 1e-6 && found.statement.contains("dB"), "{found:?}");
+}
