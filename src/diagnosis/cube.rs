@@ -270,6 +270,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn frames_of_few_chirps_are_looked_at_in_greater_number() {
+        let most = |loops_per_frame: usize| most_frames(&Radar { loops_per_frame, ..Radar::small(1) });
+        assert_eq!([1, 2, 7, 8, 64].map(most), [2048, 1024, 292, 256, 256]);
+        let large = Radar { loops_per_frame: 255, samples_per_chirp: 4096, ..Radar::small(1) };
+        assert!(most_frames(&large) * large.dims()[1..].iter().product::<usize>() <= MOST_SAMPLES);
+    }
+
+    #[test]
     fn a_single_long_frame_becomes_blocks_of_loops_in_order() {
         let mut radar = Radar::small(1);
         radar.loops_per_frame = 85;

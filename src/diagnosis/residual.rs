@@ -79,6 +79,13 @@ pub fn is_by_chirp(candidate: &Candidate) -> bool {
     is_one_of(candidate, &BY_CHIRP)
 }
 
+/// Whether to undo it leaves something at the chirps' edges: what is delayed chirp by chirp is read beyond them, and what was cut is guessed.
+pub fn leaves_edges(candidate: &Candidate) -> bool {
+    is_by_chirp(candidate)
+        || candidate.behaves_like == Behaviour::DelayProportionalPhase
+        || candidate.id == Some(effects::adc_saturation::ID)
+}
+
 /// Whether it differs between receivers: what others leave, or leaves what others are, unless those were there before.
 pub fn is_of_receivers(candidate: &Candidate) -> bool {
     candidate.place.stage == Some(OF_RECEIVERS)
@@ -231,6 +238,19 @@ mod tests {
         assert!(is_left_by(&mover, &ghost(90.0)) && !is_left_by(&mover, &ghost(110.0)));
         let no_law = Candidate { id: None, ..mover };
         assert!(is_left_by(&no_law, &ghost(4e3)) && !is_left_by(&no_law, &ghost(6e3)));
+    }
+
+    #[test]
+    fn at_the_frequency_of_a_line_without_a_name_nothing_else_has_one() {
+        let line = |id: Option<&'static str>, behaves_like: Behaviour, line_hz: [f64; 2]| Candidate {
+            line_hz: Some(line_hz),
+            ..of(id, behaves_like, 100.0)
+        };
+        let unnamed = line(None, Behaviour::DelayProportionalPhase, [26.8, 26.95]);
+        let vibration = |line_hz: [f64; 2]| line(Some(effects::radar_vibration::ID), Behaviour::SlowTimePhase, line_hz);
+        assert!(is_left_by(&unnamed, &vibration([26.85, 26.9])));
+        assert!(!is_left_by(&unnamed, &vibration([27.1, 27.2])));
+        assert!(!is_left_by(&vibration([26.8, 26.9]), &vibration([26.8, 26.9])));
     }
 
     #[test]

@@ -18,8 +18,8 @@ use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
 use super::residual::{
-    ROUGHLY, has_shape_of, is_added, is_by_chirp, is_left_by, is_of_noise, is_of_receivers, is_of_residual, is_product, is_rough,
-    is_same,
+    ROUGHLY, has_shape_of, is_added, is_left_by, is_of_noise, is_of_receivers, is_of_residual, is_product, is_rough, is_same,
+    leaves_edges,
 };
 use precedence::{is_course_of_all, is_displaced, is_echo, upstream};
 use said::{candidates, said_by};
@@ -54,7 +54,7 @@ const MOST_SURPLUS: f64 = 10.0;
 /// p-value below which what has no name needs only half as much more than what has one.
 const NO_CHANCE: f64 = 1e-12;
 
-/// What undoing chirp by chirp leaves at the chirps' edges looks like these; a true one was there before.
+/// What is left at the chirps' edges looks like these; a true one was there before.
 const LIKE_EDGES: [&str; 4] =
     [effects::ramp_edge_transient::ID, effects::if_highpass::ID, effects::if_lowpass::ID, effects::if_delay::ID];
 
@@ -205,10 +205,10 @@ impl Rounds<'_> {
         // So they do where products were taken out roughly.
         let bent = |effect: &Accepted| effect.candidate.behaves_like == Behaviour::Quadratic;
         let mixed = evidence.products().mixed().is_some() || self.accepted.iter().any(bent);
-        let by_chirp = self.accepted.iter().any(|effect| is_by_chirp(&effect.candidate));
+        let at_edges = self.accepted.iter().any(|effect| leaves_edges(&effect.candidate));
         let may_be_named = |id: &str| {
             (!mixed || WHATEVER_THE_SIGNAL.contains(&id))
-                && (!by_chirp || !LIKE_EDGES.contains(&id) || self.at_first.iter().flatten().any(|first| first.0 == id))
+                && (!at_edges || !LIKE_EDGES.contains(&id) || self.at_first.iter().flatten().any(|first| first.0 == id))
                 && !self.refused.contains(&id)
                 && self.accepted.iter().filter(|effect| effect.candidate.id == Some(id)).count() < MOST_ALIKE
         };

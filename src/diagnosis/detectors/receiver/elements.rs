@@ -246,3 +246,29 @@ fn improve(field: &Field, images: &Images, chosen: &mut [Element], step: f64) {
 pub fn refine(at: f64, step: f64, value: impl FnMut(f64) -> f64) -> f64 {
     golden_section([at - step, at + step], 18, value)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::radar::Radar;
+    use crate::room::Room;
+
+    #[test]
+    fn tones_about_zero_leave_no_constant_estimable() {
+        let radar = Radar { samples_per_chirp: 128, loops_per_frame: 16, ..Radar::small(12) };
+        let turns = |range_m: f64| 2.0 * range_m * radar.slope_hz_per_s / crate::radar::SPEED_OF_LIGHT / radar.sample_rate_hz;
+        let mut evidence = Evidence::in_noise(radar.clone(), 7, |[.., n]| {
+            tone(turns(3.0), n + 1)[n] * 30.0 + tone(turns(0.08), n + 1)[n] * 100.0
+        });
+        let walls = Room { left_m: Some(2.0), right_m: Some(2.0), floor_m: Some(1.0), ceiling_m: Some(1.5), ..Room::default() };
+        evidence.room = Some(Room { front_m: Some(4.0), back_m: Some(1.0), ..walls });
+        let field = Field::new(&evidence).expect("a field");
+        let leakages = |ranges_m: &[f64]| -> Vec<Element> {
+            let tones = ranges_m.iter().map(|range_m| Element::Leakage(turns(*range_m)));
+            std::iter::once(Element::Offset).chain(tones).collect()
+        };
+        assert!(inflation(&field, &leakages(&[0.4]), &Element::Offset) < MOST_INFLATED);
+        assert!(inflation(&field, &leakages(&[0.02, 0.06, 0.1]), &Element::Offset) > MOST_INFLATED);
+        assert_eq!(inflation(&field, &[Element::Leakage(turns(0.1))], &Element::Offset), 1.0);
+    }
+}

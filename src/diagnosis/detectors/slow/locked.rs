@@ -343,6 +343,16 @@ mod tests {
     }
 
     #[test]
+    fn what_is_beside_more_that_all_returns_do_is_not_said_to_be_alone() {
+        let said = |all: fn(usize) -> f64| {
+            let evidence = evidence(1, |_, index| (0.2 * settles(index)).into(), all);
+            find(&evidence).pop().expect("a settling").statement
+        };
+        assert!(said(settles).contains("beside what all static returns do alike"), "{}", said(settles));
+        assert!(said(|_| 0.0).contains("the other static returns do not"), "{}", said(|_| 0.0));
+    }
+
+    #[test]
     fn neither_what_all_returns_do_nor_what_goes_on_from_frame_to_frame_nor_a_mover_is_one() {
         for seed in 2..8 {
             let common = evidence(seed, |_, _| Complex64::ZERO, settles);

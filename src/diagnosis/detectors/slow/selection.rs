@@ -134,3 +134,24 @@ pub(super) fn judged(Found { mut candidate, unsure, within_frames, .. }: Found) 
     }
     candidate
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::Place;
+    use crate::effects::{self, Stage};
+
+    #[test]
+    fn a_vibration_that_may_as_well_be_in_proportion_to_the_delay_has_no_name() {
+        let line = |id: Option<&'static str>, behaves_like: Behaviour, nats: f64| {
+            let candidate = Candidate::new(behaves_like, Place::at(Stage::Scene), 0.0, nats);
+            Found::from(Candidate { id, line_hz: Some([9.9, 10.1]), ..candidate })
+        };
+        let named = |of_delay: f64| {
+            let vibration = line(Some(effects::radar_vibration::ID), Behaviour::SlowTimePhase, 100.0);
+            let found = unnamed_if_undecided(vec![vibration, line(None, Behaviour::DelayProportionalPhase, of_delay)]);
+            found[0].is_named()
+        };
+        assert!(named(90.0) && !named(97.0) && !named(120.0));
+    }
+}

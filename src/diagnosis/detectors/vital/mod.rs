@@ -32,8 +32,10 @@ const FEWEST_FRAMES: usize = 24;
 const NEAREST_BIN: usize = 3;
 /// Ranges on each side that may belong to the same reflector.
 const NEIGHBOURS: usize = 1;
-/// Chance at which a line in the complex plane looks like an arc.
-const UNCURVED: f64 = 1e-3;
+/// Nats by which an arc must be likelier than a line: a thousand times.
+const DECIDES: f64 = 6.9;
+/// Steps to the first principal component.
+const ITERATIONS: usize = 20;
 /// Share of the phase's variance that a rhythm must hold.
 const RHYTHMIC: f64 = 0.5;
 
@@ -91,8 +93,24 @@ fn change(data: &Frames, mean: &[Complex64], training: &[usize]) -> Vec<f64> {
         .collect()
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+/// Energy of changes, `[frame][cell]`, off the line along which most of it lies (the first principal component, by power iteration).
+fn off_line(changes: &[Vec<Complex64>]) -> f64 {
+    let along = |line: &[Complex64], change: &[Complex64]| line.iter().zip(change).map(|(l, c)| (l.conj() * c).re).sum::<f64>();
+    let energy = |change: &[Complex64]| change.iter().map(Complex64::norm_sqr).sum::<f64>();
+    let Some(largest) = changes.iter().max_by(|a, b| energy(a).total_cmp(&energy(b))) else { return 0.0 };
+    let mut line = largest.clone();
+    for _ in 0..ITERATIONS {
+        let norm = energy(&line).sqrt().max(f64::MIN_POSITIVE);
+        line.iter_mut().for_each(|value| *value /= norm);
+        let mut next = vec![Complex64::ZERO; line.len()];
+        for change in changes {
+            let share = along(&line, change);
+            next.iter_mut().zip(change).for_each(|(next, value)| *next += share * value);
+        }
+        line = next;
+    }
+    let whole = energy(&line).max(f64::MIN_POSITIVE);
+    changes.iter().map(|change| energy(change) - along(&line, change).powi(2) / whole).sum()
 }
 
 /// What moves in a rhythm by its rate and its size; `metres`: of a radian.
@@ -178,10 +196,9 @@ impl Motion<'_> {
                  by far less than a wavelength, or passes in front of it, or its gain changes."
             ),
             None => {
-                let moves = format!(
-                    "At {range_m:.2} m something moves slowly, over {:.1} mm during the recording",
-                    extent[1] - extent[0]
-                );
+                let extent = extent[1] - extent[0];
+                let extent = if extent < 0.1 { format!("{:.0} µm", 1e3 * extent) } else { format!("{extent:.1} mm") };
+                let moves = format!("At {range_m:.2} m something moves slowly, over {extent} during the recording");
                 if self.evidence.may_move() {
                     format!("{moves}. {MAY_MOVE}.")
                 } else {
@@ -191,23 +208,26 @@ impl Motion<'_> {
         }
     }
 
-    /// Whether it turns by so much that its path is seen to be an arc: only then is its size known. The sagitta is that of the course's
-    /// second order, `a ψ² / 2`, less its mean and what of it is linear in ψ.
+    /// Whether its path is seen to be an arc and no line, which a gain makes as well: only then is its size known. Either has one number for
+    /// each frame.
     fn is_curved(&self) -> bool {
+        let Reflector { cells, clutter, amplitude, phase, .. } = &self.circle;
+        let Frames { values, noise, bins } = &self.data;
         let training = &self.evidence.split.training;
-        let phase: Vec<f64> = training.iter().map(|&frame| self.circle.phase[frame]).collect();
-        let centred = |values: &[f64]| -> Vec<f64> {
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
-            values.iter().map(|value| value - mean).collect()
+        let scale = |cell: usize| noise[cell / bins].max(f64::MIN_POSITIVE).sqrt().recip();
+        let off_arc = |&f: &usize| -> f64 {
+            let off = |(i, &cell): (usize, &usize)| {
+                ((values[f][cell] - clutter[i] - amplitude[i] * Complex64::cis(phase[f])) * scale(cell)).norm_sqr()
+            };
+            cells.iter().enumerate().map(off).sum()
         };
-        let phase = centred(&phase);
-        let bent = centred(&phase.iter().map(|phase| 0.5 * phase * phase).collect::<Vec<f64>>());
-        let slope = dot(&bent, &phase) / dot(&phase, &phase).max(f64::MIN_POSITIVE);
-        let sagitta: f64 = bent.iter().zip(&phase).map(|(bent, phase)| (bent - slope * phase).powi(2)).sum();
-        let of_cell = |(amplitude, variance): (&Complex64, &f64)| amplitude.norm_sqr() / variance.max(f64::MIN_POSITIVE);
-        let snr: f64 = self.circle.amplitude.iter().zip(&self.circle.variance).map(of_cell).sum();
-        // Twice the log-likelihood that the arc gains on the line.
-        statistics::chi2_tail(2.0 * sagitta * snr, 1.0) < UNCURVED
+        let mean = |cell: usize| training.iter().map(|&f| values[f][cell]).sum::<Complex64>() / training.len() as f64;
+        let means: Vec<Complex64> = cells.iter().map(|&cell| mean(cell)).collect();
+        let of_frame = |&f: &usize| -> Vec<Complex64> {
+            cells.iter().zip(&means).map(|(&cell, mean)| (values[f][cell] - mean) * scale(cell)).collect()
+        };
+        let changes: Vec<Vec<Complex64>> = training.iter().map(of_frame).collect();
+        off_line(&changes) - training.iter().map(off_arc).sum::<f64>() > DECIDES
     }
 
     /// Of the change alone; a rhythm has its own.
@@ -256,5 +276,32 @@ impl Motion<'_> {
             correction: Correction::Followed(Box::new(removal(evidence, 1, region)), Arc::new(course)),
             ..Candidate::new(Behaviour::PathLike, place, p_value, gain)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::radar::Radar;
+
+    /// Static returns, one of which has a factor that changes slowly, from 0 to 1 of a course without a rhythm.
+    fn said(factor: impl Fn(f64) -> Complex64) -> String {
+        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 4, ..Radar::small(48) };
+        let evidence = Evidence::in_noise(radar, 6, |[frame, channel, _, n]| {
+            let tone = |bin: f64, level: f64| Complex64::from_polar(level, TAU * bin * n as f64 / 64.0 + channel as f64 * bin);
+            let course = (frame as f64 / 47.0).powi(2);
+            tone(8.0, 30.0) + tone(15.0, 30.0) + tone(22.0, 20.0) * factor(course) + tone(29.0, 25.0)
+        });
+        find(&evidence).pop().expect("a change").statement
+    }
+
+    #[test]
+    fn how_far_something_moves_is_said_where_its_path_is_an_arc() {
+        let fades = said(|course| (1.0 - 0.3 * course).into());
+        assert!(fades.contains("along one line in the complex plane"), "{fades}");
+        let moves = said(|course| Complex64::cis(2.5 * course));
+        assert!(moves.contains("moves slowly, over"), "{moves}");
     }
 }
