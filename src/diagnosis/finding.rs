@@ -98,6 +98,11 @@ impl Place {
     }
 }
 
+/// Whether two intervals have nothing in common.
+pub fn apart(a: [f64; 2], b: [f64; 2]) -> bool {
+    a[1] < b[0] || b[1] < a[0]
+}
+
 /// What changes the samples of all frames.
 pub type Undo = Arc<dyn Fn(&mut Cube) + Send + Sync>;
 
@@ -257,7 +262,7 @@ impl Candidate {
 
     /// Whether both oscillate at one frequency.
     pub fn is_at_the_line_of(&self, other: &Self) -> bool {
-        matches!((self.line_hz, other.line_hz), (Some(a), Some(b)) if a[0] <= b[1] && b[0] <= a[1])
+        self.line_hz.zip(other.line_hz).is_some_and(|(own, other)| !apart(own, other))
     }
 
     /// Without its name where all the numbers that it gives may as well be those at which the effect does nothing: something is

@@ -1,7 +1,7 @@
 //! Residuals of corrections: the accepted effect itself, where it could not be removed in full, and what a rough correction makes.
 
 use super::detectors::paths;
-use super::finding::{Candidate, Correction};
+use super::finding::{self, Candidate, Correction};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::effects::{self, Stage};
 
@@ -75,7 +75,7 @@ pub fn is_rough(candidate: &Candidate) -> bool {
     candidate.id.is_none() && ROUGH.contains(&candidate.behaves_like)
 }
 
-pub fn is_by_chirp(candidate: &Candidate) -> bool {
+fn is_by_chirp(candidate: &Candidate) -> bool {
     is_one_of(candidate, &BY_CHIRP)
 }
 
@@ -205,8 +205,9 @@ fn is_of_cut(accepted: &Candidate, candidate: &Candidate) -> bool {
         && (is_of_receivers(candidate) || candidate.place.stage == Some(Stage::Waveform))
 }
 
+/// Whether both are known and have nothing in common.
 fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> bool {
-    matches!((a, b), (Some(a), Some(b)) if a[1] < b[0] || b[1] < a[0])
+    a.zip(b).is_some_and(|(a, b)| finding::apart(a, b))
 }
 
 #[cfg(test)]

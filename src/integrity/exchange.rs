@@ -34,10 +34,9 @@ pub(super) fn bins(samples: usize) -> Range<usize> {
 pub(super) struct Halves {
     /// Of each group that was given, whether it stands out of the noise and of the side lobes of stronger returns.
     pub stand_out: Vec<bool>,
-    /// How many do, and in how many of them the exchange leaves less than was there.
-    pub groups: usize,
+    /// In how many of these the exchange leaves less than was there.
     pub less: usize,
-    /// By how much the exchange leaves less than was right before, and more than is right after it: logarithms.
+    /// Of each of these, by how much the exchange leaves less than was right before, and more than is right after it: logarithms.
     losses: Vec<f64>,
     gains: Vec<f64>,
     /// Shares of the energy in the far half, of all groups, before and after.
@@ -60,7 +59,7 @@ impl Halves {
         let least = if still.shows_noise() { RETURN * still.noise_of_bin() } else { 0.0 };
         let stands_out = standing_out(&before, is_mirrored);
         let (losses, gains, shares, weaker) = (vec![], vec![], [0.0; 2], [0.0; 2]);
-        let mut halves = Self { stand_out: vec![], groups: 0, less: 0, losses, gains, shares, weaker };
+        let mut halves = Self { stand_out: vec![], less: 0, losses, gains, shares, weaker };
         let mut all = 0.0;
         for [near, away] in groups {
             let sum = |power: &[f64], bins: [usize; K]| bins.into_iter().map(|bin| power[bin]).sum::<f64>();
@@ -77,7 +76,6 @@ impl Halves {
                     |before: f64, after: f64| (0.5 * before.min(half).max(f64::MIN_POSITIVE) / after.max(f64::MIN_POSITIVE)).ln();
                 halves.losses.push(loss(far, far_after));
                 halves.gains.push(loss(far_after, far));
-                halves.groups += 1;
                 halves.less += usize::from(far_after < far.min(half));
                 halves.weaker = [halves.weaker[0] + far.min(close), halves.weaker[1] + far_after.min(close_after)];
             }
@@ -86,9 +84,14 @@ impl Halves {
         halves
     }
 
+    /// How many groups stand out.
+    pub fn groups(&self) -> usize {
+        self.losses.len()
+    }
+
     /// Logarithm of the chance of so many groups of one kind where either kind is as likely.
     pub fn log_p_of(&self, count: usize) -> f64 {
-        log_binomial_tail(count, self.groups, 0.5)
+        log_binomial_tail(count, self.groups(), 0.5)
     }
 
     /// Logarithm of the chance that what was read looks exchanged so much where it was not.
@@ -120,6 +123,7 @@ pub(super) mod scene {
 
     use crate::data::IfFrame;
     use crate::integrity::stream::{Schedule, Stream};
+    use crate::integrity::{Finding, Inspector};
     use crate::support::numbers;
 
     const RX: usize = 4;
@@ -127,6 +131,12 @@ pub(super) mod scene {
     pub const SAMPLES: usize = 128;
     pub const SCHEDULE: Schedule =
         Schedule { tx: 1, rx: RX, loops: LOOPS, samples: SAMPLES, is_real: false, is_falling: false, farthest_bin: None };
+
+    /// What is found in one frame.
+    pub fn judged(mut inspector: Box<dyn Inspector>, frame: &Stream) -> Finding {
+        inspector.see(frame);
+        inspector.conclude().unwrap()
+    }
 
     /// A chirp and tones of a frequency in bins and of an amplitude, through a receiver.
     pub fn with_tones(chirp: &[Complex64], tones: &[[f64; 2]], receiver: impl Fn(Complex64) -> Complex64) -> Vec<Complex64> {

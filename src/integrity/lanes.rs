@@ -56,8 +56,11 @@ impl Inspector for Lanes {
         let shares = halves.text("neighbouring samples");
         let log_p = halves.log_p_as_they_are();
         if log_p < ALARM.ln() {
-            let found =
-                format!("{shares}, in {} of {} groups of frequencies less: two lanes were exchanged", halves.less, halves.groups);
+            let found = format!(
+                "{shares}, in {} of {} groups of frequencies less: two lanes were exchanged",
+                halves.less,
+                halves.groups()
+            );
             return Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p));
         }
         if halves.log_p_as_exchanged() < ALARM.ln() {
@@ -70,15 +73,13 @@ impl Inspector for Lanes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrity::exchange::scene::{SAMPLES, SCHEDULE, stream, with_tones};
+    use crate::integrity::exchange::scene::{SAMPLES, SCHEDULE, judged, stream, with_tones};
 
     /// Static returns of an amplitude at each bin; neighbours exchanged or not.
     fn seen(amplitude: impl Fn(usize) -> f64, is_real: bool, are_exchanged: bool) -> Finding {
         let schedule = Schedule { is_real, ..SCHEDULE };
         let sent = |chirp: &[Complex64]| if are_exchanged { exchanged(chirp) } else { chirp.to_vec() };
-        let mut inspector = Box::new(Lanes::new(schedule));
-        inspector.see(&stream(schedule, amplitude, |value| value, sent));
-        inspector.conclude().unwrap()
+        judged(Box::new(Lanes::new(schedule)), &stream(schedule, amplitude, |value| value, sent))
     }
 
     /// A room, falling with range.
@@ -105,9 +106,7 @@ mod tests {
                     let right = with_tones(chirp, tones, |value| value);
                     if are_exchanged { exchanged(&right) } else { right }
                 };
-                let mut inspector = Box::new(Lanes::new(SCHEDULE));
-                inspector.see(&stream(SCHEDULE, |_| 0.0, |value| value, sent));
-                let finding = inspector.conclude().unwrap();
+                let finding = judged(Box::new(Lanes::new(SCHEDULE)), &stream(SCHEDULE, |_| 0.0, |value| value, sent));
                 assert!(finding.ok && !finding.decided, "{tones:?}, {are_exchanged}: {finding:?}");
             }
         }

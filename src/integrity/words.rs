@@ -72,7 +72,7 @@ fn judged(halves: &Halves, as_they_are: [usize; 2], as_exchanged: [usize; 2]) ->
     let wrong = |count: usize, log_p: f64, what: &str| {
         let found = format!(
             "{shares}, in {count} of {} groups of frequencies {what}: I I Q Q was read as I Q I Q, or the other way round",
-            halves.groups
+            halves.groups()
         );
         Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p)
     };
@@ -127,14 +127,12 @@ impl Inspector for Words {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrity::exchange::scene::{SCHEDULE, stream, with_tones};
+    use crate::integrity::exchange::scene::{self, SCHEDULE, stream, with_tones};
 
     /// Static returns of an amplitude at each bin through a receiver; words exchanged or not.
     fn seen(amplitude: impl Fn(usize) -> f64, receiver: impl Fn(Complex64) -> Complex64, are_exchanged: bool) -> Finding {
         let sent = |chirp: &[Complex64]| if are_exchanged { exchanged(chirp) } else { chirp.to_vec() };
-        let mut inspector = Box::new(Words::new(SCHEDULE));
-        inspector.see(&stream(SCHEDULE, amplitude, receiver, sent));
-        inspector.conclude().unwrap()
+        scene::judged(Box::new(Words::new(SCHEDULE)), &stream(SCHEDULE, amplitude, receiver, sent))
     }
 
     /// Near and, as strong, at the far end of the band.
@@ -179,9 +177,7 @@ mod tests {
         let unbalanced = |value: Complex64| Complex64::new(value.re, 1.12 * (value.im + 0.087 * value.re));
         for bin in [1.3, 1.7] {
             let sent = |chirp: &[Complex64]| with_tones(chirp, &[[bin, 15000.0]], unbalanced);
-            let mut inspector = Box::new(Words::new(SCHEDULE));
-            inspector.see(&stream(SCHEDULE, |_| 0.0, |value| value, sent));
-            let finding = inspector.conclude().unwrap();
+            let finding = scene::judged(Box::new(Words::new(SCHEDULE)), &stream(SCHEDULE, |_| 0.0, |value| value, sent));
             assert!(finding.ok && !finding.decided, "{bin}: {finding:?}");
         }
     }

@@ -25,8 +25,8 @@ pub(super) fn said_by(detector: usize, evidence: &Evidence) -> Vec<Candidate> {
 
 /// Without its name where an echo of the body returns more than it receives, by more than a standard deviation: nothing passive does.
 fn passive(candidate: Candidate) -> Candidate {
-    let gains = |estimate: &&Estimate| estimate.name == "coefficient" && least(estimate) > 1.0;
-    if candidate.id.is_none() || !candidate.estimates.iter().any(|estimate| gains(&estimate)) {
+    let gains = |estimate: &Estimate| estimate.name == "coefficient" && least(estimate) > 1.0;
+    if candidate.id.is_none() || !candidate.estimates.iter().any(gains) {
         return candidate;
     }
     let statement = format!("{} No boundary returns more than it receives: something else moves there.", candidate.statement);

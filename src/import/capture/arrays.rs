@@ -164,7 +164,8 @@ impl Settings {
         if let Some(of_stream) = configs.iter().find(|path| ["cfg", "json"].contains(&extension(path).as_str())) {
             return Err(Error::field(of_stream, "type", format!("`.{}`", extension(of_stream)), "TOML with [radar], for arrays")
                 .with_hint(
-                    "TI's .cfg and .mmwave.json describe the .bin files of a capture card: leave --layout out for these; of an array state                      the radar in TOML, or with --board and --set radar.KEY=VALUE",
+                    "TI's .cfg and .mmwave.json describe the .bin files of a capture card: leave --layout out for these; of an array state \
+                     the radar in TOML, or with --board and --set radar.KEY=VALUE",
                 ));
         }
         let mut table = table_of(configs.first().map(|path| path.as_path()), &stated.sets)?;

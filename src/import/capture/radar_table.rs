@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use super::boards::Board;
 use crate::data::read_toml;
-use crate::data::settings::{apply_sets, nearest, settings_from_table};
+use crate::data::settings::{apply_sets, settings_from_table};
 use crate::error::{Error, Result};
 use crate::radar::Radar;
 
@@ -16,6 +16,12 @@ pub fn table_of(config: Option<&Path>, sets: &[String]) -> Result<Table> {
     table.retain(|key, _| key == "radar");
     apply_sets(&mut table, sets)?;
     Ok(table)
+}
+
+/// Settings of nothing but a radar.
+#[derive(serde::Deserialize)]
+struct Whole {
+    radar: Radar,
 }
 
 /// The table `radar` in others.
@@ -64,18 +70,19 @@ pub fn missing(radar: &Table) -> Vec<&'static str> {
 
 /// Refuses a key that no radar has, before another is missed because of it.
 pub fn refuse_unknown(radar: &Table, name: &Path) -> Result<()> {
-    let mut known = missing(&Table::new());
-    known.extend(["sampling", "adc_start_s", "position_m", "full_scale_codes"]);
-    let Some(key) = radar.keys().find(|key| !known.contains(&key.as_str())) else { return Ok(()) };
-    Err(Error::UnknownKey { path: name.into(), key: format!("radar.{key}"), nearest: nearest(key, known).map(str::to_string) })
+    // Each by itself: what else is wrong or missing says nothing of it.
+    let refuse = |(key, value): (&String, &Value)| {
+        let alone = Table::from_iter([(key.clone(), value.clone())]);
+        match settings_from_table::<Whole>(Table::from_iter([("radar".into(), Value::Table(alone))]), name, &[]) {
+            Err(unknown @ Error::UnknownKey { .. }) => Err(unknown),
+            _ => Ok(()),
+        }
+    };
+    radar.iter().try_for_each(refuse)
 }
 
 /// The radar of a table that says all but perhaps when the ADC starts.
 pub fn finished(mut table: Table, name: &Path, notes: &mut Vec<String>) -> Result<Radar> {
-    #[derive(serde::Deserialize)]
-    struct Whole {
-        radar: Radar,
-    }
     let radar = radar_table(&mut table)?;
     if !radar.contains_key("adc_start_s") {
         radar.insert("adc_start_s".into(), Value::Float(0.0));

@@ -167,6 +167,7 @@ mod tests {
         assert_eq!(unknown.behaves_like, Behaviour::RangeOffset);
         assert!(unknown.statement.contains("nearer"), "{}", unknown.statement);
     }
+
     #[test]
     fn a_body_is_not_said_to_be_elsewhere_by_frames_in_which_something_else_is_beside_it() {
         let beside = |others_m: [f64; 2]| {

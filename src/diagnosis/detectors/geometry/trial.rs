@@ -4,9 +4,11 @@ use rayon::prelude::*;
 
 use super::change::{Change, Moves};
 use crate::diagnosis::evidence::REACH_M;
+use crate::diagnosis::finding::apart;
 use crate::diagnosis::power::{PowerModel, Reach, improve, part_templates};
 use crate::diagnosis::prediction::{Point, range_and_velocity};
-use crate::diagnosis::{BodyPrediction, Evidence};
+use crate::diagnosis::{BodyPrediction, Evidence, Place};
+use crate::effects::Stage;
 
 /// Degrees of freedom of the heavy tail: the expected power itself is uncertain.
 const TAIL: f32 = 2.0;
@@ -105,9 +107,10 @@ impl<'a> Trial<'a> {
 /// Whether what moves beside the body stays farther from it than the echoes of one of them reach: what is left of it there looks like a body
 /// that is elsewhere.
 fn is_alone(evidence: &Evidence, points: &[Point]) -> bool {
-    let ranges = points.iter().map(|point| range_and_velocity(&evidence.radar, point.position_m, point.velocity_mps).0);
-    let [near, far] = ranges.fold([f64::INFINITY, f64::NEG_INFINITY], |[near, far], range| [near.min(range), far.max(range)]);
-    evidence.others_m.iter().all(|[low, high]| near - REACH_M > *high || far + REACH_M < *low)
+    let returns = points.iter().map(|point| range_and_velocity(&evidence.radar, point.position_m, point.velocity_mps));
+    let own_m = Place::spanning(Stage::Scene, returns).range_m;
+    let reached_m = own_m.map(|[near, far]| [near - REACH_M, far + REACH_M]);
+    reached_m.is_none_or(|reached_m| evidence.others_m.iter().all(|other_m| apart(reached_m, *other_m)))
 }
 
 /// Logarithm of the density of a power that is exponential about a mean which is itself uncertain (Lomax law): what the

@@ -96,23 +96,13 @@ fn unexplained(evidence: &Evidence, field: &Field, p_value: f64, nats: f64) -> O
 
 #[cfg(test)]
 mod tests {
+    use super::super::elements::scene;
     use super::*;
     use crate::effects;
-    use crate::radar::Radar;
-    use crate::room::Room;
 
     #[test]
     fn a_leakage_that_no_single_tone_describes_is_one_and_is_taken_out_in_full() {
-        let radar = Radar { samples_per_chirp: 128, loops_per_frame: 16, ..Radar::small(12) };
-        let turns = |range_m: f64| 2.0 * range_m * radar.slope_hz_per_s / crate::radar::SPEED_OF_LIGHT / radar.sample_rate_hz;
-        let (wall, leak) = (turns(3.0), turns(0.08));
-        let mut evidence = Evidence::in_noise(radar.clone(), 7, |[_, rx, _, n]| {
-            let tone = |turns: f64| Complex64::cis(std::f64::consts::TAU * turns * n as f64 + rx as f64);
-            // It falls by 2.8 dB along the chirp.
-            tone(wall) * 30.0 + tone(leak) * 100.0 * (-0.32 * n as f64 / 128.0).exp()
-        });
-        let walls = Room { left_m: Some(2.0), right_m: Some(2.0), floor_m: Some(1.0), ceiling_m: Some(1.5), ..Room::default() };
-        evidence.room = Some(Room { front_m: Some(4.0), back_m: Some(1.0), ..walls });
+        let (evidence, _) = scene::leaking();
         let likelihood = |evidence: &Evidence| Field::new(evidence).expect("a field").free_likelihood();
         let found = find(&evidence);
         let leaks: Vec<&Candidate> = found.iter().filter(|found| found.id == Some(effects::tx_leakage::ID)).collect();

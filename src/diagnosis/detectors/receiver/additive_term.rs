@@ -243,7 +243,7 @@ pub fn is_bent(evidence: &Evidence) -> bool {
     evidence.accepted.contains(&effects::adc_saturation::ID)
 }
 
-/// Held-out log-likelihood gained by subtracting a static term, samples outside `range` untouched.
+/// Held-out log-likelihood gained by subtracting a static term, `[channel][sample]`.
 pub fn gain(evidence: &Evidence, term: &[Vec<Complex64>]) -> f64 {
     let [.., loops, samples] = evidence.cube.dims;
     let mut gain = 0.0;

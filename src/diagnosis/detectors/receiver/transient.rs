@@ -69,16 +69,20 @@ pub fn edge(evidence: &Evidence, clutter: &[Vec<Complex64>], at_end: bool) -> Op
     })
 }
 
+/// What was sampled of a value: the rest of an analytic signal says nothing of the edges.
+fn sampled(evidence: &Evidence, value: Complex64) -> Complex64 {
+    if evidence.is_real() { value.re.into() } else { value }
+}
+
 /// Of a sample, mean over the channels.
 fn powers(evidence: &Evidence, chirps: &[Vec<Complex64>]) -> Vec<f64> {
     let samples = evidence.cube.dims[4];
-    // Without quadrature a constant is no transient, and what was not sampled says nothing of the edges.
+    // Without quadrature a constant is no transient.
     let centre = |chirp: &Vec<Complex64>| {
         if evidence.is_real() { chirp.iter().sum::<Complex64>() / samples as f64 } else { Complex64::ZERO }
     };
-    let part = |value: Complex64| if evidence.is_real() { value.re.into() } else { value };
     let centred: Vec<(&Vec<Complex64>, Complex64)> = chirps.iter().map(|chirp| (chirp, centre(chirp))).collect();
-    let of_sample = |n: usize| centred.iter().map(|(chirp, centre)| part(chirp[n] - centre).norm_sqr()).sum::<f64>();
+    let of_sample = |n: usize| centred.iter().map(|(chirp, centre)| sampled(evidence, chirp[n] - centre).norm_sqr()).sum::<f64>();
     (0..samples).map(|n| of_sample(n) / chirps.len() as f64).collect()
 }
 
@@ -101,9 +105,7 @@ fn stood_out(evidence: &Evidence, affected: &std::ops::Range<usize>) -> bool {
     let Ok(inverse) = fitted.pseudo_inverse(least) else { return false };
     let all: Vec<usize> = (0..samples).collect();
     let predict = rows(&all) * inverse;
-    // What was not sampled says nothing of the edges.
-    let part = |value: &Complex64| if evidence.is_real() { value.re.into() } else { *value };
-    let standing: Vec<Complex64> = evidence.standing().iter().map(part).collect();
+    let standing: Vec<Complex64> = evidence.standing().iter().map(|value| sampled(evidence, *value)).collect();
     let left: Vec<Vec<Complex64>> = standing
         .chunks_exact(samples)
         .map(|chirp| {
@@ -135,7 +137,7 @@ mod tests {
         });
         let fit: Vec<Complex64> = (0..128).map(|n| (leakage(n) * (1.0 - poor * (-(n as f64) / 0.3).exp())).into()).collect();
         let channels = evidence.cube.channels();
-        let mut after = evidence.clone().changed();
+        let mut after = evidence.changed();
         after.cube.each_chirp(|_, chirp| chirp.iter_mut().zip(&fit).for_each(|(value, fit)| *value -= fit));
         after.accepted.push(effects::tx_leakage::ID);
         after.subtracted = Some(fit.repeat(channels).into());

@@ -117,18 +117,18 @@ fn take_common(channels: &mut [Channel], bins: usize) -> Option<Vec<Complex64>> 
     if ranges.is_empty() || returns < FEWEST_RETURNS {
         return None;
     }
-    let harmonics = channels[0].mean.len();
-    let take = |harmonic: usize| {
+    let of_harmonic = |harmonic: usize| {
         let ratios = strong.iter().map(|&(channel, bin)| channels[channel].mean[harmonic][bin] / channels[channel].clutter[bin]);
         let (mut real, mut imaginary): (Vec<f64>, Vec<f64>) = ratios.map(|ratio| (ratio.re, ratio.im)).unzip();
-        let common = Complex64::new(median(&mut real), median(&mut imaginary));
-        for channel in channels.iter_mut() {
-            let own = channel.mean[harmonic].iter_mut().zip(&channel.clutter);
-            own.for_each(|(mean, clutter)| *mean -= common * clutter);
-        }
-        common
+        Complex64::new(median(&mut real), median(&mut imaginary))
     };
-    Some((0..harmonics).map(take).collect())
+    let common: Vec<Complex64> = (0..channels[0].mean.len()).map(of_harmonic).collect();
+    for Channel { mean, clutter, .. } in channels {
+        for (means, common) in mean.iter_mut().zip(&common) {
+            means.iter_mut().zip(&*clutter).for_each(|(mean, clutter)| *mean -= common * clutter);
+        }
+    }
+    Some(common)
 }
 
 /// Minus the logarithm of the chance of a cell's means, a sum over harmonics.

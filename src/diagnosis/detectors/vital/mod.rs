@@ -74,7 +74,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     if gain <= 3.0 {
         return None;
     }
-    Some(Motion { evidence, data, change, strongest, circle: best, metres, named }.candidate(gain))
+    Some(Motion { evidence, data, mean, change, strongest, circle: best, metres, named }.candidate(gain))
 }
 
 /// Power of what changes over the noise, by range.
@@ -155,6 +155,8 @@ fn held_out_gain(evidence: &Evidence, data: &Frames, mean: &[Complex64], best: &
 struct Motion<'a> {
     evidence: &'a Evidence,
     data: Frames,
+    /// Over the training frames, by cell.
+    mean: Vec<Complex64>,
     /// Power of what changes over the noise, by range, and where it is strongest.
     change: Vec<f64>,
     strongest: usize,
@@ -221,10 +223,8 @@ impl Motion<'_> {
             };
             cells.iter().enumerate().map(off).sum()
         };
-        let mean = |cell: usize| training.iter().map(|&f| values[f][cell]).sum::<Complex64>() / training.len() as f64;
-        let means: Vec<Complex64> = cells.iter().map(|&cell| mean(cell)).collect();
         let of_frame = |&f: &usize| -> Vec<Complex64> {
-            cells.iter().zip(&means).map(|(&cell, mean)| (values[f][cell] - mean) * scale(cell)).collect()
+            cells.iter().map(|&cell| (values[f][cell] - self.mean[cell]) * scale(cell)).collect()
         };
         let changes: Vec<Vec<Complex64>> = training.iter().map(of_frame).collect();
         off_line(&changes) - training.iter().map(off_arc).sum::<f64>() > DECIDES
