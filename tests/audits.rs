@@ -177,13 +177,19 @@ fn a_damaged_recording_gets_that_verdict_and_no_effect() {
 
 /// What the audit says of a recording, with another header where one is given.
 fn audited(folder: &Path, change: &dyn Fn(String) -> String) -> Vec<Check> {
+    audited_as(folder, change, &|_| {})
+}
+
+/// The same, with other samples where they are changed.
+fn audited_as(folder: &Path, change: &dyn Fn(String) -> String, spoil: &dyn Fn(&mut Loaded)) -> Vec<Check> {
     let header = folder.join("recording.toml");
     let text = std::fs::read_to_string(&header).unwrap();
     let changed = change(text.clone());
     std::fs::write(&header, &changed).unwrap();
     let recording = Recording::open(folder).unwrap();
     std::fs::write(&header, &text).unwrap();
-    let loaded = Loaded::read(&recording, 256).unwrap();
+    let mut loaded = Loaded::read(&recording, 256).unwrap();
+    spoil(&mut loaded);
     let body = recording.person().map(|person| BodyPrediction::new(person, &loaded.radar, &loaded.starts_s).unwrap());
     audit(&Evidence::new(loaded, recording.room.clone(), body), recording.person().and_then(Person::origin_m))
 }
@@ -308,6 +314,92 @@ fn a_heading_turned_by_half_a_turn_and_a_wrong_frame_period_are_found() {
     let halved = audited(&plain, &|text| text.replace("frame_period_s = 0.2", "frame_period_s = 0.1"));
     let period = check(&halved, "frame_period");
     assert!(!period.ok && period.found.contains("should be 0.200000"), "{period:?}");
+}
+
+/// Loops in reverse order change the sign of all velocities.
+#[test]
+fn velocities_of_the_other_sign_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = recorded(folder.path(), &aside(36, 10.0), ONE);
+    let reversed = audited_as(&plain, &|text| text, &|loaded| {
+        let length = loaded.cube.dims[4];
+        for (frame, channel) in (0..loaded.cube.dims[0]).flat_map(|frame| (0..4).map(move |channel| (frame, channel))) {
+            let chirps: Vec<_> = loaded.cube.channel(frame, channel).chunks_exact(length).rev().flatten().copied().collect();
+            loaded.cube.channel_mut(frame, channel).copy_from_slice(&chirps);
+        }
+    });
+    let sign = check(&reversed, "doppler_sign");
+    assert!(!sign.ok && sign.found.contains("the Doppler axis runs the other way"), "{sign:?}");
+    assert!(check(&audited(&plain, &|text| text), "doppler_sign").ok);
+}
+
+/// Receivers whose phases grow by a constant step see everything in another direction.
+#[test]
+fn a_body_in_another_direction_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = recorded(folder.path(), &aside(37, 0.0), ONE);
+    let turned = |radians: f64| {
+        let checks = audited_as(&plain, &|text| text, &|loaded| {
+            loaded.cube.each_chirp(|[_, channel, _], chirp| {
+                chirp.iter_mut().for_each(|value| *value *= num_complex::Complex64::cis(radians * channel as f64));
+            });
+        });
+        check(&checks, "body_direction").clone()
+    };
+    // Half a wavelength apart, π sin 40° each.
+    let aside = turned(2.0);
+    assert!(!aside.ok && aside.found.contains("farther to the"), "{aside:?}");
+    assert!(turned(0.0).ok);
+}
+
+/// Of a room that is stated at a quarter of its size, all returns are beyond its farthest corner.
+#[test]
+fn a_room_that_is_smaller_than_its_returns_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let sides = "left_m = 3.2\nright_m = 3.2\nfront_m = 4.8\nfloor_m = 2.4\nceiling_m = 2.4";
+    let plain = recorded(folder.path(), &format!("seed = 38\nmesh_error_m = 2e-3\n[room]\n{sides}"), ONE);
+    assert!(check(&audited(&plain, &|text| text), "room").ok);
+    let shrunk = |text: String| text.replace("m = 3.2", "m = 0.8").replace("m = 4.8", "m = 1.2").replace("m = 2.4", "m = 0.6");
+    let shrunk = audited(&plain, &shrunk);
+    let room = check(&shrunk, "room");
+    assert!(!room.ok && room.found.contains("the room's size contradicts the ranges"), "{room:?}");
+}
+
+#[test]
+fn samples_at_the_ends_of_the_converters_range_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = recorded(folder.path(), "seed = 39\nmesh_error_m = 2e-3", ONE);
+    let clipped = audited_as(&plain, &|text| text, &|loaded| {
+        let [low, high] = loaded.extremes.map(|extreme| 0.8 * extreme);
+        loaded.extremes = [low, high];
+        for value in &mut loaded.cube.samples {
+            *value = num_complex::Complex64::new(value.re.clamp(low, high), value.im.clamp(low, high));
+        }
+    });
+    let range = check(&clipped, "converter_range");
+    assert!(!range.ok && !range.found.starts_with("0.0000 %"), "{range:?}");
+    assert!(check(&audited(&plain, &|text| text), "converter_range").ok);
+}
+
+/// Points half a metre apart say nothing within a range bin of 7 cm.
+#[test]
+fn a_body_of_too_few_points_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = recorded(folder.path(), &aside(40, 10.0), ONE);
+    let recording = Recording::open(&plain).unwrap();
+    let loaded = Loaded::read(&recording, 256).unwrap();
+    let sampled = |every: usize| {
+        let mut body = BodyPrediction::new(recording.person().unwrap(), &loaded.radar, &loaded.starts_s).unwrap();
+        for points in &mut body.frames {
+            let kept: Vec<_> = points.iter().step_by(every).cloned().collect();
+            let area_m2 = points.iter().map(|point| point.area_m2).sum::<f64>() / kept.len() as f64;
+            *points = kept;
+            points.iter_mut().for_each(|point| point.area_m2 = area_m2);
+        }
+        let checks = audit(&Evidence::new(loaded.clone(), recording.room.clone(), Some(body)), None);
+        check(&checks, "surface_sampling").clone()
+    };
+    assert!(sampled(1).ok && !sampled(200).ok, "{:?}, {:?}", sampled(1), sampled(200));
 }
 
 /// All recordings at hand whose samples are whole, and those whose damage is known.

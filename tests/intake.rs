@@ -217,6 +217,8 @@ fn the_user_may_keep_his_word() {
         assert!(text(&output.stdout).contains("as stated, against the data"), "{}", text(&output.stdout));
         assert!(text(&output.stderr).contains("wrong: "), "{}", text(&output.stderr));
         let findings = integrity::inspect(&Recording::open(folder.path().join(out)).unwrap(), FRAMES).unwrap();
+        let check = |more: &[&str]| hybridsim(&[&["check", out], more].concat(), folder.path()).status.code();
+        assert_eq!([check(&[]), check(&[word])], [Some(2), Some(0)]);
         let wrong: Vec<&str> = findings.iter().filter(|finding| !finding.ok).map(|finding| finding.check).collect();
         assert_eq!(wrong, ["iq_order"], "{findings:?}");
     }

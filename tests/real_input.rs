@@ -38,7 +38,7 @@ fn training_on_a_planted_recording_lowers_its_loss() {
             }
         })
         .unwrap();
-    println!("held-out losses {losses:?} dB²");
+    println!("held-out losses {losses:?} nats a cell");
     // Far more than what another order of rounding changes: a quarter, on this recording.
     assert!(losses[5] < 0.9 * losses[0], "held-out losses {losses:?}");
 }

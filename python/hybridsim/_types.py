@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _hybridsim
+from ._errors import Error
 
 StrPath = str | os.PathLike[str]
 
@@ -27,11 +28,20 @@ WHOLE: Shard = (1, 1)
 """All of it."""
 
 
+def plain(value: Any) -> Any:
+    """What JSON has for a number of NumPy or a path."""
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise Error(f"a setting is a {type(value).__name__}, expected a number, a text, a path, a switch, or a list of these")
+
+
 def sets(settings: Settings) -> list[str]:
     """Settings as the command line's ``--set`` has them."""
     if isinstance(settings, Mapping):
         # JSON of numbers, texts, switches and lists is TOML, too.
-        return [f"{key}={json.dumps(value)}" for key, value in settings.items()]
+        return [f"{key}={json.dumps(value, default=plain)}" for key, value in settings.items()]
     if isinstance(settings, str):
         return [settings]
     return list(settings)
@@ -110,7 +120,7 @@ class Radar:
     def _json(self) -> str:
         settings = asdict(self)
         del settings["derived"]
-        return json.dumps({key: value for key, value in settings.items() if value is not None})
+        return json.dumps({key: value for key, value in settings.items() if value is not None}, default=plain)
 
 
 class Poses(NamedTuple):
@@ -217,7 +227,8 @@ class Run:
         folder: holds config.toml, metrics.json, report.md, pictures, and the checkpoints.
         epochs: that were trained.
         best_epoch: counted from 1.
-        history: numbers of every epoch; losses in dB².
+        history: numbers of every epoch, whose ``epoch`` counts from 0; losses in the unit of ``loss.scale``: nats a cell by
+            default, dB² for ``"db"``.
         scores: of the best checkpoint on held-out frames, by recording folder.
     """
 

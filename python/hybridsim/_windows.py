@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from numpy.typing import NDArray
 
@@ -70,7 +70,16 @@ class Windows(Sequence[tuple[Any, int]]):
     def __len__(self) -> int:
         return len(self._items)
 
-    def __getitem__(self, index: int) -> tuple[Any, int]:  # type: ignore[override]
+    @overload
+    def __getitem__(self, index: int) -> tuple[Any, int]: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[tuple[Any, int]]: ...
+    def __getitem__(self, index: int | slice) -> tuple[Any, int] | list[tuple[Any, int]]:
+        if isinstance(index, slice):
+            return [self._item(each) for each in range(*index.indices(len(self)))]
+        return self._item(index)
+
+    def _item(self, index: int) -> tuple[Any, int]:
         recording, start, length, number = self._items[index]
         samples = self.recordings[recording].samples(slice(start, start + length))
         return (samples if self.transform is None else self.transform(samples)), number

@@ -18,6 +18,6 @@ class RecordingDataset(Windows, Dataset[tuple[Any, int]]):
     recording opens again in each worker of a ``DataLoader``; its samples stay on the disk until a window is asked for.
     """
 
-    def __getitem__(self, index: int) -> tuple[Any, int]:  # type: ignore[override]
-        value, number = super().__getitem__(index)
+    def _item(self, index: int) -> tuple[Any, int]:
+        value, number = super()._item(index)
         return (torch.from_numpy(value) if isinstance(value, np.ndarray) else value), number

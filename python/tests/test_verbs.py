@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
 import hybridsim
 
@@ -190,3 +191,30 @@ def test_a_diagnosis_says_what_its_report_says(recording: hybridsim.Recording, t
     assert report.data == json.loads(report.json.read_text()) and report.verdict == report.data["verdict"]
     assert report.html.is_file() and report.checkpoint is None
     assert report.sentence and isinstance(report.effects, list)
+
+
+def test_settings_are_numbers_of_numpy_and_paths_too(tmp_path: Path) -> None:
+    given = {"training.epochs": np.int64(3), "data.recordings": [tmp_path], "loss.weight": np.float32(0.5), "a": np.arange(2)}
+    assert hybridsim._types.sets(given) == [
+        "training.epochs=3",
+        f'data.recordings=["{tmp_path}"]',
+        "loss.weight=0.5",
+        "a=[0, 1]",
+    ]
+    with pytest.raises(hybridsim.Error, match="a setting is a object"):
+        hybridsim._types.sets({"a": object()})
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"distance_m": 2.0}, "--distance"),
+        ({"body": "body.npz"}, "--body"),
+        ({"up": "z"}, "no motion's file"),
+        ({"clean": True, "only": "noise"}, "--clean"),
+        ({"frames": 0}, "frames"),
+    ],
+)
+def test_what_would_change_nothing_is_refused(recording: hybridsim.Recording, given: dict[str, Any], said: str) -> None:
+    with pytest.raises(hybridsim.Error, match=said):
+        hybridsim.simulate(ROOT / "models" / "quickstart", recording=recording, progress=False, **given)

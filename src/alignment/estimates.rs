@@ -7,8 +7,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::climb::{Maximum, UNIT, active};
 use super::coarse::turned_rad;
-use super::fit::Fitter;
-use super::place::{AZIMUTH, CLOCK, COUNT, FACING, HEIGHT, Place, RANGE, stated};
+use super::place::{AZIMUTH, CLOCK, COUNT, FACING, HEIGHT, Pivot, Place, RANGE, stated};
 use super::report::{ESTIMATES, Estimate};
 use crate::person::{BodyModel, Motion, Person, Placement};
 
@@ -41,8 +40,8 @@ const NEEDS: [(&str, &[usize]); 8] = [
 ];
 
 /// The motion's placement at a place.
-pub fn placement(person: &Person, fitter: &Fitter, place: &Place) -> Placement {
-    let correction = fitter.pivot.correction(place);
+pub fn placement(person: &Person, pivot: &Pivot, place: &Place) -> Placement {
+    let correction = pivot.correction(place);
     // A body without vertices: only its placement is asked for.
     let bare = Person::Skinned {
         model: BodyModel {
@@ -63,20 +62,21 @@ pub fn placement(person: &Person, fitter: &Fitter, place: &Place) -> Placement {
     }
 }
 
-/// Numbers of the report at a place, in the order of [`ESTIMATES`].
-pub fn numbers(person: &Person, fitter: &Fitter, place: &Place) -> [f64; 8] {
-    let Placement { start_s, origin_m: [x, y, z], .. } = placement(person, fitter, place);
-    let heading = fitter.pivot.correction(place).heading_rad;
+/// Numbers of the report at a place, in the order of [`ESTIMATES`]. Range, azimuth and facing are those of the pivot: only about one pivot
+/// are the numbers of two places comparable.
+pub fn numbers(person: &Person, pivot: &Pivot, place: &Place) -> [f64; 8] {
+    let Placement { start_s, origin_m: [x, y, z], .. } = placement(person, pivot, place);
+    let heading = pivot.correction(place).heading_rad;
     let angles = [heading, place.facing_rad].map(|angle| turned_rad(angle).to_degrees());
     [start_s, angles[0], x, y, z, place.range_m, place.azimuth_rad.to_degrees(), angles[1]]
 }
 
 /// All numbers of the report at a maximum, each by itself.
 pub fn estimates(person: &Person, best: &Maximum) -> BTreeMap<&'static str, Estimate> {
-    let fitter = &best.fitter;
-    let at = |place: &Place| numbers(person, fitter, place);
-    let (here, stated) = (at(&best.place), at(&fitter.pivot.stated()));
-    let active = active(fitter.readings);
+    let pivot = &best.fitter.pivot;
+    let at = |place: &Place| numbers(person, pivot, place);
+    let (here, stated) = (at(&best.place), at(&pivot.stated()));
+    let active = active(best.fitter.readings);
     // Of a linear change.
     let mut slopes = DMatrix::zeros(8, COUNT);
     for &number in &active {

@@ -69,7 +69,7 @@ pub fn alignment(found: &Found, recording: String) -> Alignment {
         as_stated,
         held_out_frames: readings.split.held_out.clone(),
         stated: stated(found.person),
-        motion: best.map_or_else(|| stated(found.person), |best| placement(found.person, &best.fitter, &best.place)),
+        motion: best.map_or_else(|| stated(found.person), |best| placement(found.person, &best.fitter.pivot, &best.place)),
         estimates: identified,
         gain,
         alternatives,
@@ -108,13 +108,15 @@ fn worse(better: &Score, other: &Score) -> f64 {
 fn alternatives(found: &Found, best: &Maximum, estimates: &BTreeMap<&'static str, Estimate>) -> Vec<Alternative> {
     let of = |other: &Maximum| {
         let p_value = worse(&best.score, &other.score);
+        // Each climb has a pivot of its own.
+        let (pivot, place) = other.fitter.pivot.restated(&other.place, best.fitter.pivot.stated_m);
         let values: BTreeMap<&'static str, f64> =
-            ESTIMATES.iter().map(|(name, ..)| *name).zip(numbers(found.person, &other.fitter, &other.place)).collect();
+            ESTIMATES.iter().map(|(name, ..)| *name).zip(numbers(found.person, &pivot, &place)).collect();
         let apart = estimates.iter().any(|(name, estimate)| {
             // Within one and the same peak, the climbs end within its interval.
             estimate.ci90.is_some_and(|[low, high]| difference(name, values[name], estimate.value).abs() > high - low)
         });
-        let motion = placement(found.person, &other.fitter, &other.place);
+        let motion = placement(found.person, &pivot, &place);
         let frames = other.score.by_frame.iter().filter(|gain| **gain != 0.0).count();
         (apart && p_value > ALARM).then_some(Alternative { values, motion, p_value, frames })
     };

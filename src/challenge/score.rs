@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::answer::Answers;
-use super::baselines::{self, Statistics, quantile};
+use super::baselines::{self, Statistics};
 use super::commitment::{Commitment, joint_root, left_out, sha256};
 use super::config::Stratum;
 use super::judge::{Judgement, judge};
@@ -29,6 +29,7 @@ use crate::error::{Error, Result};
 use crate::text::shown;
 
 mod rows;
+mod usual;
 
 /// A misfit per sample below this, nats, is nothing that could be removed.
 const LEAST_REMOVABLE: f64 = 2.0e-3;
@@ -109,7 +110,7 @@ pub fn score(
             Ok(case)
         })
         .collect::<Result<_>>()?;
-    mark_concealed(&mut cases);
+    usual::mark_concealed(&mut cases);
     let points = points(&cases);
     let psychometric = Logistic::fit(&points);
     Ok(Score {
@@ -213,31 +214,6 @@ impl Case {
         let (before, after) = (level(&self.before)?, level(&self.after)?);
         let oracle = level(self.oracle.as_ref()?)? + scale;
         (before - oracle > LEAST_REMOVABLE).then(|| (before - after) / (before - oracle))
-    }
-}
-
-/// Concealed: the trained simulator is as good as on the nulls by every usual measure, or a return covers the effect.
-/// What nobody could detect is no proof of anything.
-fn mark_concealed(cases: &mut [Case]) {
-    let usual: [fn(&Measures) -> Option<f64>; 3] = [|m| m.db_mse, |m| m.psnr_db, |m| m.ssim];
-    let bands: Vec<Option<[f64; 2]>> = usual
-        .iter()
-        .map(|measure| {
-            let nulls: Vec<f64> =
-                cases.iter().filter(|case| case.is(Stratum::Null)).filter_map(|case| measure(&case.before)).collect();
-            (!nulls.is_empty()).then(|| NULL_BAND.map(|part| quantile(&nulls, part)))
-        })
-        .collect();
-    for case in cases.iter_mut() {
-        let inside: Vec<bool> = usual
-            .iter()
-            .zip(&bands)
-            .filter_map(|(measure, band)| Some((measure(&case.before)?, (*band)?)))
-            .map(|(value, [low, high])| (low..=high).contains(&value))
-            .collect();
-        let absorbed = !inside.is_empty() && inside.iter().all(|&inside| inside);
-        let masked = case.judgement.strength.is_some_and(|strength| strength.masked());
-        case.concealed = case.planted() && case.d_prime() >= OBVIOUS_D_PRIME && (absorbed || masked);
     }
 }
 

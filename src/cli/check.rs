@@ -35,6 +35,13 @@ pub(crate) struct Arguments {
     out: Out,
 }
 
+impl Arguments {
+    /// Whether it is a config, which settings may override.
+    pub(super) fn reads_settings(&self) -> bool {
+        !self.path.is_dir() && !describe::knows(&self.path) && !describe::is_pickle(&self.path)
+    }
+}
+
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let path = &arguments.path;
     if !path.is_dir() && describe::knows(path) {
@@ -43,6 +50,12 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     if describe::is_pickle(path) {
         return Err(Error::field(path, "type", "a Python pickle", "a body as .npz, or a config (.toml)")
             .with_hint("convert a body model of SMPL, SMPL-H or SMPL-X with python scripts/smpl_to_npz.py MODEL.pkl BODY.npz"));
+    }
+    if path.is_file() && describe::ending(path) != "toml" {
+        let expected = "a config (.toml), a body or a motion (.npz, .bvh), or a mesh (.obj, .npy)";
+        return Err(Error::field(path, "type", format!("`.{}`", describe::ending(path)), expected).with_hint(
+            "other meshes are written as .obj by Blender or meshio; captures of radars are read by `hybridsim import`",
+        ));
     }
     arguments.reading.refused(READING_HINT)?;
     if path.join("checkpoint.toml").is_file() {
@@ -117,7 +130,7 @@ fn show_recording(folder: &Path, common: &Common) -> Result<(Recording, bool)> {
 
 /// What scripts are to notice.
 fn damaged(recording: &Recording) -> Error {
-    Error::field(recording.folder.join("recording.toml"), "files.if", "samples that are damaged or misread, see above", "whole samples")
+    Error::field(recording.folder.join("recording.toml"), "files.if", "samples that are damaged, misread or of another convention, see above", "whole samples, as stated")
         .with_hint(
             "what was lost is marked in valid.npy; what was misread is imported again with its right description; --as-stated keeps your word",
         )
@@ -130,7 +143,7 @@ fn show(recording: &Recording, common: &Common) -> Result<bool> {
     let findings = integrity::inspect(recording, recording.radar.frames)?;
     say!("  samples            {}, all {} frames can be read", recording.number_type(), recording.whole_frames().count());
     conventions::show(&recording.radar, &findings, Against::Questioned);
-    Ok(common.as_stated || integrity::damage(&findings).is_none())
+    Ok(common.as_stated || findings.iter().all(|finding| finding.ok))
 }
 
 /// What is stated of a recording, and whether it can be.

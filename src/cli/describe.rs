@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Name's ending in small letters, without the dot.
-fn ending(path: &Path) -> String {
+pub(super) fn ending(path: &Path) -> String {
     path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 

@@ -19,7 +19,7 @@ use crate::{
     metrics::MetricsConfig,
     pictures::page::{self, Markup, html, picture},
     training::{LoadedRecording, checkpoint, refine},
-    verbs::{heatmaps::same_radar, notes, report::draw_frame, scores::page_of_frames},
+    verbs::{claimed_for, heatmaps::same_radar, notes, report::draw_frame, scores::page_of_frames},
 };
 
 #[derive(Args)]
@@ -50,7 +50,7 @@ fn parse_range(text: &str) -> std::result::Result<(usize, usize), String> {
 }
 
 pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
-    let _claim = arguments.out.out.as_ref().map(|out| super::claimed(out)).transpose()?;
+    let _claim = arguments.out.out.as_ref().map(|out| claimed_for(out, "metrics.json")).transpose()?;
     let device = device(&common.device)?;
     let (mut simulator, state) = checkpoint::open(&arguments.checkpoint, &device)?;
     arguments.without.switch_off(&mut simulator)?;

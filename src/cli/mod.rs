@@ -51,7 +51,6 @@ use crate::{
     data::{files, unfinished},
     error::{Error, Result},
     text::shown,
-    verbs::claimed,
 };
 
 pub use device::{available, device, devices};
@@ -271,6 +270,10 @@ fn refuse_idle_settings(cli: &Cli) -> Result<()> {
             ("--set: a checkpoint keeps the settings it was trained with", "give --set to train or record")
         }
         Command::Align(_) => ("--set: align has no settings", "`hybridsim align --help` lists its options"),
+        Command::Check(ref arguments) if !arguments.reads_settings() => (
+            "--set: what is checked here has no settings to override",
+            "--set changes a config (.toml); what a recording states is in its recording.toml",
+        ),
         Command::Effects(_) | Command::Completions(_) | Command::Man(_) => {
             ("--set: this verb reads no settings", "leave --set out")
         }

@@ -6,7 +6,7 @@ use std::path::Path;
 use tempfile::TempDir;
 
 use super::leftovers::{locked, orphaned};
-use super::unfinished::Undo;
+use super::unfinished::{Undo, remove_in_use};
 use crate::error::{Error, Result};
 
 const PREFIX: &str = ".hybridsim-scratch-";
@@ -27,7 +27,7 @@ impl Scratch {
         let (folder, lock) = locked(make, |folder| File::open(folder.path()), |folder| folder.path().to_path_buf())
             .map_err(|source| Error::write(&parent, source))?;
         let doomed = folder.path().to_path_buf();
-        Ok(Self { folder, _lock: lock, _undo: Undo::by(move || drop(fs::remove_dir_all(doomed))) })
+        Ok(Self { folder, _lock: lock, _undo: Undo::by(move || remove_in_use(&doomed)) })
     }
 
     pub fn path(&self) -> &Path {

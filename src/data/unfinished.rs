@@ -4,8 +4,14 @@
 //! processes that were started) is therefore listed here, and [`abandon`] undoes it. Results get their names under the
 //! lock of the same list: a result is whole before, or it never appears.
 
+use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
+
+/// Most removals of one folder: a thread adds a file between two of them, at most.
+const REMOVALS: usize = 100;
 
 type Action = Box<dyn FnOnce() + Send>;
 
@@ -37,6 +43,15 @@ impl Drop for Undo {
     }
 }
 
+/// Removes a folder in which other threads may be at work until a signal's handler ends the process: what they add meanwhile goes, too.
+pub fn remove_in_use(folder: &Path) {
+    for _ in 0..REMOVALS {
+        if matches!(fs::remove_dir_all(folder), Err(error) if error.kind() == ErrorKind::NotFound) {
+            return;
+        }
+    }
+}
+
 /// Gives a result its name, where no signal comes between. `name` must neither make nor drop an [`Undo`].
 pub fn publish<T>(name: impl FnOnce() -> T) -> T {
     let _held = begun();
@@ -63,5 +78,31 @@ pub fn ending() -> &'static Arc<AtomicBool> {
 pub fn wait_if_ending() {
     while ENDING.load(Ordering::Relaxed) {
         std::thread::park();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_goes_though_somebody_fills_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let doomed = folder.path().join("doomed");
+        for _ in 0..20 {
+            fs::create_dir(&doomed).unwrap();
+            let stop = AtomicBool::new(false);
+            std::thread::scope(|scope| {
+                scope.spawn(|| {
+                    // As a writer does, until its folder is gone.
+                    let write =
+                        |name: &u32| fs::write(doomed.join(name.to_string()), "x").is_ok() && !stop.load(Ordering::Relaxed);
+                    (0..).take_while(write).last()
+                });
+                remove_in_use(&doomed);
+                stop.store(true, Ordering::Relaxed);
+            });
+            assert!(!doomed.exists());
+        }
     }
 }

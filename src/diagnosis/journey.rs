@@ -17,7 +17,7 @@ use super::report::{
     Effect, FORMAT, Findings, Fit, HeldOut, Location, NotDetectable, Report, Verdict, moving_energy, never_detectable,
     probability_of_nothing,
 };
-use super::residual::is_added;
+use super::residual::{is_added, is_filter};
 use super::select::{Accepted, Explanation, explain};
 use crate::data::Recording;
 use crate::effects::EffectSetting;
@@ -214,11 +214,12 @@ fn doubt(report: &mut Report, explanation: &Explanation, config: &DiagnosisConfi
             "a recording like this is improbable where nothing is missing (p = {p_value:.1e}): something may be that no detector locates"
         );
     }
-    // Of a mover limbs are left, and a law of the noise is no part of what is taken out.
-    let leaves_nothing =
-        |effect: &Accepted| is_added(&effect.candidate) || matches!(effect.candidate.correction, Correction::Inverse(..));
+    // Of a mover limbs are left, a law of the noise is no part of what is taken out, and to undo a filter amplifies side lobes.
+    let leaves_nothing = |Accepted { candidate, .. }: &Accepted| {
+        is_added(candidate) || matches!(candidate.correction, Correction::Inverse(..)) && !is_filter(candidate)
+    };
     if report.verdict == Verdict::Explained && explanation.accepted.iter().all(leaves_nothing) {
-        let left = Null::of(&explanation.evidence, config.seed).p_value();
+        let left = Null::of(&explanation.evidence, config.seed).of_held_out().p_value();
         if let Some(p_value) = left.filter(|p_value| *p_value < config.alarm) {
             report.verdict = Verdict::PartlyExplained;
             report.reason = format!(
@@ -259,7 +260,7 @@ fn prediction(recording: &Recording, person: &Person, loaded: &Loaded) -> Result
             format!("from {first:.3} s to {last:.3} s"),
             format!("a motion over all frames, from {start:.3} s to {end:.3} s"),
         )
-        .with_hint("shift it with motion.start_s, give a longer motion, or lower radar.frames"));
+        .with_hint("give a longer motion, or shift it with motion.start_s (no sequence of meshes has one), which `hybridsim align` finds"));
     }
     BodyPrediction::new(person, &loaded.radar, &loaded.starts_s)
 }

@@ -106,6 +106,11 @@ pub fn stands_still(candidate: &Candidate) -> bool {
     is_one_of(candidate, &[effects::tx_leakage::ID, effects::static_reflector::ID])
 }
 
+/// Whether to undo it amplifies what other ranges leak into its own.
+pub fn is_filter(candidate: &Candidate) -> bool {
+    is_one_of(candidate, &paths::FILTERS)
+}
+
 /// Whether it explains a little of whatever is near the body.
 pub fn is_of_residual(candidate: &Candidate) -> bool {
     is_one_of(candidate, &OF_RESIDUAL)
@@ -134,14 +139,8 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
         && !apart(accepted.place.range_m, candidate.place.range_m)
         && !apart(accepted.place.velocity_mps, candidate.place.velocity_mps);
     let by_chirp = is_by_chirp(accepted) && is_path(candidate);
-    // How much the returns of each range turn when the radar moves is known roughly: sidebands are left of them; and large
-    // turns change how much is received.
-    let vibrates = accepted.id == Some(effects::radar_vibration::ID);
-    let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
-    // So of one return that is modulated, which reaches a little beyond its ranges.
-    let around = accepted.place.range_m.map(|[near, far]| [near - NEAR_M, far + NEAR_M]);
-    let modulated = accepted.behaves_like == Behaviour::Modulated && !apart(around, candidate.place.range_m);
-    let shaken = vibrates && (turns || is_path(candidate)) || modulated && is_path(candidate);
+    let vibrates = is_vibration(accepted);
+    let shaken = is_shaken(accepted, candidate);
     let fades = vibrates && candidate.id.is_none() && candidate.behaves_like == FADING;
     // A course from frame to frame that has no name is modelled roughly: what is left of it turns all returns, too; where the strongest
     // seems to move slowly, no other is strong enough to deny it.
@@ -162,9 +161,11 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let image = timed && is_one_of(candidate, &IMAGES);
     let hardly = timed && candidate.id == Some(effects::carried_reflector::ID);
     let products = is_product(accepted) && is_product(candidate);
-    // Bursts are cut out where they are plain: what they leave below the noise of single samples is in all receivers at once.
+    // Bursts are cut out where they are plain: what they leave below the noise of single samples is in all receivers at once, and has
+    // a spectrum of its own.
     let shared = candidate.behaves_like == Behaviour::NoiseSharedByReceivers;
     let bursts = accepted.behaves_like == Behaviour::SparseAdditive && shared;
+    let tails = accepted.behaves_like == Behaviour::SparseAdditive && is_of_noise(candidate);
     let path_like = accepted.behaves_like.is_path() && !elsewhere;
     let faint = path_like && (is_one_of(candidate, &FAINT) || shared || is_path(candidate));
     // What has no name is modelled roughly.
@@ -180,7 +181,7 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let unlike = is_by_chirp(accepted) && candidate.behaves_like == Behaviour::SparseAdditive;
     // Up to which share of what was gained.
     [
-        (roughly || fades || image || unlike, ROUGHLY),
+        (roughly || fades || image || unlike || tails, ROUGHLY),
         (bursts || behind || line || is_of_cut(accepted, candidate), 1.0),
         (hardly || uneven || bent || is_mixed(accepted, candidate) || products || alone || of_line, f64::INFINITY),
         (shaken || rest, SHAKEN),
@@ -188,6 +189,19 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     ]
     .into_iter()
     .any(|(holds, share)| holds && candidate.nats < share * accepted.nats)
+}
+
+fn is_vibration(candidate: &Candidate) -> bool {
+    candidate.id == Some(effects::radar_vibration::ID)
+}
+
+/// How much the returns of each range turn when the radar moves is known roughly: sidebands are left of them; and large turns change how
+/// much is received. So of one return that is modulated, which reaches a little beyond its ranges.
+fn is_shaken(accepted: &Candidate, candidate: &Candidate) -> bool {
+    let turns = candidate.id.is_none() && TURNS.contains(&candidate.behaves_like);
+    let around = accepted.place.range_m.map(|[near, far]| [near - NEAR_M, far + NEAR_M]);
+    let modulated = accepted.behaves_like == Behaviour::Modulated && !apart(around, candidate.place.range_m);
+    is_vibration(accepted) && (turns || is_path(candidate)) || modulated && is_path(candidate)
 }
 
 /// Whether it is in the noise as an accepted correction mixes it: to undo a coupling of receivers mixes their noise, and chirps read
@@ -252,6 +266,13 @@ mod tests {
         assert!(is_left_by(&unnamed, &vibration([26.85, 26.9])));
         assert!(!is_left_by(&unnamed, &vibration([27.1, 27.2])));
         assert!(!is_left_by(&vibration([26.8, 26.9]), &vibration([26.8, 26.9])));
+    }
+
+    #[test]
+    fn bursts_leave_a_little_noise_of_another_spectrum() {
+        let bursts = of(Some(effects::interference::ID), Behaviour::SparseAdditive, 1e4);
+        let colour = |gain: f64| of(Some(effects::coloured_noise::ID), Behaviour::NoiseOverBeatFrequency, gain);
+        assert!(is_left_by(&bursts, &colour(900.0)) && !is_left_by(&bursts, &colour(1100.0)));
     }
 
     #[test]

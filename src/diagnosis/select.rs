@@ -237,7 +237,9 @@ impl Rounds<'_> {
         let as_much = |&(id, gain): &(&str, f64)| candidate.id == Some(id) && candidate.nats > NEARLY * gain;
         let vibrates = effect.candidate.id == Some(effects::radar_vibration::ID);
         let of_receivers = is_of_receivers(candidate) && effect.candidate.id.is_some() || is_of_receivers(&effect.candidate);
-        (vibrates || of_receivers || candidate.id == Some(effects::spur::ID) || is_product(candidate) || is_of_noise(candidate))
+        // Bursts are noise with a spectrum of its own until they are cut out.
+        let of_noise = is_of_noise(candidate) && effect.candidate.behaves_like != Behaviour::SparseAdditive;
+        (vibrates || of_receivers || candidate.id == Some(effects::spur::ID) || is_product(candidate) || of_noise)
             && self.at_first.iter().flatten().any(as_much)
     }
 }

@@ -6,6 +6,10 @@ use statrs::function::beta::inv_beta_reg;
 /// Decibels of a natural logarithm of an amplitude.
 pub const DECIBEL: f64 = 20.0 / std::f64::consts::LN_10;
 
+/// Difference of two log-likelihoods, nats, that decides nothing between them: neither explains the data a hundred times as well (what is
+/// less is no decisive evidence: H. Jeffreys, Theory of Probability, 1961, appendix B).
+pub const UNDECIDED: f64 = 4.6;
+
 /// Scale of an exponential distribution from its lower `quantile` (between 0 and 1): large values do not count.
 pub fn exponential_scale(values: &mut [f64], quantile: f64) -> f64 {
     if values.is_empty() {

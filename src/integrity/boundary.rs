@@ -5,11 +5,14 @@
 //! steps. What begins with a frame (a receiver that settles) makes one step the largest, too, but changes as much from frame to frame;
 //! so the step must also exceed that between frames, which a boundary that is as stated does not: a sign test over frames. A step is what
 //! lasts: a burst of somebody else's radar in one loop, which may come as evenly as frames do, is none. Where frames begin at another
-//! loop of each stated frame, they are of another length (`frame_length`), and the same sign test holds.
+//! loop of each stated frame, they are of another length (`frame_length`), and the same sign test holds; where several were read as one or
+//! one as several, the laws of `frame_parts` hold.
 
 use num_complex::Complex32;
+use statrs::statistics::{Data, OrderStatistics};
 
 use super::frame_length::{OtherLength, other_length};
+use super::frame_parts::{Next, Other, Step, other_frames};
 use super::stream::{Schedule, Stream};
 use super::tails::{log_binomial_tail, log_same_place, most_frequent};
 use super::{ALARM, Finding, Inspector, Kind};
@@ -22,21 +25,20 @@ const ENDS: usize = 2;
 /// Fewest loops of a frame whose steps can be compared.
 const FEWEST_LOOPS: usize = 2 * ENDS + 1;
 
-/// The largest step of a frame.
-struct Step {
+/// The last frame that was seen.
+struct Last {
     frame: usize,
-    /// The loop before it.
-    place: usize,
-    size: f64,
-    /// The step to the next frame where that was seen.
-    next: Option<f64>,
+    /// Two loops before its largest step, and its last two.
+    before: [Vec<Complex32>; 2],
+    end: [Vec<Complex32>; 2],
+    /// Median of its steps.
+    usual: f64,
 }
 
 pub(super) struct Boundary {
     schedule: Schedule,
     steps: Vec<Step>,
-    /// Number and last two loops of the last frame.
-    last: Option<(usize, [Vec<Complex32>; 2])>,
+    last: Option<Last>,
 }
 
 impl Boundary {
@@ -57,11 +59,18 @@ impl Boundary {
         );
         (log_p < ALARM.ln()).then(|| Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p))
     }
+
+    /// Frames that were read as parts of one, or as several.
+    fn of_other_parts(&self) -> Option<Finding> {
+        let Other { loops, text, log_p } = other_frames(self.schedule.loops, &self.steps)?;
+        let found = format!("{text}, the number of loops is {loops}");
+        (log_p < ALARM.ln()).then(|| Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p))
+    }
 }
 
 /// How many steps are larger than those to the next frame, of how many.
 fn larger<'a>(steps: impl Iterator<Item = &'a Step>) -> (usize, usize) {
-    let against: Vec<bool> = steps.filter_map(|step| step.next.map(|next| step.size > next)).collect();
+    let against: Vec<bool> = steps.filter_map(|step| step.next.as_ref().map(|next| step.size > next.size)).collect();
     (against.iter().filter(|larger| **larger).count(), against.len())
 }
 
@@ -79,18 +88,24 @@ impl Inspector for Boundary {
             return;
         }
         let loops: Vec<&[Complex32]> = stream.loops().collect();
-        if let (Some((frame, last)), Some(before)) = (&self.last, self.steps.last_mut())
-            && frame + 1 == stream.frame
+        if let (Some(last), Some(before)) = (&self.last, self.steps.last_mut())
+            && last.frame + 1 == stream.frame
         {
-            before.next = Some(step([&last[0], &last[1], loops[0], loops[1]]));
+            let to_this = |from: &[Vec<Complex32>; 2]| step([&from[0], &from[1], loops[0], loops[1]]);
+            let (size, all) = (to_this(&last.end), to_this(&last.before));
+            // Half of the amplitude of the larger one of both steps, beyond any other one.
+            let lasts = all - last.usual > 0.25 * (before.size.max(size) - last.usual);
+            before.next = Some(Next { size, lasts });
         }
         let end = loops.len() - 1;
-        let around = |place: usize| [place - 1, place, place + 1, place + 2].map(|index| loops[index]);
-        let sizes = (1..end - 1).map(|place| (place, step(around(place))));
-        if let Some((place, size)) = sizes.max_by(|a, b| a.1.total_cmp(&b.1)) {
+        let sizes: Vec<f64> = (1..end - 1).map(|at| step([at - 1, at, at + 1, at + 2].map(|index| loops[index]))).collect();
+        let largest = sizes.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+        self.last = largest.map(|(at, size)| {
+            let place = at + 1;
             self.steps.push(Step { frame: stream.frame, place, size, next: None });
-        }
-        self.last = Some((stream.frame, [end - 1, end].map(|index| loops[index].to_vec())));
+            let owned = |from: usize| [from, from + 1].map(|index| loops[index].to_vec());
+            Last { frame: stream.frame, before: owned(place - 1), end: owned(end - 1), usual: Data::new(sizes).median() }
+        });
     }
 
     fn conclude(self: Box<Self>) -> Option<Finding> {
@@ -113,10 +128,11 @@ impl Inspector for Boundary {
             );
             return Some(Finding::wrong(Kind::Misread, CHECK, EXPECTED, found, log_p));
         }
-        if let Some(found) = self.of_another_length() {
+        if let Some(found) = self.of_another_length().or_else(|| self.of_other_parts()) {
             return Some(found);
         }
-        let after: Vec<bool> = self.steps.iter().filter_map(|step| step.next.map(|next| next > step.size)).collect();
+        let after: Vec<bool> =
+            self.steps.iter().filter_map(|step| step.next.as_ref().map(|next| next.size > step.size)).collect();
         let between = after.iter().filter(|larger| **larger).count();
         let found = format!("the scene changes more to the next frame than within it in {between} of {} frames", after.len());
         if log_binomial_tail(between, after.len(), 0.5) < ALARM.ln() {
@@ -169,6 +185,39 @@ mod tests {
             let found = seen_as(stated, 0, 0.0);
             assert!(found.is_refusal() && found.found.contains("where frames of 8 loops begin"), "{stated}: {found:?}");
         }
+    }
+
+    /// Boundaries in the middle of each frame, and at each second one's beginning.
+    #[test]
+    fn frames_read_as_one_or_in_parts_are_found() {
+        let as_one = seen_as(2 * LOOPS, 0, 0.0);
+        assert!(
+            as_one.is_refusal() && as_one.found.contains("2 frames were read as one, the number of loops is 8"),
+            "{as_one:?}"
+        );
+        // Of three, poses that never repeat.
+        let (drawn, poses) = (numbers(4, 48 * LOOPS * 16, -0.05, 0.05), numbers(3, 48, 0.0, 6.3));
+        let of_three = judged([16, 3 * LOOPS, 16], |frame, i| {
+            let index = frame * 3 * LOOPS + i / 16;
+            (0.4 * (i % 16) as f64 + poses[index / LOOPS] + 0.06 * (index % LOOPS) as f64).sin()
+                + drawn[frame * 3 * LOOPS * 16 + i]
+        });
+        assert!(of_three.is_refusal() && of_three.found.contains("3 frames were read as one"), "{of_three:?}");
+        // Frames of 16 loops, in two parts.
+        let drawn = numbers(5, 48 * LOOPS * 16, -0.05, 0.05);
+        let in_parts = judged([48, LOOPS, 16], |frame, i| {
+            let time = (frame * LOOPS + i / 16) as f64 * 0.01 + (frame / 2) as f64 * 0.37;
+            (0.4 * (i % 16) as f64 + 6.0 * time).sin() + drawn[frame * LOOPS * 16 + i]
+        });
+        assert!(in_parts.is_refusal() && in_parts.found.contains("frames of 16 loops were read in 2 parts"), "{in_parts:?}");
+    }
+
+    /// A receiver that changes in the middle of each frame and is again what it was when the next one begins.
+    #[test]
+    fn what_changes_within_each_frame_and_comes_back_is_no_boundary() {
+        let drawn = numbers(6, 60 * 16 * 16, -0.05, 0.05);
+        let found = judged([60, 16, 16], |frame, i| if i / 16 < 8 { 0.0 } else { 0.4 } + drawn[frame * 256 + i]);
+        assert!(!found.is_refusal(), "{found:?}");
     }
 
     /// Bursts in one loop of each frame, a loop later in each, come as evenly as frames of another length begin. What stays so until the

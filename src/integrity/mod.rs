@@ -14,6 +14,7 @@ mod copies;
 mod devices;
 mod exchange;
 mod frame_length;
+mod frame_parts;
 mod iq_order;
 mod lanes;
 mod mean_loop;

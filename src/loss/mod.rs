@@ -1,5 +1,5 @@
-//! The loss: how far two range-Doppler maps are apart in decibels (ℒ of the paper, sec. 3.4 and supplement 8), or how unlikely the
-//! measured one is under the simulated one.
+//! The loss: how unlikely the measured range-Doppler map is under the simulated one, or how far both are apart in decibels (ℒ of the
+//! paper, sec. 3.4 and supplement 8).
 
 mod likelihood;
 

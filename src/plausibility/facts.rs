@@ -29,6 +29,8 @@ pub struct Facts {
     pub motion: Option<Motion>,
     pub placement: Option<Placement>,
     pub root: Option<RootPath>,
+    /// Between two poses of the whole motion, median, where it has more than two.
+    pub pose_interval_s: Option<f64>,
     pub course: Option<Course>,
     /// The user keeps his word: a refusal does not keep later checks from looking.
     pub as_stated: bool,
@@ -99,11 +101,19 @@ impl Facts {
             facts.placement = Some(placement.clone());
         }
         let times_s = person.pose_times_s();
+        facts.pose_interval_s = interval_s(&times_s);
         let poses = poses_of_frames(&times_s, radar);
         facts.root = Some(RootPath::new(person, &times_s, poses.clone()));
         facts.course = Some(Course::new(person, &times_s, poses, radar.map_or([0.0; 3], Radar::centre_m), pose));
         facts
     }
+}
+
+/// Median step of more than two times.
+fn interval_s(times_s: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().filter(|_| steps.len() > 1)
 }
 
 /// The poses that the radar's frames need; all without a radar.

@@ -100,9 +100,9 @@ type Check = fn(&Facts) -> Vec<Finding>;
 
 /// All checks, in stages: what follows from a wrong unit is not reported beside it.
 const STAGES: [&[Check]; 6] = [
-    &[codes::unsigned, radar::frequencies, radar::times, radar::sweep, antennas::spacing],
+    &[codes::unsigned, radar::frequencies, radar::times, radar::sweep, radar::frame, antennas::spacing],
     &[body::length, body::faces_outwards, body::longest_upwards],
-    &[motion::angles],
+    &[motion::angles, motion::rate],
     &[motion::speed_of_the_root],
     &[motion::speed_of_limbs, motion::upright],
     &[place::unambiguous_range, place::in_front, place::in_the_room, place::on_the_floor, place::unambiguous_velocity],

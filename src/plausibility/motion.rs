@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use super::facts::{minus, norm};
-use super::units::{LENGTHS, likely};
+use super::units::{LENGTHS, Unit, likely};
 use super::{Facts, Finding, Kind, Part};
 use crate::person::JOINT_NAMES;
 
@@ -13,6 +13,9 @@ const FASTEST_RUN_MPS: f64 = 12.42;
 /// A hand is no faster than what it throws: the fastest pitch on record, 105.8 mph (Aroldis Chapman 2010, Guinness World
 /// Records). Kicks and punches are slower.
 const FASTEST_HAND_MPS: f64 = 47.3;
+/// Seconds between two poses: half a step of a walk, and the fastest cameras of motion capture.
+const STEPS_S: [f64; 2] = [0.5e-3, 0.5];
+const TIMES: [Unit; 2] = [("ms", 1e-3), ("us", 1e-6)];
 /// From a shuffle to a run: how fast a person usually goes, for telling units apart.
 const USUAL_MPS: [f64; 2] = [0.05, 8.0];
 
@@ -42,6 +45,30 @@ pub fn angles(facts: &Facts) -> Vec<Finding> {
         Finding::new(Kind::Refuse, Part::Motion, "poses", found, "axis-angles in radians, of one turn at most")
             .with_hint(format!("in degrees it would be {:.2} rad: multiply the poses by pi / 180", largest.to_radians())),
     ]
+}
+
+/// Poses follow each other so that steps of a walk, one or two a second (M. P. Murray et al., J. Bone Joint Surg. 46-A, 1964), show, and no
+/// faster than any motion capture.
+pub fn rate(facts: &Facts) -> Vec<Finding> {
+    let Some(step) = facts.pose_interval_s else { return vec![] };
+    if (STEPS_S[0]..=STEPS_S[1]).contains(&step) {
+        return vec![];
+    }
+    let (field, part) = match facts.motion {
+        Some(_) => ("mocap_framerate", Part::Motion),
+        None => ("pose_times", Part::Body),
+    };
+    let found = format!("a pose every {step:.4} s, {:.4} a second", 1.0 / step);
+    let expected = format!("{:.0} to {:.0} poses a second", 1.0 / STEPS_S[1], 1.0 / STEPS_S[0]);
+    let finding = Finding::new(Kind::Refuse, part, field, found, expected);
+    vec![match likely(step, &TIMES, STEPS_S) {
+        _ if facts.motion.is_some() && (STEPS_S[0]..=STEPS_S[1]).contains(&(1.0 / step)) => finding
+            .with_hint(format!("a frame time where a rate is expected? as a frame time it would be {step:.2} poses a second")),
+        Some((unit, factor)) => {
+            finding.with_hint(format!("in {unit} it would be one every {:.4} s: multiply the times by {factor}", step * factor))
+        }
+        None => finding.with_hint("correct the frame rate, or the frame time"),
+    }]
 }
 
 /// Nobody is faster than the fastest runner.
@@ -150,6 +177,23 @@ mod tests {
         let positions_m = (0..20).map(|pose| [0.0, step_m * pose as f64, 0.0]).collect();
         let times_s = (0..20).map(|pose| pose as f64 / 30.0).collect();
         Facts { root: Some(RootPath { times_s, positions_m }), ..Facts::default() }
+    }
+
+    #[test]
+    fn times_in_milliseconds_and_a_frame_time_for_a_rate_are_recognised() {
+        let of = |step: f64, motion: bool| {
+            let facts = if motion { moving(vec![]) } else { Facts::default() };
+            rate(&Facts { pose_interval_s: Some(step), ..facts })
+        };
+        for step in [1.0 / 240.0, 1.0 / 30.0, 0.2] {
+            assert!(of(step, true).is_empty() && of(step, false).is_empty());
+        }
+        let meshes = &of(100.0, false)[0];
+        assert!(meshes.field == "pose_times" && meshes.hint.as_ref().unwrap().contains("in ms it would be one every 0.1000 s"));
+        let motion = &of(60.0, true)[0];
+        assert!(motion.kind == Kind::Refuse && motion.field == "mocap_framerate", "{motion:?}");
+        assert!(motion.hint.as_ref().unwrap().contains("as a frame time it would be 60.00 poses a second"), "{motion:?}");
+        assert!(rate(&Facts::default()).is_empty());
     }
 
     #[test]

@@ -78,6 +78,21 @@ pub fn sweep(facts: &Facts) -> Vec<Finding> {
     window(radar).or_else(|| bandwidth(radar)).into_iter().collect()
 }
 
+/// A frame ends before the next one starts.
+pub fn frame(facts: &Facts) -> Vec<Finding> {
+    let overlaps = |radar: &&Radar| radar.frames > 1 && radar.frame_duration_s() > radar.frame_period_s * (1.0 + 1e-9);
+    let Some(radar) = facts.radar.as_ref().filter(overlaps) else { return vec![] };
+    let frame_s = radar.frame_duration_s();
+    let found = format!("{}, so that a frame's chirps take {:.4} ms", radar.chirp_period_s, 1e3 * frame_s);
+    let expected = format!("a frame within its {:.4} ms", 1e3 * radar.frame_period_s);
+    let finding = Finding::new(Kind::Note, Part::Settings, "radar.chirp_period_s", found, expected);
+    vec![
+        finding.with_hint(
+            "chirp_period_s is from one ramp's start to the next, whoever transmits; frame_period_s from frame to frame",
+        ),
+    ]
+}
+
 fn window(radar: &Radar) -> Option<Finding> {
     let window_s = radar.samples_per_chirp as f64 / radar.sample_rate_hz;
     if window_s <= radar.chirp_period_s {
@@ -171,6 +186,14 @@ mod tests {
         told(times, &with(|radar| radar.chirp_period_s = 72.0), "radar.chirp_period_s", "in us it would be 7.2e-5 s");
         told(times, &with(|radar| radar.adc_start_s = 6.0), "radar.adc_start_s", "in us it would be 6e-6 s");
         told(times, &with(|radar| radar.frame_period_s = 100.0), "radar.frame_period_s", "in ms it would be 1e-1 s");
+    }
+
+    #[test]
+    fn frames_that_overlap_are_said() {
+        assert!(frame(&with(|radar| radar.frame_period_s = radar.frame_duration_s())).is_empty());
+        let found = &frame(&with(|radar| radar.chirp_period_s *= 1000.0))[0];
+        assert!(found.kind == Kind::Note && found.field == "radar.chirp_period_s", "{found:?}");
+        assert!(found.found.contains("a frame's chirps take") && found.expected.contains("100.0000 ms"), "{found:?}");
     }
 
     #[test]

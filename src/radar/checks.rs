@@ -87,6 +87,9 @@ impl Radar {
         if !(self.adc_start_s.is_finite() && self.adc_start_s >= 0.0) {
             return Err(Error::setting(format!("{key}.adc_start_s"), self.adc_start_s, "zero or a positive number"));
         }
+        if let Some(codes) = self.full_scale_codes.filter(|codes| !(codes.is_finite() && *codes >= 1.0)) {
+            return Err(Error::setting(format!("{key}.full_scale_codes"), codes, "the converter's largest code, 1 or more"));
+        }
         for (field, count, most) in [
             ("samples_per_chirp", self.samples_per_chirp, MOST_TRANSFORMED),
             ("loops_per_frame", self.loops_per_frame, MOST_TRANSFORMED),

@@ -9,7 +9,10 @@
 
 use std::f64::consts::LN_2;
 
-use burn::{module::Module, tensor::Tensor};
+use burn::{
+    module::Module,
+    tensor::{Device, Tensor},
+};
 
 use super::{FrameId, LoadedRecording, prepared::Prepared};
 use crate::{
@@ -64,6 +67,10 @@ pub fn fit_levels(
         levels.add(&plain, &recordings[id.recording], id.frame, &surfaces[id.recording], transform, heatmap)?;
     }
     levels.check()?;
+    let noise = match noise_between(recordings, prepared, &looked_at, heatmap, &simulator.device())? {
+        Some(noise) => noise,
+        None => levels.noise / levels.frames,
+    };
     let ratio = |measured: f64, simulated: f64| (measured > 0.0 && simulated > 0.0).then(|| (measured / simulated).sqrt());
     let body = ratio(levels.measured_moving, levels.simulated_moving);
     let room = ratio(levels.measured_clutter, levels.simulated_clutter);
@@ -87,12 +94,36 @@ pub fn fit_levels(
         let clean = plain.clean_signal(scene, &*scene.view(id.frame)?, &surfaces[id.recording]);
         amplitude += f64::from((clean.power() + 1e-30).sqrt().mean().into_scalar::<f32>());
     }
-    if levels.noise > 0.0 && amplitude > 0.0 {
-        let deviation = (levels.noise / levels.frames).sqrt();
+    if noise > 0.0 && amplitude > 0.0 {
+        let deviation = noise.sqrt();
         let device = simulator.device();
         simulator.noise = simulator.noise.starting_at(deviation / (amplitude / levels.frames), deviation, &device);
     }
     Ok(simulator)
+}
+
+/// Noise variance of one component of a sample, of frames of one chirp, which no other chirp tells apart from what stands still: of what
+/// differs between two frames, in the median cell. None where frames have more chirps, or nothing to compare with.
+fn noise_between(
+    recordings: &[LoadedRecording],
+    prepared: &[Prepared],
+    frames: &[FrameId],
+    heatmap: &HeatmapConfig,
+    device: &Device,
+) -> Result<Option<f64>> {
+    let (mut sum, mut pairs) = (0.0, 0.0);
+    for pair in frames.windows(2).filter(|pair| pair[0].recording == pair[1].recording) {
+        let recording = &recordings[pair[0].recording];
+        let radar = &recording.scene.radar;
+        if radar.loops_per_frame > 1 {
+            continue;
+        }
+        let change = recording.target(pair[1].frame, device)?.sub(recording.target(pair[0].frame, device)?);
+        let powers = values(prepared[pair[0].recording].loss.transform().map(change).power());
+        sum += 0.5 * median(&powers) / LN_2 / heatmap.noise_gain(radar);
+        pairs += 1.0;
+    }
+    Ok((pairs > 0.0).then(|| sum / pairs))
 }
 
 /// The surfaces of every recording, which the gains do not change.

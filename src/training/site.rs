@@ -71,7 +71,7 @@ impl LoadedRecording {
             format!("from {start:.3} s to {end:.3} s"),
             format!("a motion over all frames, from {first_s:.3} s to {last_s:.3} s"),
         )
-        .with_hint("lower radar.frames, give a longer motion, or shift it with motion.start_s"))
+        .with_hint("give a longer motion, or shift it with motion.start_s (no sequence of meshes has one), which `hybridsim align` finds"))
     }
 
     /// The measured samples of a frame, `[tx, rx, loop, sample]`.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Notice, Notify, claimed, plausible};
+use super::{Notice, Notify, claimed_for, plausible};
 use crate::{
     alignment::{self, Alignment, Search, Verdict, tracks::Track},
     data::{Recording, atomic, recording::SETTINGS_FILE, write_placement},
@@ -31,7 +31,7 @@ const STEPS: usize = 4;
 /// A recording without a body, with falling chirps or damaged samples; meshes where the placement is to be written; a folder that cannot
 /// be written.
 pub fn align(what: &Align<'_>, notify: &mut Notify<'_>) -> Result<Alignment> {
-    let _claim = claimed(what.out)?;
+    let _claim = claimed_for(what.out, "align.json")?;
     for earlier in ["align.json", "align.png", "motion.toml"].map(|name| what.out.join(name)) {
         if earlier.exists() {
             std::fs::remove_file(&earlier).map_err(|error| Error::write(&earlier, error))?;

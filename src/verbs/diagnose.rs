@@ -4,7 +4,7 @@ use std::path::Path;
 
 use burn::tensor::Device;
 
-use super::{Notice, Notify, claimed, plausible};
+use super::{Notice, Notify, claimed_for, plausible};
 use crate::{
     config::Config,
     data::{Recording, atomic, files},
@@ -36,7 +36,7 @@ pub fn diagnose(what: &Diagnose<'_>, device: &Device, as_stated: bool, notify: &
     if let Some(checkpoint) = what.checkpoint {
         checkpoint::read_state(checkpoint)?;
     }
-    let _claim = claimed(what.out)?;
+    let _claim = claimed_for(what.out, "report.json")?;
     for earlier in ["report.json", "report.html"].map(|name| what.out.join(name)) {
         if earlier.exists() {
             std::fs::remove_file(&earlier).map_err(|error| Error::write(&earlier, error))?;

@@ -26,7 +26,7 @@ use std::path::Path;
 
 use crate::{
     data::{Claim, atomic},
-    error::Result,
+    error::{Error, Result},
     experiments, training,
 };
 
@@ -59,6 +59,29 @@ pub enum Notice<'a> {
 
 /// Who receives it.
 pub type Notify<'a> = dyn FnMut(Notice<'_>) + 'a;
+
+/// What a folder holds, by a file that no other verb writes.
+const HOLDS: [(&str, &str); 5] = [
+    ("recording.toml", "a recording"),
+    ("config.toml", "a training run"),
+    ("report.json", "a diagnosis"),
+    ("align.json", "an alignment"),
+    ("metrics.json", "an evaluation"),
+];
+
+/// The same for results of which `own` is such a file, which may be replaced by results of their kind alone.
+///
+/// # Errors
+/// A folder that holds something else.
+pub fn claimed_for(folder: &Path, own: &str) -> Result<Claim> {
+    if let Some((_, what)) = HOLDS.iter().find(|(file, _)| *file != own && folder.join(file).is_file()) {
+        return Err(Error::Usage {
+            message: format!("{}: holds {what}, which would be mixed with other results", folder.display()),
+            hint: Some("choose another folder with --out".into()),
+        });
+    }
+    claimed(folder)
+}
 
 /// A folder that results are added to, made and tried before the work; nobody else works there until this is dropped.
 pub fn claimed(folder: &Path) -> Result<Claim> {

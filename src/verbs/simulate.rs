@@ -67,6 +67,33 @@ pub struct Simulate {
     pub without: Without,
 }
 
+impl Simulate {
+    /// Refuses what would change nothing, or nobody can mean.
+    fn check(&self) -> Result<()> {
+        let refused = |message: &str, hint: &str| Err(Error::Usage { message: message.into(), hint: Some(hint.into()) });
+        let of_recording = "leave it out, or name a motion (--motion) or an action (--action)";
+        match self.distance_m {
+            Some(distance_m) if !distance_m.is_finite() => {
+                return Err(Error::setting("distance", distance_m, "metres in front of the radar"));
+            }
+            Some(_) if matches!(self.what, What::Recording(_)) => {
+                return refused("--distance: the person of a recording stays where it is", of_recording);
+            }
+            _ => {}
+        }
+        if self.body.is_some() && matches!(self.what, What::Recording(_)) {
+            return refused("--body: a recording has a body of its own", of_recording);
+        }
+        if self.clean && self.only.is_some() {
+            return refused("--clean: one part alone has noise only where that is asked for", "leave out --clean, or --only");
+        }
+        if self.frames == Some(0) {
+            return Err(Error::setting("frames", 0, "at least 1"));
+        }
+        Ok(())
+    }
+}
+
 /// Effects of a checkpoint that are left out.
 #[derive(Clone, Debug, Default)]
 pub struct Without {
@@ -116,6 +143,7 @@ impl Ready {
     /// # Errors
     /// A checkpoint, motion, body or recording that cannot be read, or cannot be meant; more frames than the motion lasts.
     pub fn new(asked: &Simulate, device: &Device, as_stated: bool, notify: &mut Notify<'_>) -> Result<Self> {
+        asked.check()?;
         let (mut simulator, state) = checkpoint::open(&asked.checkpoint, device)?;
         asked.without.switch_off(&mut simulator)?;
         if let Some(part) = asked.only {

@@ -106,6 +106,8 @@ def simulate(
     if isinstance(recording, Recording):
         recording = recording.folder
     every = without_effects is True
+    if isinstance(without_effects, str):
+        without_effects = [without_effects]
     without = [] if isinstance(without_effects, bool) else list(without_effects)
     with Notifier(progress) as notify:
         about, numbers = _hybridsim.simulate(

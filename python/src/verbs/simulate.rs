@@ -80,6 +80,12 @@ fn what(
     action: Option<String>,
     recording: Option<PathBuf>,
 ) -> hybridsim::Result<What> {
+    if motion.is_none() && (up.is_some() || motion_config.is_some()) {
+        return Err(Error::Usage {
+            message: "up, motion_config: no motion's file is read".into(),
+            hint: Some("name it with motion, or leave them out".into()),
+        });
+    }
     match (motion, action, recording) {
         (Some(path), None, None) => {
             let up = up.map(|name| named("up", &name, UpAxis::ALL, |axis: &UpAxis| axis.name())).transpose()?;

@@ -1,6 +1,7 @@
 //! The rows of the result: what is asked of which cases, and how the answers fared.
 
 use super::Case;
+use super::usual::Scale;
 use crate::challenge::baselines::{TEMPLATES, quantile};
 use crate::challenge::config::Stratum;
 use crate::challenge::psychometric::Logistic;
@@ -232,28 +233,25 @@ fn baseline_rows(cases: &[Case], nulls: &[&Case], singles: &[&Case], concealed: 
     let over_nulls =
         |of: &dyn Fn(&Case) -> Option<f64>| quantile(&nulls.iter().filter_map(|case| of(case)).collect::<Vec<_>>(), part);
     let strong: Vec<&&Case> = singles.iter().filter(|case| case.d_prime() >= OBVIOUS_D_PRIME).collect();
-    // Each template on the scale of its own nulls: by the middle and the spread of their logarithms, not by their largest,
-    // beyond which one of many templates soon is.
-    let scales: Vec<[f64; 2]> = (0..TEMPLATES.len())
-        .map(|k| {
-            let logs: Vec<f64> =
-                nulls.iter().filter_map(|case| Some(case.baseline.as_ref()?.templates[k].max(1e-3).ln())).collect();
-            let [low, centre, high] = [0.16, 0.5, 0.84].map(|part| quantile(&logs, part));
-            [centre, (0.5 * (high - low)).max(0.1)]
-        })
-        .collect();
-    let beyond = |k: usize, value: f64| (value.max(1e-3).ln() - scales[k][0]) / scales[k][1];
+    // Everything on the scale of a structure's own nulls: by their middle and spread, not by their largest, beyond which one of many
+    // templates soon is; templates by their logarithms.
+    let of_template = |case: &Case, k: usize| Some(case.baseline.as_ref()?.templates[k].max(1e-3).ln());
+    let scales: Vec<Scale> = (0..TEMPLATES.len()).map(|k| Scale::of(cases, |case| of_template(case, k), 0.1)).collect();
+    let beyond = |case: &Case, k: usize, value: f64| scales[k].place(case, value.max(1e-3).ln());
     let best = |case: &Case| -> Option<(usize, f64)> {
-        let all = case.baseline.as_ref()?.templates.iter().enumerate().map(|(k, &value)| (k, beyond(k, value)));
+        let all =
+            case.baseline.as_ref()?.templates.iter().enumerate().filter_map(|(k, &value)| Some((k, beyond(case, k, value)?)));
         all.max_by(|a, b| a.1.total_cmp(&b.1))
     };
     let sparse = |case: &Case| -> Option<(usize, f64)> {
-        let picked = case.baseline.as_ref()?.sparse.iter().map(|&(k, gain)| (k, beyond(k, gain)));
+        let picked = case.baseline.as_ref()?.sparse.iter().filter_map(|&(k, gain)| Some((k, beyond(case, k, gain)?)));
         // Nothing picked is as far from an alarm as can be.
         Some(picked.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::MIN)))
     };
-    let global = |case: &Case| case.before.db_mse;
-    let chi2 = |case: &Case| case.baseline.as_ref().map(|b| b.chi2);
+    let (error, misfit) = (|case: &Case| case.before.db_mse, |case: &Case| Some(case.baseline.as_ref()?.chi2));
+    let [errors, misfits] = [Scale::of(cases, error, f64::MIN_POSITIVE), Scale::of(cases, misfit, f64::MIN_POSITIVE)];
+    let global = |case: &Case| errors.place(case, error(case)?);
+    let chi2 = |case: &Case| misfits.place(case, misfit(case)?);
     let mut rows = vec![];
     let mut add = |name: &str, value: &dyn Fn(&Case) -> Option<f64>, pick: Option<Pick>| {
         let limit = over_nulls(value);
@@ -273,7 +271,9 @@ fn baseline_rows(cases: &[Case], nulls: &[&Case], singles: &[&Case], concealed: 
             rows.push(share(format!("{name}: planted alarms with a wrong name"), wrong, Aim::None));
         }
     };
-    add("baseline, error of the trained simulator", &global, None);
+    let is_trained = cases.iter().any(|case| case.report.as_ref().is_some_and(|report| report.simulator.is_some()));
+    let of = if is_trained { "trained simulator" } else { "prediction without training" };
+    add(&format!("baseline, error of the {of}"), &global, None);
     add("baseline, χ² outside the scene", &chi2, None);
     add("baseline, templates one by one", &|case| best(case).map(|(_, ratio)| ratio), Some(&best));
     add("baseline, sparse regression", &|case| sparse(case).map(|(_, ratio)| ratio), Some(&sparse));

@@ -11,7 +11,7 @@ use super::with_mode;
 use crate::data::claim::Claim;
 use crate::data::entries::is_hidden;
 use crate::data::leftovers::{OLD, PARTIAL, READY, locked, move_out, named, parent_of, prefix, remove_beside, siblings, sweep};
-use crate::data::unfinished::{Undo, publish};
+use crate::data::unfinished::{Undo, publish, remove_in_use};
 use crate::error::{Error, Result};
 
 /// A folder that is filled under a temporary name and appears under its own when `finish` is called.
@@ -90,7 +90,7 @@ impl AtomicFolder {
         let path = |folder: &TempDir| folder.path().to_path_buf();
         let (folder, lock) = locked(make, |folder| File::open(folder.path()), path).map_err(write_error)?;
         let doomed = folder.path().to_path_buf();
-        let undo = Undo::by(move || drop(fs::remove_dir_all(doomed)));
+        let undo = Undo::by(move || remove_in_use(&doomed));
         Ok(Self { target: target.to_path_buf(), folder, _lock: lock, how, _undo: undo, _claim: claim })
     }
 

@@ -52,8 +52,17 @@ impl Recording {
     /// Reads everything but the samples, and checks the samples' header against the radar.
     pub fn open(folder: impl AsRef<Path>) -> Result<Self> {
         let folder = folder.as_ref();
-        // The settings themselves are a good name for the folder, too.
-        let folder = if folder.is_file() { folder.parent().unwrap_or(Path::new("")) } else { folder };
+        // The settings themselves are a good name for the folder, too; no other file of it is.
+        let folder = match folder.file_name() {
+            Some(name) if folder.is_file() && name == SETTINGS_FILE => folder.parent().unwrap_or(Path::new("")),
+            Some(_) if folder.is_file() => {
+                return Err(Error::field(folder, "type", "a file", format!("a recording's folder, or its {SETTINGS_FILE}"))
+                    .with_hint(
+                        "`hybridsim check FILE` says what a file is; `hybridsim import` makes recordings of raw captures",
+                    ));
+            }
+            _ => folder,
+        };
         let path = folder.join(SETTINGS_FILE);
         let settings = RecordingSettings::read(&path)?;
         let samples = IfFile::open(folder.join(&settings.files.samples), &settings.radar)?;

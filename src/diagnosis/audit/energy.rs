@@ -6,7 +6,7 @@ use crate::diagnosis::statistics::ratio_tail;
 use crate::radar::Radar;
 
 /// Doppler cells about zero that static clutter leaks into.
-const CLUTTER_CELLS: f64 = 2.5;
+pub(super) const CLUTTER_CELLS: f64 = 2.5;
 
 /// Count, sum, and sum of squares of ln power over the noise.
 #[derive(Clone, Copy, Debug, Default)]

@@ -95,6 +95,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let last = (bin..bins).take_while(|&bin| above(bin)).last()?;
     if p_value > SURE
         || !fills(evidence, bin)
+        || !stays(evidence, bin)
         || !floor.is_alone(bin, [first, last])
         || chance_of_independent_receivers(evidence, bin) > SURE
     {
@@ -156,6 +157,19 @@ fn fills(evidence: &Evidence, bin: usize) -> bool {
         })
     };
     training.chunks(training.len().div_ceil(PARTS)).all(in_frames)
+}
+
+/// Whether it is strongest at that range in each part of the recording: what turns or flutters stays, a tone of somebody else may wander.
+fn stays(evidence: &Evidence, bin: usize) -> bool {
+    let training = &evidence.split.training;
+    let strongest = |frames: &[usize]| {
+        let mean = mean_map(evidence, frames);
+        let level = |bin: &usize| floor(evidence, &mean, *bin, 1).unwrap_or(0.0);
+        (0..evidence.range_bins()).max_by(|a, b| level(a).total_cmp(&level(b)))
+    };
+    training
+        .chunks(training.len().div_ceil(PARTS))
+        .all(|frames| strongest(frames).is_some_and(|other| other.abs_diff(bin) <= HANN_LOBE))
 }
 
 /// Chance of what the receivers share at a range if each had noise of its own: of the best pair of channels, whose squared coherence
@@ -232,6 +246,23 @@ mod tests {
             let found = find(&evidence(false, common, noise));
             assert!(found.is_empty(), "{common} {noise}: {found:?}");
         }
+    }
+
+    /// Of a phase of its own in every chirp, as of somebody else's transmitter.
+    #[test]
+    fn a_tone_that_wanders_is_no_fan() {
+        let radar = Radar { samples_per_chirp: SAMPLES, loops_per_frame: 32, ..Radar::small(8) };
+        let seen = |bins_per_frame: f64| {
+            let mut random = ChaCha8Rng::seed_from_u64(9);
+            let turns: Vec<f64> = (0..8 * 32).map(|_| random.random::<f64>()).collect();
+            find(&Evidence::in_noise(radar.clone(), 7, |[frame, _, index, n]| {
+                let tone = |bin: f64, level: f64| Complex64::from_polar(level, TAU * bin * n as f64 / SAMPLES as f64);
+                let other = tone(5.0 + bins_per_frame * frame as f64, 14.0) * Complex64::cis(TAU * turns[frame * 32 + index]);
+                other + tone(14.0, 40.0) + tone(22.0, 30.0) + tone(28.0, 25.0)
+            }))
+        };
+        assert!(!seen(0.0).is_empty());
+        assert!(seen(1.0).is_empty(), "{:?}", seen(1.0));
     }
 
     /// Two who cross one range, one after the other, fast and slow.

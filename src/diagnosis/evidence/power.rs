@@ -104,6 +104,11 @@ impl PowerModel {
         &self.support[frame]
     }
 
+    /// Cells in which points of the body are predicted, however much they return: of a body that stands, static clutter hides that.
+    pub fn predicted(&self, frame: usize) -> impl Iterator<Item = usize> {
+        self.lobes[frame].iter().flat_map(|part| part.cells.iter().map(|&cell| cell as usize))
+    }
+
     /// Cells that mean something, `[doppler, range]`: away from static clutter, and in range of the receiver.
     pub fn usable(&self) -> &[bool] {
         &self.usable

@@ -54,6 +54,11 @@ impl Null {
         }
     }
 
+    /// With what nothing was fitted to alone of what is beside the body.
+    pub fn of_held_out(self) -> Self {
+        Self { beside: self.beside_held_out, ..self }
+    }
+
     /// Of all together. None where nothing was asked.
     pub fn p_value(&self) -> Option<f64> {
         let tests: Vec<f64> = [self.beside, self.along_chirp, self.between_receivers].into_iter().flatten().collect();

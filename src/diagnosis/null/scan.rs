@@ -26,8 +26,11 @@ const DRAWS: u64 = 99;
 const FEWEST_LOOPS: usize = 8;
 /// Quantile that the noise's level is taken from: large values do not count.
 const QUANTILE: f64 = 0.35;
-/// Neighbouring range bins that share a level.
-const NEIGHBOURS: usize = 5;
+/// Range bins to either side that share a level, at most.
+const MOST_BESIDE: usize = 2;
+/// Cells that a level is taken from where so many are near: its deviation is then (q / (1 − q) / n)^½ / −ln(1 − q), a sixth. Fewer bins
+/// share one then, as what an inverted law makes of the noise may be steep.
+const ENOUGH: usize = 100;
 /// Complex values that are looked at, at most: whole frames, evenly spread.
 const MOST_VALUES: usize = 4_000_000;
 /// Squared correlation of cells under a Hann window that are one and two apart.
@@ -159,9 +162,14 @@ impl Cells {
                     }
                 }
             }
+            let near = |range: usize, beside: usize| -> Vec<f64> {
+                let bins = (0..(2 * beside + 1).min(bins)).map(|i| (range + bins + i - beside.min(bins / 2)) % bins);
+                bins.flat_map(|range| powers[range].iter().copied()).collect()
+            };
             let level = |range: usize| {
-                let near = (0..NEIGHBOURS.min(bins)).map(|i| (range + bins + i - NEIGHBOURS.min(bins) / 2) % bins);
-                exponential_scale(&mut near.flat_map(|range| powers[range].iter().copied()).collect::<Vec<f64>>(), QUANTILE)
+                let mut widths = (0..=MOST_BESIDE).map(|beside| near(range, beside));
+                let enough = widths.find(|powers| powers.len() >= ENOUGH);
+                exponential_scale(&mut enough.unwrap_or_else(|| near(range, MOST_BESIDE)), QUANTILE)
             };
             let own: Vec<f64> = (0..bins).map(level).collect();
             // Where the body always is, nothing tells the level; nothing is asked there in these frames either.

@@ -13,11 +13,12 @@ use super::bearing::{Bearing, PHASE_FLOOR_RAD, Sums, along, bearing};
 use super::cells::{Cells, used};
 use super::change::{Change, Moves};
 use super::covariance::Array;
-use super::found::{AS_WELL, Found, UNEVEN};
+use super::found::{Found, UNEVEN};
 use super::{coupling, mismatch, places, skew};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::detectors::clutter::{clutter_power, energy_beyond_noise};
 use crate::diagnosis::power::{PowerModel, part_templates};
+use crate::diagnosis::statistics::UNDECIDED;
 use crate::diagnosis::{BodyPrediction, Candidate, Estimate, Evidence, Place};
 use crate::effects::{self, Stage};
 
@@ -108,7 +109,7 @@ fn best(mut found: Vec<Found>) -> Option<Candidate> {
     let each: Vec<_> = found.iter().map(|found| (found.candidate.id, found.likelihood)).collect();
     let unlikely = found.into_iter().filter(|found| found.candidate.p_value < UNLIKELY);
     let Found { candidate: mut best, likelihood, .. } = unlikely.max_by(|a, b| a.likelihood.total_cmp(&b.likelihood))?;
-    let alike = each.iter().filter(|(id, other)| *id != best.id && *other > likelihood - AS_WELL);
+    let alike = each.iter().filter(|(id, other)| *id != best.id && *other > likelihood - UNDECIDED);
     best.look_alikes.extend(alike.filter_map(|(id, _)| *id));
     best.look_alikes.sort_unstable();
     best.look_alikes.dedup();

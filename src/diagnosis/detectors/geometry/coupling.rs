@@ -1,10 +1,11 @@
 //! Mutual coupling of neighbouring receivers: the inner ones have two neighbours, the outer ones one.
 
+use crate::diagnosis::statistics::UNDECIDED;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::covariance::Array;
-use super::found::{AS_WELL, Found, LOOKS, UNEVEN};
+use super::found::{Found, LOOKS, UNEVEN};
 use super::mismatch;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::estimated::Estimated;
@@ -46,7 +47,7 @@ pub fn one_way(evidence: &Evidence, array: &Array, alike: Option<&Found>) -> Opt
         Some((side, coupling[index], found, coupling))
     });
     let (side, strength, found, coupling) = either.max_by(|a, b| a.2.likelihood.total_cmp(&b.2.likelihood))?;
-    if alike.is_some_and(|alike| alike.likelihood > found.likelihood - AS_WELL) {
+    if alike.is_some_and(|alike| alike.likelihood > found.likelihood - UNDECIDED) {
         return None;
     }
     let (both, _) = estimate(array, &[&[0], &[1], &[2], &[3]])?;

@@ -5,10 +5,11 @@
 //! power model does not know shifts the body by up to 4 mm and 1.4 ms (practice recordings without any such effect, which also
 //! helped to choose the lobes and these floors): a change must exceed these floors, frame after frame.
 
+use crate::diagnosis::statistics::UNDECIDED;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::change::{Change, Moves, frame_period_s};
-use super::fitted::{ALIKE_NATS, Fitted, refine};
+use super::fitted::{Fitted, refine};
 use super::lost::{is_step, lost_frames, predicted, ratio_p_value, step_p_value};
 use super::replica;
 use super::trial::{Score, Trial};
@@ -32,7 +33,7 @@ const RANGE_GRID_M: [f64; 11] = [-0.4, -0.3, -0.2, -0.12, -0.06, 0.0, 0.06, 0.12
 const CLOCK_GRID: [f64; 19] =
     [-3.0, -2.6, -2.2, -1.8, -1.4, -1.0, -0.6, -0.3, -0.15, 0.0, 0.15, 0.3, 0.6, 1.0, 1.4, 1.8, 2.2, 2.6, 3.0];
 /// Rates of clocks looked at first.
-const DRIFT_GRID: [f64; 7] = [-0.1, -0.03, -0.01, 0.0, 0.01, 0.03, 0.1];
+const DRIFT_GRID: [f64; 11] = [-0.35, -0.2, -0.1, -0.03, -0.01, 0.0, 0.01, 0.03, 0.1, 0.2, 0.35];
 /// Standard deviation of a displacement across the line of sight, which ranges do not show.
 const UNSEEN_M: f64 = 0.2;
 /// Kinds of change that are distinguishable, for the correction of the p-value.
@@ -135,7 +136,7 @@ fn best<'a>(trial: &Trial, fitted: &'a [Fitted], null: &Score) -> Option<&'a Fit
     ordered.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
     let leads = |fit: &&&Fitted| is_step(trial, fit);
     let best = *ordered.iter().find(leads)?;
-    let close = |other: &&&Fitted| (gain(best) - gain(other)) / best.inflation < ALIKE_NATS;
+    let close = |other: &&&Fitted| (gain(best) - gain(other)) / best.inflation < UNDECIDED;
     let named = |fit: &&&Fitted| trial.evidence.info(fit.id).is_some();
     let best_named = ordered.iter().take_while(close).filter(named).find(leads);
     Some(best_named.unwrap_or(&best))
@@ -145,7 +146,7 @@ fn best<'a>(trial: &Trial, fitted: &'a [Fitted], null: &Score) -> Option<&'a Fit
 fn look_alikes(trial: &Trial, fitted: &[Fitted], best: &Fitted) -> Vec<&'static str> {
     let evidence = trial.evidence;
     let every: Vec<usize> = (0..evidence.cube.dims[0]).collect();
-    let close = |fit: &&Fitted| fit.id != best.id && best.score.gain_over(&fit.score, &every) / best.inflation < ALIKE_NATS;
+    let close = |fit: &&Fitted| fit.id != best.id && best.score.gain_over(&fit.score, &every) / best.inflation < UNDECIDED;
     let mut look_alikes: Vec<&'static str> = fitted.iter().filter(close).map(|fit| fit.id).collect();
     // A body that stands aside may stand nearer or farther as well.
     if ALONG.contains(&best.id) && evidence.accepted.contains(&pose_offset::ID) && !look_alikes.contains(&pose_offset::ID) {
@@ -253,6 +254,15 @@ fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> Description {
             ),
             "the clocks of the motion and the radar differ".into(),
         ),
+        // No clock errs by more than the library allows it: a rate was stated wrongly.
+        Change::Drift(_) if fit.value.abs() > clock_drift::INFO.parameters[0].most => {
+            return Description::unnamed(format!(
+                "The motion runs {:.1} % {} than stated, more than a clock is wrong: the rate of the motion's frames or of the radar's is \
+                 another.",
+                1e2 * fit.value.abs(),
+                if fit.value > 0.0 { "faster" } else { "slower" }
+            ));
+        }
         Change::Drift(_) => (
             normal("relative"),
             format!(

@@ -3,9 +3,6 @@
 use super::change::Change;
 use super::trial::{Score, Trial};
 
-/// Alternatives within so many nats are said to be indistinguishable.
-pub const ALIKE_NATS: f64 = 4.6;
-
 /// An alternative, fitted.
 pub struct Fitted {
     pub id: &'static str,

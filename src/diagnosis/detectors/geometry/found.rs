@@ -6,8 +6,6 @@ use crate::diagnosis::Candidate;
 pub const UNEVEN: f64 = 0.05;
 /// In which ways receivers may differ.
 pub const LOOKS: f64 = 5.0;
-/// What explains the recording as well as the best, within so many nats, looks alike.
-pub const AS_WELL: f64 = 4.6;
 
 /// One way in which receivers may differ.
 pub struct Found {

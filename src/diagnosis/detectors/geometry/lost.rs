@@ -1,10 +1,10 @@
 //! Frames that were lost: from one frame on, the body is later in its motion by whole frames.
 
 use super::change::Change;
-use super::fitted::{ALIKE_NATS, Fitted};
+use super::fitted::Fitted;
 use super::trial::{Score, Trial};
 use crate::diagnosis::prediction::BEYOND;
-use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::statistics::{UNDECIDED, corrected};
 use crate::effects::frame_drop;
 
 /// Frames that a step must be followed by: one alone may have been bad.
@@ -55,7 +55,7 @@ pub fn is_step(trial: &Trial, fit: &Fitted) -> bool {
     let Change::Drop { count, .. } = fit.score.change else { return true };
     let every: Vec<usize> = (0..trial.evidence.cube.dims[0]).collect();
     let later = trial.score(Change::Drop { at: 0, count }, &every, true);
-    fit.score.gain_over(&later, &every) / fit.inflation >= ALIKE_NATS
+    fit.score.gain_over(&later, &every) / fit.inflation >= UNDECIDED
 }
 
 /// Log-likelihood gain of frames from which the change was not estimated: the held-out ones. Where the motion is known in none of

@@ -9,12 +9,11 @@ use num_complex::Complex64;
 
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::course::{Course, powers};
-use crate::diagnosis::detectors::paths::product::CLOSE;
 use crate::diagnosis::detectors::region::{Region, removal};
 use crate::diagnosis::detectors::vital::frames::{Frames, frames};
 use crate::diagnosis::evidence::{Evidence, hann};
 use crate::diagnosis::finding::{Candidate, Estimate, Place};
-use crate::diagnosis::statistics::{DECIBEL, corrected, fisher_tail};
+use crate::diagnosis::statistics::{DECIBEL, UNDECIDED, corrected, fisher_tail};
 use crate::effects::{self, Stage};
 
 /// What may lie at twice the range: the second trip, and the harmonic.
@@ -49,11 +48,11 @@ pub fn find(evidence: &Evidence, course: &Course, bin: f64, amplitude: &[Complex
         looks.filter_map(|(bin, kind)| along(evidence, &data, course, bin, kind, &pattern(amplitude, kind))).collect();
     let strongest = all.iter().max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     // Where receivers do not distinguish the two, the way outside goes first: it needs no receiver that bends all else, too.
-    let as_good = all.iter().filter(|other| other.kind == 0 && strongest.gain - other.gain < CLOSE);
+    let as_good = all.iter().filter(|other| other.kind == 0 && strongest.gain - other.gain < UNDECIDED);
     let best = as_good.max_by(|a, b| a.gain.total_cmp(&b.gain)).unwrap_or(strongest);
     let rival = all.iter().filter(|other| other.kind != best.kind).map(|other| other.gain).fold(f64::NEG_INFINITY, f64::max);
     let gain: f64 = bins.map(|bin| held_out_gain(evidence, &data, course, bin)).sum();
-    let look_alikes = if best.gain - rival < CLOSE {
+    let look_alikes = if best.gain - rival < UNDECIDED {
         KINDS.iter().map(|kind| kind.0).filter(|id| *id != KINDS[best.kind].0).collect()
     } else {
         vec![]

@@ -6,12 +6,9 @@ use super::removal::{emptied, patch};
 use super::scene::Scene;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::prediction::{SIDE_SPREAD, mirror_id, mirrored_return};
-use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::statistics::{UNDECIDED, chi2_tail, corrected};
 use crate::diagnosis::{Candidate, Estimate, Place};
 use crate::effects::Stage;
-
-/// Log-likelihood within which two boundaries are not distinguishable.
-const CLOSE: f64 = 4.6;
 
 pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Candidate {
     let evidence = scene.evidence;
@@ -29,7 +26,7 @@ pub fn candidate(scene: &Scene, ghost: &Ghost, all: &[Ghost], tried: f64) -> Can
         ghost.coefficient,
         10.0 * peak.max(1.0).log10()
     );
-    let others = all.iter().filter(|other| other.boundary != ghost.boundary && ghost.gain - other.gain < CLOSE);
+    let others = all.iter().filter(|other| other.boundary != ghost.boundary && ghost.gain - other.gain < UNDECIDED);
     let mut look_alikes: Vec<&'static str> = others.map(|other| mirror_id(other.boundary)).filter(|other| *other != id).collect();
     look_alikes.dedup();
     let spread = 1.645 * SIDE_SPREAD;

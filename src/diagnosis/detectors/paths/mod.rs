@@ -18,6 +18,7 @@ mod scene;
 mod sidelobes;
 mod sinusoidal;
 mod static_point;
+mod texture;
 mod track;
 mod whereabouts;
 mod whitened;
@@ -29,6 +30,7 @@ use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::{Candidate, Evidence};
 use crate::effects;
 
+pub use scene::FILTERS;
 use scene::Scene;
 pub use static_point::body_rms;
 

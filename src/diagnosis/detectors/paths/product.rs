@@ -11,12 +11,10 @@ use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::denoised;
 use crate::diagnosis::evidence::transform;
-use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::statistics::{UNDECIDED, corrected};
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Place, Volume};
 use crate::effects::{self, Stage};
 
-/// Log-likelihood within which two explanations are not distinguishable.
-pub const CLOSE: f64 = 4.6;
 /// What was measured holds the products already: so often they are taken out of their own template.
 const ROUNDS: usize = 3;
 
@@ -73,7 +71,7 @@ pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
     if best.fit.held_out < super::LEAST_GAIN || p_value > 1e-3 {
         return None;
     }
-    let close = others.iter().filter(|other| best.fit.held_out - other.fit.held_out < CLOSE);
+    let close = others.iter().filter(|other| best.fit.held_out - other.fit.held_out < UNDECIDED);
     Some(best.candidate(scene, p_value, close.map(|other| other.kind.id()).collect()))
 }
 

@@ -16,7 +16,7 @@ pub const CLUTTER_BINS: i64 = 2;
 /// Cells by which the body's support grows along Doppler: accelerations within a frame.
 const DOPPLER_MARGIN: i64 = 2;
 /// Whose undoing leaves leakage of the body at fixed ranges.
-const FILTERS: [&str; 2] = [effects::if_highpass::ID, effects::if_lowpass::ID];
+pub const FILTERS: [&str; 2] = [effects::if_highpass::ID, effects::if_lowpass::ID];
 
 /// Powers over the noise, and what is expected of them without any further path, `[frame, doppler, range]`.
 pub struct Scene<'a> {
@@ -267,11 +267,12 @@ fn never(evidence: &Evidence, model: &PowerModel) -> Vec<bool> {
     (0..loops * samples).map(is_never).collect()
 }
 
-/// Range bins that the body has power in during some frame.
+/// Range bins that the body is in during some frame, with power or so slowly that static clutter hides how much.
 fn visited_ranges(model: &PowerModel, frames: usize, samples: usize) -> Vec<bool> {
     let mut visited = vec![false; samples];
-    for row in (0..frames).flat_map(|frame| model.support(frame).chunks_exact(samples)) {
-        visited.iter_mut().zip(row).for_each(|(visited, support)| *visited |= support);
+    for frame in 0..frames {
+        let support = model.support(frame).iter().enumerate().filter(|(_, support)| **support).map(|(cell, _)| cell);
+        support.chain(model.predicted(frame)).for_each(|cell| visited[cell % samples] = true);
     }
     visited
 }

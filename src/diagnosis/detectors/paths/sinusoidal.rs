@@ -209,10 +209,13 @@ impl<'a> Search<'a> {
 
     /// Of mean, excursion, rate and direction, from all training frames.
     fn deviations(&self, motion: SinusoidalMotion) -> [f64; 4] {
-        let scene = self.ground.scene;
-        let every = &scene.evidence.split.training;
-        let end_s = every.last().map_or(self.start_s, |&last| middle_s(scene, last));
-        self.ground.deviations(motion, every, end_s - self.start_s)
+        self.ground.deviations(motion, &self.ground.scene.evidence.split.training, self.whole_s())
+    }
+
+    /// Between the first and the last training frame.
+    fn whole_s(&self) -> f64 {
+        let last = self.ground.scene.evidence.split.training.last();
+        last.map_or(0.0, |&last| middle_s(self.ground.scene, last) - self.start_s)
     }
 
     fn found(&self, motion: SinusoidalMotion, deviations: [f64; 4], gain: f64, p_value: f64) -> Found {
@@ -226,14 +229,21 @@ impl<'a> Search<'a> {
             Sighting { frame, range_m, velocity_mps, power, sine: Some(motion.sine) }
         });
         let deviations = [mean_error_m, excursion_error_m, rate_error_hz];
+        // Less than a period is any smooth course (Rayleigh's resolution of a rate from none).
+        let is_periodic = rate_hz * self.whole_s() >= 1.0;
+        let oscillation = Oscillation { mean_m, sine_m, cosine_m, rate_hz, left: 0.0, deviations };
         let mover = Mover {
             track: Track { sightings: sightings.collect(), p_value },
-            oscillation: Some(Oscillation { mean_m, sine_m, cosine_m, rate_hz, left: 0.0, deviations }),
-            id: (!self.ground.moves_with_the_body(motion)).then_some(effects::moving_reflector::ID),
+            oscillation: is_periodic.then_some(oscillation),
+            id: (is_periodic && !self.ground.moves_with_the_body(motion)).then_some(effects::moving_reflector::ID),
             gain,
             power,
             sine_error: Some(sine_error),
-            unlike: "its frames follow one sinusoidal motion, which nothing else around it does",
+            unlike: if is_periodic {
+                "its frames follow one sinusoidal motion, which nothing else around it does"
+            } else {
+                "its frames follow one course of less than a period, which nothing else around it does"
+            },
         };
         Found { mover, tones: self.ground.tones(motion) }
     }

@@ -1,9 +1,10 @@
 //! A static return that is stronger than the static clutter around it (`static_reflector`): in one range cell, from one direction,
 //! in every frame. What the clutter's own roughness may do is the null: its power in a cell is speckle about the mean of the
-//! ranges around it. Boundaries, edges and corners return more than their surroundings at known ranges, and are left out.
+//! ranges around it, times a texture, as the ranges themselves show it (`texture.rs`). Boundaries, edges and corners return more than their surroundings at known ranges, and are left out.
 
 use num_complex::Complex64;
 
+use super::texture::Texture;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::detectors::steering::{power, steering};
 use crate::diagnosis::evidence::{hann, transform};
@@ -40,6 +41,7 @@ struct Peak {
     around: Vec<usize>,
     bin: usize,
     p_value: f64,
+    texture: Texture,
 }
 
 pub fn find(evidence: &Evidence) -> Option<Candidate> {
@@ -50,7 +52,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let (peak, tried) = strongest(evidence, room, &training, &constant)?;
     let held_out = spectra(&evidence.cube, &evidence.split.held_out);
     let ratio = beam(&evidence.radar, &held_out, peak.bin, peak.sine) / mean(&held_out, &peak.around);
-    let held_out_p = tail(ratio, peak.around.len());
+    let held_out_p = peak.texture.mean_over(|texture| tail(ratio / texture, peak.around.len()));
     let p_value = corrected(peak.p_value, tried * super::TRIED);
     let nats = -(peak.p_value.max(held_out_p).max(1e-300) * tried).ln();
     (nats > super::LEAST_GAIN && p_value < 1e-3).then(|| candidate(evidence, &peak, p_value, nats))
@@ -88,6 +90,7 @@ fn strongest(evidence: &Evidence, room: &Room, spectra: &Spectra, constant: &[bo
     let inside = |bin: usize| (near_m..far_m).contains(&(bin as f64 * cell_m)) && bin + 1 < bins;
     let directions: Vec<Option<f64>> =
         if directed(radar) { (0..SINES).map(|i| Some(2.0 * i as f64 / (SINES - 1) as f64 - 1.0)).collect() } else { vec![None] };
+    let texture = Texture::of(spectra, |bin| inside(bin) && constant[bin]);
     let mut best: Option<Peak> = None;
     let mut tried = 0.0;
     for bin in (1..bins).filter(|&bin| inside(bin) && constant[bin]) {
@@ -109,9 +112,9 @@ fn strongest(evidence: &Evidence, room: &Room, spectra: &Spectra, constant: &[bo
             continue;
         }
         let ratio = power / mean(spectra, &around);
-        let p_value = tail(ratio, around.len());
+        let p_value = texture.mean_over(|texture| tail(ratio / texture, around.len()));
         if best.as_ref().is_none_or(|best| p_value < best.p_value) {
-            best = Some(Peak { range_m, cell_m, sine, ratio, around, bin, p_value });
+            best = Some(Peak { range_m, cell_m, sine, ratio, around, bin, p_value, texture: texture.clone() });
         }
     }
     best.map(|best| (best, tried))

@@ -57,8 +57,12 @@ impl Pile {
         let inward = if end == low { 1.0 } else { -1.0 };
         // Within half a code, or a hair of the range for samples that are no codes.
         let tolerance = 1e-6 * half;
-        let slab = 0.02 * half;
         let [_, _, _, loops, samples] = evidence.cube.dims;
+        let all = || evidence.cube.samples.iter().flat_map(|value| parts(value, evidence.is_real()));
+        // A converter may have fewer codes than its numbers say: the next one that there is.
+        let step = all().map(|part| inward * (part - end)).filter(|within| *within > tolerance).fold(f64::INFINITY, f64::min);
+        let step = if step.is_finite() { step.max(1.0) } else { 1.0 };
+        let slab = (0.02 * half).max(step);
         // At the end and just within it.
         let of_frame = |values: &[Complex64]| {
             let within = values.iter().flat_map(|value| parts(value, evidence.is_real())).map(|part| inward * (part - end));
@@ -69,7 +73,7 @@ impl Pile {
         let frames = evidence.cube.samples.par_chunks_exact(evidence.cube.channels() * loops * samples);
         let (by_frame, below): (Vec<usize>, Vec<usize>) = frames.map(of_frame).map(|[at, below]| (at, below)).unzip();
         // A density that falls towards its end has fewer values in the last code than in any code of the slab before it.
-        let codes = slab.max(1.0);
+        let codes = (slab / step).max(1.0);
         let expected = (below.iter().sum::<usize>() as f64 / codes).max(0.2);
         let pile = Self { ends: vec![end], least: end.abs(), tolerance, expected, by_frame };
         (half > 0.0 && pile.count() >= FEWEST && pile.count() as f64 >= 5.0 * expected).then_some(pile)
@@ -201,12 +205,14 @@ mod tests {
 
     /// Codes of a receiver without quadrature: a strong tone about an offset, cut at two ends.
     fn evidence(offset: f32, ends: [f32; 2]) -> Evidence {
-        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 16, sampling: Sampling::Real, ..Radar::small(8) };
         let mut normal = support::normal(3);
-        let count = radar.dims().iter().product::<usize>();
         let wave = |i: usize| 200.0 * (TAU * 5.3 * (i % 64) as f64 / 64.0).sin();
-        let codes: Vec<f32> =
-            (0..count).map(|i| (offset + (wave(i) + 3.0 * normal()) as f32).round().clamp(ends[0], ends[1])).collect();
+        of_codes(|i| (offset + (wave(i) + 3.0 * normal()) as f32).round().clamp(ends[0], ends[1]))
+    }
+
+    fn of_codes(code: impl FnMut(usize) -> f32) -> Evidence {
+        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 16, sampling: Sampling::Real, ..Radar::small(8) };
+        let codes: Vec<f32> = (0..radar.dims().iter().product::<usize>()).map(code).collect();
         let extremes = [f32::min, f32::max].map(|pick| f64::from(codes.iter().copied().reduce(pick).unwrap()));
         Evidence::new(Loaded::of_samples(radar, analytic(&codes, 64), extremes), None, None)
     }
@@ -222,5 +228,16 @@ mod tests {
             assert!(said(offset, [-1e4, 1e4]).is_none());
         }
         assert!(said(0.0, [-150.0, 150.0]).expect("two piles").contains("exactly at ±150,"));
+    }
+
+    /// Every 64th code alone: the next one that there is holds more than the last.
+    #[test]
+    fn the_last_code_of_a_coarse_converter_is_no_pile() {
+        let mut normal = support::normal(5);
+        let coarse = of_codes(|_| (300.0 * normal() as f32 / 64.0).round() * 64.0);
+        assert!(find(&coarse).is_empty(), "{:?}", find(&coarse));
+        let mut normal = support::normal(5);
+        let cut = of_codes(|_| ((300.0 * normal() as f32 / 64.0).round() * 64.0).clamp(-320.0, 320.0));
+        assert!(find(&cut)[0].statement.contains("exactly at ±320,"));
     }
 }

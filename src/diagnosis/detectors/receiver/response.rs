@@ -17,11 +17,9 @@ use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::detectors::climb::golden_section;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Volume};
-use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::statistics::{UNDECIDED, chi2_tail, corrected};
 use crate::effects::Stage;
 
-/// Hypotheses within this many nats of the best are indistinguishable from it.
-const INDISTINGUISHABLE: f64 = 4.6;
 /// Power that a response must let through to be undone in full.
 const LEAST_POWER: f64 = 0.25;
 
@@ -50,7 +48,7 @@ pub fn find(evidence: &Evidence, field: &Field, without: &[Vec<Complex64>]) -> O
     let p_value = corrected(chi2_tail(2.0 * top, 3.0), count);
     let mut look_alikes: Vec<&'static str> = best
         .iter()
-        .filter(|(likelihood, other, _)| top - likelihood < INDISTINGUISHABLE && other.id() != shape.id())
+        .filter(|(likelihood, other, _)| top - likelihood < UNDECIDED && other.id() != shape.id())
         .map(|(_, other, _)| other.id())
         .collect();
     look_alikes.dedup();

@@ -1,5 +1,6 @@
 //! Sinusoids over slow time: a coherent periodogram over all frames, of frames that are apart.
 
+use crate::diagnosis::statistics::UNDECIDED;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -34,8 +35,6 @@ pub struct Line {
 const HARMONICS: usize = 4;
 /// A harmonic that gains less (nats) is left out.
 const HARMONIC_GAIN: f64 = 10.0;
-/// Aliases that explain only so much less (nats) are not resolved.
-const ALIAS_GAIN: f64 = 4.6;
 /// A background above this many times the noise is more than noise.
 pub const LOUD: f64 = 1.5;
 /// Degrees of freedom that the noise's law is worth beside what frames show of it: of 155 strongest lines of recordings without anything
@@ -151,12 +150,12 @@ impl<'a> Search<'a> {
         let nearest = (frequency / frame_rate).round();
         let mut aliases: Vec<f64> = (0..=3).map(|k| (frequency - (nearest - f64::from(k)) * frame_rate).abs()).collect();
         aliases.sort_by(f64::total_cmp);
-        if aliases[0] < self.lowest_hz && self.fit(aliases[0], 1).2 > centre - ALIAS_GAIN {
+        if aliases[0] < self.lowest_hz && self.fit(aliases[0], 1).2 > centre - UNDECIDED {
             return None;
         }
         let slower = |alias: &f64| *alias > self.lowest_hz + self.step_hz && *alias < 0.9 * frequency;
         let mut slower = aliases.into_iter().filter(slower).map(|alias| self.refined(alias));
-        Some(slower.find(|(_, gain)| *gain > centre - ALIAS_GAIN).unwrap_or((frequency, centre)))
+        Some(slower.find(|(_, gain)| *gain > centre - UNDECIDED).unwrap_or((frequency, centre)))
     }
 
     /// The line at a frequency where a sinusoid gains so much, with the harmonics that it needs, as if the background were the noise.

@@ -1,14 +1,13 @@
 //! Which of the looks at one series keep their candidates: one cause shows in several.
 
 use super::lines;
+use crate::diagnosis::statistics::UNDECIDED;
 use crate::diagnosis::{behaviour::Behaviour, finding::Candidate};
 
 /// Share of the log-likelihood gain that what is simpler, or has a name, needs.
 pub(super) const NEARLY: f64 = 0.8;
 /// The same for what a sure name explains over the noise, where what has no name leaves more than noise itself.
 const HALF: f64 = 0.5;
-/// Difference of log-likelihood gains (nats) that decides nothing.
-pub(super) const UNDECIDED: f64 = 4.6;
 /// p-value below which a law that a background makes unsure is sure.
 const SURE: f64 = 1e-3;
 

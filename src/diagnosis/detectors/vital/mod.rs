@@ -14,7 +14,7 @@ use std::sync::Arc;
 use circle::Reflector;
 use frames::{Frames, frames};
 use num_complex::Complex64;
-use rhythm::{BREATHING_HZ, HEART_HZ, Rhythm, rhythm};
+use rhythm::{BREATHING_HZ, HEART_HZ, Rhythm, rhythm, vibration};
 
 use super::region::{Region, removal};
 use crate::diagnosis::behaviour::Behaviour;
@@ -66,15 +66,17 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let moving: Vec<usize> = near.filter(|&bin| change[bin] > 10.0).collect();
     let best = circle::common(&data, &mean, &moving, training)?;
     let metres = evidence.radar.wavelength_m() / (4.0 * PI);
+    let is_rhythmic = |r: &Rhythm| r.share > RHYTHMIC && r.p_value < 1e-3;
     let named = rhythm(&evidence.starts_s, &best.phase, training, held_out)
-        .filter(|r| r.share > RHYTHMIC && r.p_value < 1e-3)
+        .filter(is_rhythmic)
         .and_then(|r| Some((name(&r, metres)?, r)))
         .filter(|_| !evidence.may_move());
+    let vibration = vibration(&evidence.starts_s, &best.phase, training, held_out).filter(is_rhythmic);
     let gain = held_out_gain(evidence, &data, &mean, &best);
     if gain <= 3.0 {
         return None;
     }
-    Some(Motion { evidence, data, mean, change, strongest, circle: best, metres, named }.candidate(gain))
+    Some(Motion { evidence, data, mean, change, strongest, circle: best, metres, named, vibration }.candidate(gain))
 }
 
 /// Power of what changes over the noise, by range.
@@ -111,6 +113,11 @@ fn off_line(changes: &[Vec<Complex64>]) -> f64 {
     }
     let whole = energy(&line).max(f64::MIN_POSITIVE);
     changes.iter().map(|change| energy(change) - along(&line, change).powi(2) / whole).sum()
+}
+
+/// Of millimetres, in words.
+fn length(mm: f64) -> String {
+    if mm < 0.1 { format!("{:.0} µm", 1e3 * mm) } else { format!("{mm:.1} mm") }
 }
 
 /// What moves in a rhythm by its rate and its size; `metres`: of a radian.
@@ -165,6 +172,8 @@ struct Motion<'a> {
     metres: f64,
     /// What it is by its rhythm.
     named: Option<(&'static str, Rhythm)>,
+    /// What it is without such a name.
+    vibration: Option<Rhythm>,
 }
 
 impl Motion<'_> {
@@ -193,21 +202,45 @@ impl Motion<'_> {
                 100.0 * r.share,
                 if *id == effects::breathing::ID { "a breathing chest" } else { "a beating heart" }
             ),
+            // What moves farther than a range bin leaves it.
+            None if 1e-3 * (extent[1] - extent[0]) > self.evidence.radar.range_resolution_m() => format!(
+                "The return at {range_m:.2} m turns from frame to frame as if it moved over {:.0} mm, but its range does not change so: it is a \
+                 tone that drifts, and no mover.",
+                extent[1] - extent[0]
+            ),
             None if !self.is_curved() => format!(
-                "The return at {range_m:.2} m changes slowly from frame to frame along one line in the complex plane: something moves there \
-                 by far less than a wavelength, or passes in front of it, or its gain changes."
+                "The return at {range_m:.2} m changes from frame to frame along one line in the complex plane{}: something moves there \
+                 by far less than a wavelength, or passes in front of it, or its gain changes.",
+                self.vibration.as_ref().map_or(String::new(), |r| format!(", {}", self.times_a_second(r)))
             ),
             None => {
                 let extent = extent[1] - extent[0];
-                let extent = if extent < 0.1 { format!("{:.0} µm", 1e3 * extent) } else { format!("{extent:.1} mm") };
-                let moves = format!("At {range_m:.2} m something moves slowly, over {extent} during the recording");
-                if self.evidence.may_move() {
-                    format!("{moves}. {MAY_MOVE}.")
-                } else {
-                    format!("{moves}, without a rhythm that would show within its length.")
+                let moves = match &self.vibration {
+                    Some(r) => format!(
+                        "At {range_m:.2} m something vibrates {}, by {} (amplitude of this line, {:.0} % of its motion)",
+                        self.times_a_second(r),
+                        length(1e3 * r.amplitude * self.metres),
+                        100.0 * r.share
+                    ),
+                    None => format!("At {range_m:.2} m something moves slowly, over {} during the recording", length(extent)),
+                };
+                match (self.evidence.may_move(), &self.vibration) {
+                    (true, _) => format!("{moves}. {MAY_MOVE}."),
+                    (false, Some(_)) => format!("{moves}."),
+                    (false, None) => format!("{moves}, without a rhythm that would show within its length."),
                 }
             }
         }
+    }
+
+    /// Frames show a rate modulo their own.
+    fn times_a_second(&self, rhythm: &Rhythm) -> String {
+        let (times, frames) = (&self.evidence.starts_s, self.evidence.starts_s.len() as f64);
+        let frame_rate_hz = (frames - 1.0) / (times[times.len() - 1] - times[0]);
+        format!(
+            "{:.2} times a second (or at that rate from a multiple of the {frame_rate_hz:.4} Hz of the frames)",
+            rhythm.frequency_hz
+        )
     }
 
     /// Whether its path is seen to be an arc and no line, which a gain makes as well: only then is its size known. Either has one number for
@@ -288,11 +321,15 @@ mod tests {
 
     /// Static returns, one of which has a factor that changes slowly, from 0 to 1 of a course without a rhythm.
     fn said(factor: impl Fn(f64) -> Complex64) -> String {
+        said_of_frames(|frame| factor((frame / 47.0).powi(2)))
+    }
+
+    /// The same by frame.
+    fn said_of_frames(factor: impl Fn(f64) -> Complex64) -> String {
         let radar = Radar { samples_per_chirp: 64, loops_per_frame: 4, ..Radar::small(48) };
         let evidence = Evidence::in_noise(radar, 6, |[frame, channel, _, n]| {
             let tone = |bin: f64, level: f64| Complex64::from_polar(level, TAU * bin * n as f64 / 64.0 + channel as f64 * bin);
-            let course = (frame as f64 / 47.0).powi(2);
-            tone(8.0, 30.0) + tone(15.0, 30.0) + tone(22.0, 20.0) * factor(course) + tone(29.0, 25.0)
+            tone(8.0, 30.0) + tone(15.0, 30.0) + tone(22.0, 20.0) * factor(frame as f64) + tone(29.0, 25.0)
         });
         find(&evidence).pop().expect("a change").statement
     }
@@ -303,5 +340,22 @@ mod tests {
         assert!(fades.contains("along one line in the complex plane"), "{fades}");
         let moves = said(|course| Complex64::cis(2.5 * course));
         assert!(moves.contains("moves slowly, over"), "{moves}");
+    }
+
+    /// Faster than a heart, and a tone whose phase goes on and on.
+    #[test]
+    fn a_machine_has_its_rate_and_a_tone_that_drifts_is_no_mover() {
+        let turns = |frame: f64| TAU * 0.31 * frame;
+        let hertz = 0.31 / Radar::small(48).frame_period_s;
+        let machine = said_of_frames(|frame| Complex64::cis(1.5 * turns(frame).sin()));
+        assert!(machine.contains(&format!("vibrates {hertz:.2} times a second")), "{machine}");
+        let faint = said_of_frames(|frame| Complex64::cis(0.15 * turns(frame).sin()));
+        assert!(faint.contains("along one line") && faint.contains(&format!("{hertz:.2} times a second")), "{faint}");
+        let resolution = Radar { samples_per_chirp: 64, ..Radar::small(48) }.range_resolution_m();
+        let wavelength = Radar::small(48).wavelength_m();
+        let step = 1.5 * resolution * 4.0 * PI / wavelength / 47.0;
+        assert!(step < 3.0, "a phase that can be followed");
+        let tone = said_of_frames(|frame| Complex64::cis(step * frame));
+        assert!(tone.contains("a tone that drifts, and no mover"), "{tone}");
     }
 }

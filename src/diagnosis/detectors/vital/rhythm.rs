@@ -41,6 +41,14 @@ struct Fit {
 }
 
 impl Series<'_> {
+    /// With the mean time between two frames.
+    fn of<'a>(times: &'a [f64], phase: &'a [f64], training: &[usize], held_out: &[usize]) -> (Series<'a>, f64) {
+        let duration = times[times.len() - 1] - times[0];
+        let mut frames = [training, held_out].concat();
+        frames.sort_unstable();
+        (Series { times, phase, frames, duration }, duration / (times.len() - 1) as f64)
+    }
+
     /// A straight line is the body's slow sway.
     fn fit(&self, frequency: Option<f64>) -> Fit {
         let Self { times, phase, frames, duration } = self;
@@ -104,35 +112,53 @@ impl Series<'_> {
         }
         around
     }
+
+    /// The line at a frequency, of those between two that were looked at; none where too few are around it.
+    fn standing_out(&self, frequency_hz: f64, interval: f64, [lowest, highest]: [f64; 2]) -> Option<Rhythm> {
+        let duration = self.duration;
+        let Fit { misfit, amplitude, left } = self.fit(Some(frequency_hz));
+        let share = 1.0 - misfit / self.fit(None).misfit.max(f64::MIN_POSITIVE);
+        // The rest of the motion is slow as well: what counts is how far the line stands out of the frequencies around it.
+        let around = self.around(frequency_hz, &left, interval);
+        if around.len() < 3 {
+            return None;
+        }
+        let count = around.len() as f64;
+        let background = (around.iter().sum::<f64>() / count).max(1e-12);
+        let p = (1.0 + amplitude * amplitude / background / count).powf(-count);
+        let deviation = (0.5 * background).sqrt();
+        Some(Rhythm {
+            frequency_hz,
+            // Of a sinusoid in noise of that density, twice the variance because no body keeps time exactly.
+            frequency_deviation_hz: deviation / amplitude.max(1e-9) * 12.0f64.sqrt() / (PI * duration),
+            amplitude,
+            amplitude_deviation: deviation,
+            share,
+            p_value: statistics::corrected(p, (highest - lowest) * duration),
+        })
+    }
 }
 
+/// That of a body.
 pub fn rhythm(times: &[f64], phase: &[f64], training: &[usize], held_out: &[usize]) -> Option<Rhythm> {
-    let duration = times[times.len() - 1] - times[0];
-    let interval = duration / (times.len() - 1) as f64;
-    let mut frames = [training, held_out].concat();
-    frames.sort_unstable();
-    let series = Series { times, phase, frames, duration };
-    let lowest = (FEWEST_PERIODS / duration).max(0.5 * BREATHING_HZ[0]);
+    let (series, interval) = Series::of(times, phase, training, held_out);
+    let lowest = (FEWEST_PERIODS / series.duration).max(0.5 * BREATHING_HZ[0]);
     let highest = HEART_HZ[1].min(0.4 / interval);
     let frequency_hz = series.best(lowest, highest)?;
-    let Fit { misfit, amplitude, left } = series.fit(Some(frequency_hz));
-    let share = 1.0 - misfit / series.fit(None).misfit.max(f64::MIN_POSITIVE);
-    // The rest of the motion is slow as well: what counts is how far the line stands out of the frequencies around it.
-    let around = series.around(frequency_hz, &left, interval);
-    if around.len() < 3 {
-        return None;
-    }
-    let count = around.len() as f64;
-    let background = (around.iter().sum::<f64>() / count).max(1e-12);
-    let p = (1.0 + amplitude * amplitude / background / count).powf(-count);
-    let deviation = (0.5 * background).sqrt();
-    Some(Rhythm {
-        frequency_hz,
-        // Of a sinusoid in noise of that density, twice the variance because no body keeps time exactly.
-        frequency_deviation_hz: deviation / amplitude.max(1e-9) * 12.0f64.sqrt() / (PI * duration),
-        amplitude,
-        amplitude_deviation: deviation,
-        share,
-        p_value: statistics::corrected(p, (highest - lowest) * duration),
-    })
+    series.standing_out(frequency_hz, interval, [lowest, highest])
+}
+
+/// That of anything, up to half of the frame rate: the strongest line of the periodogram. A faster one is folded into that.
+pub fn vibration(times: &[f64], phase: &[f64], training: &[usize], held_out: &[usize]) -> Option<Rhythm> {
+    let (series, interval) = Series::of(times, phase, training, held_out);
+    let (step, width) = (0.5 / series.duration, 1.0 / series.duration);
+    let (lowest, highest) = (FEWEST_PERIODS / series.duration, 0.5 / interval - width);
+    let left = series.fit(None).left;
+    let power = |hz: f64| -> f64 {
+        left.iter().zip(&series.frames).map(|(l, &f)| l * Complex64::cis(-TAU * hz * times[f])).sum::<Complex64>().norm_sqr()
+    };
+    let lines = (0..).map(|k| lowest + f64::from(k) * step).take_while(|hz| *hz < highest).map(|hz| (hz, power(hz)));
+    let (strongest, _) = lines.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let frequency_hz = series.best((strongest - width).max(lowest), strongest + width)?;
+    series.standing_out(frequency_hz, interval, [lowest, highest])
 }

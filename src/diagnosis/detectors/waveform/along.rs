@@ -22,7 +22,7 @@ use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Volume};
 use crate::diagnosis::power::PowerModel;
 use crate::diagnosis::speckle::{Look, groups};
-use crate::diagnosis::statistics::{DECIBEL, corrected};
+use crate::diagnosis::statistics::{DECIBEL, UNDECIDED, corrected};
 use crate::diagnosis::{BodyPrediction, Evidence};
 use crate::effects::{self, Stage, legendre};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
@@ -39,8 +39,6 @@ const TILT_FLOOR: f64 = 0.1 / (2.0 * DECIBEL);
 const BEND_FLOOR: f64 = 0.01;
 /// The same for a test of whether anything is there, which must be uniform where nothing is.
 const FLOORS: [f64; 2] = [2.0 * TILT_FLOOR, 0.5 * BEND_FLOOR];
-/// Log-likelihood that a bend must gain by changing from frame to frame.
-const AS_WELL: f64 = 4.6;
 /// Chance below which a finer shape is there, and its size against the bend's from which on it is another thing.
 const UNLIKELY: f64 = 1e-3;
 const LARGE: f64 = 0.5;
@@ -80,7 +78,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         let once = chirps.converged(&first, &[BEND]);
         let changing = chirps
             .converged(&first, &[BEND, TREND])
-            .filter(|changing| once.as_ref().is_none_or(|once| changing.likelihood > once.likelihood + AS_WELL));
+            .filter(|changing| once.as_ref().is_none_or(|once| changing.likelihood > once.likelihood + UNDECIDED))
+            // A synthesiser warms up; none bends its ramp the other way meanwhile.
+            .filter(|changing| changing.values[1].abs() < changing.values[0].abs());
         found.extend(changing.or(once).map(|found| (found.likelihood, chirps.bend(evidence, &found))));
     }
     found.retain(|(_, candidate)| candidate.p_value < 1e-2 && candidate.nats > 0.0);

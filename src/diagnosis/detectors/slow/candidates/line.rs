@@ -60,6 +60,14 @@ struct Wave<'a> {
 impl Wave<'_> {
     /// Of the receiver's gain.
     fn ripple(&self) -> Description {
+        // No gain changes its sign: frames show too little of a period to say how large its amplitude is.
+        if self.amplitude >= 1.0 {
+            return Description::unnamed(format!(
+                "The gain of the whole receiver changes along the frames, at all ranges and in all channels alike, as a ripple at {} or \
+                 at another multiple of the frame rate would do it; the frames show too little of its period for an amplitude.",
+                self.hertz
+            ));
+        }
         Description::unnamed(format!(
             "The gain of the whole receiver is modulated by {:.2} % (amplitude) at {}, at all ranges and in \
              all channels alike: as mains ripple on a supply would do it.",

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use super::{Description, Deviation, STATED_AT_M, behaves_like, correction, energy, place, stated_delay_s};
 use crate::diagnosis::detectors::slow::field::{Field, Part};
 use crate::diagnosis::detectors::slow::random::{Random, Two};
-use crate::diagnosis::detectors::slow::selection::UNDECIDED;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Estimate};
 use crate::diagnosis::statistics;
@@ -17,11 +16,11 @@ pub fn of_random(evidence: &Evidence, field: &Field, part: Part, random: &Random
     let one = random.held_out_nats;
     let (description, look_alikes, gain) = match (part, &random.two) {
         (Part::Delay, Some(two)) if two.held_out_nats > one => {
-            let rivals = if two.held_out_nats < one + UNDECIDED { vec![effects::phase_noise::ID] } else { vec![] };
+            let rivals = if two.held_out_nats < one + statistics::UNDECIDED { vec![effects::phase_noise::ID] } else { vec![] };
             (start_jitter(evidence, two), rivals, two.held_out_nats)
         }
         (Part::Delay, two) => {
-            let close = two.as_ref().is_some_and(|two| two.held_out_nats > one - UNDECIDED);
+            let close = two.as_ref().is_some_and(|two| two.held_out_nats > one - statistics::UNDECIDED);
             (phase_noise(evidence, random), if close { vec![effects::chirp_start_jitter::ID] } else { vec![] }, one)
         }
         (part, _) => (common(part, random), vec![], one),

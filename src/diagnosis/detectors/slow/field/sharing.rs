@@ -17,9 +17,12 @@ pub fn most_have(gains: &[[f64; 2]], share: f64) -> bool {
 
 impl Field {
     /// Whether most of the ranges that could contradict a deviation share it: one that is far stronger than the others (a
-    /// body that stands still for a while) must not speak for all. `predicted` gives it for frame, loop and group.
+    /// body that stands still for a while) must not speak for all. So must the one that could contradict it most where the body is not:
+    /// slow parts of the body change its ranges. `predicted` gives it for frame, loop and group.
     pub fn shared(&self, predicted: impl Fn(usize, usize, &Group) -> Complex64) -> bool {
-        most_have(&self.log_likelihood_gains(predicted, |_| true), 0.0)
+        let free = self.log_likelihood_gains(&predicted, |at| self.free[at]);
+        let clearest = free.iter().max_by(|a, b| a[1].total_cmp(&b[1]));
+        clearest.is_none_or(|[gain, _]| *gain > 0.0) && most_have(&self.log_likelihood_gains(&predicted, |_| true), 0.0)
     }
 
     /// The same of a deviation that was read from these ranges chirp by chirp, in which the strongest one finds itself: most of the

@@ -15,7 +15,7 @@ use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::detectors::climb::climb;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place};
-use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::statistics::{UNDECIDED, chi2_tail, corrected};
 use crate::effects::{self, Stage};
 
 use amplitude::amplitude;
@@ -24,9 +24,8 @@ use undo::undo;
 
 /// Share of what a sinusoid explains whose phase is the same everywhere; half of what turns one way.
 const LIKENESS: f64 = 0.75;
-/// Teeth of the comb of aliases to either side, and by how much less (nats) one may explain that is not resolved.
+/// Teeth of the comb of aliases to either side.
 const TEETH: i32 = 4;
-const ALIAS_GAIN: f64 = 4.6;
 /// No mount of a radar vibrates faster with an amplitude that is measurable.
 const HIGHEST_HZ: f64 = 300.0;
 
@@ -65,7 +64,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let teeth: Vec<(f64, f64)> = (-TEETH..=TEETH).map(|k| refined(first.0 + f64::from(k) * frame_rate)).collect();
     let top = teeth.iter().map(|tooth| tooth.1).fold(first.1, f64::max);
     // Of those that the short frames cannot tell apart, the slowest.
-    let alike = teeth.into_iter().chain([first]).filter(|tooth| tooth.1 > top - ALIAS_GAIN);
+    let alike = teeth.into_iter().chain([first]).filter(|tooth| tooth.1 > top - UNDECIDED);
     let (frequency, top) = alike.min_by(|a, b| a.0.total_cmp(&b.0))?;
     let vibration = cells.fit(training, frequency, |_| true);
     let found = cells.held_out(held_out, &vibration);

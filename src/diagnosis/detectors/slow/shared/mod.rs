@@ -18,9 +18,9 @@ mod course;
 mod deviations;
 
 use super::field::Part;
-use super::selection::UNDECIDED;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::Candidate;
+use crate::diagnosis::statistics::UNDECIDED;
 
 use bets::{Shared, log_likelihood, shared, shares, spectra};
 use candidate::candidate;

@@ -1,0 +1,119 @@
+//! Frames of a whole part, or a whole multiple, of the loops that are stated.
+//!
+//! Two frames read as one have a boundary in their middle, k frames k − 1 of them at parts of a k-th. As stated, the largest step is
+//! there as often as elsewhere: a binomial law. A receiver that changes there in each frame, and is again what it was when the next one
+//! begins, is undone by then; what moves is not, so that most of what changed must last: a sign test. The largest of the two chances
+//! stands. Of frames that were read in k parts each, k − 1 of k boundaries change the scene less than the largest step within, and each
+//! k-th more: sign tests. Bonferroni over k and the first part.
+
+use super::tails::log_binomial_tail;
+
+/// Fewest loops of a part whose beginning is neither a frame's first steps, which settle, nor its last ones.
+const FEWEST: usize = 4;
+/// Most parts of a frame that are tried.
+const MOST: usize = 8;
+
+/// The largest step of a frame.
+pub(super) struct Step {
+    pub frame: usize,
+    /// The loop before it.
+    pub place: usize,
+    pub size: f64,
+    pub next: Option<Next>,
+}
+
+/// The next frame, where that was seen.
+pub(super) struct Next {
+    /// The step to it.
+    pub size: f64,
+    /// Whether what changed at the largest step of the one before is still so.
+    pub lasts: bool,
+}
+
+/// Frames of other loops than stated.
+pub(super) struct Other {
+    pub loops: usize,
+    pub text: String,
+    pub log_p: f64,
+}
+
+/// The least likely as stated.
+pub(super) fn other_frames(stated: usize, steps: &[Step]) -> Option<Other> {
+    let parts = (2..=MOST).filter(|parts| stated.is_multiple_of(*parts) && stated / parts >= FEWEST);
+    let tried = (parts.clone().count() + (2..=MOST).sum::<usize>()) as f64;
+    let wholes = (2..=MOST).flat_map(|parts| (0..parts).map(move |first| [parts, first]));
+    let all = parts.map(|parts| of_part(stated, parts, steps)).chain(wholes.map(|whole| of_whole(stated, whole, steps)));
+    let best = all.min_by(|a, b| a.log_p.total_cmp(&b.log_p))?;
+    Some(Other { log_p: (best.log_p + tried.ln()).min(0.0), ..best })
+}
+
+/// So many frames read as one.
+fn of_part(stated: usize, parts: usize, steps: &[Step]) -> Other {
+    let loops = stated / parts;
+    let there: Vec<&Step> = steps.iter().filter(|step| (step.place + 1).is_multiple_of(loops)).collect();
+    // Beside the ends of a frame there is no step.
+    let chance = (parts - 1) as f64 / (stated - 3) as f64;
+    let next: Vec<&Next> = there.iter().filter_map(|step| step.next.as_ref()).collect();
+    let lasting = next.iter().filter(|next| next.lasts).count();
+    let log_p = log_binomial_tail(there.len(), steps.len(), chance).max(log_binomial_tail(lasting, next.len(), 0.5));
+    let text = format!(
+        "in {} of {} frames the scene changes most where frames of {loops} loops begin, and in {lasting} of {} for good: {parts} frames \
+         were read as one",
+        there.len(),
+        steps.len(),
+        next.len()
+    );
+    Other { loops, text, log_p }
+}
+
+/// Frames read in so many parts each, of which the frame `first` and each one after so many parts are the last ones.
+fn of_whole(stated: usize, [parts, first]: [usize; 2], steps: &[Step]) -> Other {
+    let larger = |is_last: bool| {
+        let of_kind = steps.iter().filter(|step| (step.frame % parts == first) == is_last);
+        let against: Vec<bool> = of_kind.filter_map(|step| step.next.as_ref().map(|next| next.size > step.size)).collect();
+        (against.iter().filter(|larger| **larger).count(), against.len())
+    };
+    let ((between, ends), (within, joints)) = (larger(true), larger(false));
+    let loops = stated * parts;
+    let log_p = log_binomial_tail(between, ends, 0.5).max(log_binomial_tail(joints - within, joints, 0.5));
+    let text = format!(
+        "the scene changes more to the next frame than within it in {between} of {ends} frames, each {parts} frames, and in {within} of \
+         the {joints} others: frames of {loops} loops were read in {parts} parts"
+    );
+    Other { loops, text, log_p }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::support::numbers;
+
+    fn step(frame: usize, place: usize, [size, next]: [f64; 2], lasts: bool) -> Step {
+        Step { frame, place, size, next: Some(Next { size: next, lasts }) }
+    }
+
+    #[test]
+    fn steps_at_drawn_places_are_not_accused() {
+        for seed in 0..40 {
+            let drawn = numbers(seed, 3 * 60, 0.0, 1.0);
+            let steps: Vec<Step> = drawn
+                .chunks_exact(3)
+                .enumerate()
+                .map(|(frame, drawn)| step(frame, 1 + (drawn[0] * 13.0) as usize, [drawn[1], drawn[2]], drawn[1] > 0.5))
+                .collect();
+            let found = other_frames(16, &steps).unwrap();
+            assert!(found.log_p > 1e-3f64.ln(), "{seed}: {} {}", found.text, found.log_p);
+        }
+    }
+
+    /// Of 40 frames of 16 loops: all in the middle for good, the chance of (1/13)^40 or of (1/2)^40.
+    #[test]
+    fn the_law_is_exact_where_all_agree() {
+        let middle = |lasts: bool| (0..40).map(|frame| step(frame, 7, [2.0, 1.0], lasts)).collect::<Vec<_>>();
+        let found = other_frames(16, &middle(true)).unwrap();
+        // Two and four parts, and the first of each of two to eight.
+        assert!((found.log_p - (37f64.ln() - 40.0 * std::f64::consts::LN_2)).abs() < 1e-9, "{}", found.log_p);
+        assert_eq!(found.loops, 8);
+        assert!(other_frames(16, &middle(false)).unwrap().log_p == 0.0);
+    }
+}
