@@ -34,7 +34,7 @@ def plain(value: Any) -> Any:
         return os.fspath(value)
     if hasattr(value, "tolist"):
         return value.tolist()
-    raise Error(f"a setting is a {type(value).__name__}, expected a number, a text, a path, a switch, or a list of these")
+    raise Error(f"a setting is of type `{type(value).__name__}`, expected a number, a text, a path, a switch, or a list of these")
 
 
 def sets(settings: Settings) -> list[str]:

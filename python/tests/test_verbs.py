@@ -201,7 +201,7 @@ def test_settings_are_numbers_of_numpy_and_paths_too(tmp_path: Path) -> None:
         "loss.weight=0.5",
         "a=[0, 1]",
     ]
-    with pytest.raises(hybridsim.Error, match="a setting is a object"):
+    with pytest.raises(hybridsim.Error, match="of type `object`"):
         hybridsim._types.sets({"a": object()})
 
 

@@ -93,9 +93,9 @@ impl Inspector for Boundary {
         {
             let to_this = |from: &[Vec<Complex32>; 2]| step([&from[0], &from[1], loops[0], loops[1]]);
             let (size, all) = (to_this(&last.end), to_this(&last.before));
-            // Half of the amplitude of the larger one of both steps, beyond any other one.
-            let lasts = all - last.usual > 0.25 * (before.size.max(size) - last.usual);
-            before.next = Some(Next { size, lasts });
+            let changed = before.size.max(size) - last.usual;
+            let lasting = if changed > 0.0 { ((all - last.usual) / changed).min(1.0) } else { 0.0 };
+            before.next = Some(Next { size, lasting });
         }
         let end = loops.len() - 1;
         let sizes: Vec<f64> = (1..end - 1).map(|at| step([at - 1, at, at + 1, at + 2].map(|index| loops[index]))).collect();
@@ -196,16 +196,16 @@ mod tests {
             "{as_one:?}"
         );
         // Of three, poses that never repeat.
-        let (drawn, poses) = (numbers(4, 48 * LOOPS * 16, -0.05, 0.05), numbers(3, 48, 0.0, 6.3));
-        let of_three = judged([16, 3 * LOOPS, 16], |frame, i| {
+        let (drawn, poses) = (numbers(4, 120 * LOOPS * 16, -0.05, 0.05), numbers(3, 120, 0.0, 6.3));
+        let of_three = judged([40, 3 * LOOPS, 16], |frame, i| {
             let index = frame * 3 * LOOPS + i / 16;
             (0.4 * (i % 16) as f64 + poses[index / LOOPS] + 0.06 * (index % LOOPS) as f64).sin()
                 + drawn[frame * 3 * LOOPS * 16 + i]
         });
         assert!(of_three.is_refusal() && of_three.found.contains("3 frames were read as one"), "{of_three:?}");
         // Frames of 16 loops, in two parts.
-        let drawn = numbers(5, 48 * LOOPS * 16, -0.05, 0.05);
-        let in_parts = judged([48, LOOPS, 16], |frame, i| {
+        let drawn = numbers(5, 300 * LOOPS * 16, -0.05, 0.05);
+        let in_parts = judged([300, LOOPS, 16], |frame, i| {
             let time = (frame * LOOPS + i / 16) as f64 * 0.01 + (frame / 2) as f64 * 0.37;
             (0.4 * (i % 16) as f64 + 6.0 * time).sin() + drawn[frame * LOOPS * 16 + i]
         });

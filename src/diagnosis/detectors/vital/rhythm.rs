@@ -10,6 +10,8 @@ use crate::diagnosis::statistics;
 /// Rates of breathing and of a heart, Hz.
 pub const BREATHING_HZ: [f64; 2] = [0.1, 0.7];
 pub const HEART_HZ: [f64; 2] = [0.8, 2.2];
+/// Lines to either side that a line stands out of, at least.
+const FEWEST_BESIDE: f64 = 5.0;
 /// A rhythm needs so many periods.
 const FEWEST_PERIODS: f64 = 2.5;
 
@@ -100,7 +102,9 @@ impl Series<'_> {
     /// Squared amplitudes of what is left at the frequencies around one, its harmonics left out.
     fn around(&self, frequency_hz: f64, left: &[f64], interval: f64) -> Vec<f64> {
         let Self { times, frames, duration, .. } = self;
-        let reach = if frequency_hz < HEART_HZ[0] { [0.0, HEART_HZ[0]] } else { [frequency_hz - 0.5, frequency_hz + 0.5] };
+        // A short recording has few lines.
+        let half = 0.5f64.max(FEWEST_BESIDE / duration);
+        let reach = if frequency_hz < HEART_HZ[0] { [0.0, HEART_HZ[0]] } else { [frequency_hz - half, frequency_hz + half] };
         let mut around = vec![];
         for k in 1..(0.5 * duration / interval) as usize {
             let f = k as f64 / duration;
@@ -148,7 +152,8 @@ pub fn rhythm(times: &[f64], phase: &[f64], training: &[usize], held_out: &[usiz
     series.standing_out(frequency_hz, interval, [lowest, highest])
 }
 
-/// That of anything, up to half of the frame rate: the strongest line of the periodogram. A faster one is folded into that.
+/// That of anything, up to half of the frame rate: the strongest line of the periodogram. A faster one is folded into that; beyond about a
+/// fifth, frames between others are not predicted by them, and nothing is found.
 pub fn vibration(times: &[f64], phase: &[f64], training: &[usize], held_out: &[usize]) -> Option<Rhythm> {
     let (series, interval) = Series::of(times, phase, training, held_out);
     let (step, width) = (0.5 / series.duration, 1.0 / series.duration);
