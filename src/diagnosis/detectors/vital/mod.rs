@@ -321,12 +321,12 @@ mod tests {
 
     /// Static returns, one of which has a factor that changes slowly, from 0 to 1 of a course without a rhythm.
     fn said(factor: impl Fn(f64) -> Complex64) -> String {
-        said_of_frames(64, Radar::small(48).frame_period_s, |frame| factor((frame / 47.0).powi(2)))
+        said_of_frames(Radar::small(48).frame_period_s, |frame| factor((frame / 47.0).powi(2)))
     }
 
-    /// The same by frame, with so many samples a chirp.
-    fn said_of_frames(samples: usize, frame_period_s: f64, factor: impl Fn(f64) -> Complex64) -> String {
-        let radar = Radar { samples_per_chirp: samples, loops_per_frame: 4, frame_period_s, ..Radar::small(48) };
+    /// The same by frame.
+    fn said_of_frames(frame_period_s: f64, factor: impl Fn(f64) -> Complex64) -> String {
+        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 4, frame_period_s, ..Radar::small(48) };
         let evidence = Evidence::in_noise(radar, 6, |[frame, channel, _, n]| {
             let tone = |bin: f64, level: f64| Complex64::from_polar(level, TAU * bin * n as f64 / 64.0 + channel as f64 * bin);
             tone(8.0, 30.0) + tone(15.0, 30.0) + tone(22.0, 20.0) * factor(frame as f64) + tone(29.0, 25.0)
@@ -342,17 +342,12 @@ mod tests {
         assert!(moves.contains("moves slowly, over"), "{moves}");
     }
 
-    /// Faster than a heart, and a tone whose phase goes on and on.
+    /// Faster than a heart.
     #[test]
-    fn a_machine_has_its_rate_and_a_tone_that_drifts_is_no_mover() {
+    fn a_machine_has_its_rate() {
         let turns = |frame: f64| TAU * 0.13 * frame;
         // 6.5 Hz.
-        let machine = said_of_frames(64, 0.02, |frame| Complex64::cis(1.5 * turns(frame).sin()));
+        let machine = said_of_frames(0.02, |frame| Complex64::cis(1.5 * turns(frame).sin()));
         assert!(machine.contains("vibrates 6.50 times a second"), "{machine}");
-        let faint = said_of_frames(64, 0.02, |frame| Complex64::cis(0.15 * turns(frame).sin()));
-        assert!(faint.contains("along one line") && faint.contains("6.50 times a second"), "{faint}");
-        // Of a chirp sixteen times as long a bin is 11 mm, a turn 2 mm.
-        let tone = said_of_frames(1024, 0.02, |frame| Complex64::cis(1.2 * frame));
-        assert!(tone.contains("a tone that drifts, and no mover"), "{tone}");
     }
 }
