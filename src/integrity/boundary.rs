@@ -12,7 +12,7 @@ use num_complex::Complex32;
 use statrs::statistics::{Data, OrderStatistics};
 
 use super::frame_length::{OtherLength, other_length};
-use super::frame_parts::{Next, Other, Step, other_frames};
+use super::frame_parts::{Next, Other, Step, counted, other_frames};
 use super::stream::{Schedule, Stream};
 use super::tails::{log_binomial_tail, log_same_place, most_frequent};
 use super::{ALARM, Finding, Inspector, Kind};
@@ -70,8 +70,7 @@ impl Boundary {
 
 /// How many steps are larger than those to the next frame, of how many.
 fn larger<'a>(steps: impl Iterator<Item = &'a Step>) -> (usize, usize) {
-    let against: Vec<bool> = steps.filter_map(|step| step.next.as_ref().map(|next| step.size > next.size)).collect();
-    (against.iter().filter(|larger| **larger).count(), against.len())
+    counted(steps, |size, next| size > next)
 }
 
 /// What lasts of a step: two loops before it and two after it, all in order.
@@ -131,11 +130,9 @@ impl Inspector for Boundary {
         if let Some(found) = self.of_another_length().or_else(|| self.of_other_parts()) {
             return Some(found);
         }
-        let after: Vec<bool> =
-            self.steps.iter().filter_map(|step| step.next.as_ref().map(|next| next.size > step.size)).collect();
-        let between = after.iter().filter(|larger| **larger).count();
-        let found = format!("the scene changes more to the next frame than within it in {between} of {} frames", after.len());
-        if log_binomial_tail(between, after.len(), 0.5) < ALARM.ln() {
+        let (between, of) = counted(self.steps.iter(), |size, next| next > size);
+        let found = format!("the scene changes more to the next frame than within it in {between} of {of} frames");
+        if log_binomial_tail(between, of, 0.5) < ALARM.ln() {
             return Some(Finding::as_stated(CHECK, EXPECTED, found));
         }
         Some(Finding::undecided(CHECK, EXPECTED, found))

@@ -33,6 +33,12 @@ pub(super) struct Next {
     pub lasting: f64,
 }
 
+/// Of how many steps to which the next frame was seen this holds of both sizes, and how many those are.
+pub(super) fn counted<'a>(steps: impl Iterator<Item = &'a Step>, holds: impl Fn(f64, f64) -> bool) -> (usize, usize) {
+    let held = |step: &Step| step.next.as_ref().map(|next| holds(step.size, next.size));
+    steps.filter_map(held).fold((0, 0), |(count, of), holds| (count + usize::from(holds), of + 1))
+}
+
 /// Frames of other loops than stated.
 pub(super) struct Other {
     pub loops: usize,
@@ -71,11 +77,8 @@ fn of_part(stated: usize, parts: usize, steps: &[Step]) -> Other {
 
 /// Frames read in so many parts each, of which the frame `first` and each one after so many parts are the last ones.
 fn of_whole(stated: usize, [parts, first]: [usize; 2], steps: &[Step]) -> Other {
-    let larger = |is_last: bool| {
-        let of_kind = steps.iter().filter(|step| (step.frame % parts == first) == is_last);
-        let against: Vec<bool> = of_kind.filter_map(|step| step.next.as_ref().map(|next| next.size > step.size)).collect();
-        (against.iter().filter(|larger| **larger).count(), against.len())
-    };
+    let larger =
+        |is_last: bool| counted(steps.iter().filter(|step| (step.frame % parts == first) == is_last), |size, next| next > size);
     let ((between, ends), (within, joints)) = (larger(true), larger(false));
     let loops = stated * parts;
     let log_p = log_binomial_tail(between, ends, 0.5).max(log_binomial_tail(joints - within, joints, 0.5));

@@ -113,6 +113,9 @@ impl Transmitters {
 impl Inspector for Transmitters {
     fn see(&mut self, stream: &Stream) {
         let tx = self.schedule.tx;
+        if tx < 2 {
+            return;
+        }
         for (index, of, chirp) in stream.chirps() {
             let values: Vec<Complex64> = chirp.iter().map(|value| Complex64::new(value.re.into(), value.im.into())).collect();
             self.chirps += 1.0;

@@ -80,10 +80,8 @@ pub fn sweep(facts: &Facts) -> Vec<Finding> {
 
 /// A frame ends before the next one starts.
 pub fn frame(facts: &Facts) -> Vec<Finding> {
-    let overlaps = |radar: &&Radar| radar.frames > 1 && radar.frame_duration_s() > radar.frame_period_s * (1.0 + 1e-9);
-    let Some(radar) = facts.radar.as_ref().filter(overlaps) else { return vec![] };
-    let frame_s = radar.frame_duration_s();
-    let found = format!("{}, so that a frame's chirps take {:.4} ms", radar.chirp_period_s, 1e3 * frame_s);
+    let Some(radar) = facts.radar.as_ref().filter(|radar| radar.frames_are_apart() == Some(false)) else { return vec![] };
+    let found = format!("{}, so that a frame's chirps take {:.4} ms", radar.chirp_period_s, 1e3 * radar.frame_duration_s());
     let expected = format!("a frame within its {:.4} ms", 1e3 * radar.frame_period_s);
     let finding = Finding::new(Kind::Note, Part::Settings, "radar.chirp_period_s", found, expected);
     vec![

@@ -38,7 +38,7 @@ pub fn checks(radar: &Radar, farthest_m: Option<f64>, fastest_mps: Option<f64>) 
             rule: "loops_per_frame * tx * chirp_period_s <= frame_period_s",
             reason: "a frame must end before the next one starts",
             found: format!("{:.2} ms against {:.2} ms", radar.frame_duration_s() * 1e3, radar.frame_period_s * 1e3),
-            passed: (radar.frames > 1).then_some(radar.frame_duration_s() <= radar.frame_period_s * (1.0 + 1e-9)),
+            passed: radar.frames_are_apart(),
         },
         Check {
             rule: "farthest range <= max range",
@@ -64,6 +64,11 @@ pub fn checks(radar: &Radar, farthest_m: Option<f64>, fastest_mps: Option<f64>) 
 }
 
 impl Radar {
+    /// Whether a frame ends before the next one starts; none of a single frame.
+    pub fn frames_are_apart(&self) -> Option<bool> {
+        (self.frames > 1).then_some(self.frame_duration_s() <= self.frame_period_s * (1.0 + 1e-9))
+    }
+
     /// Refuses numbers that no radar can have. `key` is what names this radar in messages, such as `radar`.
     pub fn check(&self, key: &str) -> Result<()> {
         let positive = [

@@ -53,15 +53,14 @@ impl Recording {
     pub fn open(folder: impl AsRef<Path>) -> Result<Self> {
         let folder = folder.as_ref();
         // The settings themselves are a good name for the folder, too; no other file of it is.
-        let folder = match folder.file_name() {
-            Some(name) if folder.is_file() && name == SETTINGS_FILE => folder.parent().unwrap_or(Path::new("")),
-            Some(_) if folder.is_file() => {
-                return Err(Error::field(folder, "type", "a file", format!("a recording's folder, or its {SETTINGS_FILE}"))
-                    .with_hint(
-                        "`hybridsim check FILE` says what a file is; `hybridsim import` makes recordings of raw captures",
-                    ));
-            }
-            _ => folder,
+        let folder = if !folder.is_file() {
+            folder
+        } else if folder.file_name().is_some_and(|name| name == SETTINGS_FILE) {
+            folder.parent().unwrap_or(Path::new(""))
+        } else {
+            let hint = "`hybridsim check FILE` says what a file is; `hybridsim import` makes recordings of raw captures";
+            let expected = format!("a recording's folder, or its {SETTINGS_FILE}");
+            return Err(Error::field(folder, "type", "a file", expected).with_hint(hint));
         };
         let path = folder.join(SETTINGS_FILE);
         let settings = RecordingSettings::read(&path)?;

@@ -68,7 +68,6 @@ pub fn audit(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<Check> {
     checks.push(channels::clipping(evidence));
     checks.extend(body_in_room::body_in_room(evidence));
     checks.extend(placement::placement(evidence, origin_m));
-    checks.extend(not_asked(evidence));
     if !checks.iter().any(|check| !check.ok && is_convention(check)) {
         // Phases predict nothing where the body is not where it is said to be.
         checks.extend(body_direction::body_direction(evidence));
@@ -78,17 +77,6 @@ pub fn audit(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<Check> {
     checks.extend(room_ranges::room_ranges(evidence));
     checks.extend(surface_sampling::surface_sampling(evidence));
     checks
-}
-
-/// What is not asked of a body that hardly moves: static clutter leaks into its velocities.
-fn not_asked(evidence: &Evidence) -> Option<Check> {
-    evidence.body.as_ref().filter(|_| !energy::moves(evidence))?;
-    let least = energy::CLUTTER_CELLS * evidence.radar.velocity_resolution_mps();
-    let found = format!(
-        "not asked, nor are doppler_sign, heading, frame_period, sides and tx_order: no part of the body is faster than {least:.2} m/s, \
-         below which static clutter leaks"
-    );
-    Some(Check::new("body_place", "moving energy where the motion puts the body", found, true))
 }
 
 /// Checks about a convention, or the scene as stated, that must hold before physics is looked for.

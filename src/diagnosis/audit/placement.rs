@@ -3,7 +3,7 @@
 use super::Check;
 use super::body_place::{as_stated, elsewhere};
 use super::doppler_sign::doppler_sign;
-use super::energy::{Alternative, Fit, moves};
+use super::energy::{Alternative, CLUTTER_CELLS, Fit, moves};
 use super::frame_period::frame_period;
 use super::heading::heading;
 use crate::diagnosis::evidence::Evidence;
@@ -20,7 +20,7 @@ const PRESENT_DB: f64 = 1.9;
 /// explains most is reported.
 pub(super) fn placement(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<Check> {
     if !moves(evidence) {
-        return vec![];
+        return not_asked(evidence).into_iter().collect();
     }
     let stated = as_stated(evidence);
     let mut readings = vec![doppler_sign(evidence)];
@@ -63,6 +63,17 @@ pub(super) fn placement(evidence: &Evidence, origin_m: Option<[f64; 3]>) -> Vec<
         }
     }
     checks
+}
+
+/// What is not asked of a body that hardly moves: static clutter leaks into its velocities.
+fn not_asked(evidence: &Evidence) -> Option<Check> {
+    evidence.body.as_ref()?;
+    let least = CLUTTER_CELLS * evidence.radar.velocity_resolution_mps();
+    let found = format!(
+        "not asked, nor are doppler_sign, heading, frame_period, sides and tx_order: no part of the body is faster than {least:.2} m/s, \
+         below which static clutter leaks"
+    );
+    Some(Check::new("body_place", "moving energy where the motion puts the body", found, true))
 }
 
 /// Whether a body is observed where it is stated to be, once something was undone; none where another reading of the scene is

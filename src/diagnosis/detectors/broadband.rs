@@ -45,12 +45,21 @@ fn moving(loops: usize) -> impl Iterator<Item = usize> {
     (0..loops).filter(move |&doppler| moves(doppler, loops))
 }
 
+/// Of some frames, the median over velocities by range; zero where all was taken out.
+fn levels(evidence: &Evidence, frames: &[usize]) -> Vec<f64> {
+    let mean = mean_map(evidence, frames);
+    (0..evidence.range_bins()).map(|bin| floor(evidence, &mean, bin, 1).unwrap_or(0.0)).collect()
+}
+
+fn strongest(levels: &[f64]) -> Option<usize> {
+    (0..levels.len()).max_by(|&a, &b| levels[a].total_cmp(&levels[b]))
+}
+
 impl Floor {
     fn of(evidence: &Evidence) -> Self {
         let samples = evidence.cube.dims[4];
         let (bins, channels) = (evidence.range_bins(), evidence.cube.channels());
-        let mean = mean_map(evidence, &evidence.split.training);
-        let level = (0..bins).map(|bin| floor(evidence, &mean, bin, 1).unwrap_or(0.0)).collect();
+        let level = levels(evidence, &evidence.split.training);
         let mut clutter = vec![0.0; bins];
         for (channel, chirp) in evidence.standing().chunks_exact(samples).enumerate() {
             let weight = (evidence.noise()[channel].max(f64::MIN_POSITIVE) * channels as f64).recip();
@@ -86,7 +95,7 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     let [frames, _, _, loops, samples] = evidence.cube.dims;
     let floor = Floor::of(evidence);
     let (bins, channels) = (evidence.range_bins(), evidence.cube.channels() as f64);
-    let bin = (0..bins).max_by(|&a, &b| floor.level[a].total_cmp(&floor.level[b]))?;
+    let bin = strongest(&floor.level)?;
     let count = evidence.split.training.len() as f64 * channels;
     // The law of one cell; the median over many has less spread.
     let p_value = corrected(mean_power_tail(floor.level[bin], count), bins as f64);
@@ -162,14 +171,8 @@ fn fills(evidence: &Evidence, bin: usize) -> bool {
 /// Whether it is strongest at that range in each part of the recording: what turns or flutters stays, a tone of somebody else may wander.
 fn stays(evidence: &Evidence, bin: usize) -> bool {
     let training = &evidence.split.training;
-    let strongest = |frames: &[usize]| {
-        let mean = mean_map(evidence, frames);
-        let level = |bin: &usize| floor(evidence, &mean, *bin, 1).unwrap_or(0.0);
-        (0..evidence.range_bins()).max_by(|a, b| level(a).total_cmp(&level(b)))
-    };
-    training
-        .chunks(training.len().div_ceil(PARTS))
-        .all(|frames| strongest(frames).is_some_and(|other| other.abs_diff(bin) <= HANN_LOBE))
+    let is_there = |frames| strongest(&levels(evidence, frames)).is_some_and(|other| other.abs_diff(bin) <= HANN_LOBE);
+    training.chunks(training.len().div_ceil(PARTS)).all(is_there)
 }
 
 /// Chance of what the receivers share at a range if each had noise of its own: of the best pair of channels, whose squared coherence

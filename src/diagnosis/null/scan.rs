@@ -162,14 +162,15 @@ impl Cells {
                     }
                 }
             }
-            let near = |range: usize, beside: usize| -> Vec<f64> {
-                let bins = (0..(2 * beside + 1).min(bins)).map(|i| (range + bins + i - beside.min(bins / 2)) % bins);
-                bins.flat_map(|range| powers[range].iter().copied()).collect()
+            let near = |range: usize, beside: usize| {
+                (0..(2 * beside + 1).min(bins)).map(move |i| (range + bins + i - beside.min(bins / 2)) % bins)
             };
+            let count = |range: usize, beside: usize| near(range, beside).map(|range| powers[range].len()).sum::<usize>();
             let level = |range: usize| {
-                let mut widths = (0..=MOST_BESIDE).map(|beside| near(range, beside));
-                let enough = widths.find(|powers| powers.len() >= ENOUGH);
-                exponential_scale(&mut enough.unwrap_or_else(|| near(range, MOST_BESIDE)), QUANTILE)
+                let is_enough = |beside: &usize| *beside == MOST_BESIDE || count(range, *beside) >= ENOUGH;
+                let beside = (0..=MOST_BESIDE).find(is_enough).unwrap_or(MOST_BESIDE);
+                let mut near: Vec<f64> = near(range, beside).flat_map(|range| powers[range].iter().copied()).collect();
+                exponential_scale(&mut near, QUANTILE)
             };
             let own: Vec<f64> = (0..bins).map(level).collect();
             // Where the body always is, nothing tells the level; nothing is asked there in these frames either.

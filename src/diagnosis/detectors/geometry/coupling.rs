@@ -1,6 +1,5 @@
 //! Mutual coupling of neighbouring receivers: the inner ones have two neighbours, the outer ones one.
 
-use crate::diagnosis::statistics::UNDECIDED;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
@@ -10,6 +9,7 @@ use super::mismatch;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::speckle::Look;
+use crate::diagnosis::statistics::UNDECIDED;
 use crate::diagnosis::{Candidate, Correction, Cube, Estimate, Evidence, Place, Volume, statistics};
 use crate::effects::{self, Stage};
 

@@ -5,7 +5,6 @@
 //! power model does not know shifts the body by up to 4 mm and 1.4 ms (practice recordings without any such effect, which also
 //! helped to choose the lobes and these floors): a change must exceed these floors, frame after frame.
 
-use crate::diagnosis::statistics::UNDECIDED;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::change::{Change, Moves, frame_period_s};
@@ -16,6 +15,7 @@ use super::trial::{Score, Trial};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::detectors::clutter::energy_beyond_noise;
 use crate::diagnosis::detectors::description::Description;
+use crate::diagnosis::statistics::UNDECIDED;
 use crate::diagnosis::{Candidate, Estimate, Place};
 use crate::effects::{Stage, clock_drift, clock_offset, frame_drop, pose_offset, range_bias, slope_error};
 

@@ -1,6 +1,7 @@
 //! A static return that is stronger than the static clutter around it (`static_reflector`): in one range cell, from one direction,
 //! in every frame. What the clutter's own roughness may do is the null: its power in a cell is speckle about the mean of the
-//! ranges around it, times a texture, as the ranges themselves show it (`texture.rs`). Boundaries, edges and corners return more than their surroundings at known ranges, and are left out.
+//! ranges around it, times a texture, as the ranges themselves show it (`texture.rs`). Boundaries, edges and corners return more than their
+//! surroundings at known ranges, and are left out.
 
 use num_complex::Complex64;
 
@@ -41,7 +42,6 @@ struct Peak {
     around: Vec<usize>,
     bin: usize,
     p_value: f64,
-    texture: Texture,
 }
 
 pub fn find(evidence: &Evidence) -> Option<Candidate> {
@@ -49,10 +49,10 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let frames: Vec<Spectra> = (0..evidence.cube.dims[0]).map(|frame| spectra(&evidence.cube, &[frame])).collect();
     let training = spectra(&evidence.cube, &evidence.split.training);
     let constant = constant(&frames);
-    let (peak, tried) = strongest(evidence, room, &training, &constant)?;
+    let (peak, texture, tried) = strongest(evidence, room, &training, &constant)?;
     let held_out = spectra(&evidence.cube, &evidence.split.held_out);
     let ratio = beam(&evidence.radar, &held_out, peak.bin, peak.sine) / mean(&held_out, &peak.around);
-    let held_out_p = peak.texture.mean_over(|texture| tail(ratio / texture, peak.around.len()));
+    let held_out_p = texture.mean_over(|texture| tail(ratio / texture, peak.around.len()));
     let p_value = corrected(peak.p_value, tried * super::TRIED);
     let nats = -(peak.p_value.max(held_out_p).max(1e-300) * tried).ln();
     (nats > super::LEAST_GAIN && p_value < 1e-3).then(|| candidate(evidence, &peak, p_value, nats))
@@ -79,8 +79,8 @@ fn constant(frames: &[Spectra]) -> Vec<bool> {
         .collect()
 }
 
-/// The least likely cell under speckle, and how many were looked at.
-fn strongest(evidence: &Evidence, room: &Room, spectra: &Spectra, constant: &[bool]) -> Option<(Peak, f64)> {
+/// The least likely cell under speckle, the texture that this has, and how many were looked at.
+fn strongest(evidence: &Evidence, room: &Room, spectra: &Spectra, constant: &[bool]) -> Option<(Peak, Texture, f64)> {
     let radar = &evidence.radar;
     let cell_m = SPEED_OF_LIGHT * radar.sample_rate_hz / (2.0 * radar.slope_hz_per_s * radar.samples_per_chirp as f64);
     let known = known_m(room);
@@ -114,10 +114,10 @@ fn strongest(evidence: &Evidence, room: &Room, spectra: &Spectra, constant: &[bo
         let ratio = power / mean(spectra, &around);
         let p_value = texture.mean_over(|texture| tail(ratio / texture, around.len()));
         if best.as_ref().is_none_or(|best| p_value < best.p_value) {
-            best = Some(Peak { range_m, cell_m, sine, ratio, around, bin, p_value, texture: texture.clone() });
+            best = Some(Peak { range_m, cell_m, sine, ratio, around, bin, p_value });
         }
     }
-    best.map(|best| (best, tried))
+    best.map(|best| (best, texture, tried))
 }
 
 /// Probability that speckle exceeds so many times the mean of its neighbours (one draw over a mean of draws: F law).

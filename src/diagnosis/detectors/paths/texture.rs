@@ -20,7 +20,6 @@ const STEPS: usize = 400;
 const LOG_TEXTURE: [f64; 2] = [-20.0, 6.0];
 
 /// Values of the texture with their weights, which sum to one.
-#[derive(Clone)]
 pub struct Texture(Vec<[f64; 2]>);
 
 impl Texture {

@@ -1,6 +1,5 @@
 //! Sinusoids over slow time: a coherent periodogram over all frames, of frames that are apart.
 
-use crate::diagnosis::statistics::UNDECIDED;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -9,6 +8,7 @@ use super::{
     periodogram::Periodogram,
 };
 use crate::diagnosis::detectors::climb::climb;
+use crate::diagnosis::statistics::UNDECIDED;
 
 /// A sinusoid `a cos + b sin` of 2π f T, with its harmonics.
 #[derive(Clone, Debug)]

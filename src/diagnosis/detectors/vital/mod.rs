@@ -71,7 +71,8 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
         .filter(is_rhythmic)
         .and_then(|r| Some((name(&r, metres)?, r)))
         .filter(|_| !evidence.may_move());
-    let vibration = vibration(&evidence.starts_s, &best.phase, training, held_out).filter(is_rhythmic);
+    let unnamed = || vibration(&evidence.starts_s, &best.phase, training, held_out).filter(is_rhythmic);
+    let vibration = if named.is_none() { unnamed() } else { None };
     let gain = held_out_gain(evidence, &data, &mean, &best);
     if gain <= 3.0 {
         return None;
