@@ -164,8 +164,8 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // Bursts are cut out where they are plain: what they leave below the noise of single samples is in all receivers at once, and has
     // a spectrum of its own.
     let shared = candidate.behaves_like == Behaviour::NoiseSharedByReceivers;
-    let bursts = accepted.behaves_like == Behaviour::SparseAdditive && shared;
-    let tails = accepted.behaves_like == Behaviour::SparseAdditive && is_of_noise(candidate);
+    let sparse = accepted.behaves_like == Behaviour::SparseAdditive;
+    let (bursts, tails) = (sparse && shared, sparse && is_of_noise(candidate));
     let path_like = accepted.behaves_like.is_path() && !elsewhere;
     let faint = path_like && (is_one_of(candidate, &FAINT) || shared || is_path(candidate));
     // What has no name is modelled roughly.
@@ -179,11 +179,12 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let uneven = (smeared || is_one_of(accepted, &OF_RESIDUAL)) && is_of_receivers(candidate);
     // Chirps that start at random differ from their neighbours, and go on doing so a little.
     let unlike = is_by_chirp(accepted) && candidate.behaves_like == Behaviour::SparseAdditive;
+    let cut = is_product_of_cut(accepted, candidate);
     // Up to which share of what was gained.
     [
         (roughly || fades || image || unlike || tails, ROUGHLY),
         (bursts || behind || line || is_of_cut(accepted, candidate), 1.0),
-        (hardly || uneven || bent || is_mixed(accepted, candidate) || products || alone || of_line, f64::INFINITY),
+        (hardly || uneven || bent || is_mixed(accepted, candidate) || products || alone || of_line || cut, f64::INFINITY),
         (shaken || rest, SHAKEN),
         (by_chirp || faint, SLIGHTLY),
     ]
@@ -211,12 +212,21 @@ fn is_mixed(accepted: &Candidate, candidate: &Candidate) -> bool {
         || accepted.id == Some(effects::chirp_nonlinearity::ID) && candidate.behaves_like == Behaviour::NoiseOverBeatFrequency
 }
 
+fn is_cut(accepted: &Candidate) -> bool {
+    accepted.id == Some(effects::adc_saturation::ID) && matches!(accepted.correction, Correction::None)
+}
+
 /// Whether it is in the products of a signal that was cut and cannot be restored: of all returns along every chirp, and other ones in
-/// every receiver.
+/// every receiver; and the more is cut, the less of anything is received.
 fn is_of_cut(accepted: &Candidate, candidate: &Candidate) -> bool {
-    accepted.id == Some(effects::adc_saturation::ID)
-        && matches!(accepted.correction, Correction::None)
-        && (is_of_receivers(candidate) || candidate.place.stage == Some(Stage::Waveform))
+    let of_chirps = candidate.place.stage == Some(Stage::Waveform) || candidate.behaves_like == Behaviour::SlowTimeGain;
+    is_cut(accepted) && (is_of_receivers(candidate) || of_chirps)
+}
+
+/// Whether it may be a product of such a signal: it has less energy than all of them have, which may lie in one line.
+fn is_product_of_cut(accepted: &Candidate, candidate: &Candidate) -> bool {
+    let additive = [Behaviour::Tone, Behaviour::ExcessPower].contains(&candidate.behaves_like);
+    is_cut(accepted) && (additive || is_path(candidate) || is_product(candidate)) && candidate.energy < accepted.energy
 }
 
 /// Whether both are known and have nothing in common.
@@ -229,7 +239,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::diagnosis::Place;
+    use crate::diagnosis::{Place, Volume};
 
     fn of(id: Option<&'static str>, behaves_like: Behaviour, gain: f64) -> Candidate {
         Candidate { id, ..Candidate::new(behaves_like, Place::at(Stage::Scene), 0.0, gain) }
@@ -273,6 +283,15 @@ mod tests {
         let bursts = of(Some(effects::interference::ID), Behaviour::SparseAdditive, 1e4);
         let colour = |gain: f64| of(Some(effects::coloured_noise::ID), Behaviour::NoiseOverBeatFrequency, gain);
         assert!(is_left_by(&bursts, &colour(900.0)) && !is_left_by(&bursts, &colour(1100.0)));
+    }
+
+    #[test]
+    fn what_has_less_energy_than_the_products_of_a_cut_signal_may_be_one() {
+        let saturation = Candidate { energy: 1e3, ..of(Some(effects::adc_saturation::ID), Behaviour::Amplitude, 10.0) };
+        let mover = |energy: f64| Candidate { energy, ..of(Some(effects::moving_reflector::ID), Behaviour::PathLike, 1e6) };
+        assert!(is_left_by(&saturation, &mover(900.0)) && !is_left_by(&saturation, &mover(1100.0)));
+        let restored = Candidate { correction: Correction::inverse(Volume::KEPT, |_| ()), ..saturation };
+        assert!(!is_left_by(&restored, &mover(900.0)));
     }
 
     #[test]

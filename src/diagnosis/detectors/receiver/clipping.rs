@@ -1,9 +1,11 @@
 //! ADC clipping: components pile up at one value.
 
+use std::f64::consts::{FRAC_2_PI, SQRT_2};
 use std::sync::Arc;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
+use statrs::function::erf::erfc_inv;
 
 use super::declipping::{Declip, FARTHEST};
 use crate::diagnosis::behaviour::Behaviour;
@@ -21,7 +23,7 @@ const BOARD_BINS: usize = 8;
 const LEAKING: f64 = 0.01;
 
 /// What was sampled: without quadrature the real part alone.
-fn parts(value: &Complex64, is_real: bool) -> impl Iterator<Item = f64> {
+fn parts(value: &Complex64, is_real: bool) -> impl Iterator<Item = f64> + use<> {
     [value.re, value.im].into_iter().take(if is_real { 1 } else { 2 })
 }
 
@@ -58,25 +60,28 @@ impl Pile {
         // Within half a code, or a hair of the range for samples that are no codes.
         let tolerance = 1e-6 * half;
         let [_, _, _, loops, samples] = evidence.cube.dims;
-        let all = || evidence.cube.samples.iter().flat_map(|value| parts(value, evidence.is_real()));
-        // A converter may have fewer codes than its numbers say: the next one that there is.
-        let step = all().map(|part| inward * (part - end)).filter(|within| *within > tolerance).fold(f64::INFINITY, f64::min);
-        let step = if step.is_finite() { step.max(1.0) } else { 1.0 };
-        let slab = (0.02 * half).max(step);
-        // At the end and just within it.
-        let of_frame = |values: &[Complex64]| {
-            let within = values.iter().flat_map(|value| parts(value, evidence.is_real())).map(|part| inward * (part - end));
-            within.fold([0usize; 2], |[at, below], within| {
-                [at + usize::from(within <= tolerance), below + usize::from(within > tolerance && within <= slab)]
+        let frames = || evidence.cube.samples.par_chunks_exact(evidence.cube.channels() * loops * samples);
+        let within = |value: &Complex64| parts(value, evidence.is_real()).map(move |part| inward * (part - end));
+        // At the end, and the next value that there is: a converter may have fewer codes than its numbers say.
+        let at_and_next = |values: &[Complex64]| {
+            values.iter().flat_map(within).fold((0, f64::INFINITY), |(at, next), within| {
+                if within <= tolerance { (at + 1, next) } else { (at, next.min(within)) }
             })
         };
-        let frames = evidence.cube.samples.par_chunks_exact(evidence.cube.channels() * loops * samples);
-        let (by_frame, below): (Vec<usize>, Vec<usize>) = frames.map(of_frame).map(|[at, below]| (at, below)).unzip();
+        let (by_frame, next): (Vec<usize>, Vec<f64>) = frames().map(at_and_next).unzip();
+        let count = by_frame.iter().sum::<usize>();
+        if half <= 0.0 || count < FEWEST {
+            return None;
+        }
+        let next = next.into_iter().fold(f64::INFINITY, f64::min);
+        let step = if next.is_finite() { next.max(1.0) } else { 1.0 };
+        let slab = (0.02 * half).max(step);
+        let is_below = |within: &f64| *within > tolerance && *within <= slab;
+        let below: usize = frames().map(|values| values.iter().flat_map(within).filter(is_below).count()).sum();
         // A density that falls towards its end has fewer values in the last code than in any code of the slab before it.
         let codes = (slab / step).max(1.0);
-        let expected = (below.iter().sum::<usize>() as f64 / codes).max(0.2);
-        let pile = Self { ends: vec![end], least: end.abs(), tolerance, expected, by_frame };
-        (half > 0.0 && pile.count() >= FEWEST && pile.count() as f64 >= 5.0 * expected).then_some(pile)
+        let expected = (below as f64 / codes).max(0.2);
+        (count as f64 >= 5.0 * expected).then(|| Self { ends: vec![end], least: end.abs(), tolerance, expected, by_frame })
     }
 
     /// Components at the ends.
@@ -119,11 +124,33 @@ impl Pile {
         (level, [0.6 * level, 1.8 * level])
     }
 
+    /// Energy of what clipping adds to the signal, as of a Gaussian one in each frame.
+    fn distortion(&self, evidence: &Evidence) -> f64 {
+        let size = evidence.cube.samples.len() / self.by_frame.len();
+        let sampled = if evidence.is_real() { size } else { 2 * size } as f64;
+        let of_frame = |(values, &at): (&[Complex64], &usize)| {
+            distorted_share(at as f64 / sampled) * values.iter().map(Complex64::norm_sqr).sum::<f64>()
+        };
+        evidence.cube.samples.chunks_exact(size).zip(&self.by_frame).map(of_frame).sum()
+    }
+
     fn frames(&self) -> Option<Vec<usize>> {
         let frames: Vec<usize> = (0..self.by_frame.len()).filter(|&frame| self.by_frame[frame] > 0).collect();
         let everywhere = frames.len() == self.by_frame.len();
         (!everywhere).then_some(frames)
     }
+}
+
+/// Share of the power of a Gaussian signal, clipped, that is no copy of it (Bussgang's theorem): y = a x + d with d uncorrelated to x
+/// and a = erf(c / √2), of which the share `clipped` = erfc(c / √2) lies at the levels ±c σ.
+fn distorted_share(clipped: f64) -> f64 {
+    if clipped <= 0.0 || clipped >= 1.0 {
+        return clipped.clamp(0.0, 1.0);
+    }
+    let level = SQRT_2 * erfc_inv(clipped);
+    let copied = 1.0 - clipped;
+    let power = copied - level * FRAC_2_PI.sqrt() * (-0.5 * level * level).exp() + level * level * clipped;
+    1.0 - copied * copied / power
 }
 
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
@@ -163,7 +190,7 @@ fn candidate(evidence: &Evidence, pile: &Pile) -> Candidate {
             100.0 * at as f64 / sampled as f64,
             pile.place()
         ),
-        energy: at as f64 * (0.05 * (evidence.extremes[1] - evidence.extremes[0])).powi(2),
+        energy: pile.distortion(evidence),
         correction,
         ..Candidate::new(Behaviour::Amplitude, place, corrected((-excess).exp(), 2.0), excess * (held_at as f64 / at as f64))
     }
@@ -228,6 +255,21 @@ mod tests {
             assert!(said(offset, [-1e4, 1e4]).is_none());
         }
         assert!(said(0.0, [-150.0, 150.0]).expect("two piles").contains("exactly at ±150,"));
+    }
+
+    #[test]
+    fn the_power_that_clipping_adds_is_that_of_a_clipped_gaussian() {
+        let mut normal = support::normal(7);
+        let draws: Vec<f64> = (0..200_000).map(|_| normal()).collect();
+        for level in [0.7, 1.5, 2.2] {
+            let clipped: Vec<f64> = draws.iter().map(|x| x.clamp(-level, level)).collect();
+            let mean = |of: &dyn Fn(usize) -> f64| (0..draws.len()).map(of).sum::<f64>() / draws.len() as f64;
+            let copy = mean(&|i| draws[i] * clipped[i]) / mean(&|i| draws[i] * draws[i]);
+            let added = mean(&|i| (clipped[i] - copy * draws[i]).powi(2)) / mean(&|i| clipped[i] * clipped[i]);
+            let share = distorted_share(mean(&|i| f64::from(draws[i].abs() >= level)));
+            assert!((share / added - 1.0).abs() < 0.03, "at {level}: {share} for {added}");
+        }
+        assert_eq!((distorted_share(0.0), distorted_share(1.0)), (0.0, 1.0));
     }
 
     /// Every 64th code alone: the next one that there is holds more than the last.
