@@ -99,6 +99,7 @@ impl Recording {
         self.samples.number_type()
     }
 
+    /// Number of frames.
     pub fn frames(&self) -> usize {
         self.radar.frames
     }
