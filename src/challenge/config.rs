@@ -180,7 +180,7 @@ impl ChallengeConfig {
     /// Reads a file under `sets`, each `a.b=value`, and checks it.
     ///
     /// # Errors
-    /// A file that cannot be read, unknown keys, and whatever [`Self::check`] refuses.
+    /// A file that cannot be read, unknown keys, too few cases or nulls, and scenes outside the recorder's limits.
     pub fn read(path: &Path, sets: &[String]) -> Result<Self> {
         let config: Self = read_settings(path, sets)?;
         config.check()?;
@@ -188,7 +188,7 @@ impl ChallengeConfig {
     }
 
     /// Refuses a set with too few cases or nulls, and scenes outside the recorder's limits.
-    pub fn check(&self) -> Result<()> {
+    fn check(&self) -> Result<()> {
         self.radar.check("radar")?;
         self.kinds()?;
         // Each is planned before the first is recorded.

@@ -41,7 +41,7 @@ pub struct Frames {
 
 impl Frames {
     /// Number of frames.
-    pub fn count(&self) -> usize {
+    fn count(&self) -> usize {
         self.values.len()
     }
 }

@@ -143,7 +143,7 @@ pub struct Gain {
 
 impl Gain {
     /// A factor that starts at `gain_db` (20 log₁₀ of amplitude) and learns.
-    pub fn new(gain_db: f64, device: &Device) -> Self {
+    fn new(gain_db: f64, device: &Device) -> Self {
         Self { log_gain: draw::values(&[gain_db / 20.0 * std::f64::consts::LN_10], [1], device) }
     }
 

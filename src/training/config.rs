@@ -95,7 +95,7 @@ impl Default for TrainingConfig {
 }
 
 impl TrainingConfig {
-    /// Refuses counts, rates, fractions and refinements with which no training works, before anything is read.
+    /// Refuses counts, rates, fractions and refinements with which no training works.
     pub fn check(&self) -> Result<()> {
         for (key, value) in [("epochs", self.epochs), ("frames_per_step", self.frames_per_step), ("repeats", self.repeats)] {
             bounds::count(format!("training.{key}"), value, MOST_REPETITIONS)?;

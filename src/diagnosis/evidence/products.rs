@@ -33,7 +33,7 @@ pub enum Product {
 
 impl Product {
     /// The product of one sample.
-    pub fn of(self, value: Complex64) -> Complex64 {
+    fn of(self, value: Complex64) -> Complex64 {
         match self {
             Self::Square => value * value,
             Self::Magnitude => value.norm_sqr().into(),

@@ -176,7 +176,7 @@ impl Finder {
 /// Writes the points of all frames, and gives notes for people.
 ///
 /// # Errors
-/// Settings that fit no such map, a frame that cannot be read, a folder that cannot be written.
+/// A map without room for the training cells, a frame that cannot be read, a folder that cannot be written.
 pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
     let config = &source.config.points;
     let radar = &source.recording.radar;

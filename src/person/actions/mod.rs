@@ -136,7 +136,7 @@ impl Default for StyleConfig {
 
 impl StyleConfig {
     /// Refuses a tempo, amplitude, path scale or variation outside its limits.
-    pub fn check(&self) -> Result<()> {
+    fn check(&self) -> Result<()> {
         let limits = [
             ("tempo", self.tempo, 0.3, 2.0),
             ("amplitude", self.amplitude, 0.3, 1.5),

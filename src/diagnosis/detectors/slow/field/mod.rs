@@ -68,7 +68,7 @@ impl Field {
     }
 
     /// Deviations of one frame and loop, `[group]`.
-    pub fn deviations(&self, frame: usize, index: usize) -> &[Complex64] {
+    fn deviations(&self, frame: usize, index: usize) -> &[Complex64] {
         self.deviation.below([frame, index])
     }
 
