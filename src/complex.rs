@@ -6,7 +6,9 @@ use num_complex::Complex32;
 /// A complex tensor. Gradients flow through both parts.
 #[derive(Clone, Debug)]
 pub struct Complex<const D: usize> {
+    /// Real part; the axes are the caller's.
     pub re: Tensor<D>,
+    /// Imaginary part, of the same shape.
     pub im: Tensor<D>,
 }
 
@@ -20,6 +22,7 @@ impl<const D: usize> Complex<D> {
         Self { re, im }
     }
 
+    /// Zeros of a shape, on a device.
     pub fn zeros(dims: [usize; D], device: &Device) -> Self {
         Self { re: Tensor::zeros(dims, device), im: Tensor::zeros(dims, device) }
     }
@@ -36,14 +39,17 @@ impl<const D: usize> Complex<D> {
         Self { re: radians.clone().cos(), im: radians.sin() }
     }
 
+    /// The shape of either part.
     pub fn dims(&self) -> [usize; D] {
         self.re.dims()
     }
 
+    /// The device that the real part is on.
     pub fn device(&self) -> Device {
         self.re.device()
     }
 
+    /// The complex conjugate. Gradients flow through both parts.
     pub fn conj(self) -> Self {
         Self { re: self.re, im: -self.im }
     }
@@ -56,10 +62,12 @@ impl<const D: usize> Complex<D> {
         }
     }
 
+    /// Element-wise sum; shapes broadcast as Burn's do. Gradients flow to both summands.
     pub fn add(self, other: Self) -> Self {
         Self { re: self.re + other.re, im: self.im + other.im }
     }
 
+    /// Element-wise difference; shapes broadcast as Burn's do. Gradients flow to both.
     pub fn sub(self, other: Self) -> Self {
         Self { re: self.re - other.re, im: self.im - other.im }
     }
@@ -69,6 +77,7 @@ impl<const D: usize> Complex<D> {
         Self { re: self.re * factor.clone(), im: self.im * factor }
     }
 
+    /// Times a number that does not learn. Gradients flow to the tensor.
     pub fn scale_by(self, factor: f64) -> Self {
         Self { re: self.re * factor, im: self.im * factor }
     }
@@ -81,10 +90,12 @@ impl<const D: usize> Complex<D> {
         }
     }
 
+    /// Sum over one axis, which keeps the length 1. Gradients flow.
     pub fn sum_dim(self, dim: usize) -> Self {
         Self { re: self.re.sum_dim(dim), im: self.im.sum_dim(dim) }
     }
 
+    /// Mean over one axis, which keeps the length 1. Gradients flow.
     pub fn mean_dim(self, dim: usize) -> Self {
         Self { re: self.re.mean_dim(dim), im: self.im.mean_dim(dim) }
     }
@@ -94,18 +105,28 @@ impl<const D: usize> Complex<D> {
         self.re.clone() * self.re + self.im.clone() * self.im
     }
 
+    /// The same values, in the order of the axes, under another shape. Gradients flow.
+    ///
+    /// # Panics
+    /// When the shapes do not hold equally many values.
     pub fn reshape<const E: usize>(self, dims: [usize; E]) -> Complex<E> {
         Complex { re: self.re.reshape(dims), im: self.im.reshape(dims) }
     }
 
+    /// Swaps two axes. Gradients flow.
     pub fn swap_dims(self, a: usize, b: usize) -> Self {
         Self { re: self.re.swap_dims(a, b), im: self.im.swap_dims(a, b) }
     }
 
+    /// The `length` entries of axis `dim` from `start` on. Gradients flow to them.
     pub fn narrow(self, dim: usize, start: usize, length: usize) -> Self {
         Self { re: self.re.narrow(dim, start, length), im: self.im.narrow(dim, start, length) }
     }
 
+    /// Joins tensors along axis `dim`; the other axes must agree. Gradients flow to every part.
+    ///
+    /// # Panics
+    /// Without any part.
     pub fn cat(parts: Vec<Self>, dim: usize) -> Self {
         let (re, im) = parts.into_iter().map(|part| (part.re, part.im)).unzip();
         Self { re: Tensor::cat(re, dim), im: Tensor::cat(im, dim) }
@@ -117,6 +138,7 @@ impl<const D: usize> Complex<D> {
         part(self.re).into_iter().zip(part(self.im)).map(|(re, im)| Complex32::new(re, im)).collect()
     }
 
+    /// The same values, from which no gradient flows back.
     pub fn detach(self) -> Self {
         Self { re: self.re.detach(), im: self.im.detach() }
     }

@@ -28,6 +28,7 @@ pub struct Config {
     pub record: Option<RecorderConfig>,
 }
 
+/// Which recordings an experiment is made of.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DataConfig {

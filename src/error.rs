@@ -5,8 +5,10 @@
 
 use std::path::{Path, PathBuf};
 
+/// The result of whatever a user can make fail.
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// What a user can cause or mend; what only a bug can cause is a panic instead.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -38,14 +40,17 @@ pub enum Error {
 }
 
 impl Error {
+    /// A file or folder that the operating system could not read.
     pub fn read(path: impl AsRef<Path>, source: std::io::Error) -> Self {
         Self::Read { path: path.as_ref().into(), source }
     }
 
+    /// A file or folder that the operating system could not write.
     pub fn write(path: impl AsRef<Path>, source: std::io::Error) -> Self {
         Self::Write { path: path.as_ref().into(), source }
     }
 
+    /// A field of a file that holds `found` in place of `expected`, without a hint.
     pub fn field(
         path: impl AsRef<Path>,
         field: impl Into<String>,
@@ -61,6 +66,7 @@ impl Error {
         }
     }
 
+    /// A setting that is `found` in place of `expected`, without a hint.
     pub fn setting(key: impl Into<String>, found: impl ToString, expected: impl Into<String>) -> Self {
         Self::Setting { key: key.into(), found: found.to_string(), expected: expected.into(), hint: None }
     }

@@ -33,18 +33,22 @@ impl<T, const N: usize> Grid<T, N> {
         Self { axes, shape, values }
     }
 
+    /// Lengths of the axes, in their order.
     pub fn shape(&self) -> [usize; N] {
         self.shape
     }
 
+    /// All values, the last axis fastest.
     pub fn values(&self) -> &[T] {
         &self.values
     }
 
+    /// All values, the last axis fastest, to change in place.
     pub fn values_mut(&mut self) -> &mut [T] {
         &mut self.values
     }
 
+    /// All values, the last axis fastest, without the grid.
     pub fn into_values(self) -> Vec<T> {
         self.values
     }
@@ -56,6 +60,7 @@ impl<T, const N: usize> Grid<T, N> {
         &self.values[range]
     }
 
+    /// As [`Self::below`], to change in place.
     #[inline]
     pub fn below_mut<const M: usize>(&mut self, at: [usize; M]) -> &mut [T] {
         let range = self.range(at);
@@ -90,6 +95,7 @@ fn outside(axis: &str, index: usize, length: usize) -> ! {
 }
 
 impl<T: Clone, const N: usize> Grid<T, N> {
+    /// The same value at every place.
     pub fn filled(axes: [&'static str; N], shape: [usize; N], value: T) -> Self {
         Self { axes, shape, values: vec![value; shape.iter().product()] }
     }

@@ -35,8 +35,10 @@ pub enum Boundary {
 }
 
 impl Boundary {
+    /// All six, in the order in which lists by boundary have them.
     pub const ALL: [Self; 6] = [Self::Left, Self::Right, Self::Front, Self::Back, Self::Floor, Self::Ceiling];
 
+    /// The word of settings and reports, such as `left`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Left => "left",
@@ -68,6 +70,7 @@ impl Boundary {
 }
 
 impl Room {
+    /// Distance of a boundary from the radar's reference point; none where the room has no such boundary.
     pub fn distance_m(&self, boundary: Boundary) -> Option<f64> {
         match boundary {
             Boundary::Left => self.left_m,

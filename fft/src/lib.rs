@@ -15,6 +15,7 @@ macro_rules! planner {
 
         impl $name {
             // Never in the caller, or its crate would compile the kernels after all.
+            /// A planner that knows no length yet.
             #[inline(never)]
             pub fn new() -> Self {
                 Self(rustfft::FftPlanner::new())

@@ -12,6 +12,7 @@ use crate::person::Placement;
 /// Version of `align.json`.
 pub const FORMAT: i64 = 1;
 
+/// Whether the recording says where and when the motion took place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -66,6 +67,7 @@ pub struct Alternative {
     pub frames: usize,
 }
 
+/// `align.json`, and what its pictures are drawn from.
 #[derive(Clone, Debug, Serialize)]
 pub struct Alignment {
     pub format: i64,

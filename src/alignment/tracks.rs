@@ -12,9 +12,11 @@ pub const QUANTILES: [f64; 3] = [0.05, 0.5, 0.95];
 /// Lines over the frames that the motion has.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Track {
+    /// Radar time of the frames' middles.
     pub time_s: Vec<f64>,
     /// `[time][quantile]`
     pub range_m: Vec<[f64; 3]>,
+    /// `[time][quantile]`, positive when receding.
     pub velocity_mps: Vec<[f64; 3]>,
 }
 

@@ -29,6 +29,7 @@ use crate::{
     simulator::{FrameView, Scene, SimulatorConfig},
 };
 
+/// Settings of [`MmGpe`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MmGpeConfig {
@@ -77,6 +78,7 @@ impl MmGpeConfig {
     }
 }
 
+/// The mmGPE-like simulator of one person in front of one radar.
 pub struct MmGpe {
     config: MmGpeConfig,
     scene: Scene,

@@ -29,6 +29,7 @@ use crate::{
 
 /// A method that simulates one recording frame by frame.
 pub trait Baseline {
+    /// The radar that it simulates.
     fn radar(&self) -> &Radar;
 
     /// The signal before gain and noise.

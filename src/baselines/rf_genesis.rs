@@ -58,6 +58,7 @@ pub enum Strength {
     Distance,
 }
 
+/// Settings of [`RfGenesis`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RfGenesisConfig {
@@ -101,6 +102,7 @@ impl RfGenesisConfig {
     }
 }
 
+/// The RF-Genesis-like simulator of one person in front of one radar.
 pub struct RfGenesis {
     config: RfGenesisConfig,
     radar: Radar,

@@ -28,6 +28,7 @@ use crate::{
     training::checkpoint::{self, CheckpointState},
 };
 
+/// Settings of [`TwoBounce`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TwoBounceConfig {
@@ -41,6 +42,7 @@ impl Default for TwoBounceConfig {
     }
 }
 
+/// A trained simulator's direct path, with the room's boundaries as mirrors, for one scene.
 pub struct TwoBounce {
     config: TwoBounceConfig,
     simulator: Simulator,

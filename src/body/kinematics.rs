@@ -6,7 +6,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::person::BodyModel;
 
+/// x, y, z.
 pub type Vector = Vector3<f64>;
+/// A rotation, or another linear map of vectors.
 pub type Matrix = Matrix3<f64>;
 
 /// What a joint does to a point of the rest pose: `rotation · x + translation` (G in SMPL's notation).
@@ -18,6 +20,7 @@ pub struct JointTransform {
 }
 
 impl JointTransform {
+    /// The point after the joint's motion: rotated, then moved.
     pub fn apply(&self, point: Vector) -> Vector {
         self.rotation * point + self.translation
     }

@@ -29,10 +29,12 @@ pub struct Basis {
 }
 
 impl Basis {
+    /// Weights at one time, `[pose]` over [`Self::poses`].
     pub fn row(&self, time: usize) -> &[f64] {
         &self.weights[time * self.poses.len()..][..self.poses.len()]
     }
 
+    /// Derivatives of the weights at one time, 1/s, `[pose]` over [`Self::poses`].
     pub fn rate_row(&self, time: usize) -> &[f64] {
         &self.rates[time * self.poses.len()..][..self.poses.len()]
     }

@@ -52,6 +52,7 @@ impl SkinnedBody {
         self.shaped.iter().map(|&vertex| vertex.into()).collect()
     }
 
+    /// `[joint]`: the joint that each hangs on; the root has none.
     pub fn parents(&self) -> &[Option<usize>] {
         &self.parents
     }

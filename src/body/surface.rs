@@ -88,6 +88,7 @@ impl Surface {
         self.corners.len()
     }
 
+    /// Whether there is no point.
     pub fn is_empty(&self) -> bool {
         self.corners.is_empty()
     }

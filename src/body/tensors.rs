@@ -91,6 +91,7 @@ pub struct BodyTensors {
 }
 
 impl BodyTensors {
+    /// The constants of a body on the device and in the kind of number that `options` say; none of them learns.
     pub fn new(model: &BodyModel, options: impl Into<TensorCreationOptions>) -> Self {
         let options = options.into();
         let (vertices, joints) = (model.template.len(), model.parents.len());

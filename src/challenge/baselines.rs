@@ -49,6 +49,10 @@ pub struct Statistics {
     pub sparse: Vec<(usize, f64)>,
 }
 
+/// The statistics of a recording's samples.
+///
+/// # Errors
+/// A frame that cannot be read.
 pub fn statistics(recording: &Recording) -> Result<Statistics> {
     let radar = &recording.radar;
     let farthest_m = recording.room.as_ref().and_then(|room| room.farthest_m()).unwrap_or(radar.max_range_m());

@@ -333,6 +333,7 @@ impl Calibrated {
         write_text(out.join(TABLE), &format!("{value:#}\n"))
     }
 
+    /// The table of p-values, in Markdown, with notes, families of detectors and failures.
     pub fn markdown(&self) -> String {
         let Calibration { nulls, structure, program, false_alarms, .. } = &self.table;
         let radar = &structure.radar;

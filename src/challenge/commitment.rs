@@ -43,10 +43,12 @@ pub struct Sealed {
     pub truth: Value,
 }
 
+/// SHA-256 as hexadecimal digits.
 pub fn sha256(bytes: impl AsRef<[u8]>) -> String {
     hex(&Sha256::digest(bytes.as_ref()))
 }
 
+/// SHA-256 of a file's content; fails where it cannot be read.
 pub fn hash_file(path: &Path) -> Result<String> {
     files::read(path).map(sha256)
 }
@@ -75,6 +77,7 @@ pub fn hash_folder(folder: &Path) -> Result<String> {
     Ok(sha256(all))
 }
 
+/// The hash that is published for a case, from its truth, its salt and the hash of its data.
 pub fn leaf(sealed: &Sealed, data_sha256: &str) -> String {
     sha256(format!("{}|{}|{data_sha256}", canonical(&sealed.truth), sealed.salt))
 }

@@ -36,9 +36,11 @@ pub enum Stratum {
 }
 
 impl Stratum {
+    /// All eight, in the order of [`ChallengeConfig::counts`].
     pub const ALL: [Self; 8] =
         [Self::Null, Self::Single, Self::Masked, Self::Absorbed, Self::LookAlike, Self::Pair, Self::Outside, Self::Undetectable];
 
+    /// The word of settings, truths and tables, such as `null`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Null => "null",
@@ -107,13 +109,16 @@ pub struct Scenes {
     pub tiers: Vec<Returns>,
     /// Boundaries' distances from the radar.
     pub side_m: [f64; 2],
+    /// Lower and upper bound, as for the boundaries that follow.
     pub front_m: [f64; 2],
     pub back_m: [f64; 2],
     pub floor_m: [f64; 2],
     pub ceiling_m: [f64; 2],
     /// Of the motion's origin; kept 1.5 m away from the wall ahead.
     pub distance_m: [f64; 2],
+    /// Root mean square distance of the recorded surface from the mesh that is handed out.
     pub mesh_error_m: [f64; 2],
+    /// Of the receiver, as [`crate::recorder::ReceiverConfig`] has it.
     pub snr_db: [f64; 2],
     /// Spread of the body's reflectivity.
     pub variation_db: [f64; 2],
@@ -172,13 +177,18 @@ pub struct ChallengeConfig {
 pub const FEWEST_NULLS: f64 = 0.3;
 
 impl ChallengeConfig {
+    /// Reads a file under `sets`, each `a.b=value`, and checks it.
+    ///
+    /// # Errors
+    /// A file that cannot be read, unknown keys, too few cases or nulls, and scenes outside the recorder's limits.
     pub fn read(path: &Path, sets: &[String]) -> Result<Self> {
         let config: Self = read_settings(path, sets)?;
         config.check()?;
         Ok(config)
     }
 
-    pub fn check(&self) -> Result<()> {
+    /// Refuses a set with too few cases or nulls, and scenes outside the recorder's limits.
+    fn check(&self) -> Result<()> {
         self.radar.check("radar")?;
         self.kinds()?;
         // Each is planned before the first is recorded.
@@ -273,6 +283,7 @@ impl ChallengeConfig {
         counts
     }
 
+    /// The settings in full, as TOML.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("settings are plain data")
     }

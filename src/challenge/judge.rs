@@ -103,6 +103,7 @@ pub(super) fn stands_for(reported: &Effect, id: &str) -> bool {
     look_alike(&reported.id, id) || reported.indistinguishable_from.iter().any(|other| other == id)
 }
 
+/// Holds a report, or the reason why there is none, against what the case of this name really holds.
 pub fn judge(case: &str, truth: &Truth, report: &std::result::Result<Report, String>) -> Judgement {
     let mut judgement = Judgement::unanswered(case, truth, report.as_ref().err().cloned());
     let Ok(report) = report else { return judgement };

@@ -336,6 +336,7 @@ pub fn every() -> impl Iterator<Item = &'static Graded> {
     library().chain(OUTSIDE)
 }
 
+/// A graded effect of the library by its id; none for what is outside it.
 pub fn graded(id: &str) -> Option<&'static Graded> {
     library().find(|graded| graded.id == id)
 }

@@ -35,6 +35,7 @@ const NOTHING_DB: f64 = -200.0;
 const RETURN_OVER_NOISE: f64 = 10.0;
 
 impl Strength {
+    /// Whether stronger returns cover the effect, by [`MASKED_DB`].
     pub fn masked(&self) -> bool {
         self.below_cover_db >= MASKED_DB
     }

@@ -42,6 +42,7 @@ impl Logistic {
         (b.is_finite() && b.abs() > 1e-9).then(|| Self { middle: mean - a / b, slope: b })
     }
 
+    /// Share detected at x = log₁₀ d′.
     pub fn at(&self, x: f64) -> f64 {
         1.0 / (1.0 + (-self.slope * (x - self.middle)).exp())
     }
@@ -52,6 +53,7 @@ impl Logistic {
     }
 }
 
+/// Shares in tenths of the cases, with the curve if there is one; each point is log₁₀ d′ and whether it was detected.
 pub fn chart(points: &[(f64, bool)], fit: Option<Logistic>) -> Chart {
     let (low, high) = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &(x, _)| (low.min(x), high.max(x)));
     let mut sorted = points.to_vec();

@@ -9,6 +9,7 @@ use serde_json::Value;
 use crate::data::files::read_json;
 use crate::error::Result;
 
+/// All of a report that scoring reads.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Report {
     pub verdict: String,
@@ -32,6 +33,7 @@ pub struct Report {
     pub simulator: Option<Fit>,
 }
 
+/// A finding with a name.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Effect {
     pub id: String,
@@ -46,6 +48,7 @@ pub struct Effect {
     pub evidence: Evidence,
 }
 
+/// How sure a finding is.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct Evidence {
@@ -60,11 +63,14 @@ pub struct Parameter {
     pub ci90: Value,
 }
 
+/// Where a finding is said to be.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct Place {
     pub stage: Option<String>,
+    /// Nearest and farthest.
     pub range_m: Option<[f64; 2]>,
+    /// Radar frame.
     pub position_m: Option<[f64; 3]>,
     pub boundary: Option<String>,
     pub frames: Option<Vec<usize>>,
@@ -72,6 +78,7 @@ pub struct Place {
     pub body_part: Option<String>,
 }
 
+/// A finding without a name.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Unexplained {
     #[serde(rename = "where", default, deserialize_with = "or_default")]
@@ -82,12 +89,14 @@ pub struct Unexplained {
     pub held_out_loglik_gain: Option<f64>,
 }
 
+/// What a report says of an effect that it did not find.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Limit {
     pub id: String,
     pub at_most_db: Option<f64>,
 }
 
+/// How well the recording is predicted before and after what was found is taken into account.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Fit {
     #[serde(deserialize_with = "or_default")]
@@ -96,6 +105,7 @@ pub struct Fit {
     pub after: Measures,
 }
 
+/// The usual measures of a prediction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(default)]
 pub struct Measures {
@@ -112,6 +122,10 @@ fn or_default<'de, D: Deserializer<'de>, T: Deserialize<'de> + Default>(deserial
 const VERDICTS: [&str; 6] = ["explained", "partly_explained", "unexplained", "no_mismatch", "undecided", "damaged"];
 
 impl Report {
+    /// Reads `report.json`.
+    ///
+    /// # Errors
+    /// A file that cannot be read, that lacks what scoring needs, or whose verdict is none of those known.
     pub fn read(path: &Path) -> Result<Self> {
         let report: Self = read_json(path)?;
         if !VERDICTS.contains(&report.verdict.as_str()) {

@@ -33,6 +33,7 @@ pub const LOOK_ALIKES: &[&[&str]] = &[
 /// What an untracked person is, and what a report without a name says of one: where such a person is, these are no false
 /// alarms and no wrong names, and they are not planted.
 pub const SOMEBODY: [&str; 3] = [effects::moving_reflector::ID, effects::breathing::ID, effects::heartbeat::ID];
+/// How a finding without a name behaves that is an untracked person.
 pub const LIKE_SOMEBODY: [Behaviour; 4] =
     [Behaviour::PathLike, Behaviour::ChangingAtOneRange, Behaviour::SlowTimePatternOfOneReturn, Behaviour::ExcessPower];
 

@@ -280,6 +280,7 @@ impl Score {
         chart(&self.points, self.psychometric).save(&folder.join("psychometric.png"))
     }
 
+    /// The tables, in Markdown: all rows, effects, structures, and every failure.
     pub fn markdown(&self) -> String {
         let mut text = format!(
             "## Concealed data\n\n{} cases, committed to as `{}`; answers committed to as `{}` before the truths were opened.\n\nd′ counts what survives unknown phases of the body and amplitudes of the room; the coherent d′ counts everything.\n\n{}",

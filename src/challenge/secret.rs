@@ -44,6 +44,7 @@ impl Secret {
         hex(&self.derived("name", index)[..8])
     }
 
+    /// 32 bytes as hexadecimal digits, which hide a case's truth in its leaf.
     pub fn salt(&self, index: usize) -> String {
         hex(&self.derived("salt", index))
     }

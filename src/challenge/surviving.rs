@@ -40,7 +40,8 @@ pub struct Frames {
 }
 
 impl Frames {
-    pub fn count(&self) -> usize {
+    /// Number of frames.
+    fn count(&self) -> usize {
         self.values.len()
     }
 }

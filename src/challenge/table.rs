@@ -15,6 +15,7 @@ pub enum Aim {
     None,
 }
 
+/// One number of a score, with what it is to reach.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     pub what: String,
@@ -72,6 +73,7 @@ pub fn middle(what: impl Into<String>, values: impl IntoIterator<Item = f64>, ai
     Row { what: what.into(), n, estimate: Some(median(&mut values.clone())), interval: Some(interval), aim }
 }
 
+/// A table in Markdown, and whether each row reached its aim.
 pub fn markdown(rows: &[Row]) -> String {
     let mut text = String::from("| | n | estimate | 95 % interval | aim | met |\n|---|---|---|---|---|---|\n");
     for row in rows {

@@ -36,6 +36,7 @@ impl Truth {
         Self::of(&sealed).map_err(|found| Error::field(name, "truth", found, "a truth of this version"))
     }
 
+    /// The truth in a sealed file, unverified; fails with a message where it is of another version.
     pub fn of(sealed: &Sealed) -> std::result::Result<Self, String> {
         serde_json::from_value(sealed.truth.clone()).map_err(|error| error.to_string())
     }
@@ -59,6 +60,7 @@ impl Truth {
         report
     }
 
+    /// Coherent d′ of what was planted; zero where it was not measured.
     pub fn d_prime(&self) -> f64 {
         self.strength.map_or(0.0, |strength| strength.d_prime)
     }

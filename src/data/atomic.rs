@@ -28,6 +28,10 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
+    /// Opens a temporary beside the target, and removes what dead processes left there.
+    ///
+    /// # Errors
+    /// A target without a name, or in a folder that cannot be written.
     pub fn create(target: impl AsRef<Path>) -> Result<Self> {
         let target = target.as_ref().to_path_buf();
         let write_error = |source| Error::write(&target, source);
@@ -75,6 +79,7 @@ pub fn write_file(target: impl AsRef<Path>, fill: impl FnOnce(&mut AtomicFile) -
     file.finish()
 }
 
+/// Writes a whole text file; when that fails, whatever was at `target` before is still there.
 pub fn write_text(target: impl AsRef<Path>, text: &str) -> Result<()> {
     write_file(target, |file| file.write_all(text.as_bytes()))
 }

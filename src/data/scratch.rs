@@ -20,6 +20,10 @@ pub struct Scratch {
 }
 
 impl Scratch {
+    /// Makes a folder that is removed on drop, after removing those of dead processes.
+    ///
+    /// # Errors
+    /// A temporary directory that cannot be written.
     pub fn new() -> Result<Self> {
         let parent = std::env::temp_dir();
         sweep(&parent);
@@ -30,6 +34,7 @@ impl Scratch {
         Ok(Self { folder, _lock: lock, _undo: Undo::by(move || remove_in_use(&doomed)) })
     }
 
+    /// The folder.
     pub fn path(&self) -> &Path {
         self.folder.path()
     }

@@ -10,8 +10,10 @@ pub struct Shard {
 }
 
 impl Shard {
+    /// All of the work, in one part.
     pub const ALL: Self = Self { number: 1, of: 1 };
 
+    /// Whether the part has the piece of work with this index, from 0.
     pub fn holds(&self, index: usize) -> bool {
         index % self.of == self.number - 1
     }

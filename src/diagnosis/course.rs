@@ -19,6 +19,7 @@ pub fn powers(turned: Complex64) -> [Complex64; 3] {
     [Complex64::ONE, turned, turned * turned]
 }
 
+/// The phase that some returns have over time.
 #[derive(Clone, Debug)]
 pub struct Course {
     pub of: Of,

@@ -13,14 +13,18 @@ use crate::radar::{Radar, Sampling};
 /// negative beat frequencies are zero and the positive ones doubled.
 #[derive(Clone, Debug)]
 pub struct Cube {
+    /// Lengths of the five axes.
     pub dims: [usize; 5],
+    /// The last axis fastest.
     pub samples: Vec<Complex64>,
 }
 
 /// What is fitted on and what is judged on, as frames of a [`Cube`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Split {
+    /// Ascending.
     pub training: Vec<usize>,
+    /// Ascending.
     pub held_out: Vec<usize>,
     /// A recording with too few frames is cut into blocks of this many loops, which then take the place of frames.
     pub block_loops: Option<usize>,
@@ -61,11 +65,16 @@ pub fn most_frames(radar: &Radar) -> usize {
 }
 
 impl Cube {
+    /// Samples over axes of these lengths.
+    ///
+    /// # Panics
+    /// When there are not as many samples as the axes have places.
     pub fn new(dims: [usize; 5], samples: Vec<Complex64>) -> Self {
         assert_eq!(samples.len(), dims.iter().product::<usize>(), "cube: {} samples for {dims:?}", samples.len());
         Self { dims, samples }
     }
 
+    /// Transmitters times receivers.
     pub fn channels(&self) -> usize {
         self.dims[1] * self.dims[2]
     }
@@ -82,6 +91,7 @@ impl Cube {
         &self.samples[start..start + length]
     }
 
+    /// As [`Self::channel`], to change in place.
     pub fn channel_mut(&mut self, frame: usize, channel: usize) -> &mut [Complex64] {
         let length = self.dims[3] * self.dims[4];
         let start = (frame * self.channels() + channel) * length;
@@ -198,6 +208,7 @@ impl Loaded {
         Self { cube: Cube::new(radar.dims(), samples), split: Split::new(radar.frames, None), radar, starts_s, extremes }
     }
 
+    /// Whether the receiver has no quadrature.
     pub fn is_real(&self) -> bool {
         self.radar.sampling == Sampling::Real
     }

@@ -65,6 +65,7 @@ pub struct Evidence {
     pub(super) others_m: Vec<[f64; 2]>,
     /// Phases over time of what was accepted, oldest first.
     pub courses: Vec<Arc<Course>>,
+    /// Lowest and highest number in the raw samples.
     pub extremes: [f64; 2],
     /// Of the raw samples; none where they are no whole numbers.
     pub codes: Option<Arc<Vec<Component>>>,
@@ -84,6 +85,7 @@ pub(super) struct Once {
 }
 
 impl Evidence {
+    /// What a loaded recording says before anything is accepted; with a room and a body as far as they are known.
     pub fn new(loaded: Loaded, room: Option<Room>, body: Option<BodyPrediction>) -> Self {
         let Loaded { cube, radar, split, starts_s, extremes } = loaded;
         let codes = codes::count(&cube, &split, extremes).map(Arc::new);
@@ -123,6 +125,7 @@ impl Evidence {
         self.info(id).is_some() && !self.accepted.contains(&id)
     }
 
+    /// Whether the receiver has no quadrature.
     pub fn is_real(&self) -> bool {
         self.radar.sampling == Sampling::Real
     }
@@ -196,6 +199,7 @@ impl Evidence {
         self.total_noise() / self.noise().len().max(1) as f64
     }
 
+    /// Sum of [`Self::noise`] over the channels.
     pub fn total_noise(&self) -> f64 {
         self.noise().iter().sum()
     }
@@ -332,6 +336,7 @@ pub struct Tapered {
 }
 
 impl Tapered {
+    /// The window and the transform for chirps of so many samples.
     pub fn new(samples: usize) -> Self {
         Self { taper: blackman_harris(samples), fft: FftPlanner::new().plan_fft_forward(samples) }
     }

@@ -23,7 +23,9 @@ pub const NINETY: f64 = 1.25 * 1.645;
 pub struct Estimate {
     /// As in the table of docs/report.md.
     pub name: &'static str,
+    /// One, or as many as the list has.
     pub values: Vec<f64>,
+    /// Lower and upper end of each.
     pub ci90: Vec<[f64; 2]>,
 }
 
@@ -33,6 +35,7 @@ impl Estimate {
         Self::list(name, &[value], &[deviation])
     }
 
+    /// A list with the 90 % intervals of normal laws about its values.
     pub fn list(name: &'static str, values: &[f64], deviations: &[f64]) -> Self {
         let ci90 = values.iter().zip(deviations).map(|(value, sigma)| [value - NINETY * sigma, value + NINETY * sigma]).collect();
         Self { name, values: values.to_vec(), ci90 }
@@ -52,9 +55,13 @@ pub struct Place {
     /// Empty where it was not asked.
     #[serde(with = "word")]
     pub stage: Option<Stage>,
+    /// Nearest and farthest.
     pub range_m: Option<[f64; 2]>,
+    /// Lowest and highest radial velocity.
     pub velocity_mps: Option<[f64; 2]>,
+    /// From where to where.
     pub azimuth_deg: Option<[f64; 2]>,
+    /// Radar frame.
     pub position_m: Option<[f64; 3]>,
     pub boundary: Option<String>,
     pub frames: Option<Vec<usize>>,
@@ -83,6 +90,7 @@ mod word {
 }
 
 impl Place {
+    /// A stage, and no place in it.
     pub fn at(stage: Stage) -> Self {
         Self { stage: Some(stage), ..Self::default() }
     }
@@ -128,6 +136,7 @@ pub struct OfSample {
 impl Volume {
     /// It only turns and delays.
     pub const KEPT: Self = Self { by_sample: false, alike: 0.0, of_samples: None };
+    /// It changes every sample for itself.
     pub const BY_SAMPLE: Self = Self { by_sample: true, alike: 0.0, of_samples: None };
 
     /// Of a law with a number that every chirp or frame of so many samples has for itself: the coding cost of these,
@@ -159,10 +168,12 @@ pub enum Correction {
 }
 
 impl Correction {
+    /// [`Self::Samples`] with this change.
     pub fn samples(undo: impl Fn(&mut Cube) + Send + Sync + 'static) -> Self {
         Self::Samples(Arc::new(undo))
     }
 
+    /// [`Self::Inverse`] with this change.
     pub fn inverse(volume: Volume, undo: impl Fn(&mut Cube) + Send + Sync + 'static) -> Self {
         Self::Inverse(Arc::new(undo), volume)
     }
@@ -197,6 +208,7 @@ pub struct Curve {
 }
 
 impl Curve {
+    /// A curve with its two axes' labels; every series is a name, x and y.
     pub fn new<'a>(
         title: impl Into<String>,
         [x_label, y_label]: [&str; 2],

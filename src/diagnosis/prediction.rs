@@ -25,6 +25,7 @@ pub const BEYOND: usize = 6;
 pub struct Point {
     /// Radar frame.
     pub position_m: [f64; 3],
+    /// Radar frame.
     pub velocity_mps: [f64; 3],
     /// Unit, out of the body.
     pub normal: [f64; 3],
@@ -39,6 +40,7 @@ pub struct Point {
 pub struct Centre {
     /// Radar frame.
     pub position_m: [f64; 3],
+    /// Radar frame.
     pub velocity_mps: [f64; 3],
 }
 

@@ -19,6 +19,7 @@ use crate::effects::EffectInfo;
 /// Version of the report's format.
 pub const FORMAT: u32 = 1;
 
+/// What a report says of a recording, in a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -31,6 +32,7 @@ pub enum Verdict {
     Damaged,
 }
 
+/// Which part of the recording findings were judged on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// `frames` or `loops`.
@@ -38,6 +40,7 @@ pub struct HeldOut {
     pub indices: Vec<usize>,
 }
 
+/// What is estimated of a parameter of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// A number, or a list of them.
@@ -46,6 +49,7 @@ pub struct Parameter {
     pub ci90: serde_json::Value,
 }
 
+/// How sure a named effect is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     pub held_out_loglik_gain: f64,
@@ -54,6 +58,7 @@ pub struct Evidence {
     pub p_value: f64,
 }
 
+/// A finding with the name of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Effect {
     pub id: String,
@@ -69,6 +74,7 @@ pub struct Effect {
     pub separate_by: Option<String>,
 }
 
+/// A finding that no effect of the library explains.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Unexplained {
     #[serde(rename = "where")]
@@ -80,6 +86,7 @@ pub struct Unexplained {
     pub held_out_loglik_gain: f64,
 }
 
+/// An effect that was not found, and how strong it may be all the same.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NotDetectable {
     pub id: String,
@@ -88,6 +95,7 @@ pub struct NotDetectable {
     pub reason: String,
 }
 
+/// How well the recording is predicted before and after what was found is taken into account.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     pub before: Misfit,
@@ -114,12 +122,14 @@ pub struct Share {
 /// Where the untouched recording holds more than is expected.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Location {
+    /// Boxes of range, velocity and frames.
     pub regions: Vec<Located>,
     pub body_parts: Vec<Share>,
     pub walls: Vec<Share>,
 }
 
 impl Location {
+    /// What the residual of an evidence shows, by regions, parts of the body and walls.
     pub fn of(evidence: &super::Evidence) -> Self {
         let shares = |seen: Vec<locate::Seen>| {
             seen.into_iter().map(|seen| Share { name: seen.name, excess_db: seen.excess_db, p_value: seen.p_value }).collect()
@@ -145,12 +155,14 @@ pub struct SimulatorScores {
     pub person_error_db: Option<f64>,
 }
 
+/// The trained simulator's scores before and after what was found is taken into account.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SimulatorFit {
     pub before: SimulatorScores,
     pub after: SimulatorScores,
 }
 
+/// All of `report.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     pub format: u32,
@@ -191,6 +203,7 @@ pub struct Report {
 }
 
 impl HeldOut {
+    /// A split's held-out frames, or the loops of its blocks.
     pub fn of(split: &Split) -> Self {
         match split.block_loops {
             None => Self { axis: "frames".into(), indices: split.held_out.clone() },

@@ -148,6 +148,7 @@ pub fn binomial_interval(hits: usize, of: usize, confidence: f64) -> [f64; 2] {
     [low, high]
 }
 
+/// The upper of the two middle numbers where there are two, zero without any; reorders `values`.
 pub fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return 0.0;

@@ -16,8 +16,10 @@ use crate::{
     radar::Radar,
 };
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "antenna_position";
 
+/// What reports and docs say of `antenna_position`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "C2",

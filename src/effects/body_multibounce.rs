@@ -12,8 +12,10 @@ use crate::{
     radar::{Radar, SPEED_OF_LIGHT},
 };
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "body_multibounce";
 
+/// What reports and docs say of `body_multibounce`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "T9",

@@ -11,8 +11,10 @@ use super::{
 };
 use crate::body::Displacement;
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "breathing";
 
+/// What reports and docs say of `breathing`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "T1",

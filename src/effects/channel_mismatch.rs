@@ -9,8 +9,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "channel_mismatch";
 
+/// What reports and docs say of `channel_mismatch`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "C1",

@@ -11,8 +11,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "chirp_ripple";
 
+/// What reports and docs say of `chirp_ripple`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "W7",

@@ -9,8 +9,10 @@ use super::{
 };
 use crate::body::Displacement;
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "clock_offset";
 
+/// What reports and docs say of `clock_offset`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "G2",

@@ -9,8 +9,10 @@ use super::{
 };
 use crate::body::Displacement;
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "clothing_delay";
 
+/// What reports and docs say of `clothing_delay`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "T3",

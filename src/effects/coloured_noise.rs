@@ -10,8 +10,10 @@ use super::{
 };
 use crate::{complex::Complex, radar::Radar};
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "coloured_noise";
 
+/// What reports and docs say of `coloured_noise`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "V2",

@@ -8,8 +8,10 @@ use super::{
 };
 use crate::{complex::Complex, if_signal::noise, radar::Radar};
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "correlated_noise";
 
+/// What reports and docs say of `correlated_noise`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "V4",

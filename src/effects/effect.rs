@@ -98,6 +98,7 @@ impl Effect {
         Self { parameters, setting: setting.clone() }
     }
 
+    /// Its id, as in [`EffectInfo::id`].
     pub fn id(&self) -> &str {
         &self.setting.id
     }
@@ -115,6 +116,7 @@ impl Effect {
         self.setting.choice.as_deref()
     }
 
+    /// Whether it acts; one that is switched off keeps its values.
     pub fn is_enabled(&self) -> bool {
         self.setting.enabled
     }

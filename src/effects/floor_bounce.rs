@@ -15,8 +15,10 @@ use crate::{
     room::{Boundary, Room},
 };
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "floor_bounce";
 
+/// What reports and docs say of `floor_bounce`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "P6",

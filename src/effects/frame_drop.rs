@@ -7,8 +7,10 @@ use super::{
     values::Values,
 };
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "frame_drop";
 
+/// What reports and docs say of `frame_drop`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "G4",

@@ -12,8 +12,10 @@ use super::{
 };
 use crate::{complex::Complex, radar::Radar};
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "impulsive_noise";
 
+/// What reports and docs say of `impulsive_noise`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "V3",

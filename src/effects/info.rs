@@ -74,6 +74,7 @@ pub struct EffectInfo {
 }
 
 impl EffectInfo {
+    /// A parameter by its name; none where the effect has no such one.
     pub fn parameter(&self, name: &str) -> Option<&'static ParameterInfo> {
         named(self.parameters, name)
     }

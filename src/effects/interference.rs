@@ -14,8 +14,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "interference";
 
+/// What reports and docs say of `interference`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "I1",

@@ -11,8 +11,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "iq_imbalance";
 
+/// What reports and docs say of `iq_imbalance`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "R3",

@@ -17,8 +17,10 @@ use crate::{
     radar::Radar,
 };
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "moving_reflector";
 
+/// What reports and docs say of `moving_reflector`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "P2",

@@ -10,8 +10,10 @@ use super::{
     values::Values,
 };
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "part_reflectivity";
 
+/// What reports and docs say of `part_reflectivity`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "T4",

@@ -16,8 +16,10 @@ use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
 /// Range that `per_chirp_rad` refers to.
 const REFERENCE_M: f64 = 3.0;
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "phase_noise";
 
+/// What reports and docs say of `phase_noise`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "W8",

@@ -9,8 +9,10 @@ use super::{
 };
 use crate::body::Displacement;
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "pose_offset";
 
+/// What reports and docs say of `pose_offset`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "G1",

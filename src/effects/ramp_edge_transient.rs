@@ -11,8 +11,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "ramp_edge_transient";
 
+/// What reports and docs say of `ramp_edge_transient`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "",

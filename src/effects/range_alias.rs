@@ -9,8 +9,10 @@ use super::{
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "range_alias";
 
+/// What reports and docs say of `range_alias`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "P8",

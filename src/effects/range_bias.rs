@@ -10,8 +10,10 @@ use super::{
 };
 use crate::{complex::Complex, radar::SPEED_OF_LIGHT};
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "range_bias";
 
+/// What reports and docs say of `range_bias`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "D1'",

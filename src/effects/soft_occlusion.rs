@@ -10,8 +10,10 @@ use super::{
     values::Values,
 };
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "soft_occlusion";
 
+/// What reports and docs say of `soft_occlusion`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "T7",

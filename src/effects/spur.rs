@@ -10,8 +10,10 @@ use super::{
 };
 use crate::complex::Complex;
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "spur";
 
+/// What reports and docs say of `spur`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "R12",

@@ -14,8 +14,10 @@ use crate::{
     radar::Radar,
 };
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "static_reflector";
 
+/// What reports and docs say of `static_reflector`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "P1",

@@ -15,8 +15,10 @@ use crate::{
     room::{Boundary, Room},
 };
 
+/// Id of this effect in settings, reports and docs.
 pub const ID: &str = "wall_ghost";
 
+/// What reports and docs say of `wall_ghost`, with its parameters and its operator.
 pub static INFO: EffectInfo = EffectInfo {
     id: ID,
     card: "P4, P5",

@@ -28,6 +28,7 @@ pub struct ComparisonConfig {
 }
 
 impl ComparisonConfig {
+    /// As [`MetricsConfig::check`].
     pub fn check(&self) -> Result<()> {
         self.metrics.check()
     }

@@ -29,7 +29,8 @@ pub enum BaselineName {
 }
 
 impl BaselineName {
-    pub const ALL: [Self; 5] = [Self::RfGenesis, Self::RfGenesisReleased, Self::Mmgpe, Self::MmgpeSurface, Self::TwoBounce];
+    /// All five.
+    const ALL: [Self; 5] = [Self::RfGenesis, Self::RfGenesisReleased, Self::Mmgpe, Self::MmgpeSurface, Self::TwoBounce];
 
     /// As in settings, folders and `hybridsim baseline`.
     pub fn id(self) -> &'static str {
@@ -65,8 +66,10 @@ pub enum Protocol {
 }
 
 impl Protocol {
+    /// Both.
     pub const ALL: [Self; 2] = [Self::SameMotions, Self::OtherSubjects];
 
+    /// As in settings and folders.
     pub fn id(self) -> &'static str {
         match self {
             Self::SameMotions => "same_motions",
@@ -292,6 +295,7 @@ impl SecondSceneConfig {
 }
 
 impl ReproduceConfig {
+    /// Reads a file, over what it extends and under `sets`; fails where it cannot be read or [`Self::check`] refuses it.
     pub fn read(path: &Path, sets: &[String]) -> Result<Self> {
         let mut config: Self = read_settings(path, sets)?;
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -377,6 +381,7 @@ impl ReproduceConfig {
         Ok(())
     }
 
+    /// The settings in full, as TOML.
     pub fn to_toml(&self) -> String {
         toml::to_string_pretty(self).expect("settings are plain data")
     }

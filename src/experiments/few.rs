@@ -34,6 +34,7 @@ pub enum Material {
 }
 
 impl Material {
+    /// All three.
     pub const ALL: [Self; 3] = [Self::Measured, Self::Simulated, Self::Both];
 
     /// As in folders.

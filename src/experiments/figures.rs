@@ -27,6 +27,7 @@ pub struct FigureTask {
     pub seed: u64,
 }
 
+/// A column of a picture.
 #[derive(Clone, Debug, Serialize)]
 pub struct FigureColumn {
     pub title: String,

@@ -103,6 +103,7 @@ pub struct Few {
     pub recognised: Recognised,
 }
 
+/// Where a simulator was trained, and how long that took.
 #[derive(Clone, Debug, Serialize)]
 pub struct Training {
     pub folder: String,

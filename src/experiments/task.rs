@@ -14,6 +14,7 @@ use crate::simulator::SimulatorConfig;
 use crate::site::SiteConfig;
 use crate::training::TrainingConfig;
 
+/// A stage's work and all settings that shape its result.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "task", rename_all = "snake_case")]
 pub enum Task {

@@ -10,6 +10,7 @@ use crate::room::Boundary;
 use crate::simulator::{PathModel, SimulatorConfig};
 use crate::training::TrainingConfig;
 
+/// A simulator of the comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Variant {
@@ -45,7 +46,8 @@ pub enum Variant {
 }
 
 impl Variant {
-    pub const ALL: [Self; 15] = [
+    /// All fifteen.
+    const ALL: [Self; 15] = [
         Self::Ours,
         Self::Coupled,
         Self::WithoutIndirect,

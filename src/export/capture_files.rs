@@ -36,6 +36,7 @@ impl Default for CaptureConfig {
 }
 
 impl CaptureConfig {
+    /// Refuses a full scale that is no positive number, and files that hold no whole words.
     pub fn check(&self) -> Result<()> {
         if let Some(full_scale) = self.full_scale.filter(|scale| !(scale.is_finite() && *scale > 0.0)) {
             return Err(Error::setting("capture.full_scale", full_scale, "a positive number"));
@@ -81,11 +82,16 @@ pub struct Files {
 }
 
 impl Files {
+    /// A stream into `NAME_Raw_0.bin`, `NAME_Raw_1.bin` and so on in a folder, with as many bytes in each as the settings say.
     pub fn new(folder: &Path, name: &str, config: &CaptureConfig) -> Self {
         let stem = format!("{name}_Raw_");
         Self { folder: folder.into(), stem, most: config.file_bytes / 2, written: 0, open: None, names: Vec::new() }
     }
 
+    /// Writes words, and begins another file whenever one is full.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
     pub fn push(&mut self, mut words: &[i16]) -> Result<()> {
         while !words.is_empty() {
             if self.written == self.most {

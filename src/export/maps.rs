@@ -35,6 +35,7 @@ pub struct MapsConfig {
     pub remove_static: bool,
 }
 
+/// In what a map's power is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scale {
@@ -57,6 +58,7 @@ impl Default for MapsConfig {
 }
 
 impl MapsConfig {
+    /// Refuses counts of directions, angles and ranges outside their limits.
     pub fn check(&self) -> Result<()> {
         bounds::count("maps.azimuths", self.azimuths, 4096)?;
         bounds::count("maps.elevations", self.elevations, 4096)?;
@@ -66,6 +68,10 @@ impl MapsConfig {
     }
 }
 
+/// Writes the maps of all frames, and gives notes for people.
+///
+/// # Errors
+/// More cells in a frame than an export may have, a frame that cannot be read, a folder that cannot be written.
 pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
     let config = &source.config.maps;
     let radar = &source.recording.radar;

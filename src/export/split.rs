@@ -26,6 +26,7 @@ impl Default for SplitConfig {
 }
 
 impl SplitConfig {
+    /// Refuses a share that is negative or leaves nothing to train on.
     pub fn check(&self) -> Result<()> {
         for (key, share) in [("split.validation", self.validation), ("split.test", self.test)] {
             if !(0.0..1.0).contains(&share) {

@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Extent {
+    /// x, y, z of the lower corner, in the canonical body's axes.
     pub low_m: [f64; 3],
+    /// x, y, z of the upper corner.
     pub high_m: [f64; 3],
 }
 

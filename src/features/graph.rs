@@ -49,6 +49,10 @@ impl MeshGraph {
         Self { to: end(0), from: end(1), weight }
     }
 
+    /// The graph of a mesh: every edge of its facets, each `[face, 3]` vertices.
+    ///
+    /// # Panics
+    /// When a facet names a vertex that is not below `vertices`.
     pub fn from_faces(vertices: usize, faces: &[[usize; 3]], device: &Device) -> Self {
         Self::new(vertices, faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]), device)
     }

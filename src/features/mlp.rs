@@ -29,6 +29,7 @@ impl Default for MlpConfig {
 }
 
 impl MlpConfig {
+    /// Refuses too many layers, and a width of zero or beyond the most; `key` names these settings in messages.
     pub fn check(&self, key: &str) -> Result<()> {
         if self.hidden.len() > MOST_LAYERS {
             return Err(Error::setting(

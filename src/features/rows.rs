@@ -37,6 +37,7 @@ impl RowIndex {
         self.picks
     }
 
+    /// Whether no row is picked.
     pub fn is_empty(&self) -> bool {
         self.picks == 0
     }

@@ -76,6 +76,7 @@ impl TriPlaneConfig {
         }
     }
 
+    /// Planes whose texels are drawn uniformly between ± `initial_bound`; they learn.
     pub fn init(&self, rng: &mut ChaCha8Rng, device: &Device) -> TriPlane {
         let texels = 3 * self.resolution * self.resolution;
         TriPlane {

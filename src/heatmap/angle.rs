@@ -32,6 +32,7 @@ impl Scan {
         Self { axis: Axis::new(name, "°", degrees), directions }
     }
 
+    /// The angles, degrees.
     pub fn axis(&self) -> &Axis {
         &self.axis
     }

@@ -13,7 +13,9 @@ use crate::radar::{Radar, Sampling};
 /// Borrowed IF samples, `[frame, tx, rx, loop, sample]`; the imaginary parts of a real-sampled signal are ignored.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples<'a> {
+    /// The last axis fastest.
     pub values: &'a [Complex32],
+    /// Lengths of the five axes.
     pub dims: [usize; 5],
 }
 
@@ -25,6 +27,7 @@ impl<'a> Samples<'a> {
         Self { values, dims }
     }
 
+    /// Number of frames.
     pub fn frames(&self) -> usize {
         self.dims[0]
     }
@@ -91,6 +94,7 @@ pub struct Analysis {
 }
 
 impl Analysis {
+    /// Prepares the windows and transforms for one radar's chirps and frames.
     pub fn new(radar: &Radar, config: &HeatmapConfig) -> Self {
         let mut planner = FftPlanner::new();
         let scale = if radar.sampling == Sampling::Real { 2.0 } else { 1.0 };
@@ -104,14 +108,17 @@ impl Analysis {
         }
     }
 
+    /// The radar whose maps these are.
     pub fn radar(&self) -> &Radar {
         &self.radar
     }
 
+    /// Ranges of the maps' columns, m.
     pub fn range_axis(&self) -> Axis {
         range_axis(&self.radar)
     }
 
+    /// Radial velocities of the maps' rows, m/s.
     pub fn velocity_axis(&self) -> Axis {
         velocity_axis(&self.radar)
     }

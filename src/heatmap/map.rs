@@ -5,18 +5,22 @@
 pub struct Axis {
     pub name: &'static str,
     pub unit: &'static str,
+    /// Of every row or column, in `unit`.
     pub values: Vec<f64>,
 }
 
 impl Axis {
+    /// An axis with its name and unit as pictures write them.
     pub fn new(name: &'static str, unit: &'static str, values: Vec<f64>) -> Self {
         Self { name, unit, values }
     }
 
+    /// How many rows or columns there are.
     pub fn len(&self) -> usize {
         self.values.len()
     }
 
+    /// Whether there is no row or column.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
@@ -54,10 +58,15 @@ impl Map {
         Self { rows, columns, values }
     }
 
+    /// Numbers of rows and columns.
     pub fn dims(&self) -> [usize; 2] {
         [self.rows.len(), self.columns.len()]
     }
 
+    /// The value of one cell.
+    ///
+    /// # Panics
+    /// For a row that the map has not.
     pub fn at(&self, row: usize, column: usize) -> f64 {
         self.values[row * self.columns.len() + column]
     }

@@ -24,6 +24,7 @@ pub enum NoiseLaw {
     None,
 }
 
+/// The law of the noise, and how strong it is at the start or for good.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseConfig {
@@ -53,6 +54,7 @@ impl NoiseConfig {
         Ok(())
     }
 
+    /// The noise before training: a learned rate starts at `rate`, an unknown level at 1 in the signal's unit.
     pub fn init(&self, device: &Device) -> Noise {
         Noise {
             raw_rate: (self.law == NoiseLaw::Learned).then(|| raw_rate(self.rate, device)),

@@ -21,6 +21,7 @@ pub enum Channel {
     Rotation(usize),
 }
 
+/// A joint of the hierarchy, with its columns of the motion table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BvhJoint {
     pub name: String,
@@ -47,11 +48,17 @@ pub struct Bvh {
 
 /// Where the joints are in one frame, in the file's axes and unit.
 pub struct BvhPose {
+    /// `[joint]`: rotation from the joint's axes to the file's.
     pub turns: Vec<UnitQuaternion<f64>>,
+    /// `[joint]`.
     pub places: Vec<Vector3<f64>>,
 }
 
 impl Bvh {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is no BVH: with the line, what was found and what was expected.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = data::files::read(path)?;
         // Names in old files are not always UTF-8.
@@ -67,6 +74,7 @@ impl Bvh {
         Ok(Self { source: PathBuf::new(), joints, frame_time_s, frame_time_step_s, frames })
     }
 
+    /// Index of the first joint of this name.
     pub fn joint(&self, name: &str) -> Option<usize> {
         self.joints.iter().position(|joint| joint.name == name)
     }

@@ -128,6 +128,7 @@ impl DbLoss {
         })
     }
 
+    /// The range-Doppler transform through which recordings and simulations are compared.
     pub fn transform(&self) -> &RangeDoppler {
         &self.transform
     }

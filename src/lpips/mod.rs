@@ -64,6 +64,7 @@ impl Lpips {
         Ok(Self { network, stages, heads, device: device.clone() })
     }
 
+    /// The backbone that it sees with.
     pub fn network(&self) -> Network {
         self.network
     }

@@ -46,8 +46,10 @@ pub(super) enum Layer {
 use Layer::{Convolution, Fire, MaxPool, Tap};
 
 impl Network {
+    /// All three.
     pub const ALL: [Self; 3] = [Self::Alex, Self::Squeeze, Self::Vgg];
 
+    /// The word of settings and reports, such as `alex`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Alex => "alex",

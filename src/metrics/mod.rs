@@ -37,6 +37,7 @@ impl DbWindow {
         ((db - self.low_db) / (self.high_db - self.low_db)).clamp(0.0, 1.0)
     }
 
+    /// A map's decibels, row-major, as brightness from 0 to 1.
     pub fn image(&self, map_db: &Map) -> Vec<f64> {
         map_db.values.iter().map(|&db| self.normalise(db)).collect()
     }
@@ -59,6 +60,7 @@ impl Default for MetricsConfig {
 }
 
 impl MetricsConfig {
+    /// Refuses a span or a threshold that is no positive number of decibels.
     pub fn check(&self) -> Result<()> {
         let settings = [("span_db", self.span_db), ("person_db", self.person_db)];
         match settings.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {

@@ -14,6 +14,7 @@ pub struct DirectPaths<'a> {
 }
 
 impl<'a> DirectPaths<'a> {
+    /// Prepares the leg from transmitter `tx` to all points. Gradients flow to the points' displacement and amplitude.
     pub fn new(points: Points<'a>, radar: &'a Radar, tx: usize, dechirp: Dechirp) -> Self {
         let motion = Motion::new(points.reference_m, points.displacement);
         let from_tx = motion.leg(radar.tx_position_m(tx));

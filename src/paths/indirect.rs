@@ -27,10 +27,12 @@ impl WallReceiver {
         Self { position_m, waveform: Waveform::new(radar, dechirp).with_onward(mean_s), onward_m }
     }
 
+    /// Where the wall's receiver is, radar frame.
     pub fn position_m(&self) -> [f64; 3] {
         self.position_m
     }
 
+    /// The chirp for the legs before the last one.
     pub fn waveform(&self) -> &Waveform {
         &self.waveform
     }

@@ -41,10 +41,12 @@ impl Phasors {
         self.phase_turns.dims()
     }
 
+    /// The device of the tensors.
     pub fn device(&self) -> Device {
         self.phase_turns.device()
     }
 
+    /// Kind of number of the tensors.
     pub fn dtype(&self) -> DType {
         self.phase_turns.dtype()
     }

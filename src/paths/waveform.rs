@@ -25,11 +25,14 @@ pub enum Dechirp {
 /// Linear amplitude of the scatterers before spreading, `[point, chirp]` or `[point, 1]`; may be complex.
 #[derive(Clone, Debug)]
 pub struct Amplitude {
+    /// Real part.
     pub re: Tensor<2>,
+    /// Imaginary part; none where it is zero.
     pub im: Option<Tensor<2>>,
 }
 
 impl Amplitude {
+    /// An amplitude without an imaginary part, `[point, chirp]` or `[point, 1]`.
     pub fn real(re: Tensor<2>) -> Self {
         Self { re, im: None }
     }
@@ -57,6 +60,7 @@ pub struct Waveform {
 }
 
 impl Waveform {
+    /// The constants of a radar's chirp, for paths that end at a receiver.
     pub fn new(radar: &Radar, dechirp: Dechirp) -> Self {
         Self {
             middle_hz: radar.carrier_hz() + 0.5 * radar.bandwidth_hz(),
@@ -74,6 +78,7 @@ impl Waveform {
         Self { onward_s: delay_s, ..self }
     }
 
+    /// Delay that [`Self::with_onward`] was given; else zero.
     pub fn onward_s(&self) -> f64 {
         self.onward_s
     }

@@ -92,6 +92,7 @@ pub struct Motion {
     pub poses: Vec<Vec<[f64; 3]>>,
     /// `[pose]`, metres.
     pub translations: Vec<[f64; 3]>,
+    /// SMPL's shape coefficients, `[shape direction]`.
     pub betas: Vec<f64>,
     pub rate_hz: f64,
 }
@@ -103,8 +104,10 @@ pub struct Placement {
     /// Radar time at which the first pose happens.
     #[serde(default)]
     pub start_s: f64,
+    /// Rotation `[row][column]`: columns are the motion's axes in the radar frame.
     #[serde(default = "upright")]
     pub radar_from_motion: [[f64; 3]; 3],
+    /// Where the motion's origin is in the radar frame.
     #[serde(default)]
     pub origin_m: [f64; 3],
 }
@@ -133,6 +136,7 @@ pub enum Person {
     Meshes {
         /// `[pose][vertex, xyz]`, metres, radar frame.
         vertices: Vec<Vec<[f64; 3]>>,
+        /// `[face]`, three vertices each, counter-clockwise from outside.
         faces: Vec<[usize; 3]>,
         /// `[pose]`, ascending.
         pose_times_s: Vec<f64>,
@@ -140,6 +144,7 @@ pub enum Person {
 }
 
 impl Person {
+    /// Vertices of every facet, `[face][corner]`.
     pub fn faces(&self) -> &[[usize; 3]] {
         match self {
             Self::Skinned { model, .. } => &model.faces,

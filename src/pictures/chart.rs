@@ -16,6 +16,7 @@ const TITLE_HEIGHT: u32 = 44;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
     pub name: String,
+    /// x, y.
     pub points: Vec<[f64; 2]>,
 }
 

@@ -47,6 +47,7 @@ pub struct Radar {
     pub position_m: [f64; 3],
     /// In firing order.
     pub tx_m: Vec<[f64; 3]>,
+    /// `[rx]`, offset from `position_m`.
     pub rx_m: Vec<[f64; 3]>,
     /// The ADC's rail.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -69,6 +70,7 @@ impl Radar {
         self.slope_hz_per_s * self.samples_per_chirp as f64 / self.sample_rate_hz
     }
 
+    /// Width of a range bin: c over twice the swept bandwidth.
     pub fn range_resolution_m(&self) -> f64 {
         SPEED_OF_LIGHT / (2.0 * self.bandwidth_hz().abs())
     }
@@ -92,6 +94,7 @@ impl Radar {
         self.chirp_period_s * self.tx_m.len() as f64
     }
 
+    /// Width of a Doppler bin of one frame, as a radial velocity.
     pub fn velocity_resolution_mps(&self) -> f64 {
         self.wavelength_m() / (2.0 * self.loop_period_s() * self.loops_per_frame as f64)
     }
@@ -123,10 +126,18 @@ impl Radar {
         (chirps - 1.0) * self.chirp_period_s + self.sample_time_s(self.samples_per_chirp)
     }
 
+    /// Where a transmitter is in the radar frame.
+    ///
+    /// # Panics
+    /// For a number that no transmitter has.
     pub fn tx_position_m(&self, tx: usize) -> [f64; 3] {
         std::array::from_fn(|axis| self.position_m[axis] + self.tx_m[tx][axis])
     }
 
+    /// Where a receiver is in the radar frame.
+    ///
+    /// # Panics
+    /// For a number that no receiver has.
     pub fn rx_position_m(&self, rx: usize) -> [f64; 3] {
         std::array::from_fn(|axis| self.position_m[axis] + self.rx_m[rx][axis])
     }

@@ -24,6 +24,7 @@ pub struct Accuracy {
     pub interval_sequences: [f64; 2],
 }
 
+/// Mean of the classes' F1, with its interval.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MacroF1 {
     pub value: f64,
@@ -31,6 +32,7 @@ pub struct MacroF1 {
     pub interval_sequences: [f64; 2],
 }
 
+/// What became of the windows of one action.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClassScores {
     pub action: String,
@@ -50,6 +52,7 @@ pub fn confusion<'a>(judgements: impl IntoIterator<Item = &'a Judgement>, classe
     counts
 }
 
+/// Share of the windows on the diagonal of `[class][judged]`; zero without any.
 pub fn accuracy_of(confusion: &[Vec<usize>]) -> f64 {
     let hits: usize = confusion.iter().enumerate().map(|(class, row)| row[class]).sum();
     hits as f64 / confusion.iter().flatten().sum::<usize>().max(1) as f64

@@ -46,6 +46,7 @@ pub struct View<'a> {
 }
 
 impl<'a> View<'a> {
+    /// The array's centre (metres, radar frame) mirrored once for each leg.
     pub fn new(tx: &'a Mirror, rx: &'a Mirror, centre_m: Vector) -> Self {
         Self { tx, rx, tx_m: tx.point(centre_m), rx_m: rx.point(centre_m) }
     }

@@ -15,6 +15,7 @@ use crate::person::{Motion, Person, Placement};
 #[derive(Clone, Debug)]
 pub struct MovingBody {
     source: Source,
+    /// `[face]`, three vertices each.
     pub faces: Vec<[usize; 3]>,
     timeline: Timeline,
     /// `[vertex]`, metres along the vertex normal: how far the recorded surface is from the one that is handed out.
@@ -30,6 +31,10 @@ enum Source {
 }
 
 impl MovingBody {
+    /// The mesh of a person, without a displacement, breathing or heartbeat.
+    ///
+    /// # Errors
+    /// Pose times that do not ascend.
     pub fn new(person: &Person, interpolation: Interpolation) -> Result<Self> {
         let source = match person {
             Person::Skinned { model, motion, placement } => Source::Skinned {

@@ -42,6 +42,7 @@ pub fn widened(radar: &Radar, guard: usize) -> Radar {
 }
 
 impl Chirp {
+    /// The constants of a radar's chirp; phases are taken at its middle sample.
     pub fn new(radar: &Radar) -> Self {
         let middle_s = radar.sample_time_s(radar.samples_per_chirp / 2);
         Self {

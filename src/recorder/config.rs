@@ -30,6 +30,10 @@ pub enum RadarChoice {
 }
 
 impl RadarChoice {
+    /// The radar that is meant, presets with 24 frames.
+    ///
+    /// # Errors
+    /// A name that no preset has.
     pub fn radar(&self) -> Result<Radar> {
         match self {
             Self::Full(radar) => Ok((**radar).clone()),

@@ -50,6 +50,7 @@ impl Mirror {
         images
     }
 
+    /// How many walls the wave meets.
     pub fn order(&self) -> usize {
         self.walls.len()
     }

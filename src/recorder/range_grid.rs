@@ -31,6 +31,7 @@ pub struct RangeGrid {
 }
 
 impl RangeGrid {
+    /// Plans the transform for chirps of so many samples.
     pub fn new(samples: usize) -> Self {
         let size = (2 * samples).max(2 * TAPS);
         let half = TAPS as f64 / 2.0;

@@ -55,6 +55,7 @@ impl ReceiverConfig {
         Self { noise: false, unknown_phase: false, adc: false, ..Self::default() }
     }
 
+    /// Refuses levels that no receiver can have; `key` names these settings in messages.
     pub fn check(&self, key: &str) -> Result<()> {
         if !(self.peak_fraction > 0.0 && self.peak_fraction <= 4.0) {
             return Err(Error::setting(format!("{key}.peak_fraction"), self.peak_fraction, "above 0 and at most 4")

@@ -81,6 +81,7 @@ impl Recorder {
         Ok(recorder)
     }
 
+    /// The world that is recorded.
     pub fn world(&self) -> &World {
         &self.world
     }

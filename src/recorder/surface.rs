@@ -52,6 +52,7 @@ impl Default for SurfaceConfig {
 }
 
 impl SurfaceConfig {
+    /// Refuses pieces and irregularities outside their limits; `key` names these settings in messages.
     pub fn check(&self, key: &str) -> Result<()> {
         if !(2.0e-4..=1.2e-2).contains(&self.edge_m) {
             return Err(Error::setting(format!("{key}.edge_m"), self.edge_m, "between 0.0002 and 0.012 metres")
@@ -164,7 +165,9 @@ pub fn elements(
 
 /// Vertices and, where the surface is smoothed, vertex normals of one instant.
 pub struct Pose {
+    /// `[vertex]`, metres, radar frame.
     pub vertices: Vec<Vector>,
+    /// `[vertex]`, unit.
     pub normals: Option<Vec<Vector>>,
 }
 
@@ -174,10 +177,12 @@ pub struct Patch {
     /// Unit, outward.
     pub normal: Vector,
     pub area_m2: f64,
+    /// Of a piece of a facet, metres, radar frame.
     pub corners: Option<[Vector; 3]>,
 }
 
 impl Pose {
+    /// Vertices (metres, radar frame), with vertex normals where `smoothing` is above zero.
     pub fn new(vertices: Vec<Vector>, faces: &[[usize; 3]], smoothing: f64) -> Self {
         let normals = (smoothing > 0.0).then(|| vertex_normals(&vertices, faces));
         Self { vertices, normals }
@@ -205,6 +210,7 @@ impl Pose {
         add_scaled(point, unit(cross(subtract(b, a), subtract(c, a))), element.height_m)
     }
 
+    /// Where an element is now, which way it faces, and its area.
     pub fn patch(&self, element: &Element, faces: &[[usize; 3]], smoothing: f64) -> Patch {
         let face = faces[element.face as usize];
         let corners = match element.cell {

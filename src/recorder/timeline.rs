@@ -27,6 +27,10 @@ pub struct Timeline {
 pub type Weights = Vec<(usize, f64)>;
 
 impl Timeline {
+    /// Poses at ascending times.
+    ///
+    /// # Errors
+    /// No time, or one that is not later than the one before.
     pub fn new(times_s: Vec<f64>, interpolation: Interpolation) -> Result<Self> {
         if times_s.is_empty() || times_s.windows(2).any(|pair| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater))
         {

@@ -23,6 +23,10 @@ pub struct Obstacle<'a> {
 const SMALL_FACET_M: f64 = 0.025;
 
 impl<'a> Obstacle<'a> {
+    /// The mesh of a pose.
+    ///
+    /// # Errors
+    /// Faces that make no mesh of triangles.
     pub fn new(pose: &'a Pose, faces: &'a [[usize; 3]], smoothing: f64) -> Result<Self> {
         let vertices = pose.vertices.iter().map(|v| ParryVector::new(v[0], v[1], v[2])).collect();
         let mesh = TriMesh::new(vertices, faces.iter().map(|face| face.map(|vertex| vertex as u32)).collect())

@@ -134,10 +134,12 @@ impl World {
         self.room.boundaries().into_iter().filter(chosen).collect()
     }
 
+    /// The seeds that all of the world's random numbers come from.
     pub fn draws(&self) -> Draws {
         Draws { seed: self.seed, noise_seed: self.noise_seed, redraw: self.redraw, other_skin: self.other_skin }
     }
 
+    /// The random numbers of one purpose.
     pub fn random(&self, draw: Draw) -> ChaCha8Rng {
         self.draws().random(draw)
     }

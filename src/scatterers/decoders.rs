@@ -142,7 +142,8 @@ pub struct Gain {
 }
 
 impl Gain {
-    pub fn new(gain_db: f64, device: &Device) -> Self {
+    /// A factor that starts at `gain_db` (20 log₁₀ of amplitude) and learns.
+    fn new(gain_db: f64, device: &Device) -> Self {
         Self { log_gain: draw::values(&[gain_db / 20.0 * std::f64::consts::LN_10], [1], device) }
     }
 

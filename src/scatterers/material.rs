@@ -17,6 +17,7 @@ pub struct Range {
 }
 
 impl Range {
+    /// From `low` to `high`, where learning starts at `initial`; [`Self::check`] tests whether that is so.
     pub const fn new(low: f64, high: f64, initial: f64) -> Self {
         Self { low, high, initial }
     }
@@ -106,6 +107,7 @@ impl MaterialConfig {
         }
     }
 
+    /// Refuses ranges that reach beyond what physics allows; `key` names these settings in messages.
     pub fn check(&self, key: &str) -> Result<()> {
         self.roughness.check(&format!("{key}.roughness"), 1e-3..=1.0)?;
         self.metallic.check(&format!("{key}.metallic"), 0.0..=1.0)?;

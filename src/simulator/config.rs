@@ -31,6 +31,7 @@ pub enum PathModel {
 }
 
 impl PathModel {
+    /// Whether the direct path is simulated.
     pub fn has_direct(self) -> bool {
         self != Self::Indirect
     }

@@ -94,10 +94,12 @@ impl SimulatorConfig {
 }
 
 impl Simulator {
+    /// The settings that it was made with.
     pub fn config(&self) -> &SimulatorConfig {
         &self.config
     }
 
+    /// The device that its parameters are on.
     pub fn device(&self) -> Device {
         self.decoders.body_gain.log_gain.val().device()
     }

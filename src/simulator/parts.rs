@@ -16,8 +16,10 @@ pub enum Part {
 }
 
 impl Part {
+    /// All three.
     pub const ALL: [Self; 3] = [Self::Direct, Self::Indirect, Self::Noise];
 
+    /// The word of settings and reports, such as `direct`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Direct => "direct",

@@ -29,7 +29,9 @@ use crate::{
 /// Indices of the scatterers that a viewpoint sees.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
+    /// Of the body's points.
     pub body: Vec<usize>,
+    /// Of the room's patches.
     pub room: Vec<usize>,
 }
 

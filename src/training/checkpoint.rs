@@ -30,6 +30,7 @@ use crate::{
     simulator::{Simulator, SimulatorConfig},
 };
 
+/// Name of the weights' file in a checkpoint.
 pub const WEIGHTS: &str = "weights.safetensors";
 const OPTIMIZER: &str = "optimizer.bpk";
 const STATE: &str = "checkpoint.toml";

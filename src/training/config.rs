@@ -28,6 +28,7 @@ pub enum Split {
     Interleaved,
 }
 
+/// How long, on which frames and with which loss a simulator learns.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrainingConfig {
@@ -94,6 +95,7 @@ impl Default for TrainingConfig {
 }
 
 impl TrainingConfig {
+    /// Refuses counts, rates, fractions and refinements with which no training works.
     pub fn check(&self) -> Result<()> {
         for (key, value) in [("epochs", self.epochs), ("frames_per_step", self.frames_per_step), ("repeats", self.repeats)] {
             bounds::count(format!("training.{key}"), value, MOST_REPETITIONS)?;

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+/// What training reports about one epoch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EpochMetrics {

@@ -40,6 +40,7 @@ pub struct Pictures {
 }
 
 impl Pictures {
+    /// Prepares the pictures of one radar's recordings.
     pub fn new(radar: &Radar, heatmap: &HeatmapConfig) -> Self {
         Self { radar: radar.clone(), analysis: Analysis::new(radar, heatmap), heatmap: heatmap.clone() }
     }

@@ -22,6 +22,7 @@ pub enum Profiles {
 }
 
 impl Profiles {
+    /// What a profile may be written as, for messages.
     pub const EXPECTED: &str = "the number of a profile, or all";
 
     /// The one; none where all are taken.

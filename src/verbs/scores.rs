@@ -88,6 +88,10 @@ pub fn json(evaluations: &[(String, Evaluation)]) -> String {
     serde_json::to_string_pretty(&found).expect("plain data")
 }
 
+/// Means over the recordings; none without any.
+///
+/// # Panics
+/// As [`over_sequences`].
 pub fn summary(evaluations: &[(String, Evaluation)]) -> Option<SequenceSummary> {
     let evaluations: Vec<Evaluation> = evaluations.iter().map(|(_, evaluation)| evaluation.clone()).collect();
     over_sequences(&evaluations)

@@ -90,6 +90,7 @@ impl On {
         self.tensor(flat, [count, 3, 3])
     }
 
+    /// Host values as a constant of this kind and device; no gradient flows to them.
     pub fn tensor<const D: usize>(&self, values: Vec<f64>, shape: [usize; D]) -> Tensor<D> {
         Tensor::from_data(TensorData::new(values, shape), (&self.device, self.dtype))
     }

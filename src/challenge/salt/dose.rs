@@ -150,6 +150,7 @@ impl Dose {
         panels(&folder.join("dose.png"), &self.panels())
     }
 
+    /// The table, in Markdown, with half points and what was not planted.
     pub fn markdown(&self) -> String {
         let background = if self.background.is_empty() { "nothing".into() } else { self.background.join(", ") };
         let mut text = format!(

@@ -42,6 +42,7 @@ use crate::recorder::stages::{Ground, Onto};
 
 /// Where the recording itself, and where the copies are answered.
 pub const BACKGROUND: &str = "background";
+/// Folder of what is answered about the copies.
 pub const ANSWERS: &str = "answers";
 
 /// How samples are stored again: codes that two bytes cannot hold as floating-point numbers.

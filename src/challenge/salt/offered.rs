@@ -172,6 +172,7 @@ const REFUSED: &[(&str, &[&str])] = &[
 /// Fewest frames of which some can be lost: eight, and the six that the strongest gap takes.
 const FEWEST_FRAMES: usize = 14;
 
+/// An effect by its id; none where samples alone cannot be given it.
 pub fn offered(id: &str) -> Option<&'static Offered> {
     OFFERED.iter().find(|offered| offered.id == id)
 }

@@ -41,6 +41,7 @@ pub struct Planted<'a> {
     pub strength: f64,
 }
 
+/// Holds the report of a copy, or the reason why there is none, against the recording's own.
 pub fn outcome(planted: &Planted, report: &Result<Report, String>, background: &Report) -> Outcome {
     let mut outcome = Outcome {
         case: planted.case.into(),

@@ -2,6 +2,7 @@
 
 use num_complex::Complex;
 
+/// What kind of number an array holds, whatever its size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Bool,
@@ -52,10 +53,12 @@ pub trait Element: Copy + Send + Sync {
     /// Decodes an accepted kind of number; may reorder `bytes`.
     fn decode(stored: Stored, bytes: &mut [u8]) -> Vec<Self>;
 
+    /// Whether the number is neither NaN nor infinite; true of numbers that cannot be.
     fn is_finite(self) -> bool {
         true
     }
 
+    /// How a message names a number that is not finite.
     fn name_non_finite(self) -> &'static str {
         "NaN or infinite"
     }

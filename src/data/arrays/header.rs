@@ -18,6 +18,7 @@ pub struct Header {
     pub stored: Stored,
     /// The first axis is the fastest.
     pub fortran: bool,
+    /// Lengths of the axes, in the file's order.
     pub shape: Vec<usize>,
     /// Bytes before the first number.
     pub data_start: u64,
@@ -84,6 +85,7 @@ impl Header {
         format!("{} {:?}", self.stored.name(), self.shape)
     }
 
+    /// Bytes that the array's numbers take in the file.
     pub fn data_bytes(&self) -> u64 {
         self.shape.iter().map(|&length| length as u64).product::<u64>() * self.stored.bytes as u64
     }

@@ -27,7 +27,9 @@ use crate::error::{Error, Result};
 /// An array in C order: the last axis is the fastest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Array<T> {
+    /// Lengths of the axes, the slowest first.
     pub shape: Vec<usize>,
+    /// All values, in C order.
     pub values: Vec<T>,
 }
 
@@ -52,10 +54,12 @@ pub enum Problem {
 pub type Checked<T> = std::result::Result<T, Problem>;
 
 impl Problem {
+    /// Content that is `found` in place of `expected`, without a hint.
     pub fn new(found: impl Into<String>, expected: impl Into<String>) -> Self {
         Self::Content { found: found.into(), expected: expected.into(), hint: None }
     }
 
+    /// The same problem with a hint; one of reading stays as it is.
     pub fn with_hint(mut self, text: impl Into<String>) -> Self {
         if let Self::Content { hint, .. } = &mut self {
             *hint = Some(text.into());
@@ -63,6 +67,7 @@ impl Problem {
         self
     }
 
+    /// The error of a file and of one of its fields; a problem of reading names the file alone.
     pub fn at(self, path: &Path, field: &str) -> Error {
         match self {
             Self::Io(source) => Error::read(path, source),

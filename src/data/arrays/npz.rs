@@ -28,6 +28,10 @@ pub struct Npz {
 }
 
 impl Npz {
+    /// Opens an archive without reading an array.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is empty, is no archive or is damaged.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let (mut file, size) = open(path)?;
@@ -56,6 +60,7 @@ impl Npz {
         }
     }
 
+    /// The file that the archive was opened from.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -67,6 +72,7 @@ impl Npz {
         names
     }
 
+    /// Whether the archive has an array of this name.
     pub fn has(&self, name: &str) -> bool {
         self.members().any(|member| member == name)
     }

@@ -22,6 +22,10 @@ pub struct NpzWriter {
 }
 
 impl NpzWriter {
+    /// Begins an archive beside its target.
+    ///
+    /// # Errors
+    /// A target without a name, or in a folder that cannot be written.
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref().to_path_buf();
         Ok(Self { archive: ZipWriter::new_stream(AtomicFile::create(&path)?), path, open: None })

@@ -28,6 +28,7 @@ pub enum Values<'a> {
 #[derive(Clone, Debug)]
 pub struct Member<'a> {
     pub name: &'a str,
+    /// Lengths of the axes, the slowest first.
     pub shape: Vec<usize>,
     pub values: Values<'a>,
 }

@@ -26,6 +26,7 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
+    /// All six directions.
     pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::MinusX, Self::MinusY, Self::MinusZ];
 
     /// The name in settings.
@@ -40,6 +41,7 @@ impl UpAxis {
         }
     }
 
+    /// The unit vector that points up, in the motion's axes.
     pub fn direction(self) -> Point {
         match self {
             Self::X => Point::x(),

@@ -98,6 +98,7 @@ impl Recording {
         self.samples.number_type()
     }
 
+    /// Number of frames.
     pub fn frames(&self) -> usize {
         self.radar.frames
     }

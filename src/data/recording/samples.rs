@@ -32,6 +32,7 @@ pub enum IfLayout {
 }
 
 impl IfLayout {
+    /// `Complex` where samples of this layout have a quadrature part, `Real` where they have none.
     pub fn sampling(self) -> Sampling {
         match self {
             Self::Codes | Self::Complex => Sampling::Complex,

@@ -27,6 +27,7 @@ const LEVEL_ERROR: f64 = 0.25;
 /// Share of the best part's gain from which on another may carry it as well.
 const NEARLY: f64 = 0.9;
 
+/// How this family is asked: it counts only where no other detector finds anything.
 pub const DETECTOR: Detector = Detector { last_resort: true, ..Detector::new("carried things", find) };
 
 /// A part, and what it gains.

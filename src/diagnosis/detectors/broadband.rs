@@ -33,6 +33,8 @@ struct Floor {
     clutter: Vec<f64>,
 }
 
+/// At most one candidate: a range with power at all velocities. None where somebody is tracked, of too few loops, or without
+/// held-out frames.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let loops = evidence.cube.dims[3];
     if evidence.body.is_some() || loops < FEWEST_LOOPS || evidence.split.held_out.is_empty() {

@@ -68,6 +68,7 @@ fn share(component: &Component, bit: usize, noise: f64) -> Option<Share> {
     Some(Share { share, count, repeated: (scatter / blocks.len().max(1) as f64).max(1.0), fair })
 }
 
+/// At most one candidate, the bit that gains most. None where samples are no whole codes or come from a single channel.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(components) = &evidence.codes else { return vec![] };
     if evidence.accepted_unnamed.contains(&Behaviour::Quantisation) || evidence.cube.channels() < 2 {

@@ -6,6 +6,7 @@ use crate::diagnosis::finding::{Candidate, Place};
 use crate::diagnosis::locate::{Residual, strongest};
 use crate::effects::Stage;
 
+/// At most one candidate: the most significant box of the residual. None once such power was accepted.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.accepted_unnamed.contains(&Behaviour::ExcessPower) {
         return vec![];

@@ -34,7 +34,7 @@ const FEWEST: usize = 6;
 const FEWEST_STRONG: usize = 5;
 /// What either finds at most by chance.
 const LEAST_LIKELY: f64 = 0.01;
-pub const ID: &str = effects::soft_occlusion::ID;
+const ID: &str = effects::soft_occlusion::ID;
 
 /// Static clutter where the body never is, if anybody is tracked.
 struct Free {
@@ -80,6 +80,7 @@ fn reach(body: &BodyPrediction, centre_m: [f64; 3]) -> Option<[f64; 2]> {
     (far_m > 0.0).then_some([near_m - MARGIN_M, far_m + MARGIN_M])
 }
 
+/// Candidates for a return that changes from frame to frame and for one that is modulated; one of either at most.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let known = evidence.accepted.contains(&ID)
         || evidence.accepted_unnamed.contains(&Behaviour::ChangingAtOneRange)

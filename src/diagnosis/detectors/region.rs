@@ -14,7 +14,9 @@ use crate::diagnosis::statistics::median;
 /// Bins (not whole numbers, ends included) that may be negative: an interval around the zero frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
+    /// From and to.
     pub range: [f64; 2],
+    /// From and to.
     pub doppler: [f64; 2],
 }
 

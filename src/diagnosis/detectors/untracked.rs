@@ -30,6 +30,7 @@ const OF_FLOOR: f64 = 0.01;
 /// Power over the noise of a mover beside one that was found already: what its removal leaves is less.
 const BESIDE_ANOTHER: f64 = 100.0;
 
+/// At most one candidate: the strongest mover, else a radar that moves. None where somebody is tracked.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.body.is_some() {
         return vec![];

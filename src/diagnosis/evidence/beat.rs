@@ -20,6 +20,7 @@ pub fn beat_hz(evidence: &Evidence, range_m: f64) -> f64 {
     2.0 * range_m * evidence.radar.slope_hz_per_s / SPEED_OF_LIGHT
 }
 
+/// Range, m, of a round-trip beat frequency; [`beat_hz`] the other way round.
 pub fn range_m(evidence: &Evidence, beat_hz: f64) -> f64 {
     beat_hz * SPEED_OF_LIGHT / (2.0 * evidence.radar.slope_hz_per_s)
 }

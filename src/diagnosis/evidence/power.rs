@@ -31,7 +31,9 @@ pub const LOBES: [i32; 2] = [1, 8];
 /// A map of few cells: indices into `[doppler, range]` and power.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Template {
+    /// `[cell]`, each doppler · samples + range.
     pub cells: Vec<u32>,
+    /// `[cell]`.
     pub power: Vec<f32>,
 }
 
@@ -114,6 +116,7 @@ impl PowerModel {
         &self.usable
     }
 
+    /// Cells of a map: loops times samples.
     pub fn size(&self) -> usize {
         self.cells.loops * self.cells.samples
     }

@@ -32,7 +32,8 @@ pub enum Product {
 }
 
 impl Product {
-    pub fn of(self, value: Complex64) -> Complex64 {
+    /// The product of one sample.
+    fn of(self, value: Complex64) -> Complex64 {
         match self {
             Self::Square => value * value,
             Self::Magnitude => value.norm_sqr().into(),

@@ -48,6 +48,8 @@ pub struct Strongest {
     pub gain: f64,
 }
 
+/// The most significant box with training and held-out frames in it; none where no box has both, or where the training frames
+/// show no excess in it.
 pub fn strongest(evidence: &Evidence, residual: &Residual) -> Option<Strongest> {
     let boxes = all(residual);
     let tried = boxes.len() as f64;

@@ -19,6 +19,8 @@ pub struct Track {
 }
 
 impl Track {
+    /// Displacements `[time][point]`, metres, at ascending times from `centre_s`, the middle of the frame in which the points
+    /// were seen.
     pub fn new(centre_s: f64, times_s: Vec<f64>, displacement_m: Vec<Vec<[f32; 3]>>) -> Self {
         Self { centre_s, origin_s: 0.0, times_s, displacement_m: Arc::new(displacement_m) }
     }

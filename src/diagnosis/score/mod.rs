@@ -54,6 +54,7 @@ fn asked(evidence: &Evidence) -> Vec<&'static EffectInfo> {
     evidence.library.iter().copied().filter(is_asked).collect()
 }
 
+/// Candidates for every effect that one test for all can judge, and for fields without a name that none of them explains.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let named = asked(evidence);
     let is_open = |field: &&Field| !named.is_empty() && !evidence.accepted_unnamed.contains(&field.behaves_like);

@@ -56,6 +56,7 @@ pub fn calibrate(
     write_json(&folder.join("gain.json"), &Gain { gain: calibration.gain()? })
 }
 
+/// One recording to simulate by a method that is not ours.
 pub struct Task<'a> {
     pub method: BaselineName,
     pub recording: &'a Path,
@@ -68,6 +69,10 @@ pub struct Task<'a> {
     pub seed: u64,
 }
 
+/// Hands the frames of a method, with gain and noise, to `then`.
+///
+/// # Errors
+/// A recording, gain or checkpoint that cannot be read, and whatever the method or `then` refuses.
 pub fn simulate(task: &Task, bench: &mut Bench, then: Use<'_>) -> Result<Speed> {
     let recording = Recording::open(task.recording)?;
     let baseline = open(task.method, &recording, task.checkpoint, bench.device())?;

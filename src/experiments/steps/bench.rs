@@ -34,6 +34,7 @@ pub struct Bench {
 }
 
 impl Bench {
+    /// With these devices and nothing kept yet.
     pub fn new(devices: &[Device]) -> Self {
         Self { devices: devices.to_vec(), training: None, simulated: Default::default(), geometry_s: HashMap::new(), lpips: None }
     }

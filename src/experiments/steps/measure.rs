@@ -21,6 +21,7 @@ pub struct Speed {
     pub signal_s: f64,
 }
 
+/// Writes a value as indented JSON, whole or not at all; fails where the folder cannot be written.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     atomic::write_text(path, &serde_json::to_string_pretty(value).expect("plain data"))
 }

@@ -16,6 +16,7 @@ use crate::radar::{Radar, Sampling};
 use crate::simulator::{Simulator, SimulatorConfig};
 use crate::training::checkpoint::{load_weights, read_state, with_stable_ids};
 
+/// One recording to simulate with a trained checkpoint.
 pub struct Task<'a> {
     pub checkpoint: &'a Path,
     pub recording: &'a Path,
@@ -36,6 +37,10 @@ pub struct Source<'a> {
 /// What becomes of a method's frames.
 pub type Use<'a> = &'a mut dyn FnMut(&Source<'_>) -> Result<Speed>;
 
+/// Hands the frames of a trained simulator, with its noise, to `then`.
+///
+/// # Errors
+/// A checkpoint or recording that cannot be read, and whatever `then` refuses.
 pub fn simulate(task: &Task, bench: &mut Bench, then: Use<'_>) -> Result<Speed> {
     let (simulator, config) = open(task.checkpoint, task.graph_at_inference, bench.device())?;
     let loaded = bench.simulated(task.recording, &config)?;

@@ -14,6 +14,7 @@ use crate::simulator::SimulatorConfig;
 use crate::training::checkpoint::read_state;
 use crate::training::{EpochMetrics, Event, Outcome, TrainingConfig};
 
+/// What one simulator is trained on and how.
 pub struct Task<'a> {
     pub recordings: &'a [PathBuf],
     pub simulator: &'a SimulatorConfig,
@@ -40,6 +41,7 @@ pub struct Stability {
     pub history: Vec<EpochMetrics>,
 }
 
+/// The step in which a number was no longer finite, and the first stage of the signal's way that made it so.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Broke {
     pub step: usize,

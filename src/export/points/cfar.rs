@@ -14,6 +14,7 @@ pub struct Detection {
     /// Doppler bin, zero in the middle, and range bin.
     pub row: usize,
     pub bin: usize,
+    /// Averaged over the antennas, linear.
     pub power: f64,
     /// Of the noise in it, estimated from the training cells.
     pub noise: f64,

@@ -79,6 +79,7 @@ impl Default for PointsConfig {
 }
 
 impl PointsConfig {
+    /// Refuses rates, counts of cells, angles and ranges outside their limits.
     pub fn check(&self) -> Result<()> {
         if !(1e-12..=0.5).contains(&self.false_alarm_rate) {
             return Err(Error::setting("points.false_alarm_rate", self.false_alarm_rate, "1e-12 to 0.5"));
@@ -172,6 +173,10 @@ impl Finder {
     }
 }
 
+/// Writes the points of all frames, and gives notes for people.
+///
+/// # Errors
+/// A map without room for the training cells, a frame that cannot be read, a folder that cannot be written.
 pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
     let config = &source.config.points;
     let radar = &source.recording.radar;

@@ -200,6 +200,7 @@ impl Board {
         self.tx_half_wavelengths.get(tx).map(|&[x, z]| [x * self.half_m(), 0.0, z * self.half_m()])
     }
 
+    /// Where a receiver is, metres; none for a number that the board has not.
     pub fn rx_m(&self, rx: usize) -> Option<[f64; 3]> {
         self.rx_half_wavelengths.get(rx).map(|&[x, z]| [x * self.half_m(), 0.0, z * self.half_m()])
     }

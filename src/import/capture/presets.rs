@@ -92,6 +92,10 @@ impl Preset {
         read_text(TABLE).expect("the table is tested")
     }
 
+    /// How the samples lie in the data set's files.
+    ///
+    /// # Errors
+    /// A text that [`Layout::parse`] refuses.
     pub fn layout(&self) -> Result<Layout> {
         Layout::parse(&self.layout)
     }

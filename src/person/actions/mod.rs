@@ -135,7 +135,8 @@ impl Default for StyleConfig {
 }
 
 impl StyleConfig {
-    pub fn check(&self) -> Result<()> {
+    /// Refuses a tempo, amplitude, path scale or variation outside its limits.
+    fn check(&self) -> Result<()> {
         let limits = [
             ("tempo", self.tempo, 0.3, 2.0),
             ("amplitude", self.amplitude, 0.3, 1.5),

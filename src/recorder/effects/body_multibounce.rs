@@ -21,6 +21,8 @@ impl Effect for BodyMultibounce {
 }
 
 impl BodyMultibounce {
+    /// Adds to every chirp of the body's return its delayed copy; `radar` is the one that `body` was sampled by, guard samples
+    /// included.
     pub fn add(&self, resampler: &Resampler, radar: &Radar, body: &mut Signal) {
         let delay_s = 2.0 * self.extra_m / SPEED_OF_LIGHT;
         for (_, chirp) in body.chirps_mut() {

@@ -29,6 +29,10 @@ impl Effect for Breathing {
 }
 
 impl Breathing {
+    /// The trunk's sinusoidal motion, with a drawn phase.
+    ///
+    /// # Errors
+    /// A person given as meshes, or a body whose spine moves no vertex.
     pub fn swell(&self, draws: &Draws, person: &Person) -> Result<Swell> {
         Ok(Swell {
             weights: part_weights(person, &["spine1", "spine2", "spine3"], "effects.breathing")?,

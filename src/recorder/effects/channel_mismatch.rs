@@ -37,6 +37,7 @@ impl ChannelMismatch {
         self.gain_db.iter().zip(&self.phase_deg).map(factor).collect()
     }
 
+    /// Multiplies every channel by its factor, of `[rx]` or `[tx, rx]` as [`Self::factors`] has them.
     pub fn apply(factors: &[Complex64], signal: &mut Signal) {
         let receivers = signal.rx;
         for (place, chirp) in signal.chirps_mut() {

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use crate::radar::Radar;
 
+/// How one chirp departs from an ideal one: its frequency, its start and its quadratic bend.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ChirpError {
     pub offset_hz: f64,

@@ -8,6 +8,7 @@ use crate::recorder::draws::Draws;
 use crate::recorder::receiver::ReceiverConfig;
 use crate::room::{Boundary, Room};
 
+/// What an effect may ask of the world that it is planted in.
 #[derive(Clone, Copy)]
 pub struct Context<'a> {
     /// As it is stated.
@@ -23,6 +24,7 @@ pub struct Context<'a> {
 }
 
 impl Context<'_> {
+    /// Refuses an effect of a boundary that the room has not; `key` names the effect's settings.
     pub fn check_boundary(&self, key: &str, wall: Boundary) -> Result<()> {
         match self.room.distance_m(wall) {
             Some(_) => Ok(()),
@@ -31,6 +33,7 @@ impl Context<'_> {
         }
     }
 
+    /// Refuses an effect of the noise where the receiver makes none; `key` names the effect's settings.
     pub fn check_noise(&self, key: &str) -> Result<()> {
         if self.receiver.noise { Ok(()) } else { Err(Error::setting(key, "on", "off without receiver.noise")) }
     }

@@ -38,6 +38,7 @@ impl DcOffset {
         context.radar.rx_m.iter().map(|_| Complex64::new(around(self.i), around(self.q))).collect()
     }
 
+    /// Adds to every sample its receiver's offset, `[rx]`, in the signal's unit.
     pub fn add(&self, offsets: &[Complex64], signal: &mut Signal) {
         for (place, chirp) in signal.chirps_mut() {
             chirp.iter_mut().for_each(|value| *value += offsets[place.rx]);

@@ -23,6 +23,7 @@ fn yes() -> bool {
 impl Effect for IfHighpass {}
 
 impl IfHighpass {
+    /// As many equal sections as the order says.
     pub fn sections(&self) -> Vec<Section> {
         vec![Section { corner_hz: self.corner_hz, is_high: true }; self.order]
     }

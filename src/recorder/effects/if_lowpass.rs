@@ -12,6 +12,7 @@ settings! {
 impl Effect for IfLowpass {}
 
 impl IfLowpass {
+    /// The one section that the filter is.
     pub fn sections(&self) -> Vec<Section> {
         vec![Section { corner_hz: self.corner_hz, is_high: false }]
     }

@@ -26,6 +26,7 @@ impl Effect for ImpulsiveNoise {
 }
 
 impl ImpulsiveNoise {
+    /// Strengthens single samples of a noise, each with the probability `rate`.
     pub fn shape(&self, draws: &Draws, noise: &mut Signal) {
         let mut rng = draws.of_effect(STREAM, noise.frame);
         for value in &mut noise.values {

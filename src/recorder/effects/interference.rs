@@ -72,6 +72,7 @@ impl Interference {
             .collect()
     }
 
+    /// Adds the crossings that fall into the signal's frame; `peak` is what their amplitudes are relative to.
     pub fn add(&self, bursts: &[Burst], radar: &Radar, peak: f64, signal: &mut Signal) {
         let frame = signal.frame;
         for (place, chirp) in signal.chirps_mut() {

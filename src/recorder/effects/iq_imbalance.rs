@@ -23,6 +23,7 @@ impl Effect for IqImbalance {
 }
 
 impl IqImbalance {
+    /// Changes Q of every sample: its gain, and the part of I in it.
     pub fn apply(&self, signal: &mut Signal) {
         let gain = from_db(self.gain_db);
         let (sin, cos) = self.phase_deg.to_radians().sin_cos();

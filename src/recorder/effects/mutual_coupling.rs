@@ -34,10 +34,12 @@ impl Effect for MutualCoupling {
 }
 
 impl MutualCoupling {
+    /// Complex factor from a receiver to its neighbour, with a drawn phase.
     pub fn factor(&self, draws: &Draws) -> Complex64 {
         Complex64::from_polar(10f64.powf(self.level_db / 20.0), draws.phase(STREAM, 0))
     }
 
+    /// Adds to every receiver what its two neighbours receive, times `factor`.
     pub fn apply(factor: Complex64, signal: &mut Signal) {
         signal.mix_receivers(|_, _, values| {
             let own = values.to_vec();

@@ -47,16 +47,27 @@ pub enum Outside {
 }
 
 impl Outside {
+    /// Word of [`Self::MainsGainRipple`].
     pub const MAINS_GAIN_RIPPLE: &str = "mains_gain_ripple";
+    /// Word of [`Self::LsbStuck`].
     pub const LSB_STUCK: &str = "lsb_stuck";
+    /// Word of [`Self::RxMuxSkew`].
     pub const RX_MUX_SKEW: &str = "rx_mux_skew";
+    /// Word of [`Self::LampModulation`].
     pub const LAMP_MODULATION: &str = "lamp_modulation";
+    /// Word of [`Self::MovingCurtain`].
     pub const MOVING_CURTAIN: &str = "moving_curtain";
+    /// Word of [`Self::LoPulling`].
     pub const LO_PULLING: &str = "lo_pulling";
+    /// Word of [`Self::ThermalCurvature`].
     pub const THERMAL_CURVATURE: &str = "thermal_curvature";
+    /// Word of [`Self::GainHop`].
     pub const GAIN_HOP: &str = "gain_hop";
+    /// Word of [`Self::MuxCrosstalk`].
     pub const MUX_CROSSTALK: &str = "mux_crosstalk";
+    /// Word of [`Self::ChirpAfterglow`].
     pub const CHIRP_AFTERGLOW: &str = "chirp_afterglow";
+    /// Word of [`Self::BufferSlip`].
     pub const BUFFER_SLIP: &str = "buffer_slip";
 
     /// The word of `kind`.
@@ -196,6 +207,7 @@ impl Outside {
         }
     }
 
+    /// [`Self::LoPulling`]: turns every sample's phase in proportion to its real part over `peak`; other kinds do nothing.
     pub fn pull(&self, peak: f64, signal: &mut Signal) {
         if let Self::LoPulling { peak_rad } = self
             && peak > 0.0
@@ -204,6 +216,8 @@ impl Outside {
         }
     }
 
+    /// [`Self::ChirpAfterglow`] and [`Self::MuxCrosstalk`]: adds to every sample a part of what came before it; other kinds do
+    /// nothing.
     pub fn remember(&self, signal: &mut Signal) {
         match *self {
             Self::ChirpAfterglow { level_db } => {

@@ -37,6 +37,7 @@ impl Effect for RadarVibration {
 }
 
 impl RadarVibration {
+    /// The radar's motion along y, with a drawn phase.
     pub fn motion(&self, draws: &Draws) -> SinusoidalMotion {
         SinusoidalMotion {
             amplitude_m: [0.0, self.amplitude_m, 0.0],

@@ -43,6 +43,8 @@ impl RampEdgeTransient {
         (0..context.radar.rx_m.len()).map(|rx| Complex64::from_polar(peak * from_db(self.level_db), phase(rx))).collect()
     }
 
+    /// Adds to the last samples of every chirp a transient that decays from the end backwards; `amplitudes`, `[rx]`, are those of
+    /// the last sample.
     pub fn add(&self, amplitudes: &[Complex64], signal: &mut Signal) {
         let count = self.samples.min(signal.samples);
         for (place, chirp) in signal.chirps_mut() {

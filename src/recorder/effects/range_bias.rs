@@ -15,6 +15,7 @@ settings! {
 impl Effect for RangeBias {}
 
 impl RangeBias {
+    /// Delays every chirp; `radar` is the one that `signal` was sampled by, guard samples included.
     pub fn apply(&self, resampler: &Resampler, radar: &Radar, signal: &mut Signal) {
         let delay_s = 2.0 * self.offset_m / SPEED_OF_LIGHT;
         for (_, chirp) in signal.chirps_mut() {

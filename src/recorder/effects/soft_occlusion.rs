@@ -34,6 +34,8 @@ pub struct Shadow<'a> {
 const RAYS: usize = 16;
 
 impl<'a> Shadow<'a> {
+    /// The shadow of an obstacle with these `vertices` (metres, radar frame) as seen from `viewpoint`; `width` as in the
+    /// settings.
     pub fn new(obstacle: &'a Obstacle<'a>, vertices: &[Vector], viewpoint: Vector, wavelength_m: f64, width: f64) -> Self {
         let (mut low, mut high, mut sum, mut nearest_m) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], 0.0, f64::INFINITY);
         for vertex in vertices {

@@ -51,6 +51,7 @@ impl TxLeakage {
             .collect()
     }
 
+    /// Adds the leakage's tone to every chirp; `amplitudes`, `[tx, rx]`, are relative to `peak`.
     pub fn add(&self, path: &Chirp, amplitudes: &[Complex64], peak: f64, signal: &mut Signal) {
         let receivers = signal.rx;
         let delay_s = 2.0 * self.range_m / SPEED_OF_LIGHT;

@@ -25,6 +25,7 @@ pub struct Chain {
 }
 
 impl Chain {
+    /// The imperfections of a world's receiver, with what is random about them drawn for the whole recording.
     pub fn new(world: &World, clock: Clock, peak: f64) -> Self {
         let (effects, context) = (&world.effects, world.context());
         let offsets = effects.dc_offset.as_ref().map_or(vec![], |dc| dc.offsets(&context));

@@ -13,6 +13,7 @@ pub struct Clock {
 }
 
 impl Clock {
+    /// The clock of a world with these effects.
     pub fn new(effects: &EffectsConfig) -> Self {
         Self { drop: effects.frame_drop, tdm: effects.tdm_phase, offset: effects.clock_offset, drift: effects.clock_drift }
     }

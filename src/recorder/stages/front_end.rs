@@ -32,6 +32,7 @@ pub struct Stages {
 }
 
 impl Stages {
+    /// Prepares a world's stages, and finds how many guard samples their interpolations and filters need.
     pub fn new(world: &World) -> Self {
         let effects = &world.effects;
         let radar = effects.true_radar(&world.radar);
@@ -58,6 +59,7 @@ impl Stages {
         }
     }
 
+    /// Samples that are recorded before and after the ADC's window, and cropped by [`Self::apply`].
     pub fn guard(&self) -> usize {
         self.guard
     }
@@ -112,6 +114,7 @@ impl Stages {
         self.oscillator.as_ref().map_or(0.0, extra)
     }
 
+    /// The receiver behind these stages; `peak` is what relative levels are relative to.
     pub fn chain(&self, world: &World, peak: f64) -> Chain {
         Chain::new(world, self.clock, peak)
     }

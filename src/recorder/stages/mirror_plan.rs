@@ -18,6 +18,7 @@ pub struct MirrorPlan {
 }
 
 impl MirrorPlan {
+    /// Gathers the walls that mirror the body by the world's settings, its wall ghosts and its floor bounce.
     pub fn new(world: &World) -> Self {
         let mut plan = Self { on_a_leg: world.walls.images, together: world.walls.images, ..Self::default() };
         for wall in world.image_walls() {

@@ -16,6 +16,7 @@ use crate::diagnosis::course::{Course, Of};
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::Candidate;
 
+/// Candidates from every phase that accepted findings have over time. None where somebody is tracked.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.body.is_some() {
         return vec![];

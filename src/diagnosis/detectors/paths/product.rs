@@ -58,6 +58,8 @@ fn mean(channels: &[&[Complex64]]) -> Vec<Complex64> {
     sum
 }
 
+/// The better of the two, `tried` being the looks that its p-value is corrected for. None of real samples, nor where the receiver
+/// bends the signal in other ways.
 pub fn find(scene: &Scene, tried: f64) -> Option<Candidate> {
     // Where the receiver bends everything, or products of other kinds are there too, these two are not the cause.
     let bent = scene.evidence.accepted.contains(&effects::adc_saturation::ID)

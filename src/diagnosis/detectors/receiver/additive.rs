@@ -22,6 +22,8 @@ const ENOUGH: f64 = 0.8;
 /// Held-out log-likelihood that a free field must gain, nats.
 const LEAST_GAIN: f64 = 20.0;
 
+/// Candidates for what is added outside the room's delays: named elements, a filter in their place, or a field without a name.
+/// None where a free field is not significant.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some(field) = Field::new(evidence) else { return vec![] };
     let free = field.free_likelihood();

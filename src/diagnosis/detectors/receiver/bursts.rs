@@ -34,6 +34,7 @@ const EDGES: usize = 16;
 /// Samples next to it that count once it is known to be hit.
 const NEXT: f64 = 6.0;
 
+/// At most one candidate for all bursts together. None of fewer than eight loops, or once bursts or clipping were accepted.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [frames, _, _, loops, samples] = evidence.cube.dims;
     let known = evidence.accepted.iter().any(|id| [interference::ID, impulsive_noise::ID, adc_saturation::ID].contains(id))

@@ -153,6 +153,7 @@ fn distorted_share(clipped: f64) -> f64 {
     1.0 - copied * copied / power
 }
 
+/// At most one candidate, from the samples as they were recorded: none once anything was accepted.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // It is looked for once, in the samples as they were recorded.
     let untouched = evidence.accepted.is_empty() && evidence.accepted_unnamed.is_empty();

@@ -26,7 +26,9 @@ pub struct Field {
 /// Templates in fast time: `own` have an amplitude in every channel, `common` (`[template][channel]`) only one.
 #[derive(Clone, Default)]
 pub struct Templates {
+    /// `[template][sample]`.
     pub own: Vec<Vec<Complex64>>,
+    /// `[template][channel][sample]`.
     pub common: Vec<Vec<Vec<Complex64>>>,
 }
 
@@ -34,6 +36,7 @@ pub struct Templates {
 pub struct Fitted {
     /// `[channel][template]`
     pub own: Vec<Vec<Complex64>>,
+    /// `[template]`.
     pub common: Vec<Complex64>,
     /// `[channel][direction]`
     pub predicted: Vec<Vec<Complex64>>,
@@ -42,6 +45,7 @@ pub struct Fitted {
 }
 
 impl Field {
+    /// The field of a recording's static returns; none where the room's delays leave no direction free.
     pub fn new(evidence: &Evidence) -> Option<Self> {
         let [frames, .., loops, samples] = evidence.cube.dims;
         let channels = evidence.cube.channels();
@@ -72,6 +76,7 @@ impl Field {
         Some(Self { support, coordinates, mean, clutter, variance, training, held_out })
     }
 
+    /// Transmitters times receivers.
     pub fn channels(&self) -> usize {
         self.mean.len()
     }
@@ -109,6 +114,7 @@ impl Field {
         &self.held_out
     }
 
+    /// Coordinates of a chirp, `[direction]`, along the directions outside the support.
     pub fn project(&self, chirp: &[Complex64]) -> Vec<Complex64> {
         project(&self.support.outside, chirp)
     }
@@ -183,6 +189,7 @@ pub fn distance(a: &[Complex64], b: &[Complex64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).norm_sqr()).sum()
 }
 
+/// sum + factor · term, in place.
 pub fn add(sum: &mut [Complex64], term: &[Complex64], factor: Complex64) {
     sum.iter_mut().zip(term).for_each(|(sum, term)| *sum += term * factor);
 }

@@ -8,6 +8,8 @@ use crate::diagnosis::finding::{Candidate, Correction, Place, Volume};
 use crate::diagnosis::products::{Law, Product, without};
 use crate::effects::{self, Stage};
 
+/// At most one candidate: products that no single effect of the library makes. None of real samples, nor once the receiver was
+/// found to bend the signal.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let is_bent =
         evidence.accepted.contains(&effects::adc_saturation::ID) || evidence.accepted_unnamed.contains(&Behaviour::Quadratic);

@@ -33,6 +33,8 @@ const LEAVES: f64 = 0.25;
 /// Neighbouring samples of a mean chirp are alike: so many count as one.
 const ALIKE: f64 = 4.0;
 
+/// At most one candidate for all frames whose samples slipped. None of too short recordings, or where the radar may move within a
+/// frame.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [frames, _, _, loops, samples] = evidence.cube.dims;
     let channels = evidence.cube.channels();

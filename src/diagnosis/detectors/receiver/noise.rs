@@ -36,6 +36,8 @@ struct Cells {
     places: Vec<[usize; 2]>,
 }
 
+/// Candidates for coloured noise and for noise that receivers share, one of either at most. None with too few empty beat
+/// frequencies or fewer than 16 loops.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let empty = if ranges_m(evidence).is_some() { empty_bins(evidence) } else { quiet_bins(evidence) };
     let samples = evidence.cube.dims[4];

@@ -24,6 +24,8 @@ const LEAST_NOISE: f64 = 1e-9;
 /// Level of the test that what is near differs between the channels as reflectors do; customary (Fisher 1925).
 const SIGNIFICANCE: f64 = 0.05;
 
+/// Candidates of the first of these that is significant: transients at a chirp's ends, an offset, a leakage. None where the room
+/// bounds the delays and there is quadrature.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if ranges_m(evidence).is_some() && !evidence.is_real() || evidence.cube.dims[4] < 16 {
         return vec![];

@@ -31,6 +31,7 @@ const AROUND: i64 = 4;
 /// Chance above which nothing is said.
 const UNLIKELY: f64 = 1e-4;
 
+/// At most one tone: away from all returns, else among the slow ones, else one that wanders. None after three were accepted.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.accepted.iter().filter(|id| **id == effects::spur::ID).count() > 2 {
         return vec![];

@@ -41,6 +41,7 @@ pub fn dot(a: &[Complex64], b: &[Complex64]) -> Complex64 {
     a.iter().zip(b).map(|(a, b)| a.conj() * b).sum()
 }
 
+/// Σ |a|².
 pub fn energy(a: &[Complex64]) -> f64 {
     a.iter().map(Complex64::norm_sqr).sum()
 }

@@ -31,12 +31,16 @@ const STAYS: f64 = 3.0;
 pub struct Wandering {
     /// Turns per loop, by frame; per sample.
     pub slow: Vec<f64>,
+    /// Turns per sample.
     pub fast: f64,
+    /// `[frame, channel]`.
     pub amplitudes: Grid<Complex64, 2>,
     pub p_value: f64,
     pub gain: f64,
 }
 
+/// The steadiest line that does not move as its Doppler frequency says. None where somebody is tracked, or of too few loops or
+/// frames.
 pub fn find(evidence: &Evidence) -> Option<Wandering> {
     let [frames, _, _, loops, samples] = evidence.cube.dims;
     let (training, held_out) = (&evidence.split.training, &evidence.split.held_out);

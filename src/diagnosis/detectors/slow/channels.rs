@@ -60,6 +60,7 @@ enum Axis {
     Transmitter(usize),
 }
 
+/// At most one candidate: the receiver or transmitter that gains most. None with too few of both.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [_, transmitters, receivers, ..] = evidence.cube.dims;
     let mut units = vec![];

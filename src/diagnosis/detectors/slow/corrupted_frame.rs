@@ -46,6 +46,7 @@ struct Odd {
     deviations: Deviations,
 }
 
+/// At most one candidate: the frame and channel that stands out. None of too few frames, channels or loops.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [frames, _, _, loops, _] = evidence.cube.dims;
     if frames < FEWEST_FRAMES

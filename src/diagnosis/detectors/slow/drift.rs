@@ -14,6 +14,7 @@ pub enum Shape {
     Step([f64; 2], usize),
 }
 
+/// A course over the frames, with what it gains.
 #[derive(Clone, Debug)]
 pub struct Drift {
     pub shape: Shape,
@@ -27,6 +28,7 @@ pub struct Drift {
 }
 
 impl Drift {
+    /// Its value in a frame.
     pub fn value(&self, frame: usize) -> f64 {
         match &self.shape {
             Shape::Smooth(coefficients) => {

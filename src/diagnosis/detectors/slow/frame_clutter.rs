@@ -59,6 +59,7 @@ impl FrameClutter {
         Some(Self { frames, channels, bins, mean, deviation, scatter, limit, touched: evidence.touched() })
     }
 
+    /// What a frame of a channel deviates from the mean of the training frames at a range.
     pub fn deviation(&self, frame: usize, channel: usize, bin: usize) -> Complex64 {
         self.deviation[(frame * self.channels + channel) * self.bins + bin]
     }

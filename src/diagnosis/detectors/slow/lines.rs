@@ -49,6 +49,7 @@ pub fn unsure(gain: f64, freedom: f64) -> f64 {
 }
 
 impl Line {
+    /// Its value at a radar time.
     pub fn value(&self, time_s: f64) -> f64 {
         self.amplitudes.iter().enumerate().fold(self.constant, |sum, (harmonic, [cosine, sine])| {
             let (s, c) = (std::f64::consts::TAU * self.frequency_hz * (harmonic + 1) as f64 * time_s).sin_cos();

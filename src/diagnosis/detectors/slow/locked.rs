@@ -34,6 +34,7 @@ struct Channel {
     noise: f64,
 }
 
+/// At most one candidate. None where somebody is tracked, of too few frames, loops or samples, or where the radar may move.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let [_, _, _, loops, samples] = evidence.cube.dims;
     let training = evidence.split.training.len();

@@ -42,6 +42,7 @@ const PASSED_ON: f64 = 0.01;
 /// The parts of the complex gain that have a series each.
 const PARTS: [Part; 4] = [Part::Gain, Part::Phase, Part::Delay, Part::Boresight];
 
+/// Candidates for what static returns do together over slow time, with p-values corrected for all kinds of looks.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let known = |candidate: &Candidate| candidate.id.is_some_and(|id| evidence.accepted.contains(&id));
     let reported = |candidate: &Candidate| candidate.p_value < PASSED_ON && candidate.nats > LEAST_GAIN && !known(candidate);

@@ -28,6 +28,7 @@ impl Random {
     }
 }
 
+/// Two values between which chirps change at random.
 #[derive(Clone, Debug)]
 pub struct Two {
     pub distance: f64,
@@ -36,6 +37,8 @@ pub struct Two {
     pub held_out_nats: f64,
 }
 
+/// The variance that training frames make most likely; none where the series is too short, or where no two halves of the ranges
+/// can be compared.
 pub fn best(field: &Field, part: Part, training: &[usize], held_out: &[usize]) -> Option<Random> {
     let series = field.series(part, |_| true);
     let training: Vec<usize> = training.iter().copied().filter(|&f| series.weight[f] > 0.0).collect();

@@ -72,6 +72,7 @@ pub struct Decay {
 }
 
 impl Decay {
+    /// Fits values by loop; `length` in loops.
     pub fn fit(values: &[Complex64], length: f64) -> Self {
         let shape: Vec<f64> = (0..values.len()).map(|i| (-(i as f64) / length).exp()).collect();
         let level = shape.iter().sum::<f64>() / values.len() as f64;
@@ -180,6 +181,8 @@ impl Pattern {
     }
 }
 
+/// The decay that training frames make most likely; none of fewer than eight loops, or without a training frame that says
+/// anything.
 pub fn best(field: &Field, training: &[usize], held_out: &[usize]) -> Option<Settling> {
     if field.loops < 8 {
         return None;

@@ -15,6 +15,7 @@ pub struct Frames {
     pub bins: usize,
 }
 
+/// Mean chirp of every frame and channel under a Hann window, transformed to ranges.
 pub fn frames(evidence: &Evidence) -> Frames {
     let [count, _, _, loops, samples] = evidence.cube.dims;
     let (channels, bins) = (evidence.cube.channels(), evidence.range_bins());

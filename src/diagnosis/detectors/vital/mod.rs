@@ -39,6 +39,8 @@ const ITERATIONS: usize = 20;
 /// Share of the phase's variance that a rhythm must hold.
 const RHYTHMIC: f64 = 0.5;
 
+/// At most one candidate: a return whose phase has a rhythm. None where somebody is tracked, the radar is said to move, or frames
+/// are few or blocks of a long one.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     // Of a tracked body the phase is known to millimetres only, which is more than a breath.
     if evidence.body.is_some() || evidence.cube.dims[0] < FEWEST_FRAMES || evidence.split.block_loops.is_some() {

@@ -59,6 +59,8 @@ const FINER: usize = 2;
 const TREND: usize = 3;
 const NUMBERS: usize = 9;
 
+/// At most one candidate: a gain that falls along all chirps, or a ramp that bends. None without quadrature or without a tracked
+/// body.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let Some((model, body)) = evidence.power().zip(evidence.body.as_ref()) else { return vec![] };
     if evidence.is_real() {

@@ -107,6 +107,7 @@ fn support(evidence: &Evidence, frame: usize) -> [Option<[usize; 2]>; 2] {
     [slow, body].map(|span| span.map(|[near, far]| bins(near, far)))
 }
 
+/// The strongest pair of echoes. None without quadrature or held-out frames, or once a ripple was named.
 pub fn find(evidence: &Evidence) -> Option<Candidate> {
     let radar = &evidence.radar;
     if !evidence.may_name(effects::chirp_ripple::ID) || evidence.is_real() || evidence.split.held_out.is_empty() {

@@ -11,6 +11,7 @@ const STEPS: usize = 180;
 pub struct Reach {
     /// Cells of the map, usable ones only.
     pub cells: Vec<u32>,
+    /// Of each of `cells`.
     pub measured: Vec<f32>,
     /// Positions in `cells`, and power.
     templates: Vec<(Vec<u32>, Vec<f32>)>,

@@ -25,6 +25,7 @@ pub struct Cells {
 }
 
 impl Cells {
+    /// The law for a radar's chirps and frames.
     pub fn new(radar: &Radar) -> Self {
         let (loops, samples) = (radar.loops_per_frame, radar.samples_per_chirp);
         let window_s = samples as f64 / radar.sample_rate_hz;

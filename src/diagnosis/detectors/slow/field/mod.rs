@@ -67,7 +67,8 @@ impl Field {
         (2 * known > frames).then_some(field)
     }
 
-    pub fn deviations(&self, frame: usize, index: usize) -> &[Complex64] {
+    /// Deviations of one frame and loop, `[group]`.
+    fn deviations(&self, frame: usize, index: usize) -> &[Complex64] {
         self.deviation.below([frame, index])
     }
 
@@ -82,6 +83,7 @@ impl Field {
         if all > 0.0 { sum / all } else { 1.0 }
     }
 
+    /// Inverse variances of one frame's deviations, `[group]`.
     pub fn weights(&self, frame: usize) -> &[f64] {
         self.weight.below([frame])
     }
