@@ -44,6 +44,14 @@ pub struct Cell {
     pub aslant: DMatrix<Complex64>,
 }
 
+impl Cell {
+    /// Mean sine of the body's direction there.
+    pub fn sine(&self) -> f64 {
+        let power = self.expected[(0, 0)].re;
+        if power > 0.0 { self.aslant[(0, 0)].re / power } else { 0.0 }
+    }
+}
+
 /// The cells that the body fills, by frame and group of neighbours.
 pub struct Cells {
     pub radar: Radar,

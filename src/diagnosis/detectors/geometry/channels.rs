@@ -304,6 +304,11 @@ mod tests {
         let setting = displaced[0].setting(1.0, 1.0, &four_receivers()).expect("no setting");
         let values = &setting.parameters["offset_m"];
         assert!(values.len() == 3 * (1 + 4) && values[6] == displaced[0].estimates[0].values[1], "{values:?}");
+        // By so much that it is not linear.
+        let far_m = [0.0, 8e-4, -4e-4, 4e-4];
+        let displaced = look(6, far_m);
+        assert!(displaced.len() == 1 && displaced[0].id == Some(effects::antenna_position::ID), "{displaced:?}");
+        holds(&displaced[0].estimates[0], &far_m);
         assert!(look(4, [0.0, 1e-4, 2e-4, 3e-4]).iter().all(|found| found.p_value > 1e-3));
     }
 

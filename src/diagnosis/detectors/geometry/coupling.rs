@@ -103,7 +103,8 @@ fn estimate(array: &Array, shared: &[&[usize]]) -> Option<(Estimated, Coupling)>
 
 /// What is left of the receivers' looks without their coupling. None where that is not estimable.
 fn looks_alone(array: &Array, coupling: Coupling) -> Option<Vec<Vec<Look>>> {
-    Some(array.looks_after(&alone(array.cells.numbers().receivers, coupling)?))
+    let undo = alone(array.cells.numbers().receivers, coupling)?;
+    Some(array.looks_after(|_| undo.clone()))
 }
 
 /// What makes of the coupled signals of the receivers those without coupling. None where that is singular.

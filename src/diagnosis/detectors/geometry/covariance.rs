@@ -31,39 +31,36 @@ pub struct Array {
 impl Array {
     pub fn new(cells: Cells, bearing: Bearing) -> Self {
         let back = bearing.turned_back(&cells.radar);
-        let looks = looks(&cells, &back);
+        let looks = looks(&cells, |_| back.clone());
         Self { cells, bearing, back, looks }
     }
 
-    /// What undoes a difference between receivers, `[rx, rx]`, applied to what they observed.
-    pub fn looks_after(&self, undo: &DMatrix<Complex64>) -> Vec<Vec<Look>> {
-        looks(&self.cells, &(&self.back * undo))
+    /// `undo`: what undoes a difference between receivers, `[rx, rx]`, applied to what they observed of a cell at a sine of its direction.
+    pub fn looks_after(&self, undo: impl Fn(f64) -> DMatrix<Complex64> + Sync) -> Vec<Vec<Look>> {
+        looks(&self.cells, |sine| &self.back * undo(sine))
     }
 }
 
-/// By frame and group, after what the receivers observed was multiplied by a matrix `[rx, rx]`.
-fn looks(cells: &Cells, undo: &DMatrix<Complex64>) -> Vec<Vec<Look>> {
-    let of_the_body = cells.numbers().of_the_body(&cells.radar);
-    // What the matrix makes of independent noise has neighbours in common; that is little.
-    let noise: Vec<f64> =
-        undo.row_iter().map(|row| row.iter().zip(&cells.noise).map(|(value, noise)| value.norm_sqr() * noise).sum()).collect();
-    let of_frame = |groups: &Vec<Group>| groups.iter().map(|group| look(group, undo, &noise, &of_the_body)).collect();
-    cells.frames.par_iter().map(of_frame).collect()
+/// By frame and group, after what the receivers observed of each cell was multiplied by a matrix `[rx, rx]`.
+fn looks(cells: &Cells, undo: impl Fn(f64) -> DMatrix<Complex64> + Sync) -> Vec<Vec<Look>> {
+    let numbers = cells.numbers();
+    let of_the_body = numbers.of_the_body(&cells.radar);
+    let look = |group: &Group| {
+        let mut look = Look::new(numbers.count(), group.place);
+        for cell in &group.cells {
+            add(cell, &undo(cell.sine()), &cells.noise, numbers, &mut look);
+        }
+        look.without(&of_the_body)
+    };
+    cells.frames.par_iter().map(|groups| groups.iter().map(look).collect()).collect()
 }
 
-/// Of cells together. `noise`: of every receiver; `of_the_body`: changes of the numbers that do not count.
-fn look(group: &Group, undo: &DMatrix<Complex64>, noise: &[f64], of_the_body: &DMatrix<f64>) -> Look {
-    let numbers = Numbers { receivers: noise.len() };
-    let mut look = Look::new(numbers.count(), group.place);
-    for cell in &group.cells {
-        add(cell, undo, noise, numbers, &mut look);
-    }
-    look.without(of_the_body)
-}
-
+/// `noise`: of every receiver, before `undo`.
 fn add(cell: &Cell, undo: &DMatrix<Complex64>, noise: &[f64], numbers: Numbers, look: &mut Look) {
     let receivers = numbers.receivers;
-    let white: Vec<f64> = noise.iter().map(|noise| 1.0 / noise.sqrt()).collect();
+    // What the matrix makes of independent noise has neighbours in common; that is little.
+    let mixed = undo.row_iter().map(|row| row.iter().zip(noise).map(|(value, noise)| value.norm_sqr() * noise).sum::<f64>());
+    let white: Vec<f64> = mixed.map(|noise| 1.0 / noise.sqrt()).collect();
     let own = OWN_SHARE * (0..receivers).map(|rx| cell.expected[(rx, rx)].re).sum::<f64>() / receivers as f64;
     let shape = DMatrix::from_fn(receivers, receivers, |i, j| {
         let value = cell.expected[(i, j)] * (1.0 - OWN_SHARE) + if i == j { own } else { 0.0 };

@@ -52,7 +52,8 @@ pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
     let (directions, floors) = sought(array);
     let found = Estimated::converged(&array.looks, &directions, &floors, |at| {
         let inverse = amplitudes(cells, &(&directions * at)).map(|amplitude| 1.0 / amplitude);
-        (at.amax() <= LARGEST).then(|| array.looks_after(&DMatrix::from_diagonal(&inverse)))
+        let undo = DMatrix::from_diagonal(&inverse);
+        (at.amax() <= LARGEST).then(|| array.looks_after(|_| undo.clone()))
     })?;
     let numbers = cells.numbers();
     let values = &directions * &found.values;

@@ -6,6 +6,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
 
 use super::cells::Cells;
 use super::covariance::Array;
@@ -19,12 +20,18 @@ use crate::effects::{self, Stage};
 
 /// What errors of the prediction look like, radian per unit of the sine.
 const FLOOR: f64 = 0.02;
+/// Beyond, nothing is reported: a wavelength.
+const LARGEST: f64 = TAU;
 
 pub fn find(evidence: &Evidence, array: &Array) -> Option<Found> {
     let numbers = array.cells.numbers();
     let directions = numbers.own(&array.cells.radar, &[numbers.place(0)]);
     let floors = vec![FLOOR; directions.ncols()];
-    let found = Estimated::new(&array.looks, &DVector::zeros(directions.ncols()), &directions, &floors)?;
+    let found = Estimated::converged(&array.looks, &directions, &floors, |at| {
+        let turns = (&directions * at).rows(numbers.place(0), numbers.receivers).into_owned();
+        let undo = |sine: f64| DMatrix::from_diagonal(&turns.map(|turn| Complex64::cis(turn * sine)));
+        (at.amax() <= LARGEST).then(|| array.looks_after(undo))
+    })?;
     let candidate = candidate(evidence, &array.cells, &directions, &found);
     Some(Found { candidate, likelihood: found.likelihood, explains_all: false })
 }

@@ -18,6 +18,7 @@ use rayon::prelude::*;
 
 use super::doppler_cells::{Cell, cells, place};
 use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::detectors::clutter::unsteadiness;
 use crate::diagnosis::estimated::Estimated;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, NINETY, Place, Volume};
 use crate::diagnosis::power::PowerModel;
@@ -78,12 +79,18 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     if evidence.may_name(effects::chirp_nonlinearity::ID) {
         let once = chirps.converged(&first, &[BEND]);
+        let unsteady = |then: &Evidence| unsteadiness(&then.cube, evidence.noise());
+        let more = |changing: &Estimated| changing.likelihood - once.as_ref().map_or(0.0, |once| once.likelihood);
         let changing = chirps
             .converged(&first, &[BEND, TREND])
-            .filter(|changing| once.as_ref().is_none_or(|once| changing.likelihood > once.likelihood + UNDECIDED))
+            .filter(|changing| more(changing) > UNDECIDED)
             // A synthesiser warms up; none bends its ramp the other way meanwhile.
-            .filter(|changing| changing.values[1].abs() < changing.values[0].abs());
-        found.extend(changing.or(once).map(|found| (found.likelihood, chirps.bend(evidence, &found))));
+            .filter(|changing| changing.values[1].abs() < changing.values[0].abs())
+            .map(|changing| (more(&changing), changing.likelihood, chirps.bend(evidence, &changing)))
+            // What changes for the body changes for static clutter, too.
+            .filter(|(more, _, bend)| unsteady(&evidence.with(bend)) - unsteady(evidence) < *more)
+            .map(|(_, likelihood, bend)| (likelihood, bend));
+        found.extend(changing.or_else(|| once.map(|found| (found.likelihood, chirps.bend(evidence, &found)))));
     }
     found.retain(|(_, candidate)| candidate.p_value < 1e-2 && candidate.nats > 0.0);
     // Either leaves a little of the other.
