@@ -52,27 +52,40 @@ enum Pose {
     Learning,
 }
 
-fn measure(paths: PathModel, transmitters: usize, pose: Pose, device: &Device) {
-    let board = Radar::mmmesh(2);
-    // The loops last as long as with all transmitters.
-    let chirp_period_s = board.loop_period_s() / transmitters as f64;
-    let radar = Radar { tx_m: board.tx_m[..transmitters].to_vec(), chirp_period_s, ..board };
-    let room = RecorderConfig::default().room;
-    let model = procedural::person(&PersonConfig { edge_m: 0.0198, ..Default::default() }).expect("a person");
-    let vertices = model.template.len();
-    let motion =
-        actions::motion(Action::WalkBackForthArmswing, &StyleConfig::default(), &model, &[], 2.0, 60.0).expect("a motion");
-    let person = Person::Skinned { model, motion, placement: actions::placement(1.0, 3.0) };
-    let mut config = SimulatorConfig { paths, surface: SurfaceConfig::vertices(), ..Default::default() };
-    config.room.patches = Some(5000);
-    config.graph.used = 1.0;
-    config.surface.posing = if pose == Pose::Host { Posing::Host } else { Posing::Tensor };
-    let Person::Skinned { motion, .. } = &person else { unreachable!() };
-    let joints = motion.poses[0].len();
-    let scene = Scene::new(&radar, Some(&room), Some(&person), &config).expect("a scene");
-    let knots = PoseCorrection { knots_s: vec![0.0, 1.0], ..Default::default() };
-    let scene = scene.corrected(&person, knots).expect("a scene");
+/// What is measured: a walk seen from some of the paper's transmitters.
+struct Case {
+    scene: Scene,
+    config: SimulatorConfig,
+    vertices: usize,
+    joints: usize,
+}
 
+impl Case {
+    fn new(paths: PathModel, transmitters: usize, pose: Pose) -> Self {
+        let board = Radar::mmmesh(2);
+        // The loops last as long as with all transmitters.
+        let chirp_period_s = board.loop_period_s() / transmitters as f64;
+        let radar = Radar { tx_m: board.tx_m[..transmitters].to_vec(), chirp_period_s, ..board };
+        let room = RecorderConfig::default().room;
+        let model = procedural::person(&PersonConfig { edge_m: 0.0198, ..Default::default() }).expect("a person");
+        let vertices = model.template.len();
+        let motion =
+            actions::motion(Action::WalkBackForthArmswing, &StyleConfig::default(), &model, &[], 2.0, 60.0).expect("a motion");
+        let joints = motion.poses[0].len();
+        let person = Person::Skinned { model, motion, placement: actions::placement(1.0, 3.0) };
+        let mut config = SimulatorConfig { paths, surface: SurfaceConfig::vertices(), ..Default::default() };
+        config.room.patches = Some(5000);
+        config.graph.used = 1.0;
+        config.surface.posing = if pose == Pose::Host { Posing::Host } else { Posing::Tensor };
+        let scene = Scene::new(&radar, Some(&room), Some(&person), &config).expect("a scene");
+        let knots = PoseCorrection { knots_s: vec![0.0, 1.0], ..Default::default() };
+        let scene = scene.corrected(&person, knots).expect("a scene");
+        Self { scene, config, vertices, joints }
+    }
+}
+
+fn measure(paths: PathModel, transmitters: usize, pose: Pose, device: &Device) {
+    let Case { scene, config, vertices, joints } = Case::new(paths, transmitters, pose);
     let started = Instant::now();
     let view = scene.view(0).expect("a frame");
     let visibility_s = started.elapsed().as_secs_f64();
@@ -87,7 +100,7 @@ fn measure(paths: PathModel, transmitters: usize, pose: Pose, device: &Device) {
     });
 
     let autodiff = device.clone().autodiff();
-    let transform = RangeDoppler::new(128, 256, radar.sampling, &HeatmapConfig::default(), &autodiff);
+    let transform = RangeDoppler::new(128, 256, scene.radar.sampling, &HeatmapConfig::default(), &autodiff);
     let mut simulator: Option<Simulator> = Some(config.init(extent, 1, &autodiff));
     let leaf = |shape: usize| Tensor::<1>::zeros([shape], &autodiff).require_grad();
     let pose_tensors = || PoseTensors {

@@ -118,17 +118,16 @@ fn every_verb_refuses_a_person_behind_the_wall_and_a_user_can_keep_his_word() {
 fn a_person_too_far_around_the_radar_or_behind_it_is_not_simulated() {
     let folder = tempfile::tempdir().unwrap();
     let model = root("models/quickstart");
-    for (distance, message) in [
-        ("20", "expected a body within the radar's unambiguous range of"),
-        ("0", "the body around the radar at "),
-        ("-2", "expected a body before the radar, which looks along +y"),
+    for (place, message) in [
+        ("--distance=20", "expected a body within the radar's unambiguous range of"),
+        ("--distance=0", "the body around the radar at "),
+        ("--distance=-2", "expected a body before the radar, which looks along +y"),
+        ("--raise=-1.5", "m (infer --raise) it would stand on it"),
     ] {
-        let distance = format!("--distance={distance}");
-        let infer =
-            ["infer", "--checkpoint", &model, "--action", "torso_rotation", &distance, "--frames", "2", "--device", "flex"];
+        let infer = ["infer", "--checkpoint", &model, "--action", "torso_rotation", place, "--frames", "2", "--device", "flex"];
         let output = hybridsim(&infer, folder.path());
         assert_eq!(output.status.code(), Some(2), "{}", err(&output));
-        assert!(err(&output).contains(message), "{distance}: {}", err(&output));
+        assert!(err(&output).contains(message), "{place}: {}", err(&output));
     }
 }
 

@@ -3,6 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
+#[path = "support/scenes.rs"]
+mod scenes;
 mod support;
 
 mod align;
@@ -15,6 +17,7 @@ mod diagnosis;
 mod export;
 mod hostile_input;
 mod intake;
+mod integrity;
 mod journey;
 mod layers;
 mod pages;

@@ -63,6 +63,8 @@ def simulate(
     recording: str | None,
     body: str | None,
     distance_m: float | None,
+    raise_m: float | None,
+    turn_deg: float | None,
     frames: int | None,
     clean: bool,
     only: str | None,

@@ -209,6 +209,8 @@ def test_settings_are_numbers_of_numpy_and_paths_too(tmp_path: Path) -> None:
     ("given", "said"),
     [
         ({"distance_m": 2.0}, "--distance"),
+        ({"raise_m": 0.5}, "--raise"),
+        ({"turn_deg": 90.0}, "--turn"),
         ({"body": "body.npz"}, "--body"),
         ({"up": "z"}, "no motion's file"),
         ({"clean": True, "only": "noise"}, "--clean"),

@@ -47,40 +47,10 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     if !path.is_dir() && describe::knows(path) {
         return describe::run(path, &arguments.reading, common);
     }
-    if describe::is_pickle(path) {
-        return Err(Error::field(path, "type", "a Python pickle", "a body as .npz, or a config (.toml)")
-            .with_hint("convert a body model of SMPL, SMPL-H or SMPL-X with python scripts/smpl_to_npz.py MODEL.pkl BODY.npz"));
-    }
-    if path.is_file() && describe::ending(path) != "toml" {
-        let expected = "a config (.toml), a body or a motion (.npz, .bvh), or a mesh (.obj, .npy)";
-        return Err(Error::field(path, "type", format!("`.{}`", describe::ending(path)), expected).with_hint(
-            "other meshes are written as .obj by Blender or meshio; captures of radars are read by `hybridsim import`",
-        ));
-    }
+    refuse_others(path)?;
     arguments.reading.refused(READING_HINT)?;
     if path.join("checkpoint.toml").is_file() {
-        let (simulator, state) = checkpoint::open(path, &Device::flex())?;
-        say!(
-            "checkpoint of hybridsim {}, {} epochs, best in epoch {}",
-            state.version,
-            state.progress.epochs_done,
-            state.progress.best_epoch + 1
-        );
-        show_radar(&state.site.radar, state.site.room.as_ref());
-        plausible::scene(
-            Some(&state.site.radar),
-            state.site.room.as_ref(),
-            None,
-            &Sources::one(path.join("checkpoint.toml")),
-            common,
-        )?;
-        for effect in simulator.effects.settings() {
-            let values = effect.parameters.iter().map(|(name, values)| format!("{name} {values:.4?}"));
-            let values: Vec<String> = effect.choice.iter().cloned().chain(values).collect();
-            let off = if effect.enabled { "" } else { " (switched off)" };
-            say!("effect {}{off}: {}", effect.id, values.join(", "));
-        }
-        return Ok(());
+        return show_checkpoint(path, common);
     }
     if path.is_dir() {
         let out = arguments.out.out.as_ref().map(AtomicFolder::create).transpose()?;
@@ -91,6 +61,52 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         }
         return if is_whole { Ok(()) } else { Err(damaged(&recording)) };
     }
+    show_config(path, common)
+}
+
+/// # Errors
+/// A file that is none of those that can be checked.
+fn refuse_others(path: &Path) -> Result<()> {
+    if describe::is_pickle(path) {
+        return Err(Error::field(path, "type", "a Python pickle", "a body as .npz, or a config (.toml)")
+            .with_hint("convert a body model of SMPL, SMPL-H or SMPL-X with python scripts/smpl_to_npz.py MODEL.pkl BODY.npz"));
+    }
+    if path.is_file() && describe::ending(path) != "toml" {
+        let expected = "a config (.toml), a body or a motion (.npz, .bvh), or a mesh (.obj, .npy)";
+        return Err(Error::field(path, "type", format!("`.{}`", describe::ending(path)), expected).with_hint(
+            "other meshes are written as .obj by Blender or meshio; captures of radars are read by `hybridsim import`",
+        ));
+    }
+    Ok(())
+}
+
+fn show_checkpoint(path: &Path, common: &Common) -> Result<()> {
+    let (simulator, state) = checkpoint::open(path, &Device::flex())?;
+    say!(
+        "checkpoint of hybridsim {}, {} epochs, best in epoch {}",
+        state.version,
+        state.progress.epochs_done,
+        state.progress.best_epoch + 1
+    );
+    show_radar(&state.site.radar, state.site.room.as_ref());
+    plausible::scene(
+        Some(&state.site.radar),
+        state.site.room.as_ref(),
+        None,
+        &Sources::one(path.join("checkpoint.toml")),
+        common,
+    )?;
+    for effect in simulator.effects.settings() {
+        let values = effect.parameters.iter().map(|(name, values)| format!("{name} {values:.4?}"));
+        let values: Vec<String> = effect.choice.iter().cloned().chain(values).collect();
+        let off = if effect.enabled { "" } else { " (switched off)" };
+        say!("effect {}{off}: {}", effect.id, values.join(", "));
+    }
+    Ok(())
+}
+
+/// What a config names: recordings that there are, and the one that it makes.
+fn show_config(path: &Path, common: &Common) -> Result<()> {
     let config = Config::read(path, &common.set)?;
     let mut first_damaged = None;
     for recording in &config.data.recordings {

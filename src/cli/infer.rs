@@ -36,6 +36,13 @@ pub(crate) struct Arguments {
     /// Distance of the motion's origin in front of the radar; the training person's place by default
     #[arg(long, value_name = "METRES")]
     distance: Option<f64>,
+    /// Raise the motion by so much, such as 1.0 where its file is in the frame of a camera 1 m above the floor
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    raise: Option<f64>,
+    /// Turn the motion about the vertical through the middle of its path, counter-clockwise seen from above; without it who faces +z in
+    /// the file (y up; -y where z is up) faces the radar
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    turn: Option<f64>,
     /// Frames to simulate; as many as the motion lasts, but at most 24, by default
     #[arg(long, value_name = "COUNT")]
     frames: Option<usize>,
@@ -93,6 +100,8 @@ impl Arguments {
             what,
             body: self.body.clone(),
             distance_m: self.distance,
+            raise_m: self.raise,
+            turn_deg: self.turn,
             frames: self.frames,
             clean: self.clean,
             only: self.only.map(Part::from),

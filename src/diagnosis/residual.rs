@@ -157,7 +157,6 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     // A body that was elsewhere in its motion than it was said is brought to its place by whole frames: what is left is beside it
     // and among its images, and what a part may carry, the last resort, is never sure there.
     let timed = accepted.place.stage == Some(Stage::Timing);
-    let behind = timed && of_residual;
     let image = timed && is_one_of(candidate, &IMAGES);
     let hardly = timed && candidate.id == Some(effects::carried_reflector::ID);
     let products = is_product(accepted) && is_product(candidate);
@@ -179,12 +178,12 @@ pub fn is_left_by(accepted: &Candidate, candidate: &Candidate) -> bool {
     let uneven = (smeared || is_one_of(accepted, &OF_RESIDUAL)) && is_of_receivers(candidate);
     // Chirps that start at random differ from their neighbours, and go on doing so a little.
     let unlike = is_by_chirp(accepted) && candidate.behaves_like == Behaviour::SparseAdditive;
-    let cut = is_product_of_cut(accepted, candidate);
     // Up to which share of what was gained.
     [
         (roughly || fades || image || unlike || tails, ROUGHLY),
-        (bursts || behind || line || is_of_cut(accepted, candidate), 1.0),
-        (hardly || uneven || bent || is_mixed(accepted, candidate) || products || alone || of_line || cut, f64::INFINITY),
+        (bursts || timed && of_residual || line || is_of_cut(accepted, candidate), 1.0),
+        (hardly || uneven || bent || products || alone || of_line, f64::INFINITY),
+        (is_mixed(accepted, candidate) || is_product_of_cut(accepted, candidate), f64::INFINITY),
         (shaken || rest, SHAKEN),
         (by_chirp || faint, SLIGHTLY),
     ]

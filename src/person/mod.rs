@@ -117,6 +117,17 @@ fn upright() -> [[f64; 3]; 3] {
     [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
 }
 
+impl Placement {
+    /// The same turned about the vertical through the motion's origin, counter-clockwise seen from above.
+    #[must_use]
+    pub fn turned(self, degrees: f64) -> Self {
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        let [x, y, z] = self.radar_from_motion;
+        let mixed = |a: f64, b: f64| std::array::from_fn(|column| a * x[column] + b * y[column]);
+        Self { radar_from_motion: [mixed(cosine, -sine), mixed(sine, cosine), z], ..self }
+    }
+}
+
 impl Default for Placement {
     fn default() -> Self {
         Self { start_s: 0.0, radar_from_motion: upright(), origin_m: [0.0; 3] }
@@ -222,6 +233,15 @@ mod tests {
         let pose = vec![[0.0; 3]; model.parents.len()];
         let motion = Motion { poses: vec![pose; 2], translations: vec![[0.0; 3]; 2], betas: vec![0.0; 5], rate_hz: 60.0 };
         (model, motion, Placement::default())
+    }
+
+    #[test]
+    fn who_is_turned_a_quarter_counter_clockwise_faces_the_radars_right() {
+        // The file's +z faces the radar, −y; from above, −y turned counter-clockwise by a quarter is +x.
+        let turned = Placement { origin_m: [1.0, 2.0, 3.0], ..Placement::default() }.turned(90.0);
+        let faces: Vec<f64> = turned.radar_from_motion.iter().map(|row| row[2]).collect();
+        assert!((faces[0] - 1.0).abs() < 1e-12 && faces[1].abs() < 1e-12 && faces[2].abs() < 1e-12, "{faces:?}");
+        assert_eq!((turned.origin_m, turned.radar_from_motion[2]), ([1.0, 2.0, 3.0], [0.0, 1.0, 0.0]));
     }
 
     fn refused(change: impl FnOnce(&mut BodyModel, &mut Motion, &mut Placement)) -> String {

@@ -14,6 +14,7 @@ mod facts;
 mod motion;
 mod place;
 mod radar;
+mod room;
 mod units;
 
 #[cfg(test)]
@@ -100,7 +101,7 @@ type Check = fn(&Facts) -> Vec<Finding>;
 
 /// All checks, in stages: what follows from a wrong unit is not reported beside it.
 const STAGES: [&[Check]; 6] = [
-    &[codes::unsigned, radar::frequencies, radar::times, radar::sweep, radar::frame, antennas::spacing],
+    &[codes::unsigned, radar::frequencies, radar::times, radar::sweep, radar::frame, antennas::spacing, room::size],
     &[body::length, body::faces_outwards, body::longest_upwards],
     &[motion::angles, motion::rate],
     &[motion::speed_of_the_root],

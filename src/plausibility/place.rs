@@ -102,7 +102,7 @@ fn beyond(facts: &Facts, boundary: Boundary, distance_m: f64) -> Option<Finding>
     let expected = format!("a body in the room, whose {name} boundary is {distance_m} m away (room.{name}_m)");
     let hint = match boundary {
         Boundary::Floor => format!(
-            "a motion's origin is on the floor, motion.origin_m[2] = -room.floor_m; raised by {most:.2} m it would stand on it"
+            "a motion's origin is on the floor, motion.origin_m[2] = -room.floor_m; raised by {most:.2} m (infer --raise) it would stand on it"
         ),
         _ => format!("{MOVE}, or correct room.{name}_m"),
     };

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -121,14 +120,10 @@ fn sequence(config: &SiteConfig, subject: &str, action: Action, repetition: usiz
     };
     person.distance_m = draw(ranges.distance_m);
     let upright = actions::placement(recorder.room.floor_m.unwrap_or(1.0), person.distance_m);
-    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), draw(ranges.turn_deg).to_radians());
-    let rotation = turn.into_inner() * Matrix3::from_fn(|row, column| upright.radar_from_motion[row][column]);
     let [_, ahead, up] = upright.origin_m;
-    person.placement = Some(Placement {
-        radar_from_motion: std::array::from_fn(|row| std::array::from_fn(|column| rotation[(row, column)])),
-        origin_m: [draw(ranges.sideways_m), ahead, up],
-        start_s: -draw(ranges.begun_s),
-    });
+    let turned = upright.turned(draw(ranges.turn_deg));
+    let origin_m = [draw(ranges.sideways_m), ahead, up];
+    person.placement = Some(Placement { origin_m, start_s: -draw(ranges.begun_s), ..turned });
     Sequence { name, subject: subject.into(), action, repetition, recorder }
 }
 

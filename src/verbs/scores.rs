@@ -28,12 +28,18 @@ pub fn of_sequences(found: &SequenceSummary) -> String {
     table(&title, [&found.global, &found.moving, &found.person], found.lpips)
 }
 
+/// The cells that are scored, and why they may have no score.
+const REGIONS: [[&str; 2]; 3] = [
+    ["all cells", "nothing was received"],
+    ["static removed", "nothing changes within a frame (one chirp a frame, or a scene that stands still)"],
+    ["person's cells", "nobody is tracked, or no cell of the person's changes within a frame"],
+];
+
 /// One recording's scores, for a page.
 pub fn page_of_frames(found: &Evaluation) -> Markup {
-    let regions = [("all cells", &found.global), ("static removed", &found.moving), ("person's cells", &found.person)];
+    let regions = REGIONS.into_iter().zip([&found.global, &found.moving, &found.person]);
     let rows: Vec<Vec<Markup>> = regions
-        .into_iter()
-        .map(|(name, scores)| {
+        .map(|([name, missing], scores)| {
             let numbers = match scores {
                 Some(ScoreSummary { psnr_db, ssim, mean_absolute_error_db, lpips }) => [
                     format!("{psnr_db:.2}"),
@@ -41,7 +47,7 @@ pub fn page_of_frames(found: &Evaluation) -> Markup {
                     format!("{mean_absolute_error_db:.2}"),
                     lpips.map_or("–".into(), |lpips| format!("{lpips:.3}")),
                 ],
-                None => ["not available".to_string(), "–".into(), "–".into(), "–".into()],
+                None => [format!("not available: {missing}"), "–".into(), "–".into(), "–".into()],
             };
             std::iter::once(html! { (name) }).chain(numbers.map(|text| html! { (text) })).collect()
         })
@@ -57,13 +63,13 @@ pub fn page_of_frames(found: &Evaluation) -> Markup {
 
 fn table(title: &str, regions: [&Option<ScoreSummary>; 3], network: Option<Network>) -> String {
     let mut text = format!("  {title}\n");
-    for (name, scores) in ["all cells", "static removed", "person's cells"].into_iter().zip(regions) {
+    for ([name, missing], scores) in REGIONS.into_iter().zip(regions) {
         let line = match scores {
             Some(ScoreSummary { psnr_db, ssim, mean_absolute_error_db, lpips }) => {
                 let lpips = lpips.map(|lpips| format!("   LPIPS {lpips:.3}")).unwrap_or_default();
                 format!("PSNR {psnr_db:.2} dB   SSIM {ssim:.3}   mean error {mean_absolute_error_db:.2} dB{lpips}")
             }
-            None => "not available".into(),
+            None => format!("not available: {missing}"),
         };
         writeln!(text, "  {name:<15} {line}").expect("text grows");
     }

@@ -57,6 +57,11 @@ pub struct Simulate {
     pub body: Option<PathBuf>,
     /// Distance of the motion's origin in front of the radar, metres; the training person's place where absent.
     pub distance_m: Option<f64>,
+    /// How much higher than its file says the motion is, metres.
+    pub raise_m: Option<f64>,
+    /// How far the motion is turned about the vertical through the middle of its path, counter-clockwise seen from above; 0 keeps what
+    /// faces +z of a file whose y is up (−y where z is up) facing the radar.
+    pub turn_deg: Option<f64>,
     /// As many as the motion lasts, but at most 24, where absent.
     pub frames: Option<usize>,
     /// Whether the learned noise is left out.
@@ -72,14 +77,19 @@ impl Simulate {
     fn check(&self) -> Result<()> {
         let refused = |message: &str, hint: &str| Err(Error::Usage { message: message.into(), hint: Some(hint.into()) });
         let of_recording = "leave it out, or name a motion (--motion) or an action (--action)";
-        match self.distance_m {
-            Some(distance_m) if !distance_m.is_finite() => {
-                return Err(Error::setting("distance", distance_m, "metres in front of the radar"));
+        let places = [
+            ("distance", self.distance_m, "metres in front of the radar"),
+            ("raise", self.raise_m, "metres upwards"),
+            ("turn", self.turn_deg, "degrees, counter-clockwise seen from above"),
+        ];
+        for (name, value, expected) in places {
+            match value {
+                Some(value) if !value.is_finite() => return Err(Error::setting(name, value, expected)),
+                Some(_) if matches!(self.what, What::Recording(_)) => {
+                    return refused(&format!("--{name}: the person of a recording stays where it is"), of_recording);
+                }
+                _ => {}
             }
-            Some(_) if matches!(self.what, What::Recording(_)) => {
-                return refused("--distance: the person of a recording stays where it is", of_recording);
-            }
-            _ => {}
         }
         if self.body.is_some() && matches!(self.what, What::Recording(_)) {
             return refused("--body: a recording has a body of its own", of_recording);
@@ -253,6 +263,8 @@ fn new_person(asked: &Simulate, state: &CheckpointState, notify: &mut Notify<'_>
     if let Some(distance) = asked.distance_m {
         placement.origin_m[1] = distance;
     }
+    placement.origin_m[2] += asked.raise_m.unwrap_or(0.0);
+    placement = placement.turned(asked.turn_deg.unwrap_or(0.0));
     let mut labels = BTreeMap::new();
     let motion = match &asked.what {
         What::Motion { path, config, up } => {

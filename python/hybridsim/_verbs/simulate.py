@@ -24,6 +24,8 @@ def simulate(
     recording: Recording | StrPath | None = ...,
     body: StrPath | None = ...,
     distance_m: float | None = ...,
+    raise_m: float | None = ...,
+    turn_deg: float | None = ...,
     frames: int | None = ...,
     clean: bool = ...,
     only: str | None = ...,
@@ -46,6 +48,8 @@ def simulate(
     recording: Recording | StrPath | None = ...,
     body: StrPath | None = ...,
     distance_m: float | None = ...,
+    raise_m: float | None = ...,
+    turn_deg: float | None = ...,
     frames: int | None = ...,
     clean: bool = ...,
     only: str | None = ...,
@@ -67,6 +71,8 @@ def simulate(
     recording: Recording | StrPath | None = None,
     body: StrPath | None = None,
     distance_m: float | None = None,
+    raise_m: float | None = None,
+    turn_deg: float | None = None,
     frames: int | None = None,
     clean: bool = False,
     only: str | None = None,
@@ -87,6 +93,9 @@ def simulate(
         recording: a recording whose motion is simulated again, in place of a motion.
         body: the body that moves, npz in SMPL layout; the embedded person by default.
         distance_m: of the motion's origin in front of the radar; the training person's place by default.
+        raise_m: how much higher than its file says the motion is, such as 1.0 where that is in the frame of a camera 1 m above the floor.
+        turn_deg: about the vertical through the middle of the motion's path, counter-clockwise seen from above; without it who faces +z
+            in the file (y up; -y where z is up) faces the radar.
         frames: as many as the motion lasts, but at most 24, by default.
         clean: leave out the learned noise.
         only: ``"direct"``, ``"indirect"`` or ``"noise"``: one part of the signal; the three add up to the whole.
@@ -119,6 +128,8 @@ def simulate(
             path(recording),
             path(body),
             distance_m,
+            raise_m,
+            turn_deg,
             frames,
             clean,
             only,

@@ -31,6 +31,8 @@ pub fn simulate(
     recording: Option<PathBuf>,
     body: Option<PathBuf>,
     distance_m: Option<f64>,
+    raise_m: Option<f64>,
+    turn_deg: Option<f64>,
     frames: Option<usize>,
     clean: bool,
     only: Option<String>,
@@ -45,7 +47,7 @@ pub fn simulate(
         let what = what(motion, motion_config, up, action, recording)?;
         let only = only.map(|name| named("only", &name, Part::ALL, |part: &Part| part.name())).transpose()?;
         let without = Without { all: without_effects, ids: without };
-        Ok(Simulate { checkpoint, what, body, distance_m, frames, clean, only, without })
+        Ok(Simulate { checkpoint, what, body, distance_m, raise_m, turn_deg, frames, clean, only, without })
     };
     let asked = asked().map_err(|error| raised(py, &error))?;
     run(py, notify, move |notify| {

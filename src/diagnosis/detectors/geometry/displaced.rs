@@ -225,6 +225,7 @@ fn behaves_like(stage: Stage) -> Behaviour {
 /// That the body is elsewhere is observed; the library says why. `deviation`: of the change's value.
 fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> Description {
     let normal = |name| vec![Estimate::normal(name, fit.value, deviation)];
+    let pace = if fit.value > 0.0 { "faster" } else { "slower" };
     let (estimates, observed, cause): (_, _, String) = match fit.score.change {
         Change::Range(_) => (
             normal("offset_m"),
@@ -257,19 +258,14 @@ fn described(trial: &Trial, fit: &Fitted, deviation: f64) -> Description {
         // No clock errs by more than the library allows it: a rate was stated wrongly.
         Change::Drift(_) if fit.value.abs() > clock_drift::INFO.parameters[0].most => {
             return Description::unnamed(format!(
-                "The motion runs {:.1} % {} than stated, more than a clock is wrong: the rate of the motion's frames or of the radar's is \
-                 another.",
+                "The motion runs {:.1} % {pace} than stated, more than a clock is wrong: the rate of the motion's frames or of the radar's \
+                 is another.",
                 1e2 * fit.value.abs(),
-                if fit.value > 0.0 { "faster" } else { "slower" }
             ));
         }
         Change::Drift(_) => (
             normal("relative"),
-            format!(
-                "The motion runs {:.2} % {} than stated",
-                1e2 * fit.value.abs(),
-                if fit.value > 0.0 { "faster" } else { "slower" }
-            ),
+            format!("The motion runs {:.2} % {pace} than stated", 1e2 * fit.value.abs()),
             "its clock does, against the radar's".into(),
         ),
         Change::Replica(echo) => {
