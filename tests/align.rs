@@ -28,22 +28,15 @@ tx_m = [[-0.0153, 0.0, 0.0]]
 rx_m = [[0.0, 0.0, 0.0], [0.0019, 0.0, 0.0], [0.0038, 0.0, 0.0], [0.0057, 0.0, 0.0]]
 "#;
 
-fn turned(placement: &Placement, degrees: f64) -> Placement {
-    let (sine, cosine) = degrees.to_radians().sin_cos();
-    let [x, y, z] = placement.radar_from_motion;
-    let mixed = |a: f64, b: f64| std::array::from_fn(|column| a * x[column] + b * y[column]);
-    Placement { radar_from_motion: [mixed(cosine, -sine), mixed(sine, cosine), z], ..placement.clone() }
-}
-
 /// Where the recorded motion happens. It begins before the recording.
 fn truth() -> Placement {
     let straight = Placement { start_s: -1.0, origin_m: [0.3, 2.9, -1.0], ..Placement::default() };
-    turned(&straight, 30.0)
+    straight.turned(30.0)
 }
 
 /// 0.37 s late, 0.4 m off, 25 degrees turned.
 fn wrong() -> Placement {
-    let off = turned(&truth(), 25.0);
+    let off = truth().turned(25.0);
     Placement { start_s: off.start_s + 0.37, origin_m: [off.origin_m[0] + 0.24, off.origin_m[1] - 0.32, off.origin_m[2]], ..off }
 }
 

@@ -120,20 +120,6 @@ fn settings(recordings: &[PathBuf]) -> Config {
     config
 }
 
-fn turned(placement: &Placement, angle: f64, pivot_m: [f64; 3]) -> Placement {
-    let (sine, cosine) = angle.sin_cos();
-    let turn = |[x, y, z]: [f64; 3]| [cosine * x - sine * y, sine * x + cosine * y, z];
-    let rows = placement.radar_from_motion;
-    let column = |column: usize| turn([rows[0][column], rows[1][column], rows[2][column]]);
-    let columns = [column(0), column(1), column(2)];
-    let origin = turn(std::array::from_fn(|axis| placement.origin_m[axis] - pivot_m[axis]));
-    Placement {
-        start_s: placement.start_s,
-        radar_from_motion: std::array::from_fn(|row| std::array::from_fn(|column| columns[column][row])),
-        origin_m: std::array::from_fn(|axis| origin[axis] + pivot_m[axis]),
-    }
-}
-
 /// Where the walk begins.
 const ORIGIN_M: [f64; 3] = [0.5, 2.6, -1.0];
 
@@ -142,7 +128,7 @@ fn recorded(parent: &Path) -> PathBuf {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/test.toml");
     let mut record = settings(&[]).record(&path).unwrap().clone();
     let straight = Placement { start_s: -0.5, origin_m: ORIGIN_M, ..Default::default() };
-    record.person.placement = Some(turned(&straight, 40f64.to_radians(), ORIGIN_M));
+    record.person.placement = Some(straight.turned(40.0));
     let folder = parent.join("right");
     recorder::record_to(&record, parent, &folder, &mut |_, _| {}).unwrap();
     folder
@@ -155,7 +141,7 @@ fn misplaced(right: &Path, late_s: f64, turn_deg: f64, [x, y]: [f64; 2]) -> Path
     let file = wrong.join("recording.toml");
     let mut table: toml::Table = std::fs::read_to_string(&file).unwrap().parse().unwrap();
     let truth: Placement = table["motion"].clone().try_into().unwrap();
-    let mut off = turned(&truth, turn_deg.to_radians(), [ORIGIN_M[0], ORIGIN_M[1], 0.0]);
+    let mut off = truth.turned(turn_deg);
     off.start_s += late_s;
     off.origin_m = [off.origin_m[0] + x, off.origin_m[1] + y, off.origin_m[2]];
     table.insert("motion".into(), toml::Value::try_from(&off).unwrap());

@@ -31,7 +31,8 @@ const STEPS: usize = 20;
 const CONVERGED: f64 = 1e-4;
 
 impl Estimated {
-    /// Step by step from zeros, where the model is not linear. None where the numbers leave what can be undone.
+    /// Step by step from zeros, where the model is not linear. None where the numbers leave what can be undone, or still move by more
+    /// than their deviation after the last step.
     ///
     /// `first`: looks as [`Self::new`] takes them, with all numbers zero; `looks`: the same with the numbers at some values.
     pub fn converged(
@@ -41,14 +42,17 @@ impl Estimated {
         looks: impl Fn(&DVector<f64>) -> Option<Vec<Vec<Look>>>,
     ) -> Option<Self> {
         let mut found = Self::new(first, &DVector::zeros(directions.ncols()), directions, floors)?;
-        let mut step = found.values.amax();
+        let mut step = found.values.clone();
         for _ in 1..STEPS {
-            if step < CONVERGED {
+            if step.amax() < CONVERGED {
                 break;
             }
             let next = Self::new(&looks(&found.values)?, &found.values, directions, floors)?;
-            step = (&next.values - &found.values).amax();
+            step = &next.values - &found.values;
             found = next;
+        }
+        if (0..step.len()).any(|i| step[i].abs() > CONVERGED.max(found.covariance[(i, i)].sqrt())) {
+            return None;
         }
         let (end, half) = (looks(&found.values)?, looks(&(&found.values * 0.5))?);
         Self::between(&end, Some([first, &half]), &found.values, directions, floors)

@@ -5,8 +5,9 @@ use super::{Facts, Finding, Kind, Part};
 
 /// The length of one of the largest halls there are (the Aerium at Brand, 360 m by 210 m).
 const LONGEST_M: f64 = 360.0;
-/// What rooms are drawn in, and how far the walls of usual ones are.
+/// What rooms are drawn in.
 const UNITS: [Unit; 2] = [("millimetres", 1e-3), ("centimetres", 1e-2)];
+/// Picks the unit in the hint, and decides nothing.
 const USUAL_M: [f64; 2] = [1.0, 30.0];
 
 /// No boundary of a room is farther than a hall is long.

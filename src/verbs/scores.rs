@@ -28,11 +28,14 @@ pub fn of_sequences(found: &SequenceSummary) -> String {
     table(&title, [&found.global, &found.moving, &found.person], found.lpips)
 }
 
+/// SSIM's window.
+const TOO_SMALL: &str = "fewer than 11 velocities or ranges";
+
 /// The cells that are scored, and why they may have no score.
 const REGIONS: [[&str; 2]; 3] = [
-    ["all cells", "nothing was received"],
-    ["static removed", "nothing changes within a frame (one chirp a frame, or a scene that stands still)"],
-    ["person's cells", "nobody is tracked, or no cell of the person's changes within a frame"],
+    ["all cells", TOO_SMALL],
+    ["static removed", TOO_SMALL],
+    ["person's cells", "nobody is tracked, or no cell of the person's is 5 cells or more within the map"],
 ];
 
 /// One recording's scores, for a page.

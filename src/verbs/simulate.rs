@@ -59,8 +59,8 @@ pub struct Simulate {
     pub distance_m: Option<f64>,
     /// How much higher than its file says the motion is, metres.
     pub raise_m: Option<f64>,
-    /// How far the motion is turned about the vertical through the middle of its path, counter-clockwise seen from above; 0 keeps what
-    /// faces +z of a file whose y is up (−y where z is up) facing the radar.
+    /// How far the motion is turned about the vertical through the middle of its path (of an embedded action: its origin), degrees
+    /// counter-clockwise seen from above. Without it who faces +z of a file whose y is up (−y where z is up) faces the radar.
     pub turn_deg: Option<f64>,
     /// As many as the motion lasts, but at most 24, where absent.
     pub frames: Option<usize>,
@@ -255,16 +255,12 @@ fn new_person(asked: &Simulate, state: &CheckpointState, notify: &mut Notify<'_>
         Some(path) => read_body(path)?,
         None => procedural::person(&PersonConfig::default())?,
     };
-    let mut placement = state.site.placement.clone().unwrap_or_else(|| {
-        let floor = state.site.room.as_ref().and_then(|room| room.floor_m).unwrap_or(1.0);
-        actions::placement(floor, 3.0)
-    });
-    placement.start_s = 0.0;
-    if let Some(distance) = asked.distance_m {
-        placement.origin_m[1] = distance;
-    }
-    placement.origin_m[2] += asked.raise_m.unwrap_or(0.0);
-    placement = placement.turned(asked.turn_deg.unwrap_or(0.0));
+    // The training person's heading and axes are those of another file.
+    let floor_m = state.site.room.as_ref().and_then(|room| room.floor_m);
+    let [x, y, z] = state.site.placement.as_ref().map_or(actions::placement(1.0, 3.0).origin_m, |trained| trained.origin_m);
+    let z = floor_m.map_or(z, |floor_m| -floor_m);
+    let origin_m = [x, asked.distance_m.unwrap_or(y), z + asked.raise_m.unwrap_or(0.0)];
+    let mut placement = Placement { origin_m, ..Placement::default() }.turned(asked.turn_deg.unwrap_or(0.0));
     let mut labels = BTreeMap::new();
     let motion = match &asked.what {
         What::Motion { path, config, up } => {
@@ -320,5 +316,26 @@ fn count(asked: Option<usize>, usual: usize, limit: usize) -> Result<usize> {
         }),
         Some(asked) => Ok(asked),
         None => Ok(usual.min(limit)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_of_a_path_stays_where_the_origin_was_however_it_is_turned() {
+        let translations = vec![[1.0, 0.9, 4.0], [3.0, 0.9, 6.0]];
+        let motion = Motion { poses: vec![vec![[0.0; 3]; 24]; 2], translations, betas: vec![], rate_hz: 60.0 };
+        for degrees in [0.0, 90.0, -130.0] {
+            let mut placement = Placement { origin_m: [0.5, 3.0, -1.0], ..Placement::default() }.turned(degrees);
+            recentre(&motion, &mut placement);
+            let middle: [f64; 3] = std::array::from_fn(|axis| {
+                let row = placement.radar_from_motion[axis];
+                placement.origin_m[axis] + row[0] * 2.0 + row[1] * 0.9 + row[2] * 5.0
+            });
+            assert!((middle[0] - 0.5).abs() < 1e-12 && (middle[1] - 3.0).abs() < 1e-12, "{degrees}: {middle:?}");
+            assert!((middle[2] + 0.1).abs() < 1e-12, "the feet's height is kept: {middle:?}");
+        }
     }
 }

@@ -40,7 +40,7 @@ use crate::radar::Sampling;
 use crate::recorder::EffectsConfig;
 use crate::recorder::stages::{Ground, Onto};
 
-/// Where the recording itself, and where the copies are answered.
+/// Folder of what is answered about the recording itself.
 pub const BACKGROUND: &str = "background";
 /// Folder of what is answered about the copies.
 pub const ANSWERS: &str = "answers";

@@ -20,8 +20,8 @@ pub fn clutter_power(evidence: &Evidence) -> Vec<f64> {
     power.iter().map(|power| power * gain).collect()
 }
 
-/// How much likelier the frames would be if static clutter were the same in all of them, nats: squares of what their mean chirps deviate
-/// by from that of all, over the noise.
+/// How much less likely frames are with one static clutter for all than with one each, noise included, nats: squares of what their mean
+/// chirps deviate by from that of all, over the noise.
 /// `noise`: variance of a sample, by channel.
 pub fn unsteadiness(cube: &Cube, noise: &[f64]) -> f64 {
     let [frames, _, _, loops, samples] = cube.dims;

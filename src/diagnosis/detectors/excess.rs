@@ -20,14 +20,13 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     let words: Vec<String> =
         [along("at", "m", place.range_m), along("at", "m/s", place.velocity_mps), frames].into_iter().flatten().collect();
     let place_words = if words.is_empty() { "everywhere".to_string() } else { words.join(", ") };
-    let noise = evidence.mean_noise();
     let place = Place { stage: Some(Stage::Propagation), ..place.clone() };
     vec![Candidate {
         statement: format!(
             "there is {:.1} dB more power than body, room and noise can have, {place_words}; no effect of the library explains it",
             found.region.excess_db
         ),
-        energy: found.region.energy * noise,
+        energy: found.region.energy * evidence.total_noise(),
         ..Candidate::new(Behaviour::ExcessPower, place, found.p_value, found.gain)
     }]
 }

@@ -40,16 +40,8 @@ pub struct Cell {
     pub observed: Vec<DVector<Complex64>>,
     /// What the body is expected to have, `[rx, rx]`, the second one conjugated.
     pub expected: DMatrix<Complex64>,
-    /// The same, every point weighted with the sine of its direction.
-    pub aslant: DMatrix<Complex64>,
-}
-
-impl Cell {
     /// Mean sine of the body's direction there.
-    pub fn sine(&self) -> f64 {
-        let power = self.expected[(0, 0)].re;
-        if power > 0.0 { self.aslant[(0, 0)].re / power } else { 0.0 }
-    }
+    pub sine: f64,
 }
 
 /// The cells that the body fills, by frame and group of neighbours.
@@ -125,7 +117,7 @@ fn cells(
     let Some(used) = used(evidence, model, clutter_power, frame, LEAST_POWER) else { return [vec![], vec![]] };
     let mut slots = vec![usize::MAX; model.size()];
     used.iter().enumerate().for_each(|(slot, &cell)| slots[cell] = slot);
-    let mut sums = vec![[DMatrix::<Complex64>::zeros(receivers, receivers), DMatrix::zeros(receivers, receivers)]; used.len()];
+    let mut sums = vec![(DMatrix::<Complex64>::zeros(receivers, receivers), [0.0; 2]); used.len()];
     let wave = TAU / radar.wavelength_m();
     let centre = radar.centre_m();
     for point in body.with_echoes(radar, body.frames[frame].clone(), None) {
@@ -143,13 +135,13 @@ fn cells(
             if slots[cell] == usize::MAX || power <= 0.0 {
                 return;
             }
-            let [sum, aslant] = &mut sums[slots[cell]];
+            let (sum, [weight, aslant]) = &mut sums[slots[cell]];
+            *weight += power;
+            *aslant += power * sine;
             for column in 0..receivers {
                 let other = turns[column].conj() * power;
                 for row in 0..receivers {
-                    let value = turns[row] * other;
-                    sum[(row, column)] += value;
-                    aslant[(row, column)] += value * sine;
+                    sum[(row, column)] += turns[row] * other;
                 }
             }
         });
@@ -160,9 +152,10 @@ fn cells(
         maps.chunks_exact(receivers).map(|maps| DVector::from_fn(receivers, |rx, _| maps[rx][cell] * scale)).collect()
     };
     let mut parts = [vec![], vec![]];
-    for (&cell, [expected, aslant]) in used.iter().zip(sums) {
+    for (&cell, (expected, [weight, aslant])) in used.iter().zip(sums) {
         let part = usize::from(!model.usable()[cell]);
-        parts[part].push((cell % samples, Cell { observed: observed(cell), expected, aslant }));
+        let sine = if weight > 0.0 { aslant / weight } else { 0.0 };
+        parts[part].push((cell % samples, Cell { observed: observed(cell), expected, sine }));
     }
     parts
 }

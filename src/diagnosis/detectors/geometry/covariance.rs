@@ -48,7 +48,7 @@ fn looks(cells: &Cells, undo: impl Fn(f64) -> DMatrix<Complex64> + Sync) -> Vec<
     let look = |group: &Group| {
         let mut look = Look::new(numbers.count(), group.place);
         for cell in &group.cells {
-            add(cell, &undo(cell.sine()), &cells.noise, numbers, &mut look);
+            add(cell, &undo(cell.sine), &cells.noise, numbers, &mut look);
         }
         look.without(&of_the_body)
     };
@@ -75,14 +75,11 @@ fn add(cell: &Cell, undo: &DMatrix<Complex64>, noise: &[f64], numbers: Numbers, 
             observed
         })
         .collect();
-    look.add(shape, &observed, |level, body| {
-        let aslant = DMatrix::from_fn(receivers, receivers, |i, j| cell.aslant[(i, j)] * (level * white[i] * white[j]));
-        changes(body, &aslant, &white, numbers)
-    });
+    look.add(shape, &observed, |_, body| changes(body, cell.sine, &white, numbers));
 }
 
 /// How the covariance changes with every number.
-fn changes(body: &DMatrix<Complex64>, aslant: &DMatrix<Complex64>, white: &[f64], numbers: Numbers) -> Vec<DMatrix<Complex64>> {
+fn changes(body: &DMatrix<Complex64>, sine: f64, white: &[f64], numbers: Numbers) -> Vec<DMatrix<Complex64>> {
     let receivers = numbers.receivers;
     // What a matrix of the array makes of it, and the same conjugated.
     let by = |array: DMatrix<Complex64>| {
@@ -95,10 +92,11 @@ fn changes(body: &DMatrix<Complex64>, aslant: &DMatrix<Complex64>, white: &[f64]
         array[(rx, rx)] = value;
         by(array)
     };
-    // A receiver farther along x receives what comes from there earlier.
+    // A receiver farther along x receives what comes from there earlier: a phase by the cell's mean direction, as it is undone. How the
+    // directions within a cell spread is left out.
     let moved = |rx: usize| {
         DMatrix::from_fn(receivers, receivers, |i, j| {
-            aslant[(i, j)] * -Complex64::I * (f64::from(u8::from(i == rx)) - f64::from(u8::from(j == rx)))
+            body[(i, j)] * (-Complex64::I * sine) * (f64::from(u8::from(i == rx)) - f64::from(u8::from(j == rx)))
         })
     };
     let coupled = |step: isize, value: Complex64| {

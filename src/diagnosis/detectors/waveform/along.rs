@@ -79,6 +79,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     }
     if evidence.may_name(effects::chirp_nonlinearity::ID) {
         let once = chirps.converged(&first, &[BEND]);
+        let constant = once.as_ref().map(|once| (once.likelihood, chirps.bend(evidence, once)));
+        // To read a chirp between its samples lowers their noise, in both alike.
+        let straight = constant.as_ref().map_or_else(|| evidence.clone(), |(_, bend)| evidence.with(bend));
         let unsteady = |then: &Evidence| unsteadiness(&then.cube, evidence.noise());
         let more = |changing: &Estimated| changing.likelihood - once.as_ref().map_or(0.0, |once| once.likelihood);
         let changing = chirps
@@ -88,9 +91,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             .filter(|changing| changing.values[1].abs() < changing.values[0].abs())
             .map(|changing| (more(&changing), changing.likelihood, chirps.bend(evidence, &changing)))
             // What changes for the body changes for static clutter, too.
-            .filter(|(more, _, bend)| unsteady(&evidence.with(bend)) - unsteady(evidence) < *more)
+            .filter(|(more, _, bend)| unsteady(&evidence.with(bend)) - unsteady(&straight) < *more)
             .map(|(_, likelihood, bend)| (likelihood, bend));
-        found.extend(changing.or_else(|| once.map(|found| (found.likelihood, chirps.bend(evidence, &found)))));
+        found.extend(changing.or(constant));
     }
     found.retain(|(_, candidate)| candidate.p_value < 1e-2 && candidate.nats > 0.0);
     // Either leaves a little of the other.
