@@ -38,12 +38,12 @@ impl Look {
     /// Adds a cell.
     ///
     /// `shape`: covariance that the body is expected to have, in units of the noise; `observed`: independent draws; `changes`: how
-    /// the body's covariance, which comes with the level found, changes with every number.
+    /// the body's covariance, at the level found, changes with every number.
     pub fn add(
         &mut self,
         shape: DMatrix<Complex64>,
         observed: &[DVector<Complex64>],
-        changes: impl FnOnce(f64, &DMatrix<Complex64>) -> Vec<DMatrix<Complex64>>,
+        changes: impl FnOnce(&DMatrix<Complex64>) -> Vec<DMatrix<Complex64>>,
     ) {
         let finite = |value: &Complex64| value.is_finite();
         if !(shape.iter().all(finite) && observed.iter().flatten().all(finite)) {
@@ -64,7 +64,7 @@ impl Look {
             axes * DMatrix::from_diagonal(&diagonal) * axes.adjoint()
         };
         let inverse = of_powers(&|power| 1.0 / (1.0 + power));
-        let changes = changes(level, &of_powers(&|power| power));
+        let changes = changes(&of_powers(&|power| power));
         let weighed: Vec<DVector<Complex64>> = observed.iter().map(|observed| &inverse * observed).collect();
         let relative: Vec<DMatrix<Complex64>> = changes.iter().map(|change| &inverse * change).collect();
         for (a, change) in changes.iter().enumerate() {

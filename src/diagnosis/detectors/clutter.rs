@@ -1,8 +1,10 @@
 //! Static clutter, and what moves, against the noise.
 
+use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::diagnosis::Cube;
+use crate::diagnosis::cube::mean_chirp;
 use crate::diagnosis::evidence::{Evidence, transform};
 
 /// Power of static clutter over the noise of one frame's map, by range, mean over channels.
@@ -25,9 +27,9 @@ pub fn clutter_power(evidence: &Evidence) -> Vec<f64> {
 /// `noise`: variance of a sample, by channel.
 pub fn unsteadiness(cube: &Cube, noise: &[f64]) -> f64 {
     let [frames, _, _, loops, samples] = cube.dims;
-    let clutter = cube.clutter(&(0..frames).collect::<Vec<usize>>());
-    let of_frame = |frame: usize| {
-        let own = cube.clutter(&[frame]);
+    let each: Vec<Vec<Complex64>> = (0..frames).into_par_iter().map(|frame| cube.clutter(&[frame])).collect();
+    let clutter = mean_chirp(each.iter().map(Vec::as_slice), cube.channels() * samples);
+    let of_frame = |own: &Vec<Complex64>| {
         let channels = own.chunks_exact(samples).zip(clutter.chunks_exact(samples)).zip(noise);
         channels
             .map(|((own, all), noise)| {
@@ -35,7 +37,7 @@ pub fn unsteadiness(cube: &Cube, noise: &[f64]) -> f64 {
             })
             .sum::<f64>()
     };
-    loops as f64 * (0..frames).into_par_iter().map(of_frame).sum::<f64>()
+    loops as f64 * each.iter().map(of_frame).sum::<f64>()
 }
 
 /// Energy of what moves over all samples: what the maps' cells hold beyond the noise.
@@ -47,8 +49,6 @@ pub fn energy_beyond_noise(evidence: &Evidence) -> f64 {
 #[cfg(test)]
 mod tests {
     use std::f64::consts::TAU;
-
-    use num_complex::Complex64;
 
     use super::*;
     use crate::radar::Radar;

@@ -75,7 +75,7 @@ fn add(cell: &Cell, undo: &DMatrix<Complex64>, noise: &[f64], numbers: Numbers, 
             observed
         })
         .collect();
-    look.add(shape, &observed, |_, body| changes(body, cell.sine, &white, numbers));
+    look.add(shape, &observed, |body| changes(body, cell.sine, &white, numbers));
 }
 
 /// How the covariance changes with every number.

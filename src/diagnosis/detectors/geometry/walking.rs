@@ -21,7 +21,7 @@ pub fn walking(seed: u64, turned: impl Fn(usize, f64) -> Complex64, array: &DMat
     let mut cell = |middle: f64, aside: f64| {
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
         let mut expected = DMatrix::zeros(receivers, receivers);
-        let mut aslant = 0.0;
+        let mut mean = 0.0;
         let mut observed = DVector::from_fn(receivers, |_, _| Complex64::new(normal(), normal()) * 0.5f64.sqrt());
         let mut field = DVector::zeros(receivers);
         for _ in 0..8 {
@@ -31,12 +31,12 @@ pub fn walking(seed: u64, turned: impl Fn(usize, f64) -> Complex64, array: &DMat
             let from = |sine: f64| DVector::from_fn(receivers, |rx, _| Complex64::cis(-wave * radar.rx_m[rx][0] * sine));
             let predicted = from(sine);
             expected += &predicted * predicted.adjoint() * Complex64::from(power);
-            aslant += sine / 8.0;
+            mean += sine / 8.0;
             let real = from(sine + aside);
             field += DVector::from_fn(receivers, |rx, _| amplitude * real[rx] * turned(rx, sine + aside));
         }
         observed += array * field;
-        Cell { observed: vec![observed], expected, sine: aslant }
+        Cell { observed: vec![observed], expected, sine: mean }
     };
     let mut errors = rand_chacha::ChaCha8Rng::seed_from_u64(seed + 1000);
     let frames = (0..12)

@@ -127,16 +127,14 @@ impl Pile {
     /// Energy of what clipping adds to the signal, as of a Gaussian one in each frame, about the offset of each channel.
     fn distortion(&self, evidence: &Evidence) -> f64 {
         let [_, _, _, loops, samples] = evidence.cube.dims;
-        let size = evidence.cube.channels() * loops * samples;
-        let sampled = if evidence.is_real() { size } else { 2 * size } as f64;
-        let varying = |values: &[Complex64]| {
+        let sampled = if evidence.is_real() { 1 } else { 2 } * evidence.cube.channels() * loops * samples;
+        let varying = evidence.cube.by_channel(|frame, channel| {
+            let values = evidence.cube.channel(frame, channel);
             let mean = values.iter().sum::<Complex64>() / values.len() as f64;
             values.iter().map(|value| (value - mean).norm_sqr()).sum::<f64>()
-        };
-        let of_frame = |(values, &at): (&[Complex64], &usize)| {
-            distorted_share(at as f64 / sampled) * values.chunks_exact(loops * samples).map(varying).sum::<f64>()
-        };
-        evidence.cube.samples.chunks_exact(size).zip(&self.by_frame).map(of_frame).sum()
+        });
+        let share = |at: usize| distorted_share(at as f64 / sampled as f64);
+        self.by_frame.iter().enumerate().map(|(frame, &at)| share(at) * varying.below([frame]).iter().sum::<f64>()).sum()
     }
 
     fn frames(&self) -> Option<Vec<usize>> {

@@ -80,9 +80,9 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
     if evidence.may_name(effects::chirp_nonlinearity::ID) {
         let once = chirps.converged(&first, &[BEND]);
         let constant = once.as_ref().map(|once| (once.likelihood, chirps.bend(evidence, once)));
-        // To read a chirp between its samples lowers their noise, in both alike.
-        let straight = constant.as_ref().map_or_else(|| evidence.clone(), |(_, bend)| evidence.with(bend));
         let unsteady = |then: &Evidence| unsteadiness(&then.cube, evidence.noise());
+        // To read a chirp between its samples lowers their noise, with either bend alike.
+        let before = || constant.as_ref().map_or_else(|| unsteady(evidence), |(_, bend)| unsteady(&evidence.with(bend)));
         let more = |changing: &Estimated| changing.likelihood - once.as_ref().map_or(0.0, |once| once.likelihood);
         let changing = chirps
             .converged(&first, &[BEND, TREND])
@@ -91,7 +91,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             .filter(|changing| changing.values[1].abs() < changing.values[0].abs())
             .map(|changing| (more(&changing), changing.likelihood, chirps.bend(evidence, &changing)))
             // What changes for the body changes for static clutter, too.
-            .filter(|(more, _, bend)| unsteady(&evidence.with(bend)) - unsteady(&straight) < *more)
+            .filter(|(more, _, bend)| unsteady(&evidence.with(bend)) - before() < *more)
             .map(|(_, likelihood, bend)| (likelihood, bend));
         found.extend(changing.or(constant));
     }
@@ -189,7 +189,7 @@ impl Chirps {
             Complex64::from_polar((-tilt * x).exp(), -bend * cell.delay * legendre(2, x))
         });
         let observed: Vec<DVector<Complex64>> = cell.observed.iter().map(|observed| observed.component_mul(&undo)).collect();
-        look.add(shape, &observed, |_, body| {
+        look.add(shape, &observed, |body| {
             let by = |degree: usize, size: f64, gain: bool| {
                 let at = |part: usize| size * legendre(degree, self.along(part));
                 DMatrix::from_fn(self.parts, self.parts, |i, j| {
