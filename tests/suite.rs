@@ -9,6 +9,7 @@ mod support;
 
 mod align;
 mod audits;
+#[cfg_attr(not(any(feature = "ndarray", feature = "wgpu")), allow(dead_code, reason = "compares with another backend"))]
 mod backends;
 mod challenge;
 mod cli;
@@ -24,6 +25,7 @@ mod pages;
 mod paper;
 mod physics;
 mod plausible;
+#[cfg_attr(not(any(feature = "ndarray", feature = "wgpu")), allow(dead_code, reason = "compares with another backend"))]
 mod pose;
 mod real_captures;
 mod real_input;

@@ -59,9 +59,4 @@ impl Truth {
         }
         report
     }
-
-    /// Coherent d′ of what was planted; zero where it was not measured.
-    pub fn d_prime(&self) -> f64 {
-        self.strength.map_or(0.0, |strength| strength.d_prime)
-    }
 }

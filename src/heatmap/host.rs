@@ -108,11 +108,6 @@ impl Analysis {
         }
     }
 
-    /// The radar whose maps these are.
-    pub fn radar(&self) -> &Radar {
-        &self.radar
-    }
-
     /// Ranges of the maps' columns, m.
     pub fn range_axis(&self) -> Axis {
         range_axis(&self.radar)

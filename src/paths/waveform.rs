@@ -78,11 +78,6 @@ impl Waveform {
         Self { onward_s: delay_s, ..self }
     }
 
-    /// Delay that [`Self::with_onward`] was given; else zero.
-    pub fn onward_s(&self) -> f64 {
-        self.onward_s
-    }
-
     /// Sum of the legs → phasors.
     ///
     /// phase = f_mid τ − S τ²/2, sweep = B τ + f_mid τ̇ T, amplitude divided by the product of the legs' lengths
