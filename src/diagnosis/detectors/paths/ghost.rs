@@ -27,10 +27,12 @@ pub struct Ghost {
 /// One ghost per boundary of the room.
 pub fn ghosts(scene: &Scene) -> Vec<Ghost> {
     let Some(room) = &scene.evidence.room else { return vec![] };
-    room.boundaries().into_iter().filter_map(|boundary| ghost(scene, boundary, room.distance_m(boundary)?)).collect()
+    let body = body_ratio(scene).unwrap_or(1.0);
+    room.boundaries().into_iter().filter_map(|boundary| ghost(scene, boundary, room.distance_m(boundary)?, body)).collect()
 }
 
-fn ghost(scene: &Scene, boundary: Boundary, distance_m: f64) -> Option<Ghost> {
+/// `body`: its [`body_ratio`].
+fn ghost(scene: &Scene, boundary: Boundary, distance_m: f64, body: f64) -> Option<Ghost> {
     let split = &scene.evidence.split;
     let once = templates(scene, boundary, distance_m, false);
     let twice = templates(scene, boundary, distance_m, true);
@@ -66,8 +68,25 @@ fn ghost(scene: &Scene, boundary: Boundary, distance_m: f64) -> Option<Ghost> {
         gain_all: training + gain,
         gain,
         agreeing: seen.iter().filter(|gain| **gain > 0.0).count() as f64 / seen.len().max(1) as f64,
-        coefficient: weight.sqrt(),
+        coefficient: (weight / body).sqrt(),
     })
+}
+
+/// Energy of the body's direct return over what is expected of it, in training frames. Likelihoods follow cells where the body is weakest:
+/// of a mesh that is not the body's, the level can be tens of decibels off. None where nothing is expected.
+fn body_ratio(scene: &Scene) -> Option<f64> {
+    let model = scene.model;
+    let (mut measured, mut expected) = (0.0, 0.0);
+    for &frame in &scene.evidence.split.training {
+        let cells = model.support(frame).iter().zip(model.usable());
+        let powers = scene.map(frame).iter().zip(model.expected(frame)).zip(cells);
+        for ((power, mean), _) in powers.filter(|(_, (support, usable))| **support && **usable) {
+            measured += f64::from(power - 1.0);
+            expected += f64::from(mean - 1.0);
+        }
+    }
+    let ratio = measured / expected;
+    (ratio.is_finite() && ratio > 0.0).then_some(ratio)
 }
 
 /// Power of a mirror that loses nothing, by the weights that the body's parts have in its direct return.

@@ -102,7 +102,9 @@ fn looks(evidence: &Evidence, field: &Field) -> (Vec<Found>, Vec<Found>) {
         let mean = (0..field.loops).map(|index| settling.value(index)).sum::<Complex64>() / field.loops as f64;
         field.shared(|_, index, _| settling.value(index) - mean)
     };
-    if let Some(settling) = settling::best(field, training, held_out).filter(of_settling) {
+    // Blocks of a long frame are no frames: the first chirps of a block follow others.
+    let settling = if evidence.split.block_loops.is_none() { settling::best(field, training, held_out) } else { None };
+    if let Some(settling) = settling.filter(of_settling) {
         let candidate = candidates::of_settling(evidence, field, &settling);
         if candidate.id.is_some() { found.push(candidate.into()) } else { free.push(candidate.into()) }
     }

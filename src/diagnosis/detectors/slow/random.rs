@@ -6,6 +6,9 @@ use num_complex::Complex64;
 use super::field::{Field, Part, Series};
 use crate::diagnosis::statistics;
 
+/// Two values are two where they are so many standard deviations of either apart: a threshold midway takes 2.3 % of one for the other.
+const SPREADS_APART: f64 = 4.0;
+
 /// Chirps that deviate independently, with one variance.
 #[derive(Clone, Debug)]
 pub struct Random {
@@ -150,53 +153,81 @@ fn common_to_halves(field: &Field, part: Part, training: &[usize]) -> Option<f64
     Some(tails[0].max(tails[1]))
 }
 
+/// Two levels about their mean, each with a normal law of the same spread.
+#[derive(Clone, Copy)]
+struct Levels {
+    distance: f64,
+    /// Of the upper one.
+    share: f64,
+    spread: f64,
+}
+
+impl Levels {
+    /// Nine shares, and distances and spreads beside those that have the deviation seen.
+    fn grid(deviation: f64) -> impl Iterator<Item = Self> {
+        (1..=9).map(|tenth| 0.1 * f64::from(tenth)).flat_map(move |share| {
+            let typical = deviation / (share * (1.0 - share)).sqrt();
+            (0..=12)
+                .map(move |step| typical * (0.7 + 0.05 * f64::from(step)))
+                .flat_map(move |distance| [0.0, 0.04, 0.12, 0.25].map(|part| Self { distance, share, spread: part * distance }))
+        })
+    }
+
+    /// Whether a chirp belongs to one of the two.
+    fn are_apart(&self) -> bool {
+        self.distance > 0.0 && self.spread >= 0.0 && SPREADS_APART * self.spread <= self.distance
+    }
+
+    /// Steps to every side.
+    fn near(self, wide: f64, much: f64) -> [Self; 6] {
+        let Self { distance, share, spread } = self;
+        [
+            Self { distance: distance + wide, ..self },
+            Self { distance: distance - wide, ..self },
+            Self { share: share + much, ..self },
+            Self { share: share - much, ..self },
+            Self { spread: spread + wide, ..self },
+            Self { spread: (spread - wide).max(0.0), ..self },
+        ]
+    }
+
+    /// Log-likelihood that a value with an inverse variance of its noise gains over the noise alone.
+    fn gain(&self, value: f64, weight: f64) -> f64 {
+        let ratio = 1.0 + self.spread.powi(2) * weight;
+        let of_level = |level: f64| 0.5 * weight * (value * value - (value - level).powi(2) / ratio);
+        let (low, high) = (of_level(-self.share * self.distance), of_level((1.0 - self.share) * self.distance));
+        let top = low.max(high);
+        top + ((1.0 - self.share) * (low - top).exp() + self.share * (high - top).exp()).ln() - 0.5 * ratio.ln()
+    }
+}
+
 /// Chirps that take one of two values at random.
 fn two_valued(series: &Series, training: &[usize], held_out: &[usize], deviation: f64) -> Option<Two> {
-    let gain = |distance: f64, share: f64, frames: &[usize]| -> f64 {
-        let levels = [-share * distance, (1.0 - share) * distance];
-        frames
-            .iter()
-            .flat_map(|&f| chirps(series, f).iter().map(move |s| (s, series.weight[f])))
-            .map(|(s, w)| {
-                let [low, high] = levels.map(|level| w * level * (s - 0.5 * level));
-                let top = low.max(high);
-                top + ((1.0 - share) * (low - top).exp() + share * (high - top).exp()).ln()
-            })
-            .sum()
+    let gain = |levels: &Levels, frames: &[usize]| -> f64 {
+        let of_frame = |&f: &usize| chirps(series, f).iter().map(move |value| levels.gain(*value, series.weight[f])).sum::<f64>();
+        frames.iter().map(of_frame).sum()
     };
-    let mut best = (0.0, 0.0, f64::NEG_INFINITY);
-    for share in [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9f64] {
-        let typical = deviation / (share * (1.0 - share)).sqrt();
-        for step in 0..=12 {
-            let distance = typical * (0.7 + 0.05 * f64::from(step));
-            let found = gain(distance, share, training);
-            if found > best.2 {
-                best = (distance, share, found);
-            }
-        }
-    }
-    let (mut distance, mut share, mut top) = best;
-    let (mut wide, mut much) = (0.03 * distance, 0.05);
-    while wide > 1e-4 * distance {
-        let near = [(distance + wide, share), (distance - wide, share), (distance, share + much), (distance, share - much)];
-        let better = near
-            .into_iter()
-            .filter(|(d, s)| *d > 0.0 && (0.02..=0.98).contains(s))
-            .map(|(d, s)| (d, s, gain(d, s, training)))
-            .max_by(|a, b| a.2.total_cmp(&b.2))
-            .filter(|b| b.2 > top);
-        match better {
-            Some(b) => (distance, share, top) = b,
+    let with_gain = |levels: Levels| (levels, gain(&levels, training));
+    let better = |a: &(Levels, f64), b: &(Levels, f64)| a.1.total_cmp(&b.1);
+    let (mut levels, mut top) = Levels::grid(deviation).map(with_gain).max_by(better)?;
+    let (mut wide, mut much) = (0.03 * levels.distance, 0.05);
+    while wide > 1e-4 * levels.distance {
+        let near = levels.near(wide, much).into_iter();
+        let near = near.filter(|levels| levels.are_apart() && (0.02..=0.98).contains(&levels.share));
+        match near.map(with_gain).max_by(better).filter(|found| found.1 > top) {
+            Some(found) => (levels, top) = found,
             None => (wide, much) = (0.5 * wide, 0.5 * much),
         }
     }
+    let Levels { distance, share, .. } = levels;
     let h = 0.02 * distance;
-    let curvature = (2.0 * top - gain(distance + h, share, training) - gain(distance - h, share, training)) / (h * h);
+    let at = |distance: f64| gain(&Levels { distance, ..levels }, training);
+    let curvature = (2.0 * top - at(distance + h) - at(distance - h)) / (h * h);
     Some(Two {
         distance,
         distance_error: if curvature > 0.0 { curvature.sqrt().recip() } else { distance },
         share,
-        held_out_nats: gain(distance, share, held_out),
+        held_out_nats: gain(&levels, held_out),
     })
 }
 

@@ -20,6 +20,8 @@ pub struct Settling {
     /// What an amplitude modulation at the mains' frequency gains in training, where its periods fit into the frames': it is then
     /// alike in all of them.
     pub modulation_nats: f64,
+    /// What a straight line gains in training.
+    pub slope_nats: f64,
     /// What a free function of the loop gains on held-out frames.
     pub free: Free,
 }
@@ -47,7 +49,8 @@ const LOCKED_TURNS: f64 = 0.25;
 const FEWEST_LOOPS: f64 = 0.5;
 
 impl Settling {
-    /// Whether this is a decay, and not the best decay for something else: a modulation that is locked to the frames, say.
+    /// Whether this is a decay, and not the best decay for something else: a modulation that is locked to the frames, say, or a gain that
+    /// goes on through the frame and settles nowhere in it.
     pub fn is_named(&self) -> bool {
         let rest = self.free.held_out_nats - self.held_out_nats;
         self.held_out_nats > ENOUGH * self.free.held_out_nats
@@ -55,6 +58,7 @@ impl Settling {
             && self.amplitude.re.abs() > self.amplitude.im.abs()
             && self.loops > FEWEST_LOOPS
             && self.training_nats > self.modulation_nats
+            && self.training_nats > self.slope_nats + statistics::UNDECIDED
     }
 
     /// Relative to the settled state.
@@ -203,6 +207,7 @@ pub fn best(field: &Field, training: &[usize], held_out: &[usize]) -> Option<Set
         p_value: statistics::corrected((-nats).exp(), 10.0),
         training_nats: nats,
         modulation_nats: 0.5 * pattern.weight * modulation,
+        slope_nats: 0.5 * pattern.weight * slope(&free.values),
         held_out_nats: pattern.held_out_nats(field, held_out, decay),
         free,
     })
@@ -214,6 +219,14 @@ fn locked(field: &Field) -> impl Iterator<Item = f64> {
     let off = |turns: f64| (turns - turns.round()).abs();
     let locked = move |hertz: f64| starts.iter().all(|start| off(hertz * (start - starts[0])) < LOCKED_TURNS);
     MAINS_HZ.into_iter().filter(move |&hertz| locked(hertz))
+}
+
+/// Energy that a straight line takes out of values by loop whose mean is zero.
+fn slope(values: &[Complex64]) -> f64 {
+    let middle = 0.5 * (values.len() as f64 - 1.0);
+    let line = |index: usize| index as f64 - middle;
+    let along = values.iter().enumerate().map(|(index, value)| value * line(index)).sum::<Complex64>();
+    along.norm_sqr() / (0..values.len()).map(|index| line(index).powi(2)).sum::<f64>()
 }
 
 /// Energy that a sinusoid takes out of values by loop whose mean is zero.

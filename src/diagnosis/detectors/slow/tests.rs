@@ -185,6 +185,18 @@ fn the_first_chirps_of_a_frame_settle() {
 }
 
 #[test]
+fn what_does_not_settle_or_begins_in_no_frame_is_no_settling() {
+    let settles = |evidence: &Evidence| find(evidence).iter().any(|found| found.id == Some(effects::chirp_settling::ID));
+    let rises = evidence(6, |_, _, index, _| (1.0 + 0.1 * index as f64 / 31.0).into());
+    assert!(find(&rises).iter().any(|found| found.behaves_like == Behaviour::SlowTimeGain), "{:?}", find(&rises));
+    assert!(!settles(&rises));
+    let mut in_blocks = evidence(6, |_, _, index, _| (1.0 - 0.1 * (-(index as f64) / 5.0).exp()).into());
+    assert!(settles(&in_blocks));
+    in_blocks.split.block_loops = Some(32);
+    assert!(!settles(&in_blocks));
+}
+
+#[test]
 fn random_chirps_are_phase_noise_or_jitter() {
     let bell: Vec<f64> = std::iter::repeat_with(support::normal(9)).take(12 * 32).collect();
     let at_stated = 2.0 * 3.0 / crate::radar::SPEED_OF_LIGHT;
@@ -199,6 +211,11 @@ fn random_chirps_are_phase_noise_or_jitter() {
     let found = found_once(evidence(8, noisy(std::f64::consts::TAU * slope * 1.2e-8, two)));
     assert_eq!(found.id, Some(effects::chirp_start_jitter::ID));
     within(&found, "jitter_s", 1.2e-8);
+    // Two times that are not quite two: a normal law of all chirps is worse.
+    let spread = std::iter::repeat_with(support::normal(10)).map(|value| 0.06 * value);
+    let blurred: Vec<f64> = bell.iter().zip(spread).map(|(v, spread)| spread + if *v > 0.0 { 1.0 } else { 0.0 }).collect();
+    let found = found_once(evidence(8, noisy(std::f64::consts::TAU * slope * 2e-7, blurred)));
+    assert_eq!((found.id, found.look_alikes.len()), (Some(effects::chirp_start_jitter::ID), 0));
 }
 
 #[test]

@@ -30,9 +30,9 @@ pub fn common(data: &Frames, mean: &[Complex64], bins: &[usize], training: &[usi
     all.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, circle)| circle)
 }
 
-/// Log-likelihood that a range's cells gain by a return that turns as a circle does, each with a variance of its own that is fitted
-/// with and without it.
-fn explained(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize], circle: &Reflector) -> f64 {
+/// What all channels of a range have of a course of turns: by channel, the energy of all its changes, of those along the course, and a
+/// value's noise.
+fn along(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize], circle: &Reflector) -> Vec<[f64; 3]> {
     let count = training.len() as f64;
     let turned: Vec<Complex64> = training.iter().map(|&frame| Complex64::cis(circle.phase[frame])).collect();
     let centre = turned.iter().sum::<Complex64>() / count;
@@ -42,10 +42,25 @@ fn explained(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize], 
         let deviation = |i: usize| data.values[training[i]][cell] - mean[cell];
         let all: f64 = (0..training.len()).map(|i| deviation(i).norm_sqr()).sum();
         let along: Complex64 = turned.iter().enumerate().map(|(i, turned)| deviation(i) * (turned - centre).conj()).sum();
-        let variance = |sum: f64| (sum / count).max(data.noise[channel]);
-        count * (variance(all) / variance(all - along.norm_sqr() / energy.max(f64::MIN_POSITIVE))).ln()
+        [all, along.norm_sqr() / energy.max(f64::MIN_POSITIVE), data.noise[channel]]
     };
-    (0..data.noise.len()).map(of_channel).sum()
+    (0..data.noise.len()).map(of_channel).collect()
+}
+
+/// Power over the noise that turns as a circle does, at a range.
+pub fn power(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize], circle: &Reflector) -> f64 {
+    along(data, mean, bin, training, circle).into_iter().map(|[_, along, noise]| along / noise).sum()
+}
+
+/// Log-likelihood that a range's cells gain by a return that turns as a circle does, each with a variance of its own that is fitted
+/// with and without it.
+fn explained(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize], circle: &Reflector) -> f64 {
+    let count = training.len() as f64;
+    let of_channel = |[all, along, noise]: [f64; 3]| {
+        let variance = |sum: f64| (sum / count).max(noise);
+        count * (variance(all) / variance(all - along)).ln()
+    };
+    along(data, mean, bin, training, circle).into_iter().map(of_channel).sum()
 }
 
 /// Alternates between the phase of every frame and the cells' constants.

@@ -79,7 +79,12 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
     if gain <= 3.0 {
         return None;
     }
-    Some(Motion { evidence, data, mean, change, strongest, circle: best, metres, named, vibration }.candidate(gain))
+    // Its range is where most power turns as it does: something else may change more.
+    let bin = moving.into_iter().max_by(|&a, &b| {
+        let [a, b] = [a, b].map(|bin| circle::power(&data, &mean, bin, training, &best));
+        a.total_cmp(&b)
+    })?;
+    Some(Motion { evidence, data, mean, change, bin, circle: best, metres, named, vibration }.candidate(gain))
 }
 
 /// Power of what changes over the noise, by range.
@@ -167,9 +172,10 @@ struct Motion<'a> {
     data: Frames,
     /// Over the training frames, by cell.
     mean: Vec<Complex64>,
-    /// Power of what changes over the noise, by range, and where it is strongest.
+    /// Power of what changes over the noise, by range.
     change: Vec<f64>,
-    strongest: usize,
+    /// Where it is.
+    bin: usize,
     circle: Reflector,
     /// Of a radian.
     metres: f64,
@@ -189,7 +195,7 @@ impl Motion<'_> {
             }
             bin
         };
-        [reach(self.strongest, -1), reach(self.strongest, 1)]
+        [reach(self.bin, -1), reach(self.bin, 1)]
     }
 
     /// `displacement`: mm.
@@ -272,13 +278,13 @@ impl Motion<'_> {
             return statistics::corrected(rhythm.p_value, 4.0);
         }
         let count = (self.data.noise.len() * (self.evidence.split.training.len() - 1)) as f64;
-        statistics::corrected(statistics::mean_power_tail(self.change[self.strongest], count), self.data.bins as f64)
+        statistics::corrected(statistics::mean_power_tail(self.change[self.bin], count), self.data.bins as f64)
     }
 
     fn candidate(self, gain: f64) -> Candidate {
         let (evidence, metres, ends) = (self.evidence, self.metres, self.ends());
         let bin_m = evidence.radar.range_resolution_m();
-        let range_m = self.strongest as f64 * bin_m;
+        let range_m = self.bin as f64 * bin_m;
         let displacement: Vec<f64> = self.circle.phase.iter().map(|p| 1e3 * p * metres).collect();
         let (statement, p_value) = (self.statement(range_m, &displacement), self.p_value());
         let region = Region { range: [ends[0].saturating_sub(1) as f64, (ends[1] + 1) as f64], doppler: [-1.0, 1.0] };
