@@ -137,6 +137,13 @@ impl Table {
             let found = format!("{} numbers", calibration.p_values.len());
             return Err(Error::field(path, "p_values", found, format!("{} that ascend", calibration.answered)));
         }
+        let of_detectors = calibration.detectors.iter().map(|(name, list)| (format!("suspects.{name}"), list));
+        let mut lists = of_detectors.chain([("suspicion".to_string(), &calibration.bounds)]);
+        let unsorted = lists.find(|(_, list)| !list.is_sorted()).map(|(key, _)| key);
+        drop(lists);
+        if let Some(key) = unsorted {
+            return Err(Error::field(path, key, "numbers in another order", "numbers that ascend").with_hint(hint));
+        }
         Ok(Self { calibration, bytes })
     }
 
@@ -266,6 +273,8 @@ mod tests {
         assert!(with("format", 2.into()).contains("`format` is 2, expected 1"));
         assert!(with("program", "hybridsim 0".into()).contains("`program` is hybridsim 0"));
         assert!(with("p_values", serde_json::json!([0.7, 0.2])).contains("`p_values`"));
+        assert!(with("suspects", serde_json::json!({"spur": [0.7, 0.2]})).contains("`suspects.spur`"));
+        assert!(with("suspicion", serde_json::json!([0.7, 0.2])).contains("`suspicion`"));
         assert!(with("seeds", serde_json::json!("none")).contains("calibration.json"));
     }
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::statistics::UNDECIDED;
 use crate::data::hex;
 use crate::effects::{self, EffectInfo};
 use crate::error::{Error, Result};
@@ -20,7 +21,8 @@ pub struct DiagnosisConfig {
     pub gain: f64,
     /// The same for what has no name in the library.
     pub nameless_gain: f64,
-    /// Alternatives within so many nats of the best are not distinguished.
+    /// Effects of different detectors within so many nats of the best are not distinguished; within a detector it is always
+    /// the default, a hundred times as likely.
     pub tie: f64,
     /// Most effects that are accepted.
     pub most: usize,
@@ -49,7 +51,7 @@ impl Default for DiagnosisConfig {
             alarm: 0.01,
             gain: 6.0,
             nameless_gain: 15.0,
-            tie: 4.6,
+            tie: UNDECIDED,
             most: 10,
             epochs: 8,
             limits: true,

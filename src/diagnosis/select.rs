@@ -115,11 +115,7 @@ pub fn explain(evidence: Evidence, thresholds: &DiagnosisConfig, progress: &mut 
         refused: vec![],
         unchanged: None,
     };
-    for _ in 0..=thresholds.most {
-        if !rounds.next(progress) {
-            break;
-        }
-    }
+    while rounds.next(progress) {}
     let Rounds { current, accepted, first_bounds, .. } = rounds;
     drop(current);
     let accepted = verified(&original, accepted, thresholds);

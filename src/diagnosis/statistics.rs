@@ -69,8 +69,9 @@ pub fn poisson_tail(count: usize, mean: f64) -> f64 {
     if count == 0 { 1.0 } else { Gamma::new(count as f64, 1.0).map_or(1.0, |law| law.cdf(mean)) }
 }
 
-/// The smallest of `tried` independent p-values, made a p-value again (Šidák).
+/// The smallest of `tried` independent p-values, made a p-value again (Šidák); of less than one it is that one's.
 pub fn corrected(p: f64, tried: f64) -> f64 {
+    let tried = tried.max(1.0);
     // 1 − (1 − p)^n without cancellation.
     (-(tried * (-p.clamp(0.0, 1.0)).ln_1p()).exp_m1()).clamp(0.0, 1.0)
 }
@@ -170,6 +171,11 @@ mod tests {
         assert!((poisson_tail(1, 0.1) - (1.0 - (-0.1f64).exp())).abs() < 1e-9);
         assert!((poisson_tail(2, 0.1) - (1.0 - 1.1 * (-0.1f64).exp())).abs() < 1e-9);
         assert!((corrected(1e-12, 10.0) - 1e-11).abs() < 1e-16);
+        // A part of a test, or none, makes nothing more significant.
+        assert_eq!(
+            [(0.3, 0.5), (1.0, 0.0), (0.3, 0.0)].map(|(p, tried)| corrected(p, tried)),
+            [corrected(0.3, 1.0), 1.0, corrected(0.3, 1.0)]
+        );
         let line: Vec<f64> = (0..40).map(|k| if k == 7 { 50.0 } else { 1.0 }).collect();
         assert!(white_chance(&[1.0; 40]) > 0.9 && white_chance(&line) < 1e-3 && white_chance(&[]) == 1.0);
         // Critical distances of Stephens' table for ten numbers: 0.409 at 5 %, 0.489 at 1 %.

@@ -183,9 +183,10 @@ impl<'a> Mover<'a> {
         let estimates = azimuth.map_or(vec![], |Azimuth { degrees, deviation }| {
             let (s, c) = degrees.to_radians().sin_cos();
             let across = range_m * deviation.to_radians();
+            let centre = radar.centre_m();
             vec![Estimate::list(
                 "position_m",
-                &[range_m * s, range_m * c, 0.0],
+                &[centre[0] + range_m * s, centre[1] + range_m * c, centre[2]],
                 &[(across * c).abs().max(0.3 * bin_m), (across * s).abs().max(0.3 * bin_m), HEIGHT * range_m],
             )]
         });

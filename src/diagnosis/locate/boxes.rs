@@ -136,32 +136,43 @@ fn overlap(a: &Box3, b: &Box3) -> bool {
     (0..3).all(|axis| a.low[axis] < b.high[axis] && b.low[axis] < a.high[axis])
 }
 
+/// Ends of a half-open interval of Doppler bins, of which the upper half counts from the end, below zero.
+fn dopplers([first, end]: [usize; 2], loops: usize) -> [f64; 2] {
+    let [low, high] = [first, end - 1].map(|bin| if 2 * bin >= loops { bin as f64 - loops as f64 } else { bin as f64 });
+    [low.min(high) - 0.5, low.max(high) + 0.5]
+}
+
 fn region(evidence: &Evidence, residual: &Residual, cells: &Cells, found: &Box3) -> Region {
     let [frames, loops, _] = residual.shape();
     let mut place = Place::default();
-    let mut axes = vec![];
     if found.high[0] - found.low[0] < frames {
-        axes.push("frame");
         place.frames = Some((found.low[0]..found.high[0]).collect());
     }
     if found.high[1] - found.low[1] < loops {
-        axes.push("doppler");
-        let signed = |bin: f64| if bin > 0.5 * loops as f64 { bin - loops as f64 } else { bin };
-        let (low, high) = (signed(found.low[1] as f64), signed((found.high[1] - 1) as f64));
-        place.velocity_mps = Some([(low.min(high) - 0.5) / cells.doppler_per_mps, (low.max(high) + 0.5) / cells.doppler_per_mps]);
+        place.velocity_mps = Some(dopplers([found.low[1], found.high[1]], loops).map(|bin| bin / cells.doppler_per_mps));
     }
     if found.high[2] - found.low[2] < residual.bins {
-        axes.push("range");
         let low = (found.low[2] as f64 - 0.5).max(0.0) / cells.bins_per_m;
         place.range_m = Some([low, (found.high[2] as f64 - 0.5) / cells.bins_per_m]);
     }
     let mean = found.sum / found.count;
     let channels = evidence.cube.channels() as f64;
     Region {
-        axes,
         place,
         excess_db: 10.0 * mean.log10(),
         energy: (found.sum - found.count) * super::residual::CELLS_PER_VALUE / channels,
         p_value: found.p_value,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_upper_half_of_the_doppler_bins_lies_below_zero_from_its_first_on() {
+        assert_eq!(dopplers([32, 48], 64), [-32.5, -16.5]);
+        assert_eq!(dopplers([16, 32], 64), [15.5, 31.5]);
+        assert_eq!(dopplers([0, 1], 64), [-0.5, 0.5]);
     }
 }

@@ -24,8 +24,6 @@ use super::finding::Place;
 /// A box of cells with more power than is expected there.
 #[derive(Clone, Debug)]
 pub struct Region {
-    /// Along which axes it is bounded.
-    pub axes: Vec<&'static str>,
     pub place: Place,
     /// Measured over expected power.
     pub excess_db: f64,

@@ -17,11 +17,11 @@ type Direction = [f64; 3];
 /// `[frame]`. Where a boundary is hit at a right angle, that mirror point alone counts. None without a room there.
 pub fn seen(evidence: &Evidence, body: &BodyPrediction, range_m: f64, reach_m: f64) -> Option<Vec<f64>> {
     let room = evidence.room.as_ref()?;
-    let directions = directions(room, range_m, reach_m);
+    let centre = evidence.radar.centre_m();
+    let directions = directions(room, centre, range_m, reach_m);
     if directions.is_empty() {
         return None;
     }
-    let centre = evidence.radar.centre_m();
     let wavelength = evidence.radar.wavelength_m();
     let of_frame = |points: &Vec<crate::diagnosis::Point>| {
         let rays: Vec<(Direction, f64)> = points
@@ -45,8 +45,8 @@ pub fn seen(evidence: &Evidence, body: &BodyPrediction, range_m: f64, reach_m: f
     Some(body.frames.iter().map(of_frame).collect())
 }
 
-/// Unit vectors to the room's surface in front of the radar.
-fn directions(room: &Room, range_m: f64, reach_m: f64) -> Vec<Direction> {
+/// Unit vectors from the antennas' centre to the room's surface in front of the radar.
+fn directions(room: &Room, centre: Direction, range_m: f64, reach_m: f64) -> Vec<Direction> {
     let seen = room.boundaries().into_iter().filter(|&boundary| boundary != Boundary::Back);
     let foot = seen.clone().find(|&boundary| room.distance_m(boundary).is_some_and(|d| (d - range_m).abs() < reach_m));
     if let Some(boundary) = foot {
@@ -65,9 +65,10 @@ fn directions(room: &Room, range_m: f64, reach_m: f64) -> Vec<Direction> {
                 at[axis] = sign * distance;
                 at[u] = low[u] + i as f64 * STEP_M;
                 at[v] = low[v] + j as f64 * STEP_M;
-                let range = dot(at, at).sqrt();
-                if at[1] > 0.0 && (range - range_m).abs() < reach_m {
-                    found.push(at.map(|x| x / range));
+                let away: Direction = std::array::from_fn(|axis| at[axis] - centre[axis]);
+                let range = dot(away, away).sqrt();
+                if away[1] > 0.0 && (range - range_m).abs() < reach_m {
+                    found.push(away.map(|x| x / range));
                 }
             }
         }

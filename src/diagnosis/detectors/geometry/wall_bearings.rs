@@ -47,7 +47,7 @@ impl WallBearings {
         let bin_m = radar.range_resolution_m();
         // Range in bins, cross-section over the fourth power of the range, and phases between receivers.
         let source = |at_m: [f64; 3], section: f64, range_m: f64| -> (f64, f64, DVector<Complex64>) {
-            let way = |rx: usize| distance(at_m, radar.rx_m[rx]) - distance(at_m, radar.rx_m[0]);
+            let way = |rx: usize| distance(at_m, radar.rx_position_m(rx)) - distance(at_m, radar.rx_position_m(0));
             let phases = DVector::from_fn(receivers, |rx, _| Complex64::cis(wave * way(rx)));
             (range_m / bin_m, section / range_m.powi(4), phases)
         };

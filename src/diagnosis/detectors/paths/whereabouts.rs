@@ -99,7 +99,7 @@ impl Whereabouts {
     }
 
     fn position_m(&self, radar: &Radar, direction: &Direction) -> [f64; 3] {
-        let at = radar.position_m;
+        let at = radar.centre_m();
         [at[0] + self.mean_m * direction.sine, at[1] + self.mean_m * direction.azimuth().cos(), at[2]]
     }
 

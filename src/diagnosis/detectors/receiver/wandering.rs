@@ -72,7 +72,7 @@ pub fn find(evidence: &Evidence) -> Option<Wandering> {
 }
 
 impl Wandering {
-    /// Whether a cell of the range-Doppler maps is its own in most frames.
+    /// Whether a cell of the range-Doppler maps is its own in some frame.
     pub fn is_at(&self, [doppler, range]: [usize; 2], [loops, samples]: [usize; 2]) -> bool {
         let apart = |turns: f64, bin: usize, count: usize| {
             let off = turns - bin as f64 / count as f64;

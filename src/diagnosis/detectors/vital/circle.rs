@@ -8,7 +8,6 @@ use super::frames::Frames;
 
 /// Reflector whose echo is `c + a exp(jψ)` in some cells.
 pub struct Reflector {
-    pub bin: usize,
     pub cells: Vec<usize>,
     /// The constant `c` of each cell.
     pub clutter: Vec<Complex64>,
@@ -30,35 +29,47 @@ pub fn common(data: &Frames, mean: &[Complex64], bins: &[usize], training: &[usi
     all.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, circle)| circle)
 }
 
-/// What all channels of a range have of a course of turns: by channel, the energy of all its changes, of those along the course, and a
-/// value's noise.
-fn along(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize], circle: &Reflector) -> Vec<[f64; 3]> {
+/// What a channel has, at a range, of a course of turns.
+pub struct Along {
+    /// Of what turns so.
+    pub amplitude: Complex64,
+    /// Energy of all changes, and of those that turn so.
+    all: f64,
+    turning: f64,
+    /// Of a value.
+    noise: f64,
+}
+
+impl Along {
+    /// Energy of what turns so, over the noise of a value.
+    pub fn over_noise(&self) -> f64 {
+        self.turning / self.noise
+    }
+}
+
+/// By channel.
+pub fn along(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize], circle: &Reflector) -> Vec<Along> {
     let count = training.len() as f64;
     let turned: Vec<Complex64> = training.iter().map(|&frame| Complex64::cis(circle.phase[frame])).collect();
     let centre = turned.iter().sum::<Complex64>() / count;
-    let energy = count * (1.0 - centre.norm_sqr());
+    let energy = (count * (1.0 - centre.norm_sqr())).max(f64::MIN_POSITIVE);
     let of_channel = |channel: usize| {
         let cell = channel * data.bins + bin;
         let deviation = |i: usize| data.values[training[i]][cell] - mean[cell];
         let all: f64 = (0..training.len()).map(|i| deviation(i).norm_sqr()).sum();
         let along: Complex64 = turned.iter().enumerate().map(|(i, turned)| deviation(i) * (turned - centre).conj()).sum();
-        [all, along.norm_sqr() / energy.max(f64::MIN_POSITIVE), data.noise[channel]]
+        Along { amplitude: along / energy, all, turning: along.norm_sqr() / energy, noise: data.noise[channel] }
     };
     (0..data.noise.len()).map(of_channel).collect()
-}
-
-/// Power over the noise that turns as a circle does, at a range.
-pub fn power(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize], circle: &Reflector) -> f64 {
-    along(data, mean, bin, training, circle).into_iter().map(|[_, along, noise]| along / noise).sum()
 }
 
 /// Log-likelihood that a range's cells gain by a return that turns as a circle does, each with a variance of its own that is fitted
 /// with and without it.
 fn explained(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize], circle: &Reflector) -> f64 {
     let count = training.len() as f64;
-    let of_channel = |[all, along, noise]: [f64; 3]| {
-        let variance = |sum: f64| (sum / count).max(noise);
-        count * (variance(all) / variance(all - along)).ln()
+    let of_channel = |channel: Along| {
+        let variance = |sum: f64| (sum / count).max(channel.noise);
+        count * (variance(channel.all) / variance(channel.all - channel.turning)).ln()
     };
     along(data, mean, bin, training, circle).into_iter().map(of_channel).sum()
 }
@@ -121,7 +132,7 @@ fn reflector(data: &Frames, mean: &[Complex64], bin: usize, training: &[usize]) 
         let jump = phase[frame] - phase[frame - 1];
         phase[frame] -= TAU * (jump / TAU).round();
     }
-    Some(Reflector { bin, cells, clutter, amplitude, phase, variance })
+    Some(Reflector { cells, clutter, amplitude, phase, variance })
 }
 
 /// Centre of the circle through a cell's values (Kåsa's least squares).

@@ -11,7 +11,7 @@ mod rhythm;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use circle::Reflector;
+use circle::{Along, Reflector};
 use frames::{Frames, frames};
 use num_complex::Complex64;
 use rhythm::{BREATHING_HZ, HEART_HZ, Rhythm, rhythm, vibration};
@@ -80,11 +80,11 @@ fn one(evidence: &Evidence) -> Option<Candidate> {
         return None;
     }
     // Its range is where most power turns as it does: something else may change more.
-    let bin = moving.into_iter().max_by(|&a, &b| {
-        let [a, b] = [a, b].map(|bin| circle::power(&data, &mean, bin, training, &best));
-        a.total_cmp(&b)
-    })?;
-    Some(Motion { evidence, data, mean, change, bin, circle: best, metres, named, vibration }.candidate(gain))
+    let turning = |bin: usize| (bin, circle::along(&data, &mean, bin, training, &best));
+    let power = |of: &[Along]| of.iter().map(Along::over_noise).sum::<f64>();
+    let (bin, along) = moving.into_iter().map(turning).max_by(|a, b| power(&a.1).total_cmp(&power(&b.1)))?;
+    let amplitude = along.iter().map(|channel| channel.amplitude).collect();
+    Some(Motion { evidence, data, mean, change, bin, amplitude, circle: best, metres, named, vibration }.candidate(gain))
 }
 
 /// Power of what changes over the noise, by range.
@@ -174,8 +174,9 @@ struct Motion<'a> {
     mean: Vec<Complex64>,
     /// Power of what changes over the noise, by range.
     change: Vec<f64>,
-    /// Where it is.
+    /// Where it is, and its amplitude there in every channel.
     bin: usize,
+    amplitude: Vec<Complex64>,
     circle: Reflector,
     /// Of a radian.
     metres: f64,
@@ -190,7 +191,7 @@ impl Motion<'_> {
     fn ends(&self) -> [usize; 2] {
         let (change, bins) = (&self.change, self.data.bins);
         let reach = |mut bin: usize, step: isize| {
-            while change[bin] > 2.0 && bin > NEAREST_BIN && bin + 1 < bins {
+            while change[bin] > 2.0 && (step > 0 || bin > NEAREST_BIN) && bin + 1 < bins {
                 bin = bin.wrapping_add_signed(step);
             }
             bin
@@ -289,7 +290,7 @@ impl Motion<'_> {
         let (statement, p_value) = (self.statement(range_m, &displacement), self.p_value());
         let region = Region { range: [ends[0].saturating_sub(1) as f64, (ends[1] + 1) as f64], doppler: [-1.0, 1.0] };
         let turned = self.circle.phase.iter().map(|&phase| Complex64::cis(phase)).collect();
-        let course = Course { of: Of::Mover { bin: self.circle.bin as f64, amplitude: self.circle.amplitude }, turned };
+        let course = Course { of: Of::Mover { bin: self.bin as f64, amplitude: self.amplitude }, turned };
         let energy: f64 = self.change.iter().map(|c| (c - 1.0).max(0.0)).sum::<f64>()
             * self.data.noise.iter().sum::<f64>()
             * evidence.cube.chirps();
@@ -349,6 +350,20 @@ mod tests {
         assert!(fades.contains("along one line in the complex plane"), "{fades}");
         let moves = said(|course| Complex64::cis(2.5 * course));
         assert!(moves.contains("moves slowly, over"), "{moves}");
+    }
+
+    /// Its skirts reach farther; leakage and offsets, which lie nearer, are left.
+    #[test]
+    fn what_moves_at_the_nearest_ranges_has_a_range() {
+        let radar = Radar { samples_per_chirp: 64, loops_per_frame: 4, ..Radar::small(48) };
+        let evidence = Evidence::in_noise(radar, 6, |[frame, channel, _, n]| {
+            let tone = |bin: f64, level: f64| Complex64::from_polar(level, TAU * bin * n as f64 / 64.0 + channel as f64 * bin);
+            tone(2.6, 30.0) * Complex64::cis(2.5 * (frame as f64 / 47.0).powi(2)) + tone(22.0, 20.0)
+        });
+        let found = find(&evidence).pop().expect("a change");
+        let bin_m = evidence.radar.range_resolution_m();
+        let [low, high] = found.place.range_m.expect("a range").map(|range_m| range_m / bin_m);
+        assert!(low < 3.5 && (3.5..8.0).contains(&high), "{low} to {high}: {}", found.statement);
     }
 
     /// Faster than a heart.
