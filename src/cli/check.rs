@@ -269,3 +269,44 @@ fn show_rule(check: &radar::Check) {
         None => {}
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_config_that_ships_is_known_by_the_verb_that_reads_it() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+            if path.extension().is_none_or(|end| end != "toml") {
+                continue;
+            }
+            let verb = of_another_verb(&path, &[]).unwrap_or_else(|error| panic!("{name}: {error}")).map(|(verb, _)| verb);
+            let wanted = match name.split('_').next().unwrap() {
+                "site" => Some("site"),
+                "reproduce" => Some("reproduce"),
+                "challenge" => Some("challenge seal"),
+                _ => None,
+            };
+            assert_eq!(verb, wanted, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_folder_that_is_neither_recording_nor_checkpoint_is_called_that() {
+        let folder = tempfile::tempdir().unwrap();
+        let arguments = <Only as clap::Parser>::parse_from(["check".as_ref(), folder.path().as_os_str()]);
+        let error = run(&arguments.check, &arguments.common).unwrap_err().to_string();
+        assert!(error.contains("neither recording.toml nor checkpoint.toml"), "{error}");
+    }
+
+    #[derive(clap::Parser)]
+    struct Only {
+        #[command(flatten)]
+        check: Arguments,
+        #[command(flatten)]
+        common: Common,
+    }
+}

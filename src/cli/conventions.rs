@@ -44,3 +44,15 @@ fn verdict(wrong: usize, undecided: usize) -> String {
 fn row(finding: &Finding, against: Against) -> [String; 4] {
     [finding.name(), finding.kept(against).into(), finding.expected.into(), finding.found.clone()]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_ends_in_what_it_says() {
+        assert_eq!(verdict(0, 0), "nothing contradicts what is stated");
+        assert_eq!(verdict(0, 4), "nothing contradicts what is stated; 4 rows are undecided, each for the reason that it names");
+        assert_eq!(verdict(2, 1), "2 rows contradict what is stated; 1 row is undecided, for the reason that it names");
+    }
+}
