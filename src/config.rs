@@ -102,8 +102,10 @@ impl Config {
     /// The `[record]` section, or what to do without it.
     pub fn record(&self, path: &Path) -> Result<&RecorderConfig> {
         self.record.as_ref().ok_or_else(|| {
-            Error::field(path, "record", "missing", "a [record] section")
-                .with_hint("see configs/quickstart.toml for one; [data] recordings = [...] uses recordings that exist")
+            Error::field(path, "record", "missing", "a [record] section").with_hint(
+                "name recordings that exist, `--set 'data.recordings=[\"DIR\"]'`; or write a [record] section, such as that of \
+                     configs/quickstart.toml",
+            )
         })
     }
 }

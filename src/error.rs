@@ -20,7 +20,7 @@ pub enum Error {
     #[error("{}: {message}", path.display())]
     Parse { path: PathBuf, message: String },
     #[error("{}: unknown key `{key}`{}", path.display(), nearest.as_ref().map(|n| format!(", the nearest known one is `{n}`")).unwrap_or_default())]
-    UnknownKey { path: PathBuf, key: String, nearest: Option<String> },
+    UnknownKey { path: PathBuf, key: String, nearest: Option<String>, known: Vec<String> },
     /// A field of a file that holds something else than it must.
     #[error("{}: `{field}` is {found}, expected {expected}", path.display())]
     Field { path: PathBuf, field: String, found: String, expected: String, hint: Option<String> },
@@ -102,6 +102,9 @@ impl Error {
             }
             Self::NonFinite { .. } => Some("lower training.learning_rate, or start again from the last checkpoint".into()),
             Self::Busy { .. } => Some("wait for it, or choose another folder with --out".into()),
+            Self::UnknownKey { nearest: None, known, .. } if !known.is_empty() => {
+                Some(format!("known here: {}", known.join(", ")))
+            }
             Self::UnknownKey { .. } => Some("remove the key or correct its name".into()),
             _ => None,
         }

@@ -78,7 +78,7 @@ pub struct Alignment {
     pub as_stated: bool,
     pub held_out_frames: Vec<usize>,
     pub stated: Placement,
-    /// The best placement; only for [`Verdict::Aligned`] is it to be believed.
+    /// The best placement where the verdict is [`Verdict::Aligned`], else the one as stated.
     pub motion: Placement,
     /// `start_s`, `rotation_deg` (about the vertical, counter-clockwise seen from above, against what is stated), `origin_x_m`,
     /// `origin_y_m`, `origin_z_m`; and what the radar sees itself: `range_m` and `azimuth_deg` of the middle of the track (horizontal,

@@ -69,7 +69,10 @@ pub fn alignment(found: &Found, recording: String) -> Alignment {
         as_stated,
         held_out_frames: readings.split.held_out.clone(),
         stated: stated(found.person),
-        motion: best.map_or_else(|| stated(found.person), |best| placement(found.person, &best.fitter.pivot, &best.place)),
+        motion: match best {
+            Some(best) if verdict == Verdict::Aligned => placement(found.person, &best.fitter.pivot, &best.place),
+            _ => stated(found.person),
+        },
         estimates: identified,
         gain,
         alternatives,

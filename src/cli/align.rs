@@ -37,6 +37,9 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     let alignment = verbs::align::align(&what, &mut |notice| shown.show(notice))?;
     shown.finish();
     say!("{}", alignment.sentence);
+    if alignment.verdict == Verdict::CannotTell && !alignment.estimates.is_empty() {
+        say!("estimates of the best placement, which was rejected:");
+    }
     super::print(&alignment.lines());
     for alternative in &alignment.alternatives {
         let values: Vec<String> = alternative.values.iter().map(|(name, value)| format!("{name} {value:.3}")).collect();

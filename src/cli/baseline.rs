@@ -35,6 +35,7 @@ use crate::{
 };
 
 #[derive(Args)]
+#[command(mut_arg("out", |out| out.help("Folder for the results [default: runs/baseline]")))]
 pub(crate) struct Arguments {
     /// How to simulate
     #[arg(value_enum, value_name = "METHOD")]

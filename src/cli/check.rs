@@ -11,20 +11,24 @@ use super::{
     plausible,
 };
 use crate::{
+    challenge::ChallengeConfig,
     config::Config,
-    data::{Recording, atomic::AtomicFolder},
+    data::{Recording, atomic::AtomicFolder, recording::SETTINGS_FILE, settings},
     error::{Error, Result},
     evaluation,
+    experiments::ReproduceConfig,
     heatmap::HeatmapConfig,
     integrity::{self, Against},
     plausibility::Sources,
-    radar::{self, Radar},
+    radar::{self, FASTEST, Radar},
     room::Room,
+    site::SiteConfig,
     training::checkpoint,
-    verbs::heatmaps::Pictures,
+    verbs::{heatmaps::Pictures, plausible::of_recording},
 };
 
 #[derive(Args)]
+#[command(mut_arg("out", |out| out.help("Folder for the heatmaps of a recording [default: none are drawn]")))]
 pub(crate) struct Arguments {
     /// A config file, a recording folder, a checkpoint folder, a body (.npz), a motion (.npz, .bvh) or a mesh
     /// (vertices .npy, .obj)
@@ -51,6 +55,16 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.reading.refused(READING_HINT)?;
     if path.join("checkpoint.toml").is_file() {
         return show_checkpoint(path, common);
+    }
+    if path.is_dir() && !path.join(SETTINGS_FILE).is_file() {
+        let expected = "a recording (recording.toml) or a checkpoint (checkpoint.toml)";
+        return Err(Error::Usage {
+            message: format!(
+                "{}: neither recording.toml nor checkpoint.toml is in this folder, expected {expected}",
+                path.display()
+            ),
+            hint: Some("a run folder has its checkpoints in best and last, a site its recordings in folders below it".into()),
+        });
     }
     if path.is_dir() {
         let out = arguments.out.out.as_ref().map(AtomicFolder::create).transpose()?;
@@ -107,6 +121,10 @@ fn show_checkpoint(path: &Path, common: &Common) -> Result<()> {
 
 /// What a config names: recordings that there are, and the one that it makes.
 fn show_config(path: &Path, common: &Common) -> Result<()> {
+    if let Some((verb, resolved)) = of_another_verb(path, &common.set)? {
+        say!("a config of `hybridsim {verb}`; resolved:\n\n{resolved}");
+        return Ok(());
+    }
     let config = Config::read(path, &common.set)?;
     let mut first_damaged = None;
     for recording in &config.data.recordings {
@@ -124,6 +142,26 @@ fn show_config(path: &Path, common: &Common) -> Result<()> {
     }
     say!("resolved configuration:\n\n{}", config.to_toml());
     first_damaged.map_or(Ok(()), Err)
+}
+
+/// The verb that reads a config, where that is another one than `train`, and what the config says in full. A key that only such a config
+/// has says which it is.
+fn of_another_verb(path: &Path, sets: &[String]) -> Result<Option<(&'static str, String)>> {
+    let table = settings::resolve(path, sets)?;
+    let has = |keys: &[&str]| keys.iter().any(|key| table.contains_key(*key));
+    Ok(Some(if has(&["cases", "shares", "structures"]) {
+        ("challenge seal", in_full(&ChallengeConfig::read(path, sets)?))
+    } else if has(&["site", "variants", "second_room", "second_scene"]) {
+        ("reproduce", in_full(&ReproduceConfig::read(path, sets)?))
+    } else if has(&["subjects", "actions", "repetitions", "unseen", "again"]) {
+        ("site", SiteConfig::read(path, sets)?.to_toml())
+    } else {
+        return Ok(None);
+    }))
+}
+
+fn in_full(config: &impl serde::Serialize) -> String {
+    toml::to_string_pretty(config).expect("settings are plain data")
 }
 
 /// Heatmaps of what was measured, for `--out`.
@@ -168,7 +206,11 @@ fn report(recording: &Recording, common: &Common) -> Result<()> {
     for note in &recording.notes {
         remark!("note: {note}");
     }
-    plausible::recording(recording, common)
+    let (facts, sources) = of_recording(recording)?;
+    // Where it does not hold, a note says so.
+    let of_body = radar::checks(&recording.radar, None, facts.fastest_radial_mps());
+    of_body.iter().filter(|check| check.rule == FASTEST && check.passed == Some(true)).for_each(show_rule);
+    plausible::report(facts, &sources, common)
 }
 
 /// What is stated of a recording.
@@ -193,7 +235,9 @@ pub(super) fn describe(recording: &Recording) {
 fn show_radar(radar: &Radar, room: Option<&Room>) {
     let [frames, tx, rx, loops, samples] = radar.dims();
     say!("  frames x tx x rx x loops x samples   {frames} x {tx} x {rx} x {loops} x {samples}");
-    say!("  carrier            {:.3} GHz, wavelength {:.3} mm", radar.carrier_hz() / 1e9, radar.wavelength_m() * 1e3);
+    let middle_ghz = (radar.carrier_hz() + 0.5 * radar.bandwidth_hz()) / 1e9;
+    say!("  carrier            {:.3} GHz at the first sample", radar.carrier_hz() / 1e9);
+    say!("  wavelength         {:.3} mm at the middle of the band, {middle_ghz:.3} GHz", radar.wavelength_m() * 1e3);
     let falling = if radar.slope_hz_per_s < 0.0 { ", falling" } else { "" };
     say!("  bandwidth          {:.3} GHz{falling}", radar.bandwidth_hz().abs() / 1e9);
     say!("  range              {:.3} m resolution, up to {:.2} m", radar.range_resolution_m(), radar.max_range_m());
@@ -215,11 +259,54 @@ fn show_radar(radar: &Radar, room: Option<&Room>) {
         ),
         None => say!("  room               none: only what needs no walls will work"),
     }
-    for check in radar::checks(radar, room.and_then(Room::farthest_wall_m), None) {
-        match check.passed {
-            Some(true) => say!("  ok       {} ({})", check.rule, check.found),
-            Some(false) => remark!("warning: {} does not hold ({}): {}", check.rule, check.found, check.reason),
-            None => {}
+    radar::checks(radar, room.and_then(Room::farthest_wall_m), None).iter().for_each(show_rule);
+}
+
+fn show_rule(check: &radar::Check) {
+    match check.passed {
+        Some(true) => say!("  ok       {} ({})", check.rule, check.found),
+        Some(false) => remark!("warning: {} does not hold ({}): {}", check.rule, check.found, check.reason),
+        None => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_config_that_ships_is_known_by_the_verb_that_reads_it() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+            if path.extension().is_none_or(|end| end != "toml") {
+                continue;
+            }
+            let verb = of_another_verb(&path, &[]).unwrap_or_else(|error| panic!("{name}: {error}")).map(|(verb, _)| verb);
+            let wanted = match name.split('_').next().unwrap() {
+                "site" => Some("site"),
+                "reproduce" => Some("reproduce"),
+                "challenge" => Some("challenge seal"),
+                _ => None,
+            };
+            assert_eq!(verb, wanted, "{name}");
         }
+    }
+
+    #[test]
+    fn a_folder_that_is_neither_recording_nor_checkpoint_is_called_that() {
+        let folder = tempfile::tempdir().unwrap();
+        let arguments = <Only as clap::Parser>::parse_from(["check".as_ref(), folder.path().as_os_str()]);
+        let error = run(&arguments.check, &arguments.common).unwrap_err().to_string();
+        assert!(error.contains("neither recording.toml nor checkpoint.toml"), "{error}");
+    }
+
+    #[derive(clap::Parser)]
+    struct Only {
+        #[command(flatten)]
+        check: Arguments,
+        #[command(flatten)]
+        common: Common,
     }
 }

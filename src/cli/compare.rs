@@ -23,6 +23,7 @@ use crate::{
 };
 
 #[derive(Args)]
+#[command(mut_arg("out", |out| out.help("Folder for metrics.json and config.toml [default: nothing is written]")))]
 pub(crate) struct Arguments {
     /// A measured recording, or a folder of them
     measured: PathBuf,

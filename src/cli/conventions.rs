@@ -15,12 +15,44 @@ pub(super) fn show(radar: &Radar, findings: &[Finding], against: Against) {
     for [a, b, c, d] in std::iter::once(&heads).chain(&rows) {
         say!("  {a:name$}  {b:kept$}  {c:stated$}  {d}");
     }
+    say!("  {}", verdict(findings.iter().filter(|finding| !finding.ok).count(), rows_undecided(findings) + undecided.len()));
     for finding in findings.iter().filter(|finding| !finding.ok) {
         let what = if finding.kind == Kind::Convention { "wrong" } else { "damaged" };
         remark!("{what}: {}", finding.found);
     }
 }
 
+fn rows_undecided(findings: &[Finding]) -> usize {
+    findings.iter().filter(|finding| finding.ok && !finding.decided).count()
+}
+
+/// All of the table in a line.
+fn verdict(wrong: usize, undecided: usize) -> String {
+    let rows = |count: usize| if count == 1 { "1 row".to_string() } else { format!("{count} rows") };
+    let found = match wrong {
+        0 => "nothing contradicts what is stated".to_string(),
+        1 => "1 row contradicts what is stated".to_string(),
+        _ => format!("{wrong} rows contradict what is stated"),
+    };
+    match undecided {
+        0 => found,
+        1 => format!("{found}; {} is undecided, for the reason that it names", rows(1)),
+        _ => format!("{found}; {} are undecided, each for the reason that it names", rows(undecided)),
+    }
+}
+
 fn row(finding: &Finding, against: Against) -> [String; 4] {
     [finding.name(), finding.kept(against).into(), finding.expected.into(), finding.found.clone()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_ends_in_what_it_says() {
+        assert_eq!(verdict(0, 0), "nothing contradicts what is stated");
+        assert_eq!(verdict(0, 4), "nothing contradicts what is stated; 4 rows are undecided, each for the reason that it names");
+        assert_eq!(verdict(2, 1), "2 rows contradict what is stated; 1 row is undecided, for the reason that it names");
+    }
 }

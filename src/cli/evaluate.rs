@@ -23,6 +23,7 @@ use crate::{
 };
 
 #[derive(Args)]
+#[command(mut_arg("out", |out| out.help("Folder for metrics.json and report.html [default: nothing is written]")))]
 pub(crate) struct Arguments {
     /// Recording folders to compare with
     #[arg(required = true, value_name = "RECORDING")]

@@ -20,7 +20,7 @@ use crate::{
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// The capture: .bin files of one DCA1000 capture in their order, the folder of a cascade, of roverd or of the Infineon SDK, or
+    /// The capture: .bin files of one DCA1000 capture, in whatever order, the folder of a cascade, of roverd or of the Infineon SDK, or
     /// arrays (.npy, .npz, .mat, .h5, .bin; several or a folder: a frame each)
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,

@@ -14,6 +14,7 @@ use crate::{
 };
 
 #[derive(Args)]
+#[command(mut_arg("out", |out| out.help("Folder for the results [default: runs/inferred]")))]
 #[command(group = clap::ArgGroup::new("what").required(true).args(["motion", "action", "recording"]))]
 pub(crate) struct Arguments {
     /// A checkpoint folder, such as runs/x/best or models/quickstart
@@ -22,8 +23,7 @@ pub(crate) struct Arguments {
     /// A motion: BVH, or npz in AMASS layout
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
-    /// One of the embedded actions, such as walk_back_forth
-    #[arg(long, value_name = "NAME", value_parser = parse_action)]
+    #[arg(long, value_name = "NAME", value_parser = parse_action, help = actions())]
     action: Option<Action>,
     /// A recording whose motion is simulated again and shown beside what was measured
     #[arg(long, value_name = "DIR")]
@@ -73,6 +73,11 @@ impl From<Only> for Part {
             Only::Noise => Self::Noise,
         }
     }
+}
+
+fn actions() -> String {
+    let names: Vec<&str> = Action::every().map(Action::name).collect();
+    format!("One of the embedded actions: {}", names.join(", "))
 }
 
 fn parse_action(name: &str) -> std::result::Result<Action, String> {

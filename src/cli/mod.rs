@@ -84,7 +84,8 @@ struct Cli {
 
 #[derive(Args, Clone)]
 pub(crate) struct Common {
-    /// Change one setting, such as training.epochs=10; may be repeated
+    /// Change one setting of what the verb reads, such as training.epochs=10 (train), record.frames=24 (record), radar.frames=100 (import),
+    /// diagnosis.alarm=0.05 (diagnose), maps.farthest_m=6 (export); may be repeated
     #[arg(long, global = true, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// flex, auto (a real GPU if there is one, else flex), or of a build that has it: wgpu, wgpu-cpu, cuda:0, ndarray
@@ -217,26 +218,27 @@ pub fn main() -> ExitCode {
         }
     };
     interrupt::watch();
-    let result = refuse_idle_settings(&cli).and_then(|()| match &cli.command {
-        Command::Check(arguments) => check::run(arguments, &cli.common),
-        Command::Import(arguments) => import::run(arguments, &cli.common),
-        Command::Export(arguments) => export::run(arguments, &cli.common),
-        Command::Record(arguments) => record::run(arguments, &cli.common),
-        Command::Recognize(arguments) => recognize::run(arguments, &cli.common),
-        Command::Site(arguments) => site::run(arguments, &cli.common),
-        Command::Train(arguments) => train::run(arguments, &cli.common),
-        Command::Infer(arguments) => infer::run(arguments, &cli.common),
-        Command::Baseline(arguments) => baseline::run(arguments, &cli.common),
-        Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
-        Command::Compare(arguments) => compare::run(arguments, &cli.common),
-        Command::Align(arguments) => align::run(arguments, &cli.common),
-        Command::Diagnose(arguments) => diagnose::run(arguments, &cli.common),
-        Command::Challenge(arguments) => challenge::run(arguments, &cli.common),
-        Command::Reproduce(arguments) => reproduce::run(arguments, &cli.common),
-        Command::Effects(arguments) => catalogue::run(arguments, &cli.common),
-        Command::Completions(arguments) => shell::completions(arguments),
-        Command::Man(arguments) => shell::man(arguments),
-    });
+    let result =
+        refuse_idle_settings(&cli).and_then(|()| refuse_unknown_device(&cli.common.device)).and_then(|()| match &cli.command {
+            Command::Check(arguments) => check::run(arguments, &cli.common),
+            Command::Import(arguments) => import::run(arguments, &cli.common),
+            Command::Export(arguments) => export::run(arguments, &cli.common),
+            Command::Record(arguments) => record::run(arguments, &cli.common),
+            Command::Recognize(arguments) => recognize::run(arguments, &cli.common),
+            Command::Site(arguments) => site::run(arguments, &cli.common),
+            Command::Train(arguments) => train::run(arguments, &cli.common),
+            Command::Infer(arguments) => infer::run(arguments, &cli.common),
+            Command::Baseline(arguments) => baseline::run(arguments, &cli.common),
+            Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
+            Command::Compare(arguments) => compare::run(arguments, &cli.common),
+            Command::Align(arguments) => align::run(arguments, &cli.common),
+            Command::Diagnose(arguments) => diagnose::run(arguments, &cli.common),
+            Command::Challenge(arguments) => challenge::run(arguments, &cli.common),
+            Command::Reproduce(arguments) => reproduce::run(arguments, &cli.common),
+            Command::Effects(arguments) => catalogue::run(arguments, &cli.common),
+            Command::Completions(arguments) => shell::completions(arguments),
+            Command::Man(arguments) => shell::man(arguments),
+        });
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -280,6 +282,11 @@ fn refuse_idle_settings(cli: &Cli) -> Result<()> {
         _ => return Ok(()),
     };
     Err(Error::Usage { message: message.into(), hint: Some(hint.into()) })
+}
+
+/// Of verbs that compute on none, too. What is always there is not looked for.
+fn refuse_unknown_device(names: &str) -> Result<()> {
+    if names == "auto" { Ok(()) } else { devices(names).map(drop) }
 }
 
 /// 1: the work failed; 2: what was asked for cannot be done as asked.

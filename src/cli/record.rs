@@ -12,6 +12,7 @@ use crate::{
 };
 
 #[derive(Args)]
+#[command(mut_arg("out", |out| out.help("The recording folder [default: in runs/recordings, named by the hash of its settings]")))]
 pub(crate) struct Arguments {
     /// A config with a [record] section
     config: PathBuf,

@@ -17,6 +17,7 @@ use crate::{
 };
 
 #[derive(Args)]
+#[command(mut_arg("out", |out| out.help("Folder for the results [default: runs/ and the name of the config]")))]
 pub(crate) struct Arguments {
     /// What to reproduce, such as configs/reproduce_smoke.toml
     config: PathBuf,

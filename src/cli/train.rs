@@ -12,6 +12,7 @@ use crate::{
 };
 
 #[derive(Args)]
+#[command(mut_arg("out", |out| out.help("The run folder [default: runs/ and the name of the config, then runs/NAME-2]")))]
 pub(crate) struct Arguments {
     /// The experiment, such as configs/quickstart.toml; with --resume it may be left out
     #[arg(required_unless_present = "resume")]

@@ -104,15 +104,17 @@ pub fn scores(measured_db: &Map, simulated_db: &Map, window: &DbWindow, mask: Op
     })
 }
 
-/// Peak signal-to-noise ratio of two images with values in 0 … 1, dB; at most 100 dB, which equal images get.
+/// Largest PSNR that is said, dB: that of equal images, so that means over frames stay numbers.
+pub const MOST_PSNR_DB: f64 = 100.0;
+
+/// Peak signal-to-noise ratio of two images with values in 0 … 1, dB; at most [`MOST_PSNR_DB`].
 pub fn psnr(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len(), "psnr: {} and {} pixels", a.len(), b.len());
     psnr_of(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / a.len() as f64)
 }
 
 fn psnr_of(mean_squared: f64) -> f64 {
-    // finite for equal images, so that means over frames stay numbers
-    -10.0 * mean_squared.max(1e-10).log10()
+    (-10.0 * mean_squared.log10()).min(MOST_PSNR_DB)
 }
 
 #[cfg(test)]

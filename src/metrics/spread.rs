@@ -69,9 +69,12 @@ impl Spread {
 
 impl fmt::Display for Spread {
     /// The mean and its 95 % interval, or the deviation of the numbers where there is none: `22.31 ± 1.02`, with as many
-    /// places as asked for: `{:.3}`. What follows the ± must be said beside it.
+    /// places as asked for: `{:.3}`. What follows the ± must be said beside it. Of one number, that number alone.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let places = f.precision().unwrap_or(2);
+        if self.count == 1 {
+            return write!(f, "{:.places$}", self.mean);
+        }
         write!(f, "{:.places$} ± {:.places$}", self.mean, self.interval.unwrap_or(self.deviation))
     }
 }
@@ -102,6 +105,7 @@ mod tests {
     fn what_follows_the_mean_is_the_interval_where_there_is_one() {
         assert_eq!(format!("{:.1}", Spread::of([1.0, 3.0]).unwrap()), "2.0 ± 12.7");
         assert_eq!(format!("{:.1}", Spread::of_correlated([1.0, 3.0]).unwrap()), "2.0 ± 1.4");
+        assert_eq!(format!("{:.1}", Spread::of_correlated([1.0]).unwrap()), "1.0");
     }
 
     #[test]

@@ -107,6 +107,12 @@ impl Facts {
         facts.course = Some(Course::new(person, &times_s, poses, radar.map_or([0.0; 3], Radar::centre_m), pose));
         facts
     }
+
+    /// Of the fastest part of the body along the line of sight, where somebody is there.
+    pub fn fastest_radial_mps(&self) -> Option<f64> {
+        let looks = self.course.iter().flat_map(|course| &course.looks);
+        looks.filter_map(|look| Some(look.speed_mps?[1])).reduce(f64::max)
+    }
 }
 
 /// Median step of more than two times.

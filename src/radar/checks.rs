@@ -23,6 +23,9 @@ const MOST_TRANSFORMED: usize = 1 << 14;
 /// A day at a hundred frames a second, and some.
 const MOST_FRAMES: usize = 10_000_000;
 
+/// The rule of the fastest thing.
+pub const FASTEST: &str = "fastest velocity <= max velocity";
+
 /// The rules that are advice: a recording that breaks one can still be read.
 pub fn checks(radar: &Radar, farthest_m: Option<f64>, fastest_mps: Option<f64>) -> Vec<Check> {
     let window_s = radar.samples_per_chirp as f64 / radar.sample_rate_hz;
@@ -51,14 +54,14 @@ pub fn checks(radar: &Radar, farthest_m: Option<f64>, fastest_mps: Option<f64>) 
             passed: farthest_m.map(|range| range <= radar.max_range_m()),
         },
         Check {
-            rule: "fastest velocity <= max velocity",
+            rule: FASTEST,
             reason: "a faster echo folds back to a wrong velocity",
             found: format!(
                 "{} against {:.2} m/s",
                 fastest_mps.map_or("unknown".into(), |speed| format!("{speed:.2} m/s")),
-                radar.max_velocity_mps()
+                radar.max_tracked_velocity_mps()
             ),
-            passed: fastest_mps.map(|speed| speed <= radar.max_velocity_mps()),
+            passed: fastest_mps.map(|speed| speed <= radar.max_tracked_velocity_mps()),
         },
     ]
 }

@@ -6,7 +6,7 @@
 mod checks;
 mod presets;
 
-pub use checks::{Check, checks};
+pub use checks::{Check, FASTEST, checks};
 
 use serde::{Deserialize, Serialize};
 

@@ -7,15 +7,24 @@ use serde_json::json;
 use crate::{
     evaluation::{Evaluation, ScoreSummary, SequenceSummary, over_sequences},
     lpips::Network,
+    metrics::MOST_PSNR_DB,
     pictures::page::{Markup, html, table as page_table},
 };
 
 /// One recording's scores.
 pub fn of_frames(found: &Evaluation) -> String {
     let Evaluation { frames, span_db, .. } = found;
-    let title =
-        format!("{frames} frames, decibels from {span_db:.0} dB below the strongest cell, mean ± standard deviation over frames");
+    let title = format!("{}, decibels from {span_db:.0} dB below the strongest cell{}", counted(*frames), spread_of(*frames));
     table(&title, [&found.global, &found.moving, &found.person], found.lpips)
+}
+
+fn counted(frames: usize) -> String {
+    if frames == 1 { "one frame".into() } else { format!("{frames} frames") }
+}
+
+/// What follows a ± is, where there is one.
+fn spread_of(frames: usize) -> &'static str {
+    if frames == 1 { "" } else { ", mean ± standard deviation over frames" }
 }
 
 /// The scores of several recordings.
@@ -57,8 +66,8 @@ pub fn page_of_frames(found: &Evaluation) -> Markup {
         .collect();
     html! {
         p {
-            (found.frames) " frames, decibels from " (format!("{:.0}", found.span_db))
-            " dB below the strongest cell, mean ± standard deviation over frames."
+            (counted(found.frames)) ", decibels from " (format!("{:.0}", found.span_db))
+            " dB below the strongest cell" (spread_of(found.frames)) "."
         }
         (page_table(&["", "PSNR, dB", "SSIM", "mean error, dB", "LPIPS"], &rows))
     }
@@ -76,13 +85,14 @@ fn table(title: &str, regions: [&Option<ScoreSummary>; 3], network: Option<Netwo
         };
         writeln!(text, "  {name:<15} {line}").expect("text grows");
     }
-    match network {
-        Some(network) => {
-            writeln!(text, "  LPIPS           as seen by {}; the person's is of the box around the cells", network.name())
-        }
-        None => writeln!(text, "  LPIPS           not available: it needs a network's weights (--lpips)"),
+    if regions.into_iter().flatten().any(|scores| scores.psnr_db.mean >= MOST_PSNR_DB) {
+        writeln!(text, "  PSNR            {MOST_PSNR_DB:.0} dB is the most that is said: there are no errors to speak of")
+            .expect("text grows");
     }
-    .expect("text grows");
+    if let Some(network) = network {
+        writeln!(text, "  LPIPS           as seen by {}; the person's is of the box around the cells", network.name())
+            .expect("text grows");
+    }
     text
 }
 

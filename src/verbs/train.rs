@@ -72,14 +72,14 @@ pub fn train(start: &Start<'_>, devices: &[Device], as_stated: bool, notify: &mu
     if resume.is_some() {
         is_the_same(&run_folder.join("config.toml"), &config_toml)?;
     }
-    atomic::write_text(run_folder.join("config.toml"), &config_toml)?;
-    notify(Notice::Run { folder: &run_folder, epochs: config.training.epochs });
-
+    // What is refused leaves no run behind.
     let started = std::time::Instant::now();
     let load = if as_stated { load_recordings_as_stated } else { load_recordings };
     let recordings = load(&config.data.recordings, &config.simulator)?;
-    recordings.iter().flat_map(notes::of).for_each(|note| notify(Notice::Note(&note)));
     let trainer = config.trainer(&recordings, &config_toml, &run_folder, devices)?;
+    atomic::write_text(run_folder.join("config.toml"), &config_toml)?;
+    notify(Notice::Run { folder: &run_folder, epochs: config.training.epochs });
+    recordings.iter().flat_map(notes::of).for_each(|note| notify(Notice::Note(&note)));
     let outcome = trainer.run(resume.as_deref(), &mut |event| notify(Notice::Training(&event)))?;
 
     let evaluations = reported(&run_folder, &config, recordings, &outcome.progress, (&devices[0], started))?;

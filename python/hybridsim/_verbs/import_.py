@@ -71,14 +71,20 @@ def import_(
     """Turns a capture of a radar board into a recording.
 
     Args:
-        sources: ``adc_data.bin`` files of one DCA1000 capture in their order, a folder of the Infineon SDK, or an array
-            (``.npy``, ``.npz``, ``.mat``, ``.h5``).
+        sources: ``.bin`` files of one DCA1000 capture, in whatever order, or their folder; a ``.setup.json``, which names its files; the
+            folder of a cascade, of roverd or of the Infineon SDK; or an array (``.npy``, ``.npz``, ``.mat``, ``.h5``, ``.hdf5``, or
+            ``.bin`` with ``layout``). Several arrays, or a folder of them, whose layout has no ``frame`` are a frame each, in the order of
+            the numbers in their names.
         out: folder of the recording, which must not exist yet, or be empty. It appears when it is complete.
-        config: what describes the radar: ``.mmwave.json``, ``.setup.json`` or ``.cfg`` of TI, or TOML with ``[radar]``.
+        config: what describes the radar: ``.mmwave.json``, ``.setup.json`` or ``.cfg`` of TI; TOML with ``[radar]`` or ColoRadar's
+            ``.txt`` for arrays.
         board: whose antenna positions are then known, such as ``"IWR6843ISK"``.
-        layout: the order of an array's axes, outer to inner, of frame, tx, rx, loop, chirp, sample, iq; such as
-            ``"frame loop rx sample"``.
-        variable: which array of a container (``.npz``, ``.mat``, HDF5), or ``"RE,IM"`` for two of real numbers.
+        layout: the order of an array's axes, outer to inner, of frame, tx, rx, loop, chirp, antenna, sample, lane, iq; such as
+            ``"frame chirp rx sample"``. ``chirp`` is loops and transmitters together in the order of firing, ``antenna`` transmitters and
+            receivers together, receivers inner, ``lane`` the two samples that go out side by side (I I Q Q is ``"sample iq lane"``). Of a
+            ``.bin`` that holds no 16-bit words it ends in the type of the numbers: float32, float64, complex64 or complex128.
+        variable: which array of a container (``.npz``, ``.mat``, HDF5), such as ``"data.adc"``, or ``"RE,IM"`` for two of real numbers;
+            without it, the only one with as many axes as ``layout`` names.
         preset: a public data set by its name, whose layout and radar are then known.
         profile: which chirp profile, where a frame has several; ``"all"``: a recording of each, ``out/profile0`` and so on, all or
             none.

@@ -28,7 +28,7 @@ pub(super) fn explain(failure: Failure, sources: &[Source], sets: &[String]) -> 
         if whole.last() != Some(&key) {
             whole.push(key);
         }
-        return Error::UnknownKey { path, key: whole.join("."), nearest };
+        return Error::UnknownKey { path, key: whole.join("."), nearest, known };
     }
     match nearest_origin(keys, sources, sets) {
         Origin::Set => Error::Parse { path: "--set".into(), message: failure.to_string() },
@@ -53,10 +53,14 @@ fn unknown_key(message: &str) -> Option<(String, Vec<String>)> {
     Some((key.into(), known))
 }
 
-/// The most similar of the known keys.
+/// Likeness (one less the share of letters that differ) below which no other key was meant.
+const LIKE: f64 = 0.5;
+
+/// The most similar of the known keys; none where none is like it.
 pub fn nearest<'a>(key: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let likeness = |known: &str| strsim::normalized_damerau_levenshtein(key, known).max(strsim::jaro_winkler(key, known) - 0.1);
-    known.into_iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
+    let best = known.into_iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)))?;
+    (strsim::normalized_damerau_levenshtein(key, best) >= LIKE).then_some(best)
 }
 
 /// The file that says something about a key, or about a table above it; `None` where `--set` does.

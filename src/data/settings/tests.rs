@@ -98,6 +98,8 @@ fn an_unknown_key_is_named_with_the_nearest_known_one() {
         folder.refused("d.toml", &["trainings.epochs=1"]),
         "--set: unknown key `trainings`, the nearest known one is `training`"
     );
+    // None is like it: all are listed.
+    assert_eq!(folder.refused("d.toml", &["xyz=1"]), "--set: unknown key `xyz`");
 }
 
 #[test]
